@@ -1,0 +1,158 @@
+"""One source, two speeds.
+
+A kernel is a plain Python function on floats, arrays and tuples of them. `TwoSpeeds(kernel)` runs
+it compiled; inside `with speed("plain"):` the very same source runs in the interpreter.
+
+The compiled version is *rebuilt* from the plain one with every kernel it calls replaced by that
+kernel's own compiled version, so the plain functions never reach compiled code and can serve as
+the oracle. The on-disk cache of numba looks at one function at a time: edited callees and
+constants in other files would go unnoticed. The rebuilt function therefore carries in its name a
+digest of everything it is made from.
+"""
+
+import contextlib
+import enum
+import functools
+import hashlib
+import types
+from collections.abc import Iterator
+from contextvars import ContextVar
+from typing import Any
+
+import numpy as np
+
+SPEEDS = ("compiled", "plain")
+
+# A plain function at module level: it has __code__ and __globals__, which Callable cannot say.
+Kernel = Any
+
+_speed: ContextVar[str] = ContextVar("speed", default="compiled")
+
+
+@contextlib.contextmanager
+def speed(name: str) -> Iterator[None]:
+    """Run every kernel at the named speed, "compiled" (the default) or "plain".
+
+    Raises:
+        ValueError: if the name is neither.
+    """
+    if name not in SPEEDS:
+        raise ValueError(f"speed: expected one of {', '.join(SPEEDS)}, got {name!r}")
+    token = _speed.set(name)
+    try:
+        yield
+    finally:
+        _speed.reset(token)
+
+
+class TwoSpeeds:
+    """A kernel that runs compiled or plain, as `speed` says; compiled at its first call."""
+
+    def __init__(self, plain: Kernel):
+        self.plain = plain
+        functools.update_wrapper(self, plain)
+
+    @functools.cached_property
+    def compiled(self) -> Kernel:
+        """The version compiled by numba, on the same arguments."""
+        return compile_kernel(self.plain)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the kernel at the speed in force."""
+        if _speed.get() == "plain":
+            return self.plain(*arguments)
+        return self.compiled(*arguments)
+
+
+def compile_kernel(kernel: Kernel) -> Kernel:
+    """Compile a kernel and all kernels it calls, from their plain sources; cached on disk.
+
+    Division by zero gives infinity or NaN, as in NumPy, and floating point is strict: no
+    reordering and no fused operations, so that both speeds round alike.
+    """
+    return _jit(kernel, cache=True)
+
+
+def bind(kernel: Kernel, **callees: Kernel) -> Kernel:
+    """Return a kernel that calls other kernels under the given names: one loop, many solvers.
+
+    Raises:
+        ValueError: if the kernel does not name one of them, or has a closure.
+    """
+    for name in callees:
+        if name not in kernel.__code__.co_names:
+            raise ValueError(f"callees: expected names that {kernel.__name__} calls, got {name!r}")
+    return _rebuild(kernel, kernel.__globals__ | callees)
+
+
+def digest(kernel: Kernel) -> str:
+    """Sixteen hex digits of the code, constants and globals of a kernel and all its callees."""
+    parts: list[bytes] = []
+    _collect(kernel, parts, seen=set())
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
+
+
+@functools.cache
+def _jit(kernel: Kernel, cache: bool) -> Kernel:
+    """Compile; a callee is part of its caller's cached code and needs no cache of its own."""
+    import numba
+
+    callees = {
+        name: _jit(value, cache=False)
+        for name, value in _named_globals(kernel)
+        if isinstance(value, types.FunctionType) and value is not kernel
+    }
+    rebuilt = _rebuild(kernel, kernel.__globals__ | callees)
+    rebuilt.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}"
+    return numba.njit(cache=cache, error_model="numpy", nogil=True)(rebuilt)
+
+
+def _rebuild(kernel: Kernel, new_globals: dict[str, Any]) -> Kernel:
+    if kernel.__closure__:
+        raise ValueError(f"kernel: {kernel.__qualname__} has a closure; pass what it needs instead")
+    rebuilt = types.FunctionType(kernel.__code__, new_globals, kernel.__name__, kernel.__defaults__)
+    rebuilt.__module__ = kernel.__module__
+    rebuilt.__qualname__ = kernel.__qualname__
+    rebuilt.__doc__ = kernel.__doc__
+    return rebuilt
+
+
+def _named_globals(kernel: Kernel) -> list[tuple[str, Any]]:
+    names = sorted({name for code in _codes(kernel.__code__) for name in code.co_names})
+    return [(name, kernel.__globals__[name]) for name in names if name in kernel.__globals__]
+
+
+def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
+    """Yield the code object and those nested in it, such as comprehensions."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _codes(constant)
+
+
+def _collect(kernel: Kernel, parts: list[bytes], seen: set[Any]) -> None:
+    if kernel in seen:
+        return
+    seen.add(kernel)
+    for code in _codes(kernel.__code__):
+        constants = [c for c in code.co_consts if not isinstance(c, types.CodeType)]
+        parts += [code.co_code, repr((constants, code.co_names, code.co_varnames)).encode()]
+    parts.append(repr(kernel.__defaults__).encode())
+    for name, value in _named_globals(kernel):
+        parts.append(name.encode())
+        if isinstance(value, types.FunctionType):
+            _collect(value, parts, seen)
+        else:
+            parts.append(_fingerprint(value))
+
+
+def _fingerprint(value: Any) -> bytes:
+    if isinstance(value, np.ndarray):
+        return repr((value.dtype.str, value.shape)).encode() + value.tobytes()
+    if isinstance(value, types.ModuleType):
+        return repr((value.__name__, getattr(value, "__version__", ""))).encode()
+    if isinstance(value, enum.EnumMeta):
+        return repr(list(value)).encode()
+    if isinstance(value, type):
+        return repr((value.__qualname__, getattr(value, "_fields", ()))).encode()
+    return repr(value).encode()

@@ -1,0 +1,232 @@
+"""Curves for an effector to draw, and evening out the spacing of their samples."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import arguments
+from .arguments import FloatArray
+from .compiled import TwoSpeeds
+
+# All named curves lie in the plane y = 0 [m]; the closed ones do not repeat their first point.
+
+
+def circle(count: int = 150) -> FloatArray:
+    """Return samples of a circle of radius 0.6, shape (frame, 3) [m].
+
+    Raises:
+        ValueError: if count is not a positive integer.
+    """
+    t = _turns(count)
+    return _in_plane(0.6 * np.cos(t), 0.6 * np.sin(t))
+
+
+def square(count: int = 150) -> FloatArray:
+    """Return samples of a square of side 0.4 about the origin, shape (frame, 3) [m].
+
+    Raises:
+        ValueError: if count is not a positive integer.
+    """
+    return _polygon([(0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)], count)
+
+
+def heart(count: int = 150) -> FloatArray:
+    """Return samples of the cardioid r = 0.5 (1 - sin t), shape (frame, 3) [m].
+
+    Raises:
+        ValueError: if count is not a positive integer.
+    """
+    t = _turns(count)
+    r = 0.5 * (1.0 - np.sin(t))
+    return _in_plane(r * np.cos(t), r * np.sin(t))
+
+
+def triangle(count: int = 150) -> FloatArray:
+    """Return samples of the triangle (0, 0, 0), (0.5, 0, 0), (0, 0, 0.5), shape (frame, 3) [m].
+
+    Raises:
+        ValueError: if count is not a positive integer.
+    """
+    return _polygon([(0.0, 0.0), (0.5, 0.0), (0.0, 0.5)], count)
+
+
+def star(count: int = 400) -> FloatArray:
+    """Return samples of the pentagram of radius 0.4, every second of five points in turn.
+
+    Raises:
+        ValueError: if count is not a positive integer.
+    """
+    t = 4.0 * np.pi * np.arange(5) / 5.0
+    return _polygon(0.4 * np.column_stack([np.cos(t), np.sin(t)]), count)
+
+
+def plumb_bob(count: int = 1200) -> FloatArray:
+    """Return samples of a drawing of a plumb bob, in strokes, very unevenly spaced.
+
+    Five strokes (line, eye, collar, body, plumb mark) follow one another, the pen jumping between
+    them. Within a stroke the pen slows to a crawl and speeds up again, s = u + sin(2 pi n u) / (2
+    pi n) for even u, as hand-drawn input does: crowded where it crawls, sparse where it runs.
+
+    Returns:
+        Shape (frame, 3) [m].
+
+    Raises:
+        ValueError: if count is not a positive integer.
+    """
+    count = arguments.integer("count", count, least=1)
+    parts = np.array_split(np.arange(count), len(_BOB_STROKES))
+    return np.concatenate(
+        [stroke(_hurried(len(part))) for stroke, part in zip(_BOB_STROKES, parts, strict=True)]
+    )
+
+
+curves: dict[str, Callable[..., FloatArray]] = {
+    "circle": circle,
+    "square": square,
+    "heart": heart,
+    "triangle": triangle,
+    "star": star,
+    "plumb_bob": plumb_bob,
+}
+
+
+def resample(
+    curve: ArrayLike, *, min_spacing: float, max_spacing: float, closed: bool = False
+) -> FloatArray:
+    """Return the curve with every gap between neighbours from min_spacing to max_spacing.
+
+    Points too close to the last one kept are dropped, and gaps too wide are divided evenly. Both
+    ends are kept. Only where no point of the curve is min_spacing away from both ends, and these
+    are closer than that to each other, does nothing but the two ends remain.
+
+    Args:
+        curve: points, shape (point, 3) [m].
+        min_spacing: the least distance of neighbours [m].
+        max_spacing: the greatest, at least twice min_spacing, so that halves are not too short.
+        closed: whether the last point is a neighbour of the first.
+
+    Raises:
+        ValueError: if there are no points, they are not finite, or the spacings are not positive or
+            too near to each other.
+    """
+    points = arguments.array("curve", curve, "point", 3)
+    min_spacing = arguments.number("min_spacing", min_spacing, above=0.0)
+    max_spacing = arguments.number("max_spacing", max_spacing, least=2.0 * min_spacing)
+    if len(points) == 0:
+        raise ValueError("curve: expected at least one point, got none")
+    if closed:
+        points = np.concatenate([points, points[:1]])
+    spaced = _divide_gaps(_drop_close(points, min_spacing), max_spacing)
+    return spaced[:-1] if closed and len(spaced) > 1 else spaced
+
+
+def _drop_close(points: FloatArray, min_spacing: float) -> FloatArray:
+    """Return points at least min_spacing from the one before, both ends among them."""
+    kept = np.empty(len(points), dtype=np.int64)
+    return points[kept[: _keep(points, min_spacing, kept)]]
+
+
+def keep_spaced(points, min_spacing, kept):
+    """Fill the indices of points to keep, in order; return how many.
+
+    From the end of the greedy choice points are given up again until the last point of the curve
+    fits. If none would remain, any point far enough from both ends is taken.
+    """
+    last = len(points) - 1
+    count = 1
+    kept[0] = 0
+    for i in range(1, last):
+        if spacing(points, kept[count - 1], i) >= min_spacing:
+            kept[count] = i
+            count += 1
+    while count > 1 and spacing(points, kept[count - 1], last) < min_spacing:
+        count -= 1
+    if count == 1 and spacing(points, 0, last) < min_spacing:
+        for i in range(last - 1, 0, -1):
+            apart = min(spacing(points, 0, i), spacing(points, i, last))
+            if apart >= min_spacing and count == 1:
+                kept[count] = i
+                count += 1
+    if last > 0:
+        kept[count] = last
+        count += 1
+    return count
+
+
+def spacing(points, i, j):
+    """Return the distance between points i and j."""
+    x = points[i, 0] - points[j, 0]
+    y = points[i, 1] - points[j, 1]
+    z = points[i, 2] - points[j, 2]
+    return np.sqrt(x * x + y * y + z * z)
+
+
+_keep = TwoSpeeds(keep_spaced)
+
+
+def _divide_gaps(points: FloatArray, max_spacing: float) -> FloatArray:
+    """Return the points with as many more between neighbours as the spacing asks, evenly."""
+    if len(points) == 1:
+        return points
+    gaps = np.linalg.norm(np.diff(points, axis=0), axis=-1)
+    pieces = np.maximum(np.ceil(gaps / max_spacing), 1).astype(np.int64)
+    starts = np.repeat(np.arange(len(gaps)), pieces)
+    first = np.cumsum(pieces) - pieces
+    fraction = (np.arange(pieces.sum()) - first[starts]) / pieces[starts]
+    between = points[starts] + fraction[:, None] * np.diff(points, axis=0)[starts]
+    return np.concatenate([between, points[-1:]])
+
+
+def _turns(count: int) -> FloatArray:
+    return 2.0 * np.pi * np.arange(arguments.integer("count", count, least=1)) / count
+
+
+def _in_plane(x: ArrayLike, z: ArrayLike) -> FloatArray:
+    return np.column_stack([x, np.zeros(np.shape(x)), z])
+
+
+def _polygon(corners: ArrayLike, count: int) -> FloatArray:
+    """Return samples, evenly spaced along the closed polygon of corners (corner, 2)."""
+    count = arguments.integer("count", count, least=1)
+    around = np.concatenate([corners, np.asarray(corners)[:1]])
+    return _stroke(around)(np.arange(count) / count)
+
+
+def _stroke(corners: ArrayLike) -> Callable[[FloatArray], FloatArray]:
+    """Return the polyline of corners (corner, 2) as a function of its length's fraction."""
+    x, z = np.asarray(corners, dtype=np.float64).T
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
+
+    def at(s: FloatArray) -> FloatArray:
+        length = s * along[-1]
+        return _in_plane(np.interp(length, along, x), np.interp(length, along, z))
+
+    return at
+
+
+def _hurried(count: int, halts: int = 3) -> FloatArray:
+    """Return fractions from 0 to 1 that stand still `halts` times and run in between."""
+    u = np.linspace(0.0, 1.0, count)
+    return u + np.sin(2.0 * np.pi * halts * u) / (2.0 * np.pi * halts)
+
+
+def _body(u: FloatArray) -> FloatArray:
+    """Return the outline of the body: a point below that widens to a round shoulder."""
+    t = 2.0 * np.pi * u
+    return _in_plane(0.28 * np.sin(t) * (0.5 - 0.5 * np.cos(t)) ** 0.5, -0.05 - 0.4 * np.cos(t))
+
+
+def _eye(u: FloatArray) -> FloatArray:
+    """Return the ring through which the line runs."""
+    t = 2.0 * np.pi * u
+    return _in_plane(0.06 * np.sin(t), 0.51 + 0.06 * np.cos(t))
+
+
+_BOB_STROKES = (
+    _stroke([(0.0, 0.9), (0.0, 0.57)]),
+    _eye,
+    _stroke([(-0.1, 0.45), (0.1, 0.45), (0.1, 0.35), (-0.1, 0.35), (-0.1, 0.45)]),
+    _body,
+    _stroke([(-0.25, -0.55), (0.25, -0.55)]),
+)

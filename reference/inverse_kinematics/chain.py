@@ -1,0 +1,177 @@
+"""The chain from the root to the effector: what every solver works on, and its geometry."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arguments import FloatArray
+from ..quaternion import (
+    add,
+    between,
+    conjugate,
+    cross,
+    exponential,
+    multiply,
+    norm,
+    normalised,
+    perpendicular,
+    put_quaternion,
+    put_vector,
+    quaternion_at,
+    rotate,
+    scale,
+    subtract,
+    vector_at,
+)
+
+# A chain and target are on one line if no joint is further off it than this, over the reach.
+LINE_TOLERANCE = 1e-9
+# Such a chain is bent by this angle [rad] in all, shared evenly by its joints.
+BEND = 2.0
+# Distances are computed to a few of these, over the reach plus the target's distance.
+ROUNDING = 8 * 2.220446049250313e-16
+
+
+class Chain(NamedTuple):
+    """n links and n + 1 joints, the last the effector; link k joins joints k and k + 1.
+
+    Attributes:
+        offsets: joint k's offset in the frame of joint k - 1 [m], (n + 1, 3).
+        lengths: link lengths [m], (n,).
+        positions: global joint positions [m], (n + 1, 3).
+        rotations: global joint rotations, (n + 1, 4).
+        turns: room for one rotation a joint, (n, 4).
+        reach: total length [m].
+        longest: the longest link [m].
+    """
+
+    offsets: FloatArray
+    lengths: FloatArray
+    positions: FloatArray
+    rotations: FloatArray
+    turns: FloatArray
+    reach: float
+    longest: float
+
+
+def new_chain(offsets, path):
+    """Return a chain with no pose yet along a path of joints."""
+    n = len(path) - 1
+    along = np.empty((n + 1, 3))
+    lengths = np.empty(n)
+    reach, longest = 0.0, 0.0
+    put_vector(along, 0, vector_at(offsets, path[0]))
+    for k in range(n):
+        link = vector_at(offsets, path[k + 1])
+        put_vector(along, k + 1, link)
+        lengths[k] = norm(link)
+        reach += lengths[k]
+        longest = max(longest, lengths[k])
+    positions, rotations, turns = np.empty((n + 1, 3)), np.empty((n + 1, 4)), np.empty((n, 4))
+    return Chain(along, lengths, positions, rotations, turns, reach, longest)
+
+
+def pose_chain(chain, path, local):
+    """Give the chain the pose of local rotations (joint, 4)."""
+    put_vector(chain.positions, 0, vector_at(chain.offsets, 0))
+    put_quaternion(chain.rotations, 0, quaternion_at(local, path[0]))
+    for k in range(1, len(path)):
+        R_parent = quaternion_at(chain.rotations, k - 1)
+        put_quaternion(chain.rotations, k, multiply(R_parent, quaternion_at(local, path[k])))
+    place_joints(chain)
+
+
+def place_joints(chain):
+    """Compute the positions from the rotations, the root fixed."""
+    for k in range(len(chain.lengths)):
+        link = rotate(quaternion_at(chain.rotations, k), vector_at(chain.offsets, k + 1))
+        put_vector(chain.positions, k + 1, add(vector_at(chain.positions, k), link))
+
+
+def turn_links(chain):
+    """Turn every joint so that its link points at the next joint's position.
+
+    The shortest arc from the link's direction to the new one multiplies the global rotation from
+    the left, so that the joint keeps its twist about the link.
+    """
+    for k in range(len(chain.lengths)):
+        R = quaternion_at(chain.rotations, k)
+        link = rotate(R, vector_at(chain.offsets, k + 1))
+        way = subtract(vector_at(chain.positions, k + 1), vector_at(chain.positions, k))
+        put_quaternion(chain.rotations, k, normalised(multiply(between(link, way), R)))
+
+
+def put_local(chain, path, local):
+    """Write the chain's local rotations over those of (joint, 4); the effector keeps its own."""
+    put_quaternion(local, path[0], quaternion_at(chain.rotations, 0))
+    for k in range(1, len(chain.lengths)):
+        R_parent = quaternion_at(chain.rotations, k - 1)
+        q = multiply(conjugate(R_parent), quaternion_at(chain.rotations, k))
+        put_quaternion(local, path[k], normalised(q))
+
+
+def tip_error(chain, target):
+    """Return the distance from the effector to the target [m]."""
+    return norm(subtract(vector_at(chain.positions, len(chain.lengths)), target))
+
+
+def root_distance(chain, target):
+    """Return the distance from the root to the target [m]."""
+    return norm(subtract(target, vector_at(chain.positions, 0)))
+
+
+def least_distance(chain, d):
+    """Return how close the effector can come to a target at distance d from the root [m].
+
+    It reaches all of the shell between the full reach and the hole that the longest link leaves
+    when all others fold back: max(0, d - reach, 2 longest - reach - d).
+    """
+    return max(0.0, d - chain.reach, 2.0 * chain.longest - chain.reach - d)
+
+
+def rounding(chain, d):
+    """Return how exactly a distance to a target at distance d is known [m]."""
+    return ROUNDING * (chain.reach + d)
+
+
+def out_of_reach(chain, d):
+    """Return whether a target at distance d lies at full reach, to rounding, or beyond."""
+    return d >= chain.reach - rounding(chain, d)
+
+
+def in_hole(chain, d):
+    """Return whether a target at distance d lies on the rim of the hole, to rounding, or inside."""
+    return d <= 2.0 * chain.longest - chain.reach + rounding(chain, d)
+
+
+def on_one_line(chain, target):
+    """Return whether all joints and the target lie on a line through the root.
+
+    On it every solver that turns links towards the target in their common plane has no plane to
+    turn them in, and stays there.
+    """
+    root = vector_at(chain.positions, 0)
+    way = subtract(target, root)
+    for k in range(1, len(chain.positions)):
+        arm = subtract(vector_at(chain.positions, k), root)
+        if norm(way) <= LINE_TOLERANCE * chain.reach:
+            way = arm
+        elif norm(cross(way, arm)) > LINE_TOLERANCE * chain.reach * norm(way):
+            return False
+    return True
+
+
+def bend(chain):
+    """Bend all joints alike, the root too, about one fixed axis across the chain."""
+    n = len(chain.lengths)
+    direction = (0.0, 0.0, 0.0)
+    for k in range(n):
+        if norm(direction) == 0.0:
+            direction = rotate(quaternion_at(chain.rotations, k), vector_at(chain.offsets, k + 1))
+    axis = perpendicular(direction)
+    for k in range(n):
+        turn = exponential(scale(BEND * (k + 1) / n, axis))
+        put_quaternion(
+            chain.rotations, k, normalised(multiply(turn, quaternion_at(chain.rotations, k)))
+        )
+    place_joints(chain)

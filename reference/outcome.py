@@ -1,0 +1,28 @@
+"""How an iterative solve ended: an answer, never an exception."""
+
+from enum import IntEnum
+
+
+class Outcome(IntEnum):
+    """How a solve ended; `sentence` says it in words."""
+
+    CONVERGED = 0
+    UNREACHABLE = 1
+    STALLED = 2
+    ITERATION_LIMIT = 3
+    DIVERGED = 4
+
+    @property
+    def sentence(self) -> str:
+        """The outcome in one sentence."""
+        return _SENTENCES[self]
+
+
+_SENTENCES = {
+    Outcome.CONVERGED: "The residual is within the tolerance, or as small as rounding lets it be.",
+    Outcome.UNREACHABLE: "No pose reaches the target: geometry forbids it.",
+    Outcome.STALLED: "The iterations stopped making progress before the tolerance was met.",
+    Outcome.ITERATION_LIMIT: "All iterations were used before the tolerance was met.",
+    Outcome.DIVERGED: "The iterations left the finite numbers; what is returned is the last finite "
+    "iterate.",
+}

@@ -1,0 +1,163 @@
+"""Unit quaternions and vectors as tuples of components: the algebra inside the kernels.
+
+Hamilton product, (w, x, y, z), active: `rotate(q, v)` turns v by q, and `multiply(a, b)` turns by
+b first, then by a. The components may be floats or arrays of one shape, but for `between`,
+`exponential` and `logarithm`, which decide by value and take floats. See `rotation.py` for arrays
+of quaternions.
+"""
+
+import math
+
+IDENTITY = (1.0, 0.0, 0.0, 0.0)
+
+# Below this the sine of half the angle is its argument to the last bit: x - x^3/6 rounds to x.
+SMALL_ANGLE = 1e-8
+
+
+def quaternion_at(q, j):
+    """Return row j of an array (joint, 4) as a tuple."""
+    return q[j, 0], q[j, 1], q[j, 2], q[j, 3]
+
+
+def vector_at(p, j):
+    """Return row j of an array (joint, 3) as a tuple."""
+    return p[j, 0], p[j, 1], p[j, 2]
+
+
+def put_quaternion(q, j, value):
+    """Write a tuple into row j of an array (joint, 4)."""
+    q[j, 0], q[j, 1], q[j, 2], q[j, 3] = value
+
+
+def put_vector(p, j, value):
+    """Write a tuple into row j of an array (joint, 3)."""
+    p[j, 0], p[j, 1], p[j, 2] = value
+
+
+def add(a, b):
+    """Return the sum of two vectors."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def subtract(a, b):
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def scale(s, a):
+    """Return the vector s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+def dot(a, b):
+    """Return the scalar product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a, b):
+    """Return the vector product of two vectors."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def norm(a):
+    """Return the length of a vector of floats."""
+    return math.sqrt(dot(a, a))
+
+
+def multiply(a, b):
+    """Return the Hamilton product a b."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+
+
+def conjugate(q):
+    """Return the inverse of a unit quaternion."""
+    return q[0], -q[1], -q[2], -q[3]
+
+
+def rotate(q, v):
+    """Return q v q*: with u the vector part, v + w t + u x t where t = 2 u x v."""
+    w, x, y, z = q
+    vx, vy, vz = v
+    tx = 2.0 * (y * vz - z * vy)
+    ty = 2.0 * (z * vx - x * vz)
+    tz = 2.0 * (x * vy - y * vx)
+    return (
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )
+
+
+def magnitude(q):
+    """Return the length of a quaternion of floats."""
+    return math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+
+
+def normalised(q):
+    """Return q over its length, which must not be zero."""
+    length = magnitude(q)
+    return q[0] / length, q[1] / length, q[2] / length, q[3] / length
+
+
+def perpendicular(a):
+    """Return a fixed unit vector perpendicular to a: along a x e, e the axis a is least along."""
+    x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
+    if x <= y and x <= z:
+        across = cross(a, (1.0, 0.0, 0.0))
+    elif y <= z:
+        across = cross(a, (0.0, 1.0, 0.0))
+    else:
+        across = cross(a, (0.0, 0.0, 1.0))
+    length = norm(across)
+    if length == 0.0:
+        return 1.0, 0.0, 0.0
+    return scale(1.0 / length, across)
+
+
+def between(a, b):
+    """Return the shortest-arc rotation that turns the direction of a into that of b.
+
+    With unit vectors, w = |a + b| / 2 and the vector part is (a x b) / |a + b|: no trigonometry,
+    and accurate for small angles. Antiparallel vectors turn by pi about `perpendicular(a)`; a zero
+    vector has no direction and gives the identity.
+    """
+    length_a, length_b = norm(a), norm(b)
+    if length_a == 0.0 or length_b == 0.0:
+        return 1.0, 0.0, 0.0, 0.0
+    a = scale(1.0 / length_a, a)
+    b = scale(1.0 / length_b, b)
+    s = norm(add(a, b))
+    if s < SMALL_ANGLE:
+        x, y, z = perpendicular(a)
+        return 0.0, x, y, z
+    x, y, z = scale(1.0 / s, cross(a, b))
+    return normalised((0.5 * s, x, y, z))
+
+
+def exponential(v):
+    """Return the rotation by |v| radians about v."""
+    angle = norm(v)
+    half = 0.5 * angle
+    s = 0.5 if angle < SMALL_ANGLE else math.sin(half) / angle
+    return math.cos(half), s * v[0], s * v[1], s * v[2]
+
+
+def logarithm(q):
+    """Return the rotation vector of the shorter way round, at most pi long."""
+    w, x, y, z = q
+    if w < 0.0:
+        w, x, y, z = -w, -x, -y, -z
+    sine = math.sqrt(x * x + y * y + z * z)
+    s = 2.0 if sine < SMALL_ANGLE else 2.0 * math.atan2(sine, w) / sine
+    return s * x, s * y, s * z

@@ -1,0 +1,202 @@
+"""Arrays of unit quaternions, (..., 4), w first; leading axes broadcast.
+
+Hamilton product, active rotations: `rotate(q, v)` turns v by q, `multiply(a, b)` turns by b first.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import arguments, quaternion
+from .arguments import FloatArray
+from .compiled import TwoSpeeds
+from .quaternion import between as between_two
+from .quaternion import exponential as exponential_of
+from .quaternion import logarithm as logarithm_of
+from .quaternion import put_quaternion, put_vector, quaternion_at, vector_at
+
+UNIT_TOLERANCE = 1e-6
+
+
+def identity(*shape: int) -> FloatArray:
+    """Return identity quaternions, (*shape, 4)."""
+    result = np.zeros((*shape, 4))
+    result[..., 0] = 1.0
+    return result
+
+
+def random(rng: np.random.Generator, *shape: int) -> FloatArray:
+    """Return uniformly random rotations, (*shape, 4): normalised Gaussian 4-vectors."""
+    q = rng.standard_normal((*shape, 4))
+    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+
+
+def unit(name: str, q: ArrayLike) -> FloatArray:
+    """Return quaternions, (..., 4), normalised once; `name` is the argument's, for the error.
+
+    Raises:
+        ValueError: if a quaternion is further than 1e-6 from unit length.
+    """
+    values = arguments.array(name, q, "...", 4)
+    lengths = np.linalg.norm(values, axis=-1, keepdims=True)
+    check_unit(name, lengths[..., 0])
+    return values / lengths
+
+
+def check_unit(name: str, lengths: FloatArray) -> None:
+    """Raise a ValueError that names the first length further than 1e-6 from one."""
+    off = np.abs(lengths - 1.0) > UNIT_TOLERANCE
+    if off.any():
+        where = tuple(int(i) for i in np.argwhere(off)[0])
+        raise ValueError(
+            f"{name}: expected unit quaternions (w, x, y, z), "
+            f"got one of length {lengths[where]:.9g} at index {where}"
+        )
+
+
+def multiply(a: ArrayLike, b: ArrayLike) -> FloatArray:
+    """Return the products a b, (..., 4).
+
+    Raises:
+        ValueError: if an argument does not hold finite quaternions.
+    """
+    return _joined(quaternion.multiply(_parts("a", a, 4), _parts("b", b, 4)))
+
+
+def conjugate(q: ArrayLike) -> FloatArray:
+    """Return the inverse rotations, (..., 4).
+
+    Raises:
+        ValueError: if q does not hold finite quaternions.
+    """
+    return _joined(quaternion.conjugate(_parts("q", q, 4)))
+
+
+def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
+    """Return the vectors v, (..., 3), turned by unit quaternions q, (..., 4).
+
+    Raises:
+        ValueError: if an argument does not hold finite quaternions or vectors.
+    """
+    return _joined(quaternion.rotate(_parts("q", q, 4), _parts("v", v, 3)))
+
+
+def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
+    """Return the shortest-arc rotations from directions a to b, (..., 3) each, as (..., 4).
+
+    Antiparallel directions turn by pi about a fixed axis perpendicular to a; a zero vector has no
+    direction and gives the identity.
+
+    Raises:
+        ValueError: if an argument does not hold finite vectors.
+    """
+    a, b = np.broadcast_arrays(arguments.array("a", a, "...", 3), arguments.array("b", b, "...", 3))
+    result = np.empty((*a.shape[:-1], 4))
+    _between(_rows(a), _rows(b), result.reshape(-1, 4))
+    return result
+
+
+def exponential(v: ArrayLike) -> FloatArray:
+    """Return the rotations by |v| radians about v, (..., 3), as (..., 4).
+
+    Raises:
+        ValueError: if v does not hold finite vectors.
+    """
+    v = arguments.array("v", v, "...", 3)
+    result = np.empty((*v.shape[:-1], 4))
+    _exponential(_rows(v), result.reshape(-1, 4))
+    return result
+
+
+def logarithm(q: ArrayLike) -> FloatArray:
+    """Return the rotation vectors [rad], (..., 3), at most pi long, of rotations (..., 4).
+
+    Raises:
+        ValueError: if q does not hold unit quaternions.
+    """
+    q = unit("q", q)
+    result = np.empty((*q.shape[:-1], 3))
+    _logarithm(_rows(q), result.reshape(-1, 3))
+    return result
+
+
+def angle(a: ArrayLike, b: ArrayLike) -> FloatArray:
+    """Return the geodesic angles [rad] between rotations a and b, (..., 4) each: 0 to pi.
+
+    Raises:
+        ValueError: if an argument does not hold unit quaternions.
+    """
+    return np.linalg.norm(logarithm(multiply(conjugate(unit("a", a)), unit("b", b))), axis=-1)
+
+
+def to_matrix(q: ArrayLike) -> FloatArray:
+    """Return the rotation matrices, (..., 3, 3), of unit quaternions (..., 4).
+
+    Raises:
+        ValueError: if q does not hold finite quaternions.
+    """
+    q = arguments.array("q", q, "...", 4)
+    return np.swapaxes(rotate(q[..., None, :], np.eye(3)), -1, -2)
+
+
+def from_matrix(matrix: ArrayLike) -> FloatArray:
+    """Return the unit quaternions, (..., 4), of rotation matrices (..., 3, 3), w >= 0.
+
+    The quaternion spans the top eigenspace of a symmetric 4 x 4 matrix linear in R
+    (Bar-Itzhack 2000), which has no case of its own for any angle.
+
+    Raises:
+        ValueError: if a matrix is not a rotation to 1e-6.
+    """
+    R = arguments.array("matrix", matrix, "...", 3, 3)
+    defect = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(initial=0.0)
+    if defect > UNIT_TOLERANCE or (np.linalg.det(R) < 0).any():
+        raise ValueError(
+            f"matrix: expected rotation matrices, got one with |R R^T - 1| = {defect:.3g} "
+            f"or determinant -1"
+        )
+    q = np.linalg.eigh(_quaternion_form(R))[1][..., -1]
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def _quaternion_form(R: FloatArray) -> FloatArray:
+    """Return K, (..., 4, 4), whose quadratic form q^T K q is largest at R's quaternion."""
+    K = np.empty((*R.shape[:-2], 4, 4))
+    K[..., 0, 0] = np.trace(R, axis1=-2, axis2=-1)
+    K[..., 0, 1] = R[..., 2, 1] - R[..., 1, 2]
+    K[..., 0, 2] = R[..., 0, 2] - R[..., 2, 0]
+    K[..., 0, 3] = R[..., 1, 0] - R[..., 0, 1]
+    K[..., 1:, 0] = K[..., 0, 1:]
+    K[..., 1:, 1:] = R + np.swapaxes(R, -1, -2) - K[..., :1, :1] * np.eye(3)
+    return K
+
+
+def _parts(name: str, value: ArrayLike, count: int) -> tuple[FloatArray, ...]:
+    return tuple(np.moveaxis(arguments.array(name, value, "...", count), -1, 0))
+
+
+def _joined(parts: tuple[FloatArray, ...]) -> FloatArray:
+    return np.stack(parts, axis=-1)
+
+
+def _rows(values: FloatArray) -> FloatArray:
+    return np.array(values.reshape(-1, values.shape[-1]))
+
+
+def _between_rows(a, b, result):
+    for i in range(a.shape[0]):
+        put_quaternion(result, i, between_two(vector_at(a, i), vector_at(b, i)))
+
+
+def _exponential_rows(v, result):
+    for i in range(v.shape[0]):
+        put_quaternion(result, i, exponential_of(vector_at(v, i)))
+
+
+def _logarithm_rows(q, result):
+    for i in range(q.shape[0]):
+        put_vector(result, i, logarithm_of(quaternion_at(q, i)))
+
+
+_between = TwoSpeeds(_between_rows)
+_exponential = TwoSpeeds(_exponential_rows)
+_logarithm = TwoSpeeds(_logarithm_rows)

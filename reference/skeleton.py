@@ -1,0 +1,130 @@
+"""Skeleton (the model) and Pose (its state)."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import arguments
+from .arguments import FloatArray, IndexArray, frozen
+
+
+class SkeletonArrays(NamedTuple):
+    """What the kernels read of a skeleton."""
+
+    parents: IndexArray
+    offsets: FloatArray
+
+
+class Skeleton:
+    """A tree of ball joints without limits; parents precede children.
+
+    Attributes:
+        parents: each joint's parent, shape (joint,); -1 for the root, which is joint 0.
+        offsets: each joint's position in its parent's frame [m], shape (joint, 3); the root's
+            is its global position.
+        names: each joint's name.
+    """
+
+    def __init__(
+        self, parents: ArrayLike, offsets: ArrayLike, names: Sequence[str] | None = None
+    ) -> None:
+        """Check and copy the tree.
+
+        Raises:
+            ValueError: if there is no root or more than one, a parent does not precede its child,
+                an offset is not finite, or a name is missing, empty or used twice.
+        """
+        self.arrays = SkeletonArrays(*_checked_tree(parents, offsets))
+        self.parents = frozen(self.arrays.parents)
+        self.offsets = frozen(self.arrays.offsets)
+        self.names = _checked_names(names, self.joint_count)
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints, the root included."""
+        return len(self.arrays.parents)
+
+    @property
+    def link_lengths(self) -> FloatArray:
+        """Distance of each joint from its parent [m], shape (joint,); zero for the root."""
+        lengths = np.linalg.norm(self.offsets, axis=-1)
+        lengths[0] = 0.0
+        return lengths
+
+    def index(self, joint: int | str) -> int:
+        """Return the index of a joint given by name or index; negative indices count from the end.
+
+        Raises:
+            ValueError: if there is no such joint.
+        """
+        if isinstance(joint, str):
+            return self.names.index(arguments.choice("joint", joint, self.names))
+        count = self.joint_count
+        return arguments.integer("joint", joint, least=-count, below=count) % count
+
+    def path(self, effector: int | str = -1) -> IndexArray:
+        """Return the joints from the root to the effector, both included, shape (path,).
+
+        Raises:
+            ValueError: if there is no such joint.
+        """
+        joints = [self.index(effector)]
+        while self.parents[joints[-1]] >= 0:
+            joints.append(int(self.parents[joints[-1]]))
+        return np.array(joints[::-1], dtype=np.int64)
+
+    def reach(self, effector: int | str = -1) -> float:
+        """Return the greatest distance of the effector from the root [m]: its links' total length.
+
+        Raises:
+            ValueError: if there is no such joint.
+        """
+        return float(self.link_lengths[self.path(effector)].sum())
+
+    def __repr__(self) -> str:
+        return f"Skeleton({self.joint_count} joints, reach {self.reach():g} m)"
+
+
+class Pose(NamedTuple):
+    """Where every joint is; leading axes are batch or frame.
+
+    Attributes:
+        positions: global positions [m], shape (..., joint, 3).
+        rotations: global unit quaternions, w first, shape (..., joint, 4).
+    """
+
+    positions: FloatArray
+    rotations: FloatArray
+
+
+def _checked_tree(parents: ArrayLike, offsets: ArrayLike) -> tuple[IndexArray, FloatArray]:
+    offsets = np.array(arguments.coordinates("offsets", offsets, "joint", 3))
+    count = len(offsets)
+    if count == 0:
+        raise ValueError("offsets: expected at least one joint, got none")
+    parents = arguments.indices("parents", parents, count, least=-1, below=count)
+    roots = np.flatnonzero(parents == -1)
+    if len(roots) != 1:
+        raise ValueError(f"parents: expected one root (parent -1), got {len(roots)}")
+    late = np.flatnonzero(parents >= np.arange(count))
+    if len(late):
+        raise ValueError(
+            f"parents: expected every parent before its child, "
+            f"got parent {parents[late[0]]} for joint {late[0]}"
+        )
+    return parents, offsets
+
+
+def _checked_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
+    if names is None:
+        return tuple(f"joint{i}" for i in range(count))
+    if isinstance(names, str) or not all(isinstance(name, str) and name for name in names):
+        raise ValueError(f"names: expected {count} non-empty strings, got {names!r:.80}")
+    if len(names) != count:
+        raise ValueError(f"names: expected {count} names, one a joint, got {len(names)}")
+    if len(set(names)) != count:
+        twice = next(name for name in names if list(names).count(name) > 1)
+        raise ValueError(f"names: expected distinct names, got {twice!r} more than once")
+    return tuple(names)

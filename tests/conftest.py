@@ -1,0 +1,19 @@
+"""Fixtures that several rooms share."""
+
+import numpy as np
+import pytest
+
+from reference import compiled
+
+
+@pytest.fixture(params=compiled.SPEEDS)
+def speed(request):
+    """Run the test once compiled and once in the interpreter; yields the speed's name."""
+    with compiled.speed(request.param):
+        yield request.param
+
+
+@pytest.fixture
+def rng():
+    """A generator of the same random numbers in every run."""
+    return np.random.default_rng(20130)

@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+
+from reference import arguments
+
+
+def test_lists_and_single_precision_become_contiguous_doubles():
+    for given in ([[1, 2], [3, 4]], np.float32([[1, 2], [3, 4]]), np.ones((2, 4))[:, ::2]):
+        result = arguments.array("a", given, 2, 2)
+        assert result.dtype == np.float64
+        assert result.flags.c_contiguous
+        assert result.flags.writeable
+
+
+def test_a_fitting_array_is_not_copied():
+    given = np.ones((3, 2))
+    assert arguments.array("a", given, "...", 2) is given
+
+
+@pytest.mark.parametrize(
+    ("given", "trailing", "message"),
+    [
+        ([1.0, 2.0], (3,), r"a: expected shape \(3,\), got \(2,\)"),
+        (np.ones((2, 3)), ("joint", 4), r"a: expected shape \(joint, 4\), got \(2, 3\)"),
+        (np.ones(4), ("joint", 4), r"a: expected shape \(joint, 4\), got \(4,\)"),
+        (np.ones((2, 2, 4)), (2, 4), r"a: expected shape \(2, 4\), got \(2, 2, 4\)"),
+        ([1.0, np.nan], (2,), r"a: expected finite numbers, got nan at index \(1,\)"),
+        ([np.inf], (1,), r"a: expected finite numbers, got inf at index \(0,\)"),
+        (["x"], (1,), "a: expected an array of numbers, got"),
+        ([[1.0], [1.0, 2.0]], (2, 2), "a: expected an array of numbers, got"),
+        ([True], (1,), "a: expected an array of numbers, got"),
+        ([1j], (1,), "a: expected an array of numbers, got"),
+    ],
+)
+def test_a_misfit_array_is_named(given, trailing, message):
+    with pytest.raises(ValueError, match=message):
+        arguments.array("a", given, *trailing)
+
+
+@pytest.mark.parametrize(
+    ("given", "limits", "message"),
+    [
+        (np.nan, {}, "h: expected a finite number, got nan"),
+        ("fast", {}, "h: expected an array of numbers, got 'fast'"),
+        ([1.0], {}, "h: expected one number"),
+        (0.0, {"above": 0.0}, "h: expected a number greater than 0, got 0.0"),
+        (-1, {"least": 0.0}, "h: expected a number of at least 0, got -1"),
+    ],
+)
+def test_a_misfit_number_is_named(given, limits, message):
+    with pytest.raises(ValueError, match=message):
+        arguments.number("h", given, **limits)
+
+
+@pytest.mark.parametrize("given", [True, 1.0, "1", 0, 4])
+def test_only_an_integer_in_range_is_one(given):
+    with pytest.raises(ValueError, match="n: expected an integer"):
+        arguments.integer("n", given, least=1, below=4)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ([True, False], "pinned: expected integer indices, got bool values"),
+        ([0.0], "pinned: expected integer indices, got float64 values"),
+        ([0, 3], "pinned: expected indices from 0 to 2, got 3"),
+        ([-1], "pinned: expected indices from 0 to 2, got -1"),
+        ([[0]], r"pinned: expected shape \(pin,\), got \(1, 1\)"),
+    ],
+)
+def test_misfit_indices_are_named(given, message):
+    with pytest.raises(ValueError, match=message):
+        arguments.indices("pinned", given, "pin", least=0, below=3)
+
+
+def test_no_indices_are_fine():
+    assert arguments.indices("pinned", (), "pin", least=0, below=3).shape == (0,)
+
+
+def test_an_unknown_choice_is_answered_with_the_valid_ones():
+    with pytest.raises(ValueError, match="solver: expected one of ccd, fabrik, got 'cdc'"):
+        arguments.choice("solver", "cdc", {"ccd": 1, "fabrik": 2})
+
+
+def test_what_is_frozen_cannot_be_written_to_but_its_owner_can():
+    owner = np.zeros(3)
+    view = arguments.frozen(owner)
+    with pytest.raises(ValueError, match="read-only"):
+        view[0] = 1.0
+    owner[0] = 1.0
+    assert view[0] == 1.0

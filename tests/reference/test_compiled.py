@@ -1,0 +1,133 @@
+import math
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+from reference import compiled
+
+FACTOR = 3.0
+
+
+def square(x):
+    return x * x * FACTOR
+
+
+def cube(x):
+    return x * x * x
+
+
+def total(values):
+    s = 0.0
+    for value in values:
+        s += square(value)
+    return s
+
+
+def test_a_kernel_gives_the_same_at_both_speeds(speed):
+    assert compiled.TwoSpeeds(total)(np.arange(4.0)) == 3.0 * (1 + 4 + 9)
+
+
+def test_the_plain_speed_never_reaches_compiled_code():
+    with compiled.speed("plain"):
+        kernel = compiled.TwoSpeeds(total)
+        kernel(np.arange(4.0))
+    assert "compiled" not in vars(kernel)
+    assert total.__globals__["square"] is square
+
+
+def test_the_compiled_version_calls_compiled_callees():
+    rebuilt = compiled.compile_kernel(total).py_func
+    assert hasattr(rebuilt.__globals__["square"], "py_func")
+
+
+def test_the_speed_in_force_ends_with_its_block():
+    with compiled.speed("plain"), compiled.speed("compiled"):
+        pass
+    kernel = compiled.TwoSpeeds(total)
+    kernel(np.arange(2.0))
+    assert "compiled" in vars(kernel)
+
+
+def test_an_unknown_speed_is_refused():
+    with pytest.raises(ValueError, match="speed: expected one of compiled, plain, got 'fast'"):
+        compiled.speed("fast").__enter__()
+
+
+def test_a_bound_callee_takes_the_named_one_s_place(speed):
+    cubes = compiled.TwoSpeeds(compiled.bind(total, square=cube))
+    assert cubes(np.arange(3.0)) == 1 + 8
+
+
+def test_only_a_name_that_the_kernel_calls_can_be_bound():
+    with pytest.raises(ValueError, match="got 'sphere'"):
+        compiled.bind(total, sphere=cube)
+
+
+def test_a_closure_is_refused():
+    inner = math.tau
+
+    def kernel(x):
+        return x * inner
+
+    with pytest.raises(ValueError, match="closure"):
+        compiled.compile_kernel(kernel)
+
+
+SOURCES = {
+    "constant of a callee": ("SCALE = 2.0", "SCALE = 5.0"),
+    "code of a callee": ("return x * SCALE", "return x * SCALE + 1.0"),
+    "callee of a callee": ("return 1.0", "return 2.0"),
+    "enumeration": ("ONE = 1", "ONE = 4"),
+}
+CALLEE = textwrap.dedent("""
+    from enum import IntEnum
+
+    SCALE = 2.0
+
+    class Code(IntEnum):
+        ONE = 1
+
+    def offset():
+        return 1.0
+
+    def callee(x):
+        return x * SCALE + offset() * (2.0 if Code.ONE == 1 else 3.0)
+""")
+CALLER = textwrap.dedent("""
+    import numpy as np
+    from callee import callee
+    from reference.compiled import TwoSpeeds
+
+    def caller(x):
+        return callee(x[0])
+
+    run = TwoSpeeds(caller)
+    x = np.array([10.0])
+    print(run(x), run.plain(x), len(run.compiled.stats.cache_hits))
+""")
+
+
+def run_in_fresh_process(folder):
+    command = [sys.executable, "-B", "caller.py"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    compiled_value, plain_value, hits = done.stdout.split()
+    assert compiled_value == plain_value
+    return float(compiled_value), int(hits)
+
+
+def test_the_cache_on_disk_is_used_but_never_stale(tmp_path):
+    """Every edit below changes a file that numba's own key for the caller does not see."""
+    (tmp_path / "caller.py").write_text(CALLER)
+    (tmp_path / "callee.py").write_text(CALLEE)
+    first, _ = run_in_fresh_process(tmp_path)
+    assert run_in_fresh_process(tmp_path) == (first, 1)
+    for old, new in SOURCES.values():
+        (tmp_path / "callee.py").write_text(CALLEE.replace(old, new))
+        value, hits = run_in_fresh_process(tmp_path)
+        assert value != first
+        assert hits == 0
+    (tmp_path / "callee.py").write_text(CALLEE)
+    assert run_in_fresh_process(tmp_path) == (first, 1)

@@ -1,0 +1,155 @@
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from reference import curves, resample
+
+# Dividing a gap rounds: each spacing is met but for a few eps of the coordinates.
+ROUNDING = 1e-12
+
+
+def gaps(points):
+    return np.linalg.norm(np.diff(points, axis=0), axis=-1)
+
+
+# ---- the named curves
+
+
+@pytest.mark.parametrize("name", curves)
+@pytest.mark.parametrize("count", [1, 2, 5, 151])
+def test_a_curve_has_as_many_points_as_asked_for_in_its_plane(name, count):
+    points = curves[name](count)
+    assert points.shape == (count, 3)
+    assert (points[:, 1] == 0.0).all()
+
+
+@pytest.mark.parametrize("name", curves)
+@pytest.mark.parametrize("count", [0, -3, 1.5, True])
+def test_a_count_that_is_none_is_refused(name, count):
+    with pytest.raises(ValueError, match="count: expected an integer"):
+        curves[name](count)
+
+
+def test_the_lab_s_curves_are_sampled_as_the_lab_does():
+    counts = {name: len(curve()) for name, curve in curves.items()}
+    lab = {"circle": 150, "square": 150, "heart": 150, "triangle": 150, "star": 400}
+    assert counts | lab == counts
+    assert counts["plumb_bob"] >= 1000
+
+
+def test_the_circle_is_round():
+    np.testing.assert_allclose(np.linalg.norm(curves["circle"](), axis=-1), 0.6, rtol=1e-15)
+
+
+def test_the_heart_is_the_cardioid():
+    x, _, z = curves["heart"]().T
+    t = np.arctan2(z, x)
+    np.testing.assert_allclose(np.hypot(x, z), 0.5 * (1 - np.sin(t)), atol=1e-8)
+
+
+def test_the_square_has_its_side():
+    x, _, z = curves["square"](160).T
+    np.testing.assert_allclose(np.maximum(np.abs(x), np.abs(z)), 0.2, rtol=1e-14)
+
+
+def test_the_triangle_starts_at_its_corner_at_the_origin():
+    points = curves["triangle"](150)
+    assert (points[0] == 0.0).all()
+    x, _, z = points.T
+    on_a_side = np.minimum(np.minimum(np.abs(x), np.abs(z)), np.abs(x + z - 0.5))
+    np.testing.assert_allclose(on_a_side, 0.0, atol=1e-15)
+
+
+def test_the_star_visits_every_second_of_five_points():
+    corners = curves["star"](5)
+    turns = np.unwrap(np.arctan2(corners[:, 2], corners[:, 0]))
+    np.testing.assert_allclose(np.diff(turns), 4 * np.pi / 5)
+    np.testing.assert_allclose(np.linalg.norm(corners, axis=-1), 0.4)
+
+
+def test_the_plumb_bob_is_very_unevenly_sampled_and_in_strokes():
+    spacing = gaps(curves["plumb_bob"]())
+    assert spacing.max() > 100 * np.median(spacing)
+    assert spacing.min() < np.median(spacing) / 100
+
+
+# ---- resampling
+
+
+clouds = arrays.arrays(
+    float,
+    st.tuples(st.integers(1, 12), st.just(3)),
+    elements=st.floats(-2.0, 2.0, width=32),
+)
+spacings = st.floats(0.05, 1.0)
+factors = st.floats(2.0, 4.0)
+
+
+def can_be_spaced(points, least):
+    """Return whether the ends, or the ends and one more point, are far enough apart."""
+    first = np.linalg.norm(points - points[0], axis=-1)
+    last = np.linalg.norm(points - points[-1], axis=-1)
+    return first[-1] >= least or (np.minimum(first, last) >= least).any()
+
+
+@given(points=clouds, least=spacings, factor=factors)
+def test_every_gap_lies_within_the_two_spacings_and_the_ends_are_kept(points, least, factor):
+    assume(can_be_spaced(points, least))
+    even = resample(points, min_spacing=least, max_spacing=factor * least)
+    assert gaps(even).min() >= least - ROUNDING
+    assert gaps(even).max() <= factor * least + ROUNDING
+    assert (even[0] == points[0]).all()
+    assert (even[-1] == points[-1]).all()
+
+
+@given(points=clouds, least=spacings)
+def test_a_curve_shorter_than_the_least_spacing_keeps_its_ends(points, least):
+    points = points * (0.2 * least / max(1.0, np.abs(points).max()))
+    even = resample(points, min_spacing=least, max_spacing=2 * least)
+    assert (even == points[[0, -1]][: len(points)]).all()
+
+
+@given(points=clouds, least=spacings)
+def test_a_closed_curve_is_spaced_across_its_wrap_too(points, least):
+    assume(can_be_spaced(np.concatenate([points, points[:1]]), least))
+    even = resample(points, min_spacing=least, max_spacing=2 * least, closed=True)
+    around = gaps(np.concatenate([even, even[:1]]))
+    assert around.min() >= least - ROUNDING
+    assert around.max() <= 2 * least + ROUNDING
+
+
+def test_points_already_well_spaced_stay(speed):
+    points = curves["circle"](50)
+    even = resample(points, min_spacing=0.05, max_spacing=0.1)
+    assert (even == points).all()
+
+
+def test_resampled_points_lie_on_the_curve(speed):
+    even = resample([[0, 0, 0], [1, 0, 0], [1, 2, 0]], min_spacing=0.1, max_spacing=0.3)
+    x, y, _ = even.T
+    assert (((y == 0) & (x <= 1)) | ((x == 1) & (y <= 2))).all()
+    assert len(even) == 12
+
+
+def test_resampling_is_indifferent_to_scale(speed):
+    points = curves["plumb_bob"]()
+    even = resample(points, min_spacing=0.01, max_spacing=0.03)
+    large = resample(1024 * points, min_spacing=10.24, max_spacing=30.72)
+    np.testing.assert_allclose(large, 1024 * even, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("points", "spacings", "message"),
+    [
+        (np.zeros((0, 3)), (1.0, 2.0), "curve: expected at least one point, got none"),
+        (np.zeros((4, 2)), (1.0, 2.0), r"curve: expected shape \(point, 3\), got \(4, 2\)"),
+        ([[0.0, np.nan, 0.0]], (1.0, 2.0), "curve: expected finite numbers"),
+        (np.zeros((4, 3)), (0.0, 2.0), "min_spacing: expected a number greater than 0, got 0.0"),
+        (np.zeros((4, 3)), (1.0, 1.9), "max_spacing: expected a number of at least 2, got 1.9"),
+    ],
+)
+def test_bad_input_is_named(points, spacings, message):
+    with pytest.raises(ValueError, match=message):
+        resample(points, min_spacing=spacings[0], max_spacing=spacings[1])

@@ -1,0 +1,414 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from reference import (
+    IK_SOLVERS,
+    Outcome,
+    Skeleton,
+    Target,
+    curves,
+    forward_kinematics,
+    local_from_global,
+    rotation,
+    scenes,
+    solve_ik,
+)
+from reference.inverse_kinematics.ccd import ccd_turn
+
+# Distances of order one after a sweep over six joints, positions recomputed from rotations.
+ROUNDING = 1e-14
+
+
+@pytest.fixture(params=IK_SOLVERS)
+def solver(request):
+    return request.param
+
+
+@pytest.fixture
+def target(rng, skeleton):
+    """Return a point that the last joint reaches in some pose."""
+    pose = forward_kinematics(skeleton, rotation.random(rng, skeleton.joint_count))
+    return pose.positions[-1]
+
+
+# ---- what every solver promises
+
+
+def test_a_reachable_target_is_reached(skeleton, local, target, solver, speed):
+    solution = solve_ik(skeleton, local, target, solver, max_iterations=500)
+    assert solution.outcome is Outcome.CONVERGED
+    assert solution.residual <= 1e-4
+    assert solution.iterations > 0
+
+
+def test_the_residual_is_the_distance_by_forward_kinematics(skeleton, local, target, solver, speed):
+    solution = solve_ik(skeleton, local, target, solver, max_iterations=2)
+    pose = forward_kinematics(skeleton, solution.local_rotations)
+    np.testing.assert_allclose(solution.positions, pose.positions, atol=ROUNDING)
+    distance = np.linalg.norm(pose.positions[-1] - target)
+    assert solution.residual == pytest.approx(distance, abs=ROUNDING)
+
+
+def test_links_keep_their_lengths(skeleton, local, target, solver, speed):
+    positions = solve_ik(skeleton, local, target, solver).positions
+    links = np.linalg.norm(positions[1:] - positions[skeleton.parents[1:]], axis=-1)
+    np.testing.assert_allclose(links, skeleton.link_lengths[1:], rtol=ROUNDING)
+
+
+def test_the_root_stays(skeleton, local, target, solver, speed):
+    solution = solve_ik(skeleton, local, target, solver)
+    assert (solution.positions[0] == skeleton.offsets[0]).all()
+
+
+def test_joints_off_the_path_and_the_effector_keep_their_local_rotations(
+    skeleton, local, solver, speed
+):
+    effector = 4
+    point = forward_kinematics(skeleton, local[::-1]).positions[effector]
+    solution = solve_ik(skeleton, local, point, solver, effector)
+    off = np.setdiff1d(np.arange(6), skeleton.path(effector)[:-1])
+    np.testing.assert_allclose(solution.local_rotations[off], local[off], atol=ROUNDING)
+    assert not np.allclose(solution.local_rotations, local)
+
+
+def test_solving_in_a_turned_world_turns_the_answer(skeleton, local, target, solver, rng, speed):
+    turn, root = rotation.random(rng), skeleton.offsets[0]
+    turned = local.copy()
+    turned[0] = rotation.multiply(turn, local[0])
+    there = solve_ik(skeleton, turned, root + rotation.rotate(turn, target - root), solver)
+    here = solve_ik(skeleton, local, target, solver)
+    assert there.iterations == here.iterations
+    # Each sweep may amplify rounding; tens of them stay far below this.
+    np.testing.assert_allclose(
+        there.positions, root + rotation.rotate(turn, here.positions - root), atol=1e-10
+    )
+
+
+def test_solving_at_another_scale_scales_the_answer(skeleton, local, target, solver, speed):
+    large = Skeleton(skeleton.parents, 1024.0 * skeleton.offsets)
+    there = solve_ik(large, local, 1024.0 * target, solver, tolerance=1024.0 * 1e-4)
+    here = solve_ik(skeleton, local, target, solver)
+    assert there.iterations == here.iterations
+    np.testing.assert_allclose(there.positions, 1024.0 * here.positions, rtol=1e-10, atol=1e-9)
+
+
+def test_both_speeds_take_the_same_path(skeleton, local, target, solver):
+    from reference import speed
+
+    fast = solve_ik(skeleton, local, target, solver, record=True)
+    with speed("plain"):
+        plain = solve_ik(skeleton, local, target, solver, record=True)
+    assert plain.iterations == fast.iterations
+    np.testing.assert_allclose(plain.history, fast.history, rtol=1e-9, atol=ROUNDING)
+    np.testing.assert_allclose(plain.local_rotations, fast.local_rotations, atol=1e-10)
+
+
+def test_the_history_holds_the_residual_before_and_after_each_iteration(
+    skeleton, local, target, solver, speed
+):
+    solution = solve_ik(skeleton, local, target, solver, record=True)
+    assert solution.history.shape == (solution.iterations + 1,)
+    start = forward_kinematics(skeleton, local).positions[-1]
+    assert solution.history[0] == pytest.approx(np.linalg.norm(start - target), abs=ROUNDING)
+    assert solution.history[-1] == pytest.approx(solution.residual, abs=ROUNDING)
+    one = solve_ik(skeleton, local, target, solver, max_iterations=1)
+    assert solution.history[1] == pytest.approx(one.residual, abs=ROUNDING)
+    assert solve_ik(skeleton, local, target, solver).history.shape == (0,)
+
+
+def test_a_target_already_reached_takes_no_iteration(skeleton, local, solver, speed):
+    tip = forward_kinematics(skeleton, local).positions[-1]
+    solution = solve_ik(skeleton, local, tip, solver)
+    assert (solution.iterations, solution.outcome) == (0, Outcome.CONVERGED)
+    np.testing.assert_allclose(solution.local_rotations, local, atol=ROUNDING)
+
+
+def test_all_iterations_used_is_said(skeleton, local, target, solver, speed):
+    solution = solve_ik(skeleton, local, target, solver, tolerance=0.0, max_iterations=1)
+    assert (solution.iterations, solution.outcome) == (1, Outcome.ITERATION_LIMIT)
+
+
+def test_no_iterations_are_allowed_to_be_asked_for(skeleton, local, target, solver, speed):
+    solution = solve_ik(skeleton, local, target, solver, max_iterations=0)
+    np.testing.assert_allclose(solution.local_rotations, local, atol=ROUNDING)
+
+
+def test_the_inputs_are_unchanged_and_the_answer_read_only(skeleton, local, target, solver, speed):
+    before = local.copy(), target.copy()
+    solution = solve_ik(skeleton, local, target, solver)
+    assert (local == before[0]).all()
+    assert (target == before[1]).all()
+    with pytest.raises(ValueError, match="read-only"):
+        solution.local_rotations[0] = 0.0
+
+
+# ---- targets out of reach
+
+
+@pytest.mark.parametrize("distance", [1.0, 1.5, 100.0])
+def test_fabrik_lays_the_chain_straight_to_a_target_beyond_reach_at_once(
+    skeleton, local, distance, rng, speed
+):
+    root, reach = skeleton.offsets[0], skeleton.reach()
+    way = np.array([0.6, 0.0, -0.8])
+    solution = solve_ik(skeleton, local, root + distance * reach * way, "fabrik")
+    along = (solution.positions[skeleton.path()] - root) @ way
+    straight = np.cumsum(skeleton.link_lengths[skeleton.path()])
+    np.testing.assert_allclose(along, straight, atol=ROUNDING)
+    assert solution.iterations == 1
+    expected = Outcome.CONVERGED if distance == 1.0 else Outcome.UNREACHABLE
+    assert solution.outcome is expected
+    assert solution.residual == pytest.approx((distance - 1.0) * reach, abs=1e-13 * distance)
+
+
+def test_beyond_reach_the_residual_tends_to_the_distance_less_the_reach(solver, speed):
+    arm, rest = scenes.lab_arm()
+    solution = solve_ik(arm, rest, [3.0, 1.7, 4.0], solver, max_iterations=1000)
+    assert solution.outcome is Outcome.UNREACHABLE
+    assert solution.residual == pytest.approx(5.0 - 2.6, abs=2e-4)
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.3, 1.0])
+def test_in_the_hole_of_the_longest_link_the_rim_is_the_nearest(solver, depth, speed):
+    """Links of 3, 0.5 and 0.5 leave a hole of radius 2 about the root."""
+    claw = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [0.5, 0, 0], [0, 3.0, 0], [0, 0, 0.5]])
+    target = np.array([0.0, 0.0, 2.0 * (1.0 - depth)])
+    solution = solve_ik(claw, rotation.identity(4), target, solver, max_iterations=3000)
+    assert solution.residual == pytest.approx(2.0 * depth, abs=2e-3)
+    if depth:
+        assert solution.outcome is Outcome.UNREACHABLE
+
+
+def test_the_root_itself_as_effector_cannot_move(skeleton, local, solver, speed):
+    off = skeleton.offsets[0] + [0.0, 3.0, 4.0]
+    solution = solve_ik(skeleton, local, off, solver, effector=0)
+    assert (solution.residual, solution.iterations) == (5.0, 0)
+    assert solution.outcome is Outcome.UNREACHABLE
+    at = solve_ik(skeleton, local, skeleton.offsets[0], solver, effector=0)
+    assert at.outcome is Outcome.CONVERGED
+
+
+# ---- degenerate places
+
+
+@pytest.mark.parametrize("height", [1.7, 0.9, 0.0, -0.5, 2.0, 3.0])
+def test_a_straight_chain_is_freed_from_a_target_on_its_own_line(height, solver, speed):
+    arm, rest = scenes.lab_arm()
+    solution = solve_ik(arm, rest, [0.0, height, 0.0], solver, max_iterations=1000)
+    assert solution.outcome is Outcome.CONVERGED
+    again = solve_ik(arm, rest, [0.0, height, 0.0], solver, max_iterations=1000)
+    assert (again.local_rotations == solution.local_rotations).all()
+
+
+def test_a_straight_chain_of_two_links_is_freed_too(solver, speed):
+    chain, rest = scenes.ball_chain(links=2)
+    solution = solve_ik(chain, rest, [0.1, 0.0, 0.0], solver)  # at the middle joint
+    assert solution.outcome is Outcome.CONVERGED
+
+
+@pytest.mark.parametrize("target", [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+def test_one_link_turns_at_once_even_to_its_opposite(target, solver, speed):
+    chain, rest = scenes.ball_chain(links=1, link_length=1.0)
+    solution = solve_ik(chain, rest, target, solver, tolerance=1e-12)
+    assert (solution.iterations, solution.outcome) == (1, Outcome.CONVERGED)
+
+
+def test_links_of_no_length_do_no_harm(solver, speed):
+    offsets = [[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 0]]
+    chain = Skeleton(range(-1, 5), offsets)
+    solution = solve_ik(chain, rotation.identity(6), [0.5, 0.9, 0.0], solver)
+    assert solution.outcome is Outcome.CONVERGED
+
+
+def test_a_skeleton_of_nothing_but_a_point_answers(solver, speed):
+    point = Skeleton([-1, 0], np.zeros((2, 3)))
+    solution = solve_ik(point, rotation.identity(2), [1.0, 0.0, 0.0], solver)
+    assert (solution.residual, solution.outcome) == (1.0, Outcome.UNREACHABLE)
+
+
+coordinates = st.floats(-3.0, 3.0)
+points = st.lists(coordinates, min_size=3, max_size=3)
+
+
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    links=st.lists(points, min_size=1, max_size=5),
+    target=points,
+    solver=st.sampled_from(list(IK_SOLVERS)),
+)
+def test_there_is_always_an_answer_and_it_is_true(links, target, solver):
+    chain = Skeleton(range(-1, len(links)), [[0.0, 0.0, 0.0], *links])
+    solution = solve_ik(chain, rotation.identity(len(links) + 1), target, solver)
+    pose = forward_kinematics(chain, solution.local_rotations)
+    distance = np.linalg.norm(pose.positions[-1] - target)
+    assert solution.residual == pytest.approx(distance, abs=1e-13)
+    assert (solution.outcome is Outcome.CONVERGED) == (solution.residual <= 1e-4)
+    if solution.outcome is Outcome.UNREACHABLE:
+        lengths = chain.link_lengths
+        d = np.linalg.norm(target)
+        least = max(d - lengths.sum(), 2 * lengths.max() - lengths.sum() - d)
+        assert solution.residual >= least - 1e-13 > 0
+
+
+# ---- CCD, as the textbook has it
+
+
+def textbook_sweep(skeleton, local, target):
+    """Turn the joints one after another, all positions recomputed after each, in matrices."""
+    distances = []
+    for j in skeleton.path()[-2::-1]:
+        pose = forward_kinematics(skeleton, local)
+        to_tip, to_target = pose.positions[-1] - pose.positions[j], target - pose.positions[j]
+        rotations = np.array(pose.rotations)
+        turn = rotation.between(to_tip, to_target)
+        below = [k for k in range(skeleton.joint_count) if j in skeleton.path(k)]
+        rotations[below] = rotation.multiply(turn, rotations[below])
+        local = local_from_global(skeleton, rotations)
+        tip = forward_kinematics(skeleton, local).positions[-1]
+        distances.append(np.linalg.norm(tip - target))
+    return local, np.array(distances)
+
+
+def test_one_ccd_iteration_is_the_textbook_s(skeleton, local, target, speed):
+    expected, _ = textbook_sweep(skeleton, local, target)
+    solution = solve_ik(skeleton, local, target, "ccd", tolerance=0.0, max_iterations=1)
+    np.testing.assert_allclose(
+        np.abs(np.vecdot(solution.local_rotations, expected)), np.ones(6), atol=ROUNDING
+    )
+
+
+def test_ccd_never_moves_away_in_a_joint_update(skeleton, local, target):
+    start = forward_kinematics(skeleton, local).positions[-1]
+    _, distances = textbook_sweep(skeleton, local, target)
+    steps = np.diff([np.linalg.norm(start - target), *distances])
+    assert (steps <= ROUNDING).all()
+    assert steps.min() < -1e-3
+
+
+@given(joint=points, effector=points, target=points)
+def test_a_ccd_turn_never_moves_the_effector_away(joint, effector, target):
+    _, moved = ccd_turn(tuple(joint), tuple(effector), tuple(target))
+    before = np.linalg.norm(np.subtract(effector, target))
+    assert np.linalg.norm(np.subtract(moved, target)) <= before + ROUNDING
+
+
+# ---- FABRIK, as the paper has it
+
+
+def textbook_fabrik(positions, lengths, target):
+    """One backward and one forward pass of Algorithm 1, in the paper's own form."""
+    p, n = np.array(positions), len(positions)
+    root = p[0].copy()
+    p[-1] = target
+    for i in range(n - 2, -1, -1):
+        lam = lengths[i] / np.linalg.norm(p[i + 1] - p[i])
+        p[i] = (1 - lam) * p[i + 1] + lam * p[i]
+    p[0] = root
+    for i in range(n - 1):
+        lam = lengths[i] / np.linalg.norm(p[i + 1] - p[i])
+        p[i + 1] = (1 - lam) * p[i] + lam * p[i + 1]
+    return p
+
+
+def test_one_fabrik_iteration_is_the_paper_s(skeleton, local, target, speed):
+    path = skeleton.path()
+    start = forward_kinematics(skeleton, local).positions[path]
+    expected = textbook_fabrik(start, skeleton.link_lengths[path[1:]], target)
+    solution = solve_ik(skeleton, local, target, "fabrik", tolerance=0.0, max_iterations=1)
+    np.testing.assert_allclose(solution.positions[path], expected, atol=ROUNDING)
+
+
+def test_fabrik_turns_links_by_the_shortest_arc_so_that_twist_is_kept(
+    skeleton, local, target, speed
+):
+    solution = solve_ik(skeleton, local, target, "fabrik")
+    before = forward_kinematics(skeleton, local)
+    after = forward_kinematics(skeleton, solution.local_rotations)
+    path = skeleton.path()
+    for j, child in pairwise(path):
+        link = before.positions[child] - before.positions[j]
+        turn = rotation.multiply(after.rotations[j], rotation.conjugate(before.rotations[j]))
+        assert turn[1:] @ link == pytest.approx(0.0, abs=1e-13)
+
+
+# ---- the lab
+
+
+@pytest.mark.parametrize("curve", curves)
+def test_every_point_of_every_lab_curve_is_reached_from_rest(curve, solver):
+    arm, rest = scenes.lab_arm()
+    solution = solve_ik(arm, rest, curves[curve](), solver, tolerance=1e-4, max_iterations=100)
+    assert (solution.outcome == Outcome.CONVERGED).all()
+    assert solution.residual.max() <= 1e-4
+
+
+# ---- batches and targets
+
+
+def test_a_batch_is_its_solves(skeleton, rng, solver, speed):
+    starts = rotation.random(rng, 2, 1, 6)
+    targets = forward_kinematics(skeleton, rotation.random(rng, 3, 6)).positions[:, -1]
+    batch = solve_ik(skeleton, starts, targets, solver, record=True)
+    assert batch.positions.shape == (2, 3, 6, 3)
+    assert batch.history.shape == (2, 3, batch.iterations.max() + 1)
+    for i in range(2):
+        for j in range(3):
+            one = solve_ik(skeleton, starts[i, 0], targets[j], solver, record=True)
+            assert (batch.local_rotations[i, j] == one.local_rotations).all()
+            assert batch.residual[i, j] == one.residual
+            assert batch.iterations[i, j] == one.iterations
+            assert Outcome(batch.outcome[i, j]) is one.outcome
+            assert (batch.history[i, j, : one.iterations + 1] == one.history).all()
+            assert (batch.history[i, j, one.iterations :] == one.history[-1]).all()
+
+
+def test_whatever_comes_in_the_kernel_is_compiled_once(skeleton, local, target, solver):
+    """Read-only, strided and single-precision input would each compile another version."""
+    wide = np.repeat(local, 2, axis=-1)[:, ::2]
+    for start in (local, local.tolist(), wide, np.stack([local, local])[:, None]):
+        for point in (target, target.tolist(), np.stack([target] * 3), np.float32(target)):
+            first = solve_ik(skeleton, start, point, solver)
+            solve_ik(skeleton, first.local_rotations, point, solver)
+    assert len(IK_SOLVERS[solver].compiled.signatures) == 1
+
+
+def test_no_targets_give_no_solutions(skeleton, local, solver, speed):
+    assert solve_ik(skeleton, local, np.empty((0, 3)), solver).residual.shape == (0,)
+
+
+def test_a_target_names_its_effector(skeleton, local, target, solver, speed):
+    plain = solve_ik(skeleton, local, target, solver, effector=3)
+    for named_target in (Target(target, 3), [Target(target, "joint3")]):
+        named = solve_ik(skeleton, local, named_target, solver)
+        assert (named.local_rotations == plain.local_rotations).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"solver": "newton"}, "solver: expected one of ccd, fabrik, got 'newton'"),
+        ({"target": [1.0, 2.0]}, r"target: expected shape \(..., 3\), got \(2,\)"),
+        ({"target": [1.0, np.nan, 0.0]}, "target: expected finite numbers, got nan"),
+        ({"target": [1e80, 0.0, 0.0]}, "target: expected coordinates of at most"),
+        ({"target": [Target([0, 0, 0]), Target([0, 0, 0])]}, "target: expected one target, got 2"),
+        ({"target": Target([0, 0, 0], 2), "effector": 3}, "effector: expected that of the target"),
+        ({"target": np.zeros((2, 3))}, "target: expected leading axes that broadcast"),
+        ({"effector": "hand"}, "joint: expected one of joint0"),
+        ({"effector": 6}, "joint: expected an integer of at least -6 and at most 5, got 6"),
+        ({"tolerance": -1.0}, "tolerance: expected a number of at least 0"),
+        ({"tolerance": np.nan}, "tolerance: expected a finite number"),
+        ({"max_iterations": 1.5}, "max_iterations: expected an integer, got 1.5"),
+        ({"max_iterations": -1}, "max_iterations: expected an integer of at least 0"),
+        ({"local_rotations": np.zeros((3, 6, 4))}, "local_rotations: expected unit quaternions"),
+        ({"local_rotations": np.full((3, 6, 4), np.nan)}, "local_rotations: expected finite"),
+        ({"local_rotations": np.ones((5, 4))}, r"local_rotations: expected shape \(..., 6, 4\)"),
+    ],
+)
+def test_bad_input_is_named(change, message, skeleton, rng, speed):
+    arguments = {"local_rotations": rotation.random(rng, 3, 6), "target": [0.0, 0.0, 0.0]} | change
+    with pytest.raises(ValueError, match=message):
+        solve_ik(skeleton, **arguments)

@@ -1,0 +1,131 @@
+import numpy as np
+import pytest
+
+from reference import Skeleton, forward_kinematics, local_from_global, rotation, scenes
+
+# Six joints: a dozen products and sums of numbers of order one.
+ROUNDING = 1e-14
+
+
+def by_matrices(skeleton, local):
+    """Return positions and rotation matrices by 4 x 4 transforms, an independent formulation."""
+    world = np.empty((skeleton.joint_count, 4, 4))
+    for j, parent in enumerate(skeleton.parents):
+        T = np.eye(4)
+        T[:3, :3] = rotation.to_matrix(local[j])
+        T[:3, 3] = skeleton.offsets[j]
+        world[j] = world[parent] @ T if parent >= 0 else T
+    return world[:, :3, 3], world[:, :3, :3]
+
+
+def test_forward_kinematics_equals_a_product_of_transforms(skeleton, local, speed):
+    pose = forward_kinematics(skeleton, local)
+    positions, matrices = by_matrices(skeleton, local)
+    np.testing.assert_allclose(pose.positions, positions, atol=ROUNDING)
+    np.testing.assert_allclose(rotation.to_matrix(pose.rotations), matrices, atol=ROUNDING)
+    assert np.ptp(pose.positions, axis=0).min() > 0.01
+
+
+def test_both_speeds_give_the_same_bits_of_order_one(skeleton, local):
+    from reference import speed
+
+    fast = forward_kinematics(skeleton, local)
+    with speed("plain"):
+        plain = forward_kinematics(skeleton, local)
+    np.testing.assert_allclose(fast.positions, plain.positions, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(fast.rotations, plain.rotations, rtol=0, atol=ROUNDING)
+
+
+def test_the_lab_arm_hangs_at_its_heights(speed):
+    arm, rest = scenes.lab_arm()
+    heights = forward_kinematics(arm, rest).positions[:, 1]
+    np.testing.assert_allclose(heights, [1.7, 0.9, 0.5, 0.3, -0.9], atol=1e-15)
+
+
+def test_a_joint_moves_only_what_hangs_below_it(skeleton, local, rng, speed):
+    before = forward_kinematics(skeleton, local)
+    for j in range(skeleton.joint_count):
+        turned = local.copy()
+        turned[j] = rotation.random(rng)
+        after = forward_kinematics(skeleton, turned)
+        below = np.array([j in skeleton.path(k)[:-1] for k in range(skeleton.joint_count)])
+        assert (after.positions[~below] == before.positions[~below]).all()
+        assert (after.positions[below] != before.positions[below]).any(axis=-1).all()
+
+
+def test_links_keep_their_lengths(skeleton, local, speed):
+    positions = forward_kinematics(skeleton, local).positions
+    links = np.linalg.norm(positions[1:] - positions[skeleton.parents[1:]], axis=-1)
+    np.testing.assert_allclose(links, skeleton.link_lengths[1:], rtol=ROUNDING)
+
+
+def test_turning_the_root_turns_the_body_about_it(skeleton, local, rng, speed):
+    turn = rotation.random(rng)
+    before = forward_kinematics(skeleton, local).positions
+    local[0] = rotation.multiply(turn, local[0])
+    after = forward_kinematics(skeleton, local).positions
+    root = skeleton.offsets[0]
+    np.testing.assert_allclose(after, root + rotation.rotate(turn, before - root), atol=ROUNDING)
+
+
+def test_scaling_the_offsets_scales_the_positions(skeleton, local, speed):
+    larger = Skeleton(skeleton.parents, 1000.0 * skeleton.offsets)
+    np.testing.assert_allclose(
+        forward_kinematics(larger, local).positions,
+        1000.0 * forward_kinematics(skeleton, local).positions,
+        atol=1000.0 * ROUNDING,
+    )
+
+
+def test_local_rotations_come_back_from_global_ones(skeleton, local, speed):
+    rotations = forward_kinematics(skeleton, local).rotations
+    np.testing.assert_allclose(local_from_global(skeleton, rotations), local, atol=ROUNDING)
+
+
+def test_a_batch_is_its_poses(skeleton, rng, speed):
+    local = rotation.random(rng, 2, 3, skeleton.joint_count)
+    batch = forward_kinematics(skeleton, local)
+    assert batch.positions.shape == (2, 3, 6, 3)
+    one = forward_kinematics(skeleton, local[1, 2])
+    assert (batch.positions[1, 2] == one.positions).all()
+    assert (batch.rotations[1, 2] == one.rotations).all()
+    assert (local_from_global(skeleton, batch.rotations)[1, 2]
+            == local_from_global(skeleton, one.rotations)).all()  # fmt: skip
+
+
+def test_an_empty_batch_gives_an_empty_pose(skeleton, speed):
+    assert forward_kinematics(skeleton, np.empty((0, 6, 4))).positions.shape == (0, 6, 3)
+
+
+def test_a_pose_is_read_only_and_the_input_unchanged(skeleton, local, speed):
+    given = local * (1.0 + 5e-7)
+    before = given.copy()
+    pose = forward_kinematics(skeleton, given)
+    assert (given == before).all()
+    for values in pose:
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 0.0
+
+
+def test_slightly_long_quaternions_are_normalised_once(skeleton, local, speed):
+    long = forward_kinematics(skeleton, local * (1.0 + 5e-7))
+    np.testing.assert_allclose(
+        long.positions, forward_kinematics(skeleton, local).positions, atol=ROUNDING
+    )
+
+
+@pytest.mark.parametrize("convert", [forward_kinematics, local_from_global])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda q: q[:-1], r"expected shape \(..., 6, 4\), got \(5, 4\)"),
+        (lambda q: q[..., :3], r"expected shape \(..., 6, 4\), got \(6, 3\)"),
+        (lambda q: np.where(q == q[2, 1], np.nan, q), "expected finite numbers, got nan"),
+        (lambda q: 0.0 * q, "expected unit quaternions .* length 0 at index"),
+        (lambda q: 1.00001 * q, "expected unit quaternions"),
+        (lambda q: "pose", "expected an array of numbers"),
+    ],
+)
+def test_bad_rotations_are_named(convert, change, message, skeleton, local, speed):
+    with pytest.raises(ValueError, match=f"rotations: {message}"):
+        convert(skeleton, change(local))

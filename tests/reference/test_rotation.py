@@ -1,0 +1,175 @@
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reference import rotation
+
+# Products of unit quaternions round to a few eps; 32 leaves room for a dozen operations.
+ROUNDING = 32 * np.finfo(float).eps
+
+
+@pytest.fixture
+def a(rng):
+    return rotation.random(rng, 50)
+
+
+@pytest.fixture
+def b(rng):
+    return rotation.random(rng, 50)
+
+
+@pytest.fixture
+def v(rng):
+    return rng.standard_normal((50, 3))
+
+
+def assert_close(x, y, tolerance=ROUNDING):
+    np.testing.assert_allclose(x, y, rtol=0, atol=tolerance)
+
+
+def test_i_j_k_multiply_as_hamilton_wrote():
+    one, i, j, k = np.eye(4)
+    assert_close(rotation.multiply(i, j), k)
+    assert_close(rotation.multiply(j, k), i)
+    assert_close(rotation.multiply(k, i), j)
+    assert_close(rotation.multiply(i, i), -one)
+
+
+def test_a_quarter_turn_about_z_takes_x_to_y():
+    q = rotation.exponential([0.0, 0.0, np.pi / 2])
+    assert_close(rotation.rotate(q, [1.0, 0.0, 0.0]), [0.0, 1.0, 0.0])
+
+
+def test_a_product_turns_by_its_right_factor_first(a, b, v):
+    one_by_one = rotation.rotate(a, rotation.rotate(b, v))
+    assert_close(rotation.rotate(rotation.multiply(a, b), v), one_by_one, 4 * ROUNDING)
+
+
+def test_the_product_is_associative(a, b):
+    c = a[::-1]
+    left = rotation.multiply(rotation.multiply(a, b), c)
+    assert_close(left, rotation.multiply(a, rotation.multiply(b, c)))
+
+
+def test_the_conjugate_undoes_the_rotation(a):
+    assert_close(rotation.multiply(a, rotation.conjugate(a)), rotation.identity(50))
+
+
+def test_rotation_keeps_lengths_and_angles(a, v):
+    turned = rotation.rotate(a, v)
+    np.testing.assert_allclose(np.vecdot(turned, turned), np.vecdot(v, v), rtol=ROUNDING)
+    assert_close(np.vecdot(turned[1:], rotation.rotate(a[1:], v[:-1])), np.vecdot(v[1:], v[:-1]),
+                 1e-14)  # fmt: skip
+
+
+def test_matrices_rotate_as_quaternions_do(a, v):
+    R = rotation.to_matrix(a)
+    assert_close(np.einsum("nij,nj->ni", R, v), rotation.rotate(a, v), 4 * ROUNDING)
+    assert_close(np.linalg.det(R), np.ones(50))
+
+
+def test_a_quaternion_comes_back_from_its_matrix(a):
+    back = rotation.from_matrix(rotation.to_matrix(a))
+    assert (back[:, 0] >= 0).all()
+    assert_close(np.abs(np.vecdot(back, a)), np.ones(50))
+
+
+@pytest.mark.parametrize("axis", np.eye(3))
+def test_half_turns_come_back_from_their_matrices(axis):
+    R = 2 * np.outer(axis, axis) - np.eye(3)
+    assert_close(np.abs(rotation.from_matrix(R)[1:]), axis)
+
+
+@pytest.mark.parametrize("matrix", [-np.eye(3), 2 * np.eye(3), np.ones((3, 3))])
+def test_what_is_no_rotation_matrix_is_refused(matrix):
+    with pytest.raises(ValueError, match="matrix: expected rotation matrices"):
+        rotation.from_matrix(matrix)
+
+
+def test_between_takes_one_direction_to_the_other_by_the_shortest_arc(v, speed):
+    w = v[::-1] * 3.0
+    q = rotation.between(v, w)
+    u = v / np.linalg.norm(v, axis=-1, keepdims=True)
+    assert_close(rotation.rotate(q, u), w / np.linalg.norm(w, axis=-1, keepdims=True))
+    assert_close(np.vecdot(q[:, 1:], u), np.zeros(50))
+    assert_close(np.linalg.norm(q, axis=-1), np.ones(50))
+
+
+@pytest.mark.parametrize("direction", [*np.eye(3), [1.0, 2.0, 3.0], [1e-9, 1.0, 0.0]])
+def test_between_opposites_is_a_half_turn_about_a_fixed_axis(direction, speed):
+    direction = np.asarray(direction)
+    q = rotation.between(direction, -direction)
+    assert_close(q[0], 0.0)
+    assert_close(rotation.rotate(q, direction), -direction, 4 * ROUNDING)
+    assert (rotation.between(direction, -2 * direction) == q).all()
+
+
+@pytest.mark.parametrize("angle", [1e-12, 1e-8, 1e-4, 3.0, np.pi - 1e-4, np.pi - 1e-7])
+def test_between_is_accurate_near_zero_and_near_opposite(angle, speed):
+    end = [np.cos(angle), np.sin(angle), 0.0]
+    q = rotation.between([1.0, 0.0, 0.0], end)
+    assert q[3] == pytest.approx(np.sin(angle / 2), rel=1e-8)
+    assert_close(rotation.rotate(q, [1.0, 0.0, 0.0]), end, 2e-9)
+
+
+def test_between_without_a_direction_is_the_identity(speed):
+    zero, x = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]
+    assert_close(rotation.between([zero, x, zero], [x, zero, zero]), rotation.identity(3))
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3))
+def test_the_logarithm_undoes_the_exponential(v):
+    v = np.array(v)
+    length = np.linalg.norm(v)
+    if length <= np.pi:
+        assert_close(rotation.logarithm(rotation.exponential(v)), v, 1e-13)
+    else:
+        shorter = v * (1.0 - 2 * np.pi / length)
+        back = rotation.logarithm(rotation.exponential(v))
+        if length < 2 * np.pi:
+            assert_close(back, shorter, 1e-13)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 1e-8, 1e-7, 0.1, 3.1])
+def test_the_exponential_agrees_with_extended_precision(angle, speed):
+    with mpmath.workdps(40):
+        w, x = float(mpmath.cos(mpmath.mpf(angle) / 2)), float(mpmath.sin(mpmath.mpf(angle) / 2))
+    np.testing.assert_allclose(
+        rotation.exponential([angle, 0.0, 0.0]), [w, x, 0.0, 0.0], rtol=ROUNDING
+    )
+
+
+def test_the_angle_between_rotations_is_that_of_the_turn(a):
+    turn = rotation.exponential([0.0, 0.7, 0.0])
+    assert_close(rotation.angle(a, rotation.multiply(a, turn)), np.full(50, 0.7), 1e-14)
+    assert_close(rotation.angle(a, -a), np.zeros(50), 1e-7)
+
+
+def test_lengths_within_a_millionth_are_normalised_and_others_refused():
+    q = rotation.unit("q", [1.0 + 5e-7, 0.0, 0.0, 0.0])
+    assert q[0] == 1.0
+    with pytest.raises(ValueError, match=r"q: expected unit quaternions .* length 1.000002"):
+        rotation.unit("q", [1.0 + 2e-6, 0.0, 0.0, 0.0])
+
+
+def test_leading_axes_broadcast(a, v):
+    many = rotation.rotate(a[:, None], v[None, :7])
+    assert many.shape == (50, 7, 3)
+    assert_close(many[3, 5], rotation.rotate(a[3], v[5]))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: rotation.multiply([1.0, 0.0], [1.0, 0.0, 0.0, 0.0]), "a: expected shape"),
+        (lambda: rotation.rotate([1.0, 0.0, 0.0, 0.0], [np.nan, 0.0, 0.0]), "v: expected finite"),
+        (lambda: rotation.between([1.0], [1.0, 0.0, 0.0]), "a: expected shape"),
+        (lambda: rotation.exponential([1.0]), "v: expected shape"),
+        (lambda: rotation.logarithm([0.0, 0.0, 0.0, 0.0]), "q: expected unit quaternions"),
+    ],
+)
+def test_bad_input_is_named(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+
+from reference import Skeleton
+
+FORK = {"parents": [-1, 0, 1, 1, 0], "offsets": np.arange(15.0).reshape(5, 3)}
+
+
+@pytest.mark.parametrize(
+    ("parents", "offsets", "names", "message"),
+    [
+        ([-1, 0], np.zeros((2, 2)), None, r"offsets: expected shape \(joint, 3\), got \(2, 2\)"),
+        ([], np.zeros((0, 3)), None, "offsets: expected at least one joint"),
+        ([-1, 0], [[0, 0, 0], [0, np.nan, 0]], None, "offsets: expected finite numbers, got nan"),
+        ([-1, 0], [[0, 0, 0], [0, 1e80, 0]], None, r"offsets: expected .* at most 1e\+75"),
+        ([-1], np.zeros((2, 3)), None, r"parents: expected shape \(2,\), got \(1,\)"),
+        ([-1.0, 0.0], np.zeros((2, 3)), None, "parents: expected integer indices, got float64"),
+        ([0, 0], np.zeros((2, 3)), None, r"parents: expected one root \(parent -1\), got 0"),
+        ([-1, -1], np.zeros((2, 3)), None, r"parents: expected one root \(parent -1\), got 2"),
+        ([-1, 5], np.zeros((2, 3)), None, "parents: expected indices from -1 to 1, got 5"),
+        ([-1, 2, 0], np.zeros((3, 3)), None, "parent before its child, got parent 2 for joint 1"),
+        ([-1, 1], np.zeros((2, 3)), None, "parent before its child, got parent 1 for joint 1"),
+        ([-1, 0], np.zeros((2, 3)), ["a"], "names: expected 2 names, one a joint, got 1"),
+        ([-1, 0], np.zeros((2, 3)), ["a", "a"], "names: expected distinct names, got 'a'"),
+        ([-1, 0], np.zeros((2, 3)), ["a", ""], "names: expected 2 non-empty strings"),
+        ([-1, 0], np.zeros((2, 3)), "ab", "names: expected 2 non-empty strings"),
+    ],
+)
+def test_what_is_no_tree_is_refused_and_named(parents, offsets, names, message):
+    with pytest.raises(ValueError, match=message):
+        Skeleton(parents, offsets, names)
+
+
+def test_a_skeleton_owns_what_it_shows():
+    offsets = np.zeros((2, 3))
+    skeleton = Skeleton([-1, 0], offsets)
+    offsets[1] = 1.0
+    assert (skeleton.offsets == 0).all()
+    for shown in (skeleton.offsets, skeleton.parents):
+        with pytest.raises(ValueError, match="read-only"):
+            shown[0] = 1
+
+
+def test_the_path_runs_from_the_root_to_the_effector():
+    skeleton = Skeleton(**FORK)
+    assert skeleton.path(3).tolist() == [0, 1, 3]
+    assert skeleton.path("joint4").tolist() == [0, 4]
+    assert skeleton.path(0).tolist() == [0]
+    assert skeleton.path().tolist() == [0, 4]
+
+
+def test_the_reach_is_the_links_total_length():
+    skeleton = Skeleton([-1, 0, 1], [[5, 5, 5], [0, 3, 4], [1, 0, 0]])
+    assert skeleton.reach() == 6.0
+    assert skeleton.reach(0) == 0.0
+    assert skeleton.link_lengths.tolist() == [0.0, 5.0, 1.0]
+
+
+@pytest.mark.parametrize("joint", [5, -6, "arm", 1.0, True, None])
+def test_an_unknown_joint_is_refused(joint):
+    with pytest.raises(ValueError, match="joint: expected"):
+        Skeleton(**FORK).index(joint)
