@@ -62,9 +62,8 @@ def solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained,
     rotations = np.empty((len(tree.parents), 4))
     for i in range(len(targets)):
         local = solved.local[i]
-        if chained and i > 0:
-            local[:] = solved.local[i - 1]
-        elif not normalise(starts[i % len(starts)], local):
+        start = solved.local[i - 1] if chained and i > 0 else starts[i % len(starts)]
+        if not normalise(start, local):
             return i % len(starts)
         target = vector_at(targets, i)
         history = solved.history[i % len(solved.history)]
