@@ -3,25 +3,36 @@
 from . import rotation, scenes
 from .compiled import speed
 from .curve import curves, resample
-from .inverse_kinematics import IK_SOLVERS, IKSolution, Outcome, Target, solve_ik
+from .explicit import runge_kutta, symplectic_euler
+from .implicit_euler import STEP_SOLVERS, ImplicitEuler, StepResult
+from .inverse_kinematics import IK_SOLVERS, IKSolution, Target, solve_ik
 from .kinematics import forward_kinematics, local_from_global
+from .mass_spring import MassSpring, State
+from .outcome import Outcome
 from .skeleton import Pose, Skeleton
 from .tracking import track
 
 __all__ = [
     "IK_SOLVERS",
+    "STEP_SOLVERS",
     "IKSolution",
+    "ImplicitEuler",
+    "MassSpring",
     "Outcome",
     "Pose",
     "Skeleton",
+    "State",
+    "StepResult",
     "Target",
     "curves",
     "forward_kinematics",
     "local_from_global",
     "resample",
     "rotation",
+    "runge_kutta",
     "scenes",
     "solve_ik",
     "speed",
+    "symplectic_euler",
     "track",
 ]

@@ -1,9 +1,10 @@
-"""Skeletons and poses for the kinematics tests."""
+"""Skeletons and poses for the kinematics tests, and a network for the mass-spring tests."""
 
 import numpy as np
 import pytest
 
 from reference import Skeleton, rotation
+from reference.mass_spring import MassSpring, State
 
 
 def random_tree(rng, joints, branching=True):
@@ -24,3 +25,38 @@ def skeleton(request, rng):
 def local(rng, skeleton):
     """Return a random pose of the skeleton."""
     return rotation.random(rng, skeleton.joint_count)
+
+
+def rebuilt(system, **changes):
+    """Return the same system with some arguments changed."""
+    names = ["masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity"]
+    return MassSpring(**{name: changes.get(name, getattr(system, name)) for name in names})
+
+
+@pytest.fixture
+def altered():
+    """Return the function that rebuilds a mass-spring system with some arguments changed."""
+    return rebuilt
+
+
+@pytest.fixture
+def network(rng):
+    """Return seven unequal particles, one pinned, joined by damped springs, and a moving state.
+
+    Springs are stretched and compressed by up to a half, so that the geometric stiffness has both
+    signs; none is near length zero, where the energy has no derivatives.
+    """
+    springs = np.array([(i, j) for i in range(7) for j in range(i) if (i * j) % 4 != 3])
+    corners = np.array([[i % 2, i // 2 % 2, i // 4] for i in range(7)], dtype=float)
+    x = corners + rng.uniform(-0.2, 0.2, (7, 3))
+    lengths = np.linalg.norm(x[springs[:, 0]] - x[springs[:, 1]], axis=1)
+    system = MassSpring(
+        masses=rng.uniform(0.5, 2.0, 7),
+        springs=springs,
+        rest_lengths=lengths * rng.uniform(0.5, 1.5, len(springs)),
+        stiffnesses=rng.uniform(10.0, 100.0, len(springs)),
+        dampings=rng.uniform(0.1, 1.0, len(springs)),
+        pinned=[2],
+        gravity=(0.3, -9.81, 0.2),
+    )
+    return system, State(x, rng.standard_normal((7, 3)))

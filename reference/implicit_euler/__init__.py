@@ -1,0 +1,189 @@
+"""Implicit Euler: one definition of the step in `objective`, one file for each way to solve it."""
+
+from collections.abc import Iterator
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import FloatArray, choice, frozen, integer, number
+from ..mass_spring import MassSpring, State
+from ..outcome import Outcome
+from .gauss_newton import GaussNewton
+from .local_global import LocalGlobal
+from .newton import Newton
+from .objective import Iterate, Objective, effective_stiffnesses
+
+
+class StepSolver(Protocol):
+    """A way to minimise g, prepared for one system and one step length."""
+
+    default_iterations: int
+
+    def __init__(self, system: MassSpring, h: float) -> None:
+        """Prepare what stays the same from step to step."""
+
+    def iterates(self, objective: Objective) -> Iterator[Iterate]:
+        """Yield the start, then the iterate after each iteration, without end.
+
+        A solver that can do no more yields the very same iterate again.
+        """
+        ...
+
+
+STEP_SOLVERS: dict[str, type[StepSolver]] = {
+    "local_global": LocalGlobal,
+    "newton": Newton,
+    "gauss_newton": GaussNewton,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class StepResult:
+    """One step of implicit Euler and how well it was solved.
+
+    Attributes:
+        state: positions x and velocities (x - x_n) / h after the step.
+        residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles; infinity if the
+            very start overflowed, and then the state is the one before the step.
+        iterations: how many were run.
+        outcome: how the solve ended.
+        at_floor: whether |grad g(x)| is within what rounding can leave of it.
+        history: the residual before and after each iteration, shape (iterations + 1,).
+        objectives: g before and after each iteration, shape (iterations + 1,) [kg m²].
+    """
+
+    state: State
+    residual: float
+    iterations: int
+    outcome: Outcome
+    at_floor: bool
+    history: FloatArray
+    objectives: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ImplicitEuler:
+    """Steps of implicit Euler, velocities and positions at their ends: M v' = M v + h f(x').
+
+    Attributes:
+        system: the system that steps.
+        h: the step [s].
+        solver: one of `STEP_SOLVERS`.
+        tolerance: the residual at which a step is solved; at 0 all iterations are run.
+        max_iterations: the most iterations in a step; None means the solver's own number.
+    """
+
+    system: MassSpring
+    _: KW_ONLY
+    h: float = 1 / 60
+    solver: str = "newton"
+    tolerance: float = 1e-10
+    max_iterations: int | None = None
+    _solver: StepSolver = field(init=False, repr=False)
+    _limit: int = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the settings and let the solver prepare itself.
+
+        Raises:
+            ValueError: naming the setting, if one is out of range or unknown.
+        """
+        if not isinstance(self.system, MassSpring):
+            raise ValueError(f"system: expected a MassSpring, got {type(self.system).__name__}")
+        object.__setattr__(self, "h", number("h", self.h, above=0))
+        object.__setattr__(self, "tolerance", number("tolerance", self.tolerance, least=0))
+        method = STEP_SOLVERS[choice("solver", self.solver, STEP_SOLVERS)]
+        limit = method.default_iterations if self.max_iterations is None else self.max_iterations
+        object.__setattr__(self, "_limit", integer("max_iterations", limit, least=0))
+        with np.errstate(over="ignore"):
+            if not np.isfinite(self.h * self.h * effective_stiffnesses(self.system, self.h)).all():
+                raise ValueError(f"h: expected h² k + h c to be finite, got h = {self.h}")
+        object.__setattr__(self, "_solver", method(self.system, self.h))
+
+    def step(self, state: State, external_forces: ArrayLike | None = None) -> StepResult:
+        """Return the state one step later and how well the step was solved.
+
+        `external_forces` [N], shape (particle, 3), act besides gravity, and stay through the step.
+
+        Raises:
+            ValueError: if the state has another number of particles, or the external forces have
+                another shape or are not finite.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):  # overflow is an outcome here
+            objective = self.objective(state, external_forces)
+            last, outcome, history, objectives = self._solve(objective)
+            return _result(state, objective, last, outcome, history, objectives)
+
+    def objective(self, state: State, external_forces: ArrayLike | None = None) -> Objective:
+        """Return g of the step from this state.
+
+        Raises:
+            ValueError: as for `step`.
+        """
+        return Objective(self.system, state, self.h, external_forces)
+
+    def iterates(self, state: State, external_forces: ArrayLike | None = None) -> Iterator[Iterate]:
+        """Yield the solver's start and the iterate after each iteration, without end.
+
+        `step` takes the same ones and stops by tolerance and max_iterations.
+
+        Raises:
+            ValueError: as for `step`.
+        """
+        return self._solver.iterates(self.objective(state, external_forces))
+
+    def _solve(
+        self, objective: Objective
+    ) -> tuple[Iterate | None, Outcome, list[float], list[float]]:
+        """Return the last finite iterate, the outcome, and residual and g of each iterate."""
+        last: Iterate | None = None
+        residuals: list[float] = []
+        values: list[float] = []
+        if not objective.start.finite:
+            return last, Outcome.DIVERGED, residuals, values
+        for iterate in self._solver.iterates(objective):
+            if not iterate.finite:
+                break
+            residuals.append(objective.residual(iterate))
+            values.append(iterate.value)
+            stuck, last = iterate is last, iterate
+            outcome = self._outcome(iterate, residuals, stuck)
+            if outcome is not None:
+                return last, outcome, residuals, values
+        return last, Outcome.DIVERGED, residuals, values
+
+    def _outcome(self, iterate: Iterate, residuals: list[float], stuck: bool) -> Outcome | None:
+        """Return how the solve ends with this iterate, or None if it goes on."""
+        final = len(residuals) > self._limit
+        if self.tolerance > 0 or final:
+            if iterate.at_floor or residuals[-1] <= self.tolerance:
+                return Outcome.CONVERGED
+            if stuck:
+                return Outcome.STALLED
+        return Outcome.ITERATION_LIMIT if final else None
+
+
+def _result(
+    before: State,
+    objective: Objective,
+    last: Iterate | None,
+    outcome: Outcome,
+    residuals: list[float],
+    values: list[float],
+) -> StepResult:
+    if last is not None:
+        velocities = (last.positions - objective.x_n) / objective.h
+        if np.isfinite(velocities).all():
+            return StepResult(
+                state=State.of(last.positions, velocities),
+                residual=residuals[-1],
+                iterations=len(residuals) - 1,
+                outcome=outcome,
+                at_floor=last.at_floor,
+                history=frozen(np.array(residuals)),
+                objectives=frozen(np.array(values)),
+            )
+    nothing = frozen(np.array([np.inf]))
+    return StepResult(before, np.inf, 0, Outcome.DIVERGED, False, nothing, nothing)

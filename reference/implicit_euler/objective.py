@@ -1,0 +1,275 @@
+"""g, whose minimum is the implicit Euler step, with its gradient, Hessian and rounding error.
+
+Implicit Euler asks for M (x - y) = h² f(x), where y = x_n + h v_n. With f = -grad E that is
+grad g(x) = 0 for (Liu et al. 2013)
+
+    g(x) = 1/2 (x - y)' M (x - y) + h² E(x),    E(x) = sum of k/2 (l(x) - r)² - f_ext' x,
+
+where f_ext is gravity and what else is given. A damper adds c/(2h) (l(x) - l_n)² to E, so that
+a damped spring acts through the step as a spring of stiffness k + c/h and of rest length
+(k r + c l_n/h) / (k + c/h). Pinned particles are no variables: y leaves them at x_n, and their rows
+of the gradient are zero.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike
+
+from ..arguments import FloatArray, array
+from ..compiled import TwoSpeeds
+from ..mass_spring import (
+    MassSpring,
+    State,
+    constant_forces,
+    derivation,
+    motion,
+    rest_vectors,
+    spring_blocks,
+    spring_frame,
+)
+from ..quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
+
+# Rounding errors in the gradient are a few units in the last place of the terms that it sums.
+ROUNDING = 64 * np.finfo(float).eps
+
+
+class Iterate(NamedTuple):
+    """One point on the way to the minimum of g.
+
+    Attributes:
+        positions: x, shape (particle, 3) [m].
+        gradient: grad g(x), shape (particle, 3) [kg m], zero at the pins.
+        value: g(x) [kg m²].
+        gradient_norm: |grad g(x)|.
+        floor: what rounding alone can leave of |grad g|.
+        value_floor: how far rounding alone can move g(x).
+    """
+
+    positions: FloatArray
+    gradient: FloatArray
+    value: float
+    gradient_norm: float
+    floor: float
+    value_floor: float
+
+    @property
+    def finite(self) -> bool:
+        """Whether neither g nor its gradient has overflowed."""
+        return math.isfinite(self.value + self.gradient_norm + self.floor)
+
+    @property
+    def at_floor(self) -> bool:
+        """Whether rounding alone may have left this gradient."""
+        return self.gradient_norm <= self.floor
+
+
+class Objective:
+    """g of one step, in SI units.
+
+    Attributes:
+        system: the system that steps.
+        h: the step [s].
+        x_n: the positions before the step, shape (particle, 3).
+        y: where the particles would go by themselves, shape (particle, 3); the pins stay.
+        external: gravity and other given forces [N], shape (particle, 3).
+        effective: the system with its dampers made into springs, as above.
+    """
+
+    def __init__(
+        self,
+        system: MassSpring,
+        state: State,
+        h: float,
+        external_forces: ArrayLike | None = None,
+    ) -> None:
+        """Set up the step of length h from a state.
+
+        Raises:
+            ValueError: if the state has another number of particles, or the external forces [N]
+                have a shape other than (particle, 3) or are not finite.
+        """
+        self.system = system
+        self.h = h
+        self.x_n, v_n = motion(system, state)
+        self.y = self.x_n + h * v_n
+        self.external = constant_forces(system, external_forces)
+        self.effective, self._constant = _effective(system, self.x_n, h)
+        arrays = self.effective.arrays
+        self._arguments = (
+            self.y, self.external, h, self._constant, arrays.masses, arrays.springs,
+            arrays.rest_lengths, arrays.stiffnesses, arrays.pinned,
+        )  # fmt: skip
+        self.start = self.evaluate(self.y)
+
+    def evaluate(self, positions: FloatArray) -> Iterate:
+        """Return g, its gradient and their rounding errors at unchecked positions."""
+        return Iterate(positions, *_evaluate(positions, *self._arguments))
+
+    def residual(self, iterate: Iterate) -> float:
+        """Return |grad g(x)| / max(|grad g(y)|, floor)."""
+        if iterate.gradient_norm == 0.0:
+            return 0.0
+        return iterate.gradient_norm / max(self.start.gradient_norm, iterate.floor)
+
+    def value(self, positions: ArrayLike) -> float:
+        """Return g(x) [kg m²]; the pins contribute what does not change.
+
+        Raises:
+            ValueError: if the positions have a wrong shape or are not finite.
+        """
+        return self.evaluate(self._positions(positions)).value
+
+    def gradient(self, positions: ArrayLike) -> FloatArray:
+        """Return grad g(x) = M (x - y) - h² f(x) [kg m], shape (particle, 3), zero at the pins.
+
+        Raises:
+            ValueError: if the positions have a wrong shape or are not finite.
+        """
+        return self.evaluate(self._positions(positions)).gradient
+
+    def hessian(self, positions: ArrayLike, *, geometric: bool = True) -> Any:
+        """Return M + h² K [kg], sparse (3 particle, 3 particle); an identity at the pins.
+
+        K is the stiffness matrix at x, exact, or without its geometric terms (Gauss-Newton).
+
+        Raises:
+            ValueError: if the positions have a wrong shape or are not finite.
+        """
+        x = self._positions(positions)
+        blocks = spring_blocks(self.effective, x, geometric=geometric)
+        stiffness = self.system.free_blocks.matrix(self.h * self.h * blocks)
+        return self.system.free_mass_matrix + stiffness
+
+    def quadratic_form(self, positions: ArrayLike, d: ArrayLike) -> float:
+        """Return what g becomes when each spring's vector at rest length is held at d, (spring, 3).
+
+        1/2 x' (M + h² L) x - h² x' J d - x' (M y + h² f_ext) + constant (Liu et al. 2013), with
+        L and J of the effective springs. It is g(x) if d is optimal, `rest_vectors(effective, x)`,
+        and never less than g(x).
+
+        Raises:
+            ValueError: if the positions or d have a wrong shape or are not finite.
+        """
+        x, y, hh = self._positions(positions), self.y, self.h * self.h
+        d = array("d", d, len(self.system.springs), 3)
+        M = scipy.sparse.diags_array(self.system.masses)
+        _, _, L, J = derivation(self.effective)
+        stored = 0.5 * np.sum(self.effective.stiffnesses[:, None] * d**2) + self._constant
+        constant = 0.5 * np.sum(y * (M @ y)) + hh * stored
+        linear = hh * (J @ d) + M @ y + hh * self.external
+        return float(0.5 * np.sum(x * ((M + hh * L) @ x)) - np.sum(x * linear) + constant)
+
+    def rest_vectors(self, positions: ArrayLike) -> FloatArray:
+        """Return the optimal d at x, of the effective springs, shape (spring, 3) [m].
+
+        Raises:
+            ValueError: if the positions have a wrong shape or are not finite.
+        """
+        return rest_vectors(self.effective, positions)
+
+    def _positions(self, positions: ArrayLike) -> FloatArray:
+        return array("positions", positions, self.system.particle_count, 3)
+
+
+def global_matrix(system: MassSpring, h: float) -> Any:
+    """Return M + h² L of the effective springs [kg], sparse (particle, particle).
+
+    It is the Hessian of g with d held, the same for x, y and z and for all steps of length h. The
+    pins are eliminated: their rows and columns are those of the identity.
+    """
+    A = system.free_incidence
+    K = scipy.sparse.diags_array(effective_stiffnesses(system, h))
+    M = scipy.sparse.diags_array(system.free_masses)
+    return (M + h * h * (A @ K @ A.T)).tocsc()
+
+
+def effective_stiffnesses(system: MassSpring, h: float) -> FloatArray:
+    """Return k + c/h, shape (spring,) [N/m]."""
+    return system.stiffnesses + system.dampings / h
+
+
+def _effective(system: MassSpring, x_n: FloatArray, h: float) -> tuple[MassSpring, float]:
+    """Return the system with dampers made into springs, and the energy that this leaves out."""
+    if not system.damped:
+        return system, 0.0
+    stiffnesses = effective_stiffnesses(system, h)
+    rest_lengths, constant = _blend(x_n, h, stiffnesses, system.arrays)
+    return system.with_springs(rest_lengths, stiffnesses), constant
+
+
+def blend_dampers(x_n, h, stiffnesses, system):
+    """Return the effective rest lengths, and the constant that completes the square.
+
+    k/2 (l - a)² + b/2 (l - e)² = (k + b)/2 (l - rest)² + k b / (k + b) / 2 (a - e)².
+    """
+    rest_lengths = system.rest_lengths.copy()
+    constant = 0.0
+    for s in range(len(system.springs)):
+        damper, stiffness = system.dampings[s] / h, stiffnesses[s]
+        if damper > 0.0:
+            length, _ = spring_frame(x_n, system.springs[s, 0], system.springs[s, 1])
+            share, gap = damper / stiffness, length - system.rest_lengths[s]
+            rest_lengths[s] += share * gap
+            constant += 0.5 * share * system.stiffnesses[s] * (gap * gap)
+    return rest_lengths, constant
+
+
+def evaluate_objective(
+    x, y, external, h, constant, masses, springs, rest_lengths, stiffnesses, pinned
+):
+    """Return grad g, g, |grad g|, and what rounding can leave of |grad g| and move of g."""
+    gradient, size, reach = np.empty(x.shape), np.empty(len(x)), np.empty(len(x))
+    inertia, inertia_size = add_inertia(x, y, external, h * h, masses, gradient, size, reach)
+    elastic, elastic_size = add_springs(
+        x, h * h, springs, rest_lengths, stiffnesses, gradient, size, reach
+    )
+    for p in pinned:
+        put_vector(gradient, p, (0.0, 0.0, 0.0))
+        size[p] = 0.0
+    squares, size_squares = 0.0, 0.0
+    for i in range(len(x)):
+        squares += dot(vector_at(gradient, i), vector_at(gradient, i))
+        size_squares += size[i] * size[i]
+    value = inertia + elastic + h * h * constant
+    floor, value_floor = math.sqrt(size_squares), inertia_size + elastic_size
+    return gradient, value, math.sqrt(squares), ROUNDING * floor, ROUNDING * value_floor
+
+
+def add_inertia(x, y, external, hh, masses, gradient, size, reach):
+    """Set gradient to M (x - y) - h² f_ext, size to its terms', reach to |x|; return g's share."""
+    value, value_size = 0.0, 0.0
+    for i in range(len(x)):
+        x_i, y_i, f = vector_at(x, i), vector_at(y, i), scale(hh, vector_at(external, i))
+        away = subtract(x_i, y_i)
+        inertia = scale(masses[i], away)
+        put_vector(gradient, i, subtract(inertia, f))
+        reach[i] = norm(x_i)
+        size[i] = masses[i] * (reach[i] + norm(y_i)) + norm(f)
+        value += 0.5 * dot(inertia, away) - dot(f, x_i)
+        value_size += 0.5 * dot(inertia, away) + norm(f) * reach[i]
+    return value, value_size
+
+
+def add_springs(x, hh, springs, rest_lengths, stiffnesses, gradient, size, reach):
+    """Add h² times the springs' gradient, and the size of its terms; return g's share."""
+    value, value_size = 0.0, 0.0
+    for s in range(len(springs)):
+        i, j = springs[s, 0], springs[s, 1]
+        length, u = spring_frame(x, i, j)
+        k, stretch = hh * stiffnesses[s], length - rest_lengths[s]
+        pull = scale(k * stretch, u)
+        put_vector(gradient, i, add(vector_at(gradient, i), pull))
+        put_vector(gradient, j, subtract(vector_at(gradient, j), pull))
+        ends = reach[i] + reach[j]
+        size[i] += k * (ends + rest_lengths[s])
+        size[j] += k * (ends + rest_lengths[s])
+        value += 0.5 * k * stretch * stretch
+        value_size += k * abs(stretch) * (abs(stretch) + ends)
+    return value, value_size
+
+
+_evaluate = TwoSpeeds(evaluate_objective)
+_blend = TwoSpeeds(blend_dampers)

@@ -1,0 +1,91 @@
+"""Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
+
+Two libraries do the work behind one interface: cholespy where it is installed, the faster at
+solving, and SciPy's SuperLU everywhere. Only SuperLU finds an indefinite matrix without printing
+a warning, so whoever expects one (Newton) asks for "scipy".
+"""
+
+import importlib.util
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+import scipy
+
+from .arguments import FloatArray, choice
+
+
+class NotPositiveDefiniteError(ValueError):
+    """The matrix has no Cholesky factor: it is indefinite, singular or not finite."""
+
+
+class Factor(Protocol):
+    """A factorised matrix A."""
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side)."""
+
+
+def factorize(matrix: Any, library: str | None = None) -> Factor:
+    """Return the factor of a sparse symmetric positive definite matrix.
+
+    `library` is "cholespy" or "scipy"; by default cholespy where it is installed.
+
+    Raises:
+        NotPositiveDefiniteError: if the matrix is not positive definite.
+        ValueError: if the library is unknown.
+    """
+    if library is None:
+        library = "cholespy" if importlib.util.find_spec("cholespy") else "scipy"
+    factor = LIBRARIES[choice("library", library, LIBRARIES)]
+    if not np.isfinite(matrix.data).all():
+        raise NotPositiveDefiniteError("matrix: expected finite entries, got NaN or infinity")
+    return factor(matrix)
+
+
+class SuperLUFactor:
+    """P A P' = L U by SuperLU, pivots on the diagonal: all positive only if A is definite."""
+
+    def __init__(self, matrix: Any):
+        try:
+            self._lu = scipy.sparse.linalg.splu(
+                matrix.tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+        except RuntimeError:  # an exact zero pivot
+            raise NotPositiveDefiniteError("matrix: singular, expected positive definite") from None
+        on_diagonal = np.array_equal(self._lu.perm_r, self._lu.perm_c)
+        if not (on_diagonal and self._lu.U.diagonal().min() > 0):
+            raise NotPositiveDefiniteError("matrix: indefinite, expected positive definite")
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        """Return x of A x = b."""
+        return np.ascontiguousarray(self._lu.solve(b))
+
+
+class CholespyFactor:
+    """P A P' = L L' by CHOLMOD through cholespy."""
+
+    def __init__(self, matrix: Any):
+        import cholespy
+
+        entries = matrix.tocoo()
+        rows, columns = entries.row.astype(np.int32), entries.col.astype(np.int32)
+        layout = cholespy.MatrixType.COO
+        try:
+            self._solver = cholespy.CholeskySolverD(
+                matrix.shape[0], rows, columns, entries.data, layout
+            )
+        except ValueError:
+            raise NotPositiveDefiniteError("matrix: expected positive definite") from None
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        """Return x of A x = b."""
+        x = np.empty_like(b, order="C")
+        self._solver.solve(np.ascontiguousarray(b), x)
+        return x
+
+
+LIBRARIES: dict[str, Callable[[Any], Factor]] = {"cholespy": CholespyFactor, "scipy": SuperLUFactor}

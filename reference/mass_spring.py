@@ -1,0 +1,479 @@
+"""Particles joined by damped springs: the model, its state, energies, forces and their matrices.
+
+A spring from particle i to particle j has length l = |x_i - x_j| and direction
+u = (x_i - x_j) / l. It stores k/2 (l - r)² and pulls i with -(k (l - r) + c (v_i - v_j)·u) u.
+Where its ends coincide it has no direction of its own: u is then (1, 0, 0), as in MuJoCo.
+"""
+
+import functools
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
+
+from .arguments import FloatArray, IndexArray, array, frozen, indices
+from .compiled import TwoSpeeds
+from .quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
+
+BoolArray = NDArray[np.bool_]
+
+
+class SystemArrays(NamedTuple):
+    """What the kernels read of a mass-spring system."""
+
+    masses: FloatArray
+    springs: IndexArray
+    rest_lengths: FloatArray
+    stiffnesses: FloatArray
+    dampings: FloatArray
+    pinned: IndexArray
+    gravity: FloatArray
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class MassSpring:
+    """Particles and the springs between them; positions and velocities are in a `State`.
+
+    Attributes:
+        masses: [kg], shape (particle,).
+        springs: the two particles that each spring joins, shape (spring, 2).
+        rest_lengths: [m], shape (spring,).
+        stiffnesses: [N/m], shape (spring,).
+        dampings: along the springs [N s/m], shape (spring,).
+        pinned: the particles that stay where the state has them, ascending, shape (pinned,);
+            whatever velocity a state gives them counts as zero.
+        free: whether each particle may move, bool, shape (particle,).
+        gravity: acceleration [m/s²], shape (3,).
+        damped: whether any spring is.
+        arrays: what the kernels read; never to be written to.
+    """
+
+    masses: FloatArray
+    springs: IndexArray
+    rest_lengths: FloatArray
+    stiffnesses: FloatArray
+    dampings: FloatArray
+    pinned: IndexArray
+    free: BoolArray
+    gravity: FloatArray
+    damped: bool
+    arrays: SystemArrays
+
+    def __init__(
+        self,
+        masses: ArrayLike,
+        springs: ArrayLike,
+        rest_lengths: ArrayLike,
+        stiffnesses: ArrayLike,
+        dampings: ArrayLike = 0.0,
+        pinned: ArrayLike = (),
+        gravity: ArrayLike = (0.0, -9.81, 0.0),
+    ) -> None:
+        """Check and copy the system; what belongs to springs may be one number for all of them.
+
+        Raises:
+            ValueError: if a shape is wrong, a number is negative or not finite, an index is out of
+                range, a spring joins a particle to itself, or a free particle has no mass.
+        """
+        mass = _masses(masses)
+        ends = _springs(springs, len(mass))
+        self._hold(
+            SystemArrays(
+                mass,
+                ends,
+                _per_spring("rest_lengths", rest_lengths, len(ends)),
+                _per_spring("stiffnesses", stiffnesses, len(ends)),
+                _per_spring("dampings", dampings, len(ends)),
+                np.unique(indices("pinned", pinned, "pinned", least=0, below=len(mass))),
+                array("gravity", gravity, 3).copy(),
+            )
+        )
+        weightless = np.flatnonzero(self.free & (mass == 0))
+        if len(weightless):
+            raise ValueError(
+                f"masses: expected free particles to have mass, got 0 at index {weightless[0]}"
+            )
+
+    def _hold(self, arrays: SystemArrays) -> None:
+        free = np.ones(len(arrays.masses), dtype=bool)
+        free[arrays.pinned] = False
+        shown = {name: frozen(values) for name, values in arrays._asdict().items()}
+        damped = bool(arrays.dampings.any())
+        self.__dict__.update(shown, free=frozen(free), damped=damped, arrays=arrays)
+
+    def with_springs(self, rest_lengths: FloatArray, stiffnesses: FloatArray) -> "MassSpring":
+        """Return the same particles with other, undamped springs between them, unchecked."""
+        system = object.__new__(MassSpring)
+        system._hold(
+            self.arrays._replace(
+                rest_lengths=rest_lengths,
+                stiffnesses=stiffnesses,
+                dampings=np.zeros(len(self.springs)),
+            )
+        )
+        return system
+
+    @property
+    def particle_count(self) -> int:
+        """Number of particles, the pinned ones included."""
+        return len(self.arrays.masses)
+
+    @functools.cached_property
+    def free_incidence(self) -> Any:
+        """The columns A_i with the rows of pinned particles emptied, sparse (particle, spring)."""
+        held = scipy.sparse.diags_array(self.free.astype(float)) @ derivation(self).A
+        held.eliminate_zeros()
+        return held
+
+    @functools.cached_property
+    def free_blocks(self) -> "BlockSum":
+        """The sum over springs in which the rows and columns of pinned particles are empty."""
+        return BlockSum(self.free_incidence)
+
+    @functools.cached_property
+    def free_masses(self) -> FloatArray:
+        """The masses with a one at each pin, shape (particle,): eliminated, not made heavy."""
+        return frozen(np.where(self.free, self.masses, 1.0))
+
+    @functools.cached_property
+    def free_mass_matrix(self) -> Any:
+        """The `free_masses` three times each on a diagonal, sparse (3 particle, 3 particle)."""
+        return scipy.sparse.diags_array(np.repeat(self.free_masses, 3), format="csc")
+
+    def __repr__(self) -> str:
+        counts = self.particle_count, len(self.springs), len(self.pinned)
+        return "MassSpring({} particles, {} springs, {} pinned)".format(*counts)
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class State:
+    """Where the particles are and how they move, at one instant.
+
+    Attributes:
+        positions: [m], shape (particle, 3).
+        velocities: [m/s], shape (particle, 3).
+    """
+
+    positions: FloatArray
+    velocities: FloatArray
+
+    def __init__(self, positions: ArrayLike, velocities: ArrayLike) -> None:
+        """Check and copy both.
+
+        Raises:
+            ValueError: if a shape is wrong or a number is not finite.
+        """
+        x = array("positions", positions, "particle", 3)
+        v = array("velocities", velocities, len(x), 3)
+        self._hold(x.copy(), v.copy())
+
+    def _hold(self, positions: FloatArray, velocities: FloatArray) -> None:
+        self.__dict__.update(positions=frozen(positions), velocities=frozen(velocities))
+
+    @classmethod
+    def of(cls, positions: FloatArray, velocities: FloatArray) -> "State":
+        """Return a state that keeps these very arrays, unchecked."""
+        state = object.__new__(cls)
+        state._hold(positions, velocities)
+        return state
+
+    def __repr__(self) -> str:
+        return f"State({len(self.positions)} particles)"
+
+
+class Derivation(NamedTuple):
+    """The matrices of Liu et al. 2013, sparse, each to be read times the 3 x 3 identity.
+
+    Attributes:
+        A: shape (particle, spring); column A_i is 1 at spring i's first end, -1 at the other.
+        S: shape (spring, spring); column S_i is 1 at spring i.
+        L: the sum of k_i A_i A_i', shape (particle, particle) [N/m].
+        J: the sum of k_i A_i S_i', shape (particle, spring) [N/m].
+    """
+
+    A: Any
+    S: Any
+    L: Any
+    J: Any
+
+
+def derivation(system: MassSpring) -> Derivation:
+    """Return A, S, L and J of the system; pins play no part in them."""
+    n, s = system.particle_count, len(system.springs)
+    signs, starts = np.tile([1.0, -1.0], s), 2 * np.arange(s + 1)
+    A = scipy.sparse.csc_array((signs, system.springs.ravel(), starts), shape=(n, s))
+    S = scipy.sparse.eye_array(s, format="csc")
+    K = scipy.sparse.diags_array(system.stiffnesses, format="csc")
+    return Derivation(A=A, S=S, L=A @ K @ A.T, J=A @ K @ S.T)
+
+
+def rest_vectors(system: MassSpring, positions: ArrayLike) -> FloatArray:
+    """Return d, shape (spring, 3) [m]: d_i = r_i u_i, each spring's vector at its rest length.
+
+    Of all vectors of length r_i it is the nearest to the spring's own (Liu et al. 2013).
+
+    Raises:
+        ValueError: if the positions have a wrong shape or are not finite.
+    """
+    _, u = _frames(system, positions)
+    return system.rest_lengths[:, None] * u
+
+
+def lengths(system: MassSpring, positions: ArrayLike) -> FloatArray:
+    """Return the length of each spring [m], shape (spring,).
+
+    Raises:
+        ValueError: if the positions have a wrong shape or are not finite.
+    """
+    return _frames(system, positions)[0]
+
+
+def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
+    """Return the energy of springs and gravity [J]: sum of k/2 (l - r)² less that of m g·x.
+
+    Raises:
+        ValueError: if the positions have a wrong shape or are not finite.
+    """
+    x = _positions(system, positions)
+    weight = system.masses[:, None] * system.gravity
+    return spring_energy(system, x) - float(np.sum(weight * x))
+
+
+def spring_energy(system: MassSpring, positions: ArrayLike) -> float:
+    """Return the energy of the springs [J]: the sum of k/2 (l - r)².
+
+    Raises:
+        ValueError: if the positions have a wrong shape or are not finite.
+    """
+    stretch = lengths(system, positions) - system.rest_lengths
+    return float(np.sum(0.5 * system.stiffnesses * stretch**2))
+
+
+def kinetic_energy(system: MassSpring, state: State) -> float:
+    """Return the sum of m/2 |v|² [J].
+
+    Raises:
+        ValueError: if the state has another number of particles.
+    """
+    _, v = motion(system, state)
+    return float(np.sum(0.5 * system.masses[:, None] * v**2))
+
+
+def forces(
+    system: MassSpring, state: State, external_forces: ArrayLike | None = None
+) -> FloatArray:
+    """Return the force on each particle [N], shape (particle, 3): springs, dampers, gravity, given.
+
+    At a pinned particle it is what the pin has to hold.
+
+    Raises:
+        ValueError: if the state has another number of particles, or the external forces [N] have
+            a shape other than (particle, 3) or are not finite.
+    """
+    x, v = motion(system, state)
+    return constant_forces(system, external_forces) + _pulls(x, v, system.arrays)
+
+
+def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None) -> FloatArray:
+    """Return gravity and the external forces on each particle [N], shape (particle, 3).
+
+    Raises:
+        ValueError: if the external forces have another shape or are not finite.
+    """
+    weight = system.masses[:, None] * system.gravity
+    if external_forces is None:
+        return weight
+    return weight + array("external_forces", external_forces, system.particle_count, 3)
+
+
+def spring_forces(system: MassSpring, positions: ArrayLike) -> FloatArray:
+    """Return the springs' forces -k (l - r) u at their first ends, the opposite at the other [N].
+
+    Shape (particle, 3).
+
+    Raises:
+        ValueError: if the positions have a wrong shape or are not finite.
+    """
+    x = _positions(system, positions)
+    return _pulls(x, np.zeros_like(x), system.arrays)
+
+
+def damper_forces(system: MassSpring, state: State) -> FloatArray:
+    """Return the dampers' forces -c ((v_i - v_j)·u) u at their first ends [N], (particle, 3).
+
+    Raises:
+        ValueError: if the state has another number of particles.
+    """
+    x, v = motion(system, state)
+    slack = system.arrays._replace(stiffnesses=np.zeros(len(system.springs)))
+    return _pulls(x, v, slack)
+
+
+def stiffness_matrix(system: MassSpring, positions: ArrayLike) -> Any:
+    """Return the exact Hessian of the spring energy [N/m], sparse (3 particle, 3 particle).
+
+    It is the sum of (A_i A_i') x (k u u' + k (1 - r/l) (I - u u')); the second, geometric term is
+    left out where a spring with a rest length has shrunk to a point.
+
+    Raises:
+        ValueError: if the positions have a wrong shape or are not finite.
+    """
+    blocks = spring_blocks(system, _positions(system, positions))
+    return BlockSum(derivation(system).A).matrix(blocks)
+
+
+def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
+    """Return C, sparse (3 particle, 3 particle) [N s/m]: the dampers' forces are -C v.
+
+    It is the sum of (A_i A_i') x c u u'.
+
+    Raises:
+        ValueError: if the positions have a wrong shape or are not finite.
+    """
+    dampers = system.with_springs(system.arrays.rest_lengths, system.arrays.dampings)
+    blocks = spring_blocks(dampers, _positions(system, positions), geometric=False)
+    return BlockSum(derivation(system).A).matrix(blocks)
+
+
+def spring_blocks(
+    system: MassSpring, positions: FloatArray, *, geometric: bool = True
+) -> FloatArray:
+    """Return each spring's 3 x 3 stiffness [N/m], with or without the geometric term, unchecked."""
+    return _blocks(positions, system.arrays, geometric)
+
+
+class BlockSum:
+    """Sums of (A_i A_i') x B_i over the springs, for any symmetric 3 x 3 blocks B_i."""
+
+    def __init__(self, A: Any) -> None:
+        """Prepare for the columns A_i, sparse (particle, spring)."""
+        s = A.shape[1]
+        self._A = scipy.sparse.kron(A, scipy.sparse.eye_array(3), format="csc")
+        self._A_transposed = self._A.T.tocsc()
+        self._rows = np.repeat(np.arange(3 * s).reshape(s, 1, 3), 3, axis=1).ravel()
+        self._starts = np.arange(0, 9 * s + 1, 3)
+
+    def matrix(self, blocks: FloatArray) -> Any:
+        """Return the sum for blocks (spring, 3, 3), sparse CSC (3 particle, 3 particle)."""
+        size = self._A.shape[1]
+        B = scipy.sparse.csc_array((blocks.ravel(), self._rows, self._starts), shape=(size, size))
+        return self._A @ (B @ self._A_transposed)
+
+
+def motion(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
+    """Return positions and velocities of a state of the system, those of the pins zero.
+
+    Raises:
+        ValueError: if it is not a State, or has another number of particles.
+    """
+    if not isinstance(state, State):
+        raise ValueError(f"state: expected a State, got {type(state).__name__}")
+    if len(state.positions) != system.particle_count:
+        expected, got = system.particle_count, len(state.positions)
+        raise ValueError(f"state: expected {expected} particles, got {got}")
+    v = np.array(state.velocities)
+    v[system.pinned] = 0.0
+    return np.array(state.positions), v
+
+
+def spring_pulls(x, v, system):
+    """Return the forces of springs and dampers on each particle, shape (particle, 3)."""
+    total = np.zeros(x.shape)
+    for s in range(len(system.springs)):
+        i, j = system.springs[s, 0], system.springs[s, 1]
+        length, u = spring_frame(x, i, j)
+        rate = dot(subtract(vector_at(v, i), vector_at(v, j)), u)
+        tension = system.stiffnesses[s] * (length - system.rest_lengths[s])
+        pull = scale(tension + system.dampings[s] * rate, u)
+        put_vector(total, i, subtract(vector_at(total, i), pull))
+        put_vector(total, j, add(vector_at(total, j), pull))
+    return total
+
+
+def stiffness_blocks(x, system, geometric):
+    """Return each spring's k u u', with k (1 - r/l) (I - u u') added if geometric."""
+    blocks = np.zeros((len(system.springs), 3, 3))
+    for s in range(len(system.springs)):
+        i, j = system.springs[s, 0], system.springs[s, 1]
+        length, u = spring_frame(x, i, j)
+        k, across = system.stiffnesses[s], 0.0
+        if geometric:
+            across = k * spring_slack(length, system.rest_lengths[s])
+        for a in range(3):
+            blocks[s, a, a] = across
+            for b in range(3):
+                blocks[s, a, b] += (k - across) * (u[a] * u[b])
+    return blocks
+
+
+def spring_slack(length, rest_length):
+    """Return 1 - r/l; where l is 0, 1 without a rest length and 0 with one."""
+    if length > 0.0:
+        return 1.0 - rest_length / length
+    return 1.0 if rest_length == 0.0 else 0.0
+
+
+def spring_frames(x, springs):
+    """Return the length and the direction of every spring, shapes (spring,) and (spring, 3)."""
+    lengths, directions = np.empty(len(springs)), np.empty((len(springs), 3))
+    for s in range(len(springs)):
+        lengths[s], u = spring_frame(x, springs[s, 0], springs[s, 1])
+        put_vector(directions, s, u)
+    return lengths, directions
+
+
+def spring_frame(x, i, j):
+    """Return the length and the direction from particle j to i; (1, 0, 0) where they coincide."""
+    p = subtract(vector_at(x, i), vector_at(x, j))
+    length = norm(p)
+    if length == 0.0:
+        return length, (1.0, 0.0, 0.0)
+    return length, scale(1.0 / length, p)
+
+
+_pulls = TwoSpeeds(spring_pulls)
+_blocks = TwoSpeeds(stiffness_blocks)
+_spring_frames = TwoSpeeds(spring_frames)
+
+
+def _frames(system: MassSpring, positions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    return _spring_frames(_positions(system, positions), system.arrays.springs)
+
+
+def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
+    return array("positions", positions, system.particle_count, 3)
+
+
+def _masses(masses: ArrayLike) -> FloatArray:
+    mass = array("masses", masses, "particle").copy()
+    if len(mass) == 0:
+        raise ValueError("masses: expected at least one particle, got none")
+    return _not_negative("masses", mass)
+
+
+def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:
+    ends = indices("springs", springs, "spring", 2, least=0, below=particle_count)
+    loops = np.flatnonzero(ends[:, 0] == ends[:, 1])
+    if len(loops):
+        raise ValueError(
+            f"springs: expected two different particles, got {ends[loops[0], 0]} twice "
+            f"in spring {loops[0]}"
+        )
+    return ends
+
+
+def _per_spring(name: str, value: ArrayLike, count: int) -> FloatArray:
+    given = array(name, value, "...")
+    if given.ndim == 0:
+        return _not_negative(name, np.full(count, given))
+    return _not_negative(name, array(name, given, count).copy())
+
+
+def _not_negative(name: str, values: FloatArray) -> FloatArray:
+    negative = np.flatnonzero(values < 0)
+    if len(negative):
+        where = negative[0]
+        raise ValueError(f"{name}: expected none below 0, got {values[where]} at index {where}")
+    return values

@@ -1,0 +1,733 @@
+"""Laws of g, of the implicit Euler step and of every way to solve it."""
+
+import dataclasses
+import itertools
+
+import numpy as np
+import pytest
+
+from reference import compiled, rotation, scenes
+from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from reference.implicit_euler.objective import global_matrix
+from reference.mass_spring import (
+    MassSpring,
+    State,
+    damping_matrix,
+    derivation,
+    forces,
+    kinetic_energy,
+    lengths,
+    potential_energy,
+)
+from reference.outcome import Outcome
+
+h = 0.05
+# A central difference is off by NUDGE² times the third derivative and by precision / NUDGE.
+NUDGE = 6e-6
+DIFFERENCE = 1e-8
+
+CONVERGING = ["local_global", "newton"]
+
+
+@pytest.fixture(params=STEP_SOLVERS)
+def solver(request):
+    return request.param
+
+
+@pytest.fixture
+def cloth():
+    """A 5 x 5 cloth with dampers, swinging fast."""
+    system, state = scenes.lab_cloth(size=5, damping=0.2)
+    v = np.cross(state.positions - state.positions[0], [0.3, 0.5, 2.0])
+    return system, State(state.positions, v)
+
+
+def stepped(system, state, solver="newton", external_forces=None, **settings):
+    """Return the result of one step of length h."""
+    return ImplicitEuler(system, **{"h": h, "solver": solver} | settings).step(
+        state, external_forces
+    )
+
+
+def converged(system, state, solver, **settings):
+    """Return the state after a step solved as far as rounding allows."""
+    limit = {"local_global": 3000, "newton": 50, "gauss_newton": 1}[solver]
+    result = stepped(system, state, solver, tolerance=1e-15, max_iterations=limit, **settings)
+    assert result.at_floor or solver == "gauss_newton"
+    return result.state
+
+
+def outer(rng):
+    return rng.standard_normal((7, 3))
+
+
+class TestObjective:
+    @pytest.fixture
+    def problem(self, network, rng):
+        """g of the damped network under outer forces, and a point away from y."""
+        objective = ImplicitEuler(network[0], h=h).objective(network[1], outer(rng))
+        return objective, objective.y + 0.1 * outer(rng)
+
+    def test_value_is_the_derivations_with_dampers_in_e(self, problem, network, rng, speed):
+        objective, x = problem
+        system, state = network
+        y = state.positions + h * state.velocities
+        y[2] = state.positions[2]
+        np.testing.assert_array_equal(objective.y, y)
+        inertia = np.sum(system.masses[:, None] * (x - y) ** 2) / 2
+        moved = lengths(system, x) - lengths(system, state.positions)
+        energy = (
+            np.sum(system.stiffnesses / 2 * (lengths(system, x) - system.rest_lengths) ** 2)
+            + np.sum(system.dampings / (2 * h) * moved**2)
+            - np.sum(objective.external * x)
+        )
+        assert objective.value(x) == pytest.approx(inertia + h * h * energy, rel=1e-14)
+
+    def test_external_forces_are_gravity_and_what_is_given(self, network, rng):
+        system, state = network
+        given = outer(rng)
+        external = ImplicitEuler(system, h=h).objective(state, given).external
+        expected = system.masses[:, None] * system.gravity + given
+        np.testing.assert_array_equal(external, expected)
+
+    def test_gradient_is_the_slope_of_the_value(self, problem, speed):
+        objective, x = problem
+        expected = np.zeros((7, 3))
+        for where in itertools.product(np.flatnonzero(objective.system.free), range(3)):
+            nudge = np.zeros((7, 3))
+            nudge[where] = NUDGE
+            rise = objective.value(x + nudge) - objective.value(x - nudge)
+            expected[where] = rise / (2 * NUDGE)
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(objective.gradient(x), expected, atol=DIFFERENCE * scale)
+
+    def test_hessian_is_the_slope_of_the_gradient_and_the_identity_at_pins(self, problem, speed):
+        objective, x = problem
+        expected = np.zeros((21, 21))
+        for i in range(21):
+            nudge = np.zeros(21)
+            nudge[i] = NUDGE
+            nudge = nudge.reshape(7, 3)
+            rise = objective.gradient(x + nudge) - objective.gradient(x - nudge)
+            expected[i] = rise.ravel() / (2 * NUDGE)
+        expected[6:9] = expected[:, 6:9] = 0
+        expected[6:9, 6:9] = np.eye(3)
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(
+            objective.hessian(x).toarray(), expected, atol=DIFFERENCE * scale
+        )
+
+    def test_without_geometric_terms_the_hessian_is_that_of_linearised_lengths(
+        self, problem, network, speed
+    ):
+        objective, x = problem
+        system, state = network
+        p = derivation(system).A.T @ x
+        u = p / np.linalg.norm(p, axis=1)[:, None]
+        A = derivation(system).A.toarray()
+        jacobian = np.einsum("ps,sc->spc", A, u)
+        jacobian[:, 2] = 0
+        jacobian = jacobian.reshape(-1, 21)
+        k = system.stiffnesses + system.dampings / h
+        masses = np.repeat(np.where(system.free, system.masses, 1.0), 3)
+        expected = np.diag(masses) + h * h * jacobian.T @ (k[:, None] * jacobian)
+        actual = objective.hessian(x, geometric=False).toarray()
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-14 * expected.max())
+
+    def test_quadratic_form_is_g_where_d_is_optimal(self, problem, speed):
+        objective, x = problem
+        form = objective.quadratic_form(x, objective.rest_vectors(x))
+        assert form == pytest.approx(objective.value(x), rel=1e-13)
+
+    def test_quadratic_form_is_above_g_for_any_other_d_of_rest_length(self, problem, rng, speed):
+        objective, x = problem
+        for _ in range(10):
+            d = objective.rest_vectors(x + 0.1 * outer(rng))
+            assert objective.quadratic_form(x, d) > objective.value(x)
+
+    def test_global_matrix_is_the_hessian_of_the_quadratic_form(self, problem, network, rng):
+        objective, x = problem
+        d, direction = objective.rest_vectors(x), outer(rng)
+        direction[2] = 0
+
+        def form(t):
+            return objective.quadratic_form(x + t * direction, d)
+
+        bend = form(1.0) - 2 * form(0.0) + form(-1.0)  # exact for a quadratic
+        Q = global_matrix(network[0], h)
+        assert bend == pytest.approx(np.sum(direction * (Q @ direction)), rel=1e-12)
+        assert (Q[[2]].toarray() == np.eye(7)[2]).all()
+
+    def test_a_wrong_d_is_named(self, problem):
+        with pytest.raises(ValueError, match=r"^d: expected shape"):
+            problem[0].quadratic_form(problem[1], np.zeros((2, 3)))
+
+    @pytest.mark.parametrize("method", ["value", "gradient", "hessian", "rest_vectors"])
+    def test_wrong_positions_are_named(self, problem, method):
+        with pytest.raises(ValueError, match=r"^positions: expected shape \(7, 3\)"):
+            getattr(problem[0], method)(np.zeros((6, 3)))
+
+
+class TestStep:
+    @pytest.mark.parametrize("name", CONVERGING)
+    def test_momentum_balances_the_forces_at_the_end_of_the_step(self, network, rng, speed, name):
+        """M (v' - v) = h f(x'), the dampers pulling with c (l' - l_n) / h."""
+        system, state = network
+        given = outer(rng)
+        after = converged(system, state, name, external_forces=given)
+        x_n, x = state.positions, after.positions
+        still = State(x, np.zeros((7, 3)))
+        p = derivation(system).A.T @ x
+        u = p / np.linalg.norm(p, axis=1)[:, None]
+        rates = (lengths(system, x) - lengths(system, x_n)) / h
+        dampers = -(derivation(system).A @ ((system.dampings * rates)[:, None] * u))
+        gained = system.masses[:, None] * (after.velocities - state.velocities)
+        expected = h * (forces(system, still, given) + dampers)
+        free = system.free
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(gained[free], expected[free], rtol=0, atol=1e-12 * scale)
+
+    def test_velocities_are_the_way_over_the_time(self, network, solver, speed):
+        after = stepped(*network, solver, max_iterations=2).state
+        way = after.positions - network[1].positions
+        np.testing.assert_array_equal(after.velocities, way / h)
+        assert np.abs(way).max() > 0.01
+
+    def test_pins_hold_exactly(self, network, solver, speed):
+        system, state = network
+        after = stepped(system, state, solver, max_iterations=2).state
+        np.testing.assert_array_equal(after.positions[2], state.positions[2])
+        np.testing.assert_array_equal(after.velocities[2], np.zeros(3))
+
+    @pytest.mark.parametrize("name", CONVERGING)
+    def test_the_pin_is_felt_within_the_solve(self, altered, speed, name):
+        """A still pin and one of a billion kilograms are alike, but for a billionth."""
+        system, state = scenes.hanging_rope(particles=5, stiffness=50.0)
+        masses = np.where(system.free, system.masses, 1e9)
+        heavy = altered(system, masses=masses, pinned=(), gravity=(0, 0, 0))
+        pull = np.zeros((5, 3))
+        pull[1:] = [1.0, -2.0, 0.5]
+        held = stepped(altered(system, gravity=(0, 0, 0)), state, name, pull, tolerance=1e-12)
+        loose = stepped(heavy, state, name, pull, tolerance=1e-12)
+        assert np.abs(held.state.velocities).max() > 0.5
+        np.testing.assert_allclose(held.state.positions, loose.state.positions, rtol=0, atol=1e-8)
+
+    @pytest.mark.parametrize("name", CONVERGING)
+    def test_a_damped_spring_is_a_stiffer_spring_of_another_length(
+        self, network, altered, speed, name
+    ):
+        system, state = network
+        k, c = system.stiffnesses, system.dampings
+        l_n = lengths(system, state.positions)
+        stiff = altered(
+            system,
+            stiffnesses=k + c / h,
+            rest_lengths=(k * system.rest_lengths + c * l_n / h) / (k + c / h),
+            dampings=0.0,
+        )
+        one, other = (converged(s, state, name).positions for s in (system, stiff))
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-13)
+        undamped = converged(altered(system, dampings=0.0), state, name).positions
+        assert np.abs(one - undamped).max() > 1e-3
+
+    def test_gauss_newton_is_one_linearised_step(self, network, rng, speed):
+        """(M + h C + h² J'kJ) dv = h (f - h J'kJ v), J the Jacobian of the lengths."""
+        system, state = network
+        given = outer(rng)
+        i, j = system.springs.T
+        u = state.positions[i] - state.positions[j]
+        u /= np.linalg.norm(u, axis=1)[:, None]
+        J = np.einsum("ps,sc->spc", derivation(system).A.toarray(), u).reshape(-1, 21)
+        K = J.T @ (system.stiffnesses[:, None] * J)
+        C = damping_matrix(system, state.positions).toarray()
+        v = np.where(system.free[:, None], state.velocities, 0).ravel()
+        matrix = np.diag(np.repeat(system.masses, 3)) + h * C + h * h * K
+        right = h * (forces(system, state, given).ravel() - h * K @ v)
+        moving = np.repeat(system.free, 3)
+        dv = np.zeros(21)
+        dv[moving] = np.linalg.solve(matrix[np.ix_(moving, moving)], right[moving])
+        after = stepped(system, state, "gauss_newton", given).state
+        assert np.abs(dv).max() > 0.1
+        # Positions of about 1 m round to 1e-16, and velocities are differences of them over h.
+        expected = (v + dv).reshape(7, 3)
+        np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-13)
+
+    def test_one_local_global_iteration_is_the_labs_linear_solve(self, network, rng, speed):
+        """(M + h² L) x = h² J d + M y + h² f_ext over the free particles, d fitted to y."""
+        system, state = network
+        integrator = ImplicitEuler(system, h=h, solver="local_global", max_iterations=1)
+        given = outer(rng)
+        objective = integrator.objective(state, given)
+        _, _, L, J = (matrix.toarray() for matrix in derivation(objective.effective))
+        Q = np.diag(system.masses) + h * h * L
+        b = h * h * (J @ objective.rest_vectors(objective.y) + objective.external)
+        b += system.masses[:, None] * objective.y
+        free, pins = system.free, ~system.free
+        x = state.positions.copy()
+        b -= Q[:, pins] @ x[pins]
+        x[free] = np.linalg.solve(Q[np.ix_(free, free)], b[free])
+        after = integrator.step(state, given).state
+        np.testing.assert_allclose(after.positions, x, rtol=0, atol=1e-14)
+
+    @pytest.mark.parametrize("scene", ["network", "cloth"])
+    def test_local_global_and_newton_meet(self, request, scene):
+        system, state = request.getfixturevalue(scene)
+        one, other = (converged(system, state, name) for name in CONVERGING)
+        assert np.abs(one.positions - state.positions).max() > 0.01
+        # Both gradients are at their floor, 1e-13 of the masses here, and the Hessian is above M/2.
+        np.testing.assert_allclose(one.positions, other.positions, rtol=0, atol=1e-12)
+
+    def test_g_never_grows_in_a_local_global_iteration(self, cloth, speed):
+        integrator = ImplicitEuler(*cloth[:1], h=h, solver="local_global")
+        iterates = list(itertools.islice(integrator.iterates(cloth[1]), 60))
+        for before, after in itertools.pairwise(iterates):
+            assert after.value <= before.value + after.value_floor
+        assert iterates[-1].value < iterates[0].value - 1e-4
+        assert iterates[-1].value_floor < 1e-12
+
+    def test_newton_does_not_let_g_grow(self, cloth):
+        values = stepped(*cloth).objectives
+        assert (np.diff(values) <= 1e-13).all()
+
+    def test_newton_converges_quadratically(self, cloth):
+        residuals = stepped(*cloth).history
+        assert residuals[0] == 1
+        assert residuals[-1] < 1e-10
+        assert len(residuals) <= 6
+        assert residuals[-2] < 10 * residuals[-3] ** 2
+
+    def test_newton_descends_from_a_point_where_g_is_not_convex(self, speed):
+        """A flat cloth squeezed within its plane: the Hessian at y has negative eigenvalues."""
+        system, state = scenes.lab_cloth(size=4, stiffness=1000.0)
+        inwards = State(state.positions, 10 * (state.positions.mean(axis=0) - state.positions))
+        integrator = ImplicitEuler(system, h=h, max_iterations=200)
+        objective = integrator.objective(inwards)
+        assert np.linalg.eigvalsh(objective.hessian(objective.y).toarray())[0] < -0.1
+        result = integrator.step(inwards)
+        assert result.outcome == Outcome.CONVERGED
+        assert (np.diff(result.objectives) <= 1e-12).all()
+        end = objective.hessian(result.state.positions).toarray()
+        assert np.linalg.eigvalsh(end)[0] > 0
+
+
+class TestResidual:
+    def residual(self, system, state, x, given):
+        """Return the residual and the floor by their definition, in extended precision."""
+        wide = np.longdouble
+        m = system.masses.astype(wide)[:, None]
+        x_n, free = state.positions.astype(wide), system.free
+        x = x.astype(wide)
+        y = np.where(free[:, None], x_n + wide(h) * state.velocities.astype(wide), x_n)
+        c = system.dampings.astype(wide) / wide(h)
+        k = system.stiffnesses.astype(wide) + c
+        i, j = system.springs.T
+
+        def length(x):
+            return np.sqrt(np.sum((x[i] - x[j]) ** 2, axis=1))
+
+        r = (system.stiffnesses * system.rest_lengths + c * length(x_n)) / k
+        external = m * system.gravity + given
+
+        def gradient(x):
+            pull = ((k * (length(x) - r)) / length(x))[:, None] * (x[i] - x[j])
+            total = np.zeros_like(x)
+            np.add.at(total, i, pull)
+            np.subtract.at(total, j, pull)
+            return np.sqrt(np.sum((m * (x - y) + h * h * (total - external))[free] ** 2))
+
+        reach = np.sqrt(np.sum(x**2, axis=1))
+        size = m[:, 0] * (reach + np.sqrt(np.sum(y**2, axis=1)))
+        size += h * h * np.sqrt(np.sum(external**2, axis=1))
+        for end in (i, j):
+            np.add.at(size, end, h * h * k * (reach[i] + reach[j] + r))
+        floor = 64 * np.finfo(float).eps * np.sqrt(np.sum(size[free] ** 2))
+        return gradient(x), max(gradient(y), floor), floor
+
+    @pytest.mark.parametrize("iterations", [0, 1, 3])
+    def test_it_is_what_the_definition_says(self, network, rng, speed, solver, iterations):
+        given = outer(rng)
+        result = stepped(*network, solver, given, tolerance=0, max_iterations=iterations)
+        norm, scale, floor = self.residual(*network, result.state.positions, given)
+        # The norm in double precision is off by less than the floor, which is an upper bound.
+        assert result.residual == pytest.approx(float(norm / scale), abs=float(floor / scale))
+        assert result.residual > 1e-12 or solver != "local_global"
+
+    def test_the_floor_is_what_the_definition_says(self, network, rng, speed):
+        given = outer(rng)
+        objective = ImplicitEuler(network[0], h=h).objective(network[1], given)
+        x = network[1].positions + 0.1
+        _, _, floor = self.residual(*network, x, given)
+        assert objective.evaluate(x).floor == pytest.approx(float(floor), rel=1e-14)
+
+    def test_at_the_floor_the_gradient_is_rounding(self, network, rng):
+        given = outer(rng)
+        result = stepped(*network, "newton", given, tolerance=1e-300)
+        norm, _, floor = self.residual(*network, result.state.positions, given)
+        assert result.at_floor
+        assert norm <= 2 * floor
+
+    def test_history_is_the_residual_before_and_after_each_iteration(self, network, solver):
+        system, state = network
+        integrator = ImplicitEuler(system, h=h, solver=solver, tolerance=0, max_iterations=3)
+        result = integrator.step(state)
+        objective = integrator.objective(state)
+        iterates = list(itertools.islice(integrator.iterates(state), 4))
+        assert result.history.tolist() == [objective.residual(x) for x in iterates]
+        assert result.objectives.tolist() == [x.value for x in iterates]
+        assert result.history[-1] == result.residual
+        np.testing.assert_array_equal(iterates[-1].positions, result.state.positions)
+
+
+class TestOutcome:
+    def test_a_start_at_rest_is_converged_after_no_iteration(self, solver, speed):
+        system, state = scenes.hanging_rope(particles=5, gravity=0.0)
+        result = stepped(system, state, solver)
+        assert (result.outcome, result.iterations) == (Outcome.CONVERGED, 0)
+        assert result.residual == 0
+        np.testing.assert_array_equal(result.state.positions, state.positions)
+
+    def test_a_start_at_equilibrium_is_converged_after_no_iteration(self, solver, speed):
+        """Rounding leaves a gradient there, which is all the gradient there is."""
+        system, state = hanging(6)
+        result = stepped(system, state, solver)
+        assert (result.outcome, result.iterations) == (Outcome.CONVERGED, 0)
+        assert result.at_floor
+        assert result.residual <= 1
+
+    @pytest.mark.parametrize("name", CONVERGING)
+    def test_converged_means_within_the_tolerance(self, cloth, name):
+        for tolerance in (1e-2, 1e-5, 1e-8):
+            result = stepped(*cloth, name, tolerance=tolerance)
+            assert result.outcome == Outcome.CONVERGED
+            assert result.residual <= tolerance
+            assert (result.history[:-1] > tolerance).all()
+
+    @pytest.mark.parametrize("count", [0, 1, 7])
+    def test_without_tolerance_all_iterations_are_run(self, network, solver, count):
+        result = stepped(*network, solver, tolerance=0, max_iterations=count)
+        assert result.iterations == count
+        assert len(result.history) == len(result.objectives) == count + 1
+
+    def test_without_tolerance_a_rest_is_iterated_all_the_same(self, solver):
+        system, state = scenes.hanging_rope(particles=5, gravity=0.0)
+        result = stepped(system, state, solver, tolerance=0, max_iterations=4)
+        assert (result.iterations, result.outcome) == (4, Outcome.CONVERGED)
+
+    def test_at_the_limit_the_last_iterate_is_returned(self, cloth):
+        one, two = (
+            stepped(*cloth, "local_global", tolerance=1e-12, max_iterations=n) for n in (1, 2)
+        )
+        assert one.outcome == two.outcome == Outcome.ITERATION_LIMIT
+        assert one.history.tolist() == two.history[:2].tolist()
+        assert two.residual < one.residual
+
+    def test_a_solver_that_repeats_itself_has_stalled(self, cloth, monkeypatch):
+        class Stuck:
+            default_iterations = 50
+
+            def __init__(self, system, h):
+                pass
+
+            def iterates(self, objective):
+                return itertools.repeat(objective.start)
+
+        monkeypatch.setitem(STEP_SOLVERS, "stuck", Stuck)
+        result = stepped(*cloth, "stuck")
+        assert (result.outcome, result.residual) == (Outcome.STALLED, 1)
+        assert stepped(*cloth, "stuck", tolerance=0).iterations == 50
+
+    @pytest.mark.parametrize("bad", [np.nan, np.inf])
+    def test_after_an_overflow_the_last_finite_iterate_is_returned(self, cloth, monkeypatch, bad):
+        class Bursting:
+            default_iterations = 50
+
+            def __init__(self, system, h):
+                pass
+
+            def iterates(self, objective):
+                yield objective.start
+                yield objective.evaluate(objective.y + 0.01)
+                yield objective.evaluate(np.full_like(objective.y, bad))
+
+        monkeypatch.setitem(STEP_SOLVERS, "bursting", Bursting)
+        result = stepped(*cloth, "bursting")
+        assert (result.outcome, result.iterations) == (Outcome.DIVERGED, 1)
+        y = ImplicitEuler(cloth[0], h=h).objective(cloth[1]).y
+        np.testing.assert_array_equal(result.state.positions, y + 0.01)
+        assert np.isfinite(result.history).all()
+
+    @pytest.mark.parametrize(
+        ("positions", "velocities"), [(1e200, 1.0), (1.0, 1e308)], ids=["positions", "velocities"]
+    )
+    def test_a_start_that_overflows_is_returned_unmoved(self, solver, speed, positions, velocities):
+        system = MassSpring([1.0, 2.0], [[0, 1]], 1.0, 100.0)
+        state = State(positions * np.eye(3)[:2], velocities * np.ones((2, 3)))
+        result = stepped(system, state, solver, h=1e3)
+        assert (result.outcome, result.iterations) == (Outcome.DIVERGED, 0)
+        assert result.residual == np.inf
+        np.testing.assert_array_equal(result.state.positions, state.positions)
+
+
+def hanging(particles):
+    """Return a rope in equilibrium, spring i stretched by the weight of what is below it."""
+    system, state = scenes.hanging_rope(particles=particles, mass=0.3, stiffness=40.0)
+    below = np.arange(particles - 1, 0, -1)
+    springs = system.rest_lengths + below * 0.3 * 9.81 / 40.0
+    x = np.zeros((particles, 3))
+    x[1:, 1] = -np.cumsum(springs)
+    return system, State(x, np.zeros((particles, 3)))
+
+
+class TestMotion:
+    def oscillator(self, damping=0.0):
+        """Return a unit mass on a spring of w² = 4 from a pin, stretched by 0.5 m along x."""
+        system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 4.0, damping, pinned=[0], gravity=(0, 0, 0))
+        return system, State([[0, 0, 0], [1.5, 0, 0]], np.zeros((2, 3)))
+
+    def run(self, system, state, steps, **settings):
+        integrator = ImplicitEuler(system, **settings)
+        for _ in range(steps):
+            state = integrator.step(state).state
+        return state
+
+    def test_scalar_spring_loses_energy_by_the_closed_form(self, solver):
+        """E_n / E_0 = (1 + h² w²)^-n: each step divides the phase vector by 1 + i h w."""
+        system, start = self.oscillator()
+        state = self.run(system, start, 100, h=0.1, solver=solver, tolerance=1e-14)
+
+        def energy(state):
+            return potential_energy(system, state.positions) + kinetic_energy(system, state)
+
+        # 100 steps, each off by rounding, 2e-15 of 0.5 m over h.
+        expected = (1 + 0.1**2 * 4.0) ** -100
+        assert energy(state) / energy(start) == pytest.approx(expected, rel=1e-11)
+
+    @pytest.mark.parametrize("damping", [0.0, 0.4])
+    def test_observed_order_is_one(self, solver, damping):
+        system, start = self.oscillator(damping)
+        time, b = 1.3, damping / 2
+        w = np.sqrt(4.0 - b * b)
+        swing = np.cos(w * time) + b / w * np.sin(w * time)
+        exact = 1.0 + 0.5 * np.exp(-b * time) * swing
+        ends = [
+            self.run(system, start, n, h=time / n, solver=solver).positions[1, 0]
+            for n in (50, 100, 200)
+        ]
+        errors = np.abs(np.array(ends) - exact)
+        # The next term of the error bends the slope by a few h w.
+        np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 1, rtol=0, atol=0.1)
+
+    @pytest.mark.parametrize("name", CONVERGING)
+    def test_a_dropped_rope_comes_to_hang_in_equilibrium(self, name):
+        system, expected = hanging(4)
+        _, state = scenes.hanging_rope(particles=4)
+        assert np.abs(state.positions - expected.positions).max() > 0.3
+        end = self.run(system, state, 150, h=1.0, solver=name, tolerance=1e-13)
+        # The slowest mode halves its energy in a step, and what the last residual leaves is 1e-13.
+        np.testing.assert_allclose(end.positions, expected.positions, rtol=0, atol=1e-11)
+
+    def test_damping_slows(self):
+        system, _ = scenes.lab_cloth(size=5)
+        damped, start = scenes.lab_cloth(size=5, damping=2.0)
+        energies = []
+        for model in (system, damped):
+            end = self.run(model, start, 100, h=1 / 60)
+            energies.append(kinetic_energy(model, end) + potential_energy(model, end.positions))
+        assert energies[1] < energies[0] - 0.01
+
+    @pytest.mark.parametrize("factor", [1, 100])
+    def test_newton_solves_every_step_of_the_swinging_lab_cloth(self, factor):
+        system, state = scenes.lab_cloth(stiffness=100.0 * factor)
+        integrator = ImplicitEuler(system)
+        swung = []
+        for _ in range(60):
+            result = integrator.step(state)
+            assert result.outcome == Outcome.CONVERGED
+            assert result.residual <= 1e-10 or result.at_floor
+            assert result.iterations <= 5
+            state = result.state
+            swung.append(np.abs(state.velocities).max())
+        assert max(swung) > 0.2
+
+    def test_a_used_integrator_steps_like_a_fresh_one(self, cloth, solver):
+        system, state = cloth
+        used = ImplicitEuler(system, h=h, solver=solver)
+        middle = used.step(state).state
+        again, fresh = used.step(middle), ImplicitEuler(system, h=h, solver=solver).step(middle)
+        np.testing.assert_array_equal(again.state.positions, fresh.state.positions)
+        np.testing.assert_array_equal(again.history, fresh.history)
+
+
+class TestSymmetries:
+    """Unchanged after two iterations: what holds at every iterate holds at the solution."""
+
+    ROUNDING = 1e-13  # a solve and a gradient away from positions of about 1 m
+
+    def after(self, system, state, solver, given=None, **settings):
+        settings = {"tolerance": 0, "max_iterations": 2} | settings
+        result = stepped(system, state, solver, given, **settings)
+        assert np.abs(result.state.positions - state.positions).max() > 0.01
+        return result.state
+
+    def test_momentum_changes_by_the_outer_forces_alone(self, network, altered, rng, speed, solver):
+        system, state = altered(network[0], pinned=()), network[1]
+        given = outer(rng)
+        after = self.after(system, state, solver, given)
+        mass = system.masses[:, None]
+        gained = np.sum(mass * (after.velocities - state.velocities), axis=0)
+        expected = h * np.sum(mass * system.gravity + given, axis=0)
+        np.testing.assert_allclose(gained, expected, rtol=0, atol=self.ROUNDING / h)
+
+    def test_a_turned_and_moved_world(self, network, altered, rng, speed, solver):
+        system, state = network
+        R = rotation.to_matrix(rotation.random(rng, 1))[0]
+        way = np.array([1.0, -2.0, 3.0])
+        given = outer(rng)
+        turned = altered(system, gravity=R @ system.gravity)
+        moved = State(state.positions @ R.T + way, state.velocities @ R.T)
+        expected = self.after(system, state, solver, given).positions @ R.T + way
+        actual = self.after(turned, moved, solver, given @ R.T).positions
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=self.ROUNDING)
+
+    def test_relabelled_particles(self, network, altered, rng, speed, solver):
+        system, state = network
+        order = rng.permutation(7)
+        place = np.argsort(order)
+        renamed = altered(
+            system,
+            masses=system.masses[order],
+            springs=place[system.springs],
+            pinned=place[system.pinned],
+        )
+        moved = State(state.positions[order], state.velocities[order])
+        given = outer(rng)
+        expected = self.after(system, state, solver, given).positions[order]
+        actual = self.after(renamed, moved, solver, given[order]).positions
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=self.ROUNDING)
+
+    def test_order_and_direction_of_springs(self, network, altered, rng, speed, solver):
+        system, state = network
+        order = rng.permutation(len(system.springs))
+        ends = system.springs[order].copy()
+        ends[::2] = ends[::2, ::-1]
+        names = ("rest_lengths", "stiffnesses", "dampings")
+        per_spring = {name: getattr(system, name)[order] for name in names}
+        shuffled = altered(system, springs=ends, **per_spring)
+        expected = self.after(system, state, solver).positions
+        actual = self.after(shuffled, state, solver).positions
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=self.ROUNDING)
+
+    def test_other_units(self, network, altered, speed, solver):
+        """Powers of two: the same digits come out."""
+        system, state = network
+        metre, kilogram, second = 4.0, 0.5, 8.0
+        scaled = altered(
+            system,
+            masses=system.masses * kilogram,
+            rest_lengths=system.rest_lengths * metre,
+            stiffnesses=system.stiffnesses * kilogram / second**2,
+            dampings=system.dampings * kilogram / second,
+            gravity=system.gravity * metre / second**2,
+        )
+        moved = State(state.positions * metre, state.velocities * metre / second)
+        one = stepped(system, state, solver, max_iterations=2, tolerance=0)
+        other = stepped(scaled, moved, solver, max_iterations=2, tolerance=0, h=h * second)
+        np.testing.assert_allclose(
+            other.state.positions, one.state.positions * metre, rtol=0, atol=self.ROUNDING
+        )
+        np.testing.assert_allclose(other.history, one.history, rtol=0, atol=self.ROUNDING)
+
+    def test_both_speeds_round_alike(self, network, solver):
+        ends = []
+        for name in compiled.SPEEDS:
+            with compiled.speed(name):
+                ends.append(self.after(*network, solver).positions)
+        np.testing.assert_array_equal(*ends)
+
+
+class TestInputs:
+    @pytest.mark.parametrize(
+        ("name", "value", "message"),
+        [
+            ("h", 0.0, "greater than 0"),
+            ("h", -1.0, "greater than 0"),
+            ("h", np.nan, "finite"),
+            ("h", 1e200, "h² k . h c to be finite"),
+            ("h", "fast", "numbers"),
+            ("solver", "simplex", "one of local_global, newton, gauss_newton, got 'simplex'"),
+            ("tolerance", -1e-3, "at least 0"),
+            ("tolerance", np.inf, "finite"),
+            ("max_iterations", -1, "at least 0"),
+            ("max_iterations", 2.5, "integer"),
+            ("max_iterations", True, "integer"),
+        ],
+    )
+    def test_wrong_settings_are_named(self, cloth, name, value, message):
+        with pytest.raises(ValueError, match=f"^{name}: .*{message}"):
+            ImplicitEuler(cloth[0], **{name: value})
+
+    def test_a_wrong_system_is_named(self, cloth):
+        with pytest.raises(ValueError, match=r"^system: expected a MassSpring, got State"):
+            ImplicitEuler(cloth[1])
+
+    def test_a_wrong_state_is_named(self, cloth, network, solver):
+        integrator = ImplicitEuler(cloth[0], solver=solver)
+        with pytest.raises(ValueError, match=r"^state: expected 25 particles, got 7"):
+            integrator.step(network[1])
+        with pytest.raises(ValueError, match=r"^state: expected a State, got ndarray"):
+            integrator.step(cloth[1].positions)
+
+    @pytest.mark.parametrize("given", [np.zeros(3), np.zeros((7, 2)), np.full((25, 3), np.nan)])
+    def test_wrong_external_forces_are_named(self, cloth, given):
+        with pytest.raises(ValueError, match=r"^external_forces: "):
+            ImplicitEuler(cloth[0]).step(cloth[1], given)
+
+    def test_settings_cannot_be_changed_behind_the_factor(self, cloth):
+        integrator = ImplicitEuler(cloth[0])
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            integrator.h = 1.0
+
+    def test_the_state_before_is_left_alone(self, network, solver):
+        system, state = network
+        x, v = state.positions.copy(), state.velocities.copy()
+        stepped(system, state, solver, max_iterations=2)
+        np.testing.assert_array_equal(state.positions, x)
+        np.testing.assert_array_equal(state.velocities, v)
+
+    def test_the_result_is_read_only(self, network, solver):
+        result = stepped(*network, solver)
+        for array in (result.state.positions, result.history, result.objectives):
+            with pytest.raises(ValueError, match="read-only"):
+                array[0] = 0
+
+
+class TestUnusualSystems:
+    def test_particles_without_springs_fall_freely(self, solver, speed):
+        system = MassSpring([1.0, 2.0], np.empty((0, 2)), 1.0, 1.0, gravity=(0, -10, 0))
+        state = State(np.zeros((2, 3)), [[1.0, 0, 0], [0, 0, 0]])
+        after = stepped(system, state, solver).state
+        expected = [[1.0, -0.5, 0], [0, -0.5, 0]]
+        np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-15)
+
+    def test_a_system_that_is_all_pins_stays(self, solver, speed):
+        system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
+        state = State(np.eye(3)[:2], np.ones((2, 3)))
+        result = stepped(system, state, solver)
+        assert (result.outcome, result.residual) == (Outcome.CONVERGED, 0)
+        np.testing.assert_array_equal(result.state.positions, state.positions)
+        np.testing.assert_array_equal(result.state.velocities, np.zeros((2, 3)))
+
+    @pytest.mark.parametrize("name", CONVERGING)
+    def test_coincident_particles_are_driven_apart(self, name, speed):
+        system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 100.0, gravity=(0, 0, 0))
+        result = stepped(system, State(np.zeros((2, 3)), np.zeros((2, 3))), name)
+        assert result.outcome == Outcome.CONVERGED
+        assert lengths(system, result.state.positions)[0] > 0.2
+
+    def test_a_slack_damper_alone_is_a_spring_at_the_last_length(self, speed):
+        system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 0.0, 2.0, gravity=(0, 0, 0))
+        state = State([[0, 0, 0], [3.0, 0, 0]], [[0, 0, 0], [1.0, 0, 0]])
+        after = stepped(system, state, tolerance=1e-14).state
+        # The relative velocity w' = 1 - h c w' (1/m + 1/m).
+        gap = after.velocities[1, 0] - after.velocities[0, 0]
+        assert gap == pytest.approx(1 / (1 + h * 2.0 * 2), rel=1e-13)

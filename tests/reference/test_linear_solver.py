@@ -1,0 +1,94 @@
+"""Laws of the direct solves, over every library."""
+
+import importlib.util
+
+import numpy as np
+import pytest
+import scipy.sparse
+
+from reference import scenes
+from reference.implicit_euler.objective import global_matrix
+from reference.linear_solver import LIBRARIES, NotPositiveDefiniteError, factorize
+
+
+@pytest.fixture(params=LIBRARIES)
+def library(request):
+    if importlib.util.find_spec(request.param) is None:
+        pytest.skip(f"{request.param} is not installed")
+    return request.param
+
+
+@pytest.fixture
+def matrix(rng):
+    """A random sparse symmetric matrix of 30 rows, eigenvalues from 1 up."""
+    B = scipy.sparse.random_array((30, 30), density=0.1, rng=rng)
+    return (B @ B.T + scipy.sparse.eye_array(30)).tocsc()
+
+
+@pytest.mark.parametrize("sides", [(), (1,), (3,)])
+def test_the_solution_solves(library, matrix, rng, sides):
+    x = rng.standard_normal((30, *sides))
+    solved = factorize(matrix, library).solve(matrix @ x)
+    # The condition number is below 100: two digits of sixteen, and a few roundings more.
+    np.testing.assert_allclose(solved, x, rtol=0, atol=1e-13)
+
+
+def test_the_unsymmetric_half_is_not_ignored(library, rng):
+    # A library that reads rows as columns, or one triangle as the whole, gets this order wrong.
+    L = np.tril(rng.uniform(-1, 1, (6, 6)), -1) + 3 * np.eye(6)
+    dense = L @ L.T
+    solved = factorize(scipy.sparse.csc_array(dense), library).solve(np.eye(6))
+    np.testing.assert_allclose(solved, np.linalg.inv(dense), rtol=0, atol=1e-13)
+
+
+def test_the_right_hand_side_stays_and_the_solution_is_contiguous(library, matrix, rng):
+    b = rng.standard_normal((30, 3))
+    kept = b.copy()
+    solved = factorize(matrix, library).solve(b)
+    np.testing.assert_array_equal(b, kept)
+    assert solved.flags.c_contiguous
+    factor = factorize(matrix, library)
+    np.testing.assert_array_equal(factor.solve(np.asfortranarray(b)), solved)
+
+
+def test_a_cloths_matrix_is_solved_to_rounding(library, rng):
+    matrix = global_matrix(scenes.lab_cloth(size=20, stiffness=1e4)[0], 1 / 60)
+    b = rng.standard_normal((400, 3))
+    left = matrix @ factorize(matrix, library).solve(b) - b
+    # Backward stability: the residual is a few roundings of |A| |x|, and |x| is below |b| here.
+    assert np.abs(left).max() < 1e-14 * abs(matrix).max() * np.linalg.norm(b)
+
+
+@pytest.mark.parametrize(
+    "dense",
+    [
+        np.diag([1.0, -1.0, 2.0]),
+        np.array([[1.0, 2.0], [2.0, 1.0]]),
+        np.array([[1.0, 1.0], [1.0, 1.0]]),
+        np.array([[0.0, 1.0], [1.0, 0.0]]),
+        np.diag([1.0, np.nan]),
+        np.diag([1.0, np.inf]),
+    ],
+    ids=["negative", "saddle", "singular", "no diagonal", "NaN", "infinity"],
+)
+def test_what_is_not_positive_definite_is_refused(library, dense):
+    with pytest.raises(NotPositiveDefiniteError, match=r"^matrix: "):
+        factorize(scipy.sparse.csc_array(dense), library)
+
+
+def test_superlu_tells_definite_from_indefinite(rng):
+    """Shift random matrices so that the least eigenvalue lies a little above or below zero."""
+    for _ in range(50):
+        B = rng.standard_normal((12, 12)) * (rng.random((12, 12)) < 0.4)
+        dense = B + B.T
+        least = np.linalg.eigvalsh(dense)[0]
+        above = scipy.sparse.csc_array(dense - (least - 1e-6) * np.eye(12))
+        below = scipy.sparse.csc_array(dense - (least + 1e-6) * np.eye(12))
+        factorize(above, "scipy")
+        with pytest.raises(NotPositiveDefiniteError):
+            factorize(below, "scipy")
+
+
+def test_an_unknown_library_is_named_with_the_known_ones(matrix):
+    with pytest.raises(ValueError, match=r"^library: expected one of cholespy, scipy, got 'eigen'"):
+        factorize(matrix, "eigen")

@@ -1,0 +1,395 @@
+"""Laws of energy, forces and their matrices, and what the model and the state refuse."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from reference import compiled, rotation
+from reference.mass_spring import (
+    MassSpring,
+    State,
+    damper_forces,
+    damping_matrix,
+    derivation,
+    forces,
+    kinetic_energy,
+    lengths,
+    potential_energy,
+    rest_vectors,
+    spring_energy,
+    spring_forces,
+    stiffness_matrix,
+)
+
+# Sums of a few dozen terms round by a few units in the last place of the largest.
+ROUNDING = 1e-14
+# A central difference with the step NUDGE, the cube root of the machine's precision, is off by
+# NUDGE² times the third derivative and by precision/NUDGE times the value: 1e-10 of either.
+NUDGE = 6e-6
+DIFFERENCE = 1e-8
+
+
+def slope(function, x):
+    """Return the derivatives of a function of positions by central differences, last axis x."""
+    columns = []
+    for i in range(x.size):
+        nudge = np.zeros(x.size)
+        nudge[i] = NUDGE
+        nudge = nudge.reshape(x.shape)
+        columns.append((function(x + nudge) - function(x - nudge)) / (2 * NUDGE))
+    return np.stack(columns, axis=-1)
+
+
+def assert_close(actual, expected, tolerance=ROUNDING):
+    """Compare with the largest expected number as the scale, which must not be zero."""
+    scale = np.abs(expected).max()
+    assert scale > 0
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance * scale)
+
+
+def pair(**changes):
+    """Return two particles 2 m apart along y, joined by a spring of rest length 1.5 m."""
+    arguments = {"masses": [1.0, 3.0], "springs": [[0, 1]], "rest_lengths": 1.5, "stiffnesses": 4.0}
+    return MassSpring(**(arguments | {"gravity": (0, -10, 0)} | changes))
+
+
+PAIR = np.array([[0.0, 2.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+class TestByHand:
+    def test_a_stretched_spring_pulls_its_ends_together(self, speed):
+        expected = [[0.0, -2.0, 0.0], [0.0, 2.0, 0.0]]
+        np.testing.assert_array_equal(spring_forces(pair(), PAIR), expected)
+
+    def test_energy_is_half_the_stiffness_times_the_stretch_squared(self, speed):
+        assert spring_energy(pair(), PAIR) == 0.5
+
+    def test_potential_energy_grows_upwards(self, speed):
+        assert potential_energy(pair(), PAIR) == 0.5 + 1.0 * 10 * 2.0
+        lifted = PAIR + np.array([0, 1, 0])
+        assert potential_energy(pair(), lifted) == 0.5 + 10 * 3.0 + 3 * 10 * 1.0
+
+    def test_kinetic_energy_weighs_with_the_masses(self):
+        state = State(PAIR, [[2.0, 0, 0], [0, 0, 1.0]])
+        assert kinetic_energy(pair(), state) == 0.5 * 1 * 4 + 0.5 * 3 * 1
+
+    def test_a_damper_resists_the_rate_of_its_length_alone(self, speed):
+        state = State(PAIR, [[5.0, 3.0, 0.0], [0.0, 1.0, 7.0]])
+        expected = [[0.0, -0.5 * 2.0, 0.0], [0.0, 0.5 * 2.0, 0.0]]
+        np.testing.assert_array_equal(damper_forces(pair(dampings=0.5), state), expected)
+
+    def test_all_forces_together(self, speed):
+        state = State(PAIR, [[0.0, 3.0, 0.0], [0.0, 1.0, 0.0]])
+        external = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
+        expected = [[1.0, -2.0 - 1.0 - 10.0, 0.0], [0.0, 2.0 + 1.0 - 30.0, 2.0]]
+        np.testing.assert_array_equal(forces(pair(dampings=0.5), state, external), expected)
+
+
+class TestDerivatives:
+    def test_forces_are_the_negative_gradient_of_energy(self, network, speed):
+        system, state = network
+        still = State(state.positions, np.zeros((7, 3)))
+        gradient = slope(lambda x: potential_energy(system, x), state.positions)
+        assert_close(-gradient.reshape(-1, 3), forces(system, still), DIFFERENCE)
+
+    def test_stiffness_matrix_is_the_negative_derivative_of_the_spring_forces(self, network, speed):
+        system, state = network
+        jacobian = slope(lambda x: spring_forces(system, x), state.positions).reshape(21, 21)
+        assert_close(-jacobian, stiffness_matrix(system, state.positions).toarray(), DIFFERENCE)
+
+    def test_stiffness_matrix_is_symmetric_to_the_last_bit(self, network, speed):
+        matrix = stiffness_matrix(network[0], network[1].positions)
+        assert abs(matrix - matrix.T).max() == 0
+
+    def test_the_network_exercises_stretched_and_compressed_springs(self, network):
+        ratios = lengths(network[0], network[1].positions) / network[0].rest_lengths
+        assert ratios.min() < 0.8
+        assert ratios.max() > 1.2
+
+    def test_damping_matrix_gives_the_damper_forces(self, network, altered, speed):
+        system, state = altered(network[0], pinned=()), network[1]
+        matrix = damping_matrix(system, state.positions)
+        expected = damper_forces(system, state)
+        assert_close(-(matrix @ state.velocities.ravel()).reshape(-1, 3), expected)
+
+    def test_dampers_take_energy_at_the_rate_of_the_lengths(self, network, altered, speed):
+        system, state = altered(network[0], pinned=()), network[1]
+        x, v = state.positions, state.velocities
+        rates = (lengths(system, x + NUDGE * v) - lengths(system, x - NUDGE * v)) / (2 * NUDGE)
+        power = np.sum(v * damper_forces(system, state))
+        assert power == pytest.approx(-np.sum(system.dampings * rates**2), rel=DIFFERENCE)
+        assert power < 0
+
+
+class TestConservation:
+    @pytest.mark.parametrize("part", [spring_forces, damper_forces])
+    def test_internal_forces_have_no_sum_and_no_torque(self, network, altered, speed, part):
+        system, state = altered(network[0], pinned=()), network[1]
+        f = part(system, state.positions if part is spring_forces else state)
+        scale = ROUNDING * np.abs(f).sum()
+        assert scale > 0
+        np.testing.assert_allclose(f.sum(axis=0), 0, atol=scale)
+        np.testing.assert_allclose(np.cross(state.positions, f).sum(axis=0), 0, atol=2 * scale)
+
+
+class TestSymmetries:
+    def test_relabelled_particles_feel_the_same_forces(self, network, altered, rng, speed):
+        system, state = network
+        order = rng.permutation(7)
+        place = np.argsort(order)
+        renamed = altered(
+            system,
+            masses=system.masses[order],
+            springs=place[system.springs],
+            pinned=place[system.pinned],
+        )
+        moved = State(state.positions[order], state.velocities[order])
+        assert_close(forces(renamed, moved), forces(system, state)[order])
+
+    def test_order_and_direction_of_springs_do_not_matter(self, network, altered, rng, speed):
+        system, state = network
+        order = rng.permutation(len(system.springs))
+        ends = system.springs[order].copy()
+        ends[::2] = ends[::2, ::-1]
+        per_spring = {
+            name: getattr(system, name)[order]
+            for name in ("rest_lengths", "stiffnesses", "dampings")
+        }
+        shuffled = altered(system, springs=ends, **per_spring)
+        x = state.positions
+        assert_close(forces(shuffled, state), forces(system, state))
+        expected = stiffness_matrix(system, x).toarray()
+        assert_close(stiffness_matrix(shuffled, x).toarray(), expected)
+
+    def test_a_turned_and_moved_world_turns_forces_and_stiffness(
+        self, network, altered, rng, speed
+    ):
+        system, state = network
+        R = rotation.to_matrix(rotation.random(rng, 1))[0]
+        turned = altered(system, gravity=R @ system.gravity)
+        moved = State(state.positions @ R.T + [1.0, -2.0, 3.0], state.velocities @ R.T)
+        assert_close(forces(turned, moved), forces(system, state) @ R.T, 10 * ROUNDING)
+        R3 = np.kron(np.eye(7), R)
+        expected = R3 @ stiffness_matrix(system, state.positions).toarray() @ R3.T
+        assert_close(stiffness_matrix(turned, moved.positions).toarray(), expected, 10 * ROUNDING)
+
+    def test_other_units_scale_energy_and_forces(self, network, altered, speed):
+        system, state = network
+        metre, kilogram, second = 4.0, 0.5, 8.0  # powers of two: not even the rounding changes
+        scaled = altered(
+            system,
+            masses=system.masses * kilogram,
+            rest_lengths=system.rest_lengths * metre,
+            stiffnesses=system.stiffnesses * kilogram / second**2,
+            dampings=system.dampings * kilogram / second,
+            gravity=system.gravity * metre / second**2,
+        )
+        moved = State(state.positions * metre, state.velocities * metre / second)
+        newton, joule = kilogram * metre / second**2, kilogram * metre**2 / second**2
+        np.testing.assert_array_equal(forces(scaled, moved), forces(system, state) * newton)
+        for energy, now, then in (
+            (potential_energy, moved.positions, state.positions),
+            (kinetic_energy, moved, state),
+        ):
+            assert energy(scaled, now) == energy(system, then) * joule
+
+
+class TestDerivation:
+    """A, S, L, J and d of the lab's derivation."""
+
+    def test_the_columns_of_a_take_spring_vectors(self, network):
+        system, state = network
+        i, j = system.springs.T
+        expected = state.positions[i] - state.positions[j]
+        np.testing.assert_array_equal(derivation(system).A.T @ state.positions, expected)
+
+    def test_l_and_j_are_the_sums_over_the_springs(self, network):
+        system, _ = network
+        A, S, L, J = (matrix.toarray() for matrix in derivation(system))
+        k = system.stiffnesses
+        terms = range(len(k))
+        assert_close(L, sum(k[i] * np.outer(A[:, i], A[:, i]) for i in terms))
+        assert_close(J, sum(k[i] * np.outer(A[:, i], S[:, i]) for i in terms))
+        np.testing.assert_array_equal(S, np.eye(len(k)))
+
+    def test_l_x_minus_j_d_is_the_gradient_of_the_spring_energy(self, network, speed):
+        system, state = network
+        _, _, L, J = derivation(system)
+        x = state.positions
+        assert_close(L @ x - J @ rest_vectors(system, x), -spring_forces(system, x))
+
+    def test_d_is_the_nearest_vector_of_rest_length(self, network, rng, speed):
+        system, state = network
+        p = derivation(system).A.T @ state.positions
+        d = rest_vectors(system, state.positions)
+        np.testing.assert_allclose(np.linalg.norm(d, axis=1), system.rest_lengths, rtol=ROUNDING)
+        gap = np.linalg.norm(p - d, axis=1)
+        assert_close(gap, np.abs(lengths(system, state.positions) - system.rest_lengths))
+        for _ in range(20):
+            other = rng.standard_normal(d.shape)
+            other *= (system.rest_lengths / np.linalg.norm(other, axis=1))[:, None]
+            assert (np.linalg.norm(p - other, axis=1) > gap).all()
+
+
+class TestCoincidentEnds:
+    """A spring of length zero has the direction (1, 0, 0)."""
+
+    HERE = np.full((2, 3), 0.7)
+
+    def test_a_spring_with_a_rest_length_pushes_along_x(self, speed):
+        expected = [[6.0, 0, 0], [-6.0, 0, 0]]
+        np.testing.assert_array_equal(spring_forces(pair(), self.HERE), expected)
+        np.testing.assert_array_equal(rest_vectors(pair(), self.HERE), [[1.5, 0, 0]])
+        block = stiffness_matrix(pair(), self.HERE).toarray()[:3, :3]
+        np.testing.assert_array_equal(block, np.diag([4.0, 0, 0]))
+
+    def test_a_spring_without_rest_length_is_linear(self, speed):
+        system = pair(rest_lengths=0.0)
+        np.testing.assert_array_equal(spring_forces(system, self.HERE), np.zeros((2, 3)))
+        here, there = (stiffness_matrix(system, x).toarray() for x in (self.HERE, PAIR))
+        np.testing.assert_array_equal(here, there)
+        np.testing.assert_array_equal(here[:3, :3], 4.0 * np.eye(3))
+
+
+class TestPins:
+    def test_a_pin_has_no_velocity_whatever_the_state_says(self, speed):
+        held = pair(pinned=[1], dampings=0.5)
+        state = State(PAIR, [[0, 3.0, 0], [0, 1.0, 0]])
+        np.testing.assert_array_equal(damper_forces(held, state)[0], [0, -0.5 * 3.0, 0])
+        assert kinetic_energy(held, state) == 0.5 * 1 * 9
+
+    def test_pins_are_kept_once_and_in_order(self):
+        system = MassSpring(np.ones(4), [[0, 1]], 1.0, 1.0, pinned=[3, 0, 3])
+        assert system.pinned.tolist() == [0, 3]
+        assert system.free.tolist() == [False, True, True, False]
+
+    def test_a_pinned_particle_may_weigh_nothing(self):
+        assert pair(masses=[1.0, 0.0], pinned=[1]).masses[1] == 0
+
+
+def test_both_speeds_round_alike(network):
+    system, state = network
+    results = []
+    for speed in compiled.SPEEDS:
+        with compiled.speed(speed):
+            x = state.positions
+            matrix = stiffness_matrix(system, x).toarray()
+            results.append((forces(system, state), matrix, lengths(system, x)))
+    for one, other in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+class TestInputs:
+    def test_scalars_stand_for_all_springs(self):
+        system = MassSpring(np.ones(3), [[0, 1], [1, 2]], 1.5, 4, dampings=0.5)
+        assert system.rest_lengths.tolist() == [1.5, 1.5]
+        assert system.stiffnesses.tolist() == [4.0, 4.0]
+        assert system.dampings.tolist() == [0.5, 0.5]
+
+    def test_lists_and_strided_float32_become_own_float64(self):
+        given = np.arange(12, dtype=np.float32).reshape(2, 6)[:, ::2]
+        state = State(given, [[0, 0, 0], [1, 2, 3]])
+        for array in (state.positions, state.velocities):
+            assert array.dtype == np.float64
+            assert array.flags.c_contiguous
+        given[:] = -1
+        assert state.positions.min() == 0
+
+    def test_inputs_are_copied_and_not_changed(self):
+        masses, rest = np.array([1.0, 2.0]), np.array([1.5])
+        system = pair(masses=masses, rest_lengths=rest)
+        masses[:], rest[:] = 7.0, 7.0
+        assert system.masses.tolist() == [1.0, 2.0]
+        assert system.rest_lengths.tolist() == [1.5]
+
+    @pytest.mark.parametrize("name", [f.name for f in dataclasses.fields(MassSpring)])
+    def test_the_model_cannot_be_changed(self, network, name):
+        system, _ = network
+        value = getattr(system, name)
+        with pytest.raises(AttributeError):
+            setattr(system, name, value)
+        if isinstance(value, np.ndarray):
+            with pytest.raises(ValueError, match="read-only"):
+                value[...] = value
+
+    @pytest.mark.parametrize("name", ["positions", "velocities"])
+    def test_the_state_cannot_be_changed(self, network, name):
+        _, state = network
+        with pytest.raises(AttributeError):
+            setattr(state, name, np.zeros((7, 3)))
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(state, name)[0] = 0
+
+    @pytest.mark.parametrize(
+        ("name", "value", "message"),
+        [
+            ("masses", 1.0, r"shape \(particle,\), got \(\)"),
+            ("masses", [], "at least one particle"),
+            ("masses", [1.0, -1.0], "none below 0, got -1.0 at index 1"),
+            ("masses", [1.0, 0.0], "free particles to have mass, got 0 at index 1"),
+            ("masses", [1.0, np.nan], "finite"),
+            ("masses", ["a", "b"], "numbers"),
+            ("springs", [0, 1], r"shape \(spring, 2\), got \(2,\)"),
+            ("springs", [[0, 2]], "from 0 to 1, got 2"),
+            ("springs", [[0, -1]], "from 0 to 1, got -1"),
+            ("springs", [[0.0, 1.0]], "integer"),
+            ("springs", [[0, 1], [1, 1]], "two different particles, got 1 twice in spring 1"),
+            ("rest_lengths", -0.1, "none below 0, got -0.1"),
+            ("rest_lengths", [1.0, 1.0], r"shape \(1,\), got \(2,\)"),
+            ("rest_lengths", np.inf, "finite"),
+            ("stiffnesses", [-1.0], "none below 0"),
+            ("stiffnesses", np.nan, "finite"),
+            ("dampings", -1.0, "none below 0"),
+            ("dampings", [[1.0]], "shape"),
+            ("pinned", [True, False], "integer"),
+            ("pinned", [2], "from 0 to 1, got 2"),
+            ("pinned", 0, "shape"),
+            ("gravity", -9.81, r"shape \(3,\), got \(\)"),
+            ("gravity", (0, np.inf, 0), "finite"),
+        ],
+    )
+    def test_a_wrong_model_is_named(self, name, value, message):
+        with pytest.raises(ValueError, match=f"^{name}: .*{message}"):
+            pair(**{name: value})
+
+    @pytest.mark.parametrize(
+        ("name", "value", "message"),
+        [
+            ("positions", np.zeros(3), r"shape \(particle, 3\), got \(3,\)"),
+            ("positions", np.full((2, 3), np.nan), "finite"),
+            ("velocities", np.zeros((3, 3)), r"shape \(2, 3\), got \(3, 3\)"),
+            ("velocities", np.full((2, 3), np.inf), "finite"),
+        ],
+    )
+    def test_a_wrong_state_is_named(self, name, value, message):
+        arguments = {"positions": np.zeros((2, 3)), "velocities": np.zeros((2, 3)), name: value}
+        with pytest.raises(ValueError, match=f"^{name}: .*{message}"):
+            State(**arguments)
+
+    @pytest.mark.parametrize("function", [forces, kinetic_energy, damper_forces])
+    def test_a_state_of_another_system_is_refused(self, network, function):
+        with pytest.raises(ValueError, match=r"^state: expected 2 particles, got 7"):
+            function(pair(), network[1])
+        with pytest.raises(ValueError, match=r"^state: expected a State, got ndarray"):
+            function(pair(), PAIR)
+
+    @pytest.mark.parametrize(
+        "function",
+        [
+            potential_energy,
+            spring_energy,
+            spring_forces,
+            lengths,
+            rest_vectors,
+            stiffness_matrix,
+            damping_matrix,
+        ],
+    )
+    def test_positions_of_another_system_are_refused(self, function):
+        with pytest.raises(ValueError, match=r"^positions: expected shape \(2, 3\)"):
+            function(pair(), np.zeros((3, 3)))
+
+    def test_wrong_external_forces_are_named(self):
+        with pytest.raises(ValueError, match=r"^external_forces: expected shape \(2, 3\)"):
+            forces(pair(), State(PAIR, PAIR), np.zeros(3))
