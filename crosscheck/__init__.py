@@ -1,0 +1,1 @@
+"""Is the reference right? Engines beside it, claim by claim."""

@@ -1,0 +1,171 @@
+"""Each convention that an adapter translates, on an example where the wrong one shows."""
+
+import numpy as np
+import pytest
+
+from crosscheck import samples
+from crosscheck.engines import SKELETON_ENGINES, MujocoMassSpring, forward_kinematics_by
+from crosscheck.engines.skeleton_engine import coordinates
+from crosscheck.tolerances import STEP
+from reference import rotation
+from reference.implicit_euler import ImplicitEuler
+from reference.mass_spring import MassSpring, State
+from reference.scenes import lab_cloth
+from reference.skeleton import Skeleton
+
+# Second differences of a step of 1e-6 m leave 1e-12; rounding over the step leaves 1e-10.
+DIFFERENCE_STEP = 1e-6
+DIFFERENCE_TOLERANCE = 1e-8
+
+
+@pytest.fixture(params=SKELETON_ENGINES)
+def engine_of(request):
+    return SKELETON_ENGINES[request.param]
+
+
+def quarter_turn(axis):
+    return rotation.exponential(np.eye(3)[axis] * np.pi / 2)
+
+
+def test_quaternions_turn_the_links_below(engine_of):
+    skeleton = Skeleton([-1, 0, 1], [[0.0, 0.0, 5.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    local = np.array([quarter_turn(2), quarter_turn(0), rotation.identity()])
+    pose = forward_kinematics_by(engine_of(skeleton), local)
+    assert np.allclose(pose.positions, [[0, 0, 5], [0, 1, 5], [0, 2, 5]], atol=1e-15)
+    assert np.allclose(rotation.angle(pose.rotations[0], quarter_turn(2)), 0.0, atol=1e-15)
+    both = rotation.multiply(quarter_turn(2), quarter_turn(0))
+    assert np.allclose(rotation.angle(pose.rotations[1:], both), 0.0, atol=1e-15)
+
+
+def test_joints_are_found_by_name_where_the_engine_has_another_order(engine_of):
+    """A branch listed breadth-first, which MuJoCo reorders depth-first."""
+    offsets = np.diag([1.0, 2.0, 3.0])[[0, 0, 1, 2, 0]]
+    skeleton = Skeleton([-1, 0, 0, 1, 2], offsets, ["hip", "left", "right", "knee", "foot"])
+    pose = forward_kinematics_by(engine_of(skeleton), rotation.identity(5))
+    expected = [[1, 0, 0], [2, 0, 0], [1, 2, 0], [2, 0, 3], [2, 2, 0]]
+    assert np.array_equal(pose.positions, expected)
+
+
+def test_batches_keep_their_axes(engine_of):
+    skeleton = samples.skeleton(3)
+    local = samples.local_rotations(3, skeleton, 2, 3)
+    engine = engine_of(skeleton)
+    batch = forward_kinematics_by(engine, local)
+    one = forward_kinematics_by(engine, local[1, 2])
+    assert np.array_equal(batch.positions[1, 2], one.positions)
+    assert np.array_equal(batch.rotations[1, 2], one.rotations)
+
+
+def test_jacobian_is_the_derivative_of_the_position(engine_of):
+    skeleton = samples.skeleton(5)
+    engine = engine_of(skeleton)
+    q = coordinates(engine, samples.local_rotations(5, skeleton))
+    joint = skeleton.joint_count - 1
+
+    def position(v):
+        engine.place(engine.integrate(q, v))
+        return engine.position(joint)
+
+    steps = DIFFERENCE_STEP * np.eye(3 * skeleton.joint_count)
+    J = np.transpose([position(v) - position(-v) for v in steps]) / (2 * DIFFERENCE_STEP)
+    assert np.abs(J).max() > 0.1
+    assert np.allclose(engine.jacobian(q, joint), J, atol=DIFFERENCE_TOLERANCE)
+
+
+def test_jacobian_places_the_skeleton(engine_of):
+    skeleton = samples.skeleton(5)
+    engine = engine_of(skeleton)
+    q = coordinates(engine, samples.local_rotations(5, skeleton))
+    engine.jacobian(q, 1)
+    jacobian_left = engine.pose()
+    engine.place(q)
+    assert np.array_equal(jacobian_left.positions, engine.pose().positions)
+
+
+def test_integrate_turns_a_joint_in_its_own_frame(engine_of):
+    skeleton = Skeleton([-1, 0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    engine = engine_of(skeleton)
+    q = coordinates(engine, np.array([quarter_turn(2), rotation.identity()]))
+    turned = engine.integrate(q, np.array([np.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    engine.place(turned)
+    expected = rotation.multiply(quarter_turn(2), quarter_turn(0))
+    assert rotation.angle(engine.pose().rotations[0], expected) < 1e-15
+
+
+def test_state_comes_back_as_written():
+    system, state, _, _ = samples.motion(3)
+    engine = MujocoMassSpring(system)
+    engine.write(state)
+    assert np.array_equal(engine.read().positions, state.positions)
+    assert np.array_equal(engine.read().velocities[system.free], state.velocities[system.free])
+    assert not engine.read().velocities[system.pinned].any()
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "discrete"])
+def test_step_depends_on_its_arguments_alone(integrator):
+    system, state, external, h = samples.motion(4)
+    other = samples.motion(9).state.positions[: len(state.positions)]
+    engine = MujocoMassSpring(system, h=h, integrator=integrator)
+    first = engine.step(state, external)
+    engine.step(State(other, state.velocities))
+    again = engine.step(state, external)
+    assert np.array_equal(first.positions, again.positions)
+    assert not np.array_equal(first.positions, engine.step(state).positions)
+
+
+def test_pins_hold_and_move_with_the_state():
+    system, state, external, h = samples.motion(4)
+    engine = MujocoMassSpring(system, h=h)
+    moved = State(state.positions + 1.0, state.velocities)
+    for start in (state, moved):
+        end = engine.step(start, external)
+        assert np.array_equal(end.positions[system.pinned], start.positions[system.pinned])
+    engine.place(state)
+    at_home = engine.spring_forces()
+    engine.place(moved)
+    assert np.allclose(at_home, engine.spring_forces(), rtol=1e-9)
+
+
+def test_spring_of_no_length_pushes_along_x():
+    system = MassSpring([1.0, 1.0], [[0, 1]], 0.5, 100.0)
+    engine = MujocoMassSpring(system)
+    engine.place(State(np.ones((2, 3)), np.zeros((2, 3))))
+    assert np.array_equal(engine.spring_forces(), [[50.0, 0.0, 0.0], [-50.0, 0.0, 0.0]])
+
+
+def test_motion_that_blows_up_is_not_started_afresh(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its warnings where it stands
+    system = MassSpring([1.0, 1.0], [[0, 1]], 0.5, 1e12)
+    engine = MujocoMassSpring(system, h=1.0)
+    state = State([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], np.zeros((2, 3)))
+
+    def swing(steps, state):
+        for _ in range(steps):
+            state = engine.step(state)
+
+    with pytest.raises(ValueError, match=r"positions|velocities"):
+        swing(40, state)
+
+
+def test_discrete_solves_a_stiff_cloth_to_the_end(rng):
+    """With MuJoCo's own limit of 100 iterations this step is 3e-6 off."""
+    system, rest = lab_cloth(size=20, stiffness=1e5)
+    state = State(
+        rest.positions + 0.01 * rng.standard_normal(rest.positions.shape), rest.velocities
+    )
+    theirs = MujocoMassSpring(system, h=1 / 60, integrator="discrete").step(state).velocities
+    ours = ImplicitEuler(system, h=1 / 60, solver="gauss_newton").step(state).state.velocities
+    assert np.abs(ours - theirs).max() < STEP.value * np.abs(theirs).max()
+
+
+@pytest.mark.parametrize(("shift", "stiff"), [(0.0, False), (1e-12, True)])
+def test_discrete_sees_no_stiffness_at_the_very_rest_length(shift, stiff):
+    system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 1e3, pinned=[0], gravity=(0.0, 0.0, 0.0))
+    engine = MujocoMassSpring(system, h=0.1, integrator="discrete")
+    end = engine.step(State([[0, 0, 0], [1.0 + shift, 0, 0]], [[0, 0, 0], [1.0, 0, 0]]))
+    assert end.velocities[1, 0] == pytest.approx(1 / 11 if stiff else 1.0)
+
+
+def test_integrator_must_be_known():
+    with pytest.raises(ValueError, match="integrator: expected one of Euler, discrete, got 'RK5'"):
+        MujocoMassSpring(samples.motion(0).system, integrator="RK5")

@@ -1,0 +1,66 @@
+"""The judge: what it lets pass and what it never does."""
+
+import numpy as np
+import pytest
+
+from crosscheck.tolerances import Tolerance
+from crosscheck.verdict import Claim, Comparison, judge
+
+TOLERANCE = Tolerance(1e-12, "made up")
+
+
+def comparison(ours=(1.0, 2.0), theirs=(1.0, 2.0), still=(0.0, 0.0), scale=2.0):
+    return Comparison(np.array(ours), np.array(theirs), np.array(still), scale)
+
+
+def verdict_of(*comparisons):
+    claim = Claim("a", "b", "c", lambda cases: comparisons[:cases], TOLERANCE, cases=10)
+    return judge(claim)
+
+
+def test_equal_and_moved_holds():
+    verdict = verdict_of(comparison(), comparison(theirs=(1.0, 2.0 + 1e-12)))
+    assert verdict.held
+    assert verdict.cases == 2
+    assert verdict.difference == pytest.approx(5e-13, rel=1e-3)
+    assert verdict.moved == 1.0
+
+
+def test_no_cases_is_missed():
+    assert verdict_of().missed == "no cases"
+
+
+def test_one_bad_case_among_many_is_missed():
+    verdict = verdict_of(comparison(), comparison(theirs=(1.0, 2.1)), comparison())
+    assert verdict.missed == "they differ"
+    assert verdict.difference == pytest.approx(0.05)
+
+
+def test_one_still_case_among_many_is_missed():
+    verdict = verdict_of(comparison(), comparison(still=(1.0, 2.0 + 1e-5)))
+    assert verdict.missed == "nothing moved"
+    assert verdict.moved == pytest.approx(5e-6)
+
+
+@pytest.mark.parametrize("field", ["ours", "theirs", "still"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_what_is_not_a_number_is_missed(field, bad):
+    verdict = verdict_of(comparison(), comparison(**{field: (1.0, bad)}))
+    assert verdict.missed == "not a number"
+
+
+def test_the_same_infinity_is_missed():
+    verdict = verdict_of(comparison(ours=(1.0, np.inf), theirs=(1.0, np.inf)))
+    assert verdict.missed == "not a number"
+    assert np.isnan(verdict.difference)
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, np.nan, np.inf])
+def test_a_scale_that_measures_nothing_is_missed(scale):
+    assert verdict_of(comparison(scale=scale)).missed == "not a number"
+
+
+@pytest.mark.parametrize(("ours", "theirs"), [((1.0, 2.0), (1.0,)), ((), ())])
+def test_shapes_must_be_equal_and_not_empty(ours, theirs):
+    with pytest.raises(ValueError, match="comparison: expected"):
+        verdict_of(comparison(ours=ours, theirs=theirs))

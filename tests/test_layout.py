@@ -1,0 +1,146 @@
+"""The house rules that can be read from the sources: who imports whom, and what stays outside."""
+
+import ast
+import sys
+from pathlib import Path, PurePosixPath
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ["reference", "crosscheck", "bench"]  # each may import those before it
+LIBRARIES = {"numpy", "scipy", "numba", "cholespy"}
+RUBBISH = {"utils", "util", "helpers", "helper", "common", "misc"}
+FILES = {"pathlib", "os", "io", "shutil", "tempfile", "open", "fromfile", "tofile", "loadtxt"}
+CLOCKS = {"time", "datetime", "timeit", "perf_counter"}
+PRINTS = {"print", "logging", "stdout", "stderr"}
+
+
+def imported(tree):
+    """The dotted names a module imports from outside its own room, those in functions included."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Call) and named(node.func) in {"import_module", "__import__"}:
+            yield from (str(a.value) for a in node.args[:1] if isinstance(a, ast.Constant))
+
+
+def named(node):
+    """The last name of an expression such as `a` or `a.b`, or None."""
+    return getattr(node, "attr", None) or getattr(node, "id", None)
+
+
+def used(tree):
+    """Every name a module imports or mentions."""
+    parts = [part for name in imported(tree) for part in name.split(".")]
+    return {*parts, *(named(node) for node in ast.walk(tree))}
+
+
+def room(path):
+    return path.parts[0]
+
+
+def is_door_for_files(path):
+    return path.parts[:2] == ("reference", "formats")
+
+
+def arrows_against_the_direction(path, tree):
+    later = {*ROOMS[ROOMS.index(room(path)) + 1 :], "tests"}
+    return {name for name in imported(tree) if name.split(".")[0] in later}
+
+
+def names_that_say_nothing(path, tree):
+    return RUBBISH & {*path.parts, path.stem}
+
+
+def foreign_imports_in_reference(path, tree):
+    if room(path) != "reference":
+        return set()
+    known = LIBRARIES | set(sys.stdlib_module_names) | set(ROOMS)
+    return {name for name in imported(tree) if name.split(".")[0] not in known}
+
+
+def files_in_reference(path, tree):
+    return (
+        FILES & used(tree) if room(path) == "reference" and not is_door_for_files(path) else set()
+    )
+
+
+def clocks_in_reference(path, tree):
+    parts = {part for name in imported(tree) for part in name.split(".")}
+    return CLOCKS & parts if room(path) == "reference" else set()
+
+
+def prints_in_reference(path, tree):
+    return PRINTS & used(tree) if room(path) == "reference" else set()
+
+
+RULES = [
+    arrows_against_the_direction,
+    names_that_say_nothing,
+    foreign_imports_in_reference,
+    files_in_reference,
+    clocks_in_reference,
+    prints_in_reference,
+]
+
+SLIPS = [
+    (arrows_against_the_direction, "reference/a.py", "import crosscheck"),
+    (arrows_against_the_direction, "reference/a.py", "from crosscheck.verdict import judge"),
+    (arrows_against_the_direction, "reference/formats/a.py", "from bench import cli"),
+    (arrows_against_the_direction, "crosscheck/a.py", "def f():\n    import bench.run"),
+    (arrows_against_the_direction, "crosscheck/a.py", "import_module('bench.run')"),
+    (arrows_against_the_direction, "bench/a.py", "from tests import conftest"),
+    (names_that_say_nothing, "reference/utils.py", ""),
+    (names_that_say_nothing, "bench/helpers/a.py", ""),
+    (names_that_say_nothing, "crosscheck/common.py", ""),
+    (names_that_say_nothing, "bench/misc.py", ""),
+    (foreign_imports_in_reference, "reference/a.py", "import pinocchio"),
+    (foreign_imports_in_reference, "reference/b/a.py", "from mujoco import MjModel"),
+    (foreign_imports_in_reference, "reference/formats/a.py", "import mujoco"),
+    (files_in_reference, "reference/a.py", "def f(path):\n    return open(path)"),
+    (files_in_reference, "reference/a.py", "from pathlib import Path"),
+    (files_in_reference, "reference/a.py", "np.loadtxt('a')"),
+    (clocks_in_reference, "reference/a.py", "import time"),
+    (clocks_in_reference, "reference/a.py", "from datetime import datetime"),
+    (clocks_in_reference, "reference/a.py", "import timeit"),
+    (clocks_in_reference, "reference/formats/a.py", "from time import perf_counter as now"),
+    (prints_in_reference, "reference/a.py", "def f():\n    print(1)"),
+    (prints_in_reference, "reference/a.py", "sys.stdout.write('1')"),
+]
+
+FINE = [
+    ("reference/a.py", "import math\nimport numpy as np\nfrom .compiled import TwoSpeeds"),
+    ("reference/formats/a.py", "from pathlib import Path\nopen(Path('a'))"),
+    ("crosscheck/a.py", "import mujoco\nfrom reference import Skeleton\nfrom . import samples"),
+    ("bench/a.py", "import time\nfrom crosscheck.verdict import judge\nprint(time.time())"),
+]
+
+
+def broken(rule, path, source):
+    return rule(PurePosixPath(path), ast.parse(source))
+
+
+@pytest.mark.parametrize("name", ROOMS)
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_room_keeps_the_rules(rule, name):
+    sources = sorted((ROOT / name).rglob("*.py"))
+    assert sources
+    for source in sources:
+        path = source.relative_to(ROOT).as_posix()
+        assert not broken(rule, path, source.read_text(encoding="utf-8")), path
+
+
+@pytest.mark.parametrize(("rule", "path", "source"), SLIPS)
+def test_rule_sees_the_slip(rule, path, source):
+    assert broken(rule, path, source)
+
+
+@pytest.mark.parametrize(("path", "source"), FINE)
+def test_rules_let_good_sources_pass(path, source):
+    assert not any(broken(rule, path, source) for rule in RULES)
+
+
+def test_every_rule_has_a_slip():
+    assert {rule for rule, _, _ in SLIPS} == set(RULES)
