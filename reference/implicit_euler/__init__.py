@@ -38,6 +38,8 @@ STEP_SOLVERS: dict[str, type[StepSolver]] = {
     "gauss_newton": GaussNewton,
 }
 
+LEAP = 0.1  # the share of the residual that an iteration has to leave to be one
+
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
@@ -155,10 +157,15 @@ class ImplicitEuler:
         return last, Outcome.DIVERGED, residuals, values
 
     def _outcome(self, iterate: Iterate, residuals: list[float], stuck: bool) -> Outcome | None:
-        """Return how the solve ends with this iterate, or None if it goes on."""
+        """Return how the solve ends with this iterate, or None if it goes on.
+
+        The floor is a bound, often a thousand times what rounding really leaves: a solver that
+        falls below it with a leap is let go on.
+        """
         final = len(residuals) > self._limit
+        leaping = len(residuals) > 1 and residuals[-1] < LEAP * residuals[-2]
         if self.tolerance > 0 or final:
-            if iterate.at_floor or residuals[-1] <= self.tolerance:
+            if residuals[-1] <= self.tolerance or (iterate.at_floor and (final or not leaping)):
                 return Outcome.CONVERGED
             if stuck:
                 return Outcome.STALLED

@@ -112,7 +112,7 @@ class Objective:
         """Return |grad g(x)| / max(|grad g(y)|, floor)."""
         if iterate.gradient_norm == 0.0:
             return 0.0
-        return iterate.gradient_norm / max(self.start.gradient_norm, iterate.floor)
+        return float(iterate.gradient_norm / max(self.start.gradient_norm, iterate.floor))
 
     def value(self, positions: ArrayLike) -> float:
         """Return g(x) [kg m²]; the pins contribute what does not change.
@@ -147,8 +147,8 @@ class Objective:
         """Return what g becomes when each spring's vector at rest length is held at d, (spring, 3).
 
         1/2 x' (M + h² L) x - h² x' J d - x' (M y + h² f_ext) + constant (Liu et al. 2013), with
-        L and J of the effective springs. It is g(x) if d is optimal, `rest_vectors(effective, x)`,
-        and never less than g(x).
+        L and J of the effective springs. With the d of `rest_vectors(x)` it is g(x), with any other
+        d of the effective rest lengths it is more.
 
         Raises:
             ValueError: if the positions or d have a wrong shape or are not finite.

@@ -8,6 +8,7 @@ import pytest
 
 from reference import compiled, rotation, scenes
 from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from reference.implicit_euler.newton import line_search
 from reference.implicit_euler.objective import global_matrix
 from reference.mass_spring import (
     MassSpring,
@@ -81,7 +82,7 @@ class TestObjective:
             + np.sum(system.dampings / (2 * h) * moved**2)
             - np.sum(objective.external * x)
         )
-        assert objective.value(x) == pytest.approx(inertia + h * h * energy, rel=1e-14)
+        assert objective.value(x) == pytest.approx(inertia + h * h * energy, rel=1e-14, abs=0)
 
     def test_external_forces_are_gravity_and_what_is_given(self, network, rng):
         system, state = network
@@ -89,6 +90,19 @@ class TestObjective:
         external = ImplicitEuler(system, h=h).objective(state, given).external
         expected = system.masses[:, None] * system.gravity + given
         np.testing.assert_array_equal(external, expected)
+
+    def test_the_effective_springs_are_undamped_and_blend_spring_and_damper(
+        self, problem, network, speed
+    ):
+        system, state = network
+        effective = problem[0].effective
+        k, c, r = system.stiffnesses, system.dampings, system.rest_lengths
+        l_n = lengths(system, state.positions)
+        np.testing.assert_allclose(effective.stiffnesses, k + c / h, rtol=1e-15)
+        np.testing.assert_allclose(
+            effective.rest_lengths, (k * r + c * l_n / h) / (k + c / h), rtol=1e-14
+        )
+        assert not effective.dampings.any()
 
     def test_gradient_is_the_slope_of_the_value(self, problem, speed):
         objective, x = problem
@@ -137,7 +151,7 @@ class TestObjective:
     def test_quadratic_form_is_g_where_d_is_optimal(self, problem, speed):
         objective, x = problem
         form = objective.quadratic_form(x, objective.rest_vectors(x))
-        assert form == pytest.approx(objective.value(x), rel=1e-13)
+        assert form == pytest.approx(objective.value(x), rel=1e-13, abs=0)
 
     def test_quadratic_form_is_above_g_for_any_other_d_of_rest_length(self, problem, rng, speed):
         objective, x = problem
@@ -289,6 +303,19 @@ class TestStep:
         values = stepped(*cloth).objectives
         assert (np.diff(values) <= 1e-13).all()
 
+    def test_the_line_search_shortens_a_step_that_is_too_long(self, cloth, speed):
+        objective = ImplicitEuler(cloth[0], h=h).objective(cloth[1])
+        start = objective.start
+        step = -100 * start.gradient
+        assert objective.value(start.positions + step) > start.value
+        end = line_search(objective, start, step)
+        assert end.value < start.value
+        assert end.gradient_norm < start.gradient_norm
+
+    def test_the_line_search_does_not_go_uphill(self, cloth):
+        objective = ImplicitEuler(cloth[0], h=h).objective(cloth[1])
+        assert line_search(objective, objective.start, objective.start.gradient) is objective.start
+
     def test_newton_converges_quadratically(self, cloth):
         residuals = stepped(*cloth).history
         assert residuals[0] == 1
@@ -308,6 +335,14 @@ class TestStep:
         assert (np.diff(result.objectives) <= 1e-12).all()
         end = objective.hessian(result.state.positions).toarray()
         assert np.linalg.eigvalsh(end)[0] > 0
+
+
+    def test_newton_gives_up_where_its_hessian_overflows(self):
+        system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 1e153, pinned=[0], gravity=(0, 0, 0))
+        state = State([[0.0, 0.0, 0.0], [1e-160, 0.0, 0.0]], np.zeros((2, 3)))
+        with np.errstate(over="ignore"):
+            result = ImplicitEuler(system, h=h).step(state)
+        assert (result.outcome, result.iterations) == (Outcome.STALLED, 1)
 
 
 class TestResidual:
@@ -349,7 +384,7 @@ class TestResidual:
         result = stepped(*network, solver, given, tolerance=0, max_iterations=iterations)
         norm, scale, floor = self.residual(*network, result.state.positions, given)
         # The norm in double precision is off by less than the floor, which is an upper bound.
-        assert result.residual == pytest.approx(float(norm / scale), abs=float(floor / scale))
+        assert abs(result.residual - norm / scale) <= floor / scale
         assert result.residual > 1e-12 or solver != "local_global"
 
     def test_the_floor_is_what_the_definition_says(self, network, rng, speed):
@@ -357,7 +392,7 @@ class TestResidual:
         objective = ImplicitEuler(network[0], h=h).objective(network[1], given)
         x = network[1].positions + 0.1
         _, _, floor = self.residual(*network, x, given)
-        assert objective.evaluate(x).floor == pytest.approx(float(floor), rel=1e-14)
+        assert objective.evaluate(x).floor == pytest.approx(float(floor), rel=1e-14, abs=0)
 
     def test_at_the_floor_the_gradient_is_rounding(self, network, rng):
         given = outer(rng)
@@ -500,7 +535,7 @@ class TestMotion:
 
         # 100 steps, each off by rounding, 2e-15 of 0.5 m over h.
         expected = (1 + 0.1**2 * 4.0) ** -100
-        assert energy(state) / energy(start) == pytest.approx(expected, rel=1e-11)
+        assert energy(state) / energy(start) == pytest.approx(expected, rel=1e-11, abs=0)
 
     @pytest.mark.parametrize("damping", [0.0, 0.4])
     def test_observed_order_is_one(self, solver, damping):
@@ -543,7 +578,7 @@ class TestMotion:
         for _ in range(60):
             result = integrator.step(state)
             assert result.outcome == Outcome.CONVERGED
-            assert result.residual <= 1e-10 or result.at_floor
+            assert result.residual <= 1e-10
             assert result.iterations <= 5
             state = result.state
             swung.append(np.abs(state.velocities).max())
@@ -618,7 +653,7 @@ class TestSymmetries:
         np.testing.assert_allclose(actual, expected, rtol=0, atol=self.ROUNDING)
 
     def test_other_units(self, network, altered, speed, solver):
-        """Powers of two: the same digits come out."""
+        """Powers of two change no digit, but under the square roots of a Cholesky factor."""
         system, state = network
         metre, kilogram, second = 4.0, 0.5, 8.0
         scaled = altered(
