@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
+FLOAT64 = np.dtype(np.float64)
+
 # The fourth power of a coordinate is still a finite number.
 LARGEST_COORDINATE = 1e75
 
@@ -132,7 +134,7 @@ def spread(values: FloatArray, lengths: Sequence[int]) -> FloatArray:
 def frozen(values: np.ndarray) -> np.ndarray:
     """Return a read-only view, for models and results to show."""
     view = values.view()
-    view.flags.writeable = False
+    view.setflags(write=False)
     return view
 
 
@@ -143,12 +145,7 @@ def shape(lengths: Sequence[int | str]) -> str:
 
 
 def _floats(name: str, value: Any) -> FloatArray:
-    if (
-        type(value) is np.ndarray
-        and value.dtype == np.float64
-        and value.flags.c_contiguous
-        and value.flags.writeable
-    ):
+    if type(value) is np.ndarray and value.dtype is FLOAT64 and value.flags.carray:
         return value
     try:
         given = np.asarray(value)
@@ -160,9 +157,11 @@ def _floats(name: str, value: Any) -> FloatArray:
 
 
 def _fits(actual: tuple[int, ...], trailing: tuple[int | str, ...]) -> bool:
-    batched = bool(trailing) and trailing[0] == "..."
-    lengths = trailing[1:] if batched else trailing
-    if len(actual) < len(lengths) or (len(actual) > len(lengths) and not batched):
-        return False
-    ends = actual[len(actual) - len(lengths) :]
-    return all(isinstance(n, str) or n == m for n, m in zip(lengths, ends, strict=True))
+    if trailing and trailing[0] == "...":
+        trailing = trailing[1:]
+        actual = actual[-len(trailing) :] if trailing else ()
+    if actual == trailing:
+        return True
+    return len(actual) == len(trailing) and all(
+        isinstance(n, str) or n == m for n, m in zip(trailing, actual, strict=True)
+    )
