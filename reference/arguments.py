@@ -37,9 +37,10 @@ def coordinates(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray
     Raises:
         ValueError: as `array` does, and if a coordinate is beyond 1e75.
     """
-    result = array(name, value, *trailing)
+    result = floats(name, value, *trailing)
     largest = np.abs(result).max(initial=0.0)
-    if largest > LARGEST_COORDINATE:
+    if not largest <= LARGEST_COORDINATE:
+        array(name, result, *trailing)
         raise ValueError(
             f"{name}: expected coordinates of at most {LARGEST_COORDINATE:g}, got {largest:g}"
         )

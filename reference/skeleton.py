@@ -40,6 +40,7 @@ class Skeleton:
         self.parents = frozen(self.arrays.parents)
         self.offsets = frozen(self.arrays.offsets)
         self.names = _checked_names(names, self.joint_count)
+        self._paths: dict[int, IndexArray] = {}
 
     @property
     def joint_count(self) -> int:
@@ -70,10 +71,16 @@ class Skeleton:
         Raises:
             ValueError: if there is no such joint.
         """
-        joints = [self.index(effector)]
-        while self.parents[joints[-1]] >= 0:
-            joints.append(int(self.parents[joints[-1]]))
-        return np.array(joints[::-1], dtype=np.int64)
+        return frozen(self.path_array(self.index(effector)))
+
+    def path_array(self, joint: int) -> IndexArray:
+        """Return the path to a joint given by index, for kernels: not to be written to."""
+        if joint not in self._paths:
+            path = [joint]
+            while self.parents[path[-1]] >= 0:
+                path.append(int(self.parents[path[-1]]))
+            self._paths[joint] = np.array(path[::-1], dtype=np.int64)
+        return self._paths[joint]
 
     def reach(self, effector: int | str = -1) -> float:
         """Return the greatest distance of the effector from the root [m]: its links' total length.

@@ -2,8 +2,13 @@
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from reference import compiled
+
+# The first example of a law may compile a kernel: no deadline.
+settings.register_profile("plumbob", max_examples=20, deadline=None, derandomize=True)
+settings.load_profile("plumbob")
 
 
 @pytest.fixture(params=compiled.SPEEDS)

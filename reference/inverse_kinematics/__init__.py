@@ -82,7 +82,7 @@ def solve_targets(
     starts = starts.reshape(-1, *starts.shape[-2:])
     solved = _empty(len(targets), skeleton.joint_count, max_iterations if record else 0)
     bad = solve(
-        skeleton.arrays, skeleton.path(effector), starts, targets,
+        skeleton.arrays, skeleton.path_array(effector), starts, targets,
         tolerance, max_iterations, chained, solved,
     )  # fmt: skip
     if bad >= 0:
@@ -91,6 +91,8 @@ def solve_targets(
 
 
 def _batch_shape(starts: tuple[int, ...], targets: tuple[int, ...]) -> tuple[int, ...]:
+    if not starts:
+        return targets
     try:
         return np.broadcast_shapes(starts, targets)
     except ValueError:

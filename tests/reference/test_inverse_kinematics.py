@@ -2,7 +2,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reference import (
@@ -234,7 +234,6 @@ coordinates = st.floats(-3.0, 3.0)
 points = st.lists(coordinates, min_size=3, max_size=3)
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     links=st.lists(points, min_size=1, max_size=5),
     target=points,
