@@ -336,7 +336,6 @@ class TestStep:
         end = objective.hessian(result.state.positions).toarray()
         assert np.linalg.eigvalsh(end)[0] > 0
 
-
     def test_newton_gives_up_where_its_hessian_overflows(self):
         system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 1e153, pinned=[0], gravity=(0, 0, 0))
         state = State([[0.0, 0.0, 0.0], [1e-160, 0.0, 0.0]], np.zeros((2, 3)))
