@@ -1,0 +1,33 @@
+import re
+from pathlib import Path
+
+import pytest
+
+README = Path(__file__).parents[1] / "README.md"
+
+
+def snippets(language):
+    return re.findall(rf"```{language}\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_the_python_interface_runs_as_printed(capsys):
+    (code,) = snippets("python")
+    exec(compile(code, str(README), "exec"), {})
+    assert capsys.readouterr().out.count("CONVERGED") >= 1
+
+
+LINKS = re.findall(r"\]\(([^)#:]+)\)", README.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_every_file_that_is_linked_exists(link):
+    assert (README.parent / link).exists()
+
+
+def test_every_make_target_that_is_named_exists():
+    targets = set(
+        re.findall(r"^([a-z-]+):", (README.parent / "Makefile").read_text(), re.MULTILINE)
+    )
+    named = set(re.findall(r"make ([a-z-]+)  ", README.read_text(encoding="utf-8")))
+    assert named <= targets
+    assert {"report", "test"} <= named
