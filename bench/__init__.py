@@ -1,0 +1,1 @@
+"""How good, how fast: problems, records, tables, figures, the report and the command line."""

@@ -1,0 +1,324 @@
+"""The command line. Engines, the reference and matplotlib are imported inside the commands."""
+
+import difflib
+import sys
+from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from .suites import SUITES
+
+QUICK, FULL = "quick", "full"
+REPORT = Path("report")
+FINE, MISSED, MISUSED, INTERRUPTED = 0, 1, 2, 130
+_UsageError: Any = typer.BadParameter.__base__
+
+app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+def _block(title: str, *lines: str) -> str:
+    """Return lines for the end of a help text, kept as they are."""
+    return "\n".join(["\b", f"{title}:", *(f"  {line}" for line in lines)])
+
+
+Output = Annotated[
+    Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of records and report.")
+]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Forget what is on record; measure anew.")]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit code."""
+    sys.exit(run_command(arguments))
+
+
+def run_command(arguments: Sequence[str] | None = None) -> int:
+    """Return the exit code: 0 fine, 1 a check failed, 2 bad usage or input, 130 interrupted."""
+    try:
+        code = app(arguments, prog_name="plumbob", standalone_mode=False)
+        return code if isinstance(code, int) else FINE
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED
+    except _UsageError as error:
+        return _complain(error.format_message())
+    except OSError as error:
+        return _complain(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "))
+    except ValueError as error:
+        return _complain(str(error))
+
+
+@app.callback(
+    invoke_without_command=True,
+    epilog=_block(
+        "Examples",
+        "plumbob                        the main job",
+        "plumbob check                  is the reference right?",
+        "plumbob bench ik cloth         measure two suites at full length",
+        "plumbob report                 write the report again from the records",
+        "plumbob show cloth             an animation of the falling cloth",
+    ),
+)
+def plumbob(
+    context: typer.Context,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder to write to, else report."),
+    ] = None,
+    fresh: Fresh = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> int:
+    """Validate, measure and report: skeleton kinematics and implicit mass-spring dynamics.
+
+    Alone, it does the main job: check the reference against Pinocchio and MuJoCo, run the quick
+    bench, and write report/index.html, in a minute or two.
+    """
+    if version:
+        import importlib.metadata
+
+        print(f"plumbob {importlib.metadata.version('plumbob')}")
+        raise typer.Exit
+    if context.invoked_subcommand is not None:
+        if output or fresh:
+            raise ValueError(f"write options behind the command: {context.invoked_subcommand}")
+        return FINE
+    return main_job(output or REPORT, fresh)
+
+
+@app.command(
+    epilog=_block(
+        "Examples",
+        "plumbob check",
+        'plumbob check "spring forces" "Gauss-Newton step"',
+    )
+)
+def check(
+    claims: Annotated[
+        list[str] | None, typer.Argument(metavar="CLAIM", help="Only these; see --list.")
+    ] = None,
+    names: Annotated[bool, typer.Option("--list", help="List the claims and stop.")] = False,
+) -> int:
+    """Hold the reference against Pinocchio and MuJoCo: a verdict table, exit 1 on a miss."""
+    from crosscheck.identities import CLAIMS, run_claims
+
+    if names:
+        for claim in CLAIMS.values():
+            print(f"{claim.name}: {claim.ours}, against {claim.theirs}")
+        return FINE
+    chosen = [_known("claim", name, CLAIMS) for name in claims or CLAIMS]
+    with progress() as bar:
+        task = bar.add_task("", total=len(chosen))
+        verdicts = run_claims(
+            chosen, lambda claim: bar.update(task, description=claim.name, advance=1)
+        )
+    print_verdicts(verdicts)
+    return FINE if all(verdict.held for verdict in verdicts) else MISSED
+
+
+@app.command(
+    epilog=_block(
+        "Examples",
+        "plumbob bench                  everything, at full length",
+        "plumbob bench --quick timing   one suite, quickly",
+        "plumbob bench cloth --fresh    forget the cloth's records and measure anew",
+    )
+    + "\n\n"
+    + _block("Suites", *(f"{name:<10}{about}" for name, about in SUITES.items()))
+)
+def bench(
+    suites: Annotated[
+        list[str] | None, typer.Argument(metavar="SUITE", help="Suites to run; all if none.")
+    ] = None,
+    output: Output = REPORT,
+    fresh: Fresh = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer targets, shorter timing.")] = False,
+) -> int:
+    """Measure problems with solvers. What is on record is kept, so a run can be taken up again."""
+    chosen = tuple(dict.fromkeys(_known("suite", name, SUITES) for name in suites or SUITES))
+    writable(output)
+    return run_suites(chosen, QUICK if quick else FULL, output, fresh)
+
+
+@app.command(
+    epilog=_block(
+        "Examples",
+        "plumbob report",
+        "plumbob report --output results/laptop",
+    )
+)
+def report(output: Output = REPORT) -> int:
+    """Write tables (Markdown, LaTeX, CSV), figures and one offline page from the records."""
+    return write_report(output)
+
+
+@app.command(
+    epilog=_block(
+        "Examples",
+        "plumbob show arm",
+        "plumbob show heart --solver fabrik",
+        "plumbob show star --output star.svg",
+    )
+)
+def show(
+    scene: Annotated[
+        str, typer.Argument(metavar="SCENE", help="arm, cloth, or a curve that the arm draws.")
+    ],
+    file: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="A .gif or a .svg.")
+    ] = None,
+    solver: Annotated[
+        str | None, typer.Option(help="ccd or fabrik; local_global or newton for the cloth.")
+    ] = None,
+) -> int:
+    """Write an animation (GIF) or a picture (SVG) of the arm drawing a curve, or of the cloth."""
+    from .show import SCENES, write
+
+    _known("scene", scene, SCENES)
+    path = file or REPORT / f"{scene}.gif"
+    writable(path.parent)
+    with progress() as bar:
+        task = bar.add_task(scene, total=None)
+        write(
+            scene, path, solver, lambda done, total: bar.update(task, completed=done, total=total)
+        )
+    print(path)
+    return FINE
+
+
+def main_job(output: Path, fresh: bool) -> int:
+    """Say what comes, then check, measure quickly and report."""
+    print(
+        "Plumbob checks its reference against Pinocchio and MuJoCo, measures every suite quickly\n"
+        f"and writes {output / 'index.html'}. That takes a minute or two, compilation included;\n"
+        f"what {output} has on record already is kept. Other commands: plumbob --help\n",
+        flush=True,
+    )
+    writable(output)
+    failed = run_suites(tuple(SUITES), QUICK, output, fresh)
+    return max(failed, write_report(output))
+
+
+def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> int:
+    """Run suites with a progress bar; return 1 if a claim is missed or a block failed."""
+    from . import run
+
+    if fresh:
+        run.forget(suites, output)
+    done, failures = {run.KEPT: 0, run.MEASURED: 0, run.FAILED: 0}, []
+    with progress() as bar:
+        task = bar.add_task("starting", total=run.count(suites, scale))
+        for event in run.run(suites, scale, output):
+            bar.update(task, description=f"{event.suite}: {event.what}")
+            if event.state in done:
+                done[event.state] += 1
+                bar.advance(task)
+            if event.state == run.FAILED:
+                failures.append(f"{event.suite}: {event.what}: {event.message}")
+    print(f"{done[run.MEASURED]} measured, {done[run.KEPT]} kept as on record, in {output}")
+    for failure in [*failures, *run.missed_claims(suites, output)]:
+        print(f"plumbob: {failure}", file=sys.stderr)
+        done[run.FAILED] += 1
+    return MISSED if done[run.FAILED] else FINE
+
+
+def write_report(output: Path) -> int:
+    """Write the report and say where it is, what it found and what is missing."""
+    from .report import write
+
+    written = write(output)
+    for table in written.tables:
+        if table.rows:
+            print(f"\n{table.title}\n  {table.answer.sentence}")
+            print("".join(f"    {point}\n" for point in table.answer.points), end="")
+    print()
+    for sentence in written.missing:
+        print(f"Missing: {sentence}")
+    print(f"{written.page}: {len(written.tables)} tables, also as Markdown, LaTeX and CSV")
+    return FINE
+
+
+def print_verdicts(verdicts: Iterable[Any]) -> None:
+    """Print the table of verdicts."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from .tables import words
+
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for heading in ("claim", "cases", "largest difference", "tolerance", "verdict"):
+        table.add_column(heading, justify="left" if heading in ("claim", "verdict") else "right")
+    held = 0
+    for verdict in verdicts:
+        held += verdict.held
+        table.add_row(
+            verdict.claim.name,
+            words(verdict.cases),
+            words(verdict.difference),
+            words(verdict.claim.tolerance.value),
+            "held" if verdict.held else f"MISSED: {verdict.missed}",
+            style=None if verdict.held else "bold red",
+        )
+    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+    console.print(table)
+    print(f"{held} of {table.row_count} claims held")
+
+
+class _Quiet:
+    """Stands where a progress bar would, and says nothing."""
+
+    def add_task(self, description: str, total: float | None = None) -> int:
+        return 0
+
+    def update(self, task: int, **_: Any) -> None:
+        pass
+
+    def advance(self, task: int) -> None:
+        pass
+
+
+def progress() -> Any:
+    """Return a progress bar on a terminal, and nothing to see in a pipe."""
+    if not sys.stderr.isatty():
+        return nullcontext(_Quiet())
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        BarColumn(24),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.description}"),
+    )
+    return Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=2)
+
+
+def writable(folder: Path) -> None:
+    """Make the folder if need be.
+
+    Raises:
+        OSError: naming it, if nothing can be written there.
+    """
+    import tempfile
+
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OSError(error.errno, "cannot write here", str(folder)) from None
+
+
+def _known(kind: str, name: str, valid: Iterable[str]) -> str:
+    names = list(valid)
+    if name in names:
+        return name
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(names)}"
+    raise ValueError(f"unknown {kind} {name!r}: {hint}")
+
+
+def _complain(message: str) -> int:
+    print(f"plumbob: {' '.join(message.split())}", file=sys.stderr)
+    return MISUSED

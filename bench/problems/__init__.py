@@ -1,0 +1,1 @@
+"""Named problems: the same name and size give the same numbers on every machine."""

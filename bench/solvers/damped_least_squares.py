@@ -1,0 +1,56 @@
+"""Damped least squares on anyone's kinematics: the same loop for every engine.
+
+Wampler 1986, eq. 13: the velocities v = J' (J J' + lambda² I)^-1 e bring the effector closer by
+the error e. The damping follows the error, lambda² = |e|² / 2 (Sugihara 2011, eq. 17, for one
+task), so that it is large far from the target and vanishes at it. Three unknowns at a time, for
+any number of joints.
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from reference.arguments import FloatArray
+
+
+class Kinematics(Protocol):
+    """What the loop asks of an engine; q are the engine's own coordinates of ball joints."""
+
+    def position(self, joint: int) -> FloatArray:
+        """Return where `jacobian` has put a joint [m], (3,)."""
+
+    def jacobian(self, q: FloatArray, joint: int) -> FloatArray:
+        """Place, and return the joint's velocity per velocity coordinate, (3, 3 joint)."""
+
+    def integrate(self, q: FloatArray, v: FloatArray) -> FloatArray:
+        """Return the coordinates reached from q by moving with the velocity v for 1 s."""
+
+
+class Answer(NamedTuple):
+    """The coordinates found, the distance left [m] and the number of iterations."""
+
+    q: FloatArray
+    residual: float
+    iterations: int
+
+
+def damped_least_squares(
+    kinematics: Kinematics,
+    q: FloatArray,
+    target: FloatArray,
+    effector: int,
+    *,
+    tolerance: float,
+    max_iterations: int,
+) -> Answer:
+    """Return coordinates that bring the effector to the target, from q."""
+    for iteration in range(max_iterations + 1):
+        J = kinematics.jacobian(q, effector)
+        e = target - kinematics.position(effector)
+        residual = float(np.sqrt(e @ e))
+        if residual <= tolerance or iteration == max_iterations:
+            break
+        damped = J @ J.T
+        damped[np.diag_indices(3)] += 0.5 * residual**2
+        q = kinematics.integrate(q, J.T @ np.linalg.solve(damped, e))
+    return Answer(q, residual, iteration)

@@ -1,0 +1,29 @@
+"""What is measured: a suite is a list of blocks, each of which makes one record."""
+
+import importlib
+from collections.abc import Iterator
+
+from .block import SCALES, Block, Measured, Scale
+
+__all__ = ["SCALES", "SUITES", "Block", "Measured", "Scale", "blocks"]
+
+# Name and what it answers, in the order of the report; each is a module beside this file.
+SUITES = {
+    "check": "the reference against Pinocchio and MuJoCo, claim by claim",
+    "arm": "the lab's arm on every curve, and reaching for what is too far",
+    "ik": "a chain of ten ball joints: targets near, far, at the edge and beyond",
+    "cloth": "the lab's cloth, 1, 10 and 100 times as stiff: convergence and error",
+    "timing": "forward kinematics, solves and steps beside both engines",
+    "pictures": "the poses and cloths that the report draws",
+}
+
+
+def blocks(suite: str, scale: Scale) -> Iterator[Block]:
+    """Yield the blocks of a suite; engines are imported only now.
+
+    Raises:
+        KeyError: if there is no such suite.
+    """
+    if suite not in SUITES:
+        raise KeyError(suite)
+    yield from importlib.import_module(f".{suite}", __package__).blocks(scale)

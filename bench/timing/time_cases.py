@@ -1,0 +1,21 @@
+"""The one benchmark, run on every case by `pytest -p bench.timing.plugin`."""
+
+from bench.timing.case import announce
+from reference import speed
+
+
+def test_speed(benchmark, case, keep):
+    """Time a case; the first call, which may compile, is not counted."""
+    announce("measuring", case)
+    try:
+        with speed(case.speed):
+            call = case.prepare()
+            call()
+            benchmark(call)
+    except Exception as error:  # one that fails must not cost the others
+        failed = f"{type(error).__name__}: {error}"
+        keep(case, [], failed)
+        announce("failed", case, failed)
+        return
+    keep(case, benchmark.stats.stats.data, "")
+    announce("measured", case)

@@ -1,0 +1,150 @@
+"""Records made up for the tests, and a stamp that does not depend on the machine."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bench.record import FINISHED, Record
+from bench.suites import SUITES
+
+STAMP = {
+    "machine": {"processor": "a <b>slide</b> rule", "cores": 1, "memory_gib": 0.5, "system": "x"},
+    "versions": {"python": "3.11.0", "plumbob": "0.0", "numpy": "2", "cholespy": ""},
+    "source": "0123456789ab",
+}
+WHEN = "2000-01-02T03:04:05+00:00"
+
+
+def record(suite, problem, solver, settings=None, arrays=None, **more):
+    """A record with a stamp; lists become arrays."""
+    made = {name: np.asarray(values) for name, values in (arrays or {}).items()}
+    given = {"stamp": STAMP, "when": WHEN, **more}
+    return Record(suite, problem, solver, settings or {}, arrays=made, **given)
+
+
+def drawn(solver, warm, turn):
+    """The arm drawing a curve, in three frames."""
+    return record(
+        "arm",
+        "arm/circle",
+        solver,
+        {"tolerance": 1e-4, "max_iterations": 100, "warm": warm},
+        {
+            "residual": [1e-5, 2e-5, 3e-4],
+            "iterations": [4, 5, 6] if solver == "ccd" else [1, 2, 3],
+            "largest_turn": [turn, turn / 2],
+            "mean_turn": [turn / 4, turn / 4],
+        },
+    )
+
+
+def beyond(solver, bend):
+    """Two targets out of the arm's reach of 2 m."""
+    return record(
+        "arm",
+        "arm/beyond",
+        solver,
+        {"tolerance": 1e-6, "max_iterations": 10},
+        {
+            "residual": [1.0, 2.0],
+            "iterations": [1, 1],
+            "distance": [3.0, 4.0],
+            "bend": [0.0, bend],
+            "excess": [0.0, 0.0],
+            "reach": 2.0,
+        },
+        size=2,
+    )
+
+
+def claim(name="spring forces", held=True, **notes):
+    """A verdict of the cross-check."""
+    return record(
+        "check",
+        name,
+        "MuJoCo",
+        arrays={"cases": 5, "difference": 5e-13, "tolerance": 1e-12, "moved": 1.0, "held": held},
+        notes={"ours": "ours", "reason": "rounding", "missed": "" if held else "they differ"}
+        | notes,
+    )
+
+
+def timed(solver, seconds, problem="kinematics/10 balls/one pose a call"):
+    """Three rounds of a benchmark."""
+    rounds = [seconds, 2 * seconds, 3 * seconds]
+    return record("timing", problem, solver, {"operations": 1}, {"seconds": rounds, "moved": 0})
+
+
+def reached(stratum, solver):
+    """Two targets for the chain, with the residual of three iterations."""
+    history = {f"history_{name}": [1.0, 0.1, f] for name, f in
+               (("low", 1e-6), ("median", 1e-5), ("high", 1e-4))}  # fmt: skip
+    arrays = {"residual": [1e-5, 1e-6], "iterations": [2, 30], "distance": [0.5, 0.6]}
+    limits = {"tolerance": 1e-4, "max_iterations": 1000}
+    return record("ik", f"chain/{stratum}", solver, limits, arrays | history, size=2)
+
+
+def stepped(solver):
+    """One step of a cloth in three iterations."""
+    arrays = {"residual": [1.0, 0.1, 1e-7, 0.0], "error": [1.0, 0.2, 1e-7, 0.0]}
+    return record("cloth", "cloth/x1/one step", solver, {"h": 0.02, "step": 3}, arrays)
+
+
+def few(iterations):
+    """Two steps of a few iterations."""
+    settings = {"h": 0.02, "first": 5, "steps": 2, "iterations": iterations}
+    arrays = {"error": [0.5, 0.5], "distance": [0.1, 0.1], "drift": [0.1, 0.2], "path": [1, 2]}
+    return record("cloth", "cloth/x1/few iterations", "local_global", settings, arrays)
+
+
+def stepping():
+    """Three steps by Newton."""
+    settings = {"h": 0.02, "first": 5, "steps": 3, "tolerance": 1e-10}
+    arrays = {"iterations": [2, 2, 3], "residual": [1e-12, 1e-12, 1e-11], "outcome": [0, 0, 0]}
+    return record("cloth", "cloth/x1", "newton", settings, arrays | {"at_floor": [True] * 3})
+
+
+def pictured():
+    """The arm on a curve of three points, as drawn and evened out, and a cloth of 2 x 2."""
+    curve = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.3, 0, 0.1]])
+    ghosts = [[[0, 1, 0], [0, 0.5, 0.2], point] for point in curve]
+    arrays = {"curve": curve, "spacing": [0.1, 0.2], "ghosts": ghosts, "residual": [1e-5] * 3}
+    arrays |= {"iterations": [1, 2, 3], "largest_turn": [0.1, 0.2], "mean_turn": [0.1, 0.1]}
+    spacing = {"min_spacing": 0.01, "max_spacing": 0.02}
+    cloth = {"positions": [np.eye(4, 3), 2 * np.eye(4, 3)], "time": [0.0, 1.0], "pinned": [0, 1]}
+    return [
+        *(record("pictures", "arm/x", "ccd", {"evened": e, **spacing}, arrays) for e in (0, 1)),
+        record("pictures", "cloth/x1", "newton", {}, cloth),
+    ]
+
+
+@pytest.fixture
+def make():
+    """The makers of records, by name."""
+    return SimpleNamespace(
+        record=record, drawn=drawn, beyond=beyond, claim=claim, timed=timed, stepped=stepped
+    )
+
+
+@pytest.fixture(scope="session")
+def records():
+    """A small report's worth of records; every suite went through."""
+    finished = [record(FINISHED, suite, "") for suite in SUITES]
+    turns = {"ccd": (1.0, 0.1), "fabrik": (2.0, 0.3)}
+    arm = [drawn(s, warm, turns[s][warm]) for s in turns for warm in (False, True)]
+    return [
+        claim(),
+        *arm,
+        beyond("ccd", 0.5),
+        beyond("fabrik", 0.0),
+        *(reached("near", solver) for solver in ("ccd", "fabrik")),
+        *(stepped(solver) for solver in ("local_global", "newton")),
+        *(few(iterations) for iterations in (1, 10)),
+        stepping(),
+        *pictured(),
+        timed("Plumbob, compiled", 1e-6),
+        timed("Pinocchio", 5e-7),
+        *(timed("Plumbob, compiled", 1e-6, f"{work}/near/ccd") for work in ("ik", "cloth")),
+        *finished,
+    ]

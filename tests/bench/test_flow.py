@@ -1,0 +1,40 @@
+"""Who may do what inside the bench: read a clock, open the result file, compute."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+BENCH = Path(__file__).parents[2] / "bench"
+SOURCES = sorted(BENCH.rglob("*.py"))
+
+
+def imports(path):
+    """The modules that a file imports, without their dots."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module or ""
+
+
+def name(path):
+    return str(path.relative_to(BENCH))
+
+
+def test_only_run_and_timing_read_a_clock():
+    clocks = {"time", "datetime", "timeit"}
+    readers = {name(path) for path in SOURCES if clocks & set(imports(path))}
+    assert {"run.py"} <= readers
+    assert all(reader == "run.py" or reader.startswith("timing/") for reader in readers)
+
+
+def test_only_record_names_the_result_file():
+    namers = {name(path) for path in SOURCES if ".jsonl" in path.read_text(encoding="utf-8")}
+    assert namers == {"record.py"}
+
+
+@pytest.mark.parametrize("file", ["tables.py", "report.py", "findings/kinematics.py"])
+def test_what_shows_numbers_solves_nothing(file):
+    roots = {module.split(".")[0] for module in imports(BENCH / file)}
+    assert not roots & {"reference", "crosscheck", "scipy"}

@@ -1,0 +1,93 @@
+"""Metrics against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bench import metrics
+from reference import rotation
+
+
+@pytest.mark.parametrize("n", [1, 10, 1000])
+def test_wilsons_interval_at_no_hits_and_all_hits(n):
+    z2 = 1.959963984540054**2
+    none, every = metrics.share(np.zeros(n, bool)), metrics.share(np.ones(n, bool))
+    assert none[:3] == (0, n, pytest.approx(0.0, abs=1e-15))
+    assert none.high == pytest.approx(z2 / (n + z2), rel=1e-14)
+    assert every.high == pytest.approx(1.0, abs=1e-15)
+    assert every.low == pytest.approx(n / (n + z2), rel=1e-14)
+
+
+def test_wilsons_interval_of_the_textbook():
+    """81 of 263: Newcombe 1998, table I, method 3 (0.2553 to 0.3662)."""
+    share = metrics.share(np.arange(263) < 81)
+    assert (round(share.low, 4), round(share.high, 4)) == (0.2553, 0.3662)
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=50))
+def test_wilsons_interval_holds_the_rate_and_stays_within_bounds(hits):
+    share = metrics.share(np.array(hits))
+    assert 0.0 <= share.low <= share.hits / share.total + 1e-15
+    assert share.hits / share.total - 1e-15 <= share.high <= 1.0
+
+
+def test_no_solves_say_nothing():
+    assert metrics.share(np.array([], bool)) == (0, 0, 0.0, 1.0)
+    assert all(math.isnan(x) for x in metrics.spread(np.array([])))
+
+
+def test_spread_does_not_hide_a_nan():
+    assert all(math.isnan(x) for x in metrics.spread(np.array([1.0, np.nan])))
+
+
+def test_spread_and_whole_of_counts():
+    assert metrics.spread(np.arange(101)) == (50.0, 95.0, 100.0)
+    assert metrics.whole(np.array([1, 2])) == (1.5, pytest.approx(1.95), 2)
+    assert isinstance(metrics.whole(np.array([1, 2]))[2], int)
+
+
+def test_bend_of_a_right_angle_and_of_a_straight_line():
+    """Joints at 0, (1, 0), (1, 1): the corner is 1 off the y axis, 1/sqrt 2 off the diagonal."""
+    joints = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]]) + 5.0
+    targets = np.array([[0.0, 3, 0], [2, 2, 0]]) + 5.0
+    bends = metrics.bend(np.array([joints, joints]), targets)
+    np.testing.assert_allclose(bends, [1.0, math.sqrt(0.5)], rtol=1e-15)
+    straight = np.linspace([0.0, 0, 0], [1, 2, 3], 5)
+    assert metrics.bend(straight, np.array([2.0, 4, 6])) < 1e-15
+
+
+def test_excess_is_measured_from_the_best_residual():
+    excess = metrics.excess(np.array([1.0, 0.25]), np.array([2.5, 1.0]), 2.0)
+    np.testing.assert_array_equal(excess, [0.5, 0.25])
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.1, 3.0])
+def test_turns_are_the_angle_between_frames_whatever_the_quaternions_sign(angle):
+    still, turned = rotation.identity(2), rotation.exponential([[0, angle, 0], [0, 0, 0]])
+    turns = metrics.turns(np.array([still, turned, -turned]))
+    np.testing.assert_allclose(turns, [[angle, 0], [0, 0]], rtol=1e-9, atol=1e-15)
+
+
+def test_errors_and_distances():
+    x, exact, start = np.array([[1.0, 0]]), np.array([[0.0, 0]]), np.array([[0.0, 4]])
+    assert metrics.relative_error(x, exact, start) == 0.25
+    points = np.array([[3.0, 4, 0], [0, 0, 0]])
+    assert metrics.rms_distance(points, np.zeros((2, 3))) == pytest.approx(math.sqrt(12.5))
+
+
+def test_every_value_is_counted_once_also_beyond_the_edges():
+    counts = metrics.counts(np.array([0, 1, 1, 5, 1000]), np.array([0.5, 1.5, 10.0]))
+    np.testing.assert_array_equal(counts, [3, 2])
+
+
+def test_first_below():
+    assert metrics.first_below(np.array([1.0, 0.1, 0.2, 0.01]), 0.1) == 1
+    assert metrics.first_below(np.array([1.0, np.nan]), 0.1) is None
+
+
+def test_timing_is_the_median_between_tenths():
+    took = metrics.timing(np.arange(11.0))
+    assert took == (5.0, 1.0, 9.0, 11)

@@ -1,0 +1,156 @@
+"""The report: one page that needs nothing else, from the records alone."""
+
+import html.parser
+import re
+from dataclasses import replace
+
+import pytest
+
+from bench import report
+from bench.findings import SECTIONS
+from bench.record import RecordFile
+
+VOID = {"meta", "link", "br", "img", "input", "hr"}
+
+
+class Page(html.parser.HTMLParser):
+    """What the tests ask of a page: its ids, links, tags left open, and text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.links, self.open, self.text = [], [], [], []
+        self.tags, self.wrong = set(), []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.add(tag)
+        self.ids += [value for name, value in attributes if name == "id"]
+        self.links += [value for name, value in attributes if name in ("href", "src")]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop() != tag:
+            self.wrong.append(tag)
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def written(folder, records):
+    """Write a report of records; return what came of it and its page."""
+    RecordFile(folder).append(records)
+    result = report.write(folder)
+    return result, Page(result.page.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory, records):
+    """The report of all records, and its page."""
+    return written(tmp_path_factory.mktemp("report"), records)
+
+
+def test_the_page_needs_nothing_from_outside(whole):
+    result, page = whole
+    text = result.page.read_text(encoding="utf-8")
+    assert all(link.startswith(("#", "data:")) for link in page.links)
+    assert not re.search(r"https?://|//[a-z]+\.|@import|url\((?!#)", text)
+    assert "xlink" not in text
+    assert not page.tags & {"script", "link", "img", "iframe", "object"}
+
+
+def test_the_page_is_well_formed_and_every_id_is_its_own(whole):
+    _, page = whole
+    assert page.wrong == []
+    assert page.open == []
+    assert len(page.ids) == len(set(page.ids))
+    inner = {link[1:] for link in page.links if link.startswith("#")}
+    assert inner <= set(page.ids)
+
+
+def test_every_name_is_escaped(tmp_path, records):
+    nasty = '<img src=x onerror="alert(1)">&'
+    spoilt = [replace(r, problem=nasty) if r.suite == "check" else r for r in records]
+    result, page = written(tmp_path, spoilt)
+    assert "img" not in page.tags
+    assert nasty in "".join(page.text)
+    assert "<b>slide</b>" not in result.page.read_text(encoding="utf-8")
+
+
+def test_machine_versions_and_date_stand_in_its_head(whole):
+    _, page = whole
+    text = "".join(page.text)
+    for fact in ("a <b>slide</b> rule", "2000-01-02 03:04:05 UTC", "0123456789ab", "numpy 2"):
+        assert fact in text
+
+
+def test_tables_in_three_formats_and_figures_lie_beside_it(whole):
+    result, _ = whole
+    folder = result.page.parent
+    for table in result.tables:
+        for suffix in ("md", "tex", "csv"):
+            assert (folder / "tables" / f"{table.name}.{suffix}").stat().st_size > 0
+    drawn = {path.stem for path in (folder / "figures").iterdir()}
+    wanted = {name for section in SECTIONS for entry in section.entries for name in entry.drawings}
+    assert drawn == wanted
+    assert "<svg" in (folder / "figures" / "jitter.svg").read_text()
+
+
+def test_every_table_and_figure_stands_in_the_page(whole):
+    result, page = whole
+    text = "".join(page.text)
+    assert all(table.rows and table.title in text for table in result.tables)
+    wanted = sum(len(entry.drawings) for section in SECTIONS for entry in section.entries)
+    assert text.count("Not measured yet") == 0
+    assert result.page.read_text().count("<figure>") == wanted
+
+
+def test_a_solver_that_no_figure_knows_is_drawn_all_the_same(tmp_path, records):
+    known = ("ccd", "Pinocchio")
+    new = [replace(r, solver="brand_new") for r in records if r.solver in known]
+    result, page = written(tmp_path, [*records, *new])
+    assert "brand new, from rest" in "".join(page.text)
+
+
+def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
+    _, page = written(tmp_path, [record for record in records if record.suite == "check"])
+    assert "".join(page.text).count("Not measured yet") > 10
+
+
+def test_what_is_missing_is_said(tmp_path, records):
+    failed = replace(records[0], problem="gone", notes={"failed": "OSError: no engine"}, arrays={})
+    others = [r for r in records if not (r.suite == "finished" and r.problem == "cloth")]
+    older = replace(others[1], stamp={"source": "other"}, when="1999-01-01T00:00:00+00:00")
+    result, page = written(tmp_path, [failed, others[0], older, *others[2:]])
+    for words in (
+        "“cloth” was not run to its end",
+        "gone, MuJoCo could not be measured: OSError: no engine",
+        "cholespy is not installed",
+        "1 of ",
+    ):
+        assert any(words in sentence for sentence in result.missing)
+    assert all(sentence in "".join(page.text) for sentence in result.missing)
+
+
+def test_a_complete_report_misses_only_the_package_that_is_not_there(whole):
+    result, _ = whole
+    assert result.missing == ["cholespy is not installed."]
+
+
+def test_the_same_records_give_the_same_files(whole):
+    result, _ = whole
+    files = sorted(p for p in result.page.parent.rglob("*") if p.is_file())
+    before = [p.read_bytes() for p in files]
+    report.write(result.page.parent)
+    assert [p.read_bytes() for p in files] == before
+
+
+def test_without_records_there_is_no_report(tmp_path):
+    with pytest.raises(ValueError, match="no records"):
+        report.write(tmp_path / "empty")
+    assert not (tmp_path / "empty").exists()

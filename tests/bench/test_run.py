@@ -1,0 +1,120 @@
+"""Running suites: each block is stored at once, and what is stored is not measured again."""
+
+import pytest
+
+from bench import run
+from bench.machine import stamp
+from bench.record import RecordFile
+from bench.suites import Block, Measured
+
+
+class Suite:
+    """Three blocks that count how often they are measured; one may be made to fail."""
+
+    def __init__(self, monkeypatch, size=0):
+        self.measured, self.size, self.trouble = [], size, {}
+        monkeypatch.setattr(run, "blocks", self.blocks)
+
+    def blocks(self, suite, scale):
+        for solver in ("a", "b", "c"):
+            yield Block(suite, "p", solver, lambda s=solver: self.measure(s), size=self.size)
+
+    def measure(self, solver):
+        if solver in self.trouble:
+            raise self.trouble[solver]
+        self.measured.append(solver)
+        return Measured({"x": [1.0]})
+
+
+@pytest.fixture
+def suite(monkeypatch):
+    return Suite(monkeypatch)
+
+
+def go(folder):
+    return [event for event in run.run(["arm"], "quick", folder) if event.state != run.MEASURING]
+
+
+def stored(folder):
+    return [r.solver for r in RecordFile(folder).read().records if r.suite == "arm"]
+
+
+def test_a_second_run_measures_nothing(suite, tmp_path):
+    assert [event.state for event in go(tmp_path)] == [run.MEASURED] * 3
+    assert [event.state for event in go(tmp_path)] == [run.KEPT] * 3
+    assert suite.measured == ["a", "b", "c"]
+
+
+def test_a_run_that_was_interrupted_is_taken_up_where_it_stopped(suite, tmp_path):
+    suite.trouble = {"c": KeyboardInterrupt()}
+    with pytest.raises(KeyboardInterrupt):
+        go(tmp_path)
+    assert stored(tmp_path) == ["a", "b"]
+    suite.trouble = {}
+    go(tmp_path)
+    assert suite.measured == ["a", "b", "c"]
+
+
+def test_a_line_cut_off_by_a_kill_costs_its_own_block_only(suite, tmp_path):
+    suite.trouble = {"c": KeyboardInterrupt()}
+    with pytest.raises(KeyboardInterrupt):
+        go(tmp_path)
+    path = RecordFile(tmp_path).path
+    path.write_bytes(path.read_bytes()[:-9])
+    suite.trouble = {}
+    go(tmp_path)
+    assert suite.measured == ["a", "b", "b", "c"]
+    assert RecordFile(tmp_path).read().warning == ""
+
+
+def test_a_block_that_fails_costs_no_other_and_is_tried_again(suite, tmp_path):
+    suite.trouble = {"b": OSError("no engine")}
+    events = go(tmp_path)
+    assert [event.state for event in events] == [run.MEASURED, run.FAILED, run.MEASURED]
+    assert events[1].message == "OSError: no engine"
+    suite.trouble = {}
+    assert [event.state for event in go(tmp_path)] == [run.KEPT, run.MEASURED, run.KEPT]
+
+
+def test_other_sources_are_measured_again_and_their_leftovers_dropped(suite, tmp_path, make):
+    old = make.record("arm", "p", "a", stamp={**stamp(), "source": "old"})
+    gone = make.record("arm", "renamed since", "a", stamp={**stamp(), "source": "old"})
+    elsewhere = make.record("ik", "p", "a", stamp={**stamp(), "source": "old"})
+    RecordFile(tmp_path).append([old, gone, elsewhere])
+    go(tmp_path)
+    assert suite.measured == ["a", "b", "c"]
+    kept = {(r.suite, r.problem) for r in RecordFile(tmp_path).read().records}
+    assert kept == {("arm", "p"), ("ik", "p"), ("finished", "arm")}
+
+
+@pytest.mark.parametrize(("before", "after", "again"), [(200, 2000, True), (2000, 200, False)])
+def test_a_larger_block_stands_for_a_smaller_one_but_not_the_reverse(
+    monkeypatch, tmp_path, before, after, again
+):
+    Suite(monkeypatch, size=before)
+    go(tmp_path)
+    second = Suite(monkeypatch, size=after)
+    go(tmp_path)
+    assert bool(second.measured) is again
+
+
+def test_forget_leaves_other_suites_alone(suite, tmp_path, make):
+    go(tmp_path)
+    RecordFile(tmp_path).append([make.record("ik", "p", "a"), make.record("finished", "ik", "")])
+    run.forget(["arm"], tmp_path)
+    assert {r.suite for r in RecordFile(tmp_path).read().records} == {"ik", "finished"}
+
+
+def test_a_suite_is_finished_only_when_it_went_through(suite, tmp_path):
+    suite.trouble = {"c": KeyboardInterrupt()}
+    with pytest.raises(KeyboardInterrupt):
+        go(tmp_path)
+    assert not any(r.suite == "finished" for r in RecordFile(tmp_path).read().records)
+
+
+def test_timing_that_crashed_is_not_finished(monkeypatch, tmp_path):
+    crashed = run.Event(run.FAILED, run.TIMING, "pytest-benchmark", "killed")
+    monkeypatch.setattr(run, "_relay", lambda arguments: iter([crashed]))
+    events = list(run.run([run.TIMING], "quick", tmp_path))
+    assert events == [crashed]
+    assert RecordFile(tmp_path).read().records == []

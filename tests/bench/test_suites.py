@@ -1,0 +1,88 @@
+"""Suites: what they measure adds up."""
+
+import numpy as np
+import pytest
+
+from bench.record import key
+from bench.suites import SUITES, Scale, blocks
+from bench.timing import cases
+
+TINY = Scale(targets=3, seconds=0.001)
+MEASURED = [suite for suite in SUITES if suite != "timing"]
+
+
+def found(suite, problem, solver, **settings):
+    """The one block of a suite with this problem, solver and settings."""
+    (block,) = [
+        b
+        for b in blocks(suite, TINY)
+        if (b.problem, b.solver) == (problem, solver)
+        and settings.items() <= dict(b.settings).items()
+    ]
+    return block
+
+
+@pytest.mark.parametrize("suite", MEASURED)
+def test_no_two_blocks_have_the_same_key(suite):
+    keys = [key(b.suite, b.problem, b.solver, b.settings) for b in blocks(suite, TINY)]
+    assert len(keys) == len(set(keys)) > 0
+    assert {name for name, *_ in keys} == {suite}
+
+
+def test_no_two_cases_of_the_timing_have_the_same_key():
+    keys = [case.key for case in cases()]
+    assert len(keys) == len(set(keys)) > 0
+
+
+def test_an_unknown_suite_is_refused():
+    with pytest.raises(KeyError):
+        list(blocks("arms", TINY))
+
+
+@pytest.mark.parametrize("solver", ["ccd", "fabrik"])
+def test_the_arm_draws_within_tolerance_cold_and_warm(solver):
+    for warm in (False, True):
+        block = found("arm", "arm/triangle", solver, warm=warm)
+        arrays = block.measure().arrays
+        assert arrays["residual"].max() <= block.settings["tolerance"]
+        assert arrays["iterations"].max() <= block.settings["max_iterations"]
+        assert len(arrays["largest_turn"]) == len(arrays["residual"]) - 1
+        assert (arrays["mean_turn"] <= arrays["largest_turn"]).all()
+
+
+@pytest.mark.parametrize("solver", ["ccd", "fabrik", "dls/Pinocchio"])
+def test_no_residual_is_below_distance_less_reach(solver):
+    arrays = found("ik", "chain/beyond", solver).measure().arrays
+    assert arrays["excess"].min() > -1e-14
+    assert len(arrays["bend"]) == TINY.targets
+
+
+def test_the_history_begins_at_the_start_and_ends_at_the_residual():
+    arrays = found("ik", "chain/near", "fabrik").measure().arrays
+    assert arrays["history_low"][-1] <= arrays["residual"].max()
+    assert arrays["history_median"][0] > arrays["history_median"][-1]
+
+
+def test_a_claim_is_judged_as_by_the_cross_check():
+    (block,) = [b for b in blocks("check", TINY) if b.problem == "damper forces"]
+    arrays, notes = block.measure()
+    assert arrays["held"]
+    assert 0 < arrays["difference"] <= arrays["tolerance"]
+    assert notes["missed"] == ""
+
+
+def test_resampling_evens_the_gaps_out():
+    raw, even = (
+        found("pictures", "arm/plumb_bob", "ccd", evened=evened).measure().arrays
+        for evened in (False, True)
+    )
+    assert np.ptp(even["spacing"]) < np.ptp(raw["spacing"])
+    assert even["spacing"].max() <= 0.02 * (1 + 1e-12)
+
+
+@pytest.mark.slow
+def test_one_step_of_the_cloth_starts_at_one_and_converges():
+    for solver, last in (("newton", 12), ("local_global", 1000)):
+        arrays = found("cloth", "cloth/x1/one step", solver).measure().arrays
+        assert arrays["residual"][0] == arrays["error"][0] == 1.0
+        assert arrays["error"][last] < 1e-10

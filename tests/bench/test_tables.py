@@ -1,0 +1,111 @@
+"""Tables: every format says the same, and nothing in a cell can break it."""
+
+import csv
+import io
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bench import tables
+from bench.metrics import share
+from bench.tables import Answer, Column, Table, words
+
+HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
+
+
+COLUMNS = (Column("name", words=True), Column("value", "m"))
+
+
+def table(*rows, columns=COLUMNS):
+    return Table("t", "Title", columns, rows)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (1.0, "1.00"),
+        (-0.0123456, "-0.0123"),
+        (9.996, "10.0"),
+        (123.4, "123"),
+        (12345.6, "12,300"),
+        (1e-5, "1.0e-5"),
+        (9.98e-5, "1.0e-4"),
+        (-4.4e-16, "-4.4e-16"),
+        (2e9, "2.0e9"),
+        (float("nan"), "not a number"),
+        (float("-inf"), "-infinite"),
+        (12345, "12,345"),
+        (True, "yes"),
+        (None, "–"),
+        (share(np.array([True, False])), "1/2 = 50 % (9.5–90.5)"),
+        ("two\nlines", "two lines"),
+    ],
+)
+def test_words(value, text):
+    assert words(value) == text
+
+
+@given(st.floats(-1e300, 1e300))
+def test_a_number_in_words_is_near_itself(value):
+    shown = float(words(value).replace(",", ""))
+    assert abs(shown - value) <= 0.0500001 * abs(value)
+
+
+def test_a_ragged_row_is_refused():
+    with pytest.raises(ValueError, match="expected 2 cells in table t, got 1"):
+        table(("alone",))
+
+
+def test_headings_that_stand_twice_are_refused():
+    with pytest.raises(ValueError, match="distinct headings"):
+        table(columns=(Column("a"), Column("a")))
+
+
+def test_markdown_cells_cannot_end_a_cell_or_a_row():
+    lines = tables.markdown(table((HOSTILE, 1.0))).splitlines()
+    row = lines[-1]
+    assert len(re.findall(r"(?<!\\)\|", row)) == 3
+    assert not re.search(r"(?<!\\)[`*_\[\]<>]", row)
+
+
+def test_latex_specials_are_escaped():
+    lines = tables.latex(table((HOSTILE, 1.0))).splitlines()
+    row = lines[lines.index(r"    \midrule") + 1].removesuffix(r" & 1.00 \\")
+    commands = r"\\(textbackslash|textasciicircum|textasciitilde|textbar)\{\}|\\ensuremath\{[<>]\}"
+    rest = re.sub(rf"{commands}|\\[{{}}$&#%_]", "", row)
+    assert not set(rest) & set("\\{}$&#%_^~<>|")
+    assert "50" in rest
+
+
+def test_latex_sets_powers_of_ten():
+    assert r"$1.0 \cdot 10^{-5}$" in tables.latex(table(("x", 1e-5)))
+
+
+def test_latex_separates_groups_only_where_there_are_some():
+    single = tables.latex(table(("a", 1), ("b", 2)))
+    grouped = tables.latex(table(("a", 1), ("a", 2), ("b", 3)))
+    assert "addlinespace" not in single
+    assert grouped.count("addlinespace") == 1
+
+
+def test_csv_keeps_all_digits_and_any_text():
+    third = 1 / 3
+    columns = (Column("name", words=True), Column("value", "m"), Column("hits (95 %)"))
+    text = tables.comma_separated(
+        table((HOSTILE, third, share(np.array([True]))), ("-", None, None), columns=columns)
+    )
+    rows = list(csv.reader(io.StringIO(text)))
+    assert rows[0][:3] == ["name", "value [m]", "hits, hits"]
+    assert rows[1][0] == " ".join(HOSTILE.split())
+    assert float(rows[1][1]) == third
+    assert rows[1][2:4] == ["1", "1"]
+    assert rows[2] == ["-", "", "", "", "", ""]
+
+
+def test_an_answer_stands_in_markdown_with_its_points():
+    answered = Table("t", "T", (Column("a"),), ((1,),), answer=Answer("Thus:", ("x", "y")))
+    assert "Thus:\n\n- x\n- y\n" in tables.markdown(answered)

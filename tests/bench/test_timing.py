@@ -1,0 +1,62 @@
+"""Timing, for real but in a blink: pytest-benchmark, in a process of its own."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from bench import run
+from bench.machine import stamp
+from bench.record import RecordFile
+from bench.timing.case import LIMIT, copying
+
+
+@pytest.fixture(scope="module")
+def timed(tmp_path_factory):
+    """The folder of records and the output of timing a few cases for a millisecond."""
+    folder = tmp_path_factory.mktemp("timed")
+    arguments = run.timing_arguments(folder, 0.001, str(folder / "storage"))
+    command = [sys.executable, "-m", "pytest", *arguments, "-k", "kinematics and 10 and compiled"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
+    return folder, done
+
+
+def test_every_case_is_kept_with_rounds_of_one_operation_each(timed):
+    folder, done = timed
+    assert done.returncode == 0, done.stdout + done.stderr
+    records = RecordFile(folder).read().records
+    assert {record.settings["operations"] for record in records} >= {1, 10_000}
+    for record in records:
+        assert not record.failed
+        assert record.arrays["seconds"].size >= 5
+        assert (record.arrays["seconds"] > 0).all()
+        assert record.size == 0.001
+        together = record.arrays["seconds"].sum() * record.settings["operations"]
+        assert together == pytest.approx(record.seconds)
+        assert record.stamp["machine"] == stamp()["machine"]
+
+
+def test_what_happens_is_announced_line_by_line(timed):
+    _, done = timed
+    lines = [line for line in done.stdout.splitlines() if line.startswith(run.MARK)]
+    states = {line.split("\t")[1] for line in lines}
+    assert states == {run.MEASURING, run.MEASURED}
+
+
+def test_pytest_that_fails_is_an_event_with_its_reason():
+    (event,) = run._relay(["--no-such-option"])
+    assert event.state == run.FAILED
+    assert "no-such-option" in event.message
+
+
+def test_the_limit_moves_as_many_bytes_as_it_says(monkeypatch):
+    moved = []
+    monkeypatch.setattr(
+        np, "copyto", lambda sink, source: moved.append(sink.nbytes + source.nbytes)
+    )
+    case = copying("p", 1600, passes=3, operations=10)
+    case.prepare()()
+    assert moved == [1600] * 3
+    assert case.moved == 4800
+    assert case.solver == LIMIT

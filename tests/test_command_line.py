@@ -1,0 +1,208 @@
+"""The command line: what it prints, what it exits with, and what it never does."""
+
+import subprocess
+import sys
+
+import pytest
+
+from bench import cli
+from bench.record import RecordFile
+from crosscheck.identities import CLAIMS
+from crosscheck.verdict import Verdict
+
+
+@pytest.fixture(autouse=True)
+def empty_folder(tmp_path, monkeypatch):
+    """Run every test in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def main_job(monkeypatch):
+    """The calls of the main job, which is not done."""
+    calls = []
+    monkeypatch.setattr(cli, "main_job", lambda *arguments: calls.append(arguments) or 0)
+    return calls
+
+
+def plumbob(capsys, *arguments):
+    """The exit code, stdout and stderr of a command line."""
+    code = cli.run_command(list(arguments))
+    return code, *capsys.readouterr()
+
+
+MISUSE = {
+    "command": (["chek"], "Did you mean 'check'?"),
+    "option": (["bench", "--fersh"], "--fresh"),
+    "option of the main job": (["--fersh"], "--fresh"),
+    "suite": (["bench", "clot"], "did you mean 'cloth'?"),
+    "claim": (["check", "spring force"], "did you mean 'spring forces'?"),
+    "scene": (["show", "hart"], "did you mean 'heart'?"),
+    "scene unlike any": (["show", "qqq"], "expected one of arm, cloth, circle"),
+    "solver": (["show", "heart", "--solver", "jacobi"], "expected one of ccd, fabrik"),
+    "suffix": (["show", "heart", "-o", "heart.png"], "expected one of .gif, .svg"),
+    "no scene": (["show"], "SCENE"),
+    "no records": (["report"], "no records in report"),
+    "options before the command": (["--output", "x", "report"], "behind the command: report"),
+    "too much": (["report", "now"], "now"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), MISUSE.values(), ids=MISUSE)
+def test_misuse_exits_2_with_one_sentence(capsys, main_job, empty_folder, arguments, sentence):
+    code, out, err = plumbob(capsys, *arguments)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("plumbob: ")
+    assert err.count("\n") == 1
+    assert sentence in err
+    assert main_job == []
+    assert not (empty_folder / "report" / "records.jsonl").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["bench", "arm"], ["report"], ["show", "heart"]], ids=lambda a: " ".join(a)
+)
+def test_a_folder_that_cannot_be_written_to_exits_2_and_is_named(capsys, empty_folder, arguments):
+    (empty_folder / "file").write_text("in the way")
+    folder = empty_folder / "file" / "report"
+    target = ["-o", str(folder / "a.gif") if "show" in arguments else str(folder)]
+    code, _, err = plumbob(capsys, *arguments, *target)
+    assert code == 2
+    assert str(empty_folder / "file") in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("arguments", [["bench", "arm"], ["report"], ["bench", "--fresh"]])
+def test_a_corrupt_result_file_exits_2_and_stays(capsys, empty_folder, arguments):
+    path = RecordFile(empty_folder / "report").path
+    path.parent.mkdir()
+    path.write_text("no record\n")
+    code, _, err = plumbob(capsys, *arguments)
+    assert code == 2
+    assert "line 1: not a record" in err
+    assert path.read_text() == "no record\n"
+
+
+def test_alone_it_does_the_main_job(capsys, main_job):
+    assert plumbob(capsys)[0] == 0
+    assert len(main_job) == 1
+
+
+def test_the_main_job_says_first_what_it_does_and_where(capsys, monkeypatch):
+    monkeypatch.setattr(cli, "run_suites", lambda *_: 1)
+    monkeypatch.setattr(cli, "write_report", lambda *_: 0)
+    code, out, _ = plumbob(capsys, "--output", "here")
+    assert "Pinocchio and MuJoCo" in out
+    assert "here/index.html" in out
+    assert "minute" in out
+    assert code == 1
+
+
+def test_ctrl_c_exits_130_without_a_word(capsys, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "main_job", interrupted)
+    code, out, err = plumbob(capsys)
+    assert code == 130
+    assert (out + err).strip() == ""
+
+
+def judged(missed):
+    """Stand for `run_claims`, with every claim missed or held."""
+
+    def run_claims(names, progress=None):
+        return [Verdict(CLAIMS[name], 3, 1e-3, 1.0, missed) for name in names]
+
+    return run_claims
+
+
+def test_a_missed_claim_exits_1_and_stands_in_the_table(capsys, monkeypatch):
+    monkeypatch.setattr("crosscheck.identities.run_claims", judged("they differ"))
+    code, out, _ = plumbob(capsys, "check", "spring forces")
+    assert code == 1
+    assert "MISSED: they differ" in out
+    assert "0 of 1 claims held" in out
+
+
+def test_claims_that_hold_exit_0(capsys, monkeypatch):
+    monkeypatch.setattr("crosscheck.identities.run_claims", judged(""))
+    code, out, _ = plumbob(capsys, "check")
+    assert code == 0
+    assert f"{len(CLAIMS)} of {len(CLAIMS)} claims held" in out
+    assert all(name in out for name in CLAIMS)
+
+
+def test_the_claims_can_be_listed(capsys):
+    code, out, _ = plumbob(capsys, "check", "--list")
+    assert code == 0
+    assert len(out.splitlines()) == len(CLAIMS)
+
+
+@pytest.mark.parametrize("command", [(), ("check",), ("bench",), ("report",), ("show",)])
+def test_help_has_examples_and_does_nothing(capsys, main_job, empty_folder, command):
+    code, out, _ = plumbob(capsys, *command, "--help")
+    assert code == 0
+    assert "Examples:\n    plumbob" in out
+    assert main_job == []
+    assert list(empty_folder.iterdir()) == []
+
+
+def test_version(capsys, main_job):
+    code, out, _ = plumbob(capsys, "--version")
+    assert code == 0
+    assert out.startswith("plumbob ")
+    assert main_job == []
+
+
+def test_help_imports_no_engine_no_reference_and_no_matplotlib():
+    script = (
+        "import sys, bench.cli; bench.cli.run_command(['--help']);"
+        "print(sorted({name.partition('.')[0] for name in sys.modules}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    loaded = set(eval(done.stdout.splitlines()[-1]))
+    assert "typer" in loaded
+    assert not loaded & {"numpy", "numba", "scipy", "mujoco", "pinocchio", "matplotlib"}
+    assert not loaded & {"reference", "crosscheck", "rich"}
+
+
+def test_from_measuring_to_the_page(capsys, empty_folder):
+    """A suite is measured, kept on record, not measured again, and reported."""
+    code, out, err = plumbob(capsys, "bench", "arm", "--quick", "-o", "out")
+    assert (code, err) == (0, "")
+    count = int(out.split()[0])
+    assert count > 0
+    assert f"{count} measured, 0 kept" in out
+    code, out, _ = plumbob(capsys, "bench", "arm", "--quick", "-o", "out")
+    assert f"0 measured, {count} kept" in out
+    code, out, _ = plumbob(capsys, "bench", "arm", "--quick", "--fresh", "-o", "out")
+    assert f"{count} measured, 0 kept" in out
+    code, out, err = plumbob(capsys, "report", "-o", "out")
+    assert (code, err) == (0, "")
+    assert "Missing: The suite “cloth” was not run to its end" in out
+    page = (empty_folder / "out" / "index.html").read_text()
+    assert "FABRIK needs fewer iterations than CCD" in page
+    assert [path.name for path in empty_folder.iterdir()] == ["out"]
+
+
+def test_a_picture_of_a_scene_is_written_and_named(capsys, empty_folder):
+    code, out, err = plumbob(capsys, "show", "heart", "-o", "pictures/heart.svg")
+    assert (code, out, err) == (0, "pictures/heart.svg\n", "")
+    assert "<svg" in (empty_folder / "pictures" / "heart.svg").read_text()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", ["cloth", "plumb_bob"])
+def test_an_animation_of_a_scene_moves(capsys, empty_folder, scene):
+    from PIL import Image
+
+    assert plumbob(capsys, "show", scene)[0] == 0
+    with Image.open(empty_folder / "report" / f"{scene}.gif") as film:
+        first = film.convert("RGB").tobytes()
+        film.seek(film.n_frames - 1)
+        assert film.convert("RGB").tobytes() != first
