@@ -16,10 +16,9 @@ import numpy as np
 from .machine import stamp
 from .record import FINISHED, Key, Record, RecordFile, key
 from .suites import SCALES, Block, blocks
+from .timing import cases as timing_cases
+from .timing.case import MARK, TIMING
 
-TIMING = "timing"
-# Before each line by which the process that takes the times tells what it does.
-MARK = "plumbob\t"
 # At most so many rounds of a benchmark are kept.
 ROUNDS = 200
 KEPT, MEASURING, MEASURED, FAILED = "kept", "measuring", "measured", "failed"
@@ -112,9 +111,7 @@ def count(suites: Sequence[str], scale: str) -> int:
 def keys(suite: str, scale: str) -> set[Key]:
     """Return the keys of all records of a suite that was gone through."""
     if suite == TIMING:
-        from . import timing
-
-        return {case.key for case in timing.cases()}
+        return {case.key for case in timing_cases()}
     return {block_key(block) for block in blocks(suite, SCALES[scale])}
 
 
@@ -172,10 +169,8 @@ def measure(block: Block) -> Record:
 
 def _run_timing(scale: str, folder: Path, present: dict[Key, Record]) -> Iterator[Event]:
     """Time the cases in a process of its own, which keeps the records, and relay what it says."""
-    from . import timing
-
     length = SCALES[scale].seconds
-    cases = list(timing.cases())
+    cases = list(timing_cases())
     kept = [case for case in cases if is_done(present.get(case.key), length)]
     yield from (Event(KEPT, TIMING, case.name) for case in kept)
     if len(kept) == len(cases):
