@@ -12,7 +12,10 @@ from ..outcome import Outcome
 from ..skeleton import Skeleton
 from .batch import Solved, iterate, solve_batch
 from .ccd import ccd_sweep
+from .damped_least_squares import damped_least_squares_sweep
 from .fabrik import fabrik_sweep
+from .jacobian_transpose import jacobian_transpose_sweep
+from .levenberg_marquardt import levenberg_marquardt_sweep
 from .problem import IKSolution, Target, checked_target
 
 __all__ = ["IK_SOLVERS", "IKSolution", "Outcome", "Target", "solve_ik"]
@@ -25,6 +28,9 @@ def _batch(sweep):
 IK_SOLVERS = {
     "ccd": _batch(ccd_sweep),
     "fabrik": _batch(fabrik_sweep),
+    "levenberg_marquardt": _batch(levenberg_marquardt_sweep),
+    "damped_least_squares": _batch(damped_least_squares_sweep),
+    "jacobian_transpose": _batch(jacobian_transpose_sweep),
 }
 
 

@@ -8,7 +8,7 @@ from ..arguments import FloatArray, IndexArray
 from ..kinematics import forward_pose, normalise
 from ..outcome import Outcome
 from ..quaternion import norm, subtract, vector_at
-from .ccd import ccd_sweep as sweep
+from .ccd import ccd_sweep as sweep  # the one that is bound to each solver's
 from .chain import (
     bend,
     least_distance,

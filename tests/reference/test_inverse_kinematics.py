@@ -23,6 +23,10 @@ from reference.inverse_kinematics.ccd import ccd_turn
 ROUNDING = 1e-14
 
 
+# Towards a target out of reach, plain damped least squares and the transpose may swing for ever.
+SETTLING = ("ccd", "fabrik", "levenberg_marquardt")
+
+
 @pytest.fixture(params=IK_SOLVERS)
 def solver(request):
     return request.param
@@ -165,6 +169,7 @@ def test_fabrik_lays_the_chain_straight_to_a_target_beyond_reach_at_once(
     assert solution.residual == pytest.approx((distance - 1.0) * reach, abs=1e-13 * distance)
 
 
+@pytest.mark.parametrize("solver", SETTLING, indirect=True)
 def test_beyond_reach_the_residual_tends_to_the_distance_less_the_reach(solver, speed):
     arm, rest = scenes.lab_arm()
     solution = solve_ik(arm, rest, [3.0, 1.7, 4.0], solver, max_iterations=1000)
@@ -172,6 +177,7 @@ def test_beyond_reach_the_residual_tends_to_the_distance_less_the_reach(solver, 
     assert solution.residual == pytest.approx(5.0 - 2.6, abs=2e-4)
 
 
+@pytest.mark.parametrize("solver", SETTLING, indirect=True)
 @pytest.mark.parametrize("depth", [0.0, 0.3, 1.0])
 def test_in_the_hole_of_the_longest_link_the_rim_is_the_nearest(solver, depth, speed):
     """Links of 3, 0.5 and 0.5 leave a hole of radius 2 about the root."""
@@ -211,10 +217,20 @@ def test_a_straight_chain_of_two_links_is_freed_too(solver, speed):
 
 
 @pytest.mark.parametrize("target", [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-def test_one_link_turns_at_once_even_to_its_opposite(target, solver, speed):
+def test_one_link_turns_even_to_its_opposite(target, solver, speed):
     chain, rest = scenes.ball_chain(links=1, link_length=1.0)
-    solution = solve_ik(chain, rest, target, solver, tolerance=1e-12)
-    assert (solution.iterations, solution.outcome) == (1, Outcome.CONVERGED)
+    solution = solve_ik(chain, rest, target, solver, tolerance=1e-9)
+    assert solution.outcome is Outcome.CONVERGED
+    if solver in ("ccd", "fabrik"):
+        assert solution.iterations == 1
+
+
+def test_a_straight_chain_turns_round_to_a_target_behind_it(solver, speed):
+    chain, rest = scenes.ball_chain(links=3)
+    for distance, outcome in ((0.25, Outcome.CONVERGED), (0.5, Outcome.UNREACHABLE)):
+        solution = solve_ik(chain, rest, [-distance, 0.0, 0.0], solver, max_iterations=1000)
+        assert solution.outcome is outcome
+        assert solution.residual < distance
 
 
 def test_links_of_no_length_do_no_harm(solver, speed):
@@ -389,7 +405,7 @@ def test_a_target_names_its_effector(skeleton, local, target, solver, speed):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"solver": "newton"}, "solver: expected one of ccd, fabrik, got 'newton'"),
+        ({"solver": "newton"}, "solver: expected one of ccd, fabrik, .*, got 'newton'"),
         ({"target": [1.0, 2.0]}, r"target: expected shape \(..., 3\), got \(2,\)"),
         ({"target": [1.0, np.nan, 0.0]}, "target: expected finite numbers, got nan"),
         ({"target": [1e80, 0.0, 0.0]}, "target: expected coordinates of at most"),

@@ -37,7 +37,7 @@ def test_a_cold_frame_starts_from_the_given_pose(arm, solver, rng, speed):
     assert (motion.local_rotations == solve_ik(arm, start, curve, solver).local_rotations).all()
 
 
-@pytest.mark.parametrize("solver", IK_SOLVERS)
+@pytest.mark.parametrize("solver", ["ccd", "fabrik"])
 def test_warm_starts_keep_neighbouring_frames_alike(arm, solver):
     """The triangle's corner lies on the straight arm's line: solved from rest, the arm jumps."""
 

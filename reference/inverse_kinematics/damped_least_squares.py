@@ -1,0 +1,15 @@
+"""Damped least squares with one fixed damping (Wampler 1986; Nakamura & Hanafusa 1986).
+
+Steps towards a target beyond reach do not die down: it may swing about the straight chain.
+"""
+
+from .jacobian import linearise, solve_damped, turn_joints
+
+# The square of the damping factor, over the reach squared: a tenth of the reach.
+DAMPING = 0.01
+
+
+def damped_least_squares_sweep(chain, target):
+    """Turn all joints by J^T (J J^T + (0.1 reach)^2 1)^-1 e."""
+    e, A = linearise(chain, target)
+    turn_joints(chain, solve_damped(A, DAMPING * chain.reach * chain.reach, e))

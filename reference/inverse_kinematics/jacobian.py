@@ -1,0 +1,86 @@
+"""What the Jacobian methods share: J J^T of a chain of ball joints, and a step along J^T z.
+
+With r_k the arm from joint k to the effector, a turn w_k of joint k moves the effector by w_k x
+r_k: J_k w = w x r_k and J_k^T z = r_k x z. For three coordinates J J^T is 3 x 3 however many
+joints there are: sum over k of |r_k|^2 1 - r_k r_k^T.
+"""
+
+from ..quaternion import (
+    IDENTITY,
+    cross,
+    exponential,
+    multiply,
+    norm,
+    normalised,
+    put_quaternion,
+    quaternion_at,
+    subtract,
+    vector_at,
+)
+from .chain import LINE_TOLERANCE, bend, place_joints
+
+
+def task_matrix(chain):
+    """Return J J^T as its six entries xx, yy, zz, xy, xz, yz [m²]."""
+    n = len(chain.lengths)
+    tip = vector_at(chain.positions, n)
+    xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(n):
+        x, y, z = subtract(tip, vector_at(chain.positions, k))
+        xx += y * y + z * z
+        yy += x * x + z * z
+        zz += x * x + y * y
+        xy -= x * y
+        xz -= x * z
+        yz -= y * z
+    return xx, yy, zz, xy, xz, yz
+
+
+def linearise(chain, target):
+    """Return e, from the effector to the target [m], and J J^T, the chain bent first if need be.
+
+    Where every arm lies along e no turn brings the effector nearer at first order.
+    """
+    for _ in range(2):
+        e = subtract(target, vector_at(chain.positions, len(chain.lengths)))
+        A = task_matrix(chain)
+        if norm(times(A, e)) > LINE_TOLERANCE * chain.reach * chain.reach * norm(e):
+            break
+        bend(chain)
+    return e, A
+
+
+def times(A, v):
+    """Return A v for a symmetric matrix given by its six entries."""
+    xx, yy, zz, xy, xz, yz = A
+    x, y, z = v
+    return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
+
+
+def solve_damped(A, damping, b):
+    """Return z of (A + damping 1) z = b, A positive semidefinite, by Cholesky's factors."""
+    xx, yy, zz, xy, xz, yz = A
+    d0 = xx + damping
+    l10, l20 = xy / d0, xz / d0
+    d1 = yy + damping - l10 * xy
+    u21 = yz - l10 * xz
+    l21 = u21 / d1
+    d2 = zz + damping - l20 * xz - l21 * u21
+    y1 = b[1] - l10 * b[0]
+    y2 = b[2] - l20 * b[0] - l21 * y1
+    z2 = y2 / d2
+    z1 = y1 / d1 - l21 * z2
+    return b[0] / d0 - l10 * z1 - l20 * z2, z1, z2
+
+
+def turn_joints(chain, z):
+    """Turn every joint k by the rotation vector r_k x z, J^T z, seen in the world."""
+    n = len(chain.lengths)
+    tip = vector_at(chain.positions, n)
+    above = IDENTITY
+    for k in range(n):
+        turn = exponential(cross(subtract(tip, vector_at(chain.positions, k)), z))
+        above = normalised(multiply(above, turn))
+        R = quaternion_at(chain.rotations, k)
+        put_quaternion(chain.rotations, k, normalised(multiply(above, R)))
+    place_joints(chain)

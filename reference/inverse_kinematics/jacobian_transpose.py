@@ -1,0 +1,19 @@
+"""The transposed Jacobian (Wolovich & Elliott 1984; Balestrino et al. 1984).
+
+Steps towards a target beyond reach do not die down: it may swing about the straight chain.
+"""
+
+from ..quaternion import dot, scale
+from .jacobian import linearise, times, turn_joints
+
+
+def jacobian_transpose_sweep(chain, target):
+    """Turn all joints by a J^T e, a = <e, J J^T e> / |J J^T e|^2.
+
+    The step length is the one that brings the effector nearest if it moved by a J J^T e in a
+    straight line (Buss 2004).
+    """
+    e, A = linearise(chain, target)
+    move = times(A, e)
+    if dot(move, move) > 0.0:
+        turn_joints(chain, scale(dot(e, move) / dot(move, move), e))

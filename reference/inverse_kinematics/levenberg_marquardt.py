@@ -1,0 +1,20 @@
+"""Levenberg-Marquardt with the damping of Sugihara 2011.
+
+"Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method": the step minimises
+1/2 |e - J q|^2 + 1/2 mu |q|^2 with mu = 1/2 |e|^2 plus a bias. Far from the target, or where it
+cannot be reached, the step is short and safe; near it the damping vanishes with the square of the
+error, and convergence is quadratic even where the Jacobian loses rank.
+"""
+
+from ..quaternion import dot
+from .jacobian import linearise, solve_damped, turn_joints
+
+# Over the reach squared; it only keeps a division by zero away.
+BIAS = 1e-24
+
+
+def levenberg_marquardt_sweep(chain, target):
+    """Turn all joints by J^T (J J^T + mu 1)^-1 e, mu = 1/2 |e|^2 + bias."""
+    e, A = linearise(chain, target)
+    damping = 0.5 * dot(e, e) + BIAS * chain.reach * chain.reach
+    turn_joints(chain, solve_damped(A, damping, e))
