@@ -169,7 +169,7 @@ def show(
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="A .gif or a .svg.")
     ] = None,
     solver: Annotated[
-        str | None, typer.Option(help="For arms fabrik, ccd, ...; for the cloth newton, local_global.")
+        str | None, typer.Option(help="For an arm fabrik, ccd, ...; for the cloth newton, ...")
     ] = None,
 ) -> int:
     """Write an animation (GIF) or a picture (SVG) of the arm drawing a curve, or of the cloth."""
