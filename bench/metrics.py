@@ -46,7 +46,7 @@ class Convergence(NamedTuple):
 
 
 def share(hits: NDArray[np.bool_]) -> Share:
-    """Return how many of the entries are true, with Wilson's interval (Wilson 1927, eq. 1)."""
+    """Return how many of the entries are true, with Wilson's interval (Wilson 1927)."""
     count, total, z = int(np.count_nonzero(hits)), int(np.size(hits)), 1.959963984540054
     if total == 0:
         return Share(0, 0, 0.0, 1.0)

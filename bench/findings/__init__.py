@@ -40,8 +40,8 @@ SECTIONS = (
         "Task 1: inverse kinematics",
         "The lab’s arm of five joints draws curves with its tip, by cyclic coordinate descent "
         "(CCD) and by FABRIK; a chain of ten ball joints reaches for targets near, far, at the "
-        "edge of its reach and beyond it, also by damped least squares on the engines’ kinematics "
-        "(DLS).",
+        "edge of its reach and beyond it, also by Levenberg-Marquardt on the engines’ kinematics "
+        "(LM).",
         (
             Entry(
                 "Q1. If the target is too far away, what does inverse kinematics give?",

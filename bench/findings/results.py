@@ -9,7 +9,7 @@ from ..tables import words
 LABELS = {
     "ccd": "CCD",
     "fabrik": "FABRIK",
-    "dls": "DLS",
+    "lm": "LM",
     "local_global": "local/global",
     "newton": "Newton",
     "levenberg_marquardt": "Levenberg-Marquardt",

@@ -1,4 +1,4 @@
-"""Our forward kinematics as the damped least squares loop asks for it."""
+"""Our forward kinematics as the Levenberg-Marquardt loop asks for it."""
 
 import numpy as np
 

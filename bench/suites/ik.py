@@ -13,7 +13,7 @@ from reference.arguments import FloatArray
 
 from .. import metrics
 from ..problems.chain import STRATA, TargetsForSkeleton, chain_targets
-from ..solvers.damped_least_squares import damped_least_squares
+from ..solvers.levenberg_marquardt import levenberg_marquardt
 from .block import Block, Measured, Scale
 
 TOLERANCE = 1e-4
@@ -24,7 +24,7 @@ MAX_ITERATIONS = 1000
 ENGINE_ITERATIONS = 200
 # The residuals of so many iterations are kept for the figure.
 HISTORY = 200
-ENGINE_SOLVER = "dls/{}"
+ENGINE_SOLVER = "lm/{}"
 
 
 class Limits(NamedTuple):
@@ -67,11 +67,11 @@ def solve_targets(
 
 
 def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) -> Measured:
-    """Solve all targets by damped least squares on an engine's kinematics."""
+    """Solve all targets by Levenberg-Marquardt on an engine's kinematics."""
     engine = SKELETON_ENGINES[name](problem.skeleton)
     effector = problem.skeleton.joint_count - 1
     answers = [
-        damped_least_squares(engine, q, target, effector, **limits._asdict())
+        levenberg_marquardt(engine, q, target, effector, **limits._asdict())
         for q, target in zip(coordinates(engine, problem.starts), problem.targets, strict=True)
     ]
     found = np.array([answer.q[engine.columns] for answer in answers])

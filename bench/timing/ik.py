@@ -9,7 +9,7 @@ from crosscheck.engines.skeleton_engine import coordinates
 from reference import IK_SOLVERS, solve_ik
 
 from ..problems.chain import chain_targets
-from ..solvers.damped_least_squares import damped_least_squares
+from ..solvers.levenberg_marquardt import levenberg_marquardt
 from ..solvers.reference_kinematics import ReferenceKinematics
 from ..suites.ik import ENGINE_ITERATIONS, MAX_ITERATIONS, TOLERANCE, Limits
 from .case import COMPILED, OURS, PLAIN, Case
@@ -20,7 +20,7 @@ TARGETS = 50
 FEW_TARGETS = 5
 OUR_LIMITS = Limits(TOLERANCE, MAX_ITERATIONS)._asdict()
 LOOP_LIMITS = Limits(TOLERANCE, ENGINE_ITERATIONS)._asdict()
-LOOP = "damped least squares"
+LOOP = "levenberg_marquardt"
 
 
 def cases() -> Iterator[Case]:
@@ -60,7 +60,7 @@ def at_once(stratum: str, solver: str) -> Callable[[], Any]:
 
 
 def by_loop(stratum: str, name: str) -> Callable[[], Any]:
-    """Return a call that solves all targets by damped least squares on someone's kinematics."""
+    """Return a call that solves all targets by Levenberg-Marquardt on someone's kinematics."""
     problem = chain_targets(stratum, TARGETS)
     kinematics: dict[str, type[SkeletonEngine] | type[ReferenceKinematics]] = {
         OURS: ReferenceKinematics,
@@ -72,6 +72,6 @@ def by_loop(stratum: str, name: str) -> Callable[[], Any]:
 
     def run() -> None:
         for q, target in zip(starts, problem.targets, strict=True):
-            damped_least_squares(engine, q, target, effector, **LOOP_LIMITS)
+            levenberg_marquardt(engine, q, target, effector, **LOOP_LIMITS)
 
     return run

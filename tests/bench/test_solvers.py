@@ -1,14 +1,14 @@
-"""Damped least squares, the same on everyone's kinematics."""
+"""Levenberg-Marquardt, the same on everyone's kinematics."""
 
 import numpy as np
 import pytest
 
 from bench.problems.chain import chain_targets
-from bench.solvers.damped_least_squares import damped_least_squares
+from bench.solvers.levenberg_marquardt import levenberg_marquardt
 from bench.solvers.reference_kinematics import ReferenceKinematics
 from crosscheck.engines import SKELETON_ENGINES
 from crosscheck.engines.skeleton_engine import coordinates
-from reference import Skeleton, forward_kinematics, rotation
+from reference import Skeleton, forward_kinematics, rotation, solve_ik
 
 KINEMATICS = {"Plumbob": ReferenceKinematics, **SKELETON_ENGINES}
 
@@ -45,7 +45,7 @@ def test_every_kinematics_takes_the_same_way_to_the_target(name):
         kinematics = kind(problem.skeleton)
         starts = coordinates(kinematics, problem.starts)
         answers = [
-            damped_least_squares(kinematics, q, target, tip, tolerance=1e-9, max_iterations=100)
+            levenberg_marquardt(kinematics, q, target, tip, tolerance=1e-9, max_iterations=100)
             for q, target in zip(starts, problem.targets, strict=True)
         ]
         found = np.array([answer.q[kinematics.columns] for answer in answers])
@@ -62,7 +62,7 @@ def test_a_start_at_the_target_takes_no_iteration():
     q = coordinates(kinematics, problem.starts)[0]
     tip = problem.skeleton.joint_count - 1
     target = forward_kinematics(problem.skeleton, problem.starts[0]).positions[tip]
-    answer = damped_least_squares(kinematics, q, target, tip, tolerance=1e-6, max_iterations=9)
+    answer = levenberg_marquardt(kinematics, q, target, tip, tolerance=1e-6, max_iterations=9)
     assert answer.iterations == 0
     np.testing.assert_array_equal(answer.q, q)
 
@@ -72,8 +72,26 @@ def test_out_of_reach_all_iterations_are_made():
     kinematics = ReferenceKinematics(problem.skeleton)
     q = coordinates(kinematics, problem.starts)[0]
     tip = problem.skeleton.joint_count - 1
-    answer = damped_least_squares(
+    answer = levenberg_marquardt(
         kinematics, q, problem.targets[0], tip, tolerance=1e-6, max_iterations=3
     )
     assert answer.iterations == 3
     assert answer.residual > 0
+
+
+def test_the_loop_and_the_reference_s_solver_are_one_method():
+    """Turns in the world from the left are tangents in the joints' frames from the right."""
+    problem = chain_targets("far", 20)
+    kinematics = ReferenceKinematics(problem.skeleton)
+    tip = problem.skeleton.joint_count - 1
+    limits = {"tolerance": 1e-6, "max_iterations": 100}
+    ours = solve_ik(
+        problem.skeleton, problem.starts, problem.targets, "levenberg_marquardt", **limits
+    )
+    starts = coordinates(kinematics, problem.starts)
+    answers = [
+        levenberg_marquardt(kinematics, q, target, tip, **limits)
+        for q, target in zip(starts, problem.targets, strict=True)
+    ]
+    assert [answer.iterations for answer in answers] == ours.iterations.tolist()
+    np.testing.assert_allclose([answer.residual for answer in answers], ours.residual, atol=1e-12)

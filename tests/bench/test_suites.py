@@ -50,7 +50,7 @@ def test_the_arm_draws_within_tolerance_cold_and_warm(solver):
         assert (arrays["mean_turn"] <= arrays["largest_turn"]).all()
 
 
-@pytest.mark.parametrize("solver", ["ccd", "fabrik", "dls/Pinocchio"])
+@pytest.mark.parametrize("solver", ["ccd", "fabrik", "lm/Pinocchio"])
 def test_no_residual_is_below_distance_less_reach(solver):
     arrays = found("ik", "chain/beyond", solver).measure().arrays
     assert arrays["excess"].min() > -1e-14

@@ -1,9 +1,8 @@
-"""Damped least squares on anyone's kinematics: the same loop for every engine.
+"""Levenberg-Marquardt on anyone's kinematics: the reference's method as one loop for all.
 
-Wampler 1986, eq. 13: the velocities v = J' (J J' + lambda² I)^-1 e bring the effector closer by
-the error e. The damping follows the error, lambda² = |e|² / 2 (Sugihara 2011, eq. 17, for one
-task), so that it is large far from the target and vanishes at it. Three unknowns at a time, for
-any number of joints.
+The velocities v = J' (J J' + mu I)^-1 e bring the effector closer by the error e. The damping
+follows the error, mu = |e|² / 2 (Sugihara 2011), so that it is large far from the target and
+vanishes at it. Three unknowns at a time, for any number of joints.
 """
 
 from typing import NamedTuple, Protocol
@@ -34,7 +33,7 @@ class Answer(NamedTuple):
     iterations: int
 
 
-def damped_least_squares(
+def levenberg_marquardt(
     kinematics: Kinematics,
     q: FloatArray,
     target: FloatArray,
