@@ -9,9 +9,7 @@ from .compiled import TwoSpeeds
 from .quaternion import (
     add,
     conjugate,
-    magnitude,
     multiply,
-    normalised,
     put_quaternion,
     put_vector,
     quaternion_at,
@@ -51,8 +49,8 @@ def forward_kinematics(skeleton: Skeleton, local_rotations: ArrayLike) -> Pose:
         positions.reshape(-1, count, 3),
         rotations.reshape(-1, count, 4),
     )
-    if not fine:
-        rotation.unit("local_rotations", local)
+    if not fine:  # raise, or the lengths were on the very edge of the tolerance
+        return forward_kinematics(skeleton, rotation.unit("local_rotations", local))
     return Pose(frozen(positions), frozen(rotations))
 
 
@@ -68,19 +66,22 @@ def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
     local = np.empty(given.shape)
     fine = _local(skeleton.arrays.parents, given.reshape(-1, count, 4), local.reshape(-1, count, 4))
     if not fine:
-        rotation.unit("rotations", given)
+        return local_from_global(skeleton, rotation.unit("rotations", given))
     return local
 
 
 def forward_pose(parents, offsets, local, positions, rotations):
     """Fill positions (joint, 3) and rotations (joint, 4) of one pose from unit quaternions."""
-    put_vector(positions, 0, vector_at(offsets, 0))
-    put_quaternion(rotations, 0, quaternion_at(local, 0))
+    x, R = vector_at(offsets, 0), quaternion_at(local, 0)
+    put_vector(positions, 0, x)
+    put_quaternion(rotations, 0, R)
     for j in range(1, len(parents)):
-        R_parent = quaternion_at(rotations, parents[j])
-        x_parent = vector_at(positions, parents[j])
-        put_quaternion(rotations, j, multiply(R_parent, quaternion_at(local, j)))
-        put_vector(positions, j, add(x_parent, rotate(R_parent, vector_at(offsets, j))))
+        if parents[j] != j - 1:  # along a chain the parent is still at hand
+            x, R = vector_at(positions, parents[j]), quaternion_at(rotations, parents[j])
+        x = add(x, rotate(R, vector_at(offsets, j)))
+        R = multiply(R, quaternion_at(local, j))
+        put_vector(positions, j, x)
+        put_quaternion(rotations, j, R)
 
 
 def local_pose(parents, rotations, local):
@@ -92,14 +93,18 @@ def local_pose(parents, rotations, local):
 
 
 def normalise(given, unit):
-    """Fill unit quaternions (joint, 4); return whether all given ones were unit within 1e-6."""
+    """Fill unit quaternions (joint, 4); return whether all given ones were unit within 1e-6.
+
+    1/|q| is the series of (1 + e)^-1/2 in e = |q|^2 - 1, which for so small an e is exact to
+    rounding with four terms, and needs neither a root nor a division.
+    """
     fine = True
     for j in range(len(given)):
-        q = quaternion_at(given, j)
-        if abs(magnitude(q) - 1.0) <= UNIT_TOLERANCE:
-            put_quaternion(unit, j, normalised(q))
-        else:
-            fine = False
+        w, x, y, z = quaternion_at(given, j)
+        e = w * w + x * x + y * y + z * z - 1.0
+        s = 1.0 - e * (0.5 - e * (0.375 - e * 0.3125))
+        put_quaternion(unit, j, (s * w, s * x, s * y, s * z))
+        fine &= abs(e) <= 2.0 * UNIT_TOLERANCE
     return fine
 
 

@@ -91,8 +91,11 @@ def solve_targets(
         skeleton.arrays, skeleton.path_array(effector), starts, targets,
         tolerance, max_iterations, chained, solved,
     )  # fmt: skip
-    if bad >= 0:
-        rotation.unit("local_rotations", local_rotations)
+    if bad >= 0:  # raise, or the lengths were on the very edge of the tolerance
+        unit = rotation.unit("local_rotations", local_rotations)
+        return solve_targets(
+            skeleton, unit, target, solver, effector, tolerance, max_iterations, record, chained
+        )
     return _solution(solved, batch, record)
 
 

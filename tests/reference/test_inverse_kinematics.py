@@ -391,6 +391,15 @@ def test_whatever_comes_in_the_kernel_is_compiled_once(skeleton, local, target, 
     assert len(IK_SOLVERS[solver].compiled.signatures) == 1
 
 
+@pytest.mark.parametrize("excess", [1e-6 - 1e-13, -1e-6 + 1e-13])
+def test_a_start_on_the_edge_of_the_unit_tolerance_is_a_start(
+    skeleton, local, target, solver, excess, speed
+):
+    exact = solve_ik(skeleton, local, target, solver, max_iterations=2)
+    edge = solve_ik(skeleton, local * (1.0 + excess), target, solver, max_iterations=2)
+    np.testing.assert_allclose(edge.positions, exact.positions, atol=1e-13)
+
+
 def test_no_targets_give_no_solutions(skeleton, local, solver, speed):
     assert solve_ik(skeleton, local, np.empty((0, 3)), solver).residual.shape == (0,)
 

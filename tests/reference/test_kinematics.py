@@ -114,6 +114,15 @@ def test_slightly_long_quaternions_are_normalised_once(skeleton, local, speed):
     )
 
 
+@pytest.mark.parametrize("excess", [1e-6 - 1e-13, -1e-6 + 1e-13])
+def test_lengths_on_the_edge_of_the_tolerance_are_normalised_too(skeleton, local, excess, speed):
+    exact = forward_kinematics(skeleton, local)
+    edge = forward_kinematics(skeleton, local * (1.0 + excess))
+    np.testing.assert_allclose(edge.positions, exact.positions, atol=ROUNDING)
+    back = local_from_global(skeleton, exact.rotations * (1.0 + excess))
+    np.testing.assert_allclose(back, local, atol=ROUNDING)
+
+
 @pytest.mark.parametrize("convert", [forward_kinematics, local_from_global])
 @pytest.mark.parametrize(
     ("change", "message"),
