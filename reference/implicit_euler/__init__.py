@@ -11,6 +11,7 @@ from ..arguments import FloatArray, choice, frozen, integer, number
 from ..mass_spring import MassSpring, State
 from ..outcome import Outcome
 from .gauss_newton import GaussNewton
+from .lbfgs import LBFGS
 from .local_global import LocalGlobal
 from .newton import Newton
 from .objective import Iterate, Objective, effective_stiffnesses
@@ -34,6 +35,7 @@ class StepSolver(Protocol):
 
 STEP_SOLVERS: dict[str, type[StepSolver]] = {
     "local_global": LocalGlobal,
+    "lbfgs": LBFGS,
     "newton": Newton,
     "gauss_newton": GaussNewton,
 }

@@ -2,9 +2,7 @@
 
 Where springs are compressed the Hessian M + h² K may be indefinite; a multiple of M is then added
 until it is positive definite, which bends the step towards the inertial one (a Levenberg shift in
-the metric of M). The step is halved until g decreases enough (Armijo). Close to the minimum g can
-no longer tell, since its changes drown in rounding: there the slope decides (the approximate Wolfe
-condition of Hager and Zhang 2005, "A New Conjugate Gradient Method with Guaranteed Descent").
+the metric of M).
 """
 
 from collections.abc import Iterator
@@ -12,13 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import FloatArray
 from ..linear_solver import Factor, NotPositiveDefiniteError, factorize
 from ..mass_spring import MassSpring
+from .line_search import line_search
 from .objective import Iterate, Objective
 
-ARMIJO = 1e-4  # least share of the decrease promised by the slope
-HALVINGS = 40
 FIRST_SHIFT = 1e-2  # times M
 SHIFT_GROWTH, SHIFT_DECAY = 4.0, 2.0
 
@@ -54,24 +50,3 @@ class Newton:
                 return factorize(hessian + shift * self._M if shift else hessian, "scipy"), shift
             except NotPositiveDefiniteError:
                 shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)
-
-
-def line_search(objective: Objective, start: Iterate, step: FloatArray) -> Iterate:
-    """Return an acceptable iterate along a descent step, or the start itself if there is none."""
-    slope = float(np.sum(start.gradient * step))
-    length = 1.0
-    for _ in range(HALVINGS):
-        end = objective.evaluate(start.positions + length * step)
-        if accepts(start, end, step, slope, length):
-            return end
-        length /= 2
-    return start
-
-
-def accepts(start: Iterate, end: Iterate, step: FloatArray, slope: float, length: float) -> bool:
-    """Return whether g decreased enough or, where rounding hides that, does not climb steeply."""
-    rise = end.value - start.value
-    if rise <= ARMIJO * length * slope:
-        return True
-    end_slope = float(np.sum(end.gradient * step))
-    return rise <= end.value_floor and end_slope <= (2 * ARMIJO - 1) * slope

@@ -18,6 +18,7 @@ from reference import (
     solve_ik,
 )
 from reference.inverse_kinematics.ccd import ccd_turn
+from reference.inverse_kinematics.chain import BEND, bend, new_chain, pose_chain
 
 # Distances of order one after a sweep over six joints, positions recomputed from rotations.
 ROUNDING = 1e-14
@@ -169,6 +170,23 @@ def test_fabrik_lays_the_chain_straight_to_a_target_beyond_reach_at_once(
     assert solution.residual == pytest.approx((distance - 1.0) * reach, abs=1e-13 * distance)
 
 
+@pytest.mark.parametrize("solver", ["fabrik", "levenberg_marquardt"], indirect=True)
+def test_a_target_just_within_reach_is_reached(skeleton, local, solver, speed):
+    root, reach = skeleton.offsets[0], skeleton.reach()
+    target = root + 0.995 * reach * np.array([0.6, 0.0, -0.8])
+    solution = solve_ik(skeleton, local, target, solver, max_iterations=1000)
+    assert solution.outcome is Outcome.CONVERGED
+
+
+@pytest.mark.parametrize("depth", [0.3, 0.9])
+def test_fabrik_folds_the_chain_back_from_a_target_in_the_hole_at_once(depth, rng, speed):
+    claw = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [0.5, 0, 0], [0, 3.0, 0], [0, 0, 0.5]])
+    target = [0.0, 0.0, 2.0 * (1.0 - depth)]
+    solution = solve_ik(claw, rotation.random(rng, 4), target, "fabrik")
+    np.testing.assert_allclose(solution.positions[:, 2], [0.0, -0.5, 2.5, 2.0], atol=ROUNDING)
+    assert (solution.iterations, solution.outcome) == (1, Outcome.UNREACHABLE)
+
+
 @pytest.mark.parametrize("solver", SETTLING, indirect=True)
 def test_beyond_reach_the_residual_tends_to_the_distance_less_the_reach(solver, speed):
     arm, rest = scenes.lab_arm()
@@ -208,6 +226,22 @@ def test_a_straight_chain_is_freed_from_a_target_on_its_own_line(height, solver,
     assert solution.outcome is Outcome.CONVERGED
     again = solve_ik(arm, rest, [0.0, height, 0.0], solver, max_iterations=1000)
     assert (again.local_rotations == solution.local_rotations).all()
+
+
+def test_a_straight_chain_is_bent_in_one_plane_however_its_joints_are_twisted(rng):
+    rotations, lengths = rotation.random(rng, 4), np.array([0.8, 0.4, 0.2, 1.2])
+    links = lengths[:, None] * [0.0, 0.0, 1.0]
+    offsets = np.vstack([np.zeros(3), rotation.rotate(rotation.conjugate(rotations), links)])
+    tree = Skeleton(range(-1, 4), offsets)
+    local = local_from_global(tree, np.vstack([rotations, rotation.identity(1)]))
+    chain = new_chain(tree.offsets, tree.path())
+    pose_chain(chain, tree.path(), local)
+    bend(chain)
+    directions = np.diff(chain.positions, axis=0) / lengths[:, None]
+    angles = BEND * np.arange(1, 5) / 4
+    np.testing.assert_allclose(directions[:, 2], np.cos(angles), rtol=0, atol=ROUNDING)
+    normals = np.cross([0.0, 0.0, 1.0], directions) / np.sin(angles)[:, None]
+    np.testing.assert_allclose(normals, normals[[0] * 4], rtol=0, atol=ROUNDING)
 
 
 def test_a_straight_chain_of_two_links_is_freed_too(solver, speed):
@@ -293,6 +327,19 @@ def test_one_ccd_iteration_is_the_textbook_s(skeleton, local, target, speed):
     solution = solve_ik(skeleton, local, target, "ccd", tolerance=0.0, max_iterations=1)
     np.testing.assert_allclose(
         np.abs(np.vecdot(solution.local_rotations, expected)), np.ones(6), atol=ROUNDING
+    )
+
+
+@pytest.mark.parametrize("angle", [1.0, 1e-4])
+def test_a_chain_off_its_target_s_line_in_the_last_link_alone_is_not_bent(angle, speed):
+    arm, local = scenes.lab_arm()
+    local[-2] = rotation.exponential([angle, 0.0, 0.0])
+    target = np.array([0.0, 0.0, 0.0])
+    expected, _ = textbook_sweep(arm, local, target)
+    solution = solve_ik(arm, local, target, "ccd", tolerance=0.0, max_iterations=1)
+    # The turns' axes are quotients of numbers as small as the angle.
+    np.testing.assert_allclose(
+        np.abs(np.vecdot(solution.local_rotations, expected)), np.ones(5), rtol=0, atol=1e-9
     )
 
 

@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference import rotation
+from reference.quaternion import perpendicular
 
 # Products of unit quaternions round to a few eps; 32 leaves room for a dozen operations.
 ROUNDING = 32 * np.finfo(float).eps
@@ -106,6 +107,28 @@ def test_between_opposites_is_a_half_turn_about_a_fixed_axis(direction, speed):
     assert (rotation.between(direction, -2 * direction) == q).all()
 
 
+@pytest.mark.parametrize(
+    ("direction", "axis"),
+    [
+        ([1, 2, 3], [0, 3, -2]),
+        ([3, 1, 2], [-2, 0, 3]),
+        ([3, 2, 1], [2, -3, 0]),
+        ([0, 0, 0], [1, 0, 0]),
+    ],
+)
+def test_the_fixed_axis_lies_across_the_coordinate_axis_the_direction_is_least_along(
+    direction, axis
+):
+    expected = np.array(axis) / np.linalg.norm(axis)
+    assert_close(perpendicular(tuple(map(float, direction))), expected)
+
+
+def test_between_near_opposites_is_of_unit_length(v, rng, speed):
+    """There the vector part is a quotient of two small numbers, and rounding shows in its length."""
+    almost = -v + 1e-7 * rng.standard_normal(v.shape)
+    assert_close(np.linalg.norm(rotation.between(v, almost), axis=-1), np.ones(50))
+
+
 @pytest.mark.parametrize("angle", [1e-12, 1e-8, 1e-4, 3.0, np.pi - 1e-4, np.pi - 1e-7])
 def test_between_is_accurate_near_zero_and_near_opposite(angle, speed):
     end = [np.cos(angle), np.sin(angle), 0.0]
@@ -139,6 +162,21 @@ def test_the_exponential_agrees_with_extended_precision(angle, speed):
     np.testing.assert_allclose(
         rotation.exponential([angle, 0.0, 0.0]), [w, x, 0.0, 0.0], rtol=ROUNDING
     )
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 1e-8, 1e-7, 0.1, 3.1, np.pi - 1e-7])
+def test_the_logarithm_is_accurate_near_zero_and_near_half_a_turn(angle, speed):
+    q = [np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0]
+    np.testing.assert_allclose(rotation.logarithm(q), [angle, 0.0, 0.0], rtol=ROUNDING)
+
+
+def test_random_rotations_are_uniform(rng):
+    """Moments of the uniform distribution on the 3-sphere, to five of their standard errors."""
+    q = rotation.random(rng, 100_000)
+    assert_close(np.linalg.norm(q, axis=-1), np.ones(len(q)))
+    assert_close(q.mean(axis=0), np.zeros(4), 0.008)
+    assert_close(q.T @ q / len(q), np.eye(4) / 4, 0.004)
+    assert_close((q**4).mean(axis=0), np.full(4, 1 / 8), 0.003)
 
 
 def test_the_angle_between_rotations_is_that_of_the_turn(a):

@@ -36,7 +36,7 @@ def test_a_skeleton_owns_what_it_shows():
     skeleton = Skeleton([-1, 0], offsets)
     offsets[1] = 1.0
     assert (skeleton.offsets == 0).all()
-    for shown in (skeleton.offsets, skeleton.parents):
+    for shown in (skeleton.offsets, skeleton.parents, skeleton.path()):
         with pytest.raises(ValueError, match="read-only"):
             shown[0] = 1
 
@@ -47,6 +47,13 @@ def test_the_path_runs_from_the_root_to_the_effector():
     assert skeleton.path("joint4").tolist() == [0, 4]
     assert skeleton.path(0).tolist() == [0]
     assert skeleton.path().tolist() == [0, 4]
+
+
+def test_joints_answer_to_the_names_they_are_given():
+    skeleton = Skeleton(**FORK, names=["root", "spine", "left", "right", "tail"])
+    assert skeleton.names == ("root", "spine", "left", "right", "tail")
+    assert [skeleton.index(name) for name in skeleton.names] == [0, 1, 2, 3, 4]
+    assert skeleton.path("right").tolist() == [0, 1, 3]
 
 
 def test_the_reach_is_the_links_total_length():

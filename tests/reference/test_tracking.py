@@ -37,6 +37,19 @@ def test_a_cold_frame_starts_from_the_given_pose(arm, solver, rng, speed):
     assert (motion.local_rotations == solve_ik(arm, start, curve, solver).local_rotations).all()
 
 
+@pytest.mark.parametrize(
+    "options",
+    [{"effector": "palm"}, {"tolerance": 1e-9}, {"max_iterations": 1}, {"record": True}],
+    ids=lambda options: next(iter(options)),
+)
+def test_a_cold_motion_is_a_batch_solved_with_the_same_options(arm, options, rng, speed):
+    curve, start = curves["circle"](5), rotation.random(rng, 5)
+    motion = track(arm, curve, "fabrik", start, warm=False, **options)
+    batch = solve_ik(arm, start, curve, "fabrik", **options)
+    for tracked, solved in zip(motion, batch, strict=True):
+        np.testing.assert_array_equal(tracked, solved)
+
+
 @pytest.mark.parametrize("solver", ["ccd", "fabrik"])
 def test_warm_starts_keep_neighbouring_frames_alike(arm, solver):
     """The triangle's corner lies on the straight arm's line: solved from rest, the arm jumps."""
