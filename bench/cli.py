@@ -1,6 +1,7 @@
 """The command line. Engines, the reference and matplotlib are imported inside the commands."""
 
 import difflib
+import signal
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
@@ -31,7 +32,12 @@ Fresh = Annotated[bool, typer.Option("--fresh", help="Forget what is on record; 
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and leave with its exit code."""
+    """Run the command line and leave with its exit code.
+
+    A reader that has seen enough, such as `head`, ends the program as it ends any other.
+    """
+    if hasattr(signal, "SIGPIPE"):
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     sys.exit(run_command(arguments))
 
 
@@ -39,8 +45,11 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
     """Return the exit code: 0 fine, 1 a check failed, 2 bad usage or input, 130 interrupted."""
     try:
         code = app(arguments, prog_name="plumbob", standalone_mode=False)
+        if code == INTERRUPTED:  # typer's own answer to Ctrl-C
+            raise KeyboardInterrupt
         return code if isinstance(code, int) else FINE
     except (KeyboardInterrupt, typer.Abort):
+        print("plumbob: interrupted; what was finished is on record", file=sys.stderr)
         return INTERRUPTED
     except _UsageError as error:
         return _complain(error.format_message())

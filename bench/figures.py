@@ -124,7 +124,7 @@ def iterations(results: Results) -> Drawing | None:
         axes[0].set_ylabel("targets")
         axes[0].legend(loc="upper right")
         return finished(
-            figure, "iterations", "Iterations of CCD and FABRIK",
+            figure, "iterations", "Iterations of every solver",
             "How many of the targets took how many iterations, in classes of doubling width; the "
             "last class holds those that used all.",
         )  # fmt: skip

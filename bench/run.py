@@ -152,6 +152,8 @@ def measure(block: Block) -> Record:
     try:
         arrays, notes = block.measure()
     except Exception as error:  # whatever a solver raises is a result of that solver
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
+            raise KeyboardInterrupt from None
         arrays, notes = {}, {"failed": f"{type(error).__name__}: {error}"}
     return Record(
         block.suite,

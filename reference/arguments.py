@@ -65,6 +65,8 @@ def number(name: str, value: Any, *, least: float = -np.inf, above: float = -np.
     Raises:
         ValueError: if it is not a finite number in that range.
     """
+    if isinstance(value, str | bool):
+        raise ValueError(f"{name}: expected a number, got {value!r}")
     result = _floats(name, value)
     if result.shape != ():
         raise ValueError(f"{name}: expected one number, got shape {shape(result.shape)}")

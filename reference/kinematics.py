@@ -17,7 +17,7 @@ from .quaternion import (
     vector_at,
 )
 from .rotation import UNIT_TOLERANCE
-from .skeleton import Pose, Skeleton
+from .skeleton import Pose, Skeleton, checked_skeleton
 
 
 def forward_kinematics(skeleton: Skeleton, local_rotations: ArrayLike) -> Pose:
@@ -39,7 +39,7 @@ def forward_kinematics(skeleton: Skeleton, local_rotations: ArrayLike) -> Pose:
         ValueError: if the shape is another, or a quaternion is not finite or further than 1e-6
             from unit length.
     """
-    count = skeleton.joint_count
+    count = checked_skeleton(skeleton).joint_count
     local = arguments.floats("local_rotations", local_rotations, "...", count, 4)
     positions = np.empty((*local.shape[:-1], 3))
     rotations = np.empty(local.shape)
@@ -61,7 +61,7 @@ def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
         ValueError: if the shape is another, or a quaternion is not finite or further than 1e-6
             from unit length.
     """
-    count = skeleton.joint_count
+    count = checked_skeleton(skeleton).joint_count
     given = arguments.floats("rotations", rotations, "...", count, 4)
     local = np.empty(given.shape)
     fine = _local(skeleton.arrays.parents, given.reshape(-1, count, 4), local.reshape(-1, count, 4))

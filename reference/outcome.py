@@ -20,7 +20,8 @@ class Outcome(IntEnum):
 
 _SENTENCES = {
     Outcome.CONVERGED: "The residual is within the tolerance, or as small as rounding lets it be.",
-    Outcome.UNREACHABLE: "No pose reaches the target: geometry forbids it.",
+    Outcome.UNREACHABLE: "No pose reaches the target: geometry forbids it; the residual says how "
+    "far this one is.",
     Outcome.STALLED: "The iterations stopped making progress before the tolerance was met.",
     Outcome.ITERATION_LIMIT: "All iterations were used before the tolerance was met.",
     Outcome.DIVERGED: "The iterations left the finite numbers; what is returned is the last finite "

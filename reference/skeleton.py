@@ -1,6 +1,7 @@
 """Skeleton (the model) and Pose (its state)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ class SkeletonArrays(NamedTuple):
     offsets: FloatArray
 
 
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Skeleton:
     """A tree of ball joints without limits; parents precede children.
 
@@ -25,7 +27,14 @@ class Skeleton:
         offsets: each joint's position in its parent's frame [m], shape (joint, 3); the root's
             is its global position.
         names: each joint's name.
+        arrays: what the kernels read; never to be written to.
     """
+
+    parents: IndexArray
+    offsets: FloatArray
+    names: tuple[str, ...]
+    arrays: SkeletonArrays
+    _paths: dict[int, IndexArray]
 
     def __init__(
         self, parents: ArrayLike, offsets: ArrayLike, names: Sequence[str] | None = None
@@ -36,11 +45,14 @@ class Skeleton:
             ValueError: if there is no root or more than one, a parent does not precede its child,
                 an offset is not finite, or a name is missing, empty or used twice.
         """
-        self.arrays = SkeletonArrays(*_checked_tree(parents, offsets))
-        self.parents = frozen(self.arrays.parents)
-        self.offsets = frozen(self.arrays.offsets)
-        self.names = _checked_names(names, self.joint_count)
-        self._paths: dict[int, IndexArray] = {}
+        arrays = SkeletonArrays(*_checked_tree(parents, offsets))
+        self.__dict__.update(
+            arrays=arrays,
+            parents=frozen(arrays.parents),
+            offsets=frozen(arrays.offsets),
+            names=_checked_names(names, len(arrays.parents)),
+            _paths={},
+        )
 
     @property
     def joint_count(self) -> int:
@@ -54,16 +66,16 @@ class Skeleton:
         lengths[0] = 0.0
         return lengths
 
-    def index(self, joint: int | str) -> int:
+    def index(self, joint: int | str, argument: str = "joint") -> int:
         """Return the index of a joint given by name or index; negative indices count from the end.
 
         Raises:
-            ValueError: if there is no such joint.
+            ValueError: if there is no such joint; it speaks of the argument named.
         """
         if isinstance(joint, str):
-            return self.names.index(arguments.choice("joint", joint, self.names))
+            return self.names.index(arguments.choice(argument, joint, self.names))
         count = self.joint_count
-        return arguments.integer("joint", joint, least=-count, below=count) % count
+        return arguments.integer(argument, joint, least=-count, below=count) % count
 
     def path(self, effector: int | str = -1) -> IndexArray:
         """Return the joints from the root to the effector, both included, shape (path,).
@@ -92,6 +104,17 @@ class Skeleton:
 
     def __repr__(self) -> str:
         return f"Skeleton({self.joint_count} joints, reach {self.reach():g} m)"
+
+
+def checked_skeleton(skeleton: Skeleton) -> Skeleton:
+    """Return the argument if it is a Skeleton.
+
+    Raises:
+        ValueError: if it is anything else, such as the pair that a scene returns.
+    """
+    if not isinstance(skeleton, Skeleton):
+        raise ValueError(f"skeleton: expected a Skeleton, got {type(skeleton).__name__}")
+    return skeleton
 
 
 class Pose(NamedTuple):

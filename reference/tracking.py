@@ -4,7 +4,7 @@ from numpy.typing import ArrayLike
 
 from . import arguments, rotation
 from .inverse_kinematics import IKSolution, solve_targets
-from .skeleton import Skeleton
+from .skeleton import Skeleton, checked_skeleton
 
 
 def track(
@@ -42,9 +42,9 @@ def track(
     points = arguments.array("curve", curve, "frame", 3)
     if len(points) == 0:
         raise ValueError("curve: expected at least one point, got none")
-    if start is None:
-        start = rotation.identity(skeleton.joint_count)
-    start = arguments.floats("start", start, skeleton.joint_count, 4)
+    count = checked_skeleton(skeleton).joint_count
+    start = rotation.identity(count) if start is None else start
+    start = arguments.floats("start", start, count, 4)
     return solve_targets(
         skeleton, start, points, solver, effector, tolerance, max_iterations, record, chained=warm
     )

@@ -100,14 +100,15 @@ def test_the_main_job_says_first_what_it_does_and_where(capsys, monkeypatch):
     assert code == 1
 
 
-def test_ctrl_c_exits_130_without_a_word(capsys, monkeypatch):
+def test_ctrl_c_exits_130_and_says_what_is_kept(capsys, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(cli, "main_job", interrupted)
     code, out, err = plumbob(capsys)
     assert code == 130
-    assert (out + err).strip() == ""
+    assert out == ""
+    assert err == "plumbob: interrupted; what was finished is on record\n"
 
 
 def judged(missed):

@@ -11,9 +11,12 @@ def snippets(language):
 
 
 def test_the_python_interface_runs_as_printed(capsys):
-    (code,) = snippets("python")
-    exec(compile(code, str(README), "exec"), {})
-    assert capsys.readouterr().out.count("CONVERGED") >= 1
+    for code in snippets("python"):
+        exec(compile(code, str(README), "exec"), {})
+    printed = capsys.readouterr().out
+    assert printed.count("CONVERGED") == 2
+    assert "distance to the target: 0.8999" in printed
+    assert "residual of the step: 1.0" in printed
 
 
 LINKS = re.findall(r"\]\(([^)#:]+)\)", README.read_text(encoding="utf-8"))

@@ -53,7 +53,7 @@ SECTIONS = (
                 ("iterations",),
             ),
             Entry(
-                "Q3. Joints may jitter from frame to frame. How is that avoided?",
+                "Q3. Joints may jitter from frame to frame: how is it avoided?",
                 kinematics.jitter,
                 ("jitter",),
             ),

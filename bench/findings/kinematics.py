@@ -67,13 +67,13 @@ def _beyond_answer(records: Sequence[Record]) -> Answer:
         excess = max(metrics.spread(r.arrays["excess"]).largest for r in mine)
         most = max(metrics.whole(r.arrays["iterations"])[2] for r in mine)
         points.append(
-            f"{label(solver)}: {words(straight.hits)} of {words(straight.total)} targets; at worst "
-            f"{words(metrics.spread(bends).largest)} of the reach off the line, {words(excess)} m "
-            f"above distance − reach, {counted(int(most), 'iteration')}"
+            f"{label(solver)}: {words(straight.hits)} of {words(straight.total)}; at worst "
+            f"{words(metrics.percent(metrics.spread(bends).largest, 1.0))} % of the reach off the "
+            f"line, {words(excess)} m above distance − reach, {counted(int(most), 'iteration')}"
         )
     return Answer(
-        "The chain becomes the straight line from root to target, within "
-        f"{words(metrics.percent(STRAIGHT, 1.0))} % of its reach, for:",
+        "The best answer is the straight line from root to target. Answers within "
+        f"{words(metrics.percent(STRAIGHT, 1.0))} % of the reach of that line:",
         tuple(points),
     )
 
@@ -203,9 +203,9 @@ def _jitter_answer(pairs: Sequence[tuple[Record, Record]]) -> Answer:
     calm = max((_turns(warm)[0], _curve(warm), label(warm.solver)) for _, warm in pairs)
     return Answer(
         "Start each frame from the solution before it, which is the nearest at hand: the largest "
-        f"turn of a joint between frames is then smaller in {calmer} of {len(pairs)} cases, at "
-        f"worst {words(calm[0])}° ({calm[1]}, {calm[2]}) where starting from the rest pose gives "
-        f"up to {words(worst[0])}° ({worst[1]}, {worst[2]})."
+        f"turn of a joint between frames is then smaller in {calmer} of {len(pairs)} cases. Of all "
+        f"cases the largest is {words(calm[0])}° so ({calm[1]}, {calm[2]}), and {words(worst[0])}° "
+        f"from the rest pose ({worst[1]}, {worst[2]})."
     )
 
 

@@ -9,7 +9,7 @@ from .. import arguments, rotation
 from ..arguments import frozen
 from ..compiled import TwoSpeeds, bind
 from ..outcome import Outcome
-from ..skeleton import Skeleton
+from ..skeleton import Skeleton, checked_skeleton
 from .batch import Solved, iterate, solve_batch
 from .ccd import ccd_sweep
 from .damped_least_squares import damped_least_squares_sweep
@@ -77,7 +77,8 @@ def solve_targets(
 ):  # fmt: skip
     """Return what `solve_ik` does; if chained, each solve starts from the one before."""
     solve = IK_SOLVERS[arguments.choice("solver", solver, IK_SOLVERS)]
-    starts = arguments.floats("local_rotations", local_rotations, "...", skeleton.joint_count, 4)
+    count = checked_skeleton(skeleton).joint_count
+    starts = arguments.floats("local_rotations", local_rotations, "...", count, 4)
     positions, effector = checked_target(skeleton, target, effector)
     tolerance = arguments.number("tolerance", tolerance, least=0.0)
     max_iterations = arguments.integer("max_iterations", max_iterations, least=0)

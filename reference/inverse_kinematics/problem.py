@@ -54,11 +54,11 @@ def checked_target(skeleton: Skeleton, target: Any, effector: int | str) -> tupl
         if len(target) > 1:
             raise ValueError(f"target: expected one target, got {len(target)}")
         target = target[0]
-    joint = skeleton.index(effector)
+    joint = skeleton.index(effector, "effector")
     if isinstance(target, Target):
-        if effector != -1 and joint != skeleton.index(target.effector):
+        if effector != -1 and joint != skeleton.index(target.effector, "effector"):
             raise ValueError(
                 f"effector: expected that of the target, {target.effector!r}, got {effector!r}"
             )
-        joint, target = skeleton.index(target.effector), target.position
+        joint, target = skeleton.index(target.effector, "effector"), target.position
     return arguments.coordinates("target", target, "...", 3), joint

@@ -40,8 +40,8 @@ def test_chains_are_counted_as_straight_only_if_they_are(make):
     table = kinematics.beyond_reach(Results([make.beyond("ccd", 0.5), make.beyond("fabrik", 1e-9)]))
     assert column(table, "off the line, largest [m]") == [0.5, 1e-9]
     ccd, fabrik = table.answer.points
-    assert ccd.startswith("CCD: 1 of 2 targets; at worst 0.250 of the reach")
-    assert fabrik.startswith("FABRIK: 2 of 2 targets")
+    assert ccd.startswith("CCD: 1 of 2; at worst 25.0 % of the reach")
+    assert fabrik.startswith("FABRIK: 2 of 2;")
 
 
 def test_iterations_count_for_whoever_needs_fewer(records):

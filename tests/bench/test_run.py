@@ -45,8 +45,16 @@ def test_a_second_run_measures_nothing(suite, tmp_path):
     assert suite.measured == ["a", "b", "c"]
 
 
-def test_a_run_that_was_interrupted_is_taken_up_where_it_stopped(suite, tmp_path):
-    suite.trouble = {"c": KeyboardInterrupt()}
+def inside_compiled_code():
+    """Return what Ctrl-C becomes where it strikes in a compiled kernel."""
+    error = SystemError("returned a result with an exception set")
+    error.__cause__ = KeyboardInterrupt()
+    return error
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt(), inside_compiled_code()])
+def test_a_run_that_was_interrupted_is_taken_up_where_it_stopped(suite, tmp_path, stop):
+    suite.trouble = {"c": stop}
     with pytest.raises(KeyboardInterrupt):
         go(tmp_path)
     assert stored(tmp_path) == ["a", "b"]

@@ -41,7 +41,8 @@ def test_a_misfit_array_is_named(given, trailing, message):
     ("given", "limits", "message"),
     [
         (np.nan, {}, "h: expected a finite number, got nan"),
-        ("fast", {}, "h: expected an array of numbers, got 'fast'"),
+        ("fast", {}, "h: expected a number, got 'fast'"),
+        (True, {}, "h: expected a number, got True"),
         ([1.0], {}, "h: expected one number"),
         (0.0, {"above": 0.0}, "h: expected a number greater than 0, got 0.0"),
         (-1, {"least": 0.0}, "h: expected a number of at least 0, got -1"),

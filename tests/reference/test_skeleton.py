@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,8 @@ def test_a_skeleton_owns_what_it_shows():
     skeleton = Skeleton([-1, 0], offsets)
     offsets[1] = 1.0
     assert (skeleton.offsets == 0).all()
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        skeleton.offsets = offsets
     for shown in (skeleton.offsets, skeleton.parents, skeleton.path()):
         with pytest.raises(ValueError, match="read-only"):
             shown[0] = 1
