@@ -710,7 +710,7 @@ class TestInputs:
             ("h", -1.0, "greater than 0"),
             ("h", np.nan, "finite"),
             ("h", 1e200, "h² k . h c to be finite"),
-            ("h", "fast", "numbers"),
+            ("h", "fast", "a number, got 'fast'"),
             (
                 "solver",
                 "simplex",
