@@ -43,6 +43,15 @@ def test_the_circle_is_round():
     np.testing.assert_allclose(np.linalg.norm(curves["circle"](), axis=-1), 0.6, rtol=1e-15)
 
 
+@pytest.mark.parametrize("name", ["circle", "square", "heart", "triangle", "star"])
+def test_a_closed_curve_runs_once_from_x_towards_z_and_does_not_repeat_its_first_point(name):
+    points = curves[name]()
+    x, _, z = points.T
+    assert (x * np.roll(z, -1) - z * np.roll(x, -1)).sum() > 0
+    closing = np.linalg.norm(points[0] - points[-1])
+    assert 0.5 * gaps(points).min() < closing < 1.01 * gaps(points).max()
+
+
 def test_the_heart_is_the_cardioid():
     x, _, z = curves["heart"]().T
     t = np.arctan2(z, x)

@@ -3,9 +3,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import forward_kinematics, local_from_global, rotation, solve_ik
+from reference import forward_kinematics, local_from_global, rotation, scenes, solve_ik
 from reference.inverse_kinematics.chain import new_chain, pose_chain
-from reference.inverse_kinematics.jacobian import solve_damped, task_matrix, times, turn_joints
+from reference.inverse_kinematics.jacobian import (
+    linearise,
+    solve_damped,
+    task_matrix,
+    times,
+    turn_joints,
+)
 
 # A forward difference over 1e-7 rad is off by about that much, and rounding by 1e-9 of the reach.
 STEP, DIFFERENCE = 1e-7, 1e-6
@@ -71,6 +77,43 @@ def test_damped_equations_are_solved(factor, b):
     z = solve_damped(A, 0.01, b)
     # The condition number is at most a thousand, times rounding.
     np.testing.assert_allclose((S + 0.01 * np.eye(3)) @ z, b, atol=1e-12)
+
+
+STEPS = {
+    "levenberg_marquardt": lambda A, e, reach: np.linalg.solve(A + 0.5 * e @ e * np.eye(3), e),
+    "damped_least_squares": lambda A, e, reach: np.linalg.solve(A + 0.01 * reach**2 * np.eye(3), e),
+    "jacobian_transpose": lambda A, e, reach: (e @ A @ e) / (e @ A @ A @ e) * e,
+}
+
+
+@pytest.mark.parametrize("solver", STEPS)
+def test_one_iteration_is_the_textbook_s(skeleton, local, solver, rng, speed):
+    """J is dense here, by the arms; a joint turns by its part of J^T z, seen from its parent."""
+    pose, path = forward_kinematics(skeleton, local), skeleton.path()
+    target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
+    arms = pose.positions[-1] - pose.positions[path[:-1]]
+    J = np.concatenate([np.cross(np.eye(3), arm) for arm in arms]).T
+    turns = J.T @ STEPS[solver](J @ J.T, target - pose.positions[-1], skeleton.reach())
+    expected = local.copy()
+    for joint, turn in zip(path[:-1], turns.reshape(-1, 3), strict=True):
+        parent = skeleton.parents[joint]
+        above = pose.rotations[parent] if parent >= 0 else rotation.identity()
+        in_parent = rotation.rotate(rotation.conjugate(above), turn)
+        expected[joint] = rotation.multiply(rotation.exponential(in_parent), local[joint])
+    solution = solve_ik(skeleton, local, target, solver, tolerance=0.0, max_iterations=1)
+    cosines = np.abs(np.vecdot(solution.local_rotations, expected))
+    np.testing.assert_allclose(cosines, np.ones(6), rtol=0, atol=1e-13)
+
+
+def test_a_chain_that_had_to_be_bent_is_linearised_where_it_then_is():
+    arm, rest = scenes.lab_arm()
+    chain = new_chain(arm.offsets, arm.path())
+    pose_chain(chain, arm.path(), rest)
+    target = (0.0, 0.3, 0.0)
+    e, A = linearise(chain, target)
+    assert np.ptp(chain.positions[:, [0, 2]]) > 0.1
+    np.testing.assert_array_equal(e, target - chain.positions[-1])
+    assert task_matrix(chain) == A
 
 
 def test_levenberg_marquardt_converges_quadratically(skeleton, local, rng, speed):

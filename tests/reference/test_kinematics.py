@@ -21,8 +21,8 @@ def by_matrices(skeleton, local):
 def test_forward_kinematics_equals_a_product_of_transforms(skeleton, local, speed):
     pose = forward_kinematics(skeleton, local)
     positions, matrices = by_matrices(skeleton, local)
-    np.testing.assert_allclose(pose.positions, positions, atol=ROUNDING)
-    np.testing.assert_allclose(rotation.to_matrix(pose.rotations), matrices, atol=ROUNDING)
+    np.testing.assert_allclose(pose.positions, positions, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(rotation.to_matrix(pose.rotations), matrices, rtol=0, atol=ROUNDING)
     assert np.ptp(pose.positions, axis=0).min() > 0.01
 
 
@@ -39,7 +39,7 @@ def test_both_speeds_give_the_same_bits_of_order_one(skeleton, local):
 def test_the_lab_arm_hangs_at_its_heights(speed):
     arm, rest = scenes.lab_arm()
     heights = forward_kinematics(arm, rest).positions[:, 1]
-    np.testing.assert_allclose(heights, [1.7, 0.9, 0.5, 0.3, -0.9], atol=1e-15)
+    np.testing.assert_allclose(heights, [1.7, 0.9, 0.5, 0.3, -0.9], rtol=0, atol=1e-15)
 
 
 def test_a_joint_moves_only_what_hangs_below_it(skeleton, local, rng, speed):
@@ -65,7 +65,9 @@ def test_turning_the_root_turns_the_body_about_it(skeleton, local, rng, speed):
     local[0] = rotation.multiply(turn, local[0])
     after = forward_kinematics(skeleton, local).positions
     root = skeleton.offsets[0]
-    np.testing.assert_allclose(after, root + rotation.rotate(turn, before - root), atol=ROUNDING)
+    np.testing.assert_allclose(
+        after, root + rotation.rotate(turn, before - root), rtol=0, atol=ROUNDING
+    )
 
 
 def test_scaling_the_offsets_scales_the_positions(skeleton, local, speed):
@@ -73,13 +75,14 @@ def test_scaling_the_offsets_scales_the_positions(skeleton, local, speed):
     np.testing.assert_allclose(
         forward_kinematics(larger, local).positions,
         1000.0 * forward_kinematics(skeleton, local).positions,
+        rtol=0,
         atol=1000.0 * ROUNDING,
     )
 
 
 def test_local_rotations_come_back_from_global_ones(skeleton, local, speed):
     rotations = forward_kinematics(skeleton, local).rotations
-    np.testing.assert_allclose(local_from_global(skeleton, rotations), local, atol=ROUNDING)
+    np.testing.assert_allclose(local_from_global(skeleton, rotations), local, rtol=0, atol=ROUNDING)
 
 
 def test_a_batch_is_its_poses(skeleton, rng, speed):
@@ -110,7 +113,7 @@ def test_a_pose_is_read_only_and_the_input_unchanged(skeleton, local, speed):
 def test_slightly_long_quaternions_are_normalised_once(skeleton, local, speed):
     long = forward_kinematics(skeleton, local * (1.0 + 5e-7))
     np.testing.assert_allclose(
-        long.positions, forward_kinematics(skeleton, local).positions, atol=ROUNDING
+        long.positions, forward_kinematics(skeleton, local).positions, rtol=0, atol=ROUNDING
     )
 
 
@@ -118,9 +121,15 @@ def test_slightly_long_quaternions_are_normalised_once(skeleton, local, speed):
 def test_lengths_on_the_edge_of_the_tolerance_are_normalised_too(skeleton, local, excess, speed):
     exact = forward_kinematics(skeleton, local)
     edge = forward_kinematics(skeleton, local * (1.0 + excess))
-    np.testing.assert_allclose(edge.positions, exact.positions, atol=ROUNDING)
+    np.testing.assert_allclose(edge.positions, exact.positions, rtol=0, atol=ROUNDING)
     back = local_from_global(skeleton, exact.rotations * (1.0 + excess))
-    np.testing.assert_allclose(back, local, atol=ROUNDING)
+    np.testing.assert_allclose(back, local, rtol=0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("convert", [forward_kinematics, local_from_global])
+def test_a_scene_not_unpacked_is_named(convert):
+    with pytest.raises(ValueError, match="skeleton: expected a Skeleton, got tuple"):
+        convert(scenes.lab_arm(), rotation.identity(5))
 
 
 @pytest.mark.parametrize("convert", [forward_kinematics, local_from_global])

@@ -124,7 +124,7 @@ def test_the_fixed_axis_lies_across_the_coordinate_axis_the_direction_is_least_a
 
 
 def test_between_near_opposites_is_of_unit_length(v, rng, speed):
-    """There the vector part is a quotient of two small numbers, and rounding shows in its length."""
+    """There the vector part is a quotient of small numbers, and rounding shows in its length."""
     almost = -v + 1e-7 * rng.standard_normal(v.shape)
     assert_close(np.linalg.norm(rotation.between(v, almost), axis=-1), np.ones(50))
 
