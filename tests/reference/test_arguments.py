@@ -53,6 +53,27 @@ def test_a_misfit_number_is_named(given, limits, message):
         arguments.number("h", given, **limits)
 
 
+def test_the_least_of_a_range_belongs_to_it():
+    assert arguments.number("h", 0, least=0.0) == 0.0
+    assert arguments.integer("n", 1, least=1, below=2) == 1
+    assert arguments.indices("i", [0, 2], "pin", least=0, below=3).tolist() == [0, 2]
+
+
+def test_coordinates_are_bounded_both_ways():
+    assert arguments.coordinates("x", [-1e75, 1e75], 2).tolist() == [-1e75, 1e75]
+    with pytest.raises(ValueError, match="x: expected coordinates of at most 1e\\+75, got 2e"):
+        arguments.coordinates("x", [-2e75, 0.0], 2)
+
+
+def test_indices_are_copied_and_what_is_spread_or_read_only_comes_back_writable():
+    given = np.array([0, 1])
+    arguments.indices("i", given, "pin", least=0, below=2)[0] = 1
+    assert given.tolist() == [0, 1]
+    shown = arguments.frozen(np.zeros((1, 3)))
+    assert arguments.floats("a", shown, "...", 3).flags.writeable
+    assert arguments.spread(np.zeros((1, 3)), (2, 3)).flags.writeable
+
+
 @pytest.mark.parametrize("given", [True, 1.0, "1", 0, 4])
 def test_only_an_integer_in_range_is_one(given):
     with pytest.raises(ValueError, match="n: expected an integer"):

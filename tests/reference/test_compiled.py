@@ -76,6 +76,97 @@ def test_a_closure_is_refused():
         compiled.compile_kernel(kernel)
 
 
+def plus_one(x):
+    return x + 1.0
+
+
+def plus_two(x):
+    return x + 2.0
+
+
+def minus_one(x):
+    return x - 1.0
+
+
+def plus_default(x, y=1.0):
+    return x + y
+
+
+def plus_other_default(x, y=2.0):
+    return x + y
+
+
+def at_sine(x):
+    return np.sin(x)
+
+
+def at_cosine(x):
+    return np.cos(x)
+
+
+WEIGHTS, OTHER_WEIGHTS = np.zeros(2000), np.zeros(2000)
+OTHER_WEIGHTS[1000] = 1.0
+
+
+def weighed(x):
+    return x * WEIGHTS[1000]
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (plus_one, plus_two),
+        (plus_one, minus_one),
+        (plus_default, plus_other_default),
+        (at_sine, at_cosine),
+        (weighed, compiled.bind(weighed, WEIGHTS=OTHER_WEIGHTS)),
+    ],
+    ids=["constant", "operation", "default", "attribute", "array"],
+)
+def test_kernels_that_differ_in_one_ingredient_have_other_digests(one, other):
+    assert compiled.digest(one) != compiled.digest(other)
+    assert compiled.digest(one) == compiled.digest(one)
+
+
+def test_a_kernel_keeps_its_defaults(speed):
+    assert compiled.TwoSpeeds(plus_default)(1.0) == 2.0
+
+
+def rounded_twice(x, y):
+    return x * x - y
+
+
+def test_products_are_rounded_before_they_are_added(speed):
+    """A fused or reordered operation would leave the product's rounding error."""
+    x = 1.0 + 2.0**-30
+    assert compiled.TwoSpeeds(rounded_twice)(x, x * x) == 0.0
+
+
+def summed(values):
+    s = 0.0
+    for value in values:
+        s += value
+    return s
+
+
+def test_sums_are_added_in_order(speed):
+    """Partial sums, as vector instructions would make them, give another last digit."""
+    values = np.array([1.0, 1e16, -1e16, 1.0] * 8)
+    expected = 0.0
+    for value in values.tolist():
+        expected += value
+    assert compiled.TwoSpeeds(summed)(values) == expected
+
+
+def quotient(values):
+    return values[0] / values[1]
+
+
+def test_division_by_zero_is_infinite_as_in_numpy(speed):
+    with np.errstate(divide="ignore"):
+        assert compiled.TwoSpeeds(quotient)(np.array([1.0, 0.0])) == np.inf
+
+
 SOURCES = {
     "constant of a callee": ("SCALE = 2.0", "SCALE = 5.0"),
     "code of a callee": ("return x * SCALE", "return x * SCALE + 1.0"),

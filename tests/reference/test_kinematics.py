@@ -141,6 +141,7 @@ def test_a_scene_not_unpacked_is_named(convert):
         (lambda q: np.where(q == q[2, 1], np.nan, q), "expected finite numbers, got nan"),
         (lambda q: 0.0 * q, "expected unit quaternions .* length 0 at index"),
         (lambda q: 1.00001 * q, "expected unit quaternions"),
+        (lambda q: 0.99999 * q, "expected unit quaternions"),
         (lambda q: "pose", "expected an array of numbers"),
     ],
 )
