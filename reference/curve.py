@@ -118,7 +118,7 @@ def resample(
     if closed:
         points = np.concatenate([points, points[:1]])
     spaced = _divide_gaps(_drop_close(points, min_spacing), max_spacing)
-    return spaced[:-1] if closed and len(spaced) > 1 else spaced
+    return spaced[:-1] if closed else spaced
 
 
 def _drop_close(points: FloatArray, min_spacing: float) -> FloatArray:

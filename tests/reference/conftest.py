@@ -60,3 +60,29 @@ def network(rng):
         gravity=(0.3, -9.81, 0.2),
     )
     return system, State(x, rng.standard_normal((7, 3)))
+
+
+@pytest.fixture
+def relabelled(network, rng):
+    """Return the network with its particles in another order, its state, and that order."""
+    system, state = network
+    order = rng.permutation(system.particle_count)
+    place = np.argsort(order)
+    renamed = rebuilt(
+        system,
+        masses=system.masses[order],
+        springs=place[system.springs],
+        pinned=place[system.pinned],
+    )
+    return renamed, State(state.positions[order], state.velocities[order]), order
+
+
+@pytest.fixture
+def shuffled(network, rng):
+    """Return the network with its springs in another order, every second one turned round."""
+    system, _ = network
+    order = rng.permutation(len(system.springs))
+    ends = system.springs[order].copy()
+    ends[::2] = ends[::2, ::-1]
+    names = ("rest_lengths", "stiffnesses", "dampings")
+    return rebuilt(system, springs=ends, **{name: getattr(system, name)[order] for name in names})
