@@ -2,7 +2,15 @@
 
 A spring from particle i to particle j has length l = |x_i - x_j| and direction
 u = (x_i - x_j) / l. It stores k/2 (l - r)² and pulls i with -(k (l - r) + c (v_i - v_j)·u) u.
-Where its ends coincide it has no direction of its own: u is then (1, 0, 0), as in MuJoCo.
+
+A tension-only spring, such as a rope, stores nothing and does not pull while it is slack, l <= r;
+its damper acts all the same, as in MuJoCo. Its stiffness jumps where l passes r: exactly there it
+is zero, the one-sided second derivative from the slack side, as in MuJoCo again. One with r = 0 has
+no slack side and is a linear spring.
+
+Where its ends coincide a spring has no direction of its own: u is then (1, 0, 0), as in MuJoCo. It
+points from its second particle to its first, so which end is pushed to which side depends on their
+order; only a spring with r = 0, whose force vanishes there, and a slack one do not care.
 """
 
 import functools
@@ -13,11 +21,14 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import FloatArray, IndexArray, array, frozen, indices
+from .arguments import FloatArray, IndexArray, array, frozen, indices, shape
 from .compiled import TwoSpeeds
 from .quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
 
 BoolArray = NDArray[np.bool_]
+
+# Ends closer than this [m] coincide: the square of their distance is no normal number.
+COINCIDENT = 1e-150
 
 
 class SystemArrays(NamedTuple):
@@ -28,6 +39,7 @@ class SystemArrays(NamedTuple):
     rest_lengths: FloatArray
     stiffnesses: FloatArray
     dampings: FloatArray
+    tension_only: BoolArray
     pinned: IndexArray
     gravity: FloatArray
 
@@ -42,8 +54,9 @@ class MassSpring:
         rest_lengths: [m], shape (spring,).
         stiffnesses: [N/m], shape (spring,).
         dampings: along the springs [N s/m], shape (spring,).
-        pinned: the particles that stay where the state has them, ascending, shape (pinned,);
-            whatever velocity a state gives them counts as zero.
+        tension_only: whether each spring goes slack below its rest length, bool, shape (spring,).
+        pinned: the particles that stay where the state has them, or go where a step is told to
+            take them, ascending, shape (pinned,); what velocity a state gives them counts as zero.
         free: whether each particle may move, bool, shape (particle,).
         gravity: acceleration [m/s²], shape (3,).
         damped: whether any spring is.
@@ -55,6 +68,7 @@ class MassSpring:
     rest_lengths: FloatArray
     stiffnesses: FloatArray
     dampings: FloatArray
+    tension_only: BoolArray
     pinned: IndexArray
     free: BoolArray
     gravity: FloatArray
@@ -70,8 +84,9 @@ class MassSpring:
         dampings: ArrayLike = 0.0,
         pinned: ArrayLike = (),
         gravity: ArrayLike = (0.0, -9.81, 0.0),
+        tension_only: ArrayLike = False,
     ) -> None:
-        """Check and copy the system; what belongs to springs may be one number for all of them.
+        """Check and copy the system; what belongs to springs may be one value for all of them.
 
         Raises:
             ValueError: if a shape is wrong, a number is negative or not finite, an index is out of
@@ -86,6 +101,7 @@ class MassSpring:
                 _per_spring("rest_lengths", rest_lengths, len(ends)),
                 _per_spring("stiffnesses", stiffnesses, len(ends)),
                 _per_spring("dampings", dampings, len(ends)),
+                _flags("tension_only", tension_only, len(ends)),
                 np.unique(indices("pinned", pinned, "pinned", least=0, below=len(mass))),
                 array("gravity", gravity, 3).copy(),
             )
@@ -103,17 +119,31 @@ class MassSpring:
         damped = bool(arrays.dampings.any())
         self.__dict__.update(shown, free=frozen(free), damped=damped, arrays=arrays)
 
-    def with_springs(self, rest_lengths: FloatArray, stiffnesses: FloatArray) -> "MassSpring":
-        """Return the same particles with other, undamped springs between them, unchecked."""
+    def replaced(self, **arrays: Any) -> "MassSpring":
+        """Return the system with some of its `SystemArrays` replaced, unchecked and not copied."""
         system = object.__new__(MassSpring)
-        system._hold(
-            self.arrays._replace(
-                rest_lengths=rest_lengths,
-                stiffnesses=stiffnesses,
-                dampings=np.zeros(len(self.springs)),
-            )
-        )
+        system._hold(self.arrays._replace(**arrays))
         return system
+
+    @functools.cached_property
+    def dampers_apart(self) -> "MassSpring":
+        """The same system, the dampers of its tension-only springs made springs of their own.
+
+        They have no stiffness and come after all other springs. Without such dampers it is the
+        system itself.
+        """
+        both = np.flatnonzero(self.tension_only & (self.dampings > 0))
+        if len(both) == 0:
+            return self
+        arrays, none = self.arrays, np.zeros(len(both))
+        kept = np.where(self.tension_only, 0.0, self.dampings)
+        return self.replaced(
+            springs=np.concatenate([arrays.springs, arrays.springs[both]]),
+            rest_lengths=np.concatenate([arrays.rest_lengths, arrays.rest_lengths[both]]),
+            stiffnesses=np.concatenate([arrays.stiffnesses, none]),
+            dampings=np.concatenate([kept, arrays.dampings[both]]),
+            tension_only=np.concatenate([arrays.tension_only, none > 0]),
+        )
 
     @property
     def particle_count(self) -> int:
@@ -123,7 +153,7 @@ class MassSpring:
     @functools.cached_property
     def free_incidence(self) -> Any:
         """The columns A_i with the rows of pinned particles emptied, sparse (particle, spring)."""
-        held = scipy.sparse.diags_array(self.free.astype(float)) @ derivation(self).A
+        held = scipy.sparse.diags_array(self.free.astype(float)) @ incidence(self)
         held.eliminate_zeros()
         return held
 
@@ -201,24 +231,28 @@ class Derivation(NamedTuple):
 
 def derivation(system: MassSpring) -> Derivation:
     """Return A, S, L and J of the system; pins play no part in them."""
+    A, K = incidence(system), scipy.sparse.diags_array(system.stiffnesses, format="csc")
+    S = scipy.sparse.eye_array(len(system.springs), format="csc")
+    return Derivation(A=A, S=S, L=A @ K @ A.T, J=A @ K @ S.T)
+
+
+def incidence(system: MassSpring) -> Any:
+    """Return A alone, sparse CSC (particle, spring)."""
     n, s = system.particle_count, len(system.springs)
     signs, starts = np.tile([1.0, -1.0], s), 2 * np.arange(s + 1)
-    A = scipy.sparse.csc_array((signs, system.springs.ravel(), starts), shape=(n, s))
-    S = scipy.sparse.eye_array(s, format="csc")
-    K = scipy.sparse.diags_array(system.stiffnesses, format="csc")
-    return Derivation(A=A, S=S, L=A @ K @ A.T, J=A @ K @ S.T)
+    return scipy.sparse.csc_array((signs, system.springs.ravel(), starts), shape=(n, s))
 
 
 def rest_vectors(system: MassSpring, positions: ArrayLike) -> FloatArray:
     """Return d, shape (spring, 3) [m]: d_i = r_i u_i, each spring's vector at its rest length.
 
-    Of all vectors of length r_i it is the nearest to the spring's own (Liu et al. 2013).
+    Of all vectors of length r_i it is the nearest to the spring's own (Liu et al. 2013). A
+    tension-only spring may have any shorter one as well: where it is slack, d_i is its own vector.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    _, u = _frames(system, positions)
-    return system.rest_lengths[:, None] * u
+    return _rest_vectors(_positions(system, positions), system.arrays)
 
 
 def lengths(system: MassSpring, positions: ArrayLike) -> FloatArray:
@@ -227,11 +261,22 @@ def lengths(system: MassSpring, positions: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    return _frames(system, positions)[0]
+    return _lengths(_positions(system, positions), system.arrays.springs)
+
+
+def stretches(system: MassSpring, positions: ArrayLike) -> FloatArray:
+    """Return l - r of each spring [m], shape (spring,), zero for a slack tension-only one.
+
+    Raises:
+        ValueError: if the positions have a wrong shape or are not finite.
+    """
+    return _stretches(_positions(system, positions), system.arrays)
 
 
 def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
     """Return the energy of springs and gravity [J]: sum of k/2 (l - r)² less that of m g·x.
+
+    Slack springs have none.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
@@ -242,13 +287,12 @@ def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
 
 
 def spring_energy(system: MassSpring, positions: ArrayLike) -> float:
-    """Return the energy of the springs [J]: the sum of k/2 (l - r)².
+    """Return the energy of the springs [J]: the sum of k/2 (l - r)², over those not slack.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    stretch = lengths(system, positions) - system.rest_lengths
-    return float(np.sum(0.5 * system.stiffnesses * stretch**2))
+    return float(np.sum(0.5 * system.stiffnesses * stretches(system, positions) ** 2))
 
 
 def kinetic_energy(system: MassSpring, state: State) -> float:
@@ -273,7 +317,7 @@ def forces(
             a shape other than (particle, 3) or are not finite.
     """
     x, v = motion(system, state)
-    return constant_forces(system, external_forces) + _pulls(x, v, system.arrays)
+    return constant_forces(system, external_forces) + pulls(system, x, v)
 
 
 def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None) -> FloatArray:
@@ -291,50 +335,58 @@ def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None
 def spring_forces(system: MassSpring, positions: ArrayLike) -> FloatArray:
     """Return the springs' forces -k (l - r) u at their first ends, the opposite at the other [N].
 
-    Shape (particle, 3).
+    Shape (particle, 3). Slack springs have none.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
     x = _positions(system, positions)
-    return _pulls(x, np.zeros_like(x), system.arrays)
+    return pulls(system, x, np.zeros_like(x))
 
 
 def damper_forces(system: MassSpring, state: State) -> FloatArray:
     """Return the dampers' forces -c ((v_i - v_j)·u) u at their first ends [N], (particle, 3).
 
+    Those of slack springs act as well.
+
     Raises:
         ValueError: if the state has another number of particles.
     """
     x, v = motion(system, state)
-    slack = system.arrays._replace(stiffnesses=np.zeros(len(system.springs)))
-    return _pulls(x, v, slack)
+    return pulls(system.replaced(stiffnesses=np.zeros(len(system.springs))), x, v)
+
+
+def pulls(system: MassSpring, x: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the forces of springs and dampers together [N], shape (particle, 3), unchecked."""
+    return _pulls(x, v, system.arrays)
 
 
 def stiffness_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     """Return the exact Hessian of the spring energy [N/m], sparse (3 particle, 3 particle).
 
     It is the sum of (A_i A_i') x (k u u' + k (1 - r/l) (I - u u')); the second, geometric term is
-    left out where a spring with a rest length has shrunk to a point.
+    left out where a spring with a rest length has shrunk to a point. Slack springs have none.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
     blocks = spring_blocks(system, _positions(system, positions))
-    return BlockSum(derivation(system).A).matrix(blocks)
+    return BlockSum(incidence(system)).matrix(blocks)
 
 
 def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     """Return C, sparse (3 particle, 3 particle) [N s/m]: the dampers' forces are -C v.
 
-    It is the sum of (A_i A_i') x c u u'.
+    It is the sum of (A_i A_i') x c u u', slack springs included.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    dampers = system.with_springs(system.arrays.rest_lengths, system.arrays.dampings)
+    dampers = system.replaced(
+        stiffnesses=system.arrays.dampings, tension_only=np.zeros(len(system.springs), dtype=bool)
+    )
     blocks = spring_blocks(dampers, _positions(system, positions), geometric=False)
-    return BlockSum(derivation(system).A).matrix(blocks)
+    return BlockSum(incidence(system)).matrix(blocks)
 
 
 def spring_blocks(
@@ -378,6 +430,15 @@ def motion(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
     return np.array(state.positions), v
 
 
+def pin_goal(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
+    """Return where the pins are to be at the end of a step, shape (pinned, 3) [m].
+
+    Raises:
+        ValueError: if they have another shape or are not finite.
+    """
+    return array("pin_positions", pin_positions, len(system.pinned), 3)
+
+
 def spring_pulls(x, v, system):
     """Return the forces of springs and dampers on each particle, shape (particle, 3)."""
     total = np.zeros(x.shape)
@@ -385,22 +446,24 @@ def spring_pulls(x, v, system):
         i, j = system.springs[s, 0], system.springs[s, 1]
         length, u = spring_frame(x, i, j)
         rate = dot(subtract(vector_at(v, i), vector_at(v, j)), u)
-        tension = system.stiffnesses[s] * (length - system.rest_lengths[s])
-        pull = scale(tension + system.dampings[s] * rate, u)
+        stretch = spring_stretch(length, system.rest_lengths[s], system.tension_only[s])
+        pull = scale(system.stiffnesses[s] * stretch + system.dampings[s] * rate, u)
         put_vector(total, i, subtract(vector_at(total, i), pull))
         put_vector(total, j, add(vector_at(total, j), pull))
     return total
 
 
 def stiffness_blocks(x, system, geometric):
-    """Return each spring's k u u', with k (1 - r/l) (I - u u') added if geometric."""
+    """Return each spring's k u u', with k (1 - r/l) (I - u u') added if geometric; 0 if slack."""
     blocks = np.zeros((len(system.springs), 3, 3))
     for s in range(len(system.springs)):
         i, j = system.springs[s, 0], system.springs[s, 1]
         length, u = spring_frame(x, i, j)
+        if is_slack(length, system.rest_lengths[s], system.tension_only[s]):
+            continue
         k, across = system.stiffnesses[s], 0.0
         if geometric:
-            across = k * spring_slack(length, system.rest_lengths[s])
+            across = k * share_across(length, system.rest_lengths[s])
         for a in range(3):
             blocks[s, a, a] = across
             for b in range(3):
@@ -408,38 +471,66 @@ def stiffness_blocks(x, system, geometric):
     return blocks
 
 
-def spring_slack(length, rest_length):
-    """Return 1 - r/l; where l is 0, 1 without a rest length and 0 with one."""
-    if length > 0.0:
+def share_across(length, rest_length):
+    """Return 1 - r/l; where the ends coincide, 1 without a rest length and 0 with one."""
+    if length >= COINCIDENT:
         return 1.0 - rest_length / length
     return 1.0 if rest_length == 0.0 else 0.0
 
 
-def spring_frames(x, springs):
-    """Return the length and the direction of every spring, shapes (spring,) and (spring, 3)."""
-    lengths, directions = np.empty(len(springs)), np.empty((len(springs), 3))
+def spring_lengths(x, springs):
+    """Return the length of every spring, shape (spring,)."""
+    lengths = np.empty(len(springs))
     for s in range(len(springs)):
-        lengths[s], u = spring_frame(x, springs[s, 0], springs[s, 1])
-        put_vector(directions, s, u)
-    return lengths, directions
+        lengths[s], _ = spring_frame(x, springs[s, 0], springs[s, 1])
+    return lengths
+
+
+def spring_stretches(x, system):
+    """Return l - r of every spring, 0 if slack, shape (spring,)."""
+    stretches = np.empty(len(system.springs))
+    for s in range(len(system.springs)):
+        length, _ = spring_frame(x, system.springs[s, 0], system.springs[s, 1])
+        stretches[s] = spring_stretch(length, system.rest_lengths[s], system.tension_only[s])
+    return stretches
+
+
+def spring_rest_vectors(x, system):
+    """Return r u of every spring, l u if slack, shape (spring, 3)."""
+    vectors = np.empty((len(system.springs), 3))
+    for s in range(len(system.springs)):
+        length, u = spring_frame(x, system.springs[s, 0], system.springs[s, 1])
+        rest_length = system.rest_lengths[s]
+        if is_slack(length, rest_length, system.tension_only[s]):
+            rest_length = length
+        put_vector(vectors, s, scale(rest_length, u))
+    return vectors
+
+
+def spring_stretch(length, rest_length, tension_only):
+    """Return l - r, or 0 for a slack spring."""
+    return 0.0 if is_slack(length, rest_length, tension_only) else length - rest_length
+
+
+def is_slack(length, rest_length, tension_only):
+    """Return whether a tension-only spring hangs loose; one without a rest length never does."""
+    return tension_only and rest_length > 0.0 and length <= rest_length
 
 
 def spring_frame(x, i, j):
     """Return the length and the direction from particle j to i; (1, 0, 0) where they coincide."""
     p = subtract(vector_at(x, i), vector_at(x, j))
     length = norm(p)
-    if length == 0.0:
+    if length < COINCIDENT:
         return length, (1.0, 0.0, 0.0)
     return length, scale(1.0 / length, p)
 
 
 _pulls = TwoSpeeds(spring_pulls)
 _blocks = TwoSpeeds(stiffness_blocks)
-_spring_frames = TwoSpeeds(spring_frames)
-
-
-def _frames(system: MassSpring, positions: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    return _spring_frames(_positions(system, positions), system.arrays.springs)
+_lengths = TwoSpeeds(spring_lengths)
+_stretches = TwoSpeeds(spring_stretches)
+_rest_vectors = TwoSpeeds(spring_rest_vectors)
 
 
 def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
@@ -454,6 +545,8 @@ def _masses(masses: ArrayLike) -> FloatArray:
 
 
 def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:
+    if isinstance(springs, list | tuple) and len(springs) == 0:
+        springs = np.empty((0, 2))
     ends = indices("springs", springs, "spring", 2, least=0, below=particle_count)
     loops = np.flatnonzero(ends[:, 0] == ends[:, 1])
     if len(loops):
@@ -469,6 +562,15 @@ def _per_spring(name: str, value: ArrayLike, count: int) -> FloatArray:
     if given.ndim == 0:
         return _not_negative(name, np.full(count, given))
     return _not_negative(name, array(name, given, count).copy())
+
+
+def _flags(name: str, value: ArrayLike, count: int) -> BoolArray:
+    given = np.asarray(value)
+    if given.dtype != bool:
+        raise ValueError(f"{name}: expected booleans, got {given.dtype} values")
+    if given.shape not in {(), (count,)}:
+        raise ValueError(f"{name}: expected shape ({count},), got {shape(given.shape)}")
+    return np.array(np.broadcast_to(given, (count,)))
 
 
 def _not_negative(name: str, values: FloatArray) -> FloatArray:

@@ -106,29 +106,49 @@ class ImplicitEuler:
                 raise ValueError(f"h: expected h² k + h c to be finite, got h = {self.h}")
         object.__setattr__(self, "_solver", method(self.system, self.h))
 
-    def step(self, state: State, external_forces: ArrayLike | None = None) -> StepResult:
+    def step(
+        self,
+        state: State,
+        external_forces: ArrayLike | None = None,
+        pin_positions: ArrayLike | None = None,
+    ) -> StepResult:
         """Return the state one step later and how well the step was solved.
 
-        `external_forces` [N], shape (particle, 3), act besides gravity, and stay through the step.
+        Args:
+            state: where the step starts.
+            external_forces: [N], shape (particle, 3), besides gravity; they stay through the step.
+            pin_positions: where the pinned particles, in ascending order, are at the end of the
+                step [m], shape (pinned, 3); by default they stay. Their velocity in the result is
+                their way over h.
 
         Raises:
-            ValueError: if the state has another number of particles, or the external forces have
-                another shape or are not finite.
+            ValueError: if the state has another number of particles, or the external forces or pin
+                positions have another shape or are not finite.
         """
         with np.errstate(over="ignore", invalid="ignore"):  # overflow is an outcome here
-            objective = self.objective(state, external_forces)
+            objective = self.objective(state, external_forces, pin_positions)
             last, outcome, history, objectives = self._solve(objective)
             return _result(state, objective, last, outcome, history, objectives)
 
-    def objective(self, state: State, external_forces: ArrayLike | None = None) -> Objective:
+    def objective(
+        self,
+        state: State,
+        external_forces: ArrayLike | None = None,
+        pin_positions: ArrayLike | None = None,
+    ) -> Objective:
         """Return g of the step from this state.
 
         Raises:
             ValueError: as for `step`.
         """
-        return Objective(self.system, state, self.h, external_forces)
+        return Objective(self.system, state, self.h, external_forces, pin_positions)
 
-    def iterates(self, state: State, external_forces: ArrayLike | None = None) -> Iterator[Iterate]:
+    def iterates(
+        self,
+        state: State,
+        external_forces: ArrayLike | None = None,
+        pin_positions: ArrayLike | None = None,
+    ) -> Iterator[Iterate]:
         """Yield the solver's start and the iterate after each iteration, without end.
 
         `step` takes the same ones and stops by tolerance and max_iterations.
@@ -136,7 +156,7 @@ class ImplicitEuler:
         Raises:
             ValueError: as for `step`.
         """
-        return self._solver.iterates(self.objective(state, external_forces))
+        return self._solver.iterates(self.objective(state, external_forces, pin_positions))
 
     def _solve(
         self, objective: Objective

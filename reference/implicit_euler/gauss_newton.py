@@ -7,10 +7,13 @@ without geometric terms the step h (v_n + dv) = -(M + h C + h² J' k J)^-1 grad 
 
 J here being the Jacobian of the lengths and f all forces with the dampers' -C v_n: one step of
 Baraff and Witkin 1998, "Large Steps in Cloth Simulation", without geometric stiffness, and the
-integrator that MuJoCo calls `discrete`.
+integrator that MuJoCo calls `discrete`. Pins that move do so from x_n, where the springs are still
+linearised: their way adds h² J' k J (x_pins - x_n) to the gradient of the free particles.
 """
 
 from collections.abc import Iterator
+
+import numpy as np
 
 from ..linear_solver import factorize
 from ..mass_spring import MassSpring
@@ -26,10 +29,12 @@ class GaussNewton:
         """Keep nothing: the matrix is another in every step."""
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield the start x_n and then one iterate after the other, without end."""
-        iterate = objective.evaluate(objective.x_n)
+        """Yield x_n, but for the pins, and then one iterate after the other, without end."""
+        x = objective.x_n
+        gradient = objective.evaluate(x).gradient + objective.pull_of_pins(x, geometric=False)
+        iterate = objective.evaluate(np.where(objective.system.free[:, None], x, objective.y))
         while True:
             yield iterate
-            matrix = objective.hessian(iterate.positions, geometric=False)
-            correction = factorize(matrix).solve(iterate.gradient.ravel())
+            correction = factorize(objective.hessian(x, geometric=False)).solve(gradient.ravel())
             iterate = objective.evaluate(iterate.positions - correction.reshape(-1, 3))
+            x, gradient = iterate.positions, iterate.gradient

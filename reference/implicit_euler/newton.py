@@ -8,8 +8,6 @@ the metric of M).
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
 from ..linear_solver import Factor, NotPositiveDefiniteError, factorize
 from ..mass_spring import MassSpring
 from .line_search import line_search
@@ -33,11 +31,9 @@ class Newton:
         iterate, shift = objective.start, 0.0
         while True:
             yield iterate
-            hessian = objective.hessian(iterate.positions)
-            if np.isfinite(hessian.data).all():  # an almost vanished spring may overflow it
-                factor, shift = self._factor(hessian, shift)
-                step = -factor.solve(iterate.gradient.ravel()).reshape(-1, 3)
-                iterate = line_search(objective, iterate, step)
+            factor, shift = self._factor(objective.hessian(iterate.positions), shift)
+            step = -factor.solve(iterate.gradient.ravel()).reshape(-1, 3)
+            iterate = line_search(objective, iterate, step)
 
     def _factor(self, hessian: Any, shift: float) -> tuple[Factor, float]:
         """Return the factor of the Hessian plus a multiple of M, and the multiple.

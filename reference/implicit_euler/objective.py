@@ -7,8 +7,10 @@ grad g(x) = 0 for (Liu et al. 2013)
 
 where f_ext is gravity and what else is given. A damper adds c/(2h) (l(x) - l_n)² to E, so that
 a damped spring acts through the step as a spring of stiffness k + c/h and of rest length
-(k r + c l_n/h) / (k + c/h). Pinned particles are no variables: y leaves them at x_n, and their rows
-of the gradient are zero.
+(k r + c l_n/h) / (k + c/h). A tension-only spring stores nothing where it is slack, but its damper
+acts all the same: the damper becomes a spring of its own, of stiffness c/h and rest length l_n.
+Pinned particles are no variables: y has them at the end of their path, at x_n if they stay, and
+their rows of the gradient are zero.
 """
 
 import math
@@ -26,9 +28,11 @@ from ..mass_spring import (
     constant_forces,
     derivation,
     motion,
+    pin_goal,
     rest_vectors,
     spring_blocks,
     spring_frame,
+    spring_stretch,
 )
 from ..quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
 
@@ -73,9 +77,10 @@ class Objective:
         system: the system that steps.
         h: the step [s].
         x_n: the positions before the step, shape (particle, 3).
-        y: where the particles would go by themselves, shape (particle, 3); the pins stay.
+        y: where the particles would go by themselves, and the pins do, shape (particle, 3).
         external: gravity and other given forces [N], shape (particle, 3).
-        effective: the system with its dampers made into springs, as above.
+        effective: the system with its dampers made into springs, as above; those that belong to
+            tension-only springs come after all others.
     """
 
     def __init__(
@@ -84,23 +89,27 @@ class Objective:
         state: State,
         h: float,
         external_forces: ArrayLike | None = None,
+        pin_positions: ArrayLike | None = None,
     ) -> None:
         """Set up the step of length h from a state.
 
         Raises:
-            ValueError: if the state has another number of particles, or the external forces [N]
-                have a shape other than (particle, 3) or are not finite.
+            ValueError: if the state has another number of particles, or the external forces [N],
+                shape (particle, 3), or the pins' positions at the end of the step [m], shape
+                (pinned, 3), have another shape or are not finite.
         """
         self.system = system
         self.h = h
         self.x_n, v_n = motion(system, state)
         self.y = self.x_n + h * v_n
+        if pin_positions is not None:
+            self.y[system.pinned] = pin_goal(system, pin_positions)
         self.external = constant_forces(system, external_forces)
         self.effective, self._constant = _effective(system, self.x_n, h)
         arrays = self.effective.arrays
         self._arguments = (
             self.y, self.external, h, self._constant, arrays.masses, arrays.springs,
-            arrays.rest_lengths, arrays.stiffnesses, arrays.pinned,
+            arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only, arrays.pinned,
         )  # fmt: skip
         self.start = self.evaluate(self.y)
 
@@ -140,21 +149,36 @@ class Objective:
         """
         x = self._positions(positions)
         blocks = spring_blocks(self.effective, x, geometric=geometric)
-        stiffness = self.system.free_blocks.matrix(self.h * self.h * blocks)
-        return self.system.free_mass_matrix + stiffness
+        springs = self.system.dampers_apart.free_blocks
+        return self.system.free_mass_matrix + springs.matrix(self.h * self.h * blocks)
+
+    def pull_of_pins(self, positions: ArrayLike, *, geometric: bool = True) -> FloatArray:
+        """Return h² K times the way of the pins from x_n to y, shape (particle, 3) [kg m].
+
+        It is what their way adds to the gradient at the free particles when the springs are
+        linearised at x; zero at the pins. K is as for `hessian`.
+
+        Raises:
+            ValueError: if the positions have a wrong shape or are not finite.
+        """
+        way = np.where(self.system.free[:, None], 0.0, self.y - self.x_n)
+        i, j = self.effective.springs.T
+        blocks = spring_blocks(self.effective, self._positions(positions), geometric=geometric)
+        pulls = np.einsum("sab,sb->sa", self.h * self.h * blocks, way[i] - way[j])
+        return self.system.dampers_apart.free_incidence @ pulls
 
     def quadratic_form(self, positions: ArrayLike, d: ArrayLike) -> float:
         """Return what g becomes when each spring's vector at rest length is held at d, (spring, 3).
 
         1/2 x' (M + h² L) x - h² x' J d - x' (M y + h² f_ext) + constant (Liu et al. 2013), with
         L and J of the effective springs. With the d of `rest_vectors(x)` it is g(x), with any other
-        d of the effective rest lengths it is more.
+        d of the effective rest lengths, or shorter in a tension-only spring, it is more.
 
         Raises:
             ValueError: if the positions or d have a wrong shape or are not finite.
         """
         x, y, hh = self._positions(positions), self.y, self.h * self.h
-        d = array("d", d, len(self.system.springs), 3)
+        d = array("d", d, len(self.effective.springs), 3)
         M = scipy.sparse.diags_array(self.system.masses)
         _, _, L, J = derivation(self.effective)
         stored = 0.5 * np.sum(self.effective.stiffnesses[:, None] * d**2) + self._constant
@@ -195,9 +219,11 @@ def _effective(system: MassSpring, x_n: FloatArray, h: float) -> tuple[MassSprin
     """Return the system with dampers made into springs, and the energy that this leaves out."""
     if not system.damped:
         return system, 0.0
-    stiffnesses = effective_stiffnesses(system, h)
-    rest_lengths, constant = _blend(x_n, h, stiffnesses, system.arrays)
-    return system.with_springs(rest_lengths, stiffnesses), constant
+    apart = system.dampers_apart
+    stiffnesses = effective_stiffnesses(apart, h)
+    rest_lengths, constant = _blend(x_n, h, stiffnesses, apart.arrays)
+    springs = {"rest_lengths": rest_lengths, "stiffnesses": stiffnesses}
+    return apart.replaced(**springs, dampings=np.zeros(len(stiffnesses))), constant
 
 
 def blend_dampers(x_n, h, stiffnesses, system):
@@ -218,13 +244,13 @@ def blend_dampers(x_n, h, stiffnesses, system):
 
 
 def evaluate_objective(
-    x, y, external, h, constant, masses, springs, rest_lengths, stiffnesses, pinned
+    x, y, external, h, constant, masses, springs, rest_lengths, stiffnesses, tension_only, pinned
 ):
     """Return grad g, g, |grad g|, and what rounding can leave of |grad g| and move of g."""
     gradient, size, reach = np.empty(x.shape), np.empty(len(x)), np.empty(len(x))
     inertia, inertia_size = add_inertia(x, y, external, h * h, masses, gradient, size, reach)
     elastic, elastic_size = add_springs(
-        x, h * h, springs, rest_lengths, stiffnesses, gradient, size, reach
+        x, h * h, springs, rest_lengths, stiffnesses, tension_only, gradient, size, reach
     )
     for p in pinned:
         put_vector(gradient, p, (0.0, 0.0, 0.0))
@@ -253,13 +279,13 @@ def add_inertia(x, y, external, hh, masses, gradient, size, reach):
     return value, value_size
 
 
-def add_springs(x, hh, springs, rest_lengths, stiffnesses, gradient, size, reach):
+def add_springs(x, hh, springs, rest_lengths, stiffnesses, tension_only, gradient, size, reach):
     """Add h² times the springs' gradient, and the size of its terms; return g's share."""
     value, value_size = 0.0, 0.0
     for s in range(len(springs)):
         i, j = springs[s, 0], springs[s, 1]
         length, u = spring_frame(x, i, j)
-        k, stretch = hh * stiffnesses[s], length - rest_lengths[s]
+        k, stretch = hh * stiffnesses[s], spring_stretch(length, rest_lengths[s], tension_only[s])
         pull = scale(k * stretch, u)
         put_vector(gradient, i, add(vector_at(gradient, i), pull))
         put_vector(gradient, j, subtract(vector_at(gradient, j), pull))

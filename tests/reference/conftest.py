@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference import Skeleton, rotation
+from reference import Articulation, Mimic, Skeleton, rotation
 from reference.mass_spring import MassSpring, State
 
 
@@ -30,6 +30,7 @@ def local(rng, skeleton):
 def rebuilt(system, **changes):
     """Return the same system with some arguments changed."""
     names = ["masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity"]
+    names += ["tension_only"]
     return MassSpring(**{name: changes.get(name, getattr(system, name)) for name in names})
 
 
@@ -39,12 +40,13 @@ def altered():
     return rebuilt
 
 
-@pytest.fixture
-def network(rng):
+@pytest.fixture(params=["springs", "ropes"])
+def network(rng, request):
     """Return seven unequal particles, one pinned, joined by damped springs, and a moving state.
 
     Springs are stretched and compressed by up to a half, so that the geometric stiffness has both
-    signs; none is near length zero, where the energy has no derivatives.
+    signs; none is near length zero or its rest length, where its energy may lack derivatives.
+    Among "ropes" every second one is tension-only.
     """
     springs = np.array([(i, j) for i in range(7) for j in range(i) if (i * j) % 4 != 3])
     corners = np.array([[i % 2, i // 2 % 2, i // 4] for i in range(7)], dtype=float)
@@ -58,6 +60,7 @@ def network(rng):
         dampings=rng.uniform(0.1, 1.0, len(springs)),
         pinned=[2],
         gravity=(0.3, -9.81, 0.2),
+        tension_only=(np.arange(len(springs)) % 2 == 0) & (request.param == "ropes"),
     )
     return system, State(x, rng.standard_normal((7, 3)))
 
@@ -84,5 +87,37 @@ def shuffled(network, rng):
     order = rng.permutation(len(system.springs))
     ends = system.springs[order].copy()
     ends[::2] = ends[::2, ::-1]
-    names = ("rest_lengths", "stiffnesses", "dampings")
+    names = ("rest_lengths", "stiffnesses", "dampings", "tension_only")
     return rebuilt(system, springs=ends, **{name: getattr(system, name)[order] for name in names})
+
+
+def random_articulation(kinds, seed):
+    """Return a random tree of joints of these kinds; two in three are limited, some are mimics."""
+    rng = np.random.default_rng(seed)
+    count = len(kinds)
+    parents = [-1] + [int(rng.integers(0, j)) for j in range(1, count)]
+    limited = rng.random(count) < 2 / 3
+    lower = np.where(limited, rng.uniform(-2.5, 0.5, count), -np.inf)
+    upper = np.where(limited, rng.uniform(0.5, 2.5, count), np.inf)
+    single = [j for j in range(count) if kinds[j] in ("hinge", "slide")]
+    leaders = {j: int(rng.choice(single)) for j in single if rng.random() < 0.3}
+    return Articulation(
+        Skeleton(parents, rng.standard_normal((count, 3))),
+        kinds,
+        rng.standard_normal((count, 3)),
+        frames=rotation.random(rng, count),
+        lower=lower,
+        upper=upper,
+        cones=np.where(limited, rng.uniform(0.0, 3.0, count), np.inf),
+        mimics={
+            j: Mimic(leader, *rng.uniform(-2.0, 2.0, 2))
+            for j, leader in leaders.items()
+            if leader not in leaders
+        },
+    )
+
+
+@pytest.fixture(scope="session")
+def articulated():
+    """Return the function that makes a random articulation of given kinds from a seed."""
+    return random_articulation

@@ -207,9 +207,12 @@ class TestDerivation:
         system, state = network
         p = derivation(system).A.T @ state.positions
         d = rest_vectors(system, state.positions)
-        np.testing.assert_allclose(np.linalg.norm(d, axis=1), system.rest_lengths, rtol=ROUNDING)
+        length, r = lengths(system, state.positions), system.rest_lengths
+        slack = system.tension_only & (length < r)
+        expected = np.where(slack, length, r)
+        np.testing.assert_allclose(np.linalg.norm(d, axis=1), expected, rtol=ROUNDING)
         gap = np.linalg.norm(p - d, axis=1)
-        assert_close(gap, np.abs(lengths(system, state.positions) - system.rest_lengths))
+        assert_close(gap, np.where(slack, 0, np.abs(length - r)))
         for _ in range(20):
             other = rng.standard_normal(d.shape)
             other *= (system.rest_lengths / np.linalg.norm(other, axis=1))[:, None]
@@ -234,6 +237,50 @@ class TestCoincidentEnds:
         here, there = (stiffness_matrix(system, x).toarray() for x in (self.HERE, PAIR))
         np.testing.assert_array_equal(here, there)
         np.testing.assert_array_equal(here[:3, :3], 4.0 * np.eye(3))
+
+    def test_a_slack_rope_between_them_has_no_direction_to_push(self, speed):
+        system = pair(tension_only=True)
+        np.testing.assert_array_equal(spring_forces(system, self.HERE), np.zeros((2, 3)))
+        np.testing.assert_array_equal(rest_vectors(system, self.HERE), np.zeros((1, 3)))
+
+    @pytest.mark.parametrize("rest_length", [0.0, 1.5])
+    def test_forces_balance_and_matrices_are_symmetric_there(self, speed, rest_length):
+        springs = [[0, 1], [1, 2], [2, 0], [2, 1]]
+        system = MassSpring(np.ones(3), springs, rest_length, [1.0, 2, 3, 4], 0.5)
+        x = np.ones((3, 3))
+        state = State(x, np.arange(9.0).reshape(3, 3))
+        np.testing.assert_allclose(forces(system, state).sum(axis=0), 3 * system.gravity, 1e-14)
+        for matrix in (stiffness_matrix(system, x), damping_matrix(system, x)):
+            assert np.isfinite(matrix.data).all()
+            assert matrix.nnz > 0
+            assert abs(matrix - matrix.T).max() == 0
+
+    @pytest.mark.parametrize("gap", [1e-140, 1e-149, 1e-155, 1e-161, 5e-324])
+    def test_directions_are_of_length_one_however_close_the_ends(self, speed, gap):
+        """Squares of less than 1e-308 lose digits: ends as close as that coincide."""
+        x = np.array([[gap, gap, 0.0], [0.0, 0.0, 0.0]])
+        d = rest_vectors(pair(), x)
+        assert np.linalg.norm(d) == pytest.approx(1.5, rel=1e-15)
+
+
+class TestFewParticles:
+    @pytest.mark.parametrize("springs", [[], (), np.empty((0, 2)), np.empty((0, 2), dtype=int)])
+    def test_a_single_particle_needs_no_springs(self, speed, springs):
+        system = MassSpring([2.0], springs, 1.0, 1.0, gravity=(0, -10, 0))
+        state = State([[1.0, 2.0, 3.0]], [[3.0, 0, 0]])
+        np.testing.assert_array_equal(forces(system, state), [[0, -20.0, 0]])
+        assert potential_energy(system, state.positions) == 40.0
+        assert kinetic_energy(system, state) == 9.0
+        assert stiffness_matrix(system, state.positions).shape == (3, 3)
+        assert stiffness_matrix(system, state.positions).nnz == 0
+        assert rest_vectors(system, state.positions).shape == (0, 3)
+        assert [m.shape for m in derivation(system)] == [(1, 0), (0, 0), (1, 1), (1, 0)]
+
+    def test_a_particle_without_springs_feels_gravity_alone(self, speed):
+        system = MassSpring([1.0, 3.0, 2.0], [[0, 1]], 1.5, 4.0, gravity=(0, -10, 0))
+        x = np.vstack([PAIR, [[5.0, 5.0, 5.0]]])
+        expected = [*forces(pair(), State(PAIR, np.zeros((2, 3)))), [0, -20.0, 0]]
+        np.testing.assert_array_equal(forces(system, State(x, np.zeros((3, 3)))), expected)
 
 
 class TestPins:
@@ -289,6 +336,7 @@ class TestInputs:
             "dampings": np.array([0.5]),
             "pinned": np.array([1]),
             "gravity": np.array([0.0, -10.0, 0.0]),
+            "tension_only": np.array([False]),
         }
         system = pair(**given)
         for name, array in given.items():
@@ -335,6 +383,7 @@ class TestInputs:
             ("springs", [[0, -1]], "from 0 to 1, got -1"),
             ("springs", [[0.0, 1.0]], "integer"),
             ("springs", [[0, 1], [1, 1]], "two different particles, got 1 twice in spring 1"),
+            ("springs", np.empty((0, 3)), r"shape \(spring, 2\), got \(0, 3\)"),
             ("rest_lengths", -0.1, "none below 0, got -0.1"),
             ("rest_lengths", [1.0, 1.0], r"shape \(1,\), got \(2,\)"),
             ("rest_lengths", np.inf, "finite"),

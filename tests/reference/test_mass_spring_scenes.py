@@ -1,12 +1,31 @@
 """The named mass-spring scenes are what they are said to be."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from reference import scenes
-from reference.mass_spring import forces, lengths
+from reference.mass_spring import forces, lengths, stretches
 
-SCENES = [scenes.lab_cloth, scenes.hanging_rope]
+SCENES = [
+    scenes.lab_cloth,
+    scenes.hanging_rope,
+    scenes.grid_cloth,
+    scenes.net,
+    scenes.lattice,
+]
+
+# Two triangles that share an edge of 1 m, and a vertex that belongs to neither.
+KITE = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0, 0.6], [0.5, 0, -0.8], [9, 9, 9]], dtype=float)
+TWO = np.array([[0, 1, 2], [1, 0, 3]])
+
+
+def pairs(system):
+    """Return the two ends of each spring, in ascending order, as a set; they must be different."""
+    found = {tuple(sorted(pair)) for pair in system.springs.tolist()}
+    assert len(found) == len(system.springs)
+    return found
 
 
 class TestLabCloth:
@@ -31,8 +50,6 @@ class TestLabCloth:
     def test_every_spring_is_there_once(self, size):
         """By brute force: all pairs whose distance on the grid is one of six kinds."""
         system, _ = scenes.lab_cloth(size=size)
-        found = {tuple(sorted(pair)) for pair in system.springs.tolist()}
-        assert len(found) == len(system.springs)
         kinds = {(0, 1), (1, 0), (0, 2), (2, 0), (1, 1)}
         expected = set()
         for a in range(size * size):
@@ -40,7 +57,7 @@ class TestLabCloth:
                 rows, columns = abs(a // size - b // size), abs(a % size - b % size)
                 if (rows, columns) in kinds:
                     expected.add((b, a))
-        assert found == expected
+        assert pairs(system) == expected
 
     def test_it_keeps_its_side_at_any_size(self):
         _, state = scenes.lab_cloth(size=4, side=3.0, height=0.5)
@@ -53,6 +70,224 @@ class TestLabCloth:
         assert set(system.dampings) == {0.2}
         assert set(system.masses) == {0.1}
         assert system.gravity[1] == -9.81
+
+
+class TestGridCloth:
+    def test_the_labs_is_one_of_them(self):
+        (lab, start), (grid, state) = (
+            scenes.lab_cloth(damping=0.2),
+            scenes.grid_cloth(11, 11, damping=0.2, gravity=0.3),
+        )
+        for name in ("springs", "rest_lengths", "stiffnesses", "dampings", "masses", "pinned"):
+            np.testing.assert_array_equal(getattr(lab, name), getattr(grid, name))
+        np.testing.assert_array_equal(start.positions, state.positions)
+
+    @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 4), (3, 1), (2, 5), (4, 3)])
+    def test_rows_lie_along_x_and_columns_along_z(self, rows, columns):
+        system, state = scenes.grid_cloth(rows, columns, spacing=0.5)
+        x = state.positions.reshape(rows, columns, 3)
+        np.testing.assert_array_equal(x[..., 0], np.tile(0.5 * np.arange(rows)[:, None], columns))
+        assert (np.diff(x[..., 2], axis=1) == 0.5).all()
+        assert x[..., 2].mean() == 0
+        steps = {(0, 1), (1, 0), (0, 2), (2, 0), (1, 1)}
+        for a, b in pairs(system):
+            assert (b // columns - a // columns, abs(b % columns - a % columns)) in steps
+
+    def test_the_three_families_have_stiffnesses_of_their_own(self):
+        system, _ = scenes.grid_cloth(
+            4, 5, spacing=1.0, stiffness=1.0, shear_stiffness=2.0, bending_stiffness=3.0
+        )
+        expected = {1.0: 1.0, np.sqrt(2): 2.0, 2.0: 3.0}
+        assert set(system.rest_lengths) == set(expected)
+        assert [expected[r] for r in system.rest_lengths] == system.stiffnesses.tolist()
+
+    def test_a_family_without_stiffness_is_left_out(self):
+        system, _ = scenes.grid_cloth(4, 5, shear_stiffness=0.0, bending_stiffness=0.0)
+        assert len(system.springs) == 4 * 4 + 3 * 5
+
+    def test_pins_and_slack_are_settings(self):
+        system, _ = scenes.grid_cloth(3, 3, pinned=[4], tension_only=True)
+        assert system.pinned.tolist() == [4]
+        assert system.tension_only.all()
+        assert not scenes.grid_cloth(3, 3)[0].tension_only.any()
+
+    def test_triangles_cover_it_facing_up(self):
+        _, state = scenes.grid_cloth(4, 3, spacing=0.5)
+        a, b, c = state.positions[scenes.grid_triangles(4, 3).T]
+        areas = np.cross(b - a, c - a) / 2
+        np.testing.assert_allclose(areas, np.tile([0, 0.125, 0], (12, 1)), rtol=0, atol=1e-15)
+
+    def test_a_line_of_particles_has_no_triangles(self):
+        assert scenes.grid_triangles(1, 5).shape == (0, 3)
+
+    def test_large_ones_are_built_from_whole_arrays(self):
+        """Counted, not timed: a loop over springs in the interpreter would be felt here."""
+        system, _ = scenes.grid_cloth(300, 200)
+        n, m = 300, 200
+        structural, bending = 2 * n * m - n - m, 2 * n * m - 2 * n - 2 * m
+        assert len(system.springs) == structural + bending + 2 * (n - 1) * (m - 1)
+
+
+class TestNet:
+    def test_it_is_of_ropes_to_the_next_knots_held_at_its_corners(self):
+        system, _ = scenes.net(3, 4)
+        expected = {(a, a + 1) for a in range(12) if a % 4 < 3} | {(a, a + 4) for a in range(8)}
+        assert pairs(system) == expected
+        assert system.tension_only.all()
+        assert system.pinned.tolist() == [0, 3, 8, 11]
+
+
+class TestLattice:
+    def test_springs_are_the_edges_of_tetrahedra_that_fill_each_cube(self):
+        """Six to a cube: each way from corner to opposite corner along x, y and z in any order."""
+        system, state = scenes.lattice((2, 2, 2), spacing=1.0)
+        edges = set()
+        volume = 0.0
+        for order in itertools.permutations(np.eye(3)):
+            corners = np.cumsum([np.zeros(3), *order], axis=0)
+            volume += abs(np.linalg.det(np.diff(corners, axis=0))) / 6
+            ids = [int(corner @ [4, 2, 1]) for corner in corners]
+            np.testing.assert_array_equal(state.positions[ids], corners)
+            edges |= set(itertools.combinations(sorted(ids), 2))
+        assert volume == pytest.approx(1.0)
+        assert pairs(system) == edges
+
+    def test_neighbouring_cubes_share_their_faces_springs(self):
+        system, _ = scenes.lattice((3, 4, 5))
+        steps = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1)]
+        count = sum((3 - a) * (4 - b) * (5 - c) for a, b, c in steps)
+        assert len(pairs(system)) == count
+
+    def test_it_is_clamped_at_x_0(self):
+        system, state = scenes.lattice((3, 2, 2))
+        held = np.zeros(12, dtype=bool)
+        held[system.pinned] = True
+        np.testing.assert_array_equal(held, state.positions[:, 0] == 0)
+
+
+class TestClothFromMesh:
+    def test_every_edge_is_a_spring_once(self):
+        system, state = scenes.cloth_from_mesh(KITE, TWO, mass=0.1)
+        assert pairs(system) == {(0, 1), (0, 2), (1, 2), (0, 3), (1, 3)}
+        np.testing.assert_array_equal(state.positions, KITE)
+
+    def test_a_bending_spring_joins_what_faces_across_an_edge(self):
+        system, _ = scenes.cloth_from_mesh(
+            KITE, TWO, mass=0.1, stiffness=5.0, bending_stiffness=2.0, tension_only=True
+        )
+        assert system.springs[-1].tolist() == [2, 3]
+        assert system.rest_lengths[-1] == pytest.approx(1.4)
+        assert system.stiffnesses.tolist() == [5.0] * 5 + [2.0]
+        assert system.tension_only.tolist() == [True] * 5 + [False]
+
+    def test_its_triangles_mass_goes_to_its_corners(self):
+        system, _ = scenes.cloth_from_mesh(KITE, TWO, density=6.0, pinned=[4])
+        # 0.3 and 0.4 m² of 6 kg/m², a third for each corner.
+        np.testing.assert_allclose(system.masses, [1.4, 1.4, 0.6, 0.8, 0.0], rtol=1e-15)
+
+    def test_a_grid_makes_the_grids_cloth_but_for_half_its_diagonals(self):
+        grid, state = scenes.grid_cloth(5, 4, bending_stiffness=0.0)
+        mesh, _ = scenes.cloth_from_mesh(
+            state.positions, scenes.grid_triangles(5, 4), density=2.0, bending_stiffness=1.0
+        )
+        straight = {pair for pair in pairs(grid) if (pair[1] - pair[0]) in (1, 4)}
+        assert straight < pairs(mesh)
+        assert len(mesh.springs) == len(straight) + 4 * 3 + (4 * 3 + 3 * 3 + 4 * 2)
+        assert mesh.masses.sum() == pytest.approx(2.0 * 0.2**2 * 12)
+
+    def test_every_two_of_three_triangles_at_an_edge_bend(self):
+        x = np.vstack([KITE[:4], [[0.5, 1.0, 0]]])
+        triangles = np.vstack([TWO, [[0, 1, 4]]])
+        system, _ = scenes.cloth_from_mesh(x, triangles, mass=0.1, bending_stiffness=1.0)
+        assert pairs(system) >= {(2, 3), (2, 4), (3, 4)}
+        assert len(system.springs) == 7 + 3
+
+    def test_an_edge_is_not_doubled_by_a_bending_spring(self):
+        """What faces each other across an edge of a tetrahedron is joined by an edge."""
+        x = np.vstack([np.zeros(3), np.eye(3)])
+        triangles = list(itertools.combinations(range(4), 3))
+        system, _ = scenes.cloth_from_mesh(x, triangles, density=1.0, bending_stiffness=1.0)
+        assert len(pairs(system)) == 6
+
+    def test_order_and_turn_of_triangles_do_not_matter(self):
+        _, state = scenes.grid_cloth(4, 4)
+        triangles = scenes.grid_triangles(4, 4)
+        settings = {"density": 1.0, "bending_stiffness": 1.0}
+        one, _ = scenes.cloth_from_mesh(state.positions, triangles, **settings)
+        other, _ = scenes.cloth_from_mesh(state.positions, triangles[::-1, ::-1], **settings)
+        np.testing.assert_array_equal(one.springs, other.springs)
+        np.testing.assert_allclose(one.masses, other.masses, rtol=1e-15)
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            ({"vertices": KITE[:, :2]}, "^vertices: expected shape"),
+            ({"vertices": np.full((5, 3), np.nan)}, "^vertices: .*finite"),
+            ({"triangles": [[0, 1, 5]]}, "^triangles: .*from 0 to 4, got 5"),
+            ({"triangles": [[0, 1, -1]]}, "^triangles: .*got -1"),
+            ({"triangles": [[0, 1]]}, "^triangles: expected shape"),
+            ({"triangles": [[0, 1, 2], [3, 1, 3]]}, r"^triangles: .*\[3, 1, 3\] at index 1"),
+            ({"triangles": [[0, 1, 2], [1, 0, 3], [2, 0, 1]]}, "^triangles: .*indices 0, 2"),
+            ({"density": 1.0}, "^density, mass: .*got both"),
+            ({"mass": None}, "^density, mass: .*neither"),
+            ({"mass": 0.0}, "^mass: "),
+            ({"mass": None, "density": 0.0}, "^density: "),
+            ({"mass": None, "density": 1.0}, "^masses: .*free particles.*index 4"),
+            ({"stiffness": -1.0}, "^stiffness: "),
+            ({"bending_stiffness": np.nan}, "^bending_stiffness: "),
+            ({"damping": -1.0}, "^damping: "),
+            ({"pinned": [7]}, "^pinned: "),
+            ({"gravity": np.inf}, "^gravity: "),
+        ],
+    )
+    def test_wrong_meshes_are_named(self, change, message):
+        arguments = {"vertices": KITE, "triangles": TWO, "mass": 0.1} | change
+        with pytest.raises(ValueError, match=message):
+            scenes.cloth_from_mesh(**arguments)
+
+    def test_a_fan_about_one_edge_is_refused_before_it_fills_the_memory(self):
+        wings = np.arange(2, 20)
+        triangles = np.stack([0 * wings, 0 * wings + 1, wings], axis=1)
+        x = np.random.default_rng(0).standard_normal((20, 3))
+        scenes.cloth_from_mesh(x, triangles[:16], mass=1.0, bending_stiffness=1.0)
+        with pytest.raises(ValueError, match=r"^triangles: expected at most 16 at an edge"):
+            scenes.cloth_from_mesh(x, triangles[:17], mass=1.0, bending_stiffness=1.0)
+
+
+class TestRandomNetwork:
+    def test_a_seed_gives_the_same_network_again_and_another_another(self):
+        (one, here), (two, there) = (scenes.random_network(3) for _ in range(2))
+        np.testing.assert_array_equal(one.springs, two.springs)
+        np.testing.assert_array_equal(one.stiffnesses, two.stiffnesses)
+        np.testing.assert_array_equal(here.positions, there.positions)
+        assert (scenes.random_network(4)[1].positions != here.positions).all()
+
+    @pytest.mark.parametrize("seed", range(5))
+    def test_it_hangs_together_without_twins(self, seed):
+        system, state = scenes.random_network(seed, particles=17, pinned=2)
+        reached = {0}
+        for _ in range(17):
+            reached |= {b for pair in pairs(system) for b in pair if reached & set(pair)}
+        assert len(reached) == 17
+        assert len(system.pinned) == 2
+        assert len(set(system.stiffnesses)) == len(system.springs)
+        strain = stretches(system, state.positions) / system.rest_lengths
+        assert np.abs(strain).min() > 0.01
+        assert strain.min() < 0 < strain.max()
+
+    def test_a_share_of_it_is_ropes(self):
+        """Of about 100 springs 30 ± 5; four standard deviations away."""
+        none, some, every = (
+            scenes.random_network(1, particles=50, tension_only=share)[0].tension_only.mean()
+            for share in (0.0, 0.3, 1.0)
+        )
+        assert (none, every) == (0, 1)
+        assert 0.1 < some < 0.5
+
+    def test_one_particle_is_a_network(self):
+        system, state = scenes.random_network(0, particles=1, pinned=0)
+        assert system.springs.shape == (0, 2)
+        assert state.positions.shape == (1, 3)
 
 
 class TestHangingRope:
@@ -79,9 +314,7 @@ class TestHangingRope:
 def test_it_starts_at_rest_and_unstretched(scene):
     system, state = scene()
     assert (state.velocities == 0).all()
-    # Two ways to round a length of at most 1 m.
-    found = lengths(system, state.positions)
-    np.testing.assert_allclose(found, system.rest_lengths, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(lengths(system, state.positions), system.rest_lengths)
 
 
 @pytest.mark.parametrize(
@@ -93,6 +326,23 @@ def test_it_starts_at_rest_and_unstretched(scene):
         (scenes.lab_cloth, "height", np.nan),
         (scenes.hanging_rope, "particles", 1),
         (scenes.hanging_rope, "length", -1.0),
+        (scenes.grid_cloth, "rows", 0),
+        (scenes.grid_cloth, "columns", 2.0),
+        (scenes.grid_cloth, "spacing", 0.0),
+        (scenes.grid_cloth, "shear_stiffness", -1.0),
+        (scenes.grid_cloth, "bending_stiffness", np.nan),
+        (scenes.grid_cloth, "tension_only", 1),
+        (scenes.grid_cloth, "pinned", [121]),
+        (scenes.net, "rows", 0),
+        (scenes.net, "spacing", -1.0),
+        (scenes.lattice, "counts", (2, 2)),
+        (scenes.lattice, "counts", (2, 2, 0)),
+        (scenes.lattice, "spacing", np.inf),
+        (scenes.random_network, "seed", -1),
+        (scenes.random_network, "particles", 0),
+        (scenes.random_network, "pinned", 21),
+        (scenes.random_network, "damping", -1.0),
+        (scenes.random_network, "tension_only", -0.5),
         *((scene, "mass", 0.0) for scene in SCENES),
         *((scene, "stiffness", -1.0) for scene in SCENES),
         *((scene, "damping", -0.2) for scene in SCENES),
@@ -100,5 +350,6 @@ def test_it_starts_at_rest_and_unstretched(scene):
     ],
 )
 def test_wrong_settings_are_named(scene, name, value):
+    arguments = {"seed": 0} if scene is scenes.random_network else {}
     with pytest.raises(ValueError, match=f"^{name}: "):
-        scene(**{name: value})
+        scene(**(arguments | {name: value}))

@@ -1,0 +1,278 @@
+"""Ropes, cloths, nets and lattices: particles on regular grids."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import FloatArray, IndexArray, integer, number
+from ..mass_spring import MassSpring, State
+from .rest import at_rest
+
+# Steps along rows and columns from a particle of the cloth to those that springs join it to.
+NEIGHBOURS = [(1, 0), (0, 1)]
+NEXT_BUT_ONE = [(2, 0), (0, 2)]
+DIAGONALS = [(1, 1), (1, -1)]
+
+# The edges of the six tetrahedra around one diagonal of a cube, the same in every cube, so that
+# neighbouring cubes share the diagonals of their faces (Freudenthal 1942).
+TETRAHEDRA = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1)]
+
+
+def lab_cloth(
+    *,
+    size: int = 11,
+    side: float = 2.0,
+    height: float = 1.5,
+    mass: float = 1.0,
+    stiffness: float = 100.0,
+    damping: float = 0.0,
+    gravity: float = 0.3,
+) -> tuple[MassSpring, State]:
+    """Return the lab's cloth: a square `grid_cloth`, the two corners at x = 0 pinned.
+
+    The lab's own cloth has a damping of 0.2.
+
+    Args:
+        size: particles along each side, 2 or more.
+        side: [m].
+        height: [m].
+        mass: of each particle [kg].
+        stiffness: of each spring [N/m].
+        damping: of each spring [N s/m].
+        gravity: downwards [m/s²].
+
+    Raises:
+        ValueError: if the size is less than 2, the side not positive, or a number is negative or
+            not finite.
+    """
+    size = integer("size", size, least=2)
+    return grid_cloth(
+        size,
+        size,
+        spacing=number("side", side, above=0) / (size - 1),
+        height=height,
+        mass=mass,
+        stiffness=stiffness,
+        damping=damping,
+        gravity=gravity,
+    )
+
+
+def grid_cloth(
+    rows: int = 11,
+    columns: int = 11,
+    *,
+    spacing: float = 0.2,
+    height: float = 1.5,
+    mass: float = 1.0,
+    stiffness: float = 100.0,
+    shear_stiffness: float | None = None,
+    bending_stiffness: float | None = None,
+    damping: float = 0.0,
+    tension_only: bool = False,
+    pinned: ArrayLike | None = None,
+    gravity: float = 9.81,
+) -> tuple[MassSpring, State]:
+    """Return a cloth at rest in a level rectangle.
+
+    Particle number columns i + j lies at x = spacing i, y = height and
+    z = spacing (j - (columns - 1) / 2). Springs join neighbours, then next but one neighbours
+    (bending), then the diagonals of each square (shear).
+
+    Args:
+        rows: particles along x, 1 or more.
+        columns: particles along z, 1 or more.
+        spacing: between neighbours [m].
+        height: [m].
+        mass: of each particle [kg].
+        stiffness: of the springs between neighbours [N/m].
+        shear_stiffness: of the diagonals; 0 leaves them out, None means the stiffness.
+        bending_stiffness: of the springs to the next but one; as for shear.
+        damping: of each spring [N s/m].
+        tension_only: whether the springs go slack.
+        pinned: particles; by default the two corners at x = 0.
+        gravity: downwards [m/s²].
+
+    Raises:
+        ValueError: if a count is less than 1, spacing or mass not positive, a pinned particle
+            none of the cloth, or a number negative or not finite.
+    """
+    rows, columns = integer("rows", rows, least=1), integer("columns", columns, least=1)
+    stiffness = number("stiffness", stiffness, least=0)
+    parts = [
+        (NEIGHBOURS, stiffness),
+        (NEXT_BUT_ONE, _stiffness("bending_stiffness", bending_stiffness, stiffness)),
+        (DIAGONALS, _stiffness("shear_stiffness", shear_stiffness, stiffness)),
+    ]
+    kept = [(steps, k) for steps, k in parts if k > 0 or steps is NEIGHBOURS]
+    springs = [_springs((rows, columns), steps) for steps, _ in kept]
+    return at_rest(
+        _level(rows, columns, number("spacing", spacing, above=0), number("height", height)),
+        np.concatenate(springs),
+        masses=np.full(rows * columns, number("mass", mass, above=0)),
+        stiffnesses=np.repeat([k for _, k in kept], [len(ends) for ends in springs]),
+        damping=damping,
+        pinned=[0, columns - 1] if pinned is None else pinned,
+        gravity=gravity,
+        tension_only=tension_only,
+    )
+
+
+def grid_triangles(rows: int, columns: int) -> IndexArray:
+    """Return the triangles of a `grid_cloth`, two to a square, shape (triangle, 3).
+
+    Seen from above they turn counter-clockwise.
+
+    Raises:
+        ValueError: if a count is less than 1.
+    """
+    rows, columns = integer("rows", rows, least=1), integer("columns", columns, least=1)
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
+    c, d = corner[1:, 1:].ravel(), corner[1:, :-1].ravel()
+    return np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1).reshape(
+        -1, 3
+    )
+
+
+def net(
+    rows: int = 11,
+    columns: int = 11,
+    *,
+    spacing: float = 0.2,
+    height: float = 1.5,
+    mass: float = 0.05,
+    stiffness: float = 1000.0,
+    damping: float = 0.0,
+    gravity: float = 9.81,
+) -> tuple[MassSpring, State]:
+    """Return a level net of ropes, which only pull, held at its four corners.
+
+    It is a `grid_cloth` without diagonals and bending springs; arguments and errors are as there.
+    """
+    rows, columns = integer("rows", rows, least=1), integer("columns", columns, least=1)
+    last = rows * columns
+    return grid_cloth(
+        rows,
+        columns,
+        spacing=spacing,
+        height=height,
+        mass=mass,
+        stiffness=stiffness,
+        shear_stiffness=0.0,
+        bending_stiffness=0.0,
+        damping=damping,
+        tension_only=True,
+        pinned=[0, columns - 1, last - columns, last - 1],
+        gravity=gravity,
+    )
+
+
+def lattice(
+    counts: Sequence[int] = (9, 3, 3),
+    *,
+    spacing: float = 0.1,
+    mass: float = 0.05,
+    stiffness: float = 1000.0,
+    damping: float = 0.0,
+    gravity: float = 9.81,
+) -> tuple[MassSpring, State]:
+    """Return a block of tetrahedra, springs along their edges, clamped at its face x = 0.
+
+    The particles lie on a cubic grid from the origin, numbered along z first and along x last;
+    each cube is six tetrahedra around its diagonal.
+
+    Args:
+        counts: particles along x, y and z, 1 or more each.
+        spacing: of the grid [m].
+        mass: of each particle [kg].
+        stiffness: of each spring [N/m].
+        damping: of each spring [N s/m].
+        gravity: downwards [m/s²].
+
+    Raises:
+        ValueError: if there are not three counts of 1 or more, spacing or mass is not positive, or
+            a number is negative or not finite.
+    """
+    if len(counts) != 3:
+        raise ValueError(f"counts: expected three numbers of particles, got {len(counts)}")
+    nx, ny, nz = (integer("counts", count, least=1) for count in counts)
+    places = np.indices((nx, ny, nz)).reshape(3, -1).T.astype(np.float64)
+    return at_rest(
+        number("spacing", spacing, above=0) * places,
+        _springs((nx, ny, nz), TETRAHEDRA),
+        masses=np.full(nx * ny * nz, number("mass", mass, above=0)),
+        stiffnesses=number("stiffness", stiffness, least=0),
+        damping=damping,
+        pinned=np.arange(ny * nz),
+        gravity=gravity,
+    )
+
+
+def hanging_rope(
+    *,
+    particles: int = 11,
+    length: float = 1.0,
+    mass: float = 0.1,
+    stiffness: float = 1000.0,
+    damping: float = 0.0,
+    gravity: float = 9.81,
+    tension_only: bool = False,
+) -> tuple[MassSpring, State]:
+    """Return a rope that hangs straight down from a pin at the origin, not yet stretched.
+
+    In equilibrium each spring carries what hangs below it: spring i, counted from the top, is
+    longer than at rest by (particles - 1 - i) mass gravity / stiffness.
+
+    Args:
+        particles: 2 or more, the pinned one, number 0, included.
+        length: at rest [m].
+        mass: of each particle [kg].
+        stiffness: of each spring [N/m].
+        damping: of each spring [N s/m].
+        gravity: downwards [m/s²].
+        tension_only: whether the springs go slack.
+
+    Raises:
+        ValueError: if there are fewer than 2 particles, the length is not positive, or a number is
+            negative or not finite.
+    """
+    particles = integer("particles", particles, least=2)
+    positions = np.zeros((particles, 3))
+    positions[:, 1] = -np.linspace(0, number("length", length, above=0), particles)
+    return at_rest(
+        positions,
+        _springs((particles, 1), [(1, 0)]),
+        masses=np.full(particles, number("mass", mass, above=0)),
+        stiffnesses=number("stiffness", stiffness, least=0),
+        damping=damping,
+        pinned=[0],
+        gravity=gravity,
+        tension_only=tension_only,
+    )
+
+
+def _stiffness(name: str, value: float | None, default: float) -> float:
+    return default if value is None else number(name, value, least=0)
+
+
+def _level(rows: int, columns: int, spacing: float, height: float) -> FloatArray:
+    """Return the positions of a level grid, shape (rows columns, 3)."""
+    positions = np.empty((rows, columns, 3))
+    positions[..., 0] = spacing * np.arange(rows)[:, None]
+    positions[..., 1] = height
+    positions[..., 2] = spacing * (np.arange(columns) - (columns - 1) / 2)
+    return positions.reshape(-1, 3)
+
+
+def _springs(counts: tuple[int, ...], steps: Sequence[tuple[int, ...]]) -> IndexArray:
+    """Return springs from each particle of a grid to the one each step leads to, (spring, 2)."""
+    number_of = np.arange(np.prod(counts)).reshape(counts)
+    springs = []
+    for step in steps:
+        starts = tuple(slice(max(-s, 0), n - max(s, 0)) for s, n in zip(step, counts, strict=True))
+        ends = tuple(slice(max(s, 0), n - max(-s, 0)) for s, n in zip(step, counts, strict=True))
+        pair = number_of[starts].ravel(), number_of[ends].ravel()
+        springs.append(np.stack(pair, axis=1))
+    return np.concatenate(springs)

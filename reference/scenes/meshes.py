@@ -1,0 +1,136 @@
+"""Cloth from a triangle mesh: a spring along every edge, and one across it against bending."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import FloatArray, IndexArray, array, indices, number
+from ..mass_spring import MassSpring, State
+from .rest import at_rest
+
+MOST_AT_AN_EDGE = 16  # triangles; k of them ask for k (k - 1) / 2 bending springs
+
+
+def cloth_from_mesh(
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    *,
+    density: float | None = None,
+    mass: float | None = None,
+    stiffness: float = 100.0,
+    bending_stiffness: float = 0.0,
+    damping: float = 0.0,
+    tension_only: bool = False,
+    pinned: ArrayLike = (),
+    gravity: float = 9.81,
+) -> tuple[MassSpring, State]:
+    """Return the mesh as a cloth at rest: a particle at each vertex, a spring along each edge.
+
+    Bending springs join the vertices that face each other across an edge; where more than two
+    triangles meet at it, every two of them. Two particles share at most one spring: where an edge
+    joins them already, they get no bending spring.
+
+    Args:
+        vertices: [m], shape (particle, 3).
+        triangles: indices of vertices, shape (triangle, 3); how they turn does not matter.
+        density: of the cloth [kg/m²]; each triangle gives a third of its mass to each corner.
+        mass: of each particle [kg], instead of a density.
+        stiffness: of the springs along edges [N/m].
+        bending_stiffness: of those across edges [N/m]; 0 leaves them out.
+        damping: of each spring [N s/m].
+        tension_only: whether the springs along edges go slack.
+        pinned: particles that stay where they are.
+        gravity: downwards [m/s²].
+
+    Raises:
+        ValueError: if not exactly one of density and mass is given, a triangle names a vertex
+            twice or is there twice, more than 16 triangles meet at an edge, a free vertex belongs
+            to no triangle that has an area and so would have no mass, or an argument has a wrong
+            shape or is out of range.
+    """
+    x = array("vertices", vertices, "particle", 3)
+    corners = _triangles(triangles, len(x))
+    bending = number("bending_stiffness", bending_stiffness, least=0)
+    edges, across = mesh_springs(corners, len(x), bending > 0)
+    stiffnesses = [number("stiffness", stiffness, least=0), bending]
+    return at_rest(
+        x,
+        np.concatenate([edges, across]),
+        masses=_masses(x, corners, density, mass),
+        stiffnesses=np.repeat(stiffnesses, [len(edges), len(across)]),
+        damping=damping,
+        pinned=pinned,
+        gravity=gravity,
+        tension_only=np.repeat([tension_only, False], [len(edges), len(across)]),
+    )
+
+
+def mesh_springs(
+    triangles: IndexArray, vertex_count: int, bending: bool
+) -> tuple[IndexArray, IndexArray]:
+    """Return the edges of the triangles and the pairs across them, each once, both (spring, 2)."""
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    keys = _keys(sides, vertex_count)
+    edges = _distinct(keys)
+    pairs = np.empty(0, dtype=np.int64)
+    if bending:
+        order = np.argsort(keys, kind="stable")
+        facing = np.concatenate([triangles[:, 2], triangles[:, 0], triangles[:, 1]])[order]
+        pairs = _distinct(_keys(_facing_pairs(keys[order], facing), vertex_count))
+        pairs = np.setdiff1d(pairs, edges, assume_unique=True)
+    return _ends(edges, vertex_count), _ends(pairs, vertex_count)
+
+
+def _facing_pairs(keys: IndexArray, facing: IndexArray) -> IndexArray:
+    """Return every two vertices that face the same edge, (pair, 2); the keys are sorted."""
+    pairs = [np.empty((0, 2), dtype=np.int64)]
+    for apart in range(1, MOST_AT_AN_EDGE + 1):
+        same = np.flatnonzero(keys[apart:] == keys[:-apart])
+        if len(same) == 0:
+            return np.concatenate(pairs)
+        pairs.append(np.stack([facing[same], facing[same + apart]], axis=1))
+    raise ValueError(f"triangles: expected at most {MOST_AT_AN_EDGE} at an edge, got more")
+
+
+def _keys(ends: IndexArray, vertex_count: int) -> IndexArray:
+    """Return one number for each pair, whatever its order."""
+    return ends.min(axis=1) * vertex_count + ends.max(axis=1)
+
+
+def _distinct(keys: IndexArray) -> IndexArray:
+    """Return each key once, ascending; much faster here than the hashing of `np.unique`."""
+    ordered = np.sort(keys)
+    return ordered[np.diff(ordered, prepend=-1) > 0]
+
+
+def _ends(keys: IndexArray, vertex_count: int) -> IndexArray:
+    return np.stack(np.divmod(keys, vertex_count), axis=1)
+
+
+def _triangles(triangles: ArrayLike, vertex_count: int) -> IndexArray:
+    corners = indices("triangles", triangles, "triangle", 3, least=0, below=vertex_count)
+    a, b, c = corners.T
+    flat = np.flatnonzero((a == b) | (b == c) | (c == a))
+    if len(flat):
+        got = f"{corners[flat[0]].tolist()} at index {flat[0]}"
+        raise ValueError(f"triangles: expected three different vertices, got {got}")
+    rows = np.sort(corners, axis=1)
+    order = np.lexsort(rows.T)
+    again = np.flatnonzero((rows[order[1:]] == rows[order[:-1]]).all(axis=1))
+    if len(again):
+        one, other = order[again[0]], order[again[0] + 1]
+        raise ValueError(f"triangles: expected each once, got the same at indices {one}, {other}")
+    return corners
+
+
+def _masses(
+    x: FloatArray, triangles: IndexArray, density: float | None, mass: float | None
+) -> FloatArray:
+    if (density is None) == (mass is None):
+        raise ValueError("density, mass: expected one of the two, got both or neither")
+    if density is None:
+        return np.full(len(x), number("mass", mass, above=0))
+    a, b, c = x[triangles.T]
+    share = number("density", density, above=0) / 6 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    masses = np.zeros(len(x))
+    np.add.at(masses, triangles, share[:, None])
+    return masses

@@ -1,0 +1,59 @@
+"""Random networks: unequal particles and springs in motion, the same for the same seed."""
+
+import numpy as np
+
+from ..arguments import IndexArray, integer, number
+from ..mass_spring import MassSpring, State
+
+
+def random_network(
+    seed: int,
+    *,
+    particles: int = 20,
+    pinned: int = 1,
+    damping: float = 1.0,
+    tension_only: float = 0.0,
+) -> tuple[MassSpring, State]:
+    """Return a random connected network in motion; no two particles or springs are alike.
+
+    Masses lie between 0.2 and 2 kg, stiffnesses between 10 and 1000 N/m. Positions and velocities
+    are normally distributed about zero, by 1 m and 1 m/s along each axis, and each spring is
+    stretched or squeezed by up to a third: none is at its rest length. Gravity has any direction.
+
+    Args:
+        seed: 0 or more.
+        particles: 1 or more.
+        pinned: how many of them.
+        damping: the largest of a spring, the least being a tenth of it [N s/m]; 0 means none.
+        tension_only: the share of springs that go slack, from 0 to 1.
+
+    Raises:
+        ValueError: if a number is out of range.
+    """
+    rng = np.random.default_rng(integer("seed", seed, least=0))
+    n = integer("particles", particles, least=1)
+    held = rng.permutation(n)[: integer("pinned", pinned, least=0, below=n + 1)]
+    springs = _connected(rng, n)
+    s, x = len(springs), rng.standard_normal((n, 3))
+    lengths = np.linalg.norm(np.subtract(*x[springs.T]), axis=-1)
+    strains = rng.uniform(0.02, 0.33, s) * rng.choice([-1.0, 1.0], s)
+    system = MassSpring(
+        masses=rng.uniform(0.2, 2.0, n),
+        springs=springs,
+        rest_lengths=lengths * (1.0 + strains),
+        stiffnesses=10.0 ** rng.uniform(1.0, 3.0, s),
+        dampings=number("damping", damping, least=0) * rng.uniform(0.1, 1.0, s),
+        pinned=held,
+        gravity=5.0 * rng.standard_normal(3),
+        tension_only=rng.uniform(size=s) < number("tension_only", tension_only, least=0),
+    )
+    return system, State(x, rng.standard_normal((n, 3)))
+
+
+def _connected(rng: np.random.Generator, n: int) -> IndexArray:
+    """Return a spanning tree and about as many springs again, ends in either order, (spring, 2)."""
+    later = np.arange(1, n)
+    tree = np.stack([rng.integers(0, later), later], axis=1)
+    others = rng.integers(0, n, (n, 2))
+    pairs = np.sort(np.concatenate([tree, others[others[:, 0] != others[:, 1]]]), axis=1)
+    return rng.permuted(np.unique(pairs, axis=0), axis=1)

@@ -1,0 +1,37 @@
+"""Particles and springs at rest: every rest length is the length at the start, to the last bit."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import FloatArray, IndexArray, number
+from ..mass_spring import MassSpring, State, lengths
+
+
+def at_rest(
+    positions: FloatArray,
+    springs: IndexArray,
+    *,
+    masses: FloatArray,
+    stiffnesses: ArrayLike,
+    damping: float,
+    pinned: ArrayLike,
+    gravity: float,
+    tension_only: ArrayLike = False,
+) -> tuple[MassSpring, State]:
+    """Return the system at rest where it is; all springs have one damping, gravity is downwards.
+
+    Raises:
+        ValueError: as `MassSpring` does, and if damping or gravity is not a number.
+    """
+    system = MassSpring(
+        masses=masses,
+        springs=springs,
+        rest_lengths=0.0,
+        stiffnesses=stiffnesses,
+        dampings=number("damping", damping, least=0),
+        pinned=pinned,
+        gravity=(0.0, -number("gravity", gravity), 0.0),
+        tension_only=tension_only,
+    )
+    still = State(positions, np.zeros_like(positions))
+    return system.replaced(rest_lengths=lengths(system, positions)), still

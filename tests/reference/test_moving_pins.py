@@ -1,0 +1,186 @@
+"""Laws of pinned particles that a step takes somewhere."""
+
+import numpy as np
+import pytest
+
+from reference import scenes
+from reference.explicit import runge_kutta, symplectic_euler
+from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from reference.mass_spring import MassSpring, State, damping_matrix, derivation, forces, lengths
+
+h = 0.02
+WAY = np.array([0.3, -0.1, 0.2])
+
+
+def implicit(name):
+    """Return a step of two iterations by the named solver: what holds then holds at the end."""
+
+    def step(system, state, h, external_forces=None, pin_positions=None):
+        integrator = ImplicitEuler(system, h=h, solver=name, tolerance=0, max_iterations=2)
+        return integrator.step(state, external_forces, pin_positions).state
+
+    return step
+
+
+STEPS = {name: implicit(name) for name in STEP_SOLVERS} | {
+    "symplectic_euler": symplectic_euler,
+    "runge_kutta": runge_kutta,
+}
+
+
+@pytest.fixture(params=STEPS)
+def step(request):
+    return STEPS[request.param]
+
+
+@pytest.fixture
+def hung(network, altered):
+    """The network with two pins, and where they are to go."""
+    system = altered(network[0], pinned=[5, 2])
+    return system, network[1], network[1].positions[[2, 5]] + [WAY, -2 * WAY]
+
+
+def test_pins_arrive_with_the_velocity_of_their_way(hung, step, speed):
+    system, state, goal = hung
+    after = step(system, state, h, None, goal)
+    np.testing.assert_array_equal(after.positions[[2, 5]], goal)
+    expected = (goal - state.positions[[2, 5]]) / h
+    np.testing.assert_allclose(after.velocities[[2, 5]], expected, rtol=1e-15)
+
+
+def test_what_moves_is_felt(hung, step, speed):
+    system, state, goal = hung
+    free = system.free
+    still, moved = (step(system, state, h, None, pins) for pins in (None, goal))
+    assert np.abs(still.velocities - moved.velocities)[free].max() > 0.01
+
+
+def test_pins_that_stay_need_no_path(hung, step):
+    system, state, _ = hung
+    one, other = (step(system, state, h, None, pins) for pins in (None, state.positions[[2, 5]]))
+    np.testing.assert_array_equal(one.positions, other.positions)
+    np.testing.assert_array_equal(one.velocities, other.velocities)
+
+
+def test_a_world_that_moves_evenly_is_like_one_at_rest(hung, rng, step, speed):
+    """Galileo's principle, with dampers, and of the pins the whole frame's way."""
+    system, state, goal = hung
+    drift, pull = np.array([2.0, 1.0, -3.0]), rng.standard_normal((7, 3))
+    at_rest = step(system, state, h, pull, goal)
+    moving = State(state.positions, state.velocities + drift)
+    after = step(system, moving, h, pull, goal + h * drift)
+    # Velocities of implicit steps are differences of positions, 1e-16 of 1 m, over h.
+    np.testing.assert_allclose(after.positions, at_rest.positions + h * drift, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(after.velocities, at_rest.velocities + drift, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", ["newton", "symplectic_euler", "runge_kutta"])
+def test_a_moving_pin_is_a_huge_mass_in_motion(hung, altered, speed, name):
+    """Alike but for what springs of some 10 N do to a billion kilograms."""
+    system, state, goal = hung
+    masses = system.masses.copy()
+    masses[[2, 5]] = 1e9
+    heavy = altered(system, masses=masses, pinned=(), gravity=(0, 0, 0))
+    v = state.velocities.copy()
+    v[[2, 5]] = (goal - state.positions[[2, 5]]) / h
+    held = altered(system, gravity=(0, 0, 0))
+    pinned = STEPS[name](held, state, h, None, goal)
+    loose = STEPS[name](heavy, State(state.positions, v), h)
+    np.testing.assert_allclose(pinned.positions, loose.positions, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(pinned.velocities, loose.velocities, rtol=0, atol=1e-6)
+
+
+def test_gauss_newton_linearises_where_the_pins_start(hung, rng, speed):
+    """M (v' - v) = h (f(x_n) - C v' - h K v') at the free particles, v' at the pins given."""
+    system, state, goal = hung
+    pull, free = rng.standard_normal((7, 3)), system.free
+    i, j = system.springs.T
+    u = (state.positions[i] - state.positions[j]) / lengths(system, state.positions)[:, None]
+    J = np.einsum("ps,sc->spc", derivation(system).A.toarray(), u).reshape(-1, 21)
+    slack = system.tension_only & (lengths(system, state.positions) < system.rest_lengths)
+    K = J.T @ (np.where(slack, 0, system.stiffnesses)[:, None] * J)
+    C = damping_matrix(system, state.positions).toarray()
+    matrix = np.diag(np.repeat(system.masses, 3)) + h * C + h * h * K
+    still = State(state.positions, np.zeros((7, 3)))
+    right = np.repeat(system.masses, 3) * state.velocities.ravel()
+    right += h * forces(system, still, pull).ravel()
+    expected = np.zeros((7, 3))
+    expected[~free] = (goal - state.positions[~free]) / h
+    rows, given = np.repeat(free, 3), expected.ravel()
+    right -= matrix @ given
+    expected[free] = np.linalg.solve(matrix[np.ix_(rows, rows)], right[rows]).reshape(-1, 3)
+    after = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, pull, goal).state
+    # Positions of about 1 m round to 1e-16, and velocities are differences of them over h.
+    np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-12)
+
+
+def test_a_damper_drags_by_the_velocity_of_its_pin(speed):
+    """Without a spring, m v' = h c (w - v') along it, w being the pin's velocity."""
+    system = MassSpring([1.0, 2.0], [[0, 1]], 1.0, 0.0, 3.0, pinned=[0], gravity=(0, 0, 0))
+    state = State([[0.0, 0, 0], [1.0, 0, 0]], np.zeros((2, 3)))
+    goal = [[-0.04, 0, 0]]
+    dragged = ImplicitEuler(system, h=h, tolerance=1e-14).step(state, None, goal).state
+    assert dragged.velocities[1, 0] == pytest.approx(-2.0 * h * 3 / (2 + h * 3), rel=1e-12)
+    pulled = symplectic_euler(system, state, h, None, goal)
+    assert pulled.velocities[1, 0] == pytest.approx(-2.0 * h * 3 / 2, rel=1e-14)
+
+
+@pytest.mark.parametrize("name", STEP_SOLVERS)
+def test_a_used_integrator_takes_pins_like_a_fresh_one(hung, name):
+    system, state, goal = hung
+    used = ImplicitEuler(system, h=h, solver=name)
+    middle = used.step(state, None, goal).state
+    for pins in (goal + WAY, None):
+        again = used.step(middle, None, pins)
+        fresh = ImplicitEuler(system, h=h, solver=name).step(middle, None, pins)
+        np.testing.assert_array_equal(again.state.positions, fresh.state.positions)
+        np.testing.assert_array_equal(again.history, fresh.history)
+
+
+def test_the_objective_holds_the_pins_at_their_goal(hung, speed):
+    system, state, goal = hung
+    objective = ImplicitEuler(system, h=h).objective(state, None, goal)
+    np.testing.assert_array_equal(objective.y[[2, 5]], goal)
+    np.testing.assert_array_equal(objective.x_n, state.positions)
+    for x in (objective.y, objective.x_n):
+        assert not objective.gradient(x)[[2, 5]].any()
+    for iterate, _ in zip(
+        ImplicitEuler(system, h=h).iterates(state, None, goal), range(3), strict=False
+    ):
+        np.testing.assert_array_equal(iterate.positions[[2, 5]], goal)
+
+
+def test_a_rope_follows_the_hand_that_swings_it(step):
+    system, state = scenes.hanging_rope(particles=5, stiffness=50.0, damping=0.1)
+    for n in range(100):
+        angle = 2 * np.pi * n / 50
+        state = step(system, state, h, None, [[0.3 * np.sin(angle), 0.1 * np.cos(angle), 0.0]])
+    assert np.abs(state.positions[1:, 0]).max() > 0.1
+    assert lengths(system, state.positions).max() < 1.0
+
+
+def test_a_system_that_is_all_pins_goes_where_it_is_taken(step, speed):
+    system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
+    goal = 2 * np.eye(3)[:2]
+    after = step(system, State(np.eye(3)[:2], np.ones((2, 3))), h, None, goal)
+    np.testing.assert_array_equal(after.positions, goal)
+
+
+def test_a_system_without_pins_takes_an_empty_path(network, altered, step):
+    system = altered(network[0], pinned=())
+    one, other = (step(system, network[1], h, None, pins) for pins in (None, np.empty((0, 3))))
+    np.testing.assert_array_equal(one.positions, other.positions)
+
+
+@pytest.mark.parametrize(
+    ("pins", "message"),
+    [
+        (np.zeros((7, 3)), r"shape \(2, 3\), got \(7, 3\)"),
+        (np.zeros(3), r"shape \(2, 3\), got \(3,\)"),
+        (np.full((2, 3), np.nan), "finite"),
+        ("up", "numbers"),
+    ],
+)
+def test_a_wrong_path_is_named(hung, step, pins, message):
+    with pytest.raises(ValueError, match=f"^pin_positions: .*{message}"):
+        step(hung[0], hung[1], h, None, pins)

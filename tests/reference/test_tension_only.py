@@ -1,0 +1,175 @@
+"""Laws of springs that go slack; those of all springs hold for the "ropes" among the networks."""
+
+import numpy as np
+import pytest
+
+from reference import scenes
+from reference.implicit_euler import ImplicitEuler
+from reference.mass_spring import (
+    MassSpring,
+    State,
+    damper_forces,
+    damping_matrix,
+    forces,
+    rest_vectors,
+    spring_energy,
+    spring_forces,
+    stiffness_matrix,
+    stretches,
+)
+
+h = 0.05
+
+
+def rope(length, **changes):
+    """Return two particles on the x axis, a length apart, and the rope of 1.5 m between them."""
+    arguments = {
+        "masses": [1.0, 3.0],
+        "springs": [[0, 1]],
+        "rest_lengths": 1.5,
+        "stiffnesses": 4.0,
+        "tension_only": True,
+        "gravity": (0, 0, 0),
+    }
+    return MassSpring(**(arguments | changes)), np.array([[length, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+class TestSlack:
+    @pytest.mark.parametrize("length", [0.0, 0.3, 1.5])
+    def test_a_slack_rope_is_not_there(self, speed, length):
+        system, x = rope(length)
+        assert stretches(system, x).tolist() == [0.0]
+        assert spring_energy(system, x) == 0
+        np.testing.assert_array_equal(spring_forces(system, x), np.zeros((2, 3)))
+        np.testing.assert_array_equal(stiffness_matrix(system, x).toarray(), np.zeros((6, 6)))
+        np.testing.assert_array_equal(rest_vectors(system, x), [[length, 0.0, 0.0]])
+
+    def test_a_taut_rope_is_a_spring(self, speed):
+        system, x = rope(2.0)
+        spring, _ = rope(2.0, tension_only=False)
+        assert spring_energy(system, x) == spring_energy(spring, x) == 0.5
+        for function in (spring_forces, rest_vectors):
+            np.testing.assert_array_equal(function(system, x), function(spring, x))
+        one, other = (stiffness_matrix(model, x).toarray() for model in (system, spring))
+        np.testing.assert_array_equal(one, other)
+
+    def test_a_rope_without_length_is_a_linear_spring_even_at_length_zero(self, speed):
+        for length in (0.0, 0.7):
+            system, x = rope(length, rest_lengths=0.0)
+            expected = np.kron([[4.0, -4.0], [-4.0, 4.0]], np.eye(3))
+            # k u u' and k (I - u u') are added.
+            np.testing.assert_allclose(stiffness_matrix(system, x).toarray(), expected, rtol=1e-15)
+            np.testing.assert_array_equal(spring_forces(system, x)[0], [-4.0 * length, 0, 0])
+
+    def test_the_damper_of_a_slack_rope_acts(self, speed):
+        system, x = rope(0.5, dampings=2.0)
+        state = State(x, [[3.0, 5.0, 0.0], [1.0, 0.0, 0.0]])
+        expected = [[-4.0, 0, 0], [4.0, 0, 0]]
+        np.testing.assert_array_equal(damper_forces(system, state), expected)
+        np.testing.assert_array_equal(forces(system, state), expected)
+        pull = damping_matrix(system, x) @ state.velocities.ravel()
+        np.testing.assert_array_equal(pull.reshape(2, 3), np.negative(expected))
+
+
+class TestKink:
+    """At the rest length energy and force are continuous, the stiffness jumps."""
+
+    STEP = 1e-6
+
+    def side(self, sign):
+        """Return the second difference of the energy along the rope, taken on one side only."""
+        energies = [spring_energy(*rope(1.5 + sign * i * self.STEP)) for i in range(3)]
+        return np.diff(energies, 2)[0] / self.STEP**2
+
+    def test_the_second_derivative_differs_from_side_to_side(self, speed):
+        assert self.side(-1) == 0
+        # Lengths near 1.5 m round by 2e-16, their differences of 1e-6 by 2e-10 of themselves.
+        assert self.side(+1) == pytest.approx(4.0, rel=1e-8)
+
+    def test_the_stiffness_there_is_that_of_the_slack_side(self, speed):
+        assert not stiffness_matrix(*rope(1.5)).toarray().any()
+        just_taut = stiffness_matrix(*rope(np.nextafter(1.5, 2))).toarray()
+        assert just_taut[0, 0] == pytest.approx(4.0, rel=1e-15)
+
+    def test_the_force_is_continuous(self, speed):
+        pulls = [spring_forces(*rope(1.5 + d))[0, 0] for d in (-1e-9, 0.0, 1e-9)]
+        np.testing.assert_allclose(pulls, [0, 0, -4e-9], rtol=0, atol=1e-15)
+
+
+class TestDampersApart:
+    def test_it_is_the_same_system(self, network, speed):
+        system, state = network
+        apart = system.dampers_apart
+        damped_ropes = apart.tension_only & (apart.dampings > 0)
+        assert not damped_ropes.any()
+        assert (apart is system) == (not system.tension_only.any())
+        expected = forces(system, state)
+        np.testing.assert_allclose(forces(apart, state), expected, rtol=0, atol=1e-13)
+
+    def test_it_is_made_once(self, network):
+        assert network[0].dampers_apart is network[0].dampers_apart
+
+
+class TestStep:
+    def test_a_slack_net_falls_freely(self, speed):
+        """Folded to three quarters of its size, so that no rope becomes taut in the step."""
+        system, state = scenes.net(4, 4)
+        folded = State(0.75 * state.positions, state.velocities)
+        result = ImplicitEuler(system, h=h).step(folded)
+        fall = result.state.velocities[system.free]
+        # Velocities are differences of positions, 1e-16 of 1 m, over h.
+        np.testing.assert_allclose(fall, np.tile([0, -9.81 * h, 0], (12, 1)), rtol=0, atol=1e-14)
+        # The Hessian is M: the second iteration only mends the rounding of the first.
+        assert result.iterations <= 2
+
+    @pytest.mark.parametrize("name", ["local_global", "lbfgs"])
+    def test_the_solvers_agree_on_a_net_that_is_partly_slack(self, name):
+        system, state = scenes.net(5, 5, damping=0.05, stiffness=100.0)
+        shaken = State(
+            state.positions, np.random.default_rng(4).uniform(-2, 2, state.positions.shape)
+        )
+        one, other = (
+            ImplicitEuler(system, h=h, solver=solver, tolerance=1e-14, max_iterations=4000)
+            .step(shaken)
+            .state.positions
+            for solver in (name, "newton")
+        )
+        slack = stretches(system, one) == 0
+        assert 5 < slack.sum() < len(slack) - 5
+        # Gradients of 1e-14 of about 1 kg m, over masses of 0.05 kg.
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-11)
+
+    def test_a_rope_catches_what_falls_where_it_can_hang(self):
+        """Long after, a weight hangs m g / k below the end of its rope."""
+        system, x = rope(0.2, pinned=[1], gravity=(0, -9.81, 0), dampings=0.5)
+        state = State(x, np.zeros((2, 3)))
+        integrator = ImplicitEuler(system, h=1.0, tolerance=1e-13)
+        for _ in range(80):
+            state = integrator.step(state).state
+        expected = [0.0, -1.5 - 9.81 / 4.0, 0.0]
+        # What is left of the swing after 80 steps, each of which takes a share of it.
+        np.testing.assert_allclose(state.positions[0], expected, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (1, "expected booleans, got int64 values"),
+        ([0.0], "expected booleans, got float64"),
+        ([True, False], r"expected shape \(1,\), got \(2,\)"),
+        ("yes", "expected booleans"),
+        (None, "expected booleans"),
+    ],
+)
+def test_wrong_flags_are_named(value, message):
+    with pytest.raises(ValueError, match=f"^tension_only: .*{message}"):
+        rope(1.0, tension_only=value)
+
+
+def test_flags_are_copied_and_one_stands_for_all():
+    given = np.array([True, False])
+    system = MassSpring(np.ones(3), [[0, 1], [1, 2]], 1.0, 1.0, tension_only=given)
+    given[:] = False
+    assert system.tension_only.tolist() == [True, False]
+    both = MassSpring(np.ones(3), [[0, 1], [1, 2]], 1.0, 1.0, tension_only=True)
+    assert both.tension_only.tolist() == [True, True]

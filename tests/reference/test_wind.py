@@ -1,0 +1,185 @@
+"""Laws of the wind."""
+
+import numpy as np
+import pytest
+
+from reference import compiled, rotation, scenes
+from reference.implicit_euler import ImplicitEuler
+from reference.mass_spring import State
+from reference.wind import wind_forces
+
+WIND = np.array([3.0, -1.0, 2.0])
+BOTH = {"drag": 1.1, "lift": 0.4}
+# Sums of some ten terms round by a few units in the last place of the largest.
+ROUNDING = 1e-14
+
+
+@pytest.fixture
+def sail(rng):
+    """Return the state of a crumpled 4 x 3 cloth in motion, and its triangles."""
+    _, state = scenes.grid_cloth(4, 3)
+    x = state.positions + rng.uniform(-0.05, 0.05, state.positions.shape)
+    return State(x, rng.standard_normal(x.shape)), scenes.grid_triangles(4, 3)
+
+
+def plate():
+    """Return a right triangle of 2 m², level and at rest; its normal points up."""
+    x = [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0], [2.0, 0.0, 0.0]]
+    return State(x, np.zeros((3, 3))), [[0, 1, 2]]
+
+
+class TestByHand:
+    def test_a_plate_square_to_the_wind_feels_its_whole_dynamic_pressure(self, speed):
+        forces = wind_forces(*plate(), [0, 3.0, 0], density=1.2, drag=1.5, lift=0.7)
+        expected = 0.5 * 1.2 * 1.5 * 3.0**2 * 2.0 / 3
+        np.testing.assert_allclose(forces, [[0, expected, 0]] * 3, rtol=1e-15, atol=1e-15)
+
+    def test_a_plate_along_the_wind_feels_nothing(self, speed):
+        np.testing.assert_array_equal(
+            wind_forces(*plate(), [3.0, 0, 4.0], **BOTH), np.zeros((3, 3))
+        )
+
+    @pytest.mark.parametrize("degrees", [20, 45, 70])
+    def test_drag_and_lift_go_with_the_angle_of_attack(self, speed, degrees):
+        """Drag like its sine, lift like its sine times its cosine."""
+        angle = np.radians(degrees)
+        e, across = np.array([np.cos(angle), np.sin(angle), 0]), [-np.sin(angle), np.cos(angle), 0]
+        total = wind_forces(*plate(), 5.0 * e, density=1.2, **BOTH).sum(axis=0)
+        pressure = 0.5 * 1.2 * 25.0 * 2.0
+        assert total @ e == pytest.approx(1.1 * pressure * np.sin(angle), rel=1e-14)
+        lift = 0.4 * pressure * np.sin(angle) * np.cos(angle)
+        assert total @ across == pytest.approx(lift, rel=1e-14)
+        assert total[2] == 0
+
+    def test_each_corner_gets_a_third(self, speed):
+        forces = wind_forces(*plate(), WIND, **BOTH)
+        np.testing.assert_array_equal(forces[0], forces[1])
+        np.testing.assert_array_equal(forces[0], forces[2])
+        assert forces[0, 1] < 0
+
+
+class TestLaws:
+    def test_what_moves_with_the_wind_feels_none(self, sail, speed):
+        state, triangles = sail
+        drifting = State(state.positions, np.tile(WIND, (12, 1)))
+        np.testing.assert_array_equal(wind_forces(drifting, triangles, WIND, **BOTH), 0)
+
+    def test_only_the_relative_velocity_counts(self, sail, speed):
+        state, triangles = sail
+        drift = np.array([1.0, 2.0, -4.0])
+        moving = State(state.positions, state.velocities + drift)
+        one, other = wind_forces(*sail, WIND), wind_forces(moving, triangles, WIND + drift)
+        np.testing.assert_allclose(one, other, rtol=0, atol=10 * ROUNDING)
+
+    def test_a_turned_world_turns_the_forces(self, sail, rng, speed):
+        state, triangles = sail
+        R = rotation.to_matrix(rotation.random(rng, 1))[0]
+        turned = State(state.positions @ R.T + [1.0, -2.0, 3.0], state.velocities @ R.T)
+        expected = wind_forces(state, triangles, WIND, **BOTH) @ R.T
+        actual = wind_forces(turned, triangles, R @ WIND, **BOTH)
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=10 * ROUNDING)
+
+    def test_it_does_not_matter_how_triangles_turn_or_in_which_order_they_come(self, sail, speed):
+        state, triangles = sail
+        other = triangles[::-1].copy()
+        other[::2] = other[::2, ::-1]
+        expected = wind_forces(state, triangles, WIND, **BOTH)
+        actual = wind_forces(state, other, WIND, **BOTH)
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=10 * ROUNDING)
+
+    def test_relabelled_particles_feel_the_same(self, sail, rng, speed):
+        state, triangles = sail
+        order = rng.permutation(12)
+        moved = State(state.positions[order], state.velocities[order])
+        actual = wind_forces(moved, np.argsort(order)[triangles], WIND, **BOTH)
+        np.testing.assert_array_equal(actual, wind_forces(*sail, WIND, **BOTH)[order])
+
+    def test_it_scales_with_density_area_and_the_square_of_the_speed(self, sail, speed):
+        state, triangles = sail
+        forces = wind_forces(*sail, WIND, **BOTH)
+        np.testing.assert_array_equal(wind_forces(*sail, WIND, density=4.8, **BOTH), 4 * forces)
+        wide = State(2 * state.positions, state.velocities)
+        np.testing.assert_allclose(wind_forces(wide, triangles, WIND, **BOTH), 4 * forces, 1e-13)
+        fast = State(state.positions, 2 * state.velocities)
+        np.testing.assert_allclose(
+            wind_forces(fast, triangles, 2 * WIND, **BOTH), 4 * forces, 1e-13
+        )
+
+    def test_the_opposite_wind_does_the_opposite(self, sail, speed):
+        state, triangles = sail
+        opposite = State(state.positions, -state.velocities)
+        forces = wind_forces(*sail, WIND, **BOTH)
+        np.testing.assert_array_equal(wind_forces(opposite, triangles, -WIND, **BOTH), -forces)
+
+    def test_still_air_takes_energy_from_a_rigid_motion_and_lift_none(self, sail, speed):
+        state, triangles = sail
+        gliding = State(state.positions, np.tile(WIND, (12, 1)))
+        total = wind_forces(gliding, triangles, np.zeros(3)).sum(axis=0)
+        assert total @ WIND < -1
+        rise = wind_forces(gliding, triangles, np.zeros(3), drag=0, lift=1.0).sum(axis=0)
+        assert np.linalg.norm(rise) > 0.1
+        assert abs(rise @ WIND) < 100 * ROUNDING
+
+    def test_wind_may_differ_from_place_to_place(self, sail, rng, speed):
+        """A triangle feels the mean at its corners."""
+        state, triangles = sail
+        gusts = rng.standard_normal((12, 3))
+        one = wind_forces(state, triangles, gusts, **BOTH)
+        calm = State(state.positions, state.velocities - gusts)
+        np.testing.assert_array_equal(one, wind_forces(calm, triangles, np.zeros(3), **BOTH))
+        np.testing.assert_array_equal(
+            wind_forces(state, triangles, np.tile(WIND, (12, 1))), wind_forces(*sail, WIND)
+        )
+
+    def test_both_speeds_round_alike(self, sail):
+        ends = []
+        for name in compiled.SPEEDS:
+            with compiled.speed(name):
+                ends.append(wind_forces(*sail, WIND, **BOTH))
+        np.testing.assert_array_equal(*ends)
+
+
+def test_a_triangle_without_area_feels_nothing(speed):
+    state = State([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [0, 0, 0]], np.zeros((4, 3)))
+    forces = wind_forces(state, [[0, 1, 2], [0, 3, 1]], WIND, **BOTH)
+    np.testing.assert_array_equal(forces, np.zeros((4, 3)))
+
+
+def test_a_curtain_is_blown_aside():
+    system, state = scenes.grid_cloth(4, 4, mass=0.05, damping=0.1)
+    triangles = scenes.grid_triangles(4, 4)
+    integrator = ImplicitEuler(system, h=1 / 30)
+    ends = []
+    for wind in ([0, 0, 0], [5.0, 0, 0]):
+        blown = state
+        for _ in range(60):
+            blown = integrator.step(blown, wind_forces(blown, triangles, wind)).state
+        ends.append(blown.positions[:, 0].mean())
+    assert ends[1] > ends[0] + 0.1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"state": np.zeros((3, 3))}, "^state: expected a State, got ndarray"),
+        ({"triangles": [[0, 1, 3]]}, "^triangles: .* from 0 to 2, got 3"),
+        ({"triangles": [0, 1, 2]}, "^triangles: expected shape"),
+        ({"triangles": [[0.0, 1.0, 2.0]]}, "^triangles: expected integer"),
+        ({"wind": np.zeros((2, 3))}, r"^wind: expected shape \(3, 3\)"),
+        ({"wind": 3.0}, "^wind: expected shape"),
+        ({"wind": [0, np.nan, 0]}, "^wind: expected finite"),
+        ({"density": -1.0}, "^density: .*at least 0"),
+        ({"drag": np.inf}, "^drag: .*finite"),
+        ({"lift": "much"}, "^lift: .*number"),
+    ],
+)
+def test_wrong_arguments_are_named(change, message):
+    state, triangles = plate()
+    arguments = {"state": state, "triangles": triangles, "wind": WIND} | change
+    with pytest.raises(ValueError, match=message):
+        wind_forces(**arguments)
+
+
+def test_a_force_that_overflows_is_an_error(speed):
+    with np.errstate(over="ignore"), pytest.raises(FloatingPointError, match=r"^wind_forces: "):
+        wind_forces(*plate(), [0, 1e200, 0])
