@@ -1,6 +1,7 @@
 """What is the right answer: readable, validated kinematics and mass-spring dynamics."""
 
 from . import rotation, scenes
+from .articulation import Articulation, Mimic
 from .compiled import speed
 from .curve import curves, resample
 from .explicit import runge_kutta, symplectic_euler
@@ -11,13 +12,16 @@ from .mass_spring import MassSpring, State
 from .outcome import Outcome
 from .skeleton import Pose, Skeleton
 from .tracking import track
+from .wind import wind_forces
 
 __all__ = [
     "IK_SOLVERS",
     "STEP_SOLVERS",
+    "Articulation",
     "IKSolution",
     "ImplicitEuler",
     "MassSpring",
+    "Mimic",
     "Outcome",
     "Pose",
     "Skeleton",
@@ -35,4 +39,5 @@ __all__ = [
     "speed",
     "symplectic_euler",
     "track",
+    "wind_forces",
 ]

@@ -65,6 +65,8 @@ def number(name: str, value: Any, *, least: float = -np.inf, above: float = -np.
     Raises:
         ValueError: if it is not a finite number in that range.
     """
+    if type(value) is float and least <= value < np.inf and value > above:
+        return value
     if isinstance(value, str | bool):
         raise ValueError(f"{name}: expected a number, got {value!r}")
     result = _floats(name, value)
@@ -85,6 +87,8 @@ def integer(name: str, value: Any, *, least: int, below: int | None = None) -> i
     Raises:
         ValueError: if it is not an integer (a boolean is none) in that range.
     """
+    if type(value) is int and value >= least and (below is None or value < below):
+        return value
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
         raise ValueError(f"{name}: expected an integer, got {value!r}")
     if value < least or (below is not None and value >= below):

@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike
 
 from . import arguments, rotation
 from .arguments import FloatArray, frozen
+from .articulation import Articulation
 from .compiled import TwoSpeeds
 from .quaternion import (
     add,
@@ -20,7 +21,7 @@ from .rotation import UNIT_TOLERANCE
 from .skeleton import Pose, Skeleton, checked_skeleton
 
 
-def forward_kinematics(skeleton: Skeleton, local_rotations: ArrayLike) -> Pose:
+def forward_kinematics(skeleton: Skeleton | Articulation, local_rotations: ArrayLike) -> Pose:
     """Return the global pose of every joint.
 
     A joint with parent p has the rotation R = R_p Q and the position x = x_p + R_p offset. The
@@ -30,7 +31,8 @@ def forward_kinematics(skeleton: Skeleton, local_rotations: ArrayLike) -> Pose:
     Args:
         skeleton: the tree.
         local_rotations: unit quaternions relative to the parent, w first, shape (..., joint, 4);
-            leading axes are batch or frame.
+            leading axes are batch or frame. For an Articulation, its coordinates (...,
+            coordinate).
 
     Returns:
         Pose with positions (..., joint, 3) [m] and rotations (..., joint, 4), read-only.
@@ -39,6 +41,9 @@ def forward_kinematics(skeleton: Skeleton, local_rotations: ArrayLike) -> Pose:
         ValueError: if the shape is another, or a quaternion is not finite or further than 1e-6
             from unit length.
     """
+    if isinstance(skeleton, Articulation):
+        x, R = skeleton.forward(local_rotations)
+        return Pose(frozen(x), frozen(R))
     count = checked_skeleton(skeleton).joint_count
     local = arguments.floats("local_rotations", local_rotations, "...", count, 4)
     positions = np.empty((*local.shape[:-1], 3))

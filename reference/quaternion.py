@@ -12,16 +12,18 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
 # Below this the sine of half the angle is its argument to the last bit: x - x^3/6 rounds to x.
 SMALL_ANGLE = 1e-8
+# A quaternion given may be so far from unit length.
+UNIT_TOLERANCE = 1e-6
 
 
-def quaternion_at(q, j):
-    """Return row j of an array (joint, 4) as a tuple."""
-    return q[j, 0], q[j, 1], q[j, 2], q[j, 3]
+def quaternion_at(q, j, k=0):
+    """Return row j of an array (joint, 4), or four entries from the k-th on, as a tuple."""
+    return q[j, k], q[j, k + 1], q[j, k + 2], q[j, k + 3]
 
 
-def vector_at(p, j):
-    """Return row j of an array (joint, 3) as a tuple."""
-    return p[j, 0], p[j, 1], p[j, 2]
+def vector_at(p, j, k=0):
+    """Return row j of an array (joint, 3), or three entries from the k-th on, as a tuple."""
+    return p[j, k], p[j, k + 1], p[j, k + 2]
 
 
 def put_quaternion(q, j, value):
@@ -110,6 +112,18 @@ def normalised(q):
     return q[0] / length, q[1] / length, q[2] / length, q[3] / length
 
 
+def made_unit(q):
+    """Return a quaternion made unit, and whether it was so within 1e-6.
+
+    1/|q| is the series of (1 + e)^-1/2 in e = |q|^2 - 1, which for so small an e is exact to
+    rounding with four terms, and needs neither a root nor a division.
+    """
+    w, x, y, z = q
+    e = w * w + x * x + y * y + z * z - 1.0
+    s = 1.0 - e * (0.5 - e * (0.375 - e * 0.3125))
+    return (s * w, s * x, s * y, s * z), abs(e) <= 2.0 * UNIT_TOLERANCE
+
+
 def perpendicular(a):
     """Return a fixed unit vector perpendicular to a: along a x e, e the axis a is least along."""
     x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
@@ -151,6 +165,18 @@ def exponential(v):
     half = 0.5 * angle
     s = 0.5 if angle < SMALL_ANGLE else math.sin(half) / angle
     return math.cos(half), s * v[0], s * v[1], s * v[2]
+
+
+def angle_between(a, b):
+    """Return the angle [rad] of the rotation from a to b, from 0 to pi."""
+    v = logarithm(multiply(b, conjugate(a)))
+    return norm(v)
+
+
+def turn_about(axis, angle):
+    """Return the rotation by an angle [rad] about a unit axis."""
+    s = math.sin(0.5 * angle)
+    return math.cos(0.5 * angle), s * axis[0], s * axis[1], s * axis[2]
 
 
 def logarithm(q):

@@ -9,12 +9,10 @@ from numpy.typing import ArrayLike
 from . import arguments, quaternion
 from .arguments import FloatArray
 from .compiled import TwoSpeeds
+from .quaternion import UNIT_TOLERANCE, put_quaternion, put_vector, quaternion_at, vector_at
 from .quaternion import between as between_two
 from .quaternion import exponential as exponential_of
 from .quaternion import logarithm as logarithm_of
-from .quaternion import put_quaternion, put_vector, quaternion_at, vector_at
-
-UNIT_TOLERANCE = 1e-6
 
 
 def identity(*shape: int) -> FloatArray:

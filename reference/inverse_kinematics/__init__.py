@@ -1,103 +1,275 @@
-"""Inverse kinematics: local rotations that bring an effector to a target."""
+"""Inverse kinematics: local rotations or coordinates that bring effectors to targets."""
 
+import functools
+import weakref
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
-from ..arguments import frozen
+from ..arguments import FloatArray, frozen
+from ..articulation import Articulation
 from ..compiled import TwoSpeeds, bind
 from ..outcome import Outcome
-from ..skeleton import Skeleton, checked_skeleton
-from .batch import Solved, iterate, solve_batch
-from .ccd import ccd_sweep
-from .damped_least_squares import damped_least_squares_sweep
-from .fabrik import fabrik_sweep
-from .jacobian_transpose import jacobian_transpose_sweep
-from .levenberg_marquardt import levenberg_marquardt_sweep
-from .problem import IKSolution, Target, checked_target
+from ..quaternion import IDENTITY
+from ..skeleton import Skeleton
+from .attempts import Answers, Request, answer_batch, attempt, attempts
+from .batch import ITERATIONS, OUTCOME, RESIDUAL, RESIDUAL_ROTATION, Solved, iterate, solve_batch
+from .ccd import ccd_sweep, ccd_update
+from .damped_least_squares import damped_least_squares_sweep, damped_least_squares_update
+from .fabrik import fabrik_sweep, fabrik_update
+from .jacobian_transpose import jacobian_transpose_sweep, jacobian_transpose_update
+from .levenberg_marquardt import levenberg_marquardt_sweep, levenberg_marquardt_update
+from .mechanism import POSITION, ROTATION, WEIGHT
+from .preparation import prepare
+from .problem import IKSolution, Target, Wanted, check_numbers, checked_targets
 
 __all__ = ["IK_SOLVERS", "IKSolution", "Outcome", "Target", "solve_ik"]
 
 
-def _batch(sweep):
-    return TwoSpeeds(bind(solve_batch, iterate=bind(iterate, sweep=sweep)))
+class IKSolver(NamedTuple):
+    """A solver's two kernels.
+
+    Attributes:
+        chain: for one position to reach by a chain of unlimited balls.
+        mechanism: for all else.
+    """
+
+    chain: TwoSpeeds
+    mechanism: TwoSpeeds
+
+
+def _solver(sweep, update) -> IKSolver:
+    many = bind(attempts, attempt=bind(attempt, update=update))
+    return IKSolver(
+        TwoSpeeds(bind(solve_batch, iterate=bind(iterate, sweep=sweep))),
+        TwoSpeeds(bind(answer_batch, attempts=many)),
+    )
 
 
 IK_SOLVERS = {
-    "ccd": _batch(ccd_sweep),
-    "fabrik": _batch(fabrik_sweep),
-    "levenberg_marquardt": _batch(levenberg_marquardt_sweep),
-    "damped_least_squares": _batch(damped_least_squares_sweep),
-    "jacobian_transpose": _batch(jacobian_transpose_sweep),
+    "ccd": _solver(ccd_sweep, ccd_update),
+    "fabrik": _solver(fabrik_sweep, fabrik_update),
+    "levenberg_marquardt": _solver(levenberg_marquardt_sweep, levenberg_marquardt_update),
+    "damped_least_squares": _solver(damped_least_squares_sweep, damped_least_squares_update),
+    "jacobian_transpose": _solver(jacobian_transpose_sweep, jacobian_transpose_update),
 }
 
 
+NO_HISTORY = frozen(np.empty(0))
+OUTCOMES = tuple(Outcome)
+
+
+class Settings(NamedTuple):
+    """Settings of a solve, checked."""
+
+    solver: IKSolver
+    tolerance: float
+    tolerance_rotation: float
+    max_iterations: int
+    restarts: int
+    seed: int
+    record: bool
+    chained: bool = False
+
+
 def solve_ik(
-    skeleton: Skeleton,
+    skeleton: Skeleton | Articulation,
     local_rotations: ArrayLike,
     target: ArrayLike | Target | Sequence[Target],
     solver: str = "fabrik",
     effector: int | str = -1,
     *,
     tolerance: float = 1e-4,
+    tolerance_rotation: float = 1e-4,
     max_iterations: int = 100,
+    restarts: int = 0,
+    seed: int = 0,
     record: bool = False,
 ) -> IKSolution:
-    """Return local rotations that bring the effector to the target, from a start pose.
+    """Return the pose that brings effectors to targets, from a start pose.
 
-    The root turns but does not move. Joints off the path from the root to the effector keep their
-    local rotation, as does the effector. An answer is always given; `outcome` says what it is. A
-    straight chain whose target lies on its own line is first bent, always in the same way.
+    The root of a Skeleton turns but does not move. Joints that move no effector keep their
+    rotation, as does an effector whose own rotation is not asked for. An answer is always given;
+    `outcome` says what it is. A start that is stuck, such as a straight chain whose target lies on
+    its own line, is first bent, always in the same way. Limits are kept; a start outside of them
+    is brought within.
 
     Args:
-        skeleton: the tree.
-        local_rotations: the start, unit quaternions, shape (..., joint, 4).
-        target: global position [m], shape (..., 3), or a Target. Leading axes broadcast with those
-            of the start: a batch.
+        skeleton: the tree; an Articulation for joints of other kinds and for limits.
+        local_rotations: the start, unit quaternions, shape (..., joint, 4); of an Articulation its
+            coordinates, (..., coordinate).
+        target: global position [m], shape (..., 3), a Target, or several for several effectors.
+            Leading axes broadcast with those of the start: a batch.
         solver: a name in IK_SOLVERS.
-        effector: the joint that is to reach it, by index or name.
+        effector: the joint that is to reach a position given alone, by index or name.
         tolerance: distance that counts as reached [m].
-        max_iterations: the most to make.
+        tolerance_rotation: angle that counts as reached [rad].
+        max_iterations: the most to make, of each attempt.
+        restarts: how many further attempts to make from random poses, until one reaches the target.
+        seed: of those poses.
         record: keep the residuals of all iterations in `history`.
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion is further than
             1e-6 from unit length, a number is out of range, or a name unknown.
     """
-    return solve_targets(
-        skeleton, local_rotations, target, solver, effector, tolerance, max_iterations, record
+    settings = checked_settings(
+        solver, tolerance, tolerance_rotation, max_iterations, restarts, seed, record
+    )
+    return solve_targets(skeleton, local_rotations, target, effector, settings)
+
+
+def checked_settings(*given: Any) -> Settings:
+    """Return the settings, of which the same are often asked for again.
+
+    Raises:
+        ValueError: if one is out of range or unknown.
+    """
+    try:
+        return _known_settings(*given)
+    except TypeError:  # one has no hash, and so is no number or name
+        return _settings(*given)
+
+
+def _settings(
+    solver: Any, tolerance: Any, tolerance_rotation: Any, max_iterations: Any,
+    restarts: Any, seed: Any, record: bool, chained: bool = False,
+) -> Settings:  # fmt: skip
+    return Settings(
+        IK_SOLVERS[arguments.choice("solver", solver, IK_SOLVERS)],
+        arguments.number("tolerance", tolerance, least=0.0),
+        arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
+        arguments.integer("max_iterations", max_iterations, least=0),
+        arguments.integer("restarts", restarts, least=0),
+        arguments.integer("seed", seed, least=0),
+        record,
+        chained,
     )
 
 
+_known_settings = functools.lru_cache(maxsize=64, typed=True)(_settings)
+
+
 def solve_targets(
-    skeleton, local_rotations, target, solver, effector, tolerance, max_iterations, record,
-    chained=False,
-):  # fmt: skip
+    model: Skeleton | Articulation,
+    start: ArrayLike,
+    target: ArrayLike | Target | Sequence[Target],
+    effector: int | str,
+    settings: Settings,
+) -> IKSolution:
     """Return what `solve_ik` does; if chained, each solve starts from the one before."""
-    solve = IK_SOLVERS[arguments.choice("solver", solver, IK_SOLVERS)]
-    count = checked_skeleton(skeleton).joint_count
-    starts = arguments.floats("local_rotations", local_rotations, "...", count, 4)
-    positions, effector = checked_target(skeleton, target, effector)
-    tolerance = arguments.number("tolerance", tolerance, least=0.0)
-    max_iterations = arguments.integer("max_iterations", max_iterations, least=0)
-    batch = _batch_shape(starts.shape[:-2], positions.shape[:-1])
-    targets = arguments.spread(positions, (*batch, 3)).reshape(-1, 3)
-    if starts.ndim > 2:
-        starts = arguments.spread(starts, (*batch, *starts.shape[-2:]))
-    starts = starts.reshape(-1, *starts.shape[-2:])
-    solved = _empty(len(targets), skeleton.joint_count, max_iterations if record else 0)
-    bad = solve(
-        skeleton.arrays, skeleton.path_array(effector), starts, targets,
-        tolerance, max_iterations, chained, solved,
-    )  # fmt: skip
-    if bad >= 0:  # raise, or the lengths were on the very edge of the tolerance
-        unit = rotation.unit("local_rotations", local_rotations)
-        return solve_targets(
-            skeleton, unit, target, solver, effector, tolerance, max_iterations, record, chained
+    if not isinstance(model, Skeleton | Articulation):
+        raise ValueError(
+            f"skeleton: expected a Skeleton or an Articulation, got {type(model).__name__}"
         )
-    return _solution(solved, batch, record)
+    wanted = checked_targets(model, target, effector)
+    one_position = len(wanted) == 1 and wanted[0].rotation is None
+    if isinstance(model, Skeleton) and one_position and not settings.restarts:
+        return _solve_chains(model, start, wanted[0], settings)
+    return _solve_mechanisms(model, start, wanted, settings)
+
+
+def _solve_chains(
+    skeleton: Skeleton, start: ArrayLike, wanted: Wanted, settings: Settings
+) -> IKSolution:
+    starts = arguments.floats("local_rotations", start, "...", skeleton.joint_count, 4)
+    batch = _batch_shape(starts.shape[:-2], wanted.position.shape[:-1])
+    targets = arguments.spread(wanted.position, (*batch, 3)).reshape(-1, 3)
+    solved = Solved(
+        np.empty((len(targets), skeleton.joint_count, 4)),
+        np.empty((len(targets), skeleton.joint_count, 3)),
+        np.empty((len(targets), 4)),
+        _history(len(targets), settings.max_iterations, settings),
+    )
+    fine = settings.solver.chain(
+        skeleton.arrays, skeleton.path_array(wanted.joint), _in_turn(starts, batch, 2), targets,
+        settings.tolerance, settings.max_iterations, settings.chained, solved,
+    )  # fmt: skip
+    if not fine:  # raise, or the lengths were on the very edge of the tolerance
+        check_numbers([wanted])
+        return _solve_chains(skeleton, rotation.unit("local_rotations", start), wanted, settings)
+    return _solution(solved.local, solved.local, solved, batch, settings)
+
+
+def _solve_mechanisms(
+    model: Skeleton | Articulation, start: ArrayLike, wanted: list[Wanted], settings: Settings
+) -> IKSolution:
+    articulation, given = model, start
+    if isinstance(model, Skeleton):
+        articulation = balls(model)
+        given = arguments.floats("local_rotations", start, "...", model.joint_count, 4)
+        given = given.reshape(*given.shape[:-2], -1)
+    starts = arguments.floats("local_rotations", given, "...", articulation.coordinate_count)
+    effectors = tuple(one.joint for one in wanted)
+    oriented = tuple(one.rotation is not None for one in wanted)
+    mechanism, columns = prepare(articulation, effectors, oriented)
+    batch = _batch_of(starts.shape[:-1], wanted)
+    request = _request(articulation, columns, wanted, batch, settings)
+    count = len(request.goals)
+    answers = Answers(
+        np.empty((count, articulation.coordinate_count)),
+        np.empty((count, articulation.joint_count, 4)),
+        np.empty((count, articulation.joint_count, 3)),
+        np.empty((count, 4)),
+        _history(count, settings.max_iterations * (settings.restarts + 2), settings),
+    )
+    fine = settings.solver.mechanism(
+        articulation.arrays, mechanism, columns, _in_turn(starts, batch, 1), request, answers
+    )
+    if not fine:
+        check_numbers(wanted)
+        again = articulation.checked("local_rotations", starts)
+        return _solve_mechanisms(articulation, again, wanted, settings)
+    if isinstance(model, Skeleton):
+        local = answers.q.reshape(answers.local.shape)
+        return _solution(local, local, answers, batch, settings)
+    return _solution(answers.local, answers.q, answers, batch, settings)
+
+
+def balls(skeleton: Skeleton) -> Articulation:
+    """Return the skeleton as an Articulation of unlimited balls, made once."""
+    if skeleton not in _BALLS:
+        _BALLS[skeleton] = Articulation(skeleton, "ball")
+    return _BALLS[skeleton]
+
+
+_BALLS: weakref.WeakKeyDictionary[Skeleton, Articulation] = weakref.WeakKeyDictionary()
+
+
+def _request(
+    articulation: Articulation,
+    columns: Any,
+    wanted: list[Wanted],
+    batch: tuple[int, ...],
+    settings: Settings,
+) -> Request:
+    goals = np.empty((*batch, len(wanted), 8))
+    for e, one in enumerate(wanted):
+        goals[..., e, POSITION : POSITION + 3] = one.position
+        turn = IDENTITY if one.rotation is None else one.rotation
+        goals[..., e, ROTATION : ROTATION + 4] = turn
+        goals[..., e, WEIGHT] = one.weight
+    return Request(
+        np.array([one.joint for one in wanted], dtype=np.int64),
+        goals.reshape(-1, len(wanted), 8),
+        settings.tolerance,
+        settings.tolerance_rotation,
+        settings.max_iterations,
+        _other_starts(articulation, columns, settings),
+        settings.chained,
+    )
+
+
+def _other_starts(articulation: Articulation, columns: Any, settings: Settings) -> FloatArray:
+    """Return the poses that restarts begin from, kept by the articulation, (restart, coordinate)."""
+    key = "restarts", settings.restarts, settings.seed, columns.tobytes()
+    if key not in articulation.mechanisms:
+        poses = articulation.random(np.random.default_rng(settings.seed), settings.restarts)
+        articulation.mechanisms[key] = np.ascontiguousarray(poses[:, columns])
+    return articulation.mechanisms[key]
 
 
 def _batch_shape(starts: tuple[int, ...], targets: tuple[int, ...]) -> tuple[int, ...]:
@@ -112,26 +284,54 @@ def _batch_shape(starts: tuple[int, ...], targets: tuple[int, ...]) -> tuple[int
         ) from None
 
 
-def _empty(targets: int, joints: int, recorded: int) -> Solved:
-    return Solved(
-        np.empty((targets, joints, 4)),
-        np.empty((targets, joints, 3)),
-        np.empty(targets),
-        np.empty(targets, dtype=np.int64),
-        np.empty(targets, dtype=np.int64),
-        np.empty((targets, recorded + 1) if recorded else (1, 1)),
-    )
+def _batch_of(starts: tuple[int, ...], wanted: list[Wanted]) -> tuple[int, ...]:
+    batch = starts
+    for one in wanted:
+        batch = _batch_shape(batch, one.position.shape[:-1])
+        if one.rotation is not None:
+            batch = _batch_shape(batch, one.rotation.shape[:-1])
+    return batch
 
 
-def _solution(solved: Solved, batch: tuple[int, ...], record: bool) -> IKSolution:
-    history = solved.history[:, : solved.iterations.max(initial=0) + 1] if record else np.empty(0)
-    local, positions, residuals, iterations, outcomes = (
-        frozen(values.reshape(batch + values.shape[1:])) for values in solved[:5]
-    )
+def _in_turn(starts: FloatArray, batch: tuple[int, ...], axes: int) -> FloatArray:
+    """Return the starts as rows that the targets of a batch take in turn."""
+    if starts.ndim > axes:
+        starts = arguments.spread(starts, (*batch, *starts.shape[-axes:]))
+    return starts.reshape(-1, *starts.shape[-axes:])
+
+
+def _history(targets: int, iterations: int, settings: Settings) -> FloatArray:
+    return np.empty((targets, iterations + 1) if settings.record else (1, 1))
+
+
+def _solution(
+    local: FloatArray,
+    coordinates: FloatArray,
+    solved: Solved | Answers,
+    batch: tuple[int, ...],
+    settings: Settings,
+) -> IKSolution:
+    """Return what the kernel filled in as a solution, in the shape of the batch."""
+    figures, history = solved.figures, NO_HISTORY
+    if settings.record:
+        history = solved.history[:, : int(figures[:, ITERATIONS].max(initial=0.0)) + 1]
     if batch:
-        history = history.reshape(*batch, -1) if record else history
-        return IKSolution(local, positions, residuals, iterations, outcomes, frozen(history))
+        return IKSolution(
+            _shaped(local, batch), _shaped(solved.positions, batch),
+            _shaped(figures[:, RESIDUAL].copy(), batch),
+            _shaped(figures[:, ITERATIONS].astype(np.int64), batch),
+            _shaped(figures[:, OUTCOME].astype(np.int64), batch),
+            _shaped(history, batch) if settings.record else NO_HISTORY,
+            _shaped(figures[:, RESIDUAL_ROTATION].copy(), batch),
+            _shaped(coordinates, batch),
+        )  # fmt: skip
+    residual, angle, iterations, outcome = figures[0].tolist()
     return IKSolution(
-        local, positions, float(residuals), int(iterations), Outcome(int(outcomes)),
-        frozen(history.reshape(-1)),
+        frozen(local[0]), frozen(solved.positions[0]), residual, int(iterations),
+        OUTCOMES[int(outcome)], frozen(history[0]) if settings.record else NO_HISTORY, angle,
+        frozen(coordinates[0]),
     )  # fmt: skip
+
+
+def _shaped(values: FloatArray, batch: tuple[int, ...]) -> FloatArray:
+    return frozen(values.reshape(batch + values.shape[1:]))

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import FloatArray, IndexArray
+from ..arguments import LARGEST_COORDINATE, FloatArray
 from ..kinematics import forward_pose, normalise
 from ..outcome import Outcome
 from ..quaternion import norm, subtract, vector_at
@@ -23,30 +23,30 @@ from .chain import (
     turn_links,
 )
 
+# Columns of figures, (target, 4): the distance from effector to target [m], the angle between them
+# [rad], the number of iterations and the value of the outcome.
+RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME = range(4)
+
 
 class Solved(NamedTuple):
-    """What the kernels fill in, a row a target.
+    """What the kernel fills in, a row a target.
 
     Attributes:
         local: local rotations, (target, joint, 4).
         positions: global positions [m], (target, joint, 3).
-        residuals: distances from effector to target [m], (target,).
-        iterations: (target,).
-        outcomes: values of Outcome, (target,).
+        figures: (target, 4), see above.
         history: residuals before and after each iteration [m], (target, iteration), or (1, 1) when
             they are not wanted. After the last iteration the last residual is repeated.
     """
 
     local: FloatArray
     positions: FloatArray
-    residuals: FloatArray
-    iterations: IndexArray
-    outcomes: IndexArray
+    figures: FloatArray
     history: FloatArray
 
 
 def solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained, solved):
-    """Solve target after target; return the index of the first start that is no rotation, or -1.
+    """Solve target after target; return whether all starts and targets were fit to compute with.
 
     Args:
         tree: SkeletonArrays.
@@ -61,11 +61,10 @@ def solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained,
     chain = new_chain(tree.offsets, path)
     rotations = np.empty((len(tree.parents), 4))
     for i in range(len(targets)):
-        local = solved.local[i]
+        local, target, figures = solved.local[i], vector_at(targets, i), solved.figures[i]
         start = solved.local[i - 1] if chained and i > 0 else starts[i % len(starts)]
-        if not normalise(start, local):
-            return i % len(starts)
-        target = vector_at(targets, i)
+        if not (normalise(start, local) and largest(target) <= LARGEST_COORDINATE):
+            return False
         history = solved.history[i % len(solved.history)]
         pose_chain(chain, path, local)
         iterations, stalled = iterate(chain, target, tolerance, max_iterations, history)
@@ -74,10 +73,16 @@ def solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained,
             put_local(chain, path, local)
         forward_pose(tree.parents, tree.offsets, local, solved.positions[i], rotations)
         residual = norm(subtract(vector_at(solved.positions[i], path[-1]), target))
-        solved.residuals[i] = residual
-        solved.iterations[i] = iterations
-        solved.outcomes[i] = judge(chain, target, residual, tolerance, stalled)
-    return -1
+        figures[RESIDUAL], figures[RESIDUAL_ROTATION] = residual, 0.0
+        figures[ITERATIONS] = iterations
+        figures[OUTCOME] = judge(chain, target, residual, tolerance, stalled).value
+    return True
+
+
+def largest(v):
+    """Return the largest magnitude of a vector's components, NaN if it has one."""
+    x, y, z = abs(v[0]), abs(v[1]), abs(v[2])
+    return x + y + z if x + y + z != x + y + z else max(x, y, z)
 
 
 def iterate(chain, target, tolerance, max_iterations, history):
@@ -90,7 +95,7 @@ def iterate(chain, target, tolerance, max_iterations, history):
     # The residual is recomputed from the rotations in the end: leave that rounding some room.
     goal = least_distance(chain, d) + tolerance - min(8.0 * rounding(chain, d), 0.5 * tolerance)
     residual = tip_error(chain, target)
-    history[:] = residual
+    fill_from(history, 0, residual)
     if residual > goal and not out_of_reach(chain, d) and on_one_line(chain, target):
         bend(chain)
     for i in range(max_iterations):
@@ -99,10 +104,16 @@ def iterate(chain, target, tolerance, max_iterations, history):
         before = residual
         sweep(chain, target)
         residual = tip_error(chain, target)
-        history[min(i + 1, len(history)) :] = residual
+        fill_from(history, i + 1, residual)
         if abs(before - residual) <= rounding(chain, d):
             return i + 1, residual > goal
     return max_iterations, False
+
+
+def fill_from(row, first, value):
+    """Write a value into a row from an entry to its end."""
+    for k in range(first, len(row)):
+        row[k] = value
 
 
 def judge(chain, target, residual, tolerance, stalled):

@@ -4,6 +4,7 @@ Steps towards a target beyond reach do not die down: it may swing about the stra
 """
 
 from .jacobian import linearise, solve_damped, turn_joints
+from .stacked import damped_step, linearise_all, take_step
 
 # The square of the damping factor, over the reach squared: a tenth of the reach.
 DAMPING = 0.01
@@ -13,3 +14,11 @@ def damped_least_squares_sweep(chain, target):
     """Turn all joints by J^T (J J^T + (0.1 reach)^2 1)^-1 e."""
     e, A = linearise(chain, target)
     turn_joints(chain, solve_damped(A, DAMPING * chain.reach * chain.reach, e))
+
+
+def damped_least_squares_update(mechanism, goal, posture, room):
+    """Change the coordinates by J' (J J' + (0.1 reach)^2 1)^-1 e, within their limits."""
+    linearise_all(mechanism, goal, posture, room.stack)
+    damping = DAMPING * mechanism.reach * mechanism.reach
+    damped_step(mechanism, posture, room.stack, damping)
+    take_step(mechanism, posture, room.stack)

@@ -1,7 +1,47 @@
-"""Forward and backward reaching (Aristidou & Lasenby 2011, Algorithm 1)."""
+"""Forward and backward reaching (Aristidou & Lasenby 2011, Algorithm 1).
 
-from ..quaternion import add, norm, put_vector, scale, subtract, vector_at
+On mechanisms the way forward turns joints instead of moving points, each to bring its children
+nearest to where they were wished backward: a hinge about its axis, a ball within its limits, one
+rotation for all children of a branch. What cannot be had remains as the residual.
+"""
+
+from ..articulation import BALL, FREE, HINGE, KIND, LEADER, PARENT, SLIDE, joint_transform
+from ..quaternion import (
+    add,
+    between,
+    conjugate,
+    dot,
+    multiply,
+    norm,
+    normalised,
+    put_quaternion,
+    put_vector,
+    quaternion_at,
+    rotate,
+    scale,
+    subtract,
+    turn_about,
+    vector_at,
+)
 from .chain import in_hole, out_of_reach, root_distance
+from .joint_moves import move_by, shift_free, turn_ball
+from .mechanism import (
+    ARM,
+    HANGS,
+    ORIENTED,
+    POSITION,
+    ROTATION,
+    TURN,
+    WEIGHT,
+    axis_of,
+    frame_of,
+    place,
+    turn_weight,
+)
+from .wahba import NOTHING, add_outer, add_turn, best_angle, best_rotation
+
+# The column of wishes, (joint, 4), that holds the weight of a joint's wish; a position before it.
+WISHED = 3
 
 
 def fabrik_sweep(chain, target):
@@ -60,3 +100,175 @@ def place_towards(start, end, length):
     if distance == 0.0:
         return add(start, (length, 0.0, 0.0))
     return add(start, scale(length / distance, way))
+
+
+def fabrik_update(mechanism, goal, posture, room):
+    """Reach backward for where each joint should be, then forward, turning joints towards that."""
+    wish(mechanism, goal, posture, room)
+    joints = mechanism.joints
+    for j in range(len(joints.integers)):
+        put_frame(joints, posture, room, j)
+        move_towards_wishes(mechanism, goal, posture, room, j)
+    place(mechanism, posture)
+
+
+def wish(mechanism, goal, posture, room):
+    """Fill where each joint would be if the effectors were on their targets, the lengths kept.
+
+    A joint with several children takes the weighted mean of what each would pull it to.
+    """
+    wishes = room.wishes
+    for j in range(len(wishes)):
+        put_quaternion(wishes, j, (0.0, 0.0, 0.0, 0.0))
+    for e in range(len(mechanism.effectors)):
+        j = mechanism.effectors[e, HANGS]
+        if j >= 0:
+            add_wish(room, j, goal[e, WEIGHT], wish_of_effector(mechanism, goal, posture, e, j))
+    for j in range(len(wishes) - 1, -1, -1):
+        if wishes[j, WISHED] > 0.0:
+            put_vector(wishes, j, scale(1.0 / wishes[j, WISHED], vector_at(wishes, j)))
+        parent = mechanism.joints.integers[j, PARENT]
+        if parent >= 0 and wishes[j, WISHED] > 0.0:
+            x, x_parent = vector_at(posture.positions, j), vector_at(posture.positions, parent)
+            length = norm(subtract(x, x_parent))
+            pulled = place_towards(vector_at(wishes, j), x_parent, length)
+            add_wish(room, parent, wishes[j, WISHED], pulled)
+
+
+def wish_of_effector(mechanism, goal, posture, e, j):
+    """Return where the joint that an effector hangs on would be with the effector on its target."""
+    target, arm = vector_at(goal, e, POSITION), vector_at(mechanism.tips, e, ARM)
+    if mechanism.effectors[e, ORIENTED]:
+        return subtract(target, rotate(wished_rotation(mechanism, goal, e), arm))
+    return place_towards(target, vector_at(posture.positions, j), norm(arm))
+
+
+def wished_rotation(mechanism, goal, e):
+    """Return the rotation that the joint needs for its effector to have the target's."""
+    frame = conjugate(quaternion_at(mechanism.tips, e, TURN))
+    return multiply(quaternion_at(goal, e, ROTATION), frame)
+
+
+def add_wish(room, j, weight, position):
+    """Add a weighted position to what is wished for a joint."""
+    put_vector(room.wishes, j, add(vector_at(room.wishes, j), scale(weight, position)))
+    room.wishes[j, WISHED] += weight
+
+
+def put_frame(joints, posture, room, j):
+    """Put a joint where its parent now has it, moved by its coordinates; a ball keeps its turn."""
+    x, R = joint_transform(joints, j, posture.q)
+    parent = joints.integers[j, PARENT]
+    if parent >= 0:
+        R_parent = quaternion_at(posture.rotations, parent)
+        x = add(vector_at(posture.positions, parent), rotate(R_parent, x))
+        R = multiply(R_parent, R)
+    put_vector(posture.positions, j, x)
+    if joints.integers[j, KIND] != BALL or room.wishes[j, WISHED] == 0.0:
+        put_quaternion(posture.rotations, j, R)
+
+
+def move_towards_wishes(mechanism, goal, posture, room, j):
+    """Move one joint, its parent in place, to bring its children nearest to their wishes."""
+    joints, q, kind = mechanism.joints, posture.q, mechanism.joints.integers[j, KIND]
+    R, x = quaternion_at(posture.rotations, j), vector_at(posture.positions, j)
+    if kind == FREE:
+        way = subtract(vector_at(room.wishes, j), x)
+        shift_free(joints, q, j, rotate(conjugate(frame_of(joints, j, posture)), way))
+        x = add(x, way)
+    elif kind == SLIDE and joints.integers[j, LEADER] == j:
+        axis = axis_of(joints, j, R)
+        way = dot(axis, mean_wish(mechanism, goal, posture, room, j))
+        x = add(x, scale(move_by(joints, q, j, way), axis))
+    put_vector(posture.positions, j, x)
+    if kind == HINGE and joints.integers[j, LEADER] == j:
+        axis = axis_of(joints, j, R)
+        angle = best_angle(arms_to_wishes(mechanism, goal, posture, room, j), axis)
+        R = multiply(turn_about(axis, move_by(joints, q, j, angle)), R)
+    elif kind in (BALL, FREE) and room.wishes[j, WISHED] > 0.0:
+        turn = turn_to_wishes(mechanism, goal, posture, room, j)
+        R = turn_ball(joints, q, j, frame_of(joints, j, posture), multiply(turn, R))
+    put_quaternion(posture.rotations, j, normalised(R))
+
+
+def turn_to_wishes(mechanism, goal, posture, room, j):
+    """Return the turn of joint j that brings what it sees nearest, the shortest if it is one."""
+    found, arm, way = 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for e in range(len(mechanism.effectors)):
+        if mechanism.moves[j, e] == 2:
+            found += 2 if mechanism.effectors[e, ORIENTED] else 1
+            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
+    for c in range(j + 1, len(room.wishes)):
+        if mechanism.sees[j, c]:
+            found += 1
+            arm, way = joint_and_wish(mechanism, posture, room, c, j)
+    if found == 1:
+        return between(arm, way)
+    M = arms_to_wishes(mechanism, goal, posture, room, j)
+    return best_rotation(M, room.eigen[0], room.eigen[1])
+
+
+def arms_to_wishes(mechanism, goal, posture, room, j):
+    """Return Wahba's M of the arms from joint j to what it sees below, and of the wishes."""
+    M = NOTHING
+    for e in range(len(mechanism.effectors)):
+        if mechanism.moves[j, e]:
+            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
+            M = add_outer(M, goal[e, WEIGHT], way, arm)
+            if mechanism.effectors[e, ORIENTED]:
+                R = rotation_below(mechanism, posture, j, e)
+                wanted = multiply(quaternion_at(goal, e, ROTATION), conjugate(R))
+                M = add_turn(M, goal[e, WEIGHT] * turn_weight(mechanism), wanted)
+    for c in range(j + 1, len(room.wishes)):
+        if mechanism.sees[j, c]:
+            arm, way = joint_and_wish(mechanism, posture, room, c, j)
+            M = add_outer(M, room.wishes[c, WISHED], way, arm)
+    return M
+
+
+def mean_wish(mechanism, goal, posture, room, j):
+    """Return the weighted mean of the ways from joint j's children to their wishes."""
+    total, mean = 0.0, (0.0, 0.0, 0.0)
+    for e in range(len(mechanism.effectors)):
+        if mechanism.effectors[e, HANGS] == j:
+            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
+            mean = add(mean, scale(goal[e, WEIGHT], subtract(way, arm)))
+            total += goal[e, WEIGHT]
+    for c in range(j + 1, len(room.wishes)):
+        if mechanism.joints.integers[c, PARENT] == j and room.wishes[c, WISHED] > 0.0:
+            arm, way = joint_and_wish(mechanism, posture, room, c, j)
+            mean = add(mean, scale(room.wishes[c, WISHED], subtract(way, arm)))
+            total += room.wishes[c, WISHED]
+    return scale(1.0 / total, mean) if total > 0.0 else mean
+
+
+def arm_and_wish(mechanism, goal, posture, e, j):
+    """Return where an effector is and should be, seen from joint j, in the world's axes [m]."""
+    x = vector_at(mechanism.tips, e, ARM)
+    arm = seen_from(mechanism.joints, posture, j, mechanism.effectors[e, HANGS], x)
+    return arm, subtract(vector_at(goal, e, POSITION), vector_at(posture.positions, j))
+
+
+def joint_and_wish(mechanism, posture, room, c, j):
+    """Return where a joint below is and should be, seen from joint j, in the world's axes [m]."""
+    x, _ = joint_transform(mechanism.joints, c, posture.q)
+    arm = seen_from(mechanism.joints, posture, j, mechanism.joints.integers[c, PARENT], x)
+    return arm, subtract(vector_at(room.wishes, c), vector_at(posture.positions, j))
+
+
+def seen_from(joints, posture, j, k, x):
+    """Return a point of the frame of joint k, below j or j itself, seen from j, in world axes."""
+    while k != j:
+        way, R = joint_transform(joints, k, posture.q)
+        x = add(way, rotate(R, x))
+        k = joints.integers[k, PARENT]
+    return rotate(quaternion_at(posture.rotations, j), x)
+
+
+def rotation_below(mechanism, posture, j, e):
+    """Return the rotation of an effector as the coordinates from joint j down have it."""
+    R, k = quaternion_at(mechanism.tips, e, TURN), mechanism.effectors[e, HANGS]
+    while k != j:
+        _, R_joint = joint_transform(mechanism.joints, k, posture.q)
+        R, k = multiply(R_joint, R), mechanism.joints.integers[k, PARENT]
+    return multiply(quaternion_at(posture.rotations, j), R)

@@ -5,6 +5,7 @@ Steps towards a target beyond reach do not die down: it may swing about the stra
 
 from ..quaternion import dot, scale
 from .jacobian import linearise, times, turn_joints
+from .stacked import linearise_all, take_step, transposed_step
 
 
 def jacobian_transpose_sweep(chain, target):
@@ -17,3 +18,10 @@ def jacobian_transpose_sweep(chain, target):
     move = times(A, e)
     if dot(move, move) > 0.0:
         turn_joints(chain, scale(dot(e, move) / dot(move, move), e))
+
+
+def jacobian_transpose_update(mechanism, goal, posture, room):
+    """Change the coordinates by a J' e with the same a, within their limits."""
+    linearise_all(mechanism, goal, posture, room.stack)
+    transposed_step(mechanism, posture, room.stack)
+    take_step(mechanism, posture, room.stack)

@@ -8,6 +8,7 @@ error, and convergence is quadratic even where the Jacobian loses rank.
 
 from ..quaternion import dot
 from .jacobian import linearise, solve_damped, turn_joints
+from .stacked import damped_step, linearise_all, squared, take_step
 
 # Over the reach squared; it only keeps a division by zero away.
 BIAS = 1e-24
@@ -18,3 +19,11 @@ def levenberg_marquardt_sweep(chain, target):
     e, A = linearise(chain, target)
     damping = 0.5 * dot(e, e) + BIAS * chain.reach * chain.reach
     turn_joints(chain, solve_damped(A, damping, e))
+
+
+def levenberg_marquardt_update(mechanism, goal, posture, room):
+    """Change the coordinates by J' (J J' + mu 1)^-1 e, within their limits."""
+    linearise_all(mechanism, goal, posture, room.stack)
+    damping = 0.5 * squared(room.stack.e) + BIAS * mechanism.reach * mechanism.reach
+    damped_step(mechanism, posture, room.stack, damping)
+    take_step(mechanism, posture, room.stack)

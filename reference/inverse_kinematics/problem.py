@@ -1,11 +1,13 @@
 """What is asked of a solver, and what it answers."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from .. import arguments
+from .. import arguments, rotation
 from ..arguments import FloatArray, IndexArray
+from ..articulation import Articulation
 from ..outcome import Outcome
 from ..skeleton import Skeleton
 
@@ -15,11 +17,15 @@ class Target(NamedTuple):
 
     Attributes:
         position: global position [m], shape (3,), or (..., 3) for a batch.
+        rotation: global rotation, shape (4,) or (..., 4); None if any will do.
         effector: the joint, by index or name.
+        weight: how much its squared error counts beside those of other targets.
     """
 
     position: ArrayLike
+    rotation: ArrayLike | None = None
     effector: int | str = -1
+    weight: float = 1.0
 
 
 class IKSolution(NamedTuple):
@@ -28,11 +34,16 @@ class IKSolution(NamedTuple):
     Attributes:
         local_rotations: the pose found, shape (..., joint, 4).
         positions: all joints' global positions in that pose [m], shape (..., joint, 3).
-        residual: distance from effector to target [m], by forward kinematics of the pose.
+        residual: distance from effector to target [m], by forward kinematics of the pose; the
+            largest of several.
         iterations: how many were made.
         outcome: how it ended; for a batch an integer array of Outcome values.
         history: residuals [m] before and after each iteration, shape (..., iterations + 1) if
             recorded, else empty. In a batch each row repeats its last residual to the longest.
+        residual_rotation: angle from effector to target [rad], the largest of several; 0 where no
+            rotation is asked for.
+        coordinates: the pose found as what was given for a start: the coordinates of an
+            Articulation, (..., coordinate), or the local rotations of a Skeleton.
     """
 
     local_rotations: FloatArray
@@ -41,24 +52,77 @@ class IKSolution(NamedTuple):
     iterations: int | IndexArray
     outcome: Outcome | IndexArray
     history: FloatArray
+    residual_rotation: float | FloatArray
+    coordinates: FloatArray
 
 
-def checked_target(skeleton: Skeleton, target: Any, effector: int | str) -> tuple[FloatArray, int]:
-    """Return the target's position, (..., 3), and the effector's index.
+class Wanted(NamedTuple):
+    """A target, checked but for its numbers, which the kernels look at.
+
+    Attributes:
+        joint: the effector's index.
+        position: [m], (..., 3).
+        rotation: (..., 4), or None.
+        weight: greater than zero.
+    """
+
+    joint: int
+    position: FloatArray
+    rotation: FloatArray | None
+    weight: float
+
+
+def checked_targets(
+    model: Skeleton | Articulation,
+    target: ArrayLike | Target | Sequence[Target],
+    effector: int | str,
+) -> list[Wanted]:
+    """Return what is wanted of each effector.
 
     Raises:
-        ValueError: if it is no position or target, several targets, or not finite; if there is no
-            such joint, or the target and the argument name different ones.
+        ValueError: if it is no position or target; if there is no such joint, two targets are for
+            the same one, or target and argument name different ones.
     """
-    if isinstance(target, list | tuple) and target and isinstance(target[0], Target):
-        if len(target) > 1:
-            raise ValueError(f"target: expected one target, got {len(target)}")
-        target = target[0]
-    joint = skeleton.index(effector, "effector")
-    if isinstance(target, Target):
-        if effector != -1 and joint != skeleton.index(target.effector, "effector"):
-            raise ValueError(
-                f"effector: expected that of the target, {target.effector!r}, got {effector!r}"
-            )
-        joint, target = skeleton.index(target.effector, "effector"), target.position
-    return arguments.coordinates("target", target, "...", 3), joint
+    if not isinstance(target, Target):
+        several = isinstance(target, list | tuple) and any(isinstance(t, Target) for t in target)
+        if not several:
+            joint = model.index(effector, "effector")
+            return [Wanted(joint, _position(target), None, 1.0)]
+    targets = [target] if isinstance(target, Target) else list(target)
+    wanted = [_checked(model, one, effector) for one in targets]
+    joints = [one.joint for one in wanted]
+    if len(set(joints)) < len(joints):
+        twice = next(joint for joint in joints if joints.count(joint) > 1)
+        raise ValueError(f"target: expected one an effector, got two for joint {twice}")
+    return wanted
+
+
+def _checked(model: Skeleton | Articulation, target: Any, effector: int | str) -> Wanted:
+    if not isinstance(target, Target):
+        raise ValueError(f"target: expected only Targets beside others, got {target!r:.80}")
+    joint = model.index(target.effector, "effector")
+    if effector != -1 and joint != model.index(effector, "effector"):
+        raise ValueError(
+            f"effector: expected that of the target, {target.effector!r}, got {effector!r}"
+        )
+    turn = target.rotation
+    if turn is not None:
+        turn = arguments.floats("rotation", turn, "...", 4)
+    weight = arguments.number("weight", target.weight, above=0.0)
+    return Wanted(joint, _position(target.position), turn, weight)
+
+
+def _position(value: Any) -> FloatArray:
+    return arguments.floats("target", value, "...", 3)
+
+
+def check_numbers(wanted: list[Wanted]) -> None:
+    """Look at the numbers of what is wanted, where the kernels have found that something is amiss.
+
+    Raises:
+        ValueError: if a position is not finite or too large, or a rotation no unit quaternion.
+    """
+    for one in wanted:
+        arguments.coordinates("target", one.position, "...", 3)
+        if one.rotation is not None:
+            rotation.unit("rotation", one.rotation)

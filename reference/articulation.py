@@ -1,0 +1,617 @@
+"""Hinge, slide, ball, free and fixed joints with limits: coordinates q to local transforms.
+
+A joint's frame sits in its parent's at an offset and a rotation, its *frame*. Its coordinates move
+it from there: a hinge turns about its axis and a slide shifts along it, a ball turns by a unit
+quaternion, a free joint shifts and turns, a fixed one stays. A mimic joint is a hinge or a slide
+whose coordinate is that of another one, times a multiplier, plus a shift.
+"""
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import arguments, rotation
+from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray, frozen
+from .compiled import TwoSpeeds
+from .quaternion import (
+    IDENTITY,
+    add,
+    dot,
+    exponential,
+    logarithm,
+    made_unit,
+    multiply,
+    normalised,
+    perpendicular,
+    put_quaternion,
+    put_vector,
+    quaternion_at,
+    rotate,
+    scale,
+    turn_about,
+    vector_at,
+)
+from .skeleton import Skeleton, checked_skeleton
+
+
+class Joint(IntEnum):
+    """The kinds of joints."""
+
+    FIXED = 0
+    HINGE = 1
+    SLIDE = 2
+    BALL = 3
+    FREE = 4
+
+
+FIXED, HINGE, SLIDE, BALL, FREE = (int(kind) for kind in Joint)
+KINDS = tuple(kind.name.lower() for kind in Joint)
+# How many coordinates and how many degrees of freedom each kind has.
+WIDTHS = np.array([0, 1, 1, 4, 7])
+FREEDOMS = np.array([0, 1, 1, 3, 6])
+# A coordinate may be so far outside its limits [rad or m] and still count as within.
+LIMIT_TOLERANCE = 1e-9
+# Columns of JointArrays.integers: the parent, the kind, where the coordinates begin in q and the
+# degrees of freedom among all (a mimic joint's are its leader's), and the leader, or the joint.
+PARENT, KIND, AT, FREEDOM, LEADER = range(5)
+# Columns of JointArrays.numbers: where the three of the offset [m], the four of the frame and the
+# three of the axis begin; the limits [rad or m]; multiplier and shift of the coordinate.
+OFFSET, FRAME, AXIS, LOWER, UPPER, CONE, MULTIPLIER, SHIFT = 0, 3, 7, 10, 11, 12, 13, 14
+
+
+class JointArrays(NamedTuple):
+    """What the kernels read of an articulation, a row a joint.
+
+    Attributes:
+        integers: (joint, 5).
+        numbers: (joint, 15).
+    """
+
+    integers: IndexArray
+    numbers: FloatArray
+
+
+class Mimic(NamedTuple):
+    """A joint that moves with another: q = multiplier q_leader + shift.
+
+    Attributes:
+        leader: the joint followed, by index or name.
+        multiplier: of its coordinate.
+        shift: added to that [rad or m].
+    """
+
+    leader: int | str
+    multiplier: float = 1.0
+    shift: float = 0.0
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class Articulation:
+    """A tree of joints of several kinds, with limits.
+
+    Its coordinates q, shape (..., coordinate), take the place of local rotations wherever a
+    Skeleton's would be given. They hold, joint after joint, nothing for a fixed or mimic joint, an
+    angle [rad] for a hinge, a way [m] for a slide, a unit quaternion, w first, for a ball, and a
+    position [m] and a quaternion for a free joint.
+
+    Attributes:
+        skeleton: the tree: parents, offsets [m], names.
+        kinds: each joint's kind, one of "fixed", "hinge", "slide", "ball", "free".
+        frames: each joint's rotation in its parent's frame where its coordinates are zero, (joint,
+            4).
+        axes: unit axes of hinges and slides, and those about which balls twist, (joint, 3).
+        lower: least coordinate of hinges and slides, least twist of balls, (joint,).
+        upper: greatest of the same.
+        cones: how far the axis of a ball may tilt [rad], (joint,).
+        mimics: the joints that move with others.
+        arrays: what the kernels read; never to be written to.
+        mechanisms: what inverse kinematics has prepared, by effectors.
+    """
+
+    skeleton: Skeleton
+    kinds: tuple[str, ...]
+    frames: FloatArray
+    axes: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    cones: FloatArray
+    mimics: dict[int, Mimic]
+    arrays: JointArrays
+    mechanisms: dict[Any, Any]
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        kinds: str | Sequence[str] = "ball",
+        axes: ArrayLike = (0.0, 0.0, 1.0),
+        *,
+        frames: ArrayLike = IDENTITY,
+        lower: ArrayLike = -np.inf,
+        upper: ArrayLike = np.inf,
+        cones: ArrayLike = np.inf,
+        mimics: Mapping[int | str, Mimic] | None = None,
+    ) -> None:
+        """Check and copy; one value serves all joints.
+
+        Args:
+            skeleton: the tree; the offsets are those of the joints' frames.
+            kinds: of each joint.
+            axes: any length but zero.
+            frames: unit quaternions.
+            lower: limits of hinges [rad], slides [m] and of the twist of balls [rad].
+            upper: likewise.
+            cones: limits of the tilt of balls [rad].
+            mimics: which hinges and slides move with others.
+
+        Raises:
+            ValueError: naming the argument, if it has another shape, is out of range, an axis is
+                zero, limits cross or no twist could keep them, or a mimic joint or its leader is
+                no hinge or slide.
+        """
+        count = checked_skeleton(skeleton).joint_count
+        names = _checked_kinds(kinds, count)
+        lower, upper = _checked_limits(lower, upper, count)
+        follows = _checked_mimics(mimics or {}, skeleton, names)
+        number = np.array([KINDS.index(kind) for kind in names])
+        _check_twists(number, lower, upper)
+        frames = _checked_frames(frames, count)
+        axes, cones = _checked_axes(axes, count), _checked_cones(cones, count)
+        layout, linear = _layout(number, follows)
+        bounds = np.column_stack([lower, upper, cones])
+        arrays = JointArrays(
+            np.column_stack([skeleton.parents, *layout]).astype(np.int64),
+            np.column_stack([skeleton.offsets, frames, axes, bounds, *linear]),
+        )
+        self.__dict__.update(
+            skeleton=skeleton, kinds=names, mimics=follows, arrays=arrays, mechanisms={},
+            frames=frozen(frames), axes=frozen(axes), cones=frozen(cones),
+            lower=frozen(lower), upper=frozen(upper),
+        )  # fmt: skip
+
+    @property
+    def joint_count(self) -> int:
+        """Number of joints, fixed ones and the root included."""
+        return self.skeleton.joint_count
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The joints' names."""
+        return self.skeleton.names
+
+    @functools.cached_property
+    def coordinate_count(self) -> int:
+        """How many coordinates q has."""
+        return int(WIDTHS[self.arrays.integers[self._leading, KIND]].sum())
+
+    @functools.cached_property
+    def freedom_count(self) -> int:
+        """How many degrees of freedom there are: what a velocity has."""
+        return int(FREEDOMS[self.arrays.integers[self._leading, KIND]].sum())
+
+    @property
+    def limited(self) -> bool:
+        """Whether any joint has limits."""
+        return bool(np.isfinite([self.lower, self.upper, self.cones]).any())
+
+    def index(self, joint: int | str, argument: str = "joint") -> int:
+        """Return the index of a joint given by name or index; negative ones count from the end.
+
+        Raises:
+            ValueError: if there is no such joint; it speaks of the argument named.
+        """
+        return self.skeleton.index(joint, argument)
+
+    def coordinates_of(self, joint: int | str) -> slice:
+        """Return where a joint's coordinates are in q, of a mimic joint its leader's.
+
+        Raises:
+            ValueError: if there is no such joint.
+        """
+        j = self.index(joint)
+        begin = int(self.arrays.integers[j, AT])
+        return slice(begin, begin + int(WIDTHS[self.arrays.integers[j, KIND]]))
+
+    def freedoms_of(self, joint: int | str) -> slice:
+        """Return where a joint's degrees of freedom are in a velocity, likewise.
+
+        Raises:
+            ValueError: if there is no such joint.
+        """
+        j = self.index(joint)
+        begin = int(self.arrays.integers[j, FREEDOM])
+        return slice(begin, begin + int(FREEDOMS[self.arrays.integers[j, KIND]]))
+
+    def neutral(self) -> FloatArray:
+        """Return the coordinates in which every joint is at zero, or at its nearest limit."""
+        return self.clamp(self.zero())
+
+    def zero(self) -> FloatArray:
+        """Return the coordinates in which every joint is at zero, limits or not."""
+        q = np.zeros(self.coordinate_count)
+        for turn in self._turns:
+            q[turn.start] = 1.0
+        return q
+
+    def random(self, rng: np.random.Generator, *shape: int) -> FloatArray:
+        """Return coordinates drawn evenly within the limits, (..., coordinate).
+
+        Without limits a hinge is drawn from a whole turn, a slide or a free joint from within a
+        metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
+        """
+        q = np.empty((math.prod(shape), self.coordinate_count))
+        for j in self._leading:
+            where = self.coordinates_of(int(j))
+            q[:, where] = _drawn(rng, self, int(j), len(q))
+        return q.reshape(*shape, self.coordinate_count)
+
+    def clamp(self, q: ArrayLike) -> FloatArray:
+        """Return the coordinates with each joint brought within its limits the short way.
+
+        Raises:
+            ValueError: if q has another shape, is not finite, or holds no unit quaternion where
+                one is expected.
+        """
+        given = self.checked("q", q)
+        result = given.copy()
+        _clamp(self.arrays, one_batch(result))
+        return result
+
+    def within_limits(self, q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> np.ndarray:
+        """Return whether each q keeps all limits to a tolerance [rad or m], shape (...).
+
+        Raises:
+            ValueError: as for `clamp`.
+        """
+        given = self.checked("q", q)
+        excess = np.empty(given.shape[:-1])
+        _excess(self.arrays, one_batch(given), excess.reshape(-1))
+        return excess <= tolerance
+
+    def local_transforms(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return each joint's position [m] and rotation in its parent's frame.
+
+        The shapes are (..., joint, 3) and (..., joint, 4).
+
+        Raises:
+            ValueError: as for `clamp`.
+        """
+        given = self.checked("q", q)
+        shape = (*given.shape[:-1], self.joint_count)
+        offsets, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
+        _locals(self.arrays, one_batch(given), one_batch(offsets, 2), one_batch(rotations, 2))
+        return offsets, rotations
+
+    def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4).
+
+        Raises:
+            ValueError: as for `clamp`.
+        """
+        given = self.checked("q", q)
+        shape = (*given.shape[:-1], self.joint_count)
+        positions, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
+        _forward(self.arrays, one_batch(given), one_batch(positions, 2), one_batch(rotations, 2))
+        return positions, rotations
+
+    def checked(self, name: str, q: ArrayLike) -> FloatArray:
+        """Return coordinates (..., coordinate), their quaternions made unit.
+
+        Raises:
+            ValueError: if the shape is another, they are not finite, or a quaternion is further
+                than 1e-6 from unit length.
+        """
+        given = arguments.coordinates(name, q, "...", self.coordinate_count)
+        if not self._turns:
+            return given
+        result = given.copy()
+        for turn in self._turns:
+            result[..., turn] = rotation.unit(name, given[..., turn])
+        return result
+
+    @functools.cached_property
+    def _turns(self) -> list[slice]:
+        """Where in q quaternions are."""
+        ends = [self.coordinates_of(int(j)).stop for j in self._leading if self._is_turning(j)]
+        return [slice(end - 4, end) for end in ends]
+
+    def _is_turning(self, j: int) -> bool:
+        return self.kinds[j] in ("ball", "free")
+
+    @functools.cached_property
+    def _leading(self) -> IndexArray:
+        """Return the joints that have coordinates of their own."""
+        own = self.arrays.integers[:, KIND] != FIXED
+        own[list(self.mimics)] = False
+        return np.flatnonzero(own)
+
+    def __repr__(self) -> str:
+        return f"Articulation({self.joint_count} joints, {self.freedom_count} degrees of freedom)"
+
+
+def one_batch(values: np.ndarray, axes: int = 1) -> np.ndarray:
+    """Return a view whose leading axes, all but the last so many, are joined into one."""
+    return values.reshape(math.prod(values.shape[:-axes]), *values.shape[-axes:])
+
+
+def joint_transform(joints, j, q):
+    """Return a joint's position and rotation in its parent's frame."""
+    x, R = vector_at(joints.numbers, j, OFFSET), quaternion_at(joints.numbers, j, FRAME)
+    kind, at = joints.integers[j, KIND], joints.integers[j, AT]
+    if kind == HINGE:
+        angle = joints.numbers[j, MULTIPLIER] * q[at] + joints.numbers[j, SHIFT]
+        R = multiply(R, turn_about(vector_at(joints.numbers, j, AXIS), angle))
+    elif kind == SLIDE:
+        way = joints.numbers[j, MULTIPLIER] * q[at] + joints.numbers[j, SHIFT]
+        x = add(x, rotate(R, scale(way, vector_at(joints.numbers, j, AXIS))))
+    elif kind == BALL:
+        R = multiply(R, (q[at], q[at + 1], q[at + 2], q[at + 3]))
+    elif kind == FREE:
+        x = add(x, rotate(R, (q[at], q[at + 1], q[at + 2])))
+        R = multiply(R, (q[at + 3], q[at + 4], q[at + 5], q[at + 6]))
+    return x, R
+
+
+def swing_twist(Q, axis):
+    """Return swing S and twist angle t [rad] of Q = S exp(t axis): t turns about the axis first."""
+    along = dot((Q[1], Q[2], Q[3]), axis)
+    if Q[0] == 0.0 and along == 0.0:  # half a turn about an axis across: any twist would do
+        return Q, 0.0
+    twist = 2.0 * math.atan2(along, Q[0])
+    if twist > math.pi:
+        twist -= 2.0 * math.pi
+    elif twist <= -math.pi:
+        twist += 2.0 * math.pi
+    return multiply(Q, turn_about(axis, -twist)), twist
+
+
+def clamp_ball(Q, axis, lower, upper, cone):
+    """Return the rotation with its swing cut down to the cone and its twist to its range."""
+    swing, twist = swing_twist(Q, axis)
+    tilt = logarithm(swing)
+    angle = math.sqrt(dot(tilt, tilt))
+    bounded = min(max(twist, lower), upper)
+    if angle <= cone and bounded == twist:
+        return Q
+    if angle > cone:
+        swing = exponential(scale(cone / angle, tilt))
+    return normalised(multiply(swing, turn_about(axis, bounded)))
+
+
+def clamp_joint(joints, j, q):
+    """Bring the coordinates of one joint within its limits."""
+    kind, at = joints.integers[j, KIND], joints.integers[j, AT]
+    if joints.integers[j, LEADER] != j:
+        return
+    if kind in (HINGE, SLIDE):
+        q[at] = min(max(q[at], joints.numbers[j, LOWER]), joints.numbers[j, UPPER])
+    elif kind == BALL:
+        Q = (q[at], q[at + 1], q[at + 2], q[at + 3])
+        bounds = joints.numbers[j, LOWER], joints.numbers[j, UPPER], joints.numbers[j, CONE]
+        w, x, y, z = clamp_ball(Q, vector_at(joints.numbers, j, AXIS), *bounds)
+        q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
+
+
+def joint_excess(joints, j, q):
+    """Return by how much [rad or m] the coordinates of one joint are outside its limits."""
+    kind, at = joints.integers[j, KIND], joints.integers[j, AT]
+    if joints.integers[j, LEADER] != j:
+        return 0.0
+    if kind in (HINGE, SLIDE):
+        return max(joints.numbers[j, LOWER] - q[at], q[at] - joints.numbers[j, UPPER], 0.0)
+    if kind == BALL:
+        swing, twist = swing_twist(
+            (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints.numbers, j, AXIS)
+        )
+        tilt = logarithm(swing)
+        over = math.sqrt(dot(tilt, tilt)) - joints.numbers[j, CONE]
+        return max(joints.numbers[j, LOWER] - twist, twist - joints.numbers[j, UPPER], over, 0.0)
+    return 0.0
+
+
+def fit_start(joints, q):
+    """Make the quaternions among coordinates unit; return whether they and all others were fit.
+
+    Fit are numbers up to 1e75, and quaternions unit within 1e-6.
+    """
+    fine = True
+    for k in range(len(q)):
+        fine &= abs(q[k]) <= LARGEST_COORDINATE
+    for j in range(len(joints.integers)):
+        kind = joints.integers[j, KIND]
+        if kind in (BALL, FREE):
+            at = joints.integers[j, AT] + (3 if kind == FREE else 0)
+            Q, unit = made_unit((q[at], q[at + 1], q[at + 2], q[at + 3]))
+            q[at], q[at + 1], q[at + 2], q[at + 3] = Q
+            fine &= unit
+    return fine
+
+
+def articulated_pose(joints, q, positions, rotations):
+    """Fill global positions (joint, 3) and rotations (joint, 4) of one q."""
+    for j in range(len(joints.integers)):
+        x, R = joint_transform(joints, j, q)
+        if joints.integers[j, PARENT] >= 0:
+            R_parent = quaternion_at(rotations, joints.integers[j, PARENT])
+            x = add(vector_at(positions, joints.integers[j, PARENT]), rotate(R_parent, x))
+            R = multiply(R_parent, R)
+        put_vector(positions, j, x)
+        put_quaternion(rotations, j, R)
+
+
+def _clamp_batch(joints, q):
+    for i in range(len(q)):
+        for j in range(len(joints.integers)):
+            clamp_joint(joints, j, q[i])
+
+
+def _excess_batch(joints, q, excess):
+    for i in range(len(q)):
+        excess[i] = 0.0
+        for j in range(len(joints.integers)):
+            excess[i] = max(excess[i], joint_excess(joints, j, q[i]))
+
+
+def _locals_batch(joints, q, offsets, rotations):
+    for i in range(len(q)):
+        for j in range(len(joints.integers)):
+            x, R = joint_transform(joints, j, q[i])
+            put_vector(offsets[i], j, x)
+            put_quaternion(rotations[i], j, R)
+
+
+def _forward_batch(joints, q, positions, rotations):
+    for i in range(len(q)):
+        articulated_pose(joints, q[i], positions[i], rotations[i])
+
+
+_clamp = TwoSpeeds(_clamp_batch)
+_excess = TwoSpeeds(_excess_batch)
+_locals = TwoSpeeds(_locals_batch)
+_forward = TwoSpeeds(_forward_batch)
+
+
+def _checked_kinds(kinds: str | Sequence[str], count: int) -> tuple[str, ...]:
+    given = (kinds,) * count if isinstance(kinds, str) else tuple(kinds)
+    if len(given) != count:
+        raise ValueError(f"kinds: expected {count} kinds, one a joint, got {len(given)}")
+    return tuple(arguments.choice("kinds", kind, KINDS) for kind in given)
+
+
+def _checked_frames(frames: ArrayLike, count: int) -> FloatArray:
+    given = rotation.unit("frames", frames)
+    _one_a_joint("frames", given.shape[:-1], count)
+    return arguments.spread(given, (count, 4))
+
+
+def _checked_axes(axes: ArrayLike, count: int) -> FloatArray:
+    given = arguments.coordinates("axes", axes, "...", 3)
+    _one_a_joint("axes", given.shape[:-1], count)
+    lengths = np.linalg.norm(given, axis=-1, keepdims=True)
+    if (lengths == 0.0).any():
+        raise ValueError("axes: expected axes that are not zero, got (0, 0, 0)")
+    return arguments.spread(given / lengths, (count, 3))
+
+
+def _checked_limits(
+    lower: ArrayLike, upper: ArrayLike, count: int
+) -> tuple[FloatArray, FloatArray]:
+    bounds = []
+    for name, value in (("lower", lower), ("upper", upper)):
+        given = arguments.floats(name, value, "...")
+        _one_a_joint(name, given.shape, count)
+        if np.isnan(given).any():
+            raise ValueError(f"{name}: expected numbers or infinity, got NaN")
+        bounds.append(arguments.spread(given, (count,)))
+    crossed = np.flatnonzero(bounds[0] > bounds[1])
+    if len(crossed):
+        j = crossed[0]
+        raise ValueError(
+            f"lower: expected at most the upper limit, {bounds[1][j]:g}, got {bounds[0][j]:g} "
+            f"for joint {j}"
+        )
+    return bounds[0], bounds[1]
+
+
+def _check_twists(kinds: IndexArray, lower: FloatArray, upper: FloatArray) -> None:
+    """Refuse limits of balls that no twist, from -pi to pi, could keep."""
+    beyond = np.flatnonzero((kinds == BALL) & ((lower > np.pi) | (upper < -np.pi)))
+    if len(beyond):
+        j = beyond[0]
+        raise ValueError(
+            f"lower: expected limits of a ball's twist within -pi to pi, got {lower[j]:g} to "
+            f"{upper[j]:g} for joint {j}"
+        )
+
+
+def _checked_cones(cones: ArrayLike, count: int) -> FloatArray:
+    given = arguments.floats("cones", cones, "...")
+    _one_a_joint("cones", given.shape, count)
+    if not (given >= 0.0).all():
+        raise ValueError(f"cones: expected angles of at least 0, got {given.min():g}")
+    return arguments.spread(given, (count,))
+
+
+def _one_a_joint(name: str, batch: tuple[int, ...], count: int) -> None:
+    if batch not in ((), (count,)):
+        raise ValueError(f"{name}: expected one, or one for each of {count} joints, got {batch}")
+
+
+def _checked_mimics(
+    mimics: Mapping[int | str, Mimic], skeleton: Skeleton, kinds: tuple[str, ...]
+) -> dict[int, Mimic]:
+    """Return the mimics by index, each with a leader that is no mimic joint itself."""
+    named = {skeleton.index(joint, "mimics"): Mimic(*mimic) for joint, mimic in mimics.items()}
+    checked = {}
+    for joint, (leader, multiplier, shift) in named.items():
+        first, seen = skeleton.index(leader, "mimics"), {joint}
+        multiplier = arguments.number("mimics", multiplier)
+        shift = arguments.number("mimics", shift)
+        while first in named:
+            if first in seen:
+                raise ValueError(
+                    f"mimics: expected a leader, got {skeleton.names[joint]!r} in a ring"
+                )
+            seen.add(first)
+            _, factor, further = named[first]
+            first, multiplier, shift = (
+                skeleton.index(named[first].leader, "mimics"),
+                multiplier * factor,
+                multiplier * further + shift,
+            )
+        for j in (joint, first):
+            if kinds[j] not in ("hinge", "slide"):
+                raise ValueError(
+                    f"mimics: expected hinges or slides, got {kinds[j]!r} for joint {j}"
+                )
+        checked[joint] = Mimic(first, multiplier, shift)
+    return checked
+
+
+def _layout(
+    kinds: IndexArray, mimics: Mapping[int, Mimic]
+) -> tuple[tuple[IndexArray, ...], tuple[FloatArray, FloatArray]]:
+    """Return kinds, starts of coordinates and freedoms, and leaders; multipliers and shifts."""
+    widths, freedoms = WIDTHS[kinds], FREEDOMS[kinds]
+    followers = list(mimics)
+    widths[followers] = freedoms[followers] = 0
+    at, freedom = np.cumsum(widths) - widths, np.cumsum(freedoms) - freedoms
+    leaders = np.arange(len(kinds))
+    multipliers, shifts = np.ones(len(kinds)), np.zeros(len(kinds))
+    for joint, (leader, multiplier, shift) in mimics.items():
+        leaders[joint], multipliers[joint], shifts[joint] = leader, multiplier, shift
+    return (kinds, at[leaders], freedom[leaders], leaders), (multipliers, shifts)
+
+
+def _drawn(rng: np.random.Generator, joints: Articulation, j: int, count: int) -> FloatArray:
+    """Return random coordinates of one joint, (count, width)."""
+    kind, lower, upper = joints.kinds[j], joints.lower[j], joints.upper[j]
+    if kind in ("hinge", "slide"):
+        most = np.pi if kind == "hinge" else 1.0
+        lower, upper = _interval(lower, upper, most)
+        return rng.uniform(lower, upper, (count, 1))
+    if kind == "free":
+        return np.hstack([rng.uniform(-1.0, 1.0, (count, 3)), rotation.random(rng, count)])
+    if not np.isfinite([lower, upper, joints.cones[j]]).any():
+        return rotation.random(rng, count)
+    axis = joints.axes[j]
+    twist = rng.uniform(*_interval(lower, upper, np.pi), (count, 1)) * axis
+    heading = rng.uniform(-np.pi, np.pi, (count, 1))
+    first = np.array(perpendicular(tuple(axis)))
+    across = np.cos(heading) * first + np.sin(heading) * np.cross(axis, first)
+    tilt = np.arccos(rng.uniform(np.cos(min(joints.cones[j], np.pi)), 1.0, (count, 1)))
+    return rotation.multiply(rotation.exponential(tilt * across), rotation.exponential(twist))
+
+
+def _interval(lower: float, upper: float, most: float) -> tuple[float, float]:
+    """Return the limits, or where one is missing so far from the other, or from zero."""
+    if np.isinf(lower) and np.isinf(upper):
+        return -most, most
+    if np.isinf(lower):
+        return min(-most, upper - most), upper
+    return lower, (max(most, lower + most) if np.isinf(upper) else upper)

@@ -1,0 +1,273 @@
+"""The loops around a solver's update of a mechanism: one attempt, restarts, and many targets."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arguments import LARGEST_COORDINATE, FloatArray, IndexArray
+from ..articulation import (
+    BALL,
+    FREE,
+    HINGE,
+    KIND,
+    LEADER,
+    articulated_pose,
+    clamp_joint,
+    fit_start,
+    joint_transform,
+)
+from ..outcome import Outcome
+from ..quaternion import (
+    angle_between,
+    made_unit,
+    multiply,
+    norm,
+    normalised,
+    put_quaternion,
+    quaternion_at,
+    subtract,
+    turn_about,
+    vector_at,
+)
+from .batch import ITERATIONS, OUTCOME, RESIDUAL, RESIDUAL_ROTATION, fill_from
+from .chain import BEND, ROUNDING
+from .joint_moves import ball_at, move_by, put_ball
+from .levenberg_marquardt import levenberg_marquardt_update as update  # bound to each solver's
+from .mechanism import (
+    LEVER,
+    ORIENTED,
+    POSITION,
+    ROTATION,
+    new_posture,
+    place,
+    residuals,
+    too_far,
+)
+from .stacked import Stack, new_stack
+
+# An attempt that may be followed by another is given up once this many iterations have not brought
+# it this much nearer.
+PATIENCE, PROGRESS = 6, 0.75
+# A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
+NUDGE_AXIS = (0.48, 0.6, 0.64)
+
+
+class Room(NamedTuple):
+    """Room for a solver.
+
+    Attributes:
+        stack: of the Jacobian methods.
+        wishes: where FABRIK wishes joints to be [m], and by what weight, (joint, 4).
+        eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
+    """
+
+    stack: Stack
+    wishes: FloatArray
+    eigen: FloatArray
+
+
+class Request(NamedTuple):
+    """What is asked.
+
+    Attributes:
+        effectors: joints of the articulation, (effector,).
+        goals: where they shall be, (target, effector, 8), see `mechanism.py`.
+        tolerance: distance that counts as reached [m].
+        tolerance_rotation: angle that does [rad].
+        max_iterations: of each attempt.
+        restarts: coordinates of the mechanism for further attempts, (restart, coordinate).
+        chained: whether each target but the first starts from the solution before it.
+    """
+
+    effectors: IndexArray
+    goals: FloatArray
+    tolerance: float
+    tolerance_rotation: float
+    max_iterations: int
+    restarts: FloatArray
+    chained: bool
+
+
+class Answers(NamedTuple):
+    """What the kernel fills in, a row a target.
+
+    Attributes:
+        q: coordinates of the articulation, (target, coordinate).
+        local: local rotations, (target, joint, 4).
+        positions: of all joints [m], (target, joint, 3).
+        figures: see `batch.py`, (target, 4).
+        history: distances before and after each iteration [m], (target, iteration), or (1, 1).
+    """
+
+    q: FloatArray
+    local: FloatArray
+    positions: FloatArray
+    figures: FloatArray
+    history: FloatArray
+
+
+def answer_batch(joints, mechanism, columns, starts, request, answers):
+    """Answer target after target; return whether all starts and goals were fit to be computed with.
+
+    `starts`, (start, coordinate), are used in turn.
+    """
+    posture, best = new_posture(mechanism, len(columns)), np.empty(len(columns))
+    room, rotations = new_room(mechanism), np.empty((len(joints.integers), 4))
+    for i in range(len(request.goals)):
+        q, goal = answers.q[i], request.goals[i]
+        chained = request.chained and i > 0
+        copy(answers.q[i - 1] if chained else starts[i % len(starts)], q)
+        if not (fit_start(joints, q) and fit_goal(goal)):
+            return False
+        for c in range(len(columns)):
+            posture.q[c] = q[columns[c]]
+        history = answers.history[i % len(answers.history)]
+        iterations, stalled = attempts(mechanism, goal, posture, room, request, best, history)
+        for c in range(len(columns)):
+            q[columns[c]] = best[c]
+        articulated_pose(joints, q, answers.positions[i], rotations)
+        for j in range(len(joints.integers)):
+            _, Q = joint_transform(joints, j, q)
+            put_quaternion(answers.local[i], j, Q)
+        answers.figures[i, ITERATIONS] = iterations
+        conclude(mechanism, goal, request, answers, i, rotations, stalled)
+    return True
+
+
+def fit_goal(goal):
+    """Make the rotations of a goal unit; return whether they and all other numbers were fit."""
+    fine = True
+    for e in range(len(goal)):
+        for k in range(ROTATION):
+            fine &= abs(goal[e, k]) <= LARGEST_COORDINATE
+        Q, unit = made_unit(quaternion_at(goal, e, ROTATION))
+        goal[e, ROTATION], goal[e, ROTATION + 1], goal[e, ROTATION + 2], goal[e, ROTATION + 3] = Q
+        fine &= unit
+    return fine
+
+
+def new_room(mechanism):
+    """Return room for a solver of a mechanism."""
+    n = len(mechanism.joints.integers)
+    return Room(new_stack(mechanism), np.empty((n, 4)), np.empty((2, 4, 4)))
+
+
+def attempts(mechanism, goal, posture, room, request, best, history):
+    """Attempt from the posture, then from a bent one if that is stuck, then from the restarts.
+
+    Fills `best` with the coordinates of the best attempt.
+
+    Returns:
+        The iterations of all attempts, and whether the best one stalled.
+    """
+    more = len(request.restarts)
+    for joint in range(len(mechanism.joints.integers)):
+        clamp_joint(mechanism.joints, joint, posture.q)
+    place(mechanism, posture)
+    distance, _ = residuals(mechanism, goal, posture)
+    fill_from(history, 0, distance)
+    done, stalled, merit = attempt(mechanism, goal, posture, room, request, history, 0, more > 0)
+    copy(posture.q, best)
+    if done == 1 and stalled and merit > 0.0:
+        nudge(mechanism, posture)
+        done, stuck, nudged = attempt(
+            mechanism, goal, posture, room, request, history, done, more > 0
+        )
+        if nudged < merit:
+            copy(posture.q, best)
+            stalled, merit = stuck, nudged
+    for r in range(more):
+        if merit == 0.0:
+            break
+        copy(request.restarts[r], posture.q)
+        place(mechanism, posture)
+        done, stuck, again = attempt(
+            mechanism, goal, posture, room, request, history, done, r + 1 < more
+        )
+        if again < merit:
+            copy(posture.q, best)
+            stalled, merit = stuck, again
+    return done, stalled
+
+
+def attempt(mechanism, goal, posture, room, request, history, done, hasty):
+    """Update a placed posture until it reaches its goal, stalls, or has had its iterations.
+
+    Returns:
+        All iterations so far, whether it stalled, and its misfit [m], 0 if it reached its goal.
+    """
+    lever = LEVER * mechanism.reach
+    distance, angle = residuals(mechanism, goal, posture)
+    merit = distance + lever * angle
+    milestone, since = merit, 0
+    for i in range(request.max_iterations + 1):
+        if within(mechanism, request, distance, angle):
+            return done + i, False, 0.0
+        if i == request.max_iterations:
+            break
+        before = merit
+        update(mechanism, goal, posture, room)
+        distance, angle = residuals(mechanism, goal, posture)
+        merit = distance + lever * angle
+        fill_from(history, done + i + 1, distance)
+        since += 1
+        if merit < PROGRESS * milestone:
+            milestone, since = merit, 0
+        still = abs(before - merit) <= ROUNDING * mechanism.reach
+        if still or (hasty and since >= PATIENCE):
+            reached = within(mechanism, request, distance, angle)
+            return done + i + 1, not reached, 0.0 if reached else merit
+    return done + request.max_iterations, False, merit
+
+
+def within(mechanism, request, distance, angle):
+    """Return whether the tolerances are kept, with some room for the rounding of another pose."""
+    room = min(ROUNDING * mechanism.reach, 0.5 * request.tolerance)
+    angular = min(ROUNDING, 0.5 * request.tolerance_rotation)
+    return distance <= request.tolerance - room and angle <= request.tolerance_rotation - angular
+
+
+def nudge(mechanism, posture):
+    """Bend a stuck mechanism, always in the same way: every joint by a share of one angle."""
+    joints, q, count = mechanism.joints, posture.q, len(mechanism.joints.integers)
+    for j in range(count):
+        kind, angle = joints.integers[j, KIND], BEND / count
+        if joints.integers[j, LEADER] != j:
+            continue
+        if kind == HINGE and move_by(joints, q, j, angle) == 0.0:
+            move_by(joints, q, j, -angle)
+        elif kind in (BALL, FREE):
+            turn = turn_about(NUDGE_AXIS, angle)
+            put_ball(joints, q, j, normalised(multiply(ball_at(joints, q, j), turn)))
+            clamp_joint(joints, j, q)
+    place(mechanism, posture)
+
+
+def conclude(mechanism, goal, request, answers, i, rotations, stalled):
+    """Fill residuals and outcome of a target from the pose of all joints."""
+    distance, angle = 0.0, 0.0
+    for e in range(len(request.effectors)):
+        j = request.effectors[e]
+        way = subtract(vector_at(goal, e, POSITION), vector_at(answers.positions[i], j))
+        distance = max(distance, norm(way))
+        if mechanism.effectors[e, ORIENTED]:
+            wanted = quaternion_at(goal, e, ROTATION)
+            angle = max(angle, angle_between(quaternion_at(rotations, j), wanted))
+    answers.figures[i, RESIDUAL], answers.figures[i, RESIDUAL_ROTATION] = distance, angle
+    outcome = outcome_of(mechanism, goal, request, distance, angle, stalled)
+    answers.figures[i, OUTCOME] = outcome.value
+
+
+def outcome_of(mechanism, goal, request, distance, angle, stalled):
+    """Return how a solve ended: UNREACHABLE only where geometry proves it."""
+    if distance <= request.tolerance and angle <= request.tolerance_rotation:
+        return Outcome.CONVERGED
+    if too_far(mechanism, goal, request.tolerance + ROUNDING * mechanism.reach):
+        return Outcome.UNREACHABLE
+    return Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT
+
+
+def copy(source, target):
+    """Copy one row of numbers into another."""
+    for k in range(len(source)):
+        target[k] = source[k]

@@ -1,0 +1,206 @@
+"""From an articulation and its effectors to the mechanism that the solvers work on."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arguments import FloatArray, IndexArray
+from ..articulation import (
+    AT,
+    AXIS,
+    FIXED,
+    FRAME,
+    FREE,
+    FREEDOM,
+    FREEDOMS,
+    HINGE,
+    KIND,
+    LEADER,
+    LOWER,
+    MULTIPLIER,
+    OFFSET,
+    PARENT,
+    SHIFT,
+    SLIDE,
+    UPPER,
+    WIDTHS,
+    Articulation,
+    JointArrays,
+)
+from ..quaternion import IDENTITY, add, multiply, quaternion_at, rotate, vector_at
+from .mechanism import Mechanism
+
+# Points are in one spot if they are no further apart than this, over the reach.
+SPOT = 1e-9
+
+
+class Prepared(NamedTuple):
+    """A mechanism, and which of the articulation's coordinates are its own, (coordinate,)."""
+
+    mechanism: Mechanism
+    columns: IndexArray
+
+
+def prepare(
+    articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
+) -> Prepared:
+    """Return the mechanism that moves some effectors, made once and kept by the articulation."""
+    key = effectors, oriented
+    if key not in articulation.mechanisms:
+        articulation.mechanisms[key] = _prepared(articulation, effectors, oriented)
+    return articulation.mechanisms[key]
+
+
+def _prepared(
+    articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
+) -> Prepared:
+    whole = articulation.arrays
+    active = _active(articulation, effectors, oriented)
+    number = {int(j): k for k, j in enumerate(active)}
+    joints, columns = _moving_joints(whole, active, number)
+    hanging = [_hanging(whole, j, number) for j in effectors]
+    hangs = np.array([k for k, _, _ in hanging], dtype=np.int64)
+    arms = np.array([x for _, x, _ in hanging])
+    moves = _moves(joints, hangs)
+    ways = _ways(joints, moves, hangs, arms)
+    reach = float(ways.max()) or 1.0
+    sizes = np.where(oriented, 6, 3)
+    tops = [np.flatnonzero(column)[0] if column.any() else -1 for column in moves.T]
+    sees, sees_tip = _sight(joints, hangs, reach)
+    furthest = ways + np.where(moves, _travel(joints)[:, None], 0.0).sum(axis=0)
+    mechanism = Mechanism(
+        joints,
+        np.column_stack([hangs, np.cumsum(sizes) - sizes, oriented, tops]).astype(np.int64),
+        np.column_stack([arms, [R for _, _, R in hanging], furthest]),
+        moves + sees_tip,
+        sees,
+        _scales(joints, reach),
+        reach,
+        int(sizes.sum()),
+    )
+    return Prepared(mechanism, columns)
+
+
+def _active(
+    articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
+) -> IndexArray:
+    """Return the joints that move on the ways to the effectors, and on those to their leaders.
+
+    An effector's own ball or hinge turns it, but does not move it.
+    """
+    path, kinds = articulation.skeleton.path_array, articulation.arrays.integers[:, KIND]
+    needed: set[int] = set()
+    for joint, turned in zip(effectors, oriented, strict=True):
+        moving = turned or kinds[joint] in (SLIDE, FREE)
+        needed.update(path(joint).tolist() if moving else path(joint).tolist()[:-1])
+    for j in list(needed):
+        needed.update(path(int(articulation.arrays.integers[j, LEADER])).tolist())
+    return np.array([j for j in sorted(needed) if kinds[j] != FIXED], dtype=np.int64)
+
+
+def _merged(whole: JointArrays, joint: int, number: dict[int, int]):
+    """Return the nearest moving joint above, and this joint's frame in the frame of that one."""
+    x, R = vector_at(whole.numbers, joint, OFFSET), quaternion_at(whole.numbers, joint, FRAME)
+    j = int(whole.integers[joint, PARENT])
+    while j >= 0 and j not in number:
+        frame = quaternion_at(whole.numbers, j, FRAME)
+        x = add(vector_at(whole.numbers, j, OFFSET), rotate(frame, x))
+        R = multiply(frame, R)
+        j = int(whole.integers[j, PARENT])
+    return number.get(j, -1), x, R
+
+
+def _hanging(whole: JointArrays, joint: int, number: dict[int, int]):
+    """Return the moving joint an effector hangs on, and its place in the frame of that one."""
+    if joint in number:
+        return number[joint], (0.0, 0.0, 0.0), IDENTITY
+    return _merged(whole, joint, number)
+
+
+def _moving_joints(
+    whole: JointArrays, active: IndexArray, number: dict[int, int]
+) -> tuple[JointArrays, IndexArray]:
+    """Return the joints of the mechanism, and the columns of q that are theirs."""
+    leaders = np.array([number[int(i)] for i in whole.integers[active, LEADER]], dtype=np.int64)
+    own = leaders == np.arange(len(active))
+    kinds, at = whole.integers[active, KIND], whole.integers[active, AT]
+    widths, freedoms = np.where(own, WIDTHS[kinds], 0), np.where(own, FREEDOMS[kinds], 0)
+    integers, numbers = whole.integers[active], whole.numbers[active]
+    integers[:, AT] = (np.cumsum(widths) - widths)[leaders]
+    integers[:, FREEDOM] = (np.cumsum(freedoms) - freedoms)[leaders]
+    integers[:, LEADER] = leaders
+    for k, j in enumerate(active):
+        integers[k, PARENT], x, R = _merged(whole, int(j), number)
+        numbers[k, OFFSET : OFFSET + 3], numbers[k, FRAME : FRAME + 4] = x, R
+    columns = [np.arange(a, a + w) for a, w in zip(at, widths, strict=True)]
+    return JointArrays(integers, numbers), np.concatenate([*columns, np.empty(0, dtype=np.int64)])
+
+
+def _moves(joints: JointArrays, hangs: IndexArray) -> IndexArray:
+    moves = np.zeros((len(joints.integers), len(hangs)), dtype=np.int64)
+    for e, j in enumerate(hangs):
+        while j >= 0:
+            moves[j, e] = 1
+            j = joints.integers[j, PARENT]
+    return moves
+
+
+def _ways(
+    joints: JointArrays, moves: IndexArray, hangs: IndexArray, arms: FloatArray
+) -> FloatArray:
+    """Return the length of the links from the first joint to each effector [m], (effector,)."""
+    lengths = np.linalg.norm(joints.numbers[:, OFFSET : OFFSET + 3], axis=1)
+    lengths[joints.integers[:, PARENT] < 0] = 0.0
+    return moves.T @ lengths + np.where(hangs >= 0, np.linalg.norm(arms, axis=1), 0.0)
+
+
+def _sight(joints: JointArrays, hangs: IndexArray, reach: float) -> tuple[IndexArray, IndexArray]:
+    """Return `sees` and 1 where a joint sees an effector: the nearest that its turn can move.
+
+    A point on a hinge's axis or in a ball's centre stays, so that the next ones down are looked at.
+    """
+    parents, leaders = joints.integers[:, PARENT], joints.integers[:, LEADER]
+    count = len(parents)
+    sees = np.zeros((count, count), dtype=np.int64)
+    sees_tip = np.zeros((count, len(hangs)), dtype=np.int64)
+    for j in range(count):
+        still = {j}
+        for c in range(j + 1, count):
+            if parents[c] in still:
+                if _stays(joints, j, c, SPOT * reach):
+                    still.add(c)
+                else:
+                    sees[j, c] = 1
+        sees_tip[j] = np.isin(hangs, list(still))
+        sees[j, j] = np.count_nonzero(leaders == j) > (leaders[j] == j)
+    return sees, sees_tip
+
+
+def _stays(joints: JointArrays, j: int, c: int, margin: float) -> bool:
+    """Return whether turning joint j leaves joint c in place, if it does so with c's parent."""
+    offset = joints.numbers[c, OFFSET : OFFSET + 3]
+    if joints.integers[c, KIND] in (SLIDE, FREE):
+        return False
+    if joints.integers[c, PARENT] == j and joints.integers[j, KIND] == HINGE:
+        offset = np.cross(joints.numbers[j, AXIS : AXIS + 3], offset)
+    return bool(np.linalg.norm(offset) <= margin)
+
+
+def _travel(joints: JointArrays) -> FloatArray:
+    """Return how far each joint can carry things by itself [m], (joint,)."""
+    kinds, leaders = joints.integers[:, KIND], joints.integers[:, LEADER]
+    ends = np.abs(joints.numbers[leaders][:, [LOWER, UPPER]]).max(axis=1, initial=0.0)
+    factors = np.abs(joints.numbers[:, MULTIPLIER])
+    with np.errstate(invalid="ignore"):  # 0 times infinity: a follower that does not move
+        ways = np.where(factors > 0.0, factors * ends, 0.0) + np.abs(joints.numbers[:, SHIFT])
+    return np.where(kinds == SLIDE, ways, np.where(kinds == FREE, np.inf, 0.0))
+
+
+def _scales(joints: JointArrays, reach: float) -> FloatArray:
+    """Return 1 for each freedom of turning and the reach for each of shifting, (freedom,)."""
+    worth = {SLIDE: [reach], FREE: [reach] * 3 + [1.0] * 3}
+    scales: list[float] = []
+    for k, row in enumerate(joints.integers):
+        if row[LEADER] == k:
+            scales += worth.get(int(row[KIND]), [1.0] * int(FREEDOMS[row[KIND]]))
+    return np.array(scales)

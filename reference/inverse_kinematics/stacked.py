@@ -1,0 +1,327 @@
+"""What the Jacobian methods share on mechanisms: all effectors' errors and Jacobians stacked.
+
+Rows of e are the ways from effectors to targets [m], and, where rotations matter, the rotation
+vectors times a lever [m], each times the root of its effector's weight. J' is kept row by row, a
+row a degree of freedom. The damped step J' (J J' + damping 1)^-1 e needs a matrix of the size of e
+only, however many joints there are.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arguments import FloatArray
+from ..articulation import (
+    AT,
+    BALL,
+    FREE,
+    FREEDOM,
+    HINGE,
+    KIND,
+    LEADER,
+    LOWER,
+    MULTIPLIER,
+    SLIDE,
+    UPPER,
+    clamp_joint,
+)
+from ..quaternion import (
+    cross,
+    exponential,
+    logarithm,
+    multiply,
+    normalised,
+    quaternion_at,
+    rotate,
+    scale,
+    subtract,
+    vector_at,
+)
+from .mechanism import (
+    LEVER,
+    ORIENTED,
+    ROW,
+    WEIGHT,
+    axis_of,
+    frame_of,
+    place,
+    position_error,
+    tip,
+    wrong_turn,
+)
+
+
+class Stack(NamedTuple):
+    """Room for the linear system.
+
+    Attributes:
+        e: errors [m], (equation,).
+        J: the Jacobian transposed, each row times what a unit of its freedom is worth, (freedom,
+            equation).
+        A: J J' + damping and then its Cholesky factor, (equation, equation).
+        z: (A)^-1 e, (equation,).
+        step: of the freedoms, over what a unit is worth, (freedom,).
+        held: 1 where a limit stops a freedom, (freedom,).
+    """
+
+    e: FloatArray
+    J: FloatArray
+    A: FloatArray
+    z: FloatArray
+    step: FloatArray
+    held: FloatArray
+
+
+def new_stack(mechanism):
+    """Return room for the linear system of a mechanism."""
+    m, n = mechanism.equations, len(mechanism.scales)
+    return Stack(
+        np.empty(m), np.empty((n, m)), np.empty((m, m)), np.empty(m), np.empty(n), np.empty(n)
+    )
+
+
+def linearise_all(mechanism, goal, posture, stack):
+    """Fill e and J at a posture."""
+    lever = LEVER * mechanism.reach
+    for e in range(len(mechanism.effectors)):
+        row, root = mechanism.effectors[e, ROW], math.sqrt(goal[e, WEIGHT])
+        put(stack.e, row, scale(root, position_error(mechanism, goal, posture, e)))
+        if mechanism.effectors[e, ORIENTED]:
+            put(
+                stack.e,
+                row + 3,
+                scale(root * lever, logarithm(wrong_turn(mechanism, goal, posture, e))),
+            )
+    joints = mechanism.joints
+    for k in range(len(stack.J)):
+        clear(stack.J[k])
+    for j in range(len(joints.integers)):
+        R = quaternion_at(posture.rotations, j)
+        kind, k, factor = (
+            joints.integers[j, KIND],
+            joints.integers[j, FREEDOM],
+            joints.numbers[j, MULTIPLIER],
+        )
+        if kind == HINGE:
+            add_turn_row(
+                mechanism, goal, posture, stack, j, k, scale(factor, axis_of(joints, j, R))
+            )
+        elif kind == SLIDE:
+            add_shift_row(mechanism, goal, stack, j, k, scale(factor, axis_of(joints, j, R)))
+        elif kind == BALL:
+            add_turn_rows(mechanism, goal, posture, stack, j, k, R)
+        elif kind == FREE:
+            add_shift_rows(mechanism, goal, stack, j, k, frame_of(joints, j, posture))
+            add_turn_rows(mechanism, goal, posture, stack, j, k + 3, R)
+
+
+def add_turn_rows(mechanism, goal, posture, stack, j, k, R):
+    """Add to J the turns of joint j about the axes of its own frame, from freedom k on."""
+    add_turn_row(mechanism, goal, posture, stack, j, k, rotate(R, (1.0, 0.0, 0.0)))
+    add_turn_row(mechanism, goal, posture, stack, j, k + 1, rotate(R, (0.0, 1.0, 0.0)))
+    add_turn_row(mechanism, goal, posture, stack, j, k + 2, rotate(R, (0.0, 0.0, 1.0)))
+
+
+def add_shift_rows(mechanism, goal, stack, j, k, R):
+    """Add to J the shifts of joint j along the axes of a frame, from freedom k on."""
+    add_shift_row(mechanism, goal, stack, j, k, rotate(R, (1.0, 0.0, 0.0)))
+    add_shift_row(mechanism, goal, stack, j, k + 1, rotate(R, (0.0, 1.0, 0.0)))
+    add_shift_row(mechanism, goal, stack, j, k + 2, rotate(R, (0.0, 0.0, 1.0)))
+
+
+def add_turn_row(mechanism, goal, posture, stack, j, k, axis):
+    """Add to row k what a turn of joint j about a world axis does to the effectors below."""
+    lever, worth = LEVER * mechanism.reach, mechanism.scales[k]
+    x = vector_at(posture.positions, j)
+    for e in range(len(mechanism.effectors)):
+        if mechanism.moves[j, e]:
+            row, root = mechanism.effectors[e, ROW], worth * math.sqrt(goal[e, WEIGHT])
+            move = cross(axis, subtract(tip(mechanism, posture, e), x))
+            put_sum(stack.J[k], row, scale(root, move))
+            if mechanism.effectors[e, ORIENTED]:
+                put_sum(stack.J[k], row + 3, scale(root * lever, axis))
+
+
+def add_shift_row(mechanism, goal, stack, j, k, axis):
+    """Add to row k what a shift of joint j along a world axis does to the effectors below."""
+    for e in range(len(mechanism.effectors)):
+        if mechanism.moves[j, e]:
+            root = mechanism.scales[k] * math.sqrt(goal[e, WEIGHT])
+            put_sum(stack.J[k], mechanism.effectors[e, ROW], scale(root, axis))
+
+
+def clear(row):
+    """Set all entries of a row to zero."""
+    for i in range(len(row)):
+        row[i] = 0.0
+
+
+def put(row, i, v):
+    """Write a vector into three entries of a row."""
+    row[i], row[i + 1], row[i + 2] = v
+
+
+def put_sum(row, i, v):
+    """Add a vector to three entries of a row."""
+    row[i] += v[0]
+    row[i + 1] += v[1]
+    row[i + 2] += v[2]
+
+
+def squared(v):
+    """Return the sum of the squares of an array's entries."""
+    total = 0.0
+    for i in range(len(v)):
+        total += v[i] * v[i]
+    return total
+
+
+def damped_step(mechanism, posture, stack, damping):
+    """Fill the step J' (J J' + damping 1)^-1 e within the limits of hinges and slides.
+
+    A freedom that the step would take beyond its limit is held at it, its part of the way is taken
+    from e, and the others are asked again.
+    """
+    clear(stack.held)
+    clear(stack.step)
+    for _ in range(len(stack.step) + 1):
+        fill_matrix(stack, damping)
+        solve(stack)
+        for k in range(len(stack.step)):
+            if stack.held[k] == 0.0:
+                stack.step[k] = inner(stack.J[k], stack.z)
+        if not hold_limited(mechanism, posture, stack):
+            return
+
+
+def transposed_step(mechanism, posture, stack):
+    """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without what limits stop."""
+    clear(stack.held)
+    for _ in range(len(stack.step) + 1):
+        square, moved = along_gradient(stack)
+        for k in range(len(stack.step)):
+            if stack.held[k] == 0.0 and moved > 0.0:
+                stack.step[k] *= square / moved
+            else:
+                stack.step[k] = 0.0
+        if not stop_at_limits(mechanism, posture, stack):
+            return
+
+
+def along_gradient(stack):
+    """Fill the step J' e and z = J J' e over the freedoms not held; return <e, z> and |z|^2."""
+    clear(stack.z)
+    for k in range(len(stack.step)):
+        if stack.held[k] == 0.0:
+            stack.step[k] = inner(stack.J[k], stack.e)
+            for i in range(len(stack.z)):
+                stack.z[i] += stack.step[k] * stack.J[k, i]
+    return inner(stack.e, stack.z), squared(stack.z)
+
+
+def stop_at_limits(mechanism, posture, stack):
+    """Hold the freedoms at a limit that the step would take further; return whether any were."""
+    joints, any_held = mechanism.joints, False
+    for j in range(len(joints.integers)):
+        k = joints.integers[j, FREEDOM]
+        if is_limited(joints, j) and stack.held[k] == 0.0:
+            q, step = posture.q[joints.integers[j, AT]], stack.step[k]
+            beyond = q >= joints.numbers[j, UPPER] if step > 0.0 else q <= joints.numbers[j, LOWER]
+            if beyond and step != 0.0:
+                stack.held[k] = 1.0
+                any_held = True
+    return any_held
+
+
+def is_limited(joints, j):
+    """Return whether a joint is a hinge or slide that moves by itself."""
+    return joints.integers[j, KIND] in (HINGE, SLIDE) and joints.integers[j, LEADER] == j
+
+
+def fill_matrix(stack, damping):
+    """Fill the lower triangle of A = J J' + damping 1 over the freedoms that are not held."""
+    A, J, m = stack.A, stack.J, len(stack.e)
+    for i in range(m):
+        for j in range(i + 1):
+            A[i, j] = 0.0
+        A[i, i] = damping
+    for k in range(len(J)):
+        if stack.held[k] == 0.0:
+            for i in range(m):
+                for j in range(i + 1):
+                    A[i, j] += J[k, i] * J[k, j]
+
+
+def solve(stack):
+    """Fill z of A z = e by Cholesky's factors, which overwrite A."""
+    A, z, m = stack.A, stack.z, len(stack.e)
+    for i in range(m):
+        z[i] = stack.e[i]
+        for j in range(i):
+            s = A[i, j]
+            for k in range(j):
+                s -= A[i, k] * A[j, k]
+            s *= A[j, j]
+            A[i, j] = s
+            A[i, i] -= s * s
+            z[i] -= s * z[j]
+        A[i, i] = 1.0 / math.sqrt(A[i, i])
+        z[i] *= A[i, i]
+    for i in range(m - 1, -1, -1):
+        for j in range(i + 1, m):
+            z[i] -= A[j, i] * z[j]
+        z[i] *= A[i, i]
+
+
+def inner(a, b):
+    """Return the scalar product of two rows."""
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+def hold_limited(mechanism, posture, stack):
+    """Hold the freedoms that the step takes beyond their limits; return whether there were any."""
+    joints, any_held = mechanism.joints, False
+    for j in range(len(joints.integers)):
+        kind, k = joints.integers[j, KIND], joints.integers[j, FREEDOM]
+        if joints.integers[j, LEADER] != j or kind not in (HINGE, SLIDE) or stack.held[k] != 0.0:
+            continue
+        q, worth = posture.q[joints.integers[j, AT]], mechanism.scales[k]
+        wanted = q + worth * stack.step[k]
+        bounded = min(max(wanted, joints.numbers[j, LOWER]), joints.numbers[j, UPPER])
+        if bounded != wanted:
+            stack.held[k] = 1.0
+            stack.step[k] = (bounded - q) / worth
+            for i in range(len(stack.e)):
+                stack.e[i] -= stack.step[k] * stack.J[k, i]
+            any_held = True
+    return any_held
+
+
+def take_step(mechanism, posture, stack):
+    """Change the coordinates by the step, within the limits."""
+    joints, q, step = mechanism.joints, posture.q, stack.step
+    for j in range(len(joints.integers)):
+        kind, k, at = joints.integers[j, KIND], joints.integers[j, FREEDOM], joints.integers[j, AT]
+        if joints.integers[j, LEADER] != j:
+            continue
+        if kind in (HINGE, SLIDE):
+            q[at] += mechanism.scales[k] * step[k]
+        elif kind == BALL:
+            turn_by(q, at, step, k)
+        elif kind == FREE:
+            for i in range(3):
+                q[at + i] += mechanism.scales[k + i] * step[k + i]
+            turn_by(q, at + 3, step, k + 3)
+        clamp_joint(joints, j, q)
+    place(mechanism, posture)
+
+
+def turn_by(q, at, step, k):
+    """Turn a quaternion among the coordinates by a rotation vector in its own frame."""
+    turn = exponential((step[k], step[k + 1], step[k + 2]))
+    w, x, y, z = normalised(multiply((q[at], q[at + 1], q[at + 2], q[at + 3]), turn))
+    q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
