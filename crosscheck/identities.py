@@ -6,9 +6,11 @@ from functools import partial
 from reference import arguments
 from reference.inverse_kinematics import IK_SOLVERS
 
-from . import kinematics, mass_spring
+from . import kinematics
 from .engines import SKELETON_ENGINES
-from .tolerances import BALANCE, ENERGY, FORCE, POSITION, ROTATION, STEP
+from .mass_spring.claims import MASS_SPRING_CLAIMS
+from .robots.claims import ROBOT_CLAIMS
+from .tolerances import POSITION, ROTATION
 from .verdict import Claim, Verdict, judge
 
 
@@ -50,86 +52,12 @@ def skeleton_claims(engine: str) -> list[Claim]:
     ]
 
 
-MASS_SPRING_CLAIMS = [
-    Claim(
-        "spring forces",
-        "spring_forces: -k (l - r) u",
-        "MuJoCo's spatial tendons with stiffness",
-        mass_spring.tendon_springs,
-        FORCE,
-        cases=50,
-    ),
-    Claim(
-        "damper forces",
-        "damper_forces: -c ((v_i - v_j)·u) u",
-        "MuJoCo's spatial tendons with damping",
-        mass_spring.tendon_dampers,
-        FORCE,
-        cases=50,
-    ),
-    Claim(
-        "potential energy",
-        "potential_energy: springs and gravity",
-        "MuJoCo's potential energy",
-        mass_spring.tendon_potential,
-        ENERGY,
-        cases=50,
-    ),
-    Claim(
-        "kinetic energy",
-        "kinetic_energy: m/2 |v|²",
-        "MuJoCo's kinetic energy",
-        mass_spring.point_kinetic,
-        ENERGY,
-        cases=50,
-    ),
-    Claim(
-        "symplectic Euler step",
-        "symplectic_euler with dampers and external forces",
-        "MuJoCo's integrator Euler",
-        mass_spring.symplectic_steps,
-        STEP,
-        cases=50,
-    ),
-    Claim(
-        "Gauss-Newton step",
-        "ImplicitEuler, gauss_newton, without dampers",
-        "MuJoCo's integrator discrete",
-        partial(mass_spring.gauss_newton_steps, damped=False),
-        STEP,
-        cases=50,
-    ),
-    Claim(
-        "Gauss-Newton step, damped",
-        "ImplicitEuler, gauss_newton, with dampers",
-        "MuJoCo's integrator discrete",
-        partial(mass_spring.gauss_newton_steps, damped=True),
-        STEP,
-        cases=50,
-    ),
-    Claim(
-        "implicit Euler balance",
-        "ImplicitEuler, newton, converged: M (x - y)",
-        "h² f(x) with MuJoCo's forces at our x",
-        partial(mass_spring.implicit_balances, damped=False),
-        BALANCE,
-        cases=25,
-    ),
-    Claim(
-        "implicit Euler balance, damped",
-        "ImplicitEuler, newton, converged: M (x - y)",
-        "h² f(x) with MuJoCo's forces at our x, dampers as tendons at rest length l_n",
-        partial(mass_spring.implicit_balances, damped=True),
-        BALANCE,
-        cases=25,
-    ),
-]
-
 CLAIMS: dict[str, Claim] = {
     claim.name: claim
     for claim in [
         *(claim for engine in SKELETON_ENGINES for claim in skeleton_claims(engine)),
         *MASS_SPRING_CLAIMS,
+        *ROBOT_CLAIMS,
     ]
 }
 

@@ -1,6 +1,6 @@
 """The seeded random systems on which claims are judged; case i is the same in every run."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,11 @@ from reference.mass_spring import MassSpring, State
 from reference.skeleton import Skeleton
 
 MOST_JOINTS = 50
-MOST_PARTICLES = 30
+LEAST_PARTICLES, MOST_PARTICLES = 5, 500
+# The sizes come round after so many cases: by then each decade has had its share.
+SIZES = 10
+# The step of a smooth motion times its highest rate.
+RESOLVED = 0.04
 
 
 def generator(quantity: str, case: int) -> np.random.Generator:
@@ -68,32 +72,144 @@ class Motion(NamedTuple):
 
 
 def motion(case: int, *, damped: bool = True) -> Motion:
-    """Return a random network of 3 to 30 particles, all of them unequal, one or two pinned.
+    """Return a random network of 5 to 500 particles, all of them unequal, one or two pinned.
 
     Every spring is stretched or squeezed by up to a third; none is at its rest length, where
     MuJoCo's integrator "discrete" sees no stiffness. In every fifth case the ends of one spring
-    coincide.
+    coincide, and in odd cases half of the springs are tension-only.
     """
-    rng = generator("motion", case)
-    n = 3 + case * 7 % (MOST_PARTICLES - 2)
+    return _motion(
+        "motion",
+        case,
+        particles(case),
+        damped=damped,
+        coincident=case % 5 == 1,
+        tension_only=0.5 * (case % 2),
+    )
+
+
+def alike(case: int) -> Motion:
+    """Return the same kind of motion, one pin, one stiffness and one damping for all springs."""
+    return _motion("alike", case, particles(case), uniform=True, pins=1)
+
+
+def smooth(case: int) -> Motion:
+    """Return a motion of 5 to 23 particles, no two in one place, in steps that resolve it.
+
+    At most `RESOLVED` is h omega, with omega a bound on the frequencies and decay rates.
+    """
+    system, state, external, _ = _motion("smooth", case, particles(case % 2))
+    return Motion(system, state, external, RESOLVED / highest_rate(system))
+
+
+def unpinned(case: int) -> Motion:
+    """Return a smooth motion of 5 to 23 particles, none of them pinned."""
+    system, state, external, _ = _motion("unpinned", case, particles(case % 2), pins=0)
+    return Motion(system, state, external, RESOLVED / highest_rate(system))
+
+
+def drifting(case: int) -> Motion:
+    """Return a smooth motion without pins, gravity or external forces: nothing turns it."""
+    system, state, _, _ = _motion("drifting", case, particles(case % 2), pins=0, gravity=0.0)
+    return Motion(system, state, np.zeros_like(state.positions), RESOLVED / highest_rate(system))
+
+
+class Oscillator(NamedTuple):
+    """One particle on a spring without a rest length, pinned at the origin; the step [s]."""
+
+    system: MassSpring
+    state: State
+    h: float
+
+
+def oscillator(case: int) -> Oscillator:
+    """Return an oscillator, h omega from 0.01 to 1, somewhere in its swing."""
+    rng = generator("oscillator", case)
+    mass, stiffness = rng.uniform(0.2, 2.0), 10.0 ** rng.uniform(1.0, 3.0)
+    system = MassSpring([1.0, mass], [[0, 1]], 0.0, stiffness, pinned=[0], gravity=(0, 0, 0))
+    x, v = np.zeros((2, 2, 3))
+    x[1], v[1] = rng.standard_normal((2, 3))
+    h = 10.0 ** rng.uniform(-2.0, 0.0) / np.sqrt(stiffness / mass)
+    return Oscillator(system, State(x, v), float(h))
+
+
+def line(case: int) -> Motion:
+    """Return a chain on the x axis that stays on it, its first particle pinned, by 1/60 s.
+
+    Spring i joins particle i to i + 1, and none is stretched or pushed so far as to turn over.
+    """
+    rng = generator("line", case)
+    n = 5 + 15 * case
+    lengths = rng.uniform(0.5, 1.5, n - 1)
+    ends = np.arange(n - 1)
+    parts = _springs(rng, np.stack([ends, ends + 1], axis=1), lengths)
+    system = MassSpring(
+        masses=rng.uniform(0.2, 2.0, n), **parts, pinned=[0], gravity=(rng.uniform(-1, 1), 0, 0)
+    )
+    x, v, f = np.zeros((3, n, 3))
+    x[1:, 0], v[1:, 0], f[1:, 0] = np.cumsum(lengths), *rng.standard_normal((2, n - 1))
+    return Motion(system, State(x, v), f, 1 / 60)
+
+
+def particles(case: int) -> int:
+    """Return how many particles a case has: the sizes are spread evenly over their magnitudes."""
+    share = case * 3 % SIZES / (SIZES - 1)
+    return round(LEAST_PARTICLES * (MOST_PARTICLES / LEAST_PARTICLES) ** share)
+
+
+def highest_rate(system: MassSpring) -> float:
+    """Return a bound on the frequencies and decay rates of a system [1/s], by Gershgorin."""
+
+    def busiest(per_spring: FloatArray) -> float:
+        total = np.zeros(system.particle_count)
+        np.add.at(total, system.springs, per_spring[:, None])
+        return float((2.0 * total / system.masses).max())
+
+    return max(np.sqrt(busiest(system.stiffnesses)), busiest(system.dampings))
+
+
+def _motion(
+    quantity: str,
+    case: int,
+    n: int,
+    *,
+    damped: bool = True,
+    coincident: bool = False,
+    uniform: bool = False,
+    tension_only: float = 0.0,
+    pins: int | None = None,
+    gravity: float = 5.0,
+) -> Motion:
+    rng = generator(quantity, case)
     springs = _network(rng, n)
-    s = len(springs)
     x = rng.standard_normal((n, 3))
-    if case % 5 == 1:
+    if coincident:
         x[springs[0, 0]] = x[springs[0, 1]]
     lengths = np.linalg.norm(x[springs[:, 0]] - x[springs[:, 1]], axis=-1)
-    strain = rng.uniform(0.02, 0.33, s) * rng.choice([-1.0, 1.0], s)
-    system = MassSpring(
-        masses=rng.uniform(0.2, 2.0, n),
-        springs=springs,
-        rest_lengths=np.where(lengths > 0.0, lengths * (1.0 + strain), 0.5),
-        stiffnesses=10.0 ** rng.uniform(1.0, 3.0, s),
-        dampings=rng.uniform(0.1, 5.0, s) * damped,
-        pinned=rng.choice(n, size=1 + case % 2, replace=False),
-        gravity=rng.standard_normal(3) * 5.0,
-    )
+    parts = _springs(rng, springs, lengths)
+    if uniform:
+        parts |= {name: parts[name][0] for name in ("stiffnesses", "dampings")}
+    masses = rng.uniform(0.2, 2.0, n)
+    pinned = rng.choice(n, size=1 + case % 2 if pins is None else pins, replace=False)
+    weight = rng.standard_normal(3) * gravity
     h = float(rng.choice([1 / 240, 1 / 60, 1 / 30]))
-    return Motion(system, State(x, rng.standard_normal((n, 3))), rng.standard_normal((n, 3)), h)
+    state, external = State(x, rng.standard_normal((n, 3))), rng.standard_normal((n, 3))
+    parts["tension_only"] = rng.uniform(size=len(springs)) < tension_only
+    if not damped:
+        parts["dampings"] = 0.0
+    return Motion(MassSpring(masses, **parts, pinned=pinned, gravity=weight), state, external, h)
+
+
+def _springs(rng: np.random.Generator, springs: np.ndarray, lengths: FloatArray) -> dict[str, Any]:
+    """Return what makes springs of these lengths [m], each under strain."""
+    s = len(springs)
+    strain = rng.uniform(0.02, 0.33, s) * rng.choice([-1.0, 1.0], s)
+    return {
+        "springs": springs,
+        "rest_lengths": np.where(lengths > 0.0, lengths * (1.0 + strain), 0.5),
+        "stiffnesses": 10.0 ** rng.uniform(1.0, 3.0, s),
+        "dampings": rng.uniform(0.1, 5.0, s),
+    }
 
 
 def _network(rng: np.random.Generator, n: int) -> np.ndarray:

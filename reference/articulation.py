@@ -174,7 +174,7 @@ class Articulation:
             lower=frozen(lower), upper=frozen(upper),
         )  # fmt: skip
 
-    @property
+    @functools.cached_property
     def joint_count(self) -> int:
         """Number of joints, fixed ones and the root included."""
         return self.skeleton.joint_count

@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from crosscheck import samples
-from crosscheck.engines import SKELETON_ENGINES, MujocoMassSpring, forward_kinematics_by
+from crosscheck.engines import (
+    SKELETON_ENGINES,
+    MujocoFlex,
+    MujocoJointChain,
+    MujocoMassSpring,
+    forward_kinematics_by,
+    mujoco_mass_spring,
+)
+from crosscheck.engines.mujoco_bodies import add_point_mass
 from crosscheck.engines.skeleton_engine import coordinates
 from crosscheck.tolerances import STEP
 from reference import rotation
@@ -167,5 +175,58 @@ def test_discrete_sees_no_stiffness_at_the_very_rest_length(shift, stiff):
 
 
 def test_integrator_must_be_known():
-    with pytest.raises(ValueError, match="integrator: expected one of Euler, discrete, got 'RK5'"):
+    known = "Euler, RK4, implicit, implicitfast, discrete"
+    with pytest.raises(ValueError, match=f"integrator: expected one of {known}, got 'RK5'"):
         MujocoMassSpring(samples.motion(0).system, integrator="RK5")
+
+
+def off_centre(*arguments):
+    body = add_point_mass(*arguments)
+    body.ipos = np.array([0.1, 0.2, 0.3])
+    return body
+
+
+@pytest.mark.parametrize("simple", [True, False])
+def test_implicitfast_keeps_whole_blocks_only_where_the_mass_matrix_does(monkeypatch, simple):
+    system, state, external, h = samples.motion(4)
+    if not simple:
+        monkeypatch.setattr(mujoco_mass_spring, "add_point_mass", off_centre)
+    fast, whole = (
+        MujocoMassSpring(system, h=h, integrator=integrator)
+        for integrator in ("implicitfast", "implicit")
+    )
+    assert (fast.model.body_simple[fast.bodies[fast.free]] > 0).all() == simple
+    apart = fast.step(state, external).velocities - whole.step(state, external).velocities
+    assert (np.abs(apart).max() < 1e-14) != simple
+
+
+def test_many_steps_are_the_same_as_one_after_the_other():
+    system, state, external, h = samples.smooth(0)
+    engine = MujocoMassSpring(system, h=h)
+    at_once = engine.step(state, external, steps=3)
+    for _ in range(3):
+        state = engine.step(state, external)
+    assert np.array_equal(at_once.positions, state.positions)
+
+
+@pytest.mark.parametrize("name", ["stiffnesses", "dampings"])
+def test_flex_wants_springs_alike(name):
+    properties = {"stiffnesses": 1.0, "dampings": 1.0} | {name: [1.0, 2.0]}
+    system = MassSpring(np.ones(3), [[0, 1], [1, 2]], 1.0, **properties)
+    with pytest.raises(ValueError, match=f"{name}: expected the same for all springs"):
+        MujocoFlex(system)
+
+
+def test_flex_stores_nothing_between_two_pins():
+    system = MassSpring(np.ones(3), [[0, 1], [1, 2]], 1.0, 100.0, pinned=[0, 1], gravity=[0, 0, 0])
+    flex, tendons = MujocoFlex(system), MujocoMassSpring(system)
+    state = State([[0, 0, 0], [3, 0, 0], [3, 2, 0]], np.zeros((3, 3)))
+    for engine in (flex, tendons):
+        engine.place(state)
+    assert tendons.potential_energy() == pytest.approx(50 * 2**2 + 50 * 1**2)
+    assert flex.potential_energy() == pytest.approx(50 * 1**2)
+
+
+def test_joint_must_be_known():
+    with pytest.raises(ValueError, match="joint: expected one of slide, hinge, got 'ball'"):
+        MujocoJointChain(samples.line(0).system, h=0.01, joint="ball")

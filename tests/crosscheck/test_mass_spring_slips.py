@@ -6,24 +6,34 @@ from functools import partial
 import numpy as np
 import pytest
 
-from crosscheck import mass_spring
-from crosscheck.identities import CLAIMS, MASS_SPRING_CLAIMS
+from crosscheck.identities import CLAIMS
+from crosscheck.mass_spring import balances, equilibria, lines, motions, steps
+from crosscheck.mass_spring import forces as force_claims
+from crosscheck.mass_spring.claims import MASS_SPRING_CLAIMS
+from crosscheck.mass_spring.steps import damper_blocks, semi_implicit
 from crosscheck.verdict import judge
 from reference.explicit import symplectic_euler
 from reference.implicit_euler import ImplicitEuler
 from reference.mass_spring import (
+    BlockSum,
     MassSpring,
     State,
     damper_forces,
+    derivation,
     forces,
     kinetic_energy,
     potential_energy,
+    spring_blocks,
     spring_energy,
     spring_forces,
+    stiffness_matrix,
 )
 
 # One pin and two, and a spring whose ends coincide.
 FEW = 2
+
+PARTS = ["masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity"]
+PARTS += ["tension_only"]
 
 # Slips in the model or the forces: (system, state, h, external) -> (system, external).
 MODEL_SLIPS = {
@@ -35,20 +45,49 @@ MODEL_SLIPS = {
         altered(s, masses=1e-9 * s.masses, gravity=(0, 0, 0)),
         f + weight(s),
     ),
+    "slack springs push": lambda s, state, h, f: (altered(s, tension_only=False), f),
     "external forces left out": lambda s, state, h, f: (s, 0.0 * f),
     "dampers left out": lambda s, state, h, f: (altered(s, dampings=0.0), f),
     "dampers twice": lambda s, state, h, f: (altered(s, dampings=2 * s.dampings), f),
     "dampers push": lambda s, state, h, f: (s, f - 2.0 * damper_forces(s, state)),
+    "dampers across the springs too": lambda s, state, h, f: (
+        s,
+        f - damper_forces(s, state) + all_round(s, state),
+    ),
+    "springs pull one end only": lambda s, state, h, f: (s, f + one_sided(s, state)),
 }
 
 
 def altered(system, **changes):
-    names = ["masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity"]
-    return MassSpring(**{name: changes.get(name, getattr(system, name)) for name in names})
+    return MassSpring(**{name: changes.get(name, getattr(system, name)) for name in PARTS})
 
 
 def weight(system):
     return system.masses[:, None] * system.gravity
+
+
+def all_round(system, state):
+    """Dampers that act on the whole relative velocity, not only on its part along the spring."""
+    v = np.where(system.free[:, None], state.velocities, 0.0)
+    i, j = system.springs.T
+    pulls = np.zeros_like(v)
+    np.add.at(pulls, i, -system.dampings[:, None] * (v[i] - v[j]))
+    np.add.at(pulls, j, system.dampings[:, None] * (v[i] - v[j]))
+    return pulls
+
+
+def one_sided(system, state):
+    """What has to be added for the first spring to leave its second end alone."""
+    k = np.where(np.arange(len(system.springs)) == 0, system.stiffnesses, 0.0)
+    pulls = spring_forces(altered(system, stiffnesses=k), state.positions)
+    pulls[system.springs[0, 0]] = 0.0
+    return -pulls
+
+
+def changed(slip, system, state, h, external):
+    """The system and the external forces as the slip has them."""
+    given = np.zeros_like(state.positions) if external is None else external
+    return MODEL_SLIPS.get(slip, lambda *same: (same[0], same[3]))(system, state, h, given)
 
 
 def slipped_springs(system, positions, *, slip):
@@ -59,6 +98,8 @@ def slipped_springs(system, positions, *, slip):
         return spring_forces(altered(system, stiffnesses=2 * system.stiffnesses), positions)
     if slip == "rest lengths left out":
         return spring_forces(altered(system, rest_lengths=0.0), positions)
+    if slip == "slack springs push":
+        return spring_forces(altered(system, tension_only=False), positions)
     if slip == "one spring forgotten":
         k = np.where(np.arange(len(system.springs)) == 0, 0.0, system.stiffnesses)
         return spring_forces(altered(system, stiffnesses=k), positions)
@@ -68,14 +109,26 @@ def slipped_springs(system, positions, *, slip):
 def slipped_dampers(system, state, *, slip):
     pulls = damper_forces(system, state)
     if slip == "across the spring too":
-        v = np.where(system.free[:, None], state.velocities, 0.0)
-        i, j = system.springs.T
-        pulls = np.zeros_like(v)
-        np.add.at(pulls, i, -system.dampings[:, None] * (v[i] - v[j]))
-        np.add.at(pulls, j, system.dampings[:, None] * (v[i] - v[j]))
+        return all_round(system, state)
     if slip == "pins with a velocity":
         return damper_forces(altered(system, pinned=()), state)
     return {"push": -1.0, "twice": 2.0}.get(slip, 1.0) * pulls
+
+
+def slipped_stiffness(system, positions, *, slip):
+    K = stiffness_matrix(system, positions)
+    blocks = spring_blocks(system, np.array(positions), geometric=False)
+    along = stiffness_matrix_of(system, blocks)
+    if slip == "one spring forgotten":
+        k = np.where(np.arange(len(system.springs)) == 0, 0.0, system.stiffnesses)
+        return stiffness_matrix(altered(system, stiffnesses=k), positions)
+    return {"geometric term dropped": along, "geometric term with the wrong sign": 2 * along - K,
+            "rest lengths left out": stiffness_matrix(altered(system, rest_lengths=0.0), positions),
+            "negated": -K}.get(slip, K)  # fmt: skip
+
+
+def stiffness_matrix_of(system, blocks):
+    return BlockSum(derivation(system).A).matrix(blocks)
 
 
 def slipped_potential(system, positions, *, slip):
@@ -96,9 +149,7 @@ def slipped_kinetic(system, state, *, slip):
 
 
 def slipped_symplectic(system, state, h, external, *, slip):
-    model, given = MODEL_SLIPS.get(slip, lambda *same: (same[0], same[3]))(
-        system, state, h, external
-    )
+    model, given = changed(slip, system, state, h, external)
     end = symplectic_euler(model, state, h, given)
     x, pins = end.positions.copy(), system.pinned
     if slip == "old velocities move":
@@ -107,6 +158,44 @@ def slipped_symplectic(system, state, h, external, *, slip):
         pull = forces(system, state, external) / system.masses[:, None]
         x[pins] += h * h * pull[pins]
     return State(x, end.velocities)
+
+
+def accelerations(system, state, external):
+    pull = forces(system, state, external) / system.masses[:, None]
+    return np.where(system.free[:, None], pull, 0.0)
+
+
+def slipped_runge_kutta(system, state, h, external, *, slip):
+    model, given = changed(slip, system, state, h, external)
+    weights = {"equal weights": np.full(4, 0.25)}.get(slip, np.array([1, 2, 2, 1]) / 6)
+    middle = {"whole steps to the middle": 1.0}.get(slip, 0.5)
+
+    def rates(share, before):
+        dx, dv = before
+        at = State(state.positions + share * h * dx, v + share * h * dv)
+        return at.velocities, accelerations(model, at, given)
+
+    v = np.where(system.free[:, None], state.velocities, 0.0)
+    k = [(v, accelerations(model, state, given))]
+    for share in (middle, middle, 1.0):
+        k.append(rates(share, k[-1]))
+    dx, dv = np.tensordot(weights, k, 1)
+    return State(state.positions + h * dx, v + h * dv)
+
+
+def slipped_semi_implicit(system, state, h, external, D, *, slip):
+    model, given = changed(slip, system, state, h, external)
+    D = {
+        "nothing implicit": 0.0 * D,
+        "D twice": 2.0 * D,
+        "D with the wrong sign": -D,
+        "the whole block": damper_blocks(system, state),
+        "the diagonal alone": np.eye(3) * D,
+    }.get(slip, D)
+    end = semi_implicit(model, state, h, given, D)
+    v = np.where(system.free[:, None], state.velocities, 0.0)
+    moved = state.positions + h * (v if slip == "old velocities move" else end.velocities)
+    return State(moved, end.velocities)
 
 
 def slipped_euler(system, *, h, slip, **settings):
@@ -126,9 +215,8 @@ class _SlippedEuler:
     slip: str | None
     settings: dict
 
-    def step(self, state, external):
-        change = MODEL_SLIPS.get(self.slip, lambda *same: (same[0], same[3]))
-        model, given = change(self.system, state, self.h, external)
+    def step(self, state, external=None):
+        model, given = changed(self.slip, self.system, state, self.h, external)
         if self.slip == "pins put back after the solve":
             model = altered(model, pinned=())
         result = ImplicitEuler(model, h=self.h, **self.settings).step(state, given)
@@ -140,12 +228,36 @@ class _SlippedEuler:
         return dataclasses.replace(result, state=State(x, v))
 
 
+def slipped_motion(step, *, slip):
+    """Stand in for an integrator of `MOTIONS`, slipping in every step."""
+
+    def over(system, h):
+        def move(state, external, count):
+            for _ in range(count):
+                state = step(system, state, h, external, slip=slip)
+            return state
+
+        return move
+
+    return over
+
+
+def slipped_implicit_step(system, state, h, external, *, slip):
+    if slip == "symplectic Euler in its place":
+        return symplectic_euler(system, state, h, external)
+    if slip == "the trapezoid in its place":
+        half = slipped_implicit_step(system, state, h / 2, external, slip=None)
+        return State(2 * half.positions - state.positions, 2 * half.velocities - state.velocities)
+    return slipped_euler(system, h=h, slip=slip).step(state, external).state
+
+
 STEP_SLIPS = [
     "gravity times mass twice",
     "gravity left out",
     "rest lengths left out",
     "external forces left out",
 ]
+LOOSE = "slack springs push"
 IMPLICIT_SLIPS = [
     *STEP_SLIPS,
     "gravity without h²",
@@ -153,64 +265,191 @@ IMPLICIT_SLIPS = [
     "pins put back after the solve",
     "one local/global iteration",
 ]
-DAMPER_SLIPS = ["dampers left out", "dampers twice", "dampers push"]
+DAMPER_SLIPS = [
+    "dampers left out",
+    "dampers twice",
+    "dampers push",
+    "dampers across the springs too",
+]
+ENERGY_SLIPS = ["k (l - r)²", "gravity upwards", "gravity times mass twice"]
+SPRING_SLIPS = ["push", "twice", "rest lengths left out", "one spring forgotten"]
+REST_SLIPS = ["gravity times mass twice", "gravity left out", "rest lengths left out"]
 
-# For each claim: the name that its comparison uses, what takes its place, and the slips of that.
+# What a claim uses, and what takes its place: (module or MOTIONS, name, stand-in).
+SYMPLECTIC_MOTION = (
+    motions.MOTIONS,
+    "symplectic Euler",
+    partial(slipped_motion, slipped_symplectic),
+)
+RUNGE_KUTTA_MOTION = (
+    motions.MOTIONS,
+    "Runge-Kutta",
+    partial(slipped_motion, slipped_runge_kutta),
+)
+IMPLICIT_MOTION = (
+    motions.MOTIONS,
+    "implicit Euler",
+    partial(slipped_motion, slipped_implicit_step),
+)
+
+# For each claim: what its comparison uses and what takes its place, and the slips of that.
 SLIPS = {
-    "spring forces": (
-        "spring_forces",
-        slipped_springs,
-        ["push", "twice", "rest lengths left out", "one spring forgotten"],
-    ),
+    "spring forces": ((force_claims, "spring_forces", slipped_springs), [*SPRING_SLIPS, LOOSE]),
     "damper forces": (
-        "damper_forces",
-        slipped_dampers,
+        (force_claims, "damper_forces", slipped_dampers),
         ["push", "twice", "across the spring too", "pins with a velocity"],
     ),
+    "stiffness matrix": (
+        (force_claims, "stiffness_matrix", slipped_stiffness),
+        [
+            "geometric term dropped",
+            "geometric term with the wrong sign",
+            "rest lengths left out",
+            "negated",
+            "one spring forgotten",
+        ],
+    ),
     "potential energy": (
-        "potential_energy",
-        slipped_potential,
-        ["k (l - r)²", "gravity upwards", "gravity times mass twice", "pinned weights left out"],
+        (force_claims, "potential_energy", slipped_potential),
+        [*ENERGY_SLIPS, "pinned weights left out"],
     ),
     "kinetic energy": (
-        "kinetic_energy",
-        slipped_kinetic,
+        (force_claims, "kinetic_energy", slipped_kinetic),
         ["m |v|²", "pins counted", "mass left out"],
     ),
+    "flex forces": ((force_claims, "spring_forces", slipped_springs), SPRING_SLIPS),
+    "flex energy": ((force_claims, "potential_energy", slipped_potential), ENERGY_SLIPS),
     "symplectic Euler step": (
-        "symplectic_euler",
-        slipped_symplectic,
+        (steps, "symplectic_euler", slipped_symplectic),
+        [*STEP_SLIPS, *DAMPER_SLIPS, LOOSE, "old velocities move", "pins fall"],
+    ),
+    "symplectic Euler step, flex": (
+        (steps, "symplectic_euler", slipped_symplectic),
         [*STEP_SLIPS, *DAMPER_SLIPS, "old velocities move", "pins fall"],
     ),
+    "symplectic Euler, 1,000 steps": (
+        SYMPLECTIC_MOTION,
+        ["gravity left out", "dampers twice", "old velocities move"],
+    ),
+    "Runge-Kutta step": (
+        (steps, "runge_kutta", slipped_runge_kutta),
+        [*STEP_SLIPS, *DAMPER_SLIPS, "equal weights", "whole steps to the middle"],
+    ),
+    "Runge-Kutta, 2,000 steps": (RUNGE_KUTTA_MOTION, ["equal weights"]),
+    "damper diagonal step": (
+        (steps, "semi_implicit", slipped_semi_implicit),
+        [
+            *STEP_SLIPS,
+            LOOSE,
+            "nothing implicit",
+            "D twice",
+            "D with the wrong sign",
+            "the whole block",
+            "old velocities move",
+        ],
+    ),
+    "damper block step": (
+        (steps, "semi_implicit", slipped_semi_implicit),
+        ["nothing implicit", "D twice", "D with the wrong sign", "the diagonal alone"],
+    ),
     "Gauss-Newton step": (
-        "ImplicitEuler",
-        slipped_euler,
-        [*IMPLICIT_SLIPS, "velocities not recomputed", "the converged step"],
+        (steps, "ImplicitEuler", slipped_euler),
+        [*IMPLICIT_SLIPS, LOOSE, "velocities not recomputed", "the converged step"],
     ),
-    "Gauss-Newton step, damped": ("ImplicitEuler", slipped_euler, DAMPER_SLIPS),
+    "Gauss-Newton step, damped": ((steps, "ImplicitEuler", slipped_euler), DAMPER_SLIPS),
+    "implicit Euler on a line": (
+        (lines, "ImplicitEuler", slipped_euler),
+        [
+            "gravity times mass twice",
+            "external forces left out",
+            "dampers left out",
+            "dampers twice",
+            "velocities not recomputed",
+        ],
+    ),
     "implicit Euler balance": (
-        "ImplicitEuler",
-        slipped_euler,
-        [*IMPLICIT_SLIPS, "one iteration"],
+        (balances, "ImplicitEuler", slipped_euler),
+        [*IMPLICIT_SLIPS, LOOSE, "one iteration"],
     ),
-    "implicit Euler balance, damped": ("ImplicitEuler", slipped_euler, DAMPER_SLIPS),
+    "implicit Euler balance, damped": ((balances, "ImplicitEuler", slipped_euler), DAMPER_SLIPS),
+    "rope at rest, closed form": ((equilibria, "ImplicitEuler", slipped_euler), REST_SLIPS),
+    "rope at rest": ((equilibria, "ImplicitEuler", slipped_euler), [*REST_SLIPS, "one iteration"]),
+    "cloth at rest": ((equilibria, "ImplicitEuler", slipped_euler), ["gravity left out"]),
+    "order of symplectic Euler": (SYMPLECTIC_MOTION, ["gravity left out", "dampers twice"]),
+    "order of implicit Euler": (
+        IMPLICIT_MOTION,
+        ["dampers left out", "gravity times mass twice", "the trapezoid in its place"],
+    ),
+    "order of Runge-Kutta": (RUNGE_KUTTA_MOTION, ["equal weights", "dampers twice"]),
+    "order of MuJoCo's integrators": (RUNGE_KUTTA_MOTION, ["dampers twice"]),
+    "order between implicit Euler and discrete": (
+        IMPLICIT_MOTION,
+        ["dampers twice", "external forces left out"],
+    ),
+    "linear momentum": (
+        SYMPLECTIC_MOTION,
+        ["gravity times mass twice", "external forces left out", "springs pull one end only"],
+    ),
+    "angular momentum": (
+        SYMPLECTIC_MOTION,
+        ["old velocities move", "dampers across the springs too", "springs pull one end only"],
+    ),
+    "angular momentum lost by implicit Euler": (
+        IMPLICIT_MOTION,
+        ["the trapezoid in its place", "dampers across the springs too"],
+    ),
+    "angular momentum lost by Runge-Kutta": (
+        RUNGE_KUTTA_MOTION,
+        ["equal weights", "dampers across the springs too"],
+    ),
+    "energy lost on one spring": (
+        IMPLICIT_MOTION,
+        ["symplectic Euler in its place", "the trapezoid in its place"],
+    ),
 }
 
 
-@pytest.mark.parametrize(
-    ("claim", "slip"), [(claim, slip) for claim in SLIPS for slip in SLIPS[claim][2]]
-)
+def put(monkeypatch, claim, slip):
+    (where, name, slipped), _ = SLIPS[claim]
+    if where is motions.MOTIONS:
+        monkeypatch.setitem(where, name, slipped(slip=slip))
+    else:
+        monkeypatch.setattr(where, name, partial(slipped, slip=slip))
+
+
+def long(claim):
+    """Whether a claim takes many steps, and therefore few cases."""
+    return CLAIMS[claim].cases < 5
+
+
+def few(claim):
+    """Judge a few cases, or of many steps one."""
+    return judge(CLAIMS[claim], 1 if long(claim) else FEW)
+
+
+def cases_of_slips():
+    """Every slip of every claim; of one that takes many steps only the first by default."""
+    for claim, (_, slips) in SLIPS.items():
+        for i, slip in enumerate(slips):
+            marks = [pytest.mark.slow] if i and long(claim) else []
+            yield pytest.param(claim, slip, marks=marks)
+
+
+def copies():
+    for claim in SLIPS:
+        yield pytest.param(claim, marks=[pytest.mark.slow] if long(claim) else [])
+
+
+@pytest.mark.parametrize(("claim", "slip"), list(cases_of_slips()))
 def test_claim_goes_red_under_the_slip(monkeypatch, claim, slip):
-    name, slipped, _ = SLIPS[claim]
-    monkeypatch.setattr(mass_spring, name, partial(slipped, slip=slip))
-    assert judge(CLAIMS[claim], FEW).missed == "they differ"
+    put(monkeypatch, claim, slip)
+    assert few(claim).missed == "they differ"
 
 
-@pytest.mark.parametrize("claim", SLIPS)
+@pytest.mark.parametrize("claim", list(copies()))
 def test_without_a_slip_the_copy_holds(monkeypatch, claim):
-    name, slipped, _ = SLIPS[claim]
-    monkeypatch.setattr(mass_spring, name, partial(slipped, slip=None))
-    assert judge(CLAIMS[claim], FEW).held
+    put(monkeypatch, claim, None)
+    assert few(claim).held
 
 
 def test_every_claim_has_a_slip():

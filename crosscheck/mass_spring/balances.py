@@ -1,0 +1,76 @@
+"""The converged step of implicit Euler: no engine takes it, but an engine's forces confirm it."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from reference.arguments import FloatArray
+from reference.implicit_euler import ImplicitEuler
+from reference.mass_spring import MassSpring, State
+
+from .. import samples
+from ..engines import MujocoMassSpring
+from ..verdict import Comparison
+
+# Newton's iterations for a balance: the hardest case needs 6 to end in rounding, where another one
+# changes nothing.
+NEWTON_ITERATIONS = 12
+
+
+def implicit_balances(cases: int, *, damped: bool) -> Iterator[Comparison]:
+    """Compare M (x - y) of our converged step with h² f(x), all forces by MuJoCo at our x.
+
+    Both are taken over |M (x - y)| + h² sum |spring force|.
+    """
+    for case in range(cases):
+        system, state, external, h = samples.motion(case, damped=damped)
+        euler = ImplicitEuler(
+            system, h=h, solver="newton", tolerance=0.0, max_iterations=NEWTON_ITERATIONS
+        )
+        x = euler.step(state, external).state.positions
+        y = state.positions + h * state.velocities
+        inertia = (system.masses[:, None] * (x - y))[system.free]
+        forces, tensions = forces_of_the_step(system, state, x, h)
+        yield Comparison(
+            ours=inertia,
+            theirs=h**2 * (forces + external[system.free]),
+            still=np.zeros_like(inertia),
+            scale=float(np.linalg.norm(inertia) + h**2 * tensions),
+        )
+
+
+def forces_of_the_step(
+    system: MassSpring, state: State, x: FloatArray, h: float
+) -> tuple[FloatArray, float]:
+    """Return MuJoCo's forces at the end x of an implicit step from a state, and their sum's size.
+
+    Springs and gravity are MuJoCo's at x. The damper of the step is not MuJoCo's damper at the
+    velocity (x - x_n)/h: that one takes the part of the velocity along the spring as it stands at
+    x, and so sees a spring that only turns by a finite angle grow shorter. The damper in E sees
+    the length itself, -c (l(x) - l_n)/h: to MuJoCo it is a tendon of stiffness c/h and rest length
+    l_n, its own length of the spring at x_n.
+
+    Returns:
+        Forces on the free particles [N], shape (free, 3); sum of |force| over all springs [N].
+    """
+    l_n = _placed(system, state).lengths()
+    dampers = MassSpring(
+        system.masses, system.springs, l_n, system.dampings / h,
+        pinned=system.pinned, gravity=(0.0, 0.0, 0.0),
+    )  # fmt: skip
+    end = State(x, np.zeros_like(x))
+    springs_at_end, dampers_at_end = _placed(system, end), _placed(dampers, end)
+    forces = springs_at_end.spring_forces() + springs_at_end.gravity_forces()
+    pulls = _tensions(system, springs_at_end), _tensions(dampers, dampers_at_end)
+    return forces + dampers_at_end.spring_forces(), float(np.abs(pulls).sum())
+
+
+def _placed(system: MassSpring, state: State) -> MujocoMassSpring:
+    engine = MujocoMassSpring(system)
+    engine.place(state)
+    return engine
+
+
+def _tensions(system: MassSpring, engine: MujocoMassSpring) -> FloatArray:
+    """Return each spring's k (l - r) [N], by MuJoCo's lengths, shape (spring,)."""
+    return system.stiffnesses * (engine.lengths() - system.rest_lengths)

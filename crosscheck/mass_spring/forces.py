@@ -1,0 +1,97 @@
+"""Forces, energies and their derivatives: tendons and flex edges beside our formulas."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from reference.mass_spring import (
+    State,
+    damper_forces,
+    kinetic_energy,
+    potential_energy,
+    spring_forces,
+    stiffness_matrix,
+)
+
+from .. import samples
+from ..engines import MujocoMassSpring
+from ..verdict import Comparison
+from .comparing import engine_of, flex, forces, numbers, placed
+
+# Central differences of order 6: offsets in steps, and weights. The step is short beside springs
+# and long beside the rounding of their lengths.
+OFFSETS = np.array([-3, -2, -1, 1, 2, 3])
+WEIGHTS = np.array([-1, 9, -45, 45, -9, 1]) / 60.0
+DIFFERENCE_STEP = 5e-4
+
+
+def tendon_springs(cases: int) -> Iterator[Comparison]:
+    """Compare the springs' forces on the free particles, over the largest."""
+    for case in range(cases):
+        system, state, _, _ = samples.motion(case)
+        ours = spring_forces(system, state.positions)[system.free]
+        yield forces(ours, placed(case).spring_forces())
+
+
+def tendon_dampers(cases: int) -> Iterator[Comparison]:
+    """Compare the dampers' forces on the free particles, over the largest."""
+    for case in range(cases):
+        system, state, _, _ = samples.motion(case)
+        ours = damper_forces(system, state)[system.free]
+        yield forces(ours, placed(case).damper_forces())
+
+
+def tendon_stiffness(cases: int) -> Iterator[Comparison]:
+    """Compare K times a direction with differences of MuJoCo's forces along it, over the largest.
+
+    Where a spring's ends coincide, its force has no derivative: those cases are not taken.
+    """
+    smooth = (case for case in range(2 * cases) if case % 5 != 1)
+    for _, case in zip(range(cases), smooth, strict=False):
+        system, state, along, _ = samples.motion(case)
+        d = np.where(system.free[:, None], along, 0.0)
+        pulls = []
+        for offset in OFFSETS * DIFFERENCE_STEP:
+            engine = engine_of(case)
+            engine.place(State(state.positions + offset * d, state.velocities))
+            pulls.append(engine.spring_forces())
+        theirs = -np.tensordot(WEIGHTS, pulls, 1) / DIFFERENCE_STEP
+        ours = (stiffness_matrix(system, state.positions) @ d.ravel()).reshape(-1, 3)
+        yield forces(ours[system.free], theirs)
+
+
+def tendon_potential(cases: int) -> Iterator[Comparison]:
+    """Compare the energy of springs and gravity, over the sum of its terms' magnitudes."""
+    for case in range(cases):
+        yield _potential(samples.motion(case), placed(case))
+
+
+def point_kinetic(cases: int) -> Iterator[Comparison]:
+    """Compare the kinetic energy, over itself."""
+    for case in range(cases):
+        system, state, _, _ = samples.motion(case)
+        theirs = placed(case).kinetic_energy()
+        yield numbers(kinetic_energy(system, state), theirs, scale=theirs)
+
+
+def flex_forces(cases: int) -> Iterator[Comparison]:
+    """Compare springs and dampers that are the edges of a flex, over the largest force."""
+    for case in range(cases):
+        system, state, _, _ = samples.alike(case)
+        ours = spring_forces(system, state.positions) + damper_forces(system, state)
+        engine = flex(case)
+        yield forces(ours[system.free], engine.spring_forces() + engine.damper_forces())
+
+
+def flex_potential(cases: int) -> Iterator[Comparison]:
+    """Compare the energy of a flex's edges and gravity, over the sum of its terms' magnitudes."""
+    for case in range(cases):
+        yield _potential(samples.alike(case), flex(case))
+
+
+def _potential(motion: samples.Motion, engine: MujocoMassSpring) -> Comparison:
+    system, state, _, _ = motion
+    stored = 0.5 * system.stiffnesses * (engine.lengths() - system.rest_lengths) ** 2
+    raised = np.abs(system.masses[:, None] * system.gravity * state.positions)
+    ours = potential_energy(system, state.positions)
+    return numbers(ours, engine.potential_energy(), scale=float(stored.sum() + raised.sum()))

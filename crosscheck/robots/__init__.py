@@ -1,0 +1,1 @@
+"""Robots and characters from files: the reference reads them itself, and so do the engines."""

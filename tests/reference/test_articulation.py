@@ -1,0 +1,410 @@
+"""Joints of all kinds: where coordinates put them, and how limits hold them."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from reference import Articulation, Mimic, Skeleton, forward_kinematics, rotation
+from reference.articulation import KINDS, clamp_ball, swing_twist
+
+# Eight joints with offsets of a few metres, slides and free joints: some dozens of roundings.
+ROUNDING = 1e-13
+# Where a ball is tilted by nearly half a turn, its twist is known only to 1e-16 over the rest.
+ANGLE = 1e-9
+
+TREES = {
+    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=8),
+    "seed": st.integers(0, 2**32 - 1),
+}
+at_both_speeds = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def coordinates_by_joint(articulation, q):
+    """Return each joint's coordinates, those of mimic joints by their leaders'."""
+    q, values = list(q), {}
+    for j, kind in enumerate(articulation.kinds):
+        width = {"fixed": 0, "hinge": 1, "slide": 1, "ball": 4, "free": 7}[kind]
+        if j not in articulation.mimics:
+            values[j], q = q[:width], q[width:]
+    for j, (leader, multiplier, shift) in articulation.mimics.items():
+        values[j] = [multiplier * values[leader][0] + shift]
+    assert not q
+    return values
+
+
+def motion(kind, axis, value):
+    """Return the 4 x 4 transform by which coordinates move a joint from its frame."""
+    T = np.eye(4)
+    if kind == "hinge":
+        T[:3, :3] = Rotation.from_rotvec(value[0] * axis).as_matrix()
+    elif kind == "slide":
+        T[:3, 3] = value[0] * axis
+    elif kind == "ball":
+        T[:3, :3] = Rotation.from_quat(value, scalar_first=True).as_matrix()
+    elif kind == "free":
+        T[:3, 3] = value[:3]
+        T[:3, :3] = Rotation.from_quat(value[3:], scalar_first=True).as_matrix()
+    return T
+
+
+def by_matrices(articulation, q):
+    """Return all joints' 4 x 4 transforms, (joint, 4, 4), by other means than ours."""
+    values = coordinates_by_joint(articulation, q)
+    world = np.empty((articulation.joint_count, 4, 4))
+    for j, parent in enumerate(articulation.skeleton.parents):
+        frame = np.eye(4)
+        frame[:3, :3] = Rotation.from_quat(articulation.frames[j], scalar_first=True).as_matrix()
+        frame[:3, 3] = articulation.skeleton.offsets[j]
+        local = frame @ motion(articulation.kinds[j], articulation.axes[j], values[j])
+        world[j] = world[parent] @ local if parent >= 0 else local
+    return world
+
+
+def one(kind, *, axis=(0.0, 0.0, 1.0), offset=(0.0, 0.0, 0.0), **limits):
+    """Return a single joint."""
+    return Articulation(Skeleton([-1], [offset]), kind, axis, **limits)
+
+
+@pytest.fixture
+def arm(articulated):
+    """Return one joint of each kind, and a mimic slide."""
+    model = articulated([*KINDS, "slide"], 7)
+    return Articulation(
+        model.skeleton, model.kinds, model.axes, frames=model.frames, mimics={5: (2, -0.5, 0.3)}
+    )
+
+
+@pytest.fixture
+def q(arm, rng):
+    return arm.random(rng)
+
+
+@at_both_speeds
+@given(**TREES)
+def test_forward_kinematics_is_a_product_of_transforms(articulated, speed, kinds, seed):
+    model = articulated(kinds, seed)
+    q = model.random(np.random.default_rng(seed))
+    pose, world = forward_kinematics(model, q), by_matrices(model, q)
+    np.testing.assert_allclose(pose.positions, world[:, :3, 3], rtol=0, atol=ROUNDING)
+    matrices = rotation.to_matrix(pose.rotations)
+    np.testing.assert_allclose(matrices, world[:, :3, :3], rtol=0, atol=ROUNDING)
+
+
+@at_both_speeds
+@given(**TREES)
+def test_global_poses_are_products_of_local_transforms(articulated, speed, kinds, seed):
+    model = articulated(kinds, seed)
+    q = model.random(np.random.default_rng(seed))
+    pose, (offsets, local) = forward_kinematics(model, q), model.local_transforms(q)
+    for j, p in enumerate(model.skeleton.parents):
+        R, x = (pose.rotations[p], pose.positions[p]) if p >= 0 else (rotation.identity(), 0.0)
+        np.testing.assert_allclose(pose.positions[j], x + rotation.rotate(R, offsets[j]))
+        np.testing.assert_allclose(pose.rotations[j], rotation.multiply(R, local[j]))
+
+
+def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, speed):
+    balls = forward_kinematics(Articulation(skeleton), local.ravel())
+    pose = forward_kinematics(skeleton, local)
+    np.testing.assert_allclose(balls.positions, pose.positions, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(balls.rotations, pose.rotations, rtol=0, atol=ROUNDING)
+
+
+def test_a_hinge_is_a_ball_that_turns_about_its_axis(skeleton, rng, speed):
+    axes = rng.standard_normal((6, 3))
+    q = rng.uniform(-7.0, 7.0, 6)
+    turns = rotation.exponential(q[:, None] * axes / np.linalg.norm(axes, axis=1, keepdims=True))
+    hinges = forward_kinematics(Articulation(skeleton, "hinge", axes), q)
+    balls = forward_kinematics(skeleton, turns)
+    np.testing.assert_allclose(hinges.positions, balls.positions, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(hinges.rotations, balls.rotations, rtol=0, atol=ROUNDING)
+
+
+def test_a_slide_shifts_along_its_axis_in_its_frame_and_does_not_turn(speed):
+    turn = rotation.exponential([0.0, 0.0, np.pi / 2])
+    slide = one("slide", axis=(2.0, 0.0, 0.0), offset=(1.0, 2.0, 3.0), frames=turn)
+    pose = forward_kinematics(slide, [0.5])
+    np.testing.assert_allclose(pose.positions, [[1.0, 2.5, 3.0]], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(pose.rotations, [turn], rtol=0, atol=1e-15)
+
+
+def test_a_free_joint_is_where_its_coordinates_say(rng, speed):
+    Q = rotation.random(rng)
+    pose = forward_kinematics(one("free", offset=(1.0, 2.0, 3.0)), [4.0, 5.0, 6.0, *Q])
+    assert (pose.positions == [[5.0, 7.0, 9.0]]).all()
+    np.testing.assert_allclose(pose.rotations, [Q], rtol=0, atol=1e-15)
+
+
+def test_fixed_joints_have_no_coordinates(skeleton, speed):
+    fixed = Articulation(skeleton, "fixed")
+    assert fixed.coordinate_count == fixed.freedom_count == 0
+    rest = forward_kinematics(skeleton, rotation.identity(6)).positions
+    assert (forward_kinematics(fixed, []).positions == rest).all()
+    assert forward_kinematics(fixed, np.empty((2, 0))).positions.shape == (2, 6, 3)
+    assert fixed.clamp(np.empty((2, 0))).shape == (2, 0)
+    assert fixed.within_limits(np.empty((2, 0))).all()
+    assert fixed.random(np.random.default_rng(1), 2).shape == (2, 0)
+
+
+def test_coordinates_and_freedoms_are_counted(arm):
+    assert arm.coordinate_count == 0 + 1 + 1 + 4 + 7
+    assert arm.freedom_count == 0 + 1 + 1 + 3 + 6
+    assert [arm.coordinates_of(j) for j in range(6)] == [
+        slice(0, 0), slice(0, 1), slice(1, 2), slice(2, 6), slice(6, 13), slice(1, 2),
+    ]  # fmt: skip
+    assert [arm.freedoms_of(j) for j in range(6)] == [
+        slice(0, 0), slice(0, 1), slice(1, 2), slice(2, 5), slice(5, 11), slice(1, 2),
+    ]  # fmt: skip
+    assert repr(arm) == "Articulation(6 joints, 11 degrees of freedom)"
+
+
+def test_joints_are_found_by_name(arm):
+    assert arm.names == arm.skeleton.names
+    assert arm.index("joint3") == arm.index(-3) == 3
+    assert arm.coordinates_of("joint3") == slice(2, 6)
+
+
+def test_a_mimic_joint_moves_with_its_leader(arm, q, speed):
+    offsets, _ = arm.local_transforms(q)
+    way = rotation.rotate(arm.frames[5], (-0.5 * q[1] + 0.3) * arm.axes[5])
+    np.testing.assert_allclose(offsets[5], arm.skeleton.offsets[5] + way, rtol=0, atol=1e-15)
+
+
+def test_a_mimic_of_a_mimic_moves_with_the_first(speed):
+    chain = Skeleton([-1, 0, 1], np.zeros((3, 3)), ["a", "b", "c"])
+    model = Articulation(
+        chain, "hinge", mimics={"a": Mimic("b", 2.0, 0.5), "b": Mimic("c", 3.0, -0.25)}
+    )
+    assert model.mimics == {0: Mimic(2, 6.0, 0.0), 1: Mimic(2, 3.0, -0.25)}
+    _, turns = model.local_transforms([0.1])
+    np.testing.assert_allclose(
+        rotation.logarithm(turns)[:, 2], [0.6, 0.05, 0.1], rtol=0, atol=1e-15
+    )
+
+
+@at_both_speeds
+@given(**TREES)
+def test_clamping_brings_within_limits_and_again_changes_nothing(articulated, speed, kinds, seed):
+    model = articulated(kinds, seed)
+    free = Articulation(model.skeleton, model.kinds, mimics=model.mimics)
+    q = 2.0 * free.random(np.random.default_rng(seed), 5)
+    for j in set(range(model.joint_count)) - set(model.mimics):
+        if kinds[j] in ("ball", "free"):
+            q[:, model.coordinates_of(j)][:, -4:] /= 2.0
+    clamped = model.clamp(q)
+    assert model.within_limits(clamped, ANGLE).all()
+    np.testing.assert_allclose(model.clamp(clamped), clamped, rtol=0, atol=ANGLE)
+    inside = model.within_limits(q, 0.0)
+    np.testing.assert_allclose(clamped[inside], q[inside], rtol=0, atol=1e-15)
+
+
+@at_both_speeds
+@given(**TREES)
+def test_random_coordinates_keep_all_limits(articulated, speed, kinds, seed):
+    model = articulated(kinds, seed)
+    q = model.random(np.random.default_rng(seed), 20)
+    assert model.within_limits(q, ANGLE).all()
+    np.testing.assert_allclose(model.clamp(q), q, rtol=0, atol=ANGLE)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "expected"),
+    [
+        (-2.0, 0.5, (-2.0, 0.5)),
+        (-np.inf, np.inf, (-np.pi, np.pi)),
+        (1.0, np.inf, (1.0, 1.0 + np.pi)),
+        (-1.0, np.inf, (-1.0, np.pi)),
+        (-np.inf, -1.0, (-1.0 - np.pi, -1.0)),
+        (-np.inf, 1.0, (-np.pi, 1.0)),
+    ],
+)
+def test_random_angles_fill_their_range(lower, upper, expected, rng):
+    q = one("hinge", lower=lower, upper=upper).random(rng, 1000)
+    # Of 1,000 even draws the least is within 2 % of the range but for a chance of 2e-9.
+    slack = 0.02 * (expected[1] - expected[0])
+    assert expected[0] <= q.min() < expected[0] + slack
+    assert expected[1] - slack < q.max() <= expected[1]
+
+
+def test_random_balls_fill_cone_and_twist(rng):
+    cone, lower, upper = 1.0, -0.5, 2.0
+    ball = one("ball", axis=(1.0, 1.0, 0.0), lower=lower, upper=upper, cones=cone)
+    parts = [swing_twist(tuple(Q), tuple(ball.axes[0])) for Q in ball.random(rng, 1000)]
+    tilts = np.array([rotation.logarithm(swing) for swing, _ in parts])
+    twists = np.array([twist for _, twist in parts])
+    # Tilts are even over the cap of the sphere: half of them are beyond half its area.
+    assert np.median(1.0 - np.cos(np.linalg.norm(tilts, axis=1))) == pytest.approx(
+        (1.0 - np.cos(cone)) / 2, rel=0.2
+    )
+    assert lower <= twists.min() < lower + 0.1
+    assert upper - 0.1 < twists.max() <= upper
+    assert np.abs(tilts.mean(axis=0)).max() < 0.1
+
+
+vectors = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)
+directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.1).map(lambda v: v / np.linalg.norm(v))
+
+
+@given(turn=vectors, axis=directions)
+def test_swing_and_twist_recompose_and_are_what_they_are_called(turn, axis):
+    Q = rotation.exponential(turn)
+    swing, twist = swing_twist(tuple(Q), tuple(axis))
+    again = rotation.multiply(swing, rotation.exponential(twist * axis))
+    np.testing.assert_allclose(rotation.angle(again, Q), 0.0, rtol=0, atol=1e-14)
+    assert -np.pi < twist <= np.pi
+    assert abs(np.dot(swing[1:], axis)) < 1e-14
+    other, same = swing_twist(tuple(-Q), tuple(axis))
+    assert rotation.angle(other, swing) < 1e-14
+    assert abs(np.exp(1j * same) - np.exp(1j * twist)) < 1e-14
+
+
+@pytest.mark.parametrize(("axis", "across"), [(0, 1), (0, 2), (1, 0), (2, 1)])
+def test_half_a_turn_about_an_axis_across_is_all_swing(axis, across):
+    Q = (0.0, *np.eye(3)[across])
+    assert swing_twist(Q, tuple(np.eye(3)[axis])) == (Q, 0.0)
+    assert clamp_ball(Q, tuple(np.eye(3)[axis]), -0.1, 0.1, np.pi) == Q
+
+
+@given(turn=vectors, axis=directions, cone=st.floats(0.0, 3.0), most=st.floats(0.0, 3.0))
+def test_a_clamped_ball_keeps_the_direction_of_its_tilt_and_the_nearer_twist(
+    turn, axis, cone, most
+):
+    Q = tuple(rotation.exponential(turn))
+    swing, twist = swing_twist(Q, tuple(axis))
+    clamped = clamp_ball(Q, tuple(axis), -most, most, cone)
+    again, held = swing_twist(clamped, tuple(axis))
+    tilt, kept = rotation.logarithm(swing), rotation.logarithm(again)
+    assert held == pytest.approx(np.clip(twist, -most, most), abs=ANGLE)
+    angle = np.linalg.norm(tilt)
+    shortened = tilt * (cone / angle if angle > cone else 1.0)
+    np.testing.assert_allclose(kept, shortened, rtol=0, atol=ANGLE)
+
+
+def test_limits_are_felt_by_their_excess(speed):
+    slide = one("slide", lower=-1.0, upper=2.0)
+    np.testing.assert_array_equal(
+        slide.within_limits([[-1.25], [-1.0], [2.0], [2.25]], 0.25), [True] * 4
+    )
+    np.testing.assert_array_equal(
+        slide.within_limits([[-1.25], [-1.0], [2.0], [2.25]], 0.2), [False, True, True, False]
+    )
+    np.testing.assert_array_equal(slide.clamp([[-1.25], [0.5], [2.25]]), [[-1.0], [0.5], [2.0]])
+
+
+@pytest.mark.parametrize(("limit", "over"), [("cones", 0), ("upper", 2), ("lower", 2)])
+def test_a_ball_beyond_its_cone_or_its_twist_is_outside(limit, over, speed):
+    ball = one("ball", **{limit: -0.4 if limit == "lower" else 0.4})
+    sign = -1.0 if limit == "lower" else 1.0
+    for angle, within in ((0.39, True), (0.41, False)):
+        turn = rotation.exponential(sign * angle * np.eye(3)[over])
+        assert ball.within_limits(turn) == within
+    clamped = ball.clamp(rotation.exponential(sign * 1.0 * np.eye(3)[over]))
+    np.testing.assert_allclose(
+        rotation.logarithm(clamped), sign * 0.4 * np.eye(3)[over], rtol=0, atol=1e-15
+    )
+
+
+def test_neutral_is_zero_or_the_nearest_limit():
+    chain = Skeleton([-1, 0, 1, 2], np.zeros((4, 3)))
+    model = Articulation(
+        chain, ["free", "hinge", "ball", "slide"], lower=[-1, 1, -1, -2], upper=[1, 2, 1, -1]
+    )
+    np.testing.assert_array_equal(model.zero(), [0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0])
+    np.testing.assert_array_equal(model.neutral(), [0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 0, 0, -1])
+    assert model.limited
+    assert not one("hinge").limited
+
+
+def test_a_batch_is_its_poses(arm, rng, speed):
+    q = arm.random(rng, 2, 3)
+    for of in (arm.forward, arm.local_transforms, lambda q: (arm.clamp(q), arm.within_limits(q))):
+        for all_at_once, single in zip(of(q), of(q[1, 2]), strict=True):
+            assert all_at_once.shape[:2] == (2, 3)
+            assert (all_at_once[1, 2] == single).all()
+    assert forward_kinematics(arm, np.empty((0, 13))).positions.shape == (0, 6, 3)
+
+
+def test_a_model_owns_what_it_shows_and_inputs_stay_as_they_were(rng, speed):
+    axes, given = np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, 0.2, 0.3, 1.0 + 5e-7, 0, 0, 0]])
+    model = Articulation(Skeleton([-1], [[0.0, 0.0, 0.0]]), "free", axes)
+    for values in (model.frames, model.axes, model.lower, model.upper, model.cones):
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 0.0
+    axes[:] = 7.0
+    assert (model.axes == [[0.0, 0.0, 1.0]]).all()
+    before = given.copy()
+    forward_kinematics(model, given), model.clamp(given)
+    assert (given == before).all()
+
+
+def test_slightly_long_quaternions_are_normalised_once(arm, q, speed):
+    long = q.copy()
+    long[2:6] *= 1.0 + 5e-7
+    expected = forward_kinematics(arm, q)
+    np.testing.assert_allclose(
+        forward_kinematics(arm, long).positions, expected.positions, rtol=0, atol=ROUNDING
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda q: q[:-1], r"expected shape \(..., 13\), got \(12,\)"),
+        (lambda q: np.where(q == q[0], np.nan, q), "expected finite numbers, got nan"),
+        (lambda q: np.where(q == q[1], 1e80, q), "expected coordinates of at most 1e.75"),
+        (lambda q: np.where(q == q[4], 2.0, q), "expected unit quaternions"),
+        (lambda q: 0.0 * q, "expected unit quaternions .* length 0"),
+        (lambda q: "pose", "expected an array of numbers"),
+    ],
+)
+@pytest.mark.parametrize("use", ["clamp", "within_limits", "local_transforms", "forward"])
+def test_bad_coordinates_are_named(use, change, message, arm, q, speed):
+    with pytest.raises(ValueError, match=f"q: {message}"):
+        getattr(arm, use)(change(q))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"skeleton": "arm"}, "skeleton: expected a Skeleton, got str"),
+        ({"kinds": ["hinge"]}, "kinds: expected 3 kinds, one a joint, got 1"),
+        ({"kinds": "wheel"}, "kinds: expected one of fixed, hinge, .*, got 'wheel'"),
+        ({"axes": [0, 0, 0]}, r"axes: expected axes that are not zero, got \(0, 0, 0\)"),
+        ({"axes": np.ones((2, 3))}, r"axes: expected one, or one for each of 3 joints, got \(2,\)"),
+        ({"axes": [1.0, np.nan, 0.0]}, "axes: expected finite numbers"),
+        ({"axes": [1.0, 0.0]}, r"axes: expected shape \(..., 3\), got \(2,\)"),
+        ({"frames": [1.0, 1.0, 0.0, 0.0]}, "frames: expected unit quaternions"),
+        ({"frames": rotation.identity(2)}, "frames: expected one, or one for each of 3 joints"),
+        ({"lower": [1.0, 2.0]}, "lower: expected one, or one for each of 3 joints"),
+        ({"upper": np.nan}, "upper: expected numbers or infinity, got NaN"),
+        (
+            {"lower": [0, 2, 0], "upper": [1, 1, 1]},
+            "lower: expected at most the upper limit, 1, got 2 for joint 1",
+        ),
+        ({"lower": 3.2}, "lower: expected limits of a ball's twist .* got 3.2 to inf for joint 2"),
+        ({"upper": -3.2}, "lower: expected limits of a ball's twist .* got -inf to -3.2"),
+        ({"cones": -1.0}, "cones: expected angles of at least 0, got -1"),
+        ({"cones": np.nan}, "cones: expected angles of at least 0, got nan"),
+        ({"cones": [1.0, 2.0]}, "cones: expected one, or one for each of 3 joints"),
+        ({"mimics": {7: Mimic(0)}}, "mimics: expected an integer .* got 7"),
+        ({"mimics": {1: Mimic("hip")}}, "mimics: expected one of .* got 'hip'"),
+        ({"mimics": {1: Mimic(2)}}, "mimics: expected hinges or slides, got 'ball' for joint 2"),
+        ({"mimics": {2: Mimic(1)}}, "mimics: expected hinges or slides, got 'ball' for joint 2"),
+        ({"mimics": {0: Mimic(1), 1: Mimic(0)}}, "mimics: expected a leader, got .* in a ring"),
+        ({"mimics": {1: Mimic(1)}}, "mimics: expected a leader, got 'joint1' in a ring"),
+        ({"mimics": {1: Mimic(0, np.inf)}}, "mimics: expected a finite number, got inf"),
+        ({"mimics": {1: Mimic(0, 1.0, np.nan)}}, "mimics: expected a finite number, got nan"),
+    ],
+)
+def test_bad_arguments_are_named(arguments, message):
+    tree = Skeleton([-1, 0, 1], np.ones((3, 3)))
+    with pytest.raises(ValueError, match=message):
+        Articulation(**{"skeleton": tree, "kinds": ["hinge", "slide", "ball"]} | arguments)
+
+
+@pytest.mark.parametrize("ask", ["index", "coordinates_of", "freedoms_of"])
+@pytest.mark.parametrize("joint", ["hip", 6, -7, 1.0])
+def test_an_unknown_joint_is_named(ask, joint, arm):
+    with pytest.raises(ValueError, match="joint: expected"):
+        getattr(arm, ask)(joint)

@@ -1,0 +1,200 @@
+"""Jacobians are derivatives by the steps that `integrate` takes, and `difference` undoes those."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from reference import Articulation, Mimic, Skeleton, forward_kinematics, rotation
+from reference.articulation import KINDS
+from reference.differential import difference, integrate, jacobian, jacobians
+
+# Central differences over a step of 1e-5 are off by 1e-10 of a few metres, and rounding by 1e-11.
+STEP, DIFFERENCE = 1e-5, 1e-8
+ROUNDING = 1e-13
+
+TREES = {
+    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
+    "seed": st.integers(0, 2**32 - 1),
+}
+at_both_speeds = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def by_differences(model, q):
+    """Return all joints' Jacobians by central differences, (joint, 6, freedom)."""
+    at = forward_kinematics(model, q)
+    columns = [np.empty((model.joint_count, 6, 0))]
+    for step in STEP * np.eye(model.freedom_count):
+        ends = [forward_kinematics(model, integrate(model, q, v)) for v in (step, -step)]
+        moved = ends[0].positions - ends[1].positions
+        turns = [rotation.multiply(end.rotations, rotation.conjugate(at.rotations)) for end in ends]
+        turned = rotation.logarithm(turns[0]) - rotation.logarithm(turns[1])
+        columns.append(np.concatenate([moved, turned], axis=1)[..., None] / (2 * STEP))
+    return np.concatenate(columns, axis=-1)
+
+
+@pytest.fixture
+def arm(articulated):
+    """Return joints of all kinds, two of them mimics."""
+    model = articulated([*KINDS, "slide", "hinge"], 7)
+    return Articulation(
+        model.skeleton, model.kinds, model.axes, frames=model.frames,
+        mimics={5: Mimic(2, -0.5, 0.3), 6: Mimic(1, 2.0, 0.1)},
+    )  # fmt: skip
+
+
+@pytest.fixture
+def q(arm, rng):
+    return arm.random(rng)
+
+
+@at_both_speeds
+@given(**TREES)
+def test_jacobians_are_derivatives_along_steps(articulated, speed, kinds, seed):
+    model = articulated(kinds, seed)
+    q = model.random(np.random.default_rng(seed))
+    J = jacobians(model, q)
+    assert J.shape == (model.joint_count, 6, model.freedom_count)
+    np.testing.assert_allclose(J, by_differences(model, q), rtol=0, atol=DIFFERENCE)
+    if model.freedom_count:
+        assert np.abs(J).max() > 0.1
+
+
+@at_both_speeds
+@given(**TREES)
+def test_difference_undoes_a_step(articulated, speed, kinds, seed):
+    model = articulated(kinds, seed)
+    rng = np.random.default_rng(seed)
+    q, v = model.random(rng), rng.uniform(-1.8, 1.8, model.freedom_count)
+    np.testing.assert_allclose(difference(model, integrate(model, q, v), q), v, rtol=0, atol=1e-14)
+
+
+@at_both_speeds
+@given(**TREES)
+def test_a_step_by_the_difference_arrives(articulated, speed, kinds, seed):
+    model = articulated(kinds, seed)
+    q0, q1 = model.random(np.random.default_rng(seed), 2)
+    arrived = forward_kinematics(model, integrate(model, q0, difference(model, q1, q0)))
+    expected = forward_kinematics(model, q1)
+    np.testing.assert_allclose(arrived.positions, expected.positions, rtol=0, atol=ROUNDING)
+    turned = rotation.angle(arrived.rotations, expected.rotations)
+    np.testing.assert_allclose(turned, 0.0, rtol=0, atol=ROUNDING)
+
+
+def test_rotations_differ_by_the_shorter_way_round(speed):
+    ball = Articulation(Skeleton([-1], np.zeros((1, 3))))
+    end = rotation.exponential([0.0, 0.0, 4.0])
+    v = difference(ball, end, rotation.identity())
+    np.testing.assert_allclose(v, [0.0, 0.0, 4.0 - 2.0 * np.pi], rtol=0, atol=1e-14)
+    assert (difference(ball, -end, rotation.identity()) == v).all()
+
+
+def test_steps_turn_a_ball_in_its_own_frame_and_shift_a_free_joint_in_its_unmoved_one(speed):
+    quarter = rotation.exponential([0.0, 0.0, np.pi / 2])
+    free = Articulation(Skeleton([-1], np.zeros((1, 3))), "free")
+    moved = integrate(free, [1.0, 2.0, 3.0, *quarter], [1.0, 0.0, 0.0, np.pi / 2, 0.0, 0.0])
+    about_x = rotation.exponential([np.pi / 2, 0.0, 0.0])
+    expected = [2.0, 2.0, 3.0, *rotation.multiply(quarter, about_x)]
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-15)
+    # At the turned joint a shift along x is one along the world's x; a turn about x one about y.
+    J = jacobian(free, [1.0, 2.0, 3.0, *quarter])
+    np.testing.assert_allclose(J[:, 0], [1, 0, 0, 0, 0, 0], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(J[:, 3], [0, 0, 0, 0, 1, 0], rtol=0, atol=1e-15)
+
+
+def test_a_hinge_moves_a_point_across_its_arm_along_the_axes_of_the_world(speed):
+    quarter = rotation.exponential([0.0, 0.0, np.pi / 2])
+    model = Articulation(
+        Skeleton([-1, 0], [[0, 0, 5.0], [2.0, 0, 0]]), ["hinge", "fixed"], frames=quarter
+    )
+    np.testing.assert_allclose(
+        jacobian(model, [np.pi / 2])[:, 0], [0, -2, 0, 0, 0, 1], rtol=0, atol=1e-15
+    )
+
+
+def test_the_jacobian_of_a_joint_is_its_row_of_all(arm, q, speed):
+    everything = jacobians(arm, q)
+    for j, name in enumerate(arm.names):
+        assert (jacobian(arm, q, name) == everything[j]).all()
+        assert (jacobian(arm, q, j) == everything[j]).all()
+    assert (jacobian(arm, q) == everything[-1]).all()
+
+
+def test_joints_off_the_path_have_columns_of_zero(arm, q, speed):
+    for effector in range(arm.joint_count):
+        moved_by = {5: 2, 6: 1}
+        leaders = {moved_by.get(int(j), int(j)) for j in arm.skeleton.path(effector)}
+        J = jacobian(arm, q, effector)
+        for j in (1, 2, 3, 4):
+            assert J[:, arm.freedoms_of(j)].any() == (j in leaders)
+
+
+def test_a_mimic_adds_to_its_leaders_column_by_the_chain_rule(arm, q, speed):
+    """The joints released: every column of a mimic joint times its multiplier."""
+    released = Articulation(arm.skeleton, arm.kinds, arm.axes, frames=arm.frames)
+    single = np.array([-0.5 * q[1] + 0.3, 2.0 * q[0] + 0.1])
+    J = jacobians(released, np.concatenate([q, single]))
+    joined = J[..., :-2].copy()
+    joined[..., 1] += -0.5 * J[..., -2]
+    joined[..., 0] += 2.0 * J[..., -1]
+    np.testing.assert_allclose(jacobians(arm, q), joined, rtol=0, atol=ROUNDING)
+    assert J[..., -2:].any(axis=(0, 1)).all()
+
+
+def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, rng, speed):
+    balls, v = Articulation(skeleton), rng.standard_normal(18)
+    assert (jacobians(skeleton, local) == jacobians(balls, local.ravel())).all()
+    assert (jacobian(skeleton, local, 2) == jacobian(balls, local.ravel(), 2)).all()
+    moved = integrate(skeleton, local, v)
+    assert moved.shape == local.shape
+    assert (moved.ravel() == integrate(balls, local.ravel(), v)).all()
+    between = difference(skeleton, moved, local)
+    assert (between == difference(balls, moved.ravel(), local.ravel())).all()
+
+
+def test_leading_axes_broadcast(arm, q, rng, speed):
+    v = rng.uniform(-0.5, 0.5, (2, 3, arm.freedom_count))
+    moved = integrate(arm, q, v)
+    assert moved.shape == (2, 3, arm.coordinate_count)
+    assert (moved[1, 2] == integrate(arm, q, v[1, 2])).all()
+    np.testing.assert_allclose(difference(arm, moved, q), v, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(difference(arm, q, moved), -v, rtol=0, atol=1e-14)
+    J = jacobians(arm, moved)
+    assert J.shape == (2, 3, arm.joint_count, 6, arm.freedom_count)
+    assert (J[1, 2] == jacobians(arm, moved[1, 2])).all()
+    assert (jacobian(arm, moved) == J[..., -1, :, :]).all()
+    assert jacobian(arm, np.empty((0, arm.coordinate_count))).shape == (0, 6, arm.freedom_count)
+
+
+def test_inputs_stay_as_they_were(arm, q, speed):
+    before, v = q.copy(), np.ones(arm.freedom_count)
+    moved = integrate(arm, q, v)
+    difference(arm, moved, q)
+    jacobians(arm, q)
+    assert (q == before).all()
+    assert (v == 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m, q: jacobian("arm", q), "skeleton: expected a Skeleton, got str"),
+        (lambda m, q: jacobian(m, q[:-1]), "q: expected shape"),
+        (lambda m, q: jacobians(m, 2.0 * q), "q: expected unit quaternions"),
+        (lambda m, q: jacobian(m, q, 7), "effector: expected an integer"),
+        (lambda m, q: jacobian(m, q, "hand"), "effector: expected one of"),
+        (lambda m, q: jacobian(m.skeleton, q), r"q: expected shape \(..., 7, 4\)"),
+        (lambda m, q: integrate(m, q, np.ones(10)), r"v: expected shape \(..., 11\), got \(10,\)"),
+        (lambda m, q: integrate(m, q, np.full(11, np.nan)), "v: expected finite numbers"),
+        (
+            lambda m, q: integrate(m, np.stack([q, q]), np.ones((3, 11))),
+            r"v: expected leading axes that broadcast with \(2,\), got \(3,\)",
+        ),
+        (lambda m, q: difference(m, q[:-1], q), "q1: expected shape"),
+        (lambda m, q: difference(m, q, q[:-1]), "q0: expected shape"),
+        (lambda m, q: difference(m, [q, q], [q, q, q]), "q1: expected leading axes"),
+    ],
+)
+def test_bad_arguments_are_named(call, message, arm, q):
+    with pytest.raises(ValueError, match=message):
+        call(arm, q)
