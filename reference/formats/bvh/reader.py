@@ -1,0 +1,256 @@
+"""Reading BVH."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...arguments import LARGEST_COORDINATE, FloatArray, frozen
+from ...quaternion import IDENTITY, multiply
+from ...skeleton import Skeleton
+from ..robot import MOST_JOINTS, ORIGIN
+from ..source import read_text
+from .motion import Motion
+
+# Frames times joints: a motion then fits in about a gigabyte.
+MOST_POSES = 20_000_000
+# In a line of the hierarchy.
+MOST_CHARACTERS = 100_000
+CHANNEL = re.compile(r"([XYZ])(POSITION|ROTATION)", re.IGNORECASE)
+COUNT = re.compile(r"[0-9]{1,9}")
+LINE = re.compile(r"\S[^\n]*")
+BRACES = re.compile(r"([{}])")
+
+
+def read(path: str | Path) -> Motion:
+    """Return the motion in a file.
+
+    Raises:
+        ValueError: naming file and line, if it cannot be read or is not a BVH file.
+    """
+    return _motion(read_text(path), str(path))
+
+
+def parse(text: str) -> Motion:
+    """Return the motion that a text describes.
+
+    Raises:
+        ValueError: as for `read`.
+    """
+    return _motion(text, "BVH")
+
+
+@dataclass
+class _Joint:
+    name: str
+    parent: int
+    is_end: bool
+    offset: tuple[float, ...] = ()
+    channels: tuple[tuple[int, bool], ...] | None = None  # each an axis, and whether it turns
+
+
+def _motion(text: str, origin: str) -> Motion:
+    lines = _Lines(text)
+    try:
+        joints = _hierarchy(lines)
+        frame_time, values = _frames(lines, joints, len(text))
+    except ValueError as error:
+        raise ValueError(f"{origin}, line {lines.number}: {error}") from None
+    offsets, rotations = _poses(joints, values)
+    rest = np.array([joint.offset for joint in joints])
+    if len(offsets):
+        rest[0] = offsets[0, 0]
+    skeleton = Skeleton([j.parent for j in joints], rest, [j.name for j in joints])
+    return Motion(skeleton, frozen(rotations), frame_time, frozen(offsets))
+
+
+class _Lines:
+    """The lines of a text that are not empty, and the number of the last one given."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.found = LINE.finditer(text)
+        self.at = 0
+
+    def __iter__(self) -> Iterator[str]:
+        for line in self.found:
+            self.at = line.start()
+            yield line[0].rstrip()
+        self.at = len(self.text)
+
+    @property
+    def number(self) -> int:
+        return self.text.count("\n", 0, self.at) + 1
+
+    def next(self, expected: str) -> str:
+        """Return the next one.
+
+        Raises:
+            ValueError: if there is none.
+        """
+        for line in self:
+            return line
+        raise ValueError(f"expected {expected}, got the end of the file")
+
+
+def _hierarchy(lines: _Lines) -> list[_Joint]:
+    """Return the joints; the lines stand behind MOTION then."""
+    first = lines.next("HIERARCHY")
+    if first.upper() != "HIERARCHY":
+        raise ValueError(f"expected HIERARCHY, got {first!r:.40}")
+    tree = _Tree()
+    for line in lines:
+        if line.upper() == "MOTION":
+            tree.check_complete()
+            return tree.joints
+        if len(line) > MOST_CHARACTERS:
+            raise ValueError(f"expected lines of at most {MOST_CHARACTERS:,} characters")
+        for piece in BRACES.split(line):
+            if piece.strip():
+                tree.take(piece.strip())
+    raise ValueError("expected MOTION, got the end of the file")
+
+
+class _Tree:
+    """The joints so far, and those that are still open."""
+
+    def __init__(self) -> None:
+        self.joints: list[_Joint] = []
+        self.names: set[str] = set()
+        self.path: list[int] = []
+        self.unopened = False
+
+    def take(self, piece: str) -> None:
+        """Take the next statement: a brace, or a word and what belongs to it."""
+        word, *rest = piece.split(maxsplit=1)
+        word = word.upper()
+        if self.unopened != (word == "{"):
+            expected = "{" if self.unopened else "a statement"
+            raise ValueError(f"expected {expected}, got {piece!r:.40}")
+        if word == "{":
+            self.unopened = False
+        elif word in ("ROOT", "JOINT", "END"):
+            self.open(word, *rest)
+        elif word in ("OFFSET", "CHANNELS", "}") and self.path:
+            joint = self.joints[self.path[-1]]
+            {"OFFSET": _set_offset, "CHANNELS": _set_channels, "}": self.close}[word](joint, *rest)
+        else:
+            raise ValueError(f"expected a joint or what belongs to one, got {piece!r:.40}")
+
+    def open(self, word: str, name: str = "") -> None:
+        """Begin a joint or an end site, whose opening brace must follow."""
+        if (word == "ROOT") == bool(self.joints) or (word != "ROOT" and not self.path):
+            raise ValueError(f"expected one ROOT and all joints in it, got {word} {name!r:.40}")
+        parent = self.path[-1] if self.path else -1
+        if self.joints and self.joints[parent].is_end:
+            raise ValueError(f"expected nothing in an end site, got {word} {name!r:.40}")
+        name = f"{self.joints[parent].name} end" if word == "END" else name
+        if not name or name in self.names:
+            raise ValueError(f"expected a name of its own, got {name!r:.40}")
+        if len(self.joints) == MOST_JOINTS:
+            raise ValueError(f"expected at most {MOST_JOINTS:,} joints, got more")
+        self.path.append(len(self.joints))
+        self.names.add(name)
+        self.joints.append(_Joint(name, parent, word == "END"))
+        self.unopened = True
+
+    def close(self, joint: _Joint) -> None:
+        """End a joint; an end site where its parent is adds nothing."""
+        if not joint.offset:
+            raise ValueError(f"expected an OFFSET in {joint.name!r:.40}, got none")
+        self.path.pop()
+        if joint.is_end and joint.offset == ORIGIN:
+            self.names.remove(self.joints.pop().name)
+
+    def check_complete(self) -> None:
+        """Raise a ValueError if there is no joint or one is still open."""
+        if self.path or not self.joints:
+            came = f"{self.joints[self.path[-1]].name!r:.40} still open" if self.path else "none"
+            raise ValueError(f"expected complete joints before MOTION, got {came}")
+
+
+def _set_offset(joint: _Joint, rest: str = "") -> None:
+    if joint.offset:
+        raise ValueError(f"expected one OFFSET in {joint.name!r:.40}, got two")
+    joint.offset = tuple(_numbers(rest, 3))
+
+
+def _set_channels(joint: _Joint, rest: str = "") -> None:
+    count, *names = rest.split(maxsplit=7) or [""]
+    found = [CHANNEL.fullmatch(name) for name in names]
+    channels = [("XYZ".index(m[1].upper()), m[2].upper() == "ROTATION") for m in found if m]
+    if joint.is_end or joint.channels is not None:
+        raise ValueError(f"expected CHANNELS once, and in joints only, got {rest!r:.40}")
+    if not COUNT.fullmatch(count) or not int(count) == len(names) == len(set(channels)):
+        raise ValueError(f"expected a count and so many different channels, got {rest!r:.80}")
+    joint.channels = tuple(channels)
+
+
+def _numbers(text: str, count: int) -> list[float]:
+    """Return the numbers that a text writes."""
+    words = text.split(maxsplit=count)
+    if len(words) != count:
+        came = "more" if len(words) > count else len(words)
+        raise ValueError(f"expected {count} numbers, got {came}")
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError as error:
+        raise ValueError(f"expected numbers, got {str(error).partition(': ')[2]:.40}") from None
+    if "_" in text or not all(abs(number) <= LARGEST_COORDINATE for number in numbers):
+        raise ValueError(f"expected numbers of at most {LARGEST_COORDINATE:g}, got {text!r:.80}")
+    return numbers
+
+
+def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, FloatArray]:
+    """Return the time of a frame and the channels' values, (frame, channel)."""
+    count_text = _after("Frames:", lines)
+    (frame_time,) = _numbers(_after("Frame Time:", lines), 1)
+    if not COUNT.fullmatch(count_text):
+        raise ValueError(f"expected a count of frames, got {count_text!r:.40}")
+    if frame_time <= 0.0:
+        raise ValueError(f"expected a frame time greater than 0, got {frame_time:g}")
+    count, width = int(count_text), sum(len(joint.channels or ()) for joint in joints)
+    if count * len(joints) > MOST_POSES:
+        raise ValueError(f"expected at most {MOST_POSES:,} frames times joints, got more")
+    if count and (width == 0 or 2 * count * width > size):  # a number and a space each, at least
+        raise ValueError(f"expected {count:,} frames of {width:,} numbers, got a shorter file")
+    values = np.empty((count, width))
+    for i in range(count):
+        values[i] = _numbers(lines.next(f"{count:,} frames"), width)
+    for line in lines:
+        raise ValueError(f"expected the end after {count:,} frames, got {line!r:.40}")
+    return frame_time, values
+
+
+def _after(title: str, lines: _Lines) -> str:
+    """Return what the next line says after its title."""
+    line = lines.next(f"'{title}'")
+    if not line.upper().startswith(title.upper()):
+        raise ValueError(f"expected '{title}', got {line!r:.40}")
+    return line[len(title) :].strip()
+
+
+def _poses(joints: list[_Joint], values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return offsets, (frame, joint, 3), and local rotations, (frame, joint, 4)."""
+    offsets = np.tile(np.array([joint.offset for joint in joints]), (len(values), 1, 1))
+    rotations = np.empty((len(values), len(joints), 4))
+    columns = iter(values.T)
+    for j, joint in enumerate(joints):
+        R = IDENTITY
+        for axis, turns in joint.channels or ():
+            if turns:
+                R = multiply(R, _turn(axis, np.radians(next(columns))))
+            else:
+                offsets[:, j, axis] = next(columns)
+        for part in range(4):
+            rotations[:, j, part] = R[part]
+    return offsets, rotations
+
+
+def _turn(axis: int, angle: FloatArray) -> Sequence[FloatArray | float]:
+    """Return the rotations by angles about one of the axes x, y, z."""
+    vector: list[FloatArray | float] = [0.0, 0.0, 0.0]
+    vector[axis] = np.sin(0.5 * angle)
+    return (np.cos(0.5 * angle), *vector)

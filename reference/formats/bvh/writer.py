@@ -1,0 +1,213 @@
+"""Writing BVH."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ... import arguments, rotation
+from ...arguments import FloatArray
+from ...articulation import Articulation
+from ...skeleton import Skeleton, checked_skeleton
+
+ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+EVEN = ("XYZ", "YZX", "ZXY")
+DECIMALS = 6
+POSITIONS = "Xposition Yposition Zposition"
+# Deeper joints are not indented further, or the text of a long chain would grow with its square.
+DEEPEST_INDENT = 40
+
+
+def write(
+    path: str | Path,
+    skeleton: Skeleton | Articulation,
+    local_rotations: ArrayLike,
+    frame_time: float = 1.0 / 60.0,
+    offsets: ArrayLike | None = None,
+    *,
+    order: str = "ZXY",
+) -> None:
+    """Write a motion to a file, over one that may be there.
+
+    Args:
+        path: of the file.
+        skeleton: what moves.
+        local_rotations: (frame, joint, 4), or of one pose (joint, 4), as `solve_ik` and `track`
+            return them; of an Articulation its coordinates, (frame, coordinate).
+        frame_time: from a frame to the next [s].
+        offsets: where joints shift, each one's position in its parent's frame, (frame, joint, 3),
+            or the root's alone, (frame, 3); the skeleton's if None.
+        order: the axes of the rotation channels.
+
+    Numbers have six decimals: an offset is off by at most 5e-7 an axis, 9e-7 in all, and a joint's
+    rotation by 1.5e-6 degrees in three angles, 2.7e-8 rad. So a joint that is n joints below the
+    root, along links of length L in all, is off by at most (n + 1) 9e-7 + n L 2.7e-8. Angles run on
+    without jumps of a whole turn. Joints are written depth first, so that a reader finds them in
+    that order, by the same names.
+
+    Raises:
+        ValueError: naming the argument, if one is wrong or a name cannot be written.
+        OSError: if the file cannot be written.
+    """
+    text = format(skeleton, local_rotations, frame_time, offsets, order=order)
+    Path(path).write_text(text, encoding="utf-8", newline="\n")
+
+
+def format(
+    skeleton: Skeleton | Articulation,
+    local_rotations: ArrayLike,
+    frame_time: float = 1.0 / 60.0,
+    offsets: ArrayLike | None = None,
+    *,
+    order: str = "ZXY",
+) -> str:
+    """Return the text of a motion; see `write`.
+
+    Raises:
+        ValueError: as for `write`.
+    """
+    arguments.choice("order", order, ORDERS)
+    frame_time = arguments.number("frame_time", frame_time, above=0.0)
+    if isinstance(skeleton, Articulation):
+        x, R = _articulated(skeleton, local_rotations, offsets)
+        skeleton = skeleton.skeleton
+    else:
+        x, R = _rotated(checked_skeleton(skeleton), local_rotations, offsets)
+    _check_names(skeleton)
+    shifts = (x != skeleton.offsets).any(axis=(0, 2))
+    shifts[0] = True
+    ends = _end_sites(skeleton, R, shifts)
+    joints, hierarchy = _hierarchy(skeleton, shifts, ends, order)
+    angles = euler_angles(R, order)
+    columns = [part for j in joints for part in ([x[:, j]] if shifts[j] else []) + [angles[:, j]]]
+    frames = _lines(np.concatenate(columns, axis=-1))
+    head = ["MOTION", f"Frames: {len(frames)}", f"Frame Time: {frame_time!r}"]
+    return "\n".join(["HIERARCHY", *hierarchy, *head, *frames, ""])
+
+
+def euler_angles(R: FloatArray, order: str) -> FloatArray:
+    """Return angles [degrees], (frame, joint, 3), of R = R_1(a_1) R_2(a_2) R_3(a_3), (..., 4).
+
+    Bernardes and Viollet 2022: with e the sign of the axes' order, (a_3 + e a_1)/2 and
+    (a_3 - e a_1)/2 are the angles of two points in the plane, made of sums of the quaternion's
+    parts, and the ratio of their distances from its origin gives a_2. At gimbal lock one of them is
+    at the origin: its angle has no meaning there, and no effect. Angles begin within half a turn
+    of zero and run on from frame to frame without jumps of a whole one.
+    """
+    first, second, third = (R[..., 1 + "XYZ".index(axis)] for axis in order)
+    first = -first if order in EVEN else first
+    w = R[..., 0]
+    a, b, c, d = w - second, third + first, w + second, first - third
+    half_sum, half_difference = np.arctan2(b, a), np.arctan2(d, c)
+    angles = np.stack(
+        [
+            half_sum + half_difference,
+            2.0 * np.arctan2(np.hypot(c, d), np.hypot(a, b)) - 0.5 * np.pi,
+            half_sum - half_difference,
+        ],
+        axis=-1,
+    )
+    angles[..., 0] *= -1.0 if order in EVEN else 1.0
+    angles = np.degrees(np.unwrap(angles, axis=0))
+    return angles - 360.0 * np.round(angles[:1] / 360.0)
+
+
+def _articulated(
+    articulation: Articulation, q: ArrayLike, offsets: ArrayLike | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return offsets and local rotations of each frame from coordinates."""
+    if offsets is not None:
+        raise ValueError("offsets: expected none beside an Articulation's coordinates, got some")
+    return articulation.local_transforms(
+        _framed("local_rotations", articulation.checked("local_rotations", q), 2)
+    )
+
+
+def _rotated(
+    skeleton: Skeleton, local_rotations: ArrayLike, offsets: ArrayLike | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return offsets and local rotations of each frame."""
+    count = skeleton.joint_count
+    given = arguments.floats("local_rotations", local_rotations, "...", count, 4)
+    R = _framed("local_rotations", rotation.unit("local_rotations", given), 3)
+    x = np.tile(skeleton.offsets, (len(R), 1, 1))
+    if offsets is None:
+        return x, R
+    if np.ndim(offsets) == 2:
+        x[:, 0] = arguments.coordinates("offsets", offsets, len(R), 3)
+        return x, R
+    return arguments.coordinates("offsets", offsets, len(R), count, 3), R
+
+
+def _framed(name: str, values: FloatArray, axes: int) -> FloatArray:
+    """Return an array that has the frames as its leading axis: one pose is one frame."""
+    if values.ndim not in (axes - 1, axes):
+        raise ValueError(f"{name}: expected one pose or a row of frames, got {values.shape}")
+    return values if values.ndim == axes else values[None]
+
+
+def _check_names(skeleton: Skeleton) -> None:
+    for name in skeleton.names:
+        if name != " ".join(name.split()) or set(name) & set("{}\0"):
+            raise ValueError(f"skeleton: expected names without braces or line ends, got {name!r}")
+
+
+def _children(skeleton: Skeleton) -> list[list[int]]:
+    children: list[list[int]] = [[] for _ in skeleton.names]
+    for joint, parent in enumerate(skeleton.parents[1:], 1):
+        children[parent].append(joint)
+    return children
+
+
+def _end_sites(skeleton: Skeleton, R: FloatArray, shifts: np.ndarray) -> set[int]:
+    """Return the joints that read back as they are from an end site."""
+    ends = set()
+    children = _children(skeleton)
+    for siblings in children:
+        j = siblings[0] if len(siblings) == 1 else 0
+        named = skeleton.names[j] == f"{skeleton.names[skeleton.parents[j]]} end"
+        apart = np.round(skeleton.offsets[j], DECIMALS).any()
+        leaf = not children[j]
+        if named and apart and leaf and not shifts[j] and (np.abs(R[:, j, 0]) == 1.0).all():
+            ends.add(j)
+    return ends
+
+
+def _hierarchy(
+    skeleton: Skeleton, shifts: np.ndarray, ends: set[int], order: str
+) -> tuple[list[int], list[str]]:
+    """Return the joints that have channels, in the order of the file, and the lines."""
+    children = _children(skeleton)
+    turns = " ".join(f"{axis}rotation" for axis in order)
+    joints: list[int] = []
+    lines: list[str] = []
+    depths = np.zeros(skeleton.joint_count, dtype=int)
+    waiting: list[int | str] = [0]
+    while waiting:
+        j = waiting.pop()
+        if isinstance(j, str):
+            lines.append(j)
+            continue
+        depths[children[j]] = depths[j] + 1
+        pad = "\t" * min(depths[j], DEEPEST_INDENT)
+        offset = skeleton.offsets[j] if j else np.zeros(3)
+        if j in ends:
+            lines += _block(pad, "End Site", offset)
+            continue
+        joints.append(j)
+        channels = f"6 {POSITIONS} {turns}" if shifts[j] else f"3 {turns}"
+        title = f"{'JOINT' if j else 'ROOT'} {skeleton.names[j]}"
+        lines += [*_block(pad, title, offset)[:-1], f"{pad}\tCHANNELS {channels}"]
+        lines += [] if children[j] else _block(pad + "\t", "End Site", np.zeros(3))
+        waiting += [pad + "}", *reversed(children[j])]
+    return joints, lines
+
+
+def _block(pad: str, title: str, offset: FloatArray) -> list[str]:
+    return [pad + title, pad + "{", f"{pad}\tOFFSET {_lines(offset[None])[0]}", pad + "}"]
+
+
+def _lines(rows: FloatArray) -> list[str]:
+    """Return a line for each row; no number is written as -0."""
+    pattern = " ".join([f"%.{DECIMALS}f"] * rows.shape[1])
+    return [pattern % tuple(row) for row in np.round(rows, DECIMALS) + 0.0]

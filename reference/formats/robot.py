@@ -1,0 +1,95 @@
+"""What a file describes: an articulation, its joints by name, and where it stands."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ..arguments import FloatArray, frozen
+from ..articulation import Articulation, Mimic
+from ..quaternion import IDENTITY, between
+from ..skeleton import Skeleton
+
+MOST_JOINTS = 10_000
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+ORIGIN = (0.0, 0.0, 0.0)
+INFINITY = float("inf")
+
+
+class Robot(NamedTuple):
+    """A robot or a character read from a file.
+
+    Attributes:
+        articulation: its joints, named after the file's links or bodies, whose poses they are.
+        joints: the articulation's joint, by the name of the file's joint: its place in q is
+            `articulation.coordinates_of(joints[name])`.
+        home: the coordinates in which the file shows it, (coordinate,).
+    """
+
+    articulation: Articulation
+    joints: dict[str, int]
+    home: FloatArray
+
+
+class Link(NamedTuple):
+    """One joint of an articulation, as a reader finds it.
+
+    Attributes:
+        name: of the joint.
+        parent: the number of its parent among the links, -1 for the root.
+        offset: its position in the parent's frame [m].
+        frame: its rotation in the parent's frame.
+        kind: of the joint.
+        axis: in its own frame.
+        lower: limit [rad or m].
+        upper: limit [rad or m].
+        cone: limit of a ball's tilt [rad].
+    """
+
+    name: str
+    parent: int
+    offset: Vector = ORIGIN
+    frame: Quaternion = IDENTITY
+    kind: str = "fixed"
+    axis: Vector = (0.0, 0.0, 1.0)
+    lower: float = -INFINITY
+    upper: float = INFINITY
+    cone: float = INFINITY
+
+
+def upright(axis: Vector) -> Quaternion:
+    """Return the shortest rotation of z onto an axis; onto -z, half a turn about x, like MuJoCo."""
+    x, y, z = axis
+    if z < 0.0 and max(abs(x), abs(y)) < 1e-10 * -z:
+        return 0.0, 1.0, 0.0, 0.0
+    return between((0.0, 0.0, 1.0), axis)
+
+
+def assemble(
+    origin: str,
+    links: list[Link],
+    joints: dict[str, int],
+    mimics: Mapping[int | str, Mimic] | None = None,
+) -> Robot:
+    """Return the robot of these links, at home where its coordinates are zero.
+
+    Raises:
+        ValueError: naming the origin, if there are more than MOST_JOINTS, or one is wrong.
+    """
+    if len(links) > MOST_JOINTS:
+        raise ValueError(f"{origin}: expected at most {MOST_JOINTS:,} joints, got {len(links):,}")
+    names, parents, offsets, frames, kinds, axes, lower, upper, cones = zip(*links, strict=True)
+    try:
+        articulation = Articulation(
+            Skeleton(parents, offsets, names),
+            kinds,
+            axes,
+            frames=frames,
+            lower=lower,
+            upper=upper,
+            cones=cones,
+            mimics=mimics,
+        )
+    except ValueError as error:
+        raise ValueError(f"{origin}: {error}") from None
+    return Robot(articulation, joints, frozen(articulation.zero()))

@@ -1,0 +1,173 @@
+"""Elements of an XML file that may come from anywhere.
+
+Only elements and attributes are kept. A document type is refused, and with it every entity that a
+file could define: those that grow without bound and those that read other files.
+"""
+
+import math
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar, cast
+from xml.parsers import expat
+
+from ..arguments import LARGEST_COORDINATE
+from .source import read_text
+
+MOST_ELEMENTS = 100_000
+# As deep as TinyXML2, which MuJoCo and ROS read with.
+MOST_DEPTH = 500
+# In an attribute that is read: one that goes into every joint must not be a file of its own.
+MOST_CHARACTERS = 2000
+
+Numbers = TypeVar("Numbers", bound=tuple[float, ...])
+
+
+class Element(NamedTuple):
+    """An element of a file.
+
+    Attributes:
+        tag: its name.
+        attributes: what they say, by name.
+        children: the elements in it, in the order of the file.
+        place: the file and the line it begins in.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    children: list["Element"]
+    place: str
+
+    def named(self, tag: str) -> list["Element"]:
+        """Return the children of that name."""
+        return [child for child in self.children if child.tag == tag]
+
+    def single(self, tag: str) -> "Element | None":
+        """Return the child of that name, None if there is none.
+
+        Raises:
+            ValueError: if there are several.
+        """
+        found = self.named(tag)
+        if len(found) > 1:
+            raise self.error(f"expected at most one <{tag}>, got {len(found)}")
+        return found[0] if found else None
+
+    def word(self, name: str, default: str | None = None) -> str:
+        """Return an attribute, or the default where it is missing.
+
+        Raises:
+            ValueError: if it is missing and has no default, is empty or too long.
+        """
+        value = self._short(name) if name in self.attributes else default
+        if not value:
+            came = "none" if value is None else "an empty one"
+            raise self.error(f"expected an attribute {name!r}, got {came}")
+        return value
+
+    def numbers(self, name: str, default: Numbers) -> Numbers:
+        """Return as many finite numbers as the default has, or the default itself.
+
+        Raises:
+            ValueError: if they are fewer, more, no numbers, or beyond 1e75.
+        """
+        values = self.limits(name, default)
+        if not all(abs(value) <= LARGEST_COORDINATE for value in values):
+            raise self._no_numbers(name, len(default), f"numbers of at most {LARGEST_COORDINATE:g}")
+        return values
+
+    def limits(self, name: str, default: Numbers) -> Numbers:
+        """Return the same, infinite ones let through.
+
+        Raises:
+            ValueError: if they are fewer, more, or not numbers.
+        """
+        words = self._short(name).split()
+        if not words:
+            return default
+        values = tuple(map(_number, words))
+        if len(values) != len(default) or any(map(math.isnan, values)):
+            raise self._no_numbers(name, len(default), "numbers")
+        return cast(Numbers, values)
+
+    def error(self, problem: str) -> ValueError:
+        """Return an error that says where, in which element and what."""
+        name = f" name={self.attributes['name']!r:.60}" if "name" in self.attributes else ""
+        return ValueError(f"{self.place}: <{self.tag:.60}{name}>: {problem}")
+
+    def _short(self, name: str) -> str:
+        value = self.attributes.get(name, "")
+        if len(value) > MOST_CHARACTERS:
+            raise self.error(f"expected at most {MOST_CHARACTERS:,} characters in {name!r}")
+        return value
+
+    def _no_numbers(self, name: str, count: int, kind: str) -> ValueError:
+        return self.error(f"expected {count} {kind} in {name!r}, got {self.attributes[name]!r:.80}")
+
+
+def read(path: str | Path) -> Element:
+    """Return the root element of a file.
+
+    Raises:
+        ValueError: as for `parse`, and if it cannot be read.
+    """
+    return parse(read_text(path), str(path))
+
+
+def parse(text: str, origin: str) -> Element:
+    """Return the root element of a text; origin names it in errors.
+
+    Raises:
+        ValueError: if it is not well-formed, has a document type, more than MOST_ELEMENTS
+            elements, or some nested deeper than MOST_DEPTH.
+    """
+    builder = _Builder(origin)
+    try:
+        builder.parser.Parse(text.encode(errors="replace"), True)
+    except expat.ExpatError as error:
+        problem = expat.ErrorString(error.code)
+        raise ValueError(
+            f"{origin}, line {error.lineno}: expected well-formed XML, got {problem}"
+        ) from None
+    return builder.top.children[0]
+
+
+class _Builder:
+    """Gathers the elements that the parser reports."""
+
+    def __init__(self, origin: str) -> None:
+        self.origin = origin
+        self.count = 0
+        self.top = Element("", {}, [], origin)
+        self.open = [self.top]
+        self.parser: Any = expat.ParserCreate("utf-8")
+        self.parser.StartElementHandler = self.start
+        self.parser.EndElementHandler = self.end
+        self.parser.StartDoctypeDeclHandler = self.refuse_document_type
+
+    def place(self) -> str:
+        return f"{self.origin}, line {self.parser.CurrentLineNumber}"
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.count += 1
+        if self.count > MOST_ELEMENTS:
+            raise ValueError(f"{self.place()}: expected at most {MOST_ELEMENTS:,} elements")
+        if len(self.open) > MOST_DEPTH:
+            raise ValueError(
+                f"{self.place()}: expected at most {MOST_DEPTH} elements in each other"
+            )
+        element = Element(tag, attributes, [], self.place())
+        self.open[-1].children.append(element)
+        self.open.append(element)
+
+    def end(self, tag: str) -> None:
+        self.open.pop()
+
+    def refuse_document_type(self, name: str, *declaration: Any) -> None:
+        raise ValueError(f"{self.place()}: expected no document type, got <!DOCTYPE {name:.60}>")
+
+
+def _number(word: str) -> float:
+    """Return the number a word stands for, infinity included; NaN if for none."""
+    try:
+        return math.nan if "_" in word else float(word)
+    except ValueError:
+        return math.nan

@@ -1,0 +1,319 @@
+import mujoco
+import numpy as np
+import pytest
+
+from reference import forward_kinematics, rotation
+from reference.formats import mjcf
+
+SOLID = '<geom size="1"/>'
+
+
+def character(bodies, head=""):
+    return mjcf.parse(f"<mujoco>{head}<worldbody>{bodies}</worldbody></mujoco>")
+
+
+def pose(found, body, q=None):
+    """The position and the rotation matrix of a body."""
+    poses = forward_kinematics(found.articulation, found.home if q is None else q)
+    at = found.articulation.index(body)
+    return poses.positions[at], rotation.to_matrix(poses.rotations[at])
+
+
+def difference_from_mujoco(text, q=None):
+    """How far our poses of all bodies are from MuJoCo's for the same text, at q or each at home."""
+    model, found = mujoco.MjModel.from_xml_string(text), mjcf.parse(text)
+    data = mujoco.MjData(model)
+    data.qpos[:] = model.qpos0 if q is None else q
+    mujoco.mj_kinematics(model, data)
+    worst = 0.0
+    for i in range(model.nbody):
+        x, R = pose(found, model.body(i).name or f"body#{i}", q)
+        worst = max(worst, np.abs(x - data.xpos[i]).max())
+        worst = max(worst, np.abs(R.ravel() - data.xmat[i]).max())
+    return worst
+
+
+def spoken(rng, count, low=-2.0, high=2.0):
+    return " ".join(f"{value:.17g}" for value in rng.uniform(low, high, count))
+
+
+def oriented(rng):
+    """One of the forms of an orientation, or none."""
+    count, name = [(4, "quat"), (4, "axisangle"), (3, "euler"), (6, "xyaxes"), (3, "zaxis"),
+                   (0, "")][rng.integers(6)]  # fmt: skip
+    return f'{name}="{spoken(rng, count)}"' if name else ""
+
+
+def any_joint(rng, kinds, k):
+    name = f'name="j{k}"' if rng.integers(2) else ""
+    low, high = np.sort(rng.uniform(-2, 2, 2))
+    limits = ["", f'range="{low:.17g} {high:.17g}"', f'limited="false" range="{low} {high}"']
+    kind = kinds[rng.integers(len(kinds))]
+    about = ["", f'axis="{spoken(rng, 3)}"'][rng.integers(2)]
+    anchor = ["", f'pos="{spoken(rng, 3)}"'][rng.integers(2)]
+    ref = ["", f'ref="{spoken(rng, 1)}"'][rng.integers(2)]
+    grade = ["", 'class="slides"', 'class="inner"'][rng.integers(3)] if kind == "hinge" else ""
+    kind = f'type="{kind}"' if kind != "hinge" or rng.integers(2) else ""
+    if "ball" in kind:
+        return f'<joint {name} {kind} {anchor} range="0 {high + 3:.17g}" class="main"/>'
+    return f"<joint {name} {kind} {about} {anchor} {ref} {grade} {limits[rng.integers(3)]}/>"
+
+
+def any_content(rng, depth, ids):
+    """Joints, and bodies inside frames or not."""
+    ball = depth and not rng.integers(4)  # no more than six freedoms in all
+    count = rng.integers(2) if ball else rng.integers(4)
+    text = "".join(any_joint(rng, ["hinge", "slide"], next(ids)) for _ in range(count))
+    text += any_joint(rng, ["ball"], next(ids)) if ball else ""
+    for _ in range(rng.integers(1, 3) if depth < 3 else 0):
+        inner = any_body(rng, depth + 1, ids)
+        grade = ["", 'childclass="inner"'][rng.integers(2)]
+        inside = (
+            ""
+            if rng.integers(2)
+            else any_joint(rng, ["slide"] if ball else ["hinge", "slide"], next(ids))
+        )
+        framed = f'<frame pos="{spoken(rng, 3)}" {oriented(rng)} {grade}>{inside}{inner}</frame>'
+        text += framed if rng.integers(2) else inner
+    return text
+
+
+def any_body(rng, depth, ids):
+    name = f'name="b{next(ids)}"' if rng.integers(3) else ""
+    grade = ["", 'childclass="slides"'][rng.integers(2)]
+    place = f'pos="{spoken(rng, 3)}"' if rng.integers(3) else ""
+    return (
+        f"<body {name} {place} {oriented(rng)} {grade}>{SOLID}{any_content(rng, depth, ids)}</body>"
+    )
+
+
+def any_character(rng):
+    ids = iter(range(10_000))
+    sequence = "".join(rng.choice(list("xyzXYZ"), 3))
+    unit = ["", 'angle="degree"', 'angle="radian"'][rng.integers(3)]
+    defaults = """<default><joint axis="1 2 3" ref="0.5"/><default class="inner">
+        <joint range="-1 1"/><default class="slides"><joint type="slide" ref="0.2"/></default>
+        </default></default>"""
+    free = f'<body pos="1 2 3" euler="10 20 30"><freejoint/>{SOLID}{any_body(rng, 1, ids)}</body>'
+    placed = f'<frame pos="{spoken(rng, 3)}" {oriented(rng)}>{free}</frame>'
+    return (
+        f"<mujoco><worldbody>{any_body(rng, 0, ids)}{placed}</worldbody><compiler {unit}/>"
+        f'<compiler eulerseq="{sequence}"/>{defaults}</mujoco>'
+    )
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_any_character_stands_as_mujoco_says(seed):
+    rng = np.random.default_rng(seed)
+    text = any_character(rng)
+    found = mjcf.parse(text)
+    assert found.articulation.joint_count > 4
+    q = found.articulation.random(rng)
+    # Ten bodies in each other, of lengths of some metres: some hundred roundings of 1e-15.
+    assert difference_from_mujoco(text) < 1e-13
+    assert difference_from_mujoco(text, q) < 1e-13
+    assert not np.allclose(pose(found, found.articulation.names[-1], q)[1],
+                           pose(found, found.articulation.names[-1])[1])  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_limits_and_names_are_mujocos(seed):
+    text = any_character(np.random.default_rng(seed))
+    model, found = mujoco.MjModel.from_xml_string(text), mjcf.parse(text)
+    named = [i for i in range(model.njnt) if model.joint(i).name]
+    assert named
+    assert len(found.joints) == model.njnt
+    for i in named:
+        j = found.joints[model.joint(i).name]
+        limits = model.jnt_range[i] if model.jnt_limited[i] else (-np.inf, np.inf)
+        where = found.articulation.coordinates_of(j)
+        assert where.start == model.jnt_qposadr[i]
+        if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_BALL:
+            assert found.articulation.cones[j] == pytest.approx(limits[1], abs=1e-15)
+            limits = -limits[1], limits[1]
+        ours = found.articulation.lower[j], found.articulation.upper[j]
+        np.testing.assert_allclose(ours, limits, atol=1e-15)  # one rounding of degrees
+
+
+def test_a_hinge_turns_about_its_anchor():
+    found = character(
+        '<body name="door" pos="5 0 0"><joint name="hinge" pos="1 0 0" ref="0"/></body>'
+    )
+    assert found.articulation.names == ("world", "door/hinge", "door")
+    assert found.joints == {"hinge": 1}
+    x, _ = pose(found, "door", [np.pi / 2])
+    np.testing.assert_allclose(x, [6, -1, 0], atol=1e-15)
+
+
+def test_the_last_joint_is_the_body_where_it_can_be():
+    found = character(
+        '<body name="a"><joint name="x" type="slide" pos="1 1 1"/><joint/><body/></body>'
+        '<body name="still"/><body name="b"><joint type="slide" pos="1 1 1"/></body>'
+    )
+    assert found.articulation.names == ("world", "a/x", "a", "body#2", "still", "b")
+    assert found.joints == {"x": 1, "a/hinge2": 2, "b/slide1": 5}
+
+
+def test_ref_is_where_the_file_shows_the_body():
+    found = character(
+        '<body name="a" pos="1 2 3"><joint type="slide" axis="1 0 0" ref="0.5"/>'
+        '<joint axis="0 0 1" ref="30" range="-90 90"/></body>'
+    )
+    np.testing.assert_allclose(found.home, [0.5, np.pi / 6], atol=1e-16)
+    x, R = pose(found, "a")
+    np.testing.assert_allclose(x, [1, 2, 3], atol=1e-15)
+    np.testing.assert_allclose(R, np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(pose(found, "a", [0, np.pi / 6])[0], [0.5, 2, 3], atol=1e-15)
+    assert found.articulation.upper[2] == pytest.approx(np.pi / 2, abs=1e-15)
+
+
+SAME = [
+    'euler="90 0 0"',
+    'quat="3 3 0 0"',
+    'axisangle="2 0 0 90"',
+    'xyaxes="2 0 0 1 0 5"',
+    'zaxis="0 -3 0"',
+]
+
+
+@pytest.mark.parametrize("form", SAME)
+@pytest.mark.parametrize("unit", ["degree", "radian"])
+def test_every_form_of_an_orientation_says_the_same(form, unit):
+    if unit == "radian":
+        form = form.replace("90", repr(np.pi / 2))
+    found = character(f'<body name="a" {form}/>', f'<compiler angle="{unit}"/>')
+    np.testing.assert_allclose(pose(found, "a")[1], [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("form", ['zaxis="0 0 -1"', 'zaxis="1e-12 0 -1"', 'zaxis="0 0 5"'])
+def test_an_axis_upside_down_turns_like_mujocos(form):
+    text = f"<mujoco><worldbody><body {form}/></worldbody></mujoco>"
+    assert difference_from_mujoco(text) < 1e-11  # both take 1e-12 for none
+
+
+def test_balls_keep_within_what_mujoco_allows_and_allow_all_of_it(rng):
+    ball = '<body name="a"><joint type="ball" range="0 50"/></body>'
+    found = character(ball).articulation
+    turns = rng.standard_normal((200, 3))
+    turns *= np.radians(50) * rng.uniform(0, 1, (200, 1)) / np.linalg.norm(turns, axis=1)[:, None]
+    assert found.within_limits(rotation.exponential(turns)).all()
+    assert not found.within_limits(rotation.exponential([0.0, 0.0, np.radians(51)]))
+    assert not found.within_limits(rotation.exponential([np.radians(51), 0.0, 0.0]))
+
+
+def test_a_file_includes_others_of_its_folder(tmp_path):
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "main.xml").write_text(
+        '<mujoco><include file="parts/settings.xml"/><worldbody><body name="a" euler="1 0 0">'
+        '<include file="parts/arm.xml"/></body></worldbody></mujoco>'
+    )
+    (tmp_path / "parts" / "settings.xml").write_text(
+        '<mujoco><include file="unit.xml"/><default><joint type="slide"/></default></mujoco>'
+    )
+    (tmp_path / "parts" / "unit.xml").write_text('<mujoco><compiler angle="radian"/></mujoco>')
+    (tmp_path / "parts" / "arm.xml").write_text(
+        '<mujocoinclude><joint name="j"/><body name="b"/></mujocoinclude>'
+    )
+    found = mjcf.read(tmp_path / "main.xml")
+    assert found.articulation.names == ("world", "a", "b")
+    assert found.articulation.kinds == ("fixed", "slide", "fixed")
+    np.testing.assert_allclose(pose(found, "a")[1][2, 1], np.sin(1.0), atol=1e-15)
+
+
+def test_a_file_includes_nothing_twice_nor_from_elsewhere(tmp_path, refusal):
+    folder = tmp_path / "model"
+    folder.mkdir()
+    (tmp_path / "secret.xml").write_text("<mujoco/>")
+    (folder / "ring.xml").write_text('<mujoco><include file="main.xml"/></mujoco>')
+    (folder / "twice.xml").write_text(
+        '<mujoco><include file="part.xml"/><include file="./part.xml"/></mujoco>'
+    )
+    (folder / "part.xml").write_text("<mujoco/>")
+    (folder / "link.xml").symlink_to(tmp_path / "secret.xml")
+    for name, message in [
+        ("ring.xml", "ring.xml, line 1: <include>: expected every file to be included once"),
+        ("twice.xml", "twice.xml, line 1: <include>: expected every file to be included once"),
+        ("../secret.xml", "expected a file in the folder of 'main.xml', got '../secret.xml'"),
+        (str(tmp_path / "secret.xml"), "expected a file in the folder"),
+        ("link.xml", "expected a file in the folder"),
+        ("missing.xml", "expected a file in the folder"),
+        ("", "expected an attribute 'file', got an empty one"),
+    ]:
+        (folder / "main.xml").write_text(f'<mujoco><include file="{name}"/></mujoco>')
+        assert message in refusal(mjcf.read, folder / "main.xml")
+    text = '<mujoco><include file="ring.xml"/></mujoco>'
+    assert "expected a text without includes" in refusal(mjcf.parse, text)
+
+
+DEEP = 400
+
+
+def test_a_long_chain_is_no_trouble():
+    found = character(f'<body pos="0 0 1"><joint/>{SOLID}' * DEEP + "</body>" * DEEP)
+    assert pose(found, f"body#{DEEP}")[0][2] == DEEP
+
+
+WRONG = {
+    "two orientations": ('<body quat="1 0 0 0" euler="0 0 0"/>', "got quat and euler"),
+    "no quaternion": ('<body quat="0 0 0 0"/>', "expected a quaternion in 'quat', got '0 0 0 0'"),
+    "no axis of a turn": ('<body axisangle="0 0 0 1"/>', "expected a direction in 'axisangle'"),
+    "no z axis": ('<body zaxis="0 0 0"/>', "expected a direction in 'zaxis'"),
+    "parallel axes": ('<body xyaxes="1 0 0 2 0 0"/>', "expected a direction in 'xyaxes'"),
+    "no axis": ('<body><joint axis="0 0 0"/></body>', "expected a direction in 'axis'"),
+    "two numbers": ('<body pos="1 2"/>', "expected 3 numbers in 'pos', got '1 2'"),
+    "numbers without end": (f'<body pos="{"1 " * 9**6}"/>', "at most 2,000 characters in 'pos'"),
+    "a name without end": (f'<body name="{"a" * 9**6}"/>', "at most 2,000 characters in 'name'"),
+    "not a number": ('<body pos="nan 0 0"/>', "expected 3 numbers in 'pos', got 'nan 0 0'"),
+    "another type": ('<body><joint type="screw"/></body>', "one of hinge, slide, ball, free"),
+    "a joint of the world": ("<joint/>", "expected no joint in the world"),
+    "a free joint inside": ("<body><body><freejoint/></body></body>", "a free joint alone"),
+    "a free joint and another": ("<body><freejoint/><joint/></body>", "a free joint alone"),
+    "an aligned joint": ('<body><freejoint align="true"/></body>', "not aligned"),
+    "no class": ('<body childclass="c"/>', "expected a default class, got 'c'"),
+    "no class of a joint": ('<body><joint class="c"/></body>', "expected a default class, got 'c'"),
+    "a body twice": ('<body name="a"/><body name="a"/>', "a body's name once, got 'a' twice"),
+    "another world": ('<body name="world"/>', "expected a body's name once, got 'world' twice"),
+    "a joint twice": (
+        '<body><joint name="j"/><joint name="j"/></body>', "a joint's name once, got 'j' twice"
+    ),
+    "crossed limits": (
+        '<body><joint limited="true" range="2 1"/></body>', "range from the least up, got 2 to 1"
+    ),
+    "a ball's lower limit": (
+        '<body><joint type="ball" range="1 2"/></body>', "expected a range from 0 up, got 1 to 2"
+    ),
+    "perhaps a limit": ('<body><joint limited="1"/></body>', "one of true, false, auto"),
+    "copies": ('<body><replicate count="9"/></body>', "got a rule for some"),
+    "an attachment": ('<attach model="m"/>', "<attach>: expected every body to be written out"),
+    "a composite": ('<body><composite type="cable"/></body>', "got a rule for some"),
+    "a flexible body": ('<frame><flexcomp name="f"/></frame>', "got a rule for some"),
+    "too many": ("<body/>" * 10_001, "expected at most 10,000 joints, got 10,002"),
+}  # fmt: skip
+WRONG_HEADS = {
+    "another unit": ('<compiler angle="turn"/>', "one of degree, radian for angle, got 'turn'"),
+    "another sequence": ('<compiler eulerseq="xy"/>', "expected three axes"),
+    "global coordinates": ('<compiler coordinate="global"/>', "one of local for coordinate"),
+    "limits left open": (
+        '<compiler autolimits="false"/><default><joint range="0 1"/></default>',
+        "expected limited='true' or 'false'",
+    ),
+    "all aligned": ('<compiler alignfree="true"/>', "not aligned"),
+    "another main class": ('<default class="c"/>', "outermost class to be 'main', got 'c'"),
+    "a class twice": (
+        '<default><default class="c"/><default class="c"/></default>', "class once, got 'c' twice"
+    ),
+    "a class without a name": ("<default><default/></default>", "expected an attribute 'class'"),
+    "two joints of a class": ("<default><joint/><joint/></default>", "at most one <joint>, got 2"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_no_character_is_refused_and_named(name, refusal):
+    text, message = WRONG[name]
+    assert message in refusal(character, text)
+
+
+@pytest.mark.parametrize("name", WRONG_HEADS)
+def test_what_is_no_setting_is_refused_and_named(name, refusal):
+    head, message = WRONG_HEADS[name]
+    assert message in refusal(character, "<body><freejoint/></body><body><joint/></body>", head)

@@ -1,0 +1,254 @@
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reference import forward_kinematics, rotation
+from reference.formats import urdf
+
+PI = np.pi
+
+
+def link(*names):
+    return "".join(f'<link name="{name}"/>' for name in names)
+
+
+def joint(name, parent, child, kind="revolute", inside="", limit='<limit lower="-9" upper="9"/>'):
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f"{inside}{limit}</joint>"
+    )
+
+
+def robot(*parts):
+    return urdf.parse(f'<robot name="r">{"".join(parts)}</robot>')
+
+
+def pose(found, link, **coordinates):
+    """The position and the rotation matrix of a link, at home but for some joints by name."""
+    q = np.array(found.home)
+    for name, value in coordinates.items():
+        q[found.articulation.coordinates_of(found.joints[name])] = value
+    all_of_them = forward_kinematics(found.articulation, q)
+    at = found.articulation.index(link)
+    return all_of_them.positions[at], rotation.to_matrix(all_of_them.rotations[at])
+
+
+def turn(axis, angle):
+    """The matrix of a rotation about x, y or z, from its definition."""
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = [(1, 2), (2, 0), (0, 1)]["xyz".index(axis)]
+    matrix = np.eye(3)
+    matrix[i, i], matrix[i, j], matrix[j, i], matrix[j, j] = c, -s, s, c
+    return matrix
+
+
+def test_a_planar_arm_reaches_where_trigonometry_says():
+    z = '<axis xyz="0 0 1"/>'
+    found = robot(
+        link("base", "upper", "lower", "hand"),
+        joint("shoulder", "base", "upper", inside=z),
+        joint("elbow", "upper", "lower", inside='<origin xyz="2 0 0"/>' + z),
+        joint("grip", "lower", "hand", "fixed", '<origin xyz="1 0 0"/>', ""),
+    )
+    a, b = 0.4, 1.1
+    x, R = pose(found, "hand", shoulder=a, elbow=b)
+    expected = [2 * np.cos(a) + np.cos(a + b), 2 * np.sin(a) + np.sin(a + b), 0.0]
+    np.testing.assert_allclose(x, expected, atol=1e-15)
+    np.testing.assert_allclose(R, turn("z", a + b), atol=1e-15)
+
+
+def test_rpy_turns_about_fixed_axes():
+    found = robot(link("a", "b"), joint("j", "a", "b", "fixed", '<origin rpy="0.3 0.5 -1.2"/>', ""))
+    expected = turn("z", -1.2) @ turn("y", 0.5) @ turn("x", 0.3)
+    np.testing.assert_allclose(pose(found, "b")[1], expected, atol=1e-15)
+
+
+ORIGIN = '<origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/>'  # x points along y, y along -x
+MOVES = {
+    "revolute": (0.5, (1, 2, 3), turn("z", PI / 2) @ turn("x", 0.5)),
+    "continuous": (0.5, (1, 2, 3), turn("z", PI / 2) @ turn("x", 0.5)),
+    "prismatic": (0.5, (1, 2.5, 3), turn("z", PI / 2)),
+    "fixed": ((), (1, 2, 3), turn("z", PI / 2)),
+    "floating": ((1, 0, 0, np.cos(0.25), 0, np.sin(0.25), 0), (1, 3, 3),
+                 turn("z", PI / 2) @ turn("y", 0.5)),
+    "planar": (0.5, (1, 2, 3), turn("z", PI / 2) @ turn("x", 0.5)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", MOVES)
+def test_a_joint_moves_as_its_type_says(kind, speed):
+    coordinates, x, R = MOVES[kind]
+    found = robot(link("a", "b"), joint("j", "a", "b", kind, ORIGIN))
+    positions, rotations = pose(found, "b", j=coordinates)
+    np.testing.assert_allclose(positions, x, atol=1e-15)
+    np.testing.assert_allclose(rotations, R, atol=1e-15)
+
+
+def test_a_planar_joint_shifts_within_its_plane():
+    plane = joint("p", "a", "b", "planar", '<axis xyz="1 2 2"/>')
+    found = robot(link("a", "b"), plane)
+    assert found.articulation.names == ("a", "p x", "p y", "b")
+    x, y, turned = (
+        forward_kinematics(found.articulation, unit).positions[-1] for unit in np.eye(3)
+    )
+    normal = np.array([1, 2, 2]) / 3
+    np.testing.assert_allclose([x @ normal, y @ normal, x @ y], 0.0, atol=1e-15)
+    np.testing.assert_allclose(np.cross(x, y), normal, atol=1e-15)
+    np.testing.assert_allclose(turned, 0.0, atol=1e-15)
+
+
+def test_links_keep_the_order_of_the_file_and_follow_their_parents():
+    found = robot(
+        joint("3", "b", "late"), joint("1", "a", "second"), joint("2", "a", "b"),
+        joint("4", "b", "last"), link("b", "last", "second", "late", "a"),
+    )  # fmt: skip
+    assert found.articulation.names == ("a", "second", "b", "late", "last")
+    assert found.joints == {"1": 1, "2": 2, "3": 3, "4": 4}
+    assert found.articulation.skeleton.parents.tolist() == [-1, 0, 0, 2, 2]
+
+
+def test_limits_are_those_of_the_type():
+    limit = '<limit lower="-1" upper="2"/><safety_controller soft_lower_limit="0"/>'
+    found = robot(
+        link(*"abcdefg"),
+        joint("b", "a", "b", limit=limit),
+        joint("c", "a", "c", "continuous", limit=limit),
+        joint("d", "a", "d", "prismatic", limit=limit),
+        joint("e", "a", "e", limit='<limit effort="5" velocity="1"/>'),
+        joint("f", "a", "f", limit='<limit upper="inf"/>'),
+        joint("g", "a", "g", "fixed", limit=limit),
+    ).articulation
+    inf = np.inf
+    assert found.lower.tolist() == [-inf, -1, -inf, -1, 0, 0, -inf]
+    assert found.upper.tolist() == [inf, 2, inf, 2, 0, inf, inf]
+
+
+def test_mimic_joints_follow_through_chains():
+    follow = '<mimic joint="{}" multiplier="{}" offset="{}"/>'.format
+    found = robot(
+        link(*"abcd"),
+        joint("c", "b", "c", "prismatic", follow("b", -3, 0.5)),
+        joint("b", "a", "b", "continuous", follow("d", 2, 0.25)),
+        joint("d", "a", "d", "continuous"),
+    )
+    assert found.articulation.coordinate_count == 1
+    q_b = 2 * 0.7 + 0.25
+    x, R = pose(found, "c", d=0.7)
+    np.testing.assert_allclose(x, [-3 * q_b + 0.5, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(R, turn("x", q_b), atol=1e-15)
+
+
+def test_mimic_joints_move_by_themselves_on_demand():
+    follower = joint("c", "b", "c", inside='<mimic joint="gone"/>')
+    text = f"<robot>{link('a', 'b', 'c')}{joint('b', 'a', 'b')}{follower}</robot>"
+    assert urdf.parse(text, mimic=False).articulation.coordinate_count == 2
+
+
+@given(st.randoms(use_true_random=False), st.floats(0.01, 100.0))
+def test_neither_order_nor_names_nor_the_length_of_axes_change_a_robot(random, scale):
+    tree = [(random.randrange(i), i, random.choice(["revolute", "prismatic"])) for i in range(1, 6)]
+
+    def pieces(prefix, scale):
+        for parent, child, kind in tree:
+            place = f'<origin xyz="{child} 0.5 {-child}" rpy="0.1 1 {child}"/>'
+            axis = f'<axis xyz="{3 * scale} {2 * scale} {-scale}"/>'
+            yield joint(f"j{child}", f"{prefix}{parent}", f"{prefix}{child}", kind, place + axis)
+        yield from (link(f"{prefix}{i}") for i in range(6))
+
+    shuffled = list(pieces("other", scale))
+    random.shuffle(shuffled)
+    first, second = robot(*pieces("link", 1.0)), robot(*shuffled)
+    q = {f"j{i}": random.uniform(-3, 3) for i in range(1, 6)}
+    for i in range(6):
+        (x, R), (y, S) = pose(first, f"link{i}", **q), pose(second, f"other{i}", **q)
+        np.testing.assert_allclose(x, y, atol=1e-13)  # some roundings of lengths up to 30 m
+        np.testing.assert_allclose(R, S, atol=1e-13)
+
+
+def test_a_long_chain_of_mimics_is_no_trouble():
+    names = [str(i) for i in range(3000)]
+    parts = [
+        joint(b, a, b, "continuous", f'<mimic joint="{int(b) + 1}" offset="1"/>')
+        for a, b in itertools.pairwise(names)
+    ]
+    parts[-1] = parts[-1].replace("<mimic", "<other")
+    found = robot(link(*names), *parts).articulation
+    assert found.mimics[1] == (2999, 1.0, 2998.0)
+    assert found.coordinate_count == 1
+
+
+WRONG = {
+    "no links": ("", "expected a <link>, got none"),
+    "two roots": (link("a", "b"), "that no joint moves, the root, got 2: 'a', 'b'"),
+    "a ring": (link("a", "b") + joint("j", "a", "b") + joint("k", "b", "a"), "the root, got none"),
+    "a ring aside": (
+        link("c", "a", "b") + joint("j", "a", "b") + joint("k", "b", "a"),
+        "expected a way to the root 'c', got a ring",
+    ),
+    "itself": (link("a", "b") + joint("j", "b", "b"), "expected a way to the root 'a'"),
+    "a missing link": (link("a") + joint("j", "a", "b"), "a <link> of that name, got none: 'b'"),
+    "two parents": (
+        link("a", "b") + joint("j", "a", "b") + joint("k", "a", "b"),
+        "expected one joint to move link 'b', got 'j' as well",
+    ),
+    "a link twice": (link("a", "a"), "expected a link's name once, got it twice"),
+    "a joint twice": (link(*"abc") + joint("j", "a", "b") + joint("j", "a", "c"), "name once"),
+    "a link without a name": ("<link/>", "expected an attribute 'name', got none"),
+    "an empty name": ('<link name=""/>', "expected an attribute 'name', got an empty one"),
+    "no parent": (
+        link("a") + '<joint name="j" type="fixed"><child link="a"/></joint>',
+        "expected a <parent>, got none",
+    ),
+    "two children": (
+        link("a", "b") + joint("j", "a", "b", inside='<child link="a"/>'),
+        "expected at most one <child>, got 2",
+    ),
+    "another type": (link("a", "b") + joint("j", "a", "b", "hinge"), "expected one of fixed, rev"),
+    "no type": (link("a") + '<joint name="j"/>', "expected an attribute 'type'"),
+    "no axis": (link("a", "b") + joint("j", "a", "b", inside='<axis xyz="0 0 0"/>'), "not zero"),
+    "no limit": (link("a", "b") + joint("j", "a", "b", limit=""), "<limit> of a revolute joint"),
+    "crossed limits": (
+        link("a", "b") + joint("j", "a", "b", limit='<limit lower="2" upper="1"/>'),
+        "expected lower <= upper, got lower 2, upper 1",
+    ),
+    "two numbers": (
+        link("a", "b") + joint("j", "a", "b", inside='<origin xyz="1 2"/>'),
+        "expected 3 numbers in 'xyz', got '1 2'",
+    ),
+    "not a number": (
+        link("a", "b") + joint("j", "a", "b", inside='<origin xyz="1 2 nan"/>'),
+        "expected 3 numbers in 'xyz', got '1 2 nan'",
+    ),
+    "no leader": (
+        link("a", "b") + joint("j", "a", "b", inside='<mimic joint="k"/>'),
+        "got none of that name for 'k'",
+    ),
+    "a fixed leader": (
+        link(*"abc") + joint("k", "a", "b", "fixed")
+        + joint("j", "b", "c", inside='<mimic joint="k"/>'),
+        "got fixed for 'k'",
+    ),
+    "a ring of mimics": (
+        link(*"abc") + joint("k", "a", "b", inside='<mimic joint="j"/>')
+        + joint("j", "b", "c", inside='<mimic joint="k"/>'),
+        "in a ring",
+    ),
+    "too many": (
+        link(*map(str, range(10_001)))
+        + "".join(joint(str(i), "0", str(i), "fixed") for i in range(1, 10_001)),
+        "expected at most 10,000 joints, got 10,001",
+    ),
+    "unexpanded macros": (
+        link("a", "b") + joint("j", "a", "b", inside='<origin xyz="${x} 0 0"/>'),
+        "expected 3 numbers in 'xyz', got '${x} 0 0'",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_no_robot_is_refused_and_named(name, refusal):
+    text, message = WRONG[name]
+    assert message in refusal(robot, text)
