@@ -1,11 +1,9 @@
 """Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
 
-Two libraries do the work behind one interface: cholespy where it is installed, the faster at
-solving, and SciPy's SuperLU everywhere. Only SuperLU finds an indefinite matrix without printing
-a warning, so whoever expects one (Newton) asks for "scipy".
+Three ways stand behind one interface: our own `cholesky`, the default, CHOLMOD through cholespy
+where that is installed, and SciPy's SuperLU. cholespy prints a warning at an indefinite matrix.
 """
 
-import importlib.util
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -13,10 +11,7 @@ import numpy as np
 import scipy
 
 from .arguments import FloatArray, choice
-
-
-class NotPositiveDefiniteError(ValueError):
-    """The matrix has no Cholesky factor: it is indefinite, singular or not finite."""
+from .cholesky import CholeskyFactor, NotPositiveDefiniteError
 
 
 class Factor(Protocol):
@@ -25,18 +20,23 @@ class Factor(Protocol):
     def solve(self, b: FloatArray) -> FloatArray:
         """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side)."""
 
+    def refactorize(self, matrix: Any) -> "Factor":
+        """Return the factor of another matrix, quicker where its pattern is the same.
 
-def factorize(matrix: Any, library: str | None = None) -> Factor:
-    """Return the factor of a sparse symmetric positive definite matrix.
+        Raises:
+            NotPositiveDefiniteError: if the matrix is not positive definite.
+        """
 
-    `library` is "cholespy" or "scipy"; by default cholespy where it is installed.
+
+def factorize(matrix: Any, library: str = "supernodal") -> Factor:
+    """Return the factor of a sparse symmetric positive definite matrix, both triangles given.
+
+    `library` is "supernodal", "cholespy" or "scipy".
 
     Raises:
         NotPositiveDefiniteError: if the matrix is not positive definite.
         ValueError: if the library is unknown.
     """
-    if library is None:
-        library = "cholespy" if importlib.util.find_spec("cholespy") else "scipy"
     factor = LIBRARIES[choice("library", library, LIBRARIES)]
     if not np.isfinite(matrix.data).all():
         raise NotPositiveDefiniteError("matrix: expected finite entries, got NaN or infinity")
@@ -60,9 +60,18 @@ class SuperLUFactor:
         if not (on_diagonal and self._lu.U.diagonal().min() > 0):
             raise NotPositiveDefiniteError("matrix: indefinite, expected positive definite")
 
+    @property
+    def entries(self) -> int:
+        """How many entries of L are stored."""
+        return self._lu.L.nnz
+
     def solve(self, b: FloatArray) -> FloatArray:
         """Return x of A x = b."""
         return np.ascontiguousarray(self._lu.solve(b))
+
+    def refactorize(self, matrix: Any) -> Factor:
+        """Return the factor of another matrix."""
+        return factorize(matrix, "scipy")
 
 
 class CholespyFactor:
@@ -87,5 +96,13 @@ class CholespyFactor:
         self._solver.solve(np.ascontiguousarray(b), x)
         return x
 
+    def refactorize(self, matrix: Any) -> Factor:
+        """Return the factor of another matrix."""
+        return factorize(matrix, "cholespy")
 
-LIBRARIES: dict[str, Callable[[Any], Factor]] = {"cholespy": CholespyFactor, "scipy": SuperLUFactor}
+
+LIBRARIES: dict[str, Callable[[Any], Factor]] = {
+    "supernodal": CholeskyFactor,
+    "cholespy": CholespyFactor,
+    "scipy": SuperLUFactor,
+}

@@ -1,0 +1,114 @@
+"""The factor of a matrix as callers see it: made, solved with, and made again for new values."""
+
+from typing import Any
+
+import numpy as np
+
+from ..arguments import FloatArray
+from ..compiled import TwoSpeeds
+from .analysis import analyse
+from .dissection import Graph
+from .multifrontal import factorize
+from .triangular import SIDES, solve
+
+
+class NotPositiveDefiniteError(ValueError):
+    """The matrix has no Cholesky factor: it is indefinite, singular or not finite."""
+
+
+class Pattern:
+    """The analysis of a symmetric pattern, shared by the factors of all matrices that have it."""
+
+    def __init__(self, indptr: Any, indices: Any) -> None:
+        """Order the columns and find out which entries L has."""
+        self.graph = Graph(indptr, indices)
+        n = len(indptr) - 1
+        self.order, self.place, self.blocks, self.family = _analyse(
+            self.graph, np.arange(n, dtype=np.int32)
+        )
+
+    def fits(self, indptr: Any, indices: Any) -> bool:
+        """Return whether the pattern is the same."""
+        return np.array_equal(indptr, self.graph.indptr) and np.array_equal(
+            indices, self.graph.indices
+        )
+
+
+class CholeskyFactor:
+    """P A P' = L L', L in supernodes."""
+
+    def __init__(self, matrix: Any, pattern: Pattern | None = None) -> None:
+        """Factorise a sparse symmetric matrix, both triangles given.
+
+        `pattern` is the analysis of an earlier matrix; it is used if the matrix has that pattern.
+
+        Raises:
+            NotPositiveDefiniteError: if a pivot is not positive, or not finite.
+        """
+        columns = matrix.tocsc()
+        indptr, indices = columns.indptr.astype(np.int32), columns.indices.astype(np.int32)
+        if pattern is None or not pattern.fits(indptr, indices):
+            pattern = Pattern(indptr, indices)
+        self.pattern = pattern
+        self._values = np.empty(pattern.family.entries)
+        data = np.array(columns.data, dtype=np.float64)
+        failed = _factorize(
+            pattern.graph, data, pattern.order, pattern.place, pattern.blocks, pattern.family,
+            self._values,
+        )  # fmt: skip
+        if failed >= 0:
+            raise NotPositiveDefiniteError(
+                f"matrix: expected positive definite, got no positive pivot in row"
+                f" {pattern.order[failed]}"
+            )
+
+    @property
+    def entries(self) -> int:
+        """How many entries of L are stored."""
+        return len(self._values)
+
+    def refactorize(self, matrix: Any) -> "CholeskyFactor":
+        """Return the factor of another matrix, with this one's analysis if the pattern is the same.
+
+        Raises:
+            NotPositiveDefiniteError: if the matrix is not positive definite.
+        """
+        return CholeskyFactor(matrix, self.pattern)
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side)."""
+        n, pattern = len(self.pattern.order), self.pattern
+        if b.shape == (n, SIDES):
+            x = np.empty(b.shape)
+            _solve(pattern.order, *pattern.blocks, self._values, _plain_layout(b), x)
+            return x
+        given = b.reshape(n, -1)
+        x, some = np.empty(given.shape), np.zeros((n, SIDES))
+        for first in range(0, given.shape[1], SIDES):
+            sides = given[:, first : first + SIDES]
+            some[:, : sides.shape[1]] = sides
+            x[:, first : first + SIDES] = self.solve(some)[:, : sides.shape[1]]
+        return x.reshape(b.shape)
+
+    def lower(self) -> Any:
+        """Return L, sparse (n, n), with the explicit zeros of its blocks."""
+        import scipy
+
+        columns, starts, rows, _ = self.pattern.blocks
+        lists = []
+        for s in range(len(columns) - 1):
+            block = np.r_[columns[s] : columns[s + 1], rows[starts[s] : starts[s + 1]]]
+            lists += [block[j:] for j in range(columns[s + 1] - columns[s])]
+        indptr = np.cumsum([0, *map(len, lists)])
+        return scipy.sparse.csc_array((self._values, np.concatenate(lists), indptr))
+
+
+def _plain_layout(b: FloatArray) -> FloatArray:
+    if b.dtype == np.float64 and b.flags.carray:
+        return b
+    return np.array(b, dtype=np.float64, order="C")
+
+
+_analyse = TwoSpeeds(analyse)
+_factorize = TwoSpeeds(factorize, relaxed=True)
+_solve = TwoSpeeds(solve, relaxed=True)
