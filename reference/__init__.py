@@ -10,6 +10,7 @@ from .inverse_kinematics import IK_SOLVERS, IKSolution, Target, solve_ik
 from .kinematics import forward_kinematics, local_from_global
 from .mass_spring import MassSpring, State
 from .outcome import Outcome
+from .parallel import cores
 from .skeleton import Pose, Skeleton
 from .tracking import track
 from .wind import wind_forces
@@ -28,6 +29,7 @@ __all__ = [
     "State",
     "StepResult",
     "Target",
+    "cores",
     "curves",
     "forward_kinematics",
     "local_from_global",

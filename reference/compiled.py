@@ -14,8 +14,9 @@ import contextlib
 import enum
 import functools
 import hashlib
+import importlib
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from typing import Any
 
@@ -94,6 +95,20 @@ def bind(kernel: Kernel, **callees: Kernel) -> Kernel:
     return _rebuild(kernel, kernel.__globals__ | callees)
 
 
+def compiled_in(module: str) -> Callable[[Kernel], Kernel]:
+    """Return a decorator: the compiled version is the function of that name in another module.
+
+    It is for what no plain source can say, such as vector instructions. The module is imported
+    when a caller is compiled.
+    """
+
+    def mark(plain: Kernel) -> Kernel:
+        plain.compiled_in = module
+        return plain
+
+    return mark
+
+
 def digest(kernel: Kernel) -> str:
     """Sixteen hex digits of the code, constants and globals of a kernel and all its callees."""
     parts: list[bytes] = []
@@ -107,7 +122,7 @@ def _jit(kernel: Kernel, cache: bool, relaxed: bool) -> Kernel:
     import numba
 
     callees = {
-        name: _jit(value, False, relaxed)
+        name: _callee(value, relaxed)
         for name, value in _named_globals(kernel)
         if isinstance(value, types.FunctionType) and value is not kernel
     }
@@ -125,6 +140,13 @@ def _jit(kernel: Kernel, cache: bool, relaxed: bool) -> Kernel:
     )(rebuilt)
 
 
+def _callee(kernel: Kernel, relaxed: bool) -> Kernel:
+    module = getattr(kernel, "compiled_in", None)
+    if module is None:
+        return _jit(kernel, False, relaxed)
+    return getattr(importlib.import_module(module), kernel.__name__)
+
+
 def allocates(kernel: Kernel) -> bool:
     """Return whether a kernel, or one that it calls, may make arrays.
 
@@ -135,7 +157,9 @@ def allocates(kernel: Kernel) -> bool:
     return bool(ALLOCATING & names) or any(
         allocates(value)
         for _, value in _named_globals(kernel)
-        if isinstance(value, types.FunctionType) and value is not kernel
+        if isinstance(value, types.FunctionType)
+        and value is not kernel
+        and not hasattr(value, "compiled_in")
     )
 
 
@@ -166,16 +190,33 @@ def _collect(kernel: Kernel, parts: list[bytes], seen: set[Any]) -> None:
     if kernel in seen:
         return
     seen.add(kernel)
-    for code in _codes(kernel.__code__):
-        constants = [c for c in code.co_consts if not isinstance(c, types.CodeType)]
-        parts += [code.co_code, repr((constants, code.co_names, code.co_varnames)).encode()]
+    _collect_code(kernel.__code__, parts)
     parts.append(repr(kernel.__defaults__).encode())
+    if hasattr(kernel, "compiled_in"):
+        parts.append(_module_fingerprint(kernel.compiled_in))
     for name, value in _named_globals(kernel):
         parts.append(name.encode())
         if isinstance(value, types.FunctionType):
             _collect(value, parts, seen)
         else:
             parts.append(_fingerprint(value))
+
+
+def _collect_code(whole: types.CodeType, parts: list[bytes]) -> None:
+    for code in _codes(whole):
+        constants = [c for c in code.co_consts if not isinstance(c, types.CodeType)]
+        parts += [code.co_code, repr((constants, code.co_names, code.co_varnames)).encode()]
+
+
+@functools.cache
+def _module_fingerprint(name: str) -> bytes:
+    """Return all of a module: what it registers with numba is reached by no function's name."""
+    module = importlib.import_module(name)
+    loader: Any = module.__loader__
+    parts: list[bytes] = []
+    _collect_code(loader.get_code(name), parts)
+    numbers = {k: v for k, v in vars(module).items() if isinstance(v, int | float)}
+    return b"\0".join([*parts, repr(sorted(numbers.items())).encode()])
 
 
 def _fingerprint(value: Any) -> bytes:

@@ -1,15 +1,29 @@
 """Forward kinematics of a tree of joints, and back from global to local rotations."""
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import arguments, rotation
 from .arguments import FloatArray, frozen
 from .articulation import Articulation
-from .compiled import TwoSpeeds
+from .compiled import TwoSpeeds, bind
+from .lanes import (
+    LANES,
+    all_within,
+    lanes_at,
+    put_lanes,
+    put_quaternions,
+    put_vectors,
+    quaternions_at,
+    vectors_at,
+)
+from .parallel import in_slices
 from .quaternion import (
     add,
     conjugate,
+    made_unit,
     multiply,
     put_quaternion,
     put_vector,
@@ -17,8 +31,14 @@ from .quaternion import (
     rotate,
     vector_at,
 )
-from .rotation import UNIT_TOLERANCE
-from .skeleton import Pose, Skeleton, checked_skeleton
+
+# The same under the names of what they read back: in lanes that is read in another way.
+from .quaternion import quaternion_at as rotation_at
+from .quaternion import vector_at as position_at
+from .skeleton import Pose, Skeleton, SkeletonArrays, checked_skeleton
+
+# A slice of a batch with fewer joints than this is done before another thread is well under way.
+THREAD_JOINTS = 100_000
 
 
 def forward_kinematics(skeleton: Skeleton | Articulation, local_rotations: ArrayLike) -> Pose:
@@ -44,19 +64,19 @@ def forward_kinematics(skeleton: Skeleton | Articulation, local_rotations: Array
     if isinstance(skeleton, Articulation):
         x, R = skeleton.forward(local_rotations)
         return Pose(frozen(x), frozen(R))
-    count = checked_skeleton(skeleton).joint_count
+    tree = checked_skeleton(skeleton).arrays
+    count = len(tree.parents)
     local = arguments.floats("local_rotations", local_rotations, "...", count, 4)
-    positions = np.empty((*local.shape[:-1], 3))
-    rotations = np.empty(local.shape)
-    fine = _forward(
-        *skeleton.arrays,
-        local.reshape(-1, count, 4),
-        positions.reshape(-1, count, 3),
-        rotations.reshape(-1, count, 4),
-    )
+    positions, rotations = np.empty((*local.shape[:-1], 3)), np.empty(local.shape)
+    if local.ndim == 2:  # one pose, most often one of many calls, is spared all that it can be
+        fine = _forward(*tree, local, positions, rotations)
+    else:
+        fine = _in_slices(_forward_batch, tree, local, positions, rotations)
     if not fine:  # raise, or the lengths were on the very edge of the tolerance
         return forward_kinematics(skeleton, rotation.unit("local_rotations", local))
-    return Pose(frozen(positions), frozen(rotations))
+    positions.setflags(write=False)
+    rotations.setflags(write=False)
+    return Pose(positions, rotations)
 
 
 def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
@@ -66,13 +86,22 @@ def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
         ValueError: if the shape is another, or a quaternion is not finite or further than 1e-6
             from unit length.
     """
-    count = checked_skeleton(skeleton).joint_count
-    given = arguments.floats("rotations", rotations, "...", count, 4)
+    tree = checked_skeleton(skeleton).arrays
+    given = arguments.floats("rotations", rotations, "...", len(tree.parents), 4)
     local = np.empty(given.shape)
-    fine = _local(skeleton.arrays.parents, given.reshape(-1, count, 4), local.reshape(-1, count, 4))
-    if not fine:
+    if not _in_slices(_local_batch, tree, given, local):
         return local_from_global(skeleton, rotation.unit("rotations", given))
     return local
+
+
+def _in_slices(kernel: TwoSpeeds, tree: SkeletonArrays, *poses: FloatArray) -> bool:
+    """Run a kernel on slices of arrays (..., joint, 3 or 4); return whether all were fine."""
+    flat = [values.reshape(-1, *values.shape[-2:]) for values in poses]
+    least = math.ceil(THREAD_JOINTS / len(tree.parents))
+    done = in_slices(
+        kernel, len(flat[0]), lambda part: (*tree, *(values[part] for values in flat)), least=least
+    )
+    return all(done)
 
 
 def forward_pose(parents, offsets, local, positions, rotations):
@@ -82,7 +111,7 @@ def forward_pose(parents, offsets, local, positions, rotations):
     put_quaternion(rotations, 0, R)
     for j in range(1, len(parents)):
         if parents[j] != j - 1:  # along a chain the parent is still at hand
-            x, R = vector_at(positions, parents[j]), quaternion_at(rotations, parents[j])
+            x, R = position_at(positions, parents[j]), rotation_at(rotations, parents[j])
         x = add(x, rotate(R, vector_at(offsets, j)))
         R = multiply(R, quaternion_at(local, j))
         put_vector(positions, j, x)
@@ -98,31 +127,62 @@ def local_pose(parents, rotations, local):
 
 
 def normalise(given, unit):
-    """Fill unit quaternions (joint, 4); return whether all given ones were unit within 1e-6.
-
-    1/|q| is the series of (1 + e)^-1/2 in e = |q|^2 - 1, which for so small an e is exact to
-    rounding with four terms, and needs neither a root nor a division.
-    """
+    """Fill unit quaternions (joint, 4); return whether all given ones were unit within 1e-6."""
     fine = True
-    for j in range(len(given)):
-        w, x, y, z = quaternion_at(given, j)
-        e = w * w + x * x + y * y + z * z - 1.0
-        s = 1.0 - e * (0.5 - e * (0.375 - e * 0.3125))
-        put_quaternion(unit, j, (s * w, s * x, s * y, s * z))
-        fine &= abs(e) <= 2.0 * UNIT_TOLERANCE
+    for j in range(len(unit)):
+        Q, near = made_unit(quaternion_at(given, j))
+        put_quaternion(unit, j, Q)
+        fine &= near
     return fine
 
 
-def _forward_batch(parents, offsets, given, positions, rotations):
-    local = np.empty(given.shape[1:])
-    for i in range(len(given)):
-        if not normalise(given[i], local):
-            return False
-        forward_pose(parents, offsets, local, positions[i], rotations[i])
+# The same on LANES poses side by side: a tile of a batch, and unit quaternions in a scratch array.
+forward_tile = bind(
+    forward_pose,
+    quaternion_at=lanes_at,
+    position_at=vectors_at,
+    rotation_at=quaternions_at,
+    put_vector=put_vectors,
+    put_quaternion=put_quaternions,
+)
+local_tile = bind(local_pose, quaternion_at=lanes_at, put_quaternion=put_quaternions)
+normalise_tile = bind(
+    normalise,
+    quaternion_at=quaternions_at,
+    made_unit=bind(made_unit, within=all_within),
+    put_quaternion=put_lanes,
+)
+
+
+def _forward_one(parents, offsets, given, positions, rotations):
+    local = np.empty(given.shape)
+    if not normalise(given, local):
+        return False
+    forward_pose(parents, offsets, local, positions, rotations)
     return True
 
 
-def _local_batch(parents, given, local):
+def _forward_each(parents, offsets, given, positions, rotations):
+    fine = True
+    for i in range(len(given)):
+        fine &= _forward_one(parents, offsets, given[i], positions[i], rotations[i])
+    return fine
+
+
+def _forward_many(parents, offsets, given, positions, rotations):
+    if len(given) < LANES:
+        return _forward_each(parents, offsets, given, positions, rotations)
+    local = np.empty((len(parents), 4, LANES))
+    for i in range(0, len(given), LANES):
+        first = min(i, len(given) - LANES)  # the last tile overlaps the one before
+        end = first + LANES
+        if not normalise_tile(given[first:end], local):
+            return False
+        forward_tile(parents, offsets, local, positions[first:end], rotations[first:end])
+    return True
+
+
+def _local_each(parents, given, local):
     rotations = np.empty(given.shape[1:])
     for i in range(len(given)):
         if not normalise(given[i], rotations):
@@ -131,5 +191,18 @@ def _local_batch(parents, given, local):
     return True
 
 
-_forward = TwoSpeeds(_forward_batch)
-_local = TwoSpeeds(_local_batch)
+def _local_many(parents, offsets, given, local):
+    if len(given) < LANES:
+        return _local_each(parents, given, local)
+    rotations = np.empty((len(parents), 4, LANES))
+    for i in range(0, len(given), LANES):
+        first = min(i, len(given) - LANES)
+        if not normalise_tile(given[first : first + LANES], rotations):
+            return False
+        local_tile(parents, rotations, local[first : first + LANES])
+    return True
+
+
+_forward = TwoSpeeds(_forward_one)
+_forward_batch = TwoSpeeds(_forward_many)
+_local_batch = TwoSpeeds(_local_many)

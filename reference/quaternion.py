@@ -116,12 +116,17 @@ def made_unit(q):
     """Return a quaternion made unit, and whether it was so within 1e-6.
 
     1/|q| is the series of (1 + e)^-1/2 in e = |q|^2 - 1, which for so small an e is exact to
-    rounding with four terms, and needs neither a root nor a division.
+    rounding with three terms, and needs neither a root nor a division.
     """
     w, x, y, z = q
-    e = w * w + x * x + y * y + z * z - 1.0
-    s = 1.0 - e * (0.5 - e * (0.375 - e * 0.3125))
-    return (s * w, s * x, s * y, s * z), abs(e) <= 2.0 * UNIT_TOLERANCE
+    e = (w * w + x * x) + (y * y + z * z) - 1.0
+    s = 1.0 - e * (0.5 - e * 0.375)
+    return (s * w, s * x, s * y, s * z), within(e, 2.0 * UNIT_TOLERANCE)
+
+
+def within(value, bound):
+    """Return whether |value| <= bound; NaN is not."""
+    return abs(value) <= bound
 
 
 def perpendicular(a):

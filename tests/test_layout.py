@@ -8,7 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ["reference", "crosscheck", "bench"]  # each may import those before it
-LIBRARIES = {"numpy", "scipy", "numba", "cholespy"}
+LIBRARIES = {"numpy", "scipy", "numba", "llvmlite", "cholespy"}  # llvmlite is numba's own
 RUBBISH = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = {"pathlib", "os", "io", "shutil", "tempfile", "open", "fromfile", "tofile", "loadtxt"}
 CLOCKS = {"time", "datetime", "timeit", "perf_counter"}

@@ -19,8 +19,10 @@ def kinematics(results: Results) -> Table:
         "ns",
         1e9,
         "All joints’ positions and rotations. We check and normalise the quaternions given and "
-        "return arrays; an engine’s results stay inside it. A batch reads the rotations and writes "
-        "positions and rotations.",
+        "return arrays; an engine’s results stay inside it. The limit reads as many bytes as the "
+        "rotations given have and writes as many as positions and rotations have, by a compiled "
+        "loop into memory that is there already; its bandwidth counts that memory is read before "
+        "it is written.",
     )
 
 
@@ -79,16 +81,16 @@ def _table(
             for record in doers
         ),
         shows=shows + (LIMIT_SENTENCE if limits else ""),
-        measured="pytest-benchmark, one core, after a first call that may compile; each time is a "
-        "call’s divided by what it does. Spread over rounds of many calls.",
+        measured="pytest-benchmark, one core unless all are named, after a first call that may "
+        "compile; each time is a call’s divided by what it does. Spread over rounds of many calls.",
         answer=_answer(doers, limits, unit, scale),
     )
 
 
 LIMIT_COLUMNS = (Column("times the limit"), Column("bandwidth at the limit", "GB/s"))
 LIMIT_SENTENCE = (
-    " The limit is the time that a copy of as many bytes takes as have to be read and written at "
-    "the least, in memory as near as theirs."
+    " The limit is the time of moving as many bytes as have to be read and written at the least, "
+    "in memory as near as theirs."
 )
 
 

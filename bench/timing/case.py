@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from reference.compiled import TwoSpeeds
+from reference.parallel import in_slices
+
 from ..record import Key, key
 
 TIMING = "timing"
@@ -30,6 +33,7 @@ class Case:
         operations: how many poses, solves or steps one call makes; times are for one.
         moved: bytes that one call reads and writes, where it is a limit of memory.
         speed: at which of the reference's speeds it runs.
+        cores: on how many of them; None is all that there are.
     """
 
     problem: str
@@ -38,6 +42,7 @@ class Case:
     operations: int = 1
     moved: int = 0
     speed: str = "compiled"
+    cores: int | None = 1
 
     @property
     def name(self) -> str:
@@ -68,6 +73,41 @@ def copying(problem: str, size: int, *, passes: int = 1, operations: int = 1) ->
     """
     prepare = partial(_copies, size // 16, passes)
     return Case(problem, LIMIT, prepare, operations, moved=size * passes)
+
+
+def streaming(
+    problem: str, read: int, written: int, *, operations: int = 1,
+    cores: int | None = 1, least: int = 0,
+) -> Case:  # fmt: skip
+    """Return the limit of memory: a compiled loop that reads and writes so many bytes.
+
+    A processor reads what it is about to write (write-allocate), which counts as moved. On several
+    cores the loop is cut into slices that read at least `least` bytes each.
+    """
+    prepare = partial(_streams, read // 8, written // 8, least // 8)
+    return Case(problem, LIMIT, prepare, operations, read + 2 * written, cores=cores)
+
+
+def stream(source, sink):
+    """Fill a sink, longer than the source, by adding one to each number and going on with ones."""
+    for i in range(len(source)):
+        sink[i] = source[i] + 1.0
+    for i in range(len(source), len(sink)):
+        sink[i] = 1.0
+
+
+_stream = TwoSpeeds(stream)
+
+
+def _streams(read: int, written: int, least: int) -> Callable[[], Any]:
+    source, sink = np.ones(read), np.zeros(written)
+
+    def share(part: slice) -> tuple[np.ndarray, np.ndarray]:
+        return source[part], sink[part.start * written // read : part.stop * written // read]
+
+    if least == 0:
+        return partial(_stream, source, sink)
+    return partial(in_slices, _stream, read, share, least=least)
 
 
 def _copies(numbers: int, passes: int) -> Callable[[], None]:

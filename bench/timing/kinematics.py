@@ -1,48 +1,81 @@
-"""Forward kinematics of ball chains: a call for one pose, and batches."""
+"""Forward kinematics of chains and a tree: a call for one pose, and batches."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from crosscheck.engines import SKELETON_ENGINES
 from crosscheck.engines.skeleton_engine import coordinates
-from reference import forward_kinematics, rotation, scenes
+from reference import Skeleton, forward_kinematics, rotation, scenes
+from reference.kinematics import THREAD_JOINTS
 
-from .case import COMPILED, PLAIN, Case, copying
+from .case import COMPILED, PLAIN, Case, streaming
 
-BATCHES = {10: 10_000, 100: 1_000}
-# A joint's local rotation is read, its position and global rotation are written, 8 bytes a number.
-BYTES_PER_JOINT = 8 * (4 + 3 + 4)
+# Of each joint a local rotation is read, its position and global rotation are written.
+READ, WRITTEN = 8 * 4, 8 * (3 + 4)
+# A batch for all cores is so many times longer than one for a single core.
+LONGER = 5
+# The joints of a body's limbs, each from a joint that is there already: spine, legs, arms.
+LIMBS = ((0, 5), (0, 5), (0, 5), (4, 7), (4, 7))
+
+
+class Model(NamedTuple):
+    """A skeleton, and how many poses make a batch that no near cache holds."""
+
+    skeleton: Skeleton
+    batch: int
 
 
 def cases() -> Iterator[Case]:
-    """Yield one pose by everyone, and batches by us with the least that memory allows."""
-    for balls, batch in BATCHES.items():
-        single = f"kinematics/{balls} balls/one pose a call"
-        yield Case(single, COMPILED, partial(by_us, balls, ()))
-        yield Case(single, PLAIN, partial(by_us, balls, ()), speed="plain")
+    """Yield one pose by everyone, and batches by us, each with the least that memory allows."""
+    for name, (skeleton, batch) in models().items():
+        bytes_moved = np.array([READ, WRITTEN]) * skeleton.joint_count
+        one = f"kinematics/{name}/one pose a call"
+        yield Case(one, COMPILED, partial(by_us, skeleton))
+        yield Case(one, PLAIN, partial(by_us, skeleton), speed="plain")
         for engine in SKELETON_ENGINES:
-            yield Case(single, engine, partial(by_engine, engine, balls))
-        many = f"kinematics/{balls} balls/{batch:,} poses a call"
-        moved = batch * (balls + 1) * BYTES_PER_JOINT
-        yield Case(many, COMPILED, partial(by_us, balls, (batch,)), batch)
-        yield copying(many, moved, operations=batch)
+            yield Case(one, engine, partial(by_engine, engine, skeleton))
+        yield streaming(one, *bytes_moved)
+        many = f"kinematics/{name}/{batch:,} poses a call"
+        yield Case(many, COMPILED, partial(by_us, skeleton, batch), batch)
+        yield streaming(many, *(batch * bytes_moved), operations=batch)
+        batch *= LONGER
+        many = f"kinematics/{name}/{batch:,} poses a call, all cores"
+        yield Case(many, COMPILED, partial(by_us, skeleton, batch), batch, cores=None)
+        yield streaming(
+            many, *(batch * bytes_moved), operations=batch, cores=None, least=READ * THREAD_JOINTS
+        )
 
 
-def by_us(balls: int, batch: tuple[int, ...]) -> Callable[[], Any]:
+def models() -> dict[str, Model]:
+    """Return the skeletons by name."""
+    return {
+        "10 balls": Model(scenes.ball_chain(links=10)[0], 10_000),
+        "100 balls": Model(scenes.ball_chain(links=100)[0], 1_000),
+        "30-joint tree": Model(body(), 3_000),
+    }
+
+
+def body() -> Skeleton:
+    """Return a tree of 30 joints with the limbs of a body, all links along random directions."""
+    parents = [-1]
+    for begin, length in LIMBS:
+        parents += [begin, *range(len(parents), len(parents) + length - 1)]
+    return Skeleton(parents, np.random.default_rng(30).standard_normal((len(parents), 3)))
+
+
+def by_us(skeleton: Skeleton, *batch: int) -> Callable[[], Any]:
     """Return our forward kinematics of random poses."""
-    skeleton, _ = scenes.ball_chain(links=balls)
-    return partial(forward_kinematics, skeleton, _local_rotations(balls, *batch))
+    return partial(forward_kinematics, skeleton, _local_rotations(skeleton, *batch))
 
 
-def by_engine(name: str, balls: int) -> Callable[[], Any]:
+def by_engine(name: str, skeleton: Skeleton) -> Callable[[], Any]:
     """Return an engine's forward kinematics of one random pose; the result stays in the engine."""
-    skeleton, _ = scenes.ball_chain(links=balls)
     engine = SKELETON_ENGINES[name](skeleton)
-    return partial(engine.place, coordinates(engine, _local_rotations(balls)))
+    return partial(engine.place, coordinates(engine, _local_rotations(skeleton)))
 
 
-def _local_rotations(balls: int, *batch: int) -> np.ndarray:
-    return rotation.random(np.random.default_rng(balls), *batch, balls + 1)
+def _local_rotations(skeleton: Skeleton, *batch: int) -> np.ndarray:
+    return rotation.random(np.random.default_rng(0), *batch, skeleton.joint_count)

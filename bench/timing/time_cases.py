@@ -1,14 +1,14 @@
 """The one benchmark, run on every case by `pytest -p bench.timing.plugin`."""
 
 from bench.timing.case import announce
-from reference import speed
+from reference import cores, speed
 
 
 def test_speed(benchmark, case, keep):
     """Time a case; the first call, which may compile, is not counted."""
     announce("measuring", case)
     try:
-        with speed(case.speed):
+        with speed(case.speed), cores(case.cores):
             call = case.prepare()
             call()
             benchmark(call)

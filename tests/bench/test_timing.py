@@ -9,7 +9,10 @@ import pytest
 from bench import run
 from bench.machine import stamp
 from bench.record import RecordFile
-from bench.timing.case import LIMIT, copying
+from bench.timing import case as timing_case
+from bench.timing import kinematics
+from bench.timing.case import LIMIT, copying, stream, streaming
+from reference import cores, forward_kinematics
 
 
 @pytest.fixture(scope="module")
@@ -60,3 +63,46 @@ def test_the_limit_moves_as_many_bytes_as_it_says(monkeypatch):
     assert moved == [1600] * 3
     assert case.moved == 4800
     assert case.solver == LIMIT
+
+
+@pytest.mark.parametrize("many", [1, 3])
+def test_the_limit_of_batches_reads_and_writes_all_that_it_says(many, monkeypatch):
+    moved = []
+
+    def watched(source, sink):
+        stream(source, sink)
+        moved.append((source.nbytes, sink.nbytes))
+        assert (sink[: len(source)] == 2.0).all()
+        assert (sink[len(source) :] == 1.0).all()
+
+    monkeypatch.setattr(timing_case, "_stream", watched)
+    case = streaming("p", 320, 560, cores=many, least=0 if many == 1 else 8)
+    with cores(many):
+        case.prepare()()
+    assert len(moved) == (1 if many == 1 else 3 * 4)
+    assert [sum(column) for column in zip(*moved, strict=True)] == [320, 560]
+    assert case.moved == 320 + 2 * 560
+    assert (case.solver, case.cores) == (LIMIT, many)
+
+
+def test_a_batch_moves_what_its_limit_moves():
+    for name, (skeleton, batch) in kinematics.models().items():
+        given = np.zeros((batch, skeleton.joint_count, 4))
+        given[..., 0] = 1.0
+        pose = forward_kinematics(skeleton, given)
+        written = pose.positions.nbytes + pose.rotations.nbytes
+        (limit,) = [
+            case
+            for case in kinematics.cases()
+            if case.solver == LIMIT and case.problem == f"kinematics/{name}/{batch:,} poses a call"
+        ]
+        assert limit.moved == given.nbytes + 2 * written
+
+
+def test_every_forward_kinematics_stands_beside_its_limit_on_as_many_cores():
+    cases = list(kinematics.cases())
+    limits = {case.problem: case for case in cases if case.solver == LIMIT}
+    for case in cases:
+        assert limits[case.problem].cores == case.cores
+        assert limits[case.problem].operations == case.operations
+    assert {case.cores for case in cases} == {1, None}

@@ -128,6 +128,63 @@ def test_kernels_that_differ_in_one_ingredient_have_other_digests(one, other):
     assert compiled.digest(one) == compiled.digest(one)
 
 
+APART = """
+from numba import njit
+FACTOR = 2.0
+
+def register():
+    return 1
+
+@njit
+def doubled(x):
+    return FACTOR * x
+"""
+
+
+def doubled(x):
+    return 2.0 * x
+
+
+def doubled_elsewhere(module):
+    """A kernel one of whose callees has its compiled version in a module."""
+    marked = compiled.compiled_in(module)(compiled.bind(doubled))
+    return compiled.bind(total, square=marked)
+
+
+@pytest.fixture
+def module_of(tmp_path, monkeypatch):
+    """Return a function that writes a module whose name no other test uses, and returns that."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def write(name, source):
+        (tmp_path / f"{name}_of_{tmp_path.name}.py").write_text(source)
+        return f"{name}_of_{tmp_path.name}"
+
+    return write
+
+
+def test_a_callee_may_be_compiled_elsewhere(module_of, speed):
+    """The two would have to say the same; here they do not, to see which one runs."""
+    name = module_of("apart", APART.replace("FACTOR * x", "FACTOR * x + 100.0"))
+    expected = {"compiled": 206.0, "plain": 6.0}
+    assert compiled.TwoSpeeds(doubled_elsewhere(name))(np.array([1.0, 2.0])) == expected[speed]
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        ("FACTOR = 2.0", "FACTOR = 3.0"),
+        ("return 1", "return 2"),
+        ("return FACTOR * x", "return x * FACTOR"),
+    ],
+    ids=["number", "function that no kernel names", "code"],
+)
+def test_an_edit_anywhere_in_the_module_elsewhere_changes_the_digest(edit, module_of):
+    first = compiled.digest(doubled_elsewhere(module_of("apart", APART)))
+    assert compiled.digest(doubled_elsewhere(module_of("again", APART))) == first
+    assert compiled.digest(doubled_elsewhere(module_of("edited", APART.replace(*edit)))) != first
+
+
 def test_a_kernel_keeps_its_defaults(speed):
     assert compiled.TwoSpeeds(plus_default)(1.0) == 2.0
 
@@ -191,12 +248,15 @@ CALLER = textwrap.dedent("""
     import numpy as np
     from callee import callee
     from reference.compiled import TwoSpeeds
+    from reference.lanes import LANES, put_vectors, vectors_at
 
-    def caller(x):
-        return callee(x[0])
+    def caller(tile):
+        a, b, c = vectors_at(tile, 0)
+        put_vectors(tile, 0, (b, b, c))
+        return callee(tile[0, 0, 0])
 
     run = TwoSpeeds(caller)
-    x = np.array([10.0])
+    x = np.full((LANES, 1, 3), 10.0)
     print(run(x), run.plain(x), len(run.compiled.stats.cache_hits))
 """)
 

@@ -1,7 +1,17 @@
 import numpy as np
 import pytest
 
-from reference import Skeleton, forward_kinematics, local_from_global, rotation, scenes
+from reference import (
+    Skeleton,
+    compiled,
+    cores,
+    forward_kinematics,
+    kinematics,
+    local_from_global,
+    rotation,
+    scenes,
+)
+from reference.lanes import LANES
 
 # Six joints: a dozen products and sums of numbers of order one.
 ROUNDING = 1e-14
@@ -26,14 +36,51 @@ def test_forward_kinematics_equals_a_product_of_transforms(skeleton, local, spee
     assert np.ptp(pose.positions, axis=0).min() > 0.01
 
 
-def test_both_speeds_give_the_same_bits_of_order_one(skeleton, local):
-    from reference import speed
+# Fewer poses than lanes, as many, one more; a last tile that overlaps; several tiles.
+BATCHES = [1, LANES - 1, LANES, LANES + 1, 3 * LANES - 2]
 
-    fast = forward_kinematics(skeleton, local)
-    with speed("plain"):
-        plain = forward_kinematics(skeleton, local)
-    np.testing.assert_allclose(fast.positions, plain.positions, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(fast.rotations, plain.rotations, rtol=0, atol=ROUNDING)
+
+@pytest.mark.parametrize("count", BATCHES)
+def test_a_pose_has_the_same_bits_in_every_batch_and_at_both_speeds(skeleton, rng, count, speed):
+    local = rotation.random(rng, count, skeleton.joint_count) * (1.0 + 5e-7)
+    batch = forward_kinematics(skeleton, local)
+    back = local_from_global(skeleton, batch.rotations)
+    with compiled.speed("plain"):
+        poses = [forward_kinematics(skeleton, q) for q in local]
+        locals_ = [local_from_global(skeleton, pose.rotations) for pose in poses]
+    assert (batch.positions == [pose.positions for pose in poses]).all()
+    assert (batch.rotations == [pose.rotations for pose in poses]).all()
+    assert (back == locals_).all()
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_pose_has_the_same_bits_on_any_number_of_cores(skeleton, rng, count, monkeypatch):
+    local = rotation.random(rng, 50, skeleton.joint_count)
+    with cores(1):
+        one = forward_kinematics(skeleton, local)
+        back = local_from_global(skeleton, one.rotations)
+    monkeypatch.setattr(kinematics, "THREAD_JOINTS", 1)
+    with cores(count):
+        several = forward_kinematics(skeleton, local)
+        assert (several.positions == one.positions).all()
+        assert (several.rotations == one.rotations).all()
+        assert (local_from_global(skeleton, one.rotations) == back).all()
+
+
+@pytest.mark.parametrize("convert", [forward_kinematics, local_from_global])
+@pytest.mark.parametrize("value", [np.nan, 1.5])
+@pytest.mark.parametrize(
+    ("count", "pose"),
+    [(LANES - 1, 0), *((2 * LANES + 3, pose) for pose in (0, LANES - 1, LANES, 2 * LANES + 2))],
+)
+def test_one_bad_quaternion_in_a_batch_is_found(
+    convert, value, count, pose, skeleton, rng, monkeypatch, speed
+):
+    monkeypatch.setattr(kinematics, "THREAD_JOINTS", LANES * skeleton.joint_count)
+    rotations = rotation.random(rng, count, skeleton.joint_count)
+    rotations[pose, 3, 2] = value
+    with cores(2), pytest.raises(ValueError, match=rf"rotations: .* at index \({pose}, 3"):
+        convert(skeleton, rotations)
 
 
 def test_the_lab_arm_hangs_at_its_heights(speed):

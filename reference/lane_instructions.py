@@ -1,0 +1,259 @@
+"""What the functions of `lanes.py` are in compiled code: vectors of doubles in LLVM's terms.
+
+LLVM makes of a vector what the processor has: one register of AVX-512, two of AVX, four of SSE.
+Floating point is as strict as for floats. Whatever reads or writes a row of a tile also asks for
+a share of the memory of the next tile: rows so far apart leave the processor nothing to guess by.
+"""
+
+import operator
+
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.typeconv import Conversion
+from numba.extending import (
+    intrinsic,
+    lower_builtin,
+    lower_cast,
+    models,
+    register_model,
+    type_callable,
+)
+
+from .lanes import LANES
+
+DOUBLE, INT, POINTER = ir.DoubleType(), ir.IntType(32), ir.IntType(8).as_pointer()
+VECTOR = ir.VectorType(DOUBLE, LANES)
+HALF = LANES // 2
+MASK = ir.IntType(LANES)
+DOUBLE_BYTES, LINE_BYTES = 8, 64
+INSTRUCTIONS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul"}
+# What llvm.prefetch calls reading, writing, "keep it close" and "data".
+READ, WRITE, NEAR, DATA = 0, 1, 3, 1
+
+
+class LanesType(types.Type):
+    """LANES doubles side by side; a float stands for as many equal ones."""
+
+    def can_convert_from(self, typingctx, other):
+        """Say that floats convert."""
+        return Conversion.safe if isinstance(other, types.Float) else None
+
+    def unify(self, typingctx, other):
+        """Let a variable that is here a float and there lanes be lanes."""
+        return self if isinstance(other, types.Float) else None
+
+
+lanes = LanesType("lanes")
+
+
+@register_model(LanesType)
+class LanesModel(models.PrimitiveModel):
+    """Lanes are one LLVM value."""
+
+    def __init__(self, manager, kind):
+        super().__init__(manager, kind, VECTOR)
+
+
+@lower_cast(types.Float, LanesType)
+def repeat(context, builder, kind, wanted, value):
+    """Put a float into every lane."""
+    first = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), value, INT(0))
+    return _shuffled(builder, first, first, [0] * LANES)
+
+
+def define_arithmetic(operation, instruction):
+    """Let lanes be added, subtracted or multiplied, by lanes or floats."""
+
+    @type_callable(operation)
+    def operands(context):
+        def typed(a, b):
+            if lanes in (a, b) and all(k is lanes or isinstance(k, types.Float) for k in (a, b)):
+                return lanes(lanes, lanes)
+            return None
+
+        return typed
+
+    @lower_builtin(operation, lanes, lanes)
+    def lower(context, builder, signature, arguments):
+        return getattr(builder, instruction)(*arguments)
+
+
+for _operation, _instruction in INSTRUCTIONS.items():
+    define_arithmetic(_operation, _instruction)
+
+
+@type_callable(operator.neg)
+def negated(context):
+    """Let lanes be negated."""
+    return lambda a: lanes if a is lanes else None
+
+
+@lower_builtin(operator.neg, lanes)
+def negate(context, builder, signature, arguments):
+    """Change all signs."""
+    return builder.fneg(*arguments)
+
+
+@intrinsic
+def vectors_at(typingctx, tile, j):
+    """Read three doubles of each pose and transpose them into three lanes."""
+    return _reading(tile, 3)
+
+
+@intrinsic
+def quaternions_at(typingctx, tile, j):
+    """Read four doubles of each pose and transpose them into four lanes."""
+    return _reading(tile, 4)
+
+
+@intrinsic
+def put_vectors(typingctx, tile, j, value):
+    """Transpose three lanes and write three doubles into each pose."""
+    return _writing(tile, 3)
+
+
+@intrinsic
+def put_quaternions(typingctx, tile, j, value):
+    """Transpose four lanes and write four doubles into each pose."""
+    return _writing(tile, 4)
+
+
+@intrinsic
+def lanes_at(typingctx, scratch, j):
+    """Read four lanes."""
+
+    def generate(context, builder, signature, arguments):
+        pointers = _scratch_row(context, builder, signature, arguments)
+        parts = [builder.load(pointer, align=DOUBLE_BYTES) for pointer in pointers]
+        return context.make_tuple(builder, signature.return_type, parts)
+
+    return types.UniTuple(lanes, 4)(_contiguous(scratch), types.intp), generate
+
+
+@intrinsic
+def put_lanes(typingctx, scratch, j, value):
+    """Write four lanes."""
+
+    def generate(context, builder, signature, arguments):
+        pointers = _scratch_row(context, builder, signature, arguments)
+        parts = cgutils.unpack_tuple(builder, arguments[2])
+        for part, pointer in zip(parts, pointers, strict=True):
+            builder.store(part, pointer, align=DOUBLE_BYTES)
+        return context.get_dummy_value()
+
+    return types.none(_contiguous(scratch), types.intp, types.UniTuple(lanes, 4)), generate
+
+
+@intrinsic
+def all_within(typingctx, value, bound):
+    """Compare all lanes at once; an ordered comparison with NaN is false."""
+
+    def generate(context, builder, signature, arguments):
+        value, bound = arguments
+        below = builder.fcmp_ordered("<=", value, bound)
+        above = builder.fcmp_ordered("<=", builder.fneg(value), bound)
+        mask = builder.bitcast(builder.and_(below, above), MASK)
+        return builder.icmp_unsigned("==", mask, MASK(2**LANES - 1))
+
+    return types.boolean(lanes, lanes), generate
+
+
+def _reading(tile, count):
+    def generate(context, builder, signature, arguments):
+        pointers = _tile_row(context, builder, signature, arguments, count, READ)
+        rows = [builder.load(pointer, align=DOUBLE_BYTES) for pointer in pointers]
+        rows = [_shuffled(builder, row, row, (0, 1, 2, count - 1)) for row in rows]
+        pairs = zip(rows[:HALF], rows[HALF:], strict=True)
+        parts = _transposed(builder, [_shuffled(builder, *pair, range(LANES)) for pair in pairs])
+        return context.make_tuple(builder, signature.return_type, parts[:count])
+
+    return types.UniTuple(lanes, count)(_contiguous(tile), types.intp), generate
+
+
+def _writing(tile, count):
+    def generate(context, builder, signature, arguments):
+        pointers = _tile_row(context, builder, signature, arguments, count, WRITE)
+        parts = cgutils.unpack_tuple(builder, arguments[2])
+        pairs = _transposed(builder, [*parts, parts[-1]][:4])
+        for lane, pointer in enumerate(pointers):
+            pair, begin = pairs[lane % HALF], lane // HALF * HALF
+            row = _shuffled(builder, pair, pair, range(begin, begin + count))
+            builder.store(row, pointer, align=DOUBLE_BYTES)
+        return context.get_dummy_value()
+
+    return types.none(_contiguous(tile), types.intp, types.UniTuple(lanes, count)), generate
+
+
+def _transposed(builder, rows):
+    """Transpose the lower halves of four vectors as a 4 x 4 matrix, and likewise the upper ones.
+
+    So a pose with the one four lanes on makes four vectors of eight numbers, and back.
+    """
+    low, high = (0, 8, 2, 10, 4, 12, 6, 14), (1, 9, 3, 11, 5, 13, 7, 15)
+    first, last = (0, 1, 8, 9, 4, 5, 12, 13), (2, 3, 10, 11, 6, 7, 14, 15)
+    a, b, c, d = rows
+    ab, cd = _shuffled(builder, a, b, low), _shuffled(builder, c, d, low)
+    AB, CD = _shuffled(builder, a, b, high), _shuffled(builder, c, d, high)
+    whole = [(ab, cd, first), (AB, CD, first), (ab, cd, last), (AB, CD, last)]
+    return [_fenced(builder, _shuffled(builder, *three)) for three in whole]
+
+
+def _fenced(builder, vector):
+    """Return a vector as it is; LLVM is not to cut the shuffles that make it into smaller ones."""
+    kind = ir.FunctionType(VECTOR, [VECTOR])
+    name = f"llvm.arithmetic.fence.v{LANES}f64"
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [vector])
+
+
+def _contiguous(array):
+    """Return the type if it is that of a C-contiguous array of three axes of doubles."""
+    if array != types.Array(types.float64, 3, "C"):
+        raise TypeError(f"expected a C-contiguous array of doubles with three axes, got {array}")
+    return array
+
+
+def _tile_row(context, builder, signature, arguments, count, access):
+    """Return pointers to row j of each pose, and ask for the next tile's memory."""
+    begin, pose_bytes = _array(context, builder, signature, arguments)
+    row_bytes = count * DOUBLE_BYTES
+    first = _moved(builder, begin, arguments[1], row_bytes)
+    share = _moved(builder, begin, pose_bytes, LANES)
+    share = _moved(builder, share, arguments[1], LANES * row_bytes)
+    _prefetch(builder, share, LANES * row_bytes, access)
+    row = ir.VectorType(DOUBLE, count).as_pointer()
+    return [builder.bitcast(_moved(builder, first, pose_bytes, k), row) for k in range(LANES)]
+
+
+def _scratch_row(context, builder, signature, arguments):
+    """Return pointers to the four lanes in row j."""
+    begin, row_bytes = _array(context, builder, signature, arguments)
+    first = builder.bitcast(
+        builder.gep(begin, [builder.mul(row_bytes, arguments[1])]), VECTOR.as_pointer()
+    )
+    return [builder.gep(first, [INT(c)]) for c in range(4)]
+
+
+def _array(context, builder, signature, arguments):
+    """Return where an array begins, and the bytes from an entry of the first axis to the next."""
+    array = context.make_array(signature.args[0])(context, builder, arguments[0])
+    return builder.bitcast(array.data, POINTER), cgutils.unpack_tuple(builder, array.strides)[0]
+
+
+def _moved(builder, pointer, count, size):
+    """Return the pointer moved on by so many times so many bytes."""
+    return builder.gep(pointer, [builder.mul(count, count.type(size))])
+
+
+def _prefetch(builder, pointer, size, access):
+    """Ask for memory that will soon be read or written; memory that is not there does no harm."""
+    kind = ir.FunctionType(ir.VoidType(), [POINTER, INT, INT, INT])
+    fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+    for offset in range(0, size, LINE_BYTES):
+        line = builder.gep(pointer, [INT(offset)])
+        builder.call(fetch, [line, INT(access), INT(NEAR), INT(DATA)])
+
+
+def _shuffled(builder, a, b, indices):
+    """Return a vector of the entries of two others, taken end to end, at these indices."""
+    mask = ir.Constant(ir.VectorType(INT, len(indices)), [INT(i) for i in indices])
+    return builder.shuffle_vector(a, b, mask)

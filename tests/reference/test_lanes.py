@@ -1,0 +1,170 @@
+import numpy as np
+import pytest
+
+from reference import compiled, lanes, quaternion
+from reference.lanes import (
+    LANES,
+    all_within,
+    lanes_at,
+    put_lanes,
+    put_quaternions,
+    put_vectors,
+    quaternions_at,
+    vectors_at,
+)
+from reference.quaternion import (
+    IDENTITY,
+    add,
+    conjugate,
+    multiply,
+    put_quaternion,
+    put_vector,
+    quaternion_at,
+    rotate,
+    scale,
+    subtract,
+    vector_at,
+)
+
+JOINTS = 3
+
+
+def copy_vectors(tile, result):
+    put_vectors(result, 1, vectors_at(tile, 2))
+
+
+def copy_quaternions(tile, result):
+    put_quaternions(result, 1, quaternions_at(tile, 2))
+
+
+def spread_out(tile, scratch):
+    put_lanes(scratch, 1, quaternions_at(tile, 2))
+
+
+def gather(scratch, tile):
+    put_quaternions(tile, 1, lanes_at(scratch, 2))
+
+
+def put_the_same(tile, scratch):
+    put_quaternions(tile, 1, (1.0, 2.0, 3.0, 4.0))
+    put_lanes(scratch, 1, (1.0, 2.0, 3.0, 4.0))
+
+
+def put_one_or_other(scratch, tile, other):
+    q = IDENTITY
+    if other:
+        q = lanes_at(scratch, 2)
+    put_quaternions(tile, 1, q)
+
+
+def bounded(scratch, bound):
+    w, x, y, z = lanes_at(scratch, 0)
+    return all_within(w, bound)
+
+
+def algebra(a, b, v, vectors, quaternions):
+    """Use every operation that lanes have, between lanes and with floats on either side."""
+    p, q, x = quaternion_at(a, 0), quaternion_at(b, 0), vector_at(v, 0)
+    put_quaternion(quaternions, 0, multiply(p, conjugate(q)))
+    put_quaternion(quaternions, 1, multiply(p, (0.5, -0.5, 0.1, 0.7)))
+    put_vector(vectors, 0, subtract(add(rotate(p, x), scale(3.0, x)), rotate(q, (0.1, 0.2, 0.3))))
+    put_vector(vectors, 1, subtract((1.0, 2.0, 3.0), x))
+
+
+algebra_of_tiles = compiled.bind(
+    algebra,
+    quaternion_at=quaternions_at,
+    vector_at=vectors_at,
+    put_quaternion=put_quaternions,
+    put_vector=put_vectors,
+)
+
+
+def run(kernel, *arguments):
+    return compiled.TwoSpeeds(kernel)(*arguments)
+
+
+@pytest.fixture
+def numbers(rng):
+    """Return arrays of random numbers, contiguous and of one type, as kernels are given."""
+    return lambda *shape: rng.standard_normal(shape)
+
+
+@pytest.mark.parametrize(("copy", "count"), [(copy_vectors, 3), (copy_quaternions, 4)])
+def test_a_row_of_a_tile_is_read_and_written_whole_and_no_other(copy, count, numbers, speed):
+    tile, result = numbers(LANES, JOINTS, count), numbers(LANES, JOINTS, count)
+    expected = result.copy()
+    expected[:, 1] = tile[:, 2]
+    before = tile.copy()
+    run(copy, tile, result)
+    assert (result == expected).all()
+    assert (tile == before).all()
+
+
+def test_a_tile_in_the_middle_of_a_batch_leaves_its_neighbours_alone(numbers, speed):
+    batch, given = numbers(3 * LANES, JOINTS, 3), numbers(LANES, JOINTS, 3)
+    expected = batch.copy()
+    expected[LANES : 2 * LANES, 1] = given[:, 2]
+    run(copy_vectors, given, batch[LANES : 2 * LANES])
+    assert (batch == expected).all()
+
+
+def test_scratch_holds_a_component_of_all_poses_side_by_side(numbers, speed):
+    tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
+    expected = scratch.copy()
+    expected[1] = tile[:, 2].T
+    run(spread_out, tile, scratch)
+    assert (scratch == expected).all()
+    back = tile.copy()
+    back[:, 1] = scratch[2].T
+    run(gather, scratch, tile)
+    assert (tile == back).all()
+
+
+def test_a_float_stands_for_itself_in_every_lane(numbers, speed):
+    tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
+    run(put_the_same, tile, scratch)
+    assert (tile[:, 1] == [1.0, 2.0, 3.0, 4.0]).all()
+    assert (scratch[1].T == [1.0, 2.0, 3.0, 4.0]).all()
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_a_variable_may_be_floats_here_and_lanes_there(other, numbers, speed):
+    tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
+    run(put_one_or_other, scratch, tile, other)
+    assert (tile[:, 1] == (scratch[2].T if other else quaternion.IDENTITY)).all()
+
+
+def test_lanes_compute_the_bits_of_floats(numbers, speed):
+    a, b, v = numbers(LANES, JOINTS, 4), numbers(LANES, JOINTS, 4), numbers(LANES, JOINTS, 3)
+    vectors, quaternions = np.zeros_like(v), np.zeros_like(a)
+    run(algebra_of_tiles, a, b, v, vectors, quaternions)
+    for i in range(LANES):
+        x, q = np.zeros((JOINTS, 3)), np.zeros((JOINTS, 4))
+        with compiled.speed("plain"):
+            run(algebra, a[i], b[i], v[i], x, q)
+        assert (x[:2] != 0.0).all()
+        assert (vectors[i] == x).all()
+        assert (quaternions[i] == q).all()
+
+
+@pytest.mark.parametrize("lane", range(LANES))
+@pytest.mark.parametrize("value", [0.5, -0.5, np.nan, np.inf, -np.inf])
+def test_one_lane_out_of_bounds_is_out_of_bounds(lane, value, numbers, speed):
+    scratch = numbers(JOINTS, 4, LANES).clip(-0.25, 0.25)
+    assert run(bounded, scratch, 0.25)
+    scratch[0, 0, lane] = value
+    assert not run(bounded, scratch, 0.25)
+    scratch[0, 1] = value
+    scratch[0, 0, lane] = 0.0
+    assert run(bounded, scratch, 0.25)
+
+
+def test_every_function_of_lanes_has_its_instructions():
+    from reference import lane_instructions
+
+    marked = [value for value in vars(lanes).values() if hasattr(value, "compiled_in")]
+    assert len(marked) == 7
+    for plain in marked:
+        assert plain.compiled_in == lane_instructions.__name__
+        assert hasattr(lane_instructions, plain.__name__)

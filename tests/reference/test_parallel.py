@@ -1,0 +1,130 @@
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+from reference import compiled, cores, parallel
+from reference.parallel import SLICES_PER_CORE, in_slices
+
+CORES = [1, 2, 3]
+
+
+def slices_of(count, least):
+    return in_slices(lambda part: part, count, lambda part: (part,), least=least)
+
+
+def total(values):
+    s = 0.0
+    for value in values:
+        s += value
+    return s
+
+
+@pytest.mark.parametrize("many", CORES)
+@pytest.mark.parametrize("count", [0, 1, 7, 100, 101])
+def test_slices_follow_one_another_from_end_to_end(many, count):
+    with cores(many):
+        parts = slices_of(count, least=5)
+    covered = [i for part in parts for i in range(part.start, part.stop)]
+    assert covered == list(range(count))
+    assert len(parts) <= max(1, SLICES_PER_CORE * many, count // 5)
+
+
+def test_slices_are_as_many_as_the_cores_want_and_no_shorter_than_worth_while():
+    with cores(2):
+        assert len(slices_of(1000, least=10)) == 2 * SLICES_PER_CORE
+        assert len(slices_of(35, least=10)) == 3
+        assert len(slices_of(19, least=10)) == 1
+    with cores(1):
+        assert len(slices_of(1000, least=10)) == 1
+
+
+def test_what_slices_return_comes_in_their_order():
+    values = np.arange(24.0)
+    with cores(3):
+        sums = in_slices(compiled.TwoSpeeds(total), 24, lambda part: (values[part],), least=1)
+    assert sums == [a + b for a, b in values.reshape(3 * SLICES_PER_CORE, 2)]
+
+
+def test_threads_are_kept_and_only_used_for_more_than_one_slice():
+    def who():
+        return threading.get_ident()
+
+    with cores(2):
+        several = set(in_slices(who, 100, lambda part: (), least=1))
+        again = set(in_slices(who, 100, lambda part: (), least=1))
+        (alone,) = in_slices(who, 100, lambda part: (), least=100)
+    assert alone == who()
+    assert len(several | again) <= 2
+    assert alone not in several | again
+
+
+def test_threads_run_at_the_speed_in_force():
+    kernel = compiled.TwoSpeeds(total)
+    with cores(2), compiled.speed("plain"):
+        in_slices(kernel, 100, lambda part: (np.ones(3),), least=1)
+    assert "compiled" not in vars(kernel)
+
+
+def test_a_slice_is_not_cut_again():
+    with cores(2):
+        counts = in_slices(parallel._cores.get, 100, lambda part: (), least=1)
+        assert counts == [1] * 2 * SLICES_PER_CORE
+        assert len(slices_of(100, least=1)) == 2 * SLICES_PER_CORE
+
+
+def test_an_error_in_one_slice_is_the_caller_s():
+    def fail(part):
+        if part.start == 50:
+            raise ZeroDivisionError("in the middle")
+
+    with cores(2), pytest.raises(ZeroDivisionError, match="in the middle"):
+        in_slices(fail, 100, lambda part: (part,), least=10)
+
+
+def test_an_interrupt_reaches_the_caller_and_drops_what_has_not_begun():
+    begun, go_on = [], threading.Event()
+
+    def wait(part):
+        begun.append(part.start)
+        if len(begun) == 2:
+            signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+        assert go_on.wait(60)
+
+    with cores(2), pytest.raises(KeyboardInterrupt):
+        in_slices(wait, 100, lambda part: (part,), least=1)
+    go_on.set()
+    with cores(2):  # all that was begun is over when the same threads have done this
+        in_slices(lambda: None, 100, lambda part: (), least=1)
+    assert len(begun) == 2
+
+
+def test_threads_that_are_gone_are_replaced():
+    """As in a process that was forked from ours."""
+    with cores(2):
+        slices_of(100, least=1)
+        parallel._pools[2][0].shutdown()
+        assert len(slices_of(100, least=1)) == 2 * SLICES_PER_CORE
+
+
+def test_the_count_in_force_ends_with_its_block():
+    with cores(2), cores(1):
+        pass
+    with cores(1):
+        with cores(2):
+            assert len(slices_of(100, least=1)) == 2 * SLICES_PER_CORE
+        assert len(slices_of(100, least=1)) == 1
+        with cores(None):
+            assert len(slices_of(100, least=1)) == slices_wanted()
+
+
+def slices_wanted():
+    many = parallel._all_cores()
+    return 1 if many == 1 else SLICES_PER_CORE * many
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, True, "two"])
+def test_a_count_that_is_none_is_refused(count):
+    with pytest.raises(ValueError, match="count: expected an integer"):
+        cores(count).__enter__()
