@@ -126,7 +126,7 @@ def choice(name: str, value: Any, valid: Mapping[str, Any] | Sequence[str]) -> s
     Raises:
         ValueError: if not, with the valid names.
     """
-    if value not in tuple(valid):
+    if not isinstance(value, str) or value not in valid:
         raise ValueError(f"{name}: expected one of {', '.join(valid)}, got {value!r}")
     return value
 

@@ -547,30 +547,33 @@ def _checked_mimics(
 ) -> dict[int, Mimic]:
     """Return the mimics by index, each with a leader that is no mimic joint itself."""
     named = {skeleton.index(joint, "mimics"): Mimic(*mimic) for joint, mimic in mimics.items()}
-    checked = {}
-    for joint, (leader, multiplier, shift) in named.items():
-        first, seen = skeleton.index(leader, "mimics"), {joint}
-        multiplier = arguments.number("mimics", multiplier)
-        shift = arguments.number("mimics", shift)
-        while first in named:
-            if first in seen:
-                raise ValueError(
-                    f"mimics: expected a leader, got {skeleton.names[joint]!r} in a ring"
-                )
-            seen.add(first)
-            _, factor, further = named[first]
-            first, multiplier, shift = (
-                skeleton.index(named[first].leader, "mimics"),
-                multiplier * factor,
-                multiplier * further + shift,
-            )
-        for j in (joint, first):
-            if kinds[j] not in ("hinge", "slide"):
-                raise ValueError(
-                    f"mimics: expected hinges or slides, got {kinds[j]!r} for joint {j}"
-                )
-        checked[joint] = Mimic(first, multiplier, shift)
+    leaders = {joint: skeleton.index(mimic.leader, "mimics") for joint, mimic in named.items()}
+    checked: dict[int, Mimic] = {}
+    for joint in named:
+        for j in reversed(_chain_to_leader(joint, leaders, checked, skeleton)):
+            multiplier = arguments.number("mimics", named[j].multiplier)
+            shift = arguments.number("mimics", named[j].shift)
+            first, factor, further = checked.get(leaders[j], Mimic(leaders[j]))
+            checked[j] = Mimic(first, multiplier * factor, multiplier * further + shift)
+            for k in (j, leaders[j]):
+                if kinds[k] not in ("hinge", "slide"):
+                    raise ValueError(
+                        f"mimics: expected hinges or slides, got {kinds[k]!r} for joint {k}"
+                    )
     return checked
+
+
+def _chain_to_leader(
+    joint: int, leaders: Mapping[int, int], checked: Mapping[int, Mimic], skeleton: Skeleton
+) -> list[int]:
+    """Return the mimic joints from one towards its first leader that are not yet checked."""
+    chain: dict[int, None] = {}
+    while joint in leaders and joint not in checked:
+        if joint in chain:
+            raise ValueError(f"mimics: expected a leader, got {skeleton.names[joint]!r} in a ring")
+        chain[joint] = None
+        joint = leaders[joint]
+    return list(chain)
 
 
 def _layout(

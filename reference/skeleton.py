@@ -1,5 +1,6 @@
 """Skeleton (the model) and Pose (its state)."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -54,7 +55,7 @@ class Skeleton:
             _paths={},
         )
 
-    @property
+    @functools.cached_property
     def joint_count(self) -> int:
         """Number of joints, the root included."""
         return len(self.arrays.parents)
@@ -72,10 +73,16 @@ class Skeleton:
         Raises:
             ValueError: if there is no such joint; it speaks of the argument named.
         """
-        if isinstance(joint, str):
-            return self.names.index(arguments.choice(argument, joint, self.names))
         count = self.joint_count
+        if type(joint) is int and -count <= joint < count:
+            return joint % count
+        if isinstance(joint, str):
+            return self._numbers[arguments.choice(argument, joint, self._numbers)]
         return arguments.integer(argument, joint, least=-count, below=count) % count
+
+    @functools.cached_property
+    def _numbers(self) -> dict[str, int]:
+        return {name: j for j, name in enumerate(self.names)}
 
     def path(self, effector: int | str = -1) -> IndexArray:
         """Return the joints from the root to the effector, both included, shape (path,).

@@ -1,7 +1,6 @@
 """Inverse kinematics: local rotations or coordinates that bring effectors to targets."""
 
 import functools
-import weakref
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -10,19 +9,29 @@ from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
 from ..arguments import FloatArray, frozen
-from ..articulation import Articulation
+from ..articulation import Articulation, one_batch
 from ..compiled import TwoSpeeds, bind
 from ..outcome import Outcome
+from ..parallel import in_slices
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
-from .attempts import Answers, Request, answer_batch, attempt, attempts
-from .batch import ITERATIONS, OUTCOME, RESIDUAL, RESIDUAL_ROTATION, Solved, iterate, solve_batch
+from .attempts import Answers, answer_batch, answer_given, attempt, attempts
+from .batch import (
+    ITERATIONS,
+    OUTCOME,
+    RESIDUAL,
+    RESIDUAL_ROTATION,
+    Solved,
+    iterate,
+    solve_batch,
+    solve_given,
+)
 from .ccd import ccd_sweep, ccd_update
 from .damped_least_squares import damped_least_squares_sweep, damped_least_squares_update
 from .fabrik import fabrik_sweep, fabrik_update
 from .jacobian_transpose import jacobian_transpose_sweep, jacobian_transpose_update
 from .levenberg_marquardt import levenberg_marquardt_sweep, levenberg_marquardt_update
-from .mechanism import POSITION, ROTATION, WEIGHT
+from .mechanism import ROTATION, WEIGHT
 from .preparation import prepare
 from .problem import IKSolution, Target, Wanted, check_numbers, checked_targets
 
@@ -42,10 +51,12 @@ class IKSolver(NamedTuple):
 
 
 def _solver(sweep, update) -> IKSolver:
+    chains = bind(solve_batch, iterate=bind(iterate, sweep=sweep))
     many = bind(attempts, attempt=bind(attempt, update=update))
+    mechanisms = bind(answer_batch, attempts=many)
     return IKSolver(
-        TwoSpeeds(bind(solve_batch, iterate=bind(iterate, sweep=sweep))),
-        TwoSpeeds(bind(answer_batch, attempts=many)),
+        TwoSpeeds(bind(solve_given, solve_batch=chains)),
+        TwoSpeeds(bind(answer_given, answer_batch=mechanisms)),
     )
 
 
@@ -58,6 +69,8 @@ IK_SOLVERS = {
 }
 
 
+# Targets in a slice of a batch: fewer are not worth a thread.
+LEAST = 16
 NO_HISTORY = frozen(np.empty(0))
 OUTCOMES = tuple(Outcome)
 
@@ -184,10 +197,13 @@ def _solve_chains(
         np.empty((len(targets), 4)),
         _history(len(targets), settings.max_iterations, settings),
     )
-    fine = settings.solver.chain(
-        skeleton.arrays, skeleton.path_array(wanted.joint), _in_turn(starts, batch, 2), targets,
-        settings.tolerance, settings.max_iterations, settings.chained, solved,
-    )  # fmt: skip
+    fine = _run(
+        settings.solver.chain,
+        (*skeleton.arrays, skeleton.path_array(wanted.joint)),
+        (_in_turn(starts, batch, 2), targets),
+        (settings.tolerance, settings.max_iterations, settings.chained),
+        solved,
+    )
     if not fine:  # raise, or the lengths were on the very edge of the tolerance
         check_numbers([wanted])
         return _solve_chains(skeleton, rotation.unit("local_rotations", start), wanted, settings)
@@ -203,22 +219,22 @@ def _solve_mechanisms(
         given = arguments.floats("local_rotations", start, "...", model.joint_count, 4)
         given = given.reshape(*given.shape[:-2], -1)
     starts = arguments.floats("local_rotations", given, "...", articulation.coordinate_count)
-    effectors = tuple(one.joint for one in wanted)
-    oriented = tuple(one.rotation is not None for one in wanted)
-    mechanism, columns = prepare(articulation, effectors, oriented)
-    batch = _batch_of(starts.shape[:-1], wanted)
-    request = _request(articulation, columns, wanted, batch, settings)
-    count = len(request.goals)
-    answers = Answers(
-        np.empty((count, articulation.coordinate_count)),
-        np.empty((count, articulation.joint_count, 4)),
-        np.empty((count, articulation.joint_count, 3)),
-        np.empty((count, 4)),
-        _history(count, settings.max_iterations * (settings.restarts + 2), settings),
-    )
-    fine = settings.solver.mechanism(
-        articulation.arrays, mechanism, columns, _in_turn(starts, batch, 1), request, answers
-    )
+    effectors = tuple([one.joint for one in wanted])
+    oriented = tuple([one.rotation is not None for one in wanted])
+    prepared = prepare(articulation, effectors, oriented, settings.restarts, settings.seed)
+    batch = batch_of(starts.shape[:-1], wanted)
+    goals = goals_of(wanted, batch)
+    answers = _no_answers(len(goals), articulation, settings)
+    fine = _run(
+        settings.solver.mechanism,
+        prepared.flat,
+        (_in_turn(starts, batch, 1), goals),
+        (
+            settings.tolerance, settings.tolerance_rotation, settings.max_iterations,
+            prepared.restarts, prepared.tips, settings.chained,
+        ),
+        answers,
+    )  # fmt: skip
     if not fine:
         check_numbers(wanted)
         again = articulation.checked("local_rotations", starts)
@@ -229,52 +245,67 @@ def _solve_mechanisms(
     return _solution(answers.local, answers.q, answers, batch, settings)
 
 
-def balls(skeleton: Skeleton) -> Articulation:
-    """Return the skeleton as an Articulation of unlimited balls, made once."""
-    if skeleton not in _BALLS:
-        _BALLS[skeleton] = Articulation(skeleton, "ball")
-    return _BALLS[skeleton]
+def _run(
+    kernel: TwoSpeeds,
+    model: tuple[Any, ...],
+    given: tuple[FloatArray, FloatArray],
+    rest: tuple[Any, ...],
+    filled: Solved | Answers,
+) -> bool:
+    """Run a kernel on starts and targets, on all cores where they do not depend on one another."""
+    count, chained = len(given[1]), rest[-1]
+    if chained or count < 2 * LEAST:
+        return kernel(*model, *given, *rest, *filled)
+    return all(
+        in_slices(
+            kernel,
+            count,
+            lambda part: (
+                *model, *[_part(rows, part) for rows in given],
+                *rest, *[_part(rows, part) for rows in filled],
+            ),
+            least=LEAST,
+        )
+    )  # fmt: skip
 
 
-_BALLS: weakref.WeakKeyDictionary[Skeleton, Articulation] = weakref.WeakKeyDictionary()
+def _part(rows: FloatArray, part: slice) -> FloatArray:
+    """Return a part of the rows, or the only one, which serves all targets."""
+    return rows if len(rows) == 1 else rows[part]
 
 
-def _request(
-    articulation: Articulation,
-    columns: Any,
-    wanted: list[Wanted],
-    batch: tuple[int, ...],
-    settings: Settings,
-) -> Request:
-    goals = np.empty((*batch, len(wanted), 8))
-    for e, one in enumerate(wanted):
-        goals[..., e, POSITION : POSITION + 3] = one.position
-        turn = IDENTITY if one.rotation is None else one.rotation
-        goals[..., e, ROTATION : ROTATION + 4] = turn
-        goals[..., e, WEIGHT] = one.weight
-    return Request(
-        np.array([one.joint for one in wanted], dtype=np.int64),
-        goals.reshape(-1, len(wanted), 8),
-        settings.tolerance,
-        settings.tolerance_rotation,
-        settings.max_iterations,
-        _other_starts(articulation, columns, settings),
-        settings.chained,
+def _no_answers(count: int, articulation: Articulation, settings: Settings) -> Answers:
+    return Answers(
+        np.empty((count, articulation.coordinate_count)),
+        np.empty((count, articulation.joint_count, 4)),
+        np.empty((count, articulation.joint_count, 3)),
+        np.empty((count, 4)),
+        _history(count, settings.max_iterations * (settings.restarts + 2), settings),
     )
 
 
-def _other_starts(articulation: Articulation, columns: Any, settings: Settings) -> FloatArray:
-    """Return the poses that restarts begin from, kept by the articulation, (restart, coordinate)."""
-    key = "restarts", settings.restarts, settings.seed, columns.tobytes()
-    if key not in articulation.mechanisms:
-        poses = articulation.random(np.random.default_rng(settings.seed), settings.restarts)
-        articulation.mechanisms[key] = np.ascontiguousarray(poses[:, columns])
-    return articulation.mechanisms[key]
+def balls(skeleton: Skeleton) -> Articulation:
+    """Return the skeleton as an Articulation of unlimited balls, made once and kept by it."""
+    kept = skeleton.__dict__
+    if "balls" not in kept:
+        kept["balls"] = Articulation(skeleton, "ball")
+    return kept["balls"]
+
+
+def goals_of(wanted: list[Wanted], batch: tuple[int, ...]) -> FloatArray:
+    """Return what the kernels want to know of the targets, (target, effector, 8)."""
+    goals = np.empty((*batch, len(wanted), 8))
+    for e, one in enumerate(wanted):
+        goal = goals[..., e, :]
+        goal[..., :ROTATION] = one.position
+        goal[..., ROTATION:WEIGHT] = IDENTITY if one.rotation is None else one.rotation
+        goal[..., WEIGHT] = one.weight
+    return goals.reshape(-1, len(wanted), 8)
 
 
 def _batch_shape(starts: tuple[int, ...], targets: tuple[int, ...]) -> tuple[int, ...]:
-    if not starts:
-        return targets
+    if not starts or not targets:
+        return starts or targets
     try:
         return np.broadcast_shapes(starts, targets)
     except ValueError:
@@ -284,9 +315,11 @@ def _batch_shape(starts: tuple[int, ...], targets: tuple[int, ...]) -> tuple[int
         ) from None
 
 
-def _batch_of(starts: tuple[int, ...], wanted: list[Wanted]) -> tuple[int, ...]:
+def batch_of(starts: tuple[int, ...], wanted: list[Wanted]) -> tuple[int, ...]:
     batch = starts
     for one in wanted:
+        if one.position.ndim == 1 and (one.rotation is None or one.rotation.ndim == 1):
+            continue
         batch = _batch_shape(batch, one.position.shape[:-1])
         if one.rotation is not None:
             batch = _batch_shape(batch, one.rotation.shape[:-1])
@@ -297,7 +330,7 @@ def _in_turn(starts: FloatArray, batch: tuple[int, ...], axes: int) -> FloatArra
     """Return the starts as rows that the targets of a batch take in turn."""
     if starts.ndim > axes:
         starts = arguments.spread(starts, (*batch, *starts.shape[-axes:]))
-    return starts.reshape(-1, *starts.shape[-axes:])
+    return one_batch(starts, axes)
 
 
 def _history(targets: int, iterations: int, settings: Settings) -> FloatArray:
@@ -326,10 +359,11 @@ def _solution(
             _shaped(coordinates, batch),
         )  # fmt: skip
     residual, angle, iterations, outcome = figures[0].tolist()
+    for rows in (local, coordinates, solved.positions):
+        rows.setflags(write=False)
     return IKSolution(
-        frozen(local[0]), frozen(solved.positions[0]), residual, int(iterations),
-        OUTCOMES[int(outcome)], frozen(history[0]) if settings.record else NO_HISTORY, angle,
-        frozen(coordinates[0]),
+        local[0], solved.positions[0], residual, int(iterations), OUTCOMES[int(outcome)],
+        frozen(history[0]) if settings.record else NO_HISTORY, angle, coordinates[0],
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from ..arguments import LARGEST_COORDINATE, FloatArray
 from ..kinematics import forward_pose, normalise
 from ..outcome import Outcome
 from ..quaternion import norm, subtract, vector_at
+from ..skeleton import SkeletonArrays
 from .ccd import ccd_sweep as sweep  # the one that is bound to each solver's
 from .chain import (
     bend,
@@ -43,6 +44,15 @@ class Solved(NamedTuple):
     positions: FloatArray
     figures: FloatArray
     history: FloatArray
+
+
+def solve_given(
+    parents, offsets, path, starts, targets, tolerance, max_iterations, chained, local, positions,
+    figures, history,
+):  # fmt: skip
+    """Do what `solve_batch` does, called from Python: single arrays come in faster than tuples."""
+    tree, solved = SkeletonArrays(parents, offsets), Solved(local, positions, figures, history)
+    return solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained, solved)
 
 
 def solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained, solved):

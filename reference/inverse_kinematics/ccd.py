@@ -25,7 +25,9 @@ from .mechanism import (
     WEIGHT,
     axis_of,
     frame_of,
+    is_followed,
     misfit,
+    moves,
     place,
     position_error,
     put_tip,
@@ -34,7 +36,7 @@ from .mechanism import (
     turn_weight,
     wrong_turn,
 )
-from .stacked import inner, linearise_all, squared
+from .stacked import freedom_worth, inner, linearise_all, squared
 from .wahba import NOTHING, add_outer, add_turn, best_angle, best_rotation, turn_value
 
 # A step of a joint that others follow is halved at most so often.
@@ -81,7 +83,7 @@ def ccd_update(mechanism, goal, posture, room):
     """
     joints = mechanism.joints
     for j in range(len(joints.integers) - 1, -1, -1):
-        if mechanism.sees[j, j]:
+        if is_followed(mechanism, j):
             descend(mechanism, goal, posture, room, j)
         elif joints.integers[j, LEADER] == j:
             move_joint(mechanism, goal, posture, room, j)
@@ -114,7 +116,7 @@ def arms_to_targets(mechanism, goal, posture, j):
     """Return Wahba's M of the arms from joint j to the effectors below and of their rotations."""
     M, x = NOTHING, vector_at(posture.positions, j)
     for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e]:
+        if moves(mechanism, j, e):
             weight = goal[e, WEIGHT]
             arm = subtract(tip(mechanism, posture, e), x)
             M = add_outer(M, weight, subtract(vector_at(goal, e, POSITION), x), arm)
@@ -128,7 +130,7 @@ def mean_way(mechanism, goal, posture, j):
     """Return the weighted mean of the ways from the effectors below joint j to their targets."""
     total, way = 0.0, (0.0, 0.0, 0.0)
     for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e]:
+        if moves(mechanism, j, e):
             total += goal[e, WEIGHT]
             way = add(way, scale(goal[e, WEIGHT], position_error(mechanism, goal, posture, e)))
     return scale(1.0 / total, way) if total > 0.0 else way
@@ -161,7 +163,7 @@ def only_position(mechanism, j):
     """Return the effector below joint j if it is the only one and its rotation free, else -1."""
     only = -1
     for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e]:
+        if moves(mechanism, j, e):
             if only >= 0 or mechanism.effectors[e, ORIENTED]:
                 return -1
             only = e
@@ -172,7 +174,7 @@ def turn_tips(mechanism, posture, j, turn):
     """Turn the effectors below joint j about it."""
     x = vector_at(posture.positions, j)
     for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e]:
+        if moves(mechanism, j, e):
             arm = subtract(tip(mechanism, posture, e), x)
             R = multiply(turn, tip_rotation(mechanism, posture, e))
             put_tip(mechanism, posture, e, add(x, rotate(turn, arm)), R)
@@ -181,7 +183,7 @@ def turn_tips(mechanism, posture, j, turn):
 def shift_tips(mechanism, posture, j, way):
     """Shift the effectors below joint j."""
     for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e]:
+        if moves(mechanism, j, e):
             moved = add(tip(mechanism, posture, e), way)
             put_tip(mechanism, posture, e, moved, tip_rotation(mechanism, posture, e))
 
@@ -194,7 +196,8 @@ def descend(mechanism, goal, posture, room, j):
     slope = inner(room.stack.J[k], room.stack.e)
     square = squared(room.stack.J[k])
     before, start = misfit(mechanism, goal, posture), q[at]
-    step = mechanism.scales[k] * slope / square if square > 0.0 else 0.0
+    worth = freedom_worth(mechanism, j)
+    step = worth * slope / square if square > 0.0 else 0.0
     for _ in range(HALVINGS):
         move_by(mechanism.joints, q, j, step)
         place(mechanism, posture)

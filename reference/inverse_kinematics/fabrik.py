@@ -35,7 +35,10 @@ from .mechanism import (
     WEIGHT,
     axis_of,
     frame_of,
+    moves,
     place,
+    sees,
+    sees_tip,
     turn_weight,
 )
 from .wahba import NOTHING, add_outer, add_turn, best_angle, best_rotation
@@ -195,11 +198,11 @@ def turn_to_wishes(mechanism, goal, posture, room, j):
     """Return the turn of joint j that brings what it sees nearest, the shortest if it is one."""
     found, arm, way = 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e] == 2:
+        if sees_tip(mechanism, j, e):
             found += 2 if mechanism.effectors[e, ORIENTED] else 1
             arm, way = arm_and_wish(mechanism, goal, posture, e, j)
     for c in range(j + 1, len(room.wishes)):
-        if mechanism.sees[j, c]:
+        if sees(mechanism, j, c) and room.wishes[c, WISHED] > 0.0:
             found += 1
             arm, way = joint_and_wish(mechanism, posture, room, c, j)
     if found == 1:
@@ -212,7 +215,7 @@ def arms_to_wishes(mechanism, goal, posture, room, j):
     """Return Wahba's M of the arms from joint j to what it sees below, and of the wishes."""
     M = NOTHING
     for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e]:
+        if moves(mechanism, j, e):
             arm, way = arm_and_wish(mechanism, goal, posture, e, j)
             M = add_outer(M, goal[e, WEIGHT], way, arm)
             if mechanism.effectors[e, ORIENTED]:
@@ -220,7 +223,7 @@ def arms_to_wishes(mechanism, goal, posture, room, j):
                 wanted = multiply(quaternion_at(goal, e, ROTATION), conjugate(R))
                 M = add_turn(M, goal[e, WEIGHT] * turn_weight(mechanism), wanted)
     for c in range(j + 1, len(room.wishes)):
-        if mechanism.sees[j, c]:
+        if sees(mechanism, j, c):
             arm, way = joint_and_wish(mechanism, posture, room, c, j)
             M = add_outer(M, room.wishes[c, WISHED], way, arm)
     return M

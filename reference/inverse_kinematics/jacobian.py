@@ -19,6 +19,9 @@ from ..quaternion import (
 )
 from .chain import LINE_TOLERANCE, bend, place_joints
 
+# Where J J^T is singular, a damping of so much of its trace keeps its factors above rounding.
+ROUNDING = 1e-14
+
 
 def task_matrix(chain):
     """Return J J^T as its six entries xx, yy, zz, xy, xz, yz [m²]."""

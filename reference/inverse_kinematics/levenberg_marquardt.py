@@ -1,15 +1,18 @@
-"""Levenberg-Marquardt with the damping of Sugihara 2011.
+"""Levenberg-Marquardt with a damping in proportion to the squared error (Sugihara 2011).
 
 "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method": the step minimises
 1/2 |e - J q|^2 + 1/2 mu |q|^2 with mu = 1/2 |e|^2 plus a bias. Far from the target, or where it
 cannot be reached, the step is short and safe; near it the damping vanishes with the square of the
-error, and convergence is quadratic even where the Jacobian loses rank.
+error, and convergence is quadratic even where the Jacobian loses rank. Where rotations are asked
+for mu is a tenth of |e|^2, the factor of Chan & Lawrence 1988, which needs fewer iterations there.
 """
 
 from ..quaternion import dot
-from .jacobian import linearise, solve_damped, turn_joints
+from .jacobian import ROUNDING, linearise, solve_damped, turn_joints
 from .stacked import damped_step, linearise_all, squared, take_step
 
+# Of the squared error: for positions, and for positions and rotations.
+DAMPING, DAMPING_OF_POSES = 0.5, 0.1
 # Over the reach squared; it only keeps a division by zero away.
 BIAS = 1e-24
 
@@ -17,13 +20,16 @@ BIAS = 1e-24
 def levenberg_marquardt_sweep(chain, target):
     """Turn all joints by J^T (J J^T + mu 1)^-1 e, mu = 1/2 |e|^2 + bias."""
     e, A = linearise(chain, target)
-    damping = 0.5 * dot(e, e) + BIAS * chain.reach * chain.reach
+    damping = DAMPING * dot(e, e) + BIAS * chain.reach * chain.reach
+    damping += ROUNDING * (A[0] + A[1] + A[2])
     turn_joints(chain, solve_damped(A, damping, e))
 
 
 def levenberg_marquardt_update(mechanism, goal, posture, room):
     """Change the coordinates by J' (J J' + mu 1)^-1 e, within their limits."""
     linearise_all(mechanism, goal, posture, room.stack)
-    damping = 0.5 * squared(room.stack.e) + BIAS * mechanism.reach * mechanism.reach
+    positions = 3 * len(mechanism.effectors) == mechanism.equations
+    share = DAMPING if positions else DAMPING_OF_POSES
+    damping = share * squared(room.stack.e) + BIAS * mechanism.reach * mechanism.reach
     damped_step(mechanism, posture, room.stack, damping)
     take_step(mechanism, posture, room.stack)

@@ -10,7 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import FloatArray, IndexArray
-from ..articulation import AXIS, FRAME, OFFSET, PARENT, JointArrays, articulated_pose
+from ..articulation import (
+    AXIS,
+    FRAME,
+    KIND,
+    LEADER,
+    OFFSET,
+    PARENT,
+    WIDTHS,
+    JointArrays,
+    articulated_pose,
+)
 from ..quaternion import (
     add,
     conjugate,
@@ -25,12 +35,14 @@ from ..quaternion import (
     subtract,
     vector_at,
 )
+from .chain import ROUNDING
 
 # A wrong rotation counts as much as a wrong position of its angle times this part of the reach.
 LEVER = 0.5
 # Columns of Mechanism.effectors: the joint an effector hangs on, -1 if none moves it; where its
-# equations begin; 1 where its rotation matters, else 0; the first joint on the way to it, or -1.
-HANGS, ROW, ORIENTED, TOP = range(4)
+# equations begin; 1 where its rotation matters, else 0; the first joint on the way to it, or -1;
+# the effector among the joints of the articulation.
+HANGS, ROW, ORIENTED, TOP, EFFECTOR = range(5)
 # Columns of Mechanism.tips: where the three of the arm and the four of the rotation in the frame of
 # that joint begin [m]; how far the effector can be from the first joint [m].
 ARM, TURN, REACH = 0, 3, 7
@@ -44,24 +56,26 @@ class Mechanism(NamedTuple):
 
     Attributes:
         joints: the joints that move, fixed ones merged; coordinates are the mechanism's own.
-        effectors: (effector, 4), see above.
+        sources: where a joint's coordinates begin among the articulation's, (joint,).
+        effectors: (effector, 5), see above.
         tips: (effector, 8), see above.
-        moves: 1 where a joint moves an effector, 2 where no joint does between, else 0, (joint,
-            effector).
-        sees: 1 where a turn of the first joint moves the second and no joint between, else 0; on
-            the diagonal 1 where others follow a joint, (joint, joint).
-        scales: what a unit of each freedom is worth: 1 for turns, the reach for ways, (freedom,).
+        bonds: first for each effector 1 where a joint moves it, 2 where no joint does between, else
+            0; then for each joint below 1 where a turn moves it and no joint does between, else 0;
+            on the diagonal 1 where others follow a joint, (joint, effector + joint).
         reach: the longest way from root to effector, slides left out [m].
+        coordinates: how many.
+        freedoms: how many.
         equations: how many in all.
     """
 
     joints: JointArrays
+    sources: IndexArray
     effectors: IndexArray
     tips: FloatArray
-    moves: IndexArray
-    sees: IndexArray
-    scales: FloatArray
+    bonds: IndexArray
     reach: float
+    coordinates: int
+    freedoms: int
     equations: int
 
 
@@ -79,10 +93,53 @@ class Posture(NamedTuple):
     rotations: FloatArray
 
 
-def new_posture(mechanism, coordinates):
-    """Return a posture with room for so many coordinates."""
+def new_posture(mechanism):
+    """Return a posture to be filled."""
     count = len(mechanism.joints.integers) + len(mechanism.effectors)
-    return Posture(np.empty(coordinates), np.empty((count, 3)), np.empty((count, 4)))
+    return Posture(np.empty(mechanism.coordinates), np.empty((count, 3)), np.empty((count, 4)))
+
+
+def take_coordinates(mechanism, q, own):
+    """Copy the mechanism's own coordinates out of the articulation's."""
+    at = 0
+    for j in range(len(mechanism.sources)):
+        for k in range(width(mechanism.joints, j)):
+            own[at] = q[mechanism.sources[j] + k]
+            at += 1
+
+
+def give_coordinates(mechanism, own, q):
+    """Copy the mechanism's own coordinates back among the articulation's."""
+    at = 0
+    for j in range(len(mechanism.sources)):
+        for k in range(width(mechanism.joints, j)):
+            q[mechanism.sources[j] + k] = own[at]
+            at += 1
+
+
+def width(joints, j):
+    """Return how many coordinates a joint has of its own."""
+    return WIDTHS[joints.integers[j, KIND]] if joints.integers[j, LEADER] == j else 0
+
+
+def moves(mechanism, j, e):
+    """Return whether a joint moves an effector."""
+    return mechanism.bonds[j, e] > 0
+
+
+def sees_tip(mechanism, j, e):
+    """Return whether a joint moves an effector and no joint does between."""
+    return mechanism.bonds[j, e] == 2
+
+
+def sees(mechanism, j, c):
+    """Return whether a turn of a joint moves one below and no joint does between."""
+    return mechanism.bonds[j, len(mechanism.effectors) + c] > 0
+
+
+def is_followed(mechanism, j):
+    """Return whether mimic joints move with a joint."""
+    return mechanism.bonds[j, len(mechanism.effectors) + j] > 0
 
 
 def place(mechanism, posture):
@@ -160,22 +217,33 @@ def misfit(mechanism, goal, posture):
 
 
 def residuals(mechanism, goal, posture):
-    """Return the largest distance [m] and the largest angle [rad] from effector to target."""
-    distance, angle = 0.0, 0.0
+    """Return the largest distance [m] and angle [rad] from effector to target, and all in one [m].
+
+    The last is the sum of all distances, and of all angles times the lever: it shows the progress
+    of one effector while another, further from its target, stays.
+    """
+    distance, angle, total = 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
-        distance = max(distance, norm(position_error(mechanism, goal, posture, e)))
+        way = norm(position_error(mechanism, goal, posture, e))
+        distance, total = max(distance, way), total + way
         if mechanism.effectors[e, ORIENTED]:
-            angle = max(angle, norm(logarithm(wrong_turn(mechanism, goal, posture, e))))
-    return distance, angle
+            turn = norm(logarithm(wrong_turn(mechanism, goal, posture, e)))
+            angle, total = max(angle, turn), total + LEVER * mechanism.reach * turn
+    return distance, angle, total
 
 
 def too_far(mechanism, goal, margin):
-    """Return whether a target is further than its effector can ever be, by a margin [m]."""
+    """Return whether a target is further than its effector can ever be, by a margin [m].
+
+    Distances and sums of lengths are known to a few roundings for each joint.
+    """
+    share = ROUNDING * (1 + len(mechanism.joints.integers))
     for e in range(len(mechanism.effectors)):
         start, top = vector_at(mechanism.tips, e, ARM), mechanism.effectors[e, TOP]
         if top >= 0:
             start = vector_at(mechanism.joints.numbers, top, OFFSET)
-        way = norm(subtract(vector_at(goal, e, POSITION), start))
-        if way > mechanism.tips[e, REACH] + margin:
+        target, reach = vector_at(goal, e, POSITION), mechanism.tips[e, REACH]
+        rounding = share * (reach + norm(start) + norm(target))
+        if norm(subtract(target, start)) > reach + margin + rounding:
             return True
     return False

@@ -1,6 +1,6 @@
 """From an articulation and its effectors to the mechanism that the solvers work on."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,25 +35,45 @@ SPOT = 1e-9
 
 
 class Prepared(NamedTuple):
-    """A mechanism, and which of the articulation's coordinates are its own, (coordinate,)."""
+    """What is made once for some effectors and restarts.
+
+    Attributes:
+        mechanism: what moves the effectors.
+        restarts: the mechanism's coordinates in random poses, (restart, coordinate).
+        tips: where these put the effectors, positions [m] and rotations, (restart, effector, 7).
+        flat: joints of the articulation and mechanism, one array or number after the other.
+    """
 
     mechanism: Mechanism
-    columns: IndexArray
+    restarts: FloatArray
+    tips: FloatArray
+    flat: tuple[Any, ...]
 
 
 def prepare(
-    articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
+    articulation: Articulation,
+    effectors: tuple[int, ...],
+    oriented: tuple[bool, ...],
+    restarts: int = 0,
+    seed: int = 0,
 ) -> Prepared:
-    """Return the mechanism that moves some effectors, made once and kept by the articulation."""
-    key = effectors, oriented
+    """Return what is to be made once, kept by the articulation."""
+    key = effectors, oriented, restarts, seed
     if key not in articulation.mechanisms:
-        articulation.mechanisms[key] = _prepared(articulation, effectors, oriented)
+        mechanism, columns = _prepared(articulation, effectors, oriented)
+        poses = articulation.random(np.random.default_rng(seed), restarts)
+        x, R = articulation.forward(poses)
+        tips = np.concatenate([x, R], axis=-1)[:, list(effectors)]
+        articulation.mechanisms[key] = Prepared(
+            mechanism, np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(tips),
+            (*articulation.arrays, *mechanism.joints, *mechanism[1:]),
+        )  # fmt: skip
     return articulation.mechanisms[key]
 
 
 def _prepared(
     articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
-) -> Prepared:
+) -> tuple[Mechanism, IndexArray]:
     whole = articulation.arrays
     active = _active(articulation, effectors, oriented)
     number = {int(j): k for k, j in enumerate(active)}
@@ -68,23 +88,25 @@ def _prepared(
     tops = [np.flatnonzero(column)[0] if column.any() else -1 for column in moves.T]
     sees, sees_tip = _sight(joints, hangs, reach)
     furthest = ways + np.where(moves, _travel(joints)[:, None], 0.0).sum(axis=0)
+    rows = np.cumsum(sizes) - sizes
     mechanism = Mechanism(
         joints,
-        np.column_stack([hangs, np.cumsum(sizes) - sizes, oriented, tops]).astype(np.int64),
+        whole.integers[active, AT].copy(),
+        np.column_stack([hangs, rows, oriented, tops, effectors]).astype(np.int64),
         np.column_stack([arms, [R for _, _, R in hanging], furthest]),
-        moves + sees_tip,
-        sees,
-        _scales(joints, reach),
+        np.hstack([moves + sees_tip, sees]),
         reach,
+        len(columns),
+        _freedoms(joints),
         int(sizes.sum()),
     )
-    return Prepared(mechanism, columns)
+    return mechanism, columns
 
 
 def _active(
     articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
 ) -> IndexArray:
-    """Return the joints that move on the ways to the effectors, and on those to their leaders.
+    """Return the joints that move on the ways to the effectors, and those that they follow.
 
     An effector's own ball or hinge turns it, but does not move it.
     """
@@ -93,8 +115,7 @@ def _active(
     for joint, turned in zip(effectors, oriented, strict=True):
         moving = turned or kinds[joint] in (SLIDE, FREE)
         needed.update(path(joint).tolist() if moving else path(joint).tolist()[:-1])
-    for j in list(needed):
-        needed.update(path(int(articulation.arrays.integers[j, LEADER])).tolist())
+    needed.update(articulation.arrays.integers[sorted(needed), LEADER].tolist())
     return np.array([j for j in sorted(needed) if kinds[j] != FIXED], dtype=np.int64)
 
 
@@ -196,11 +217,6 @@ def _travel(joints: JointArrays) -> FloatArray:
     return np.where(kinds == SLIDE, ways, np.where(kinds == FREE, np.inf, 0.0))
 
 
-def _scales(joints: JointArrays, reach: float) -> FloatArray:
-    """Return 1 for each freedom of turning and the reach for each of shifting, (freedom,)."""
-    worth = {SLIDE: [reach], FREE: [reach] * 3 + [1.0] * 3}
-    scales: list[float] = []
-    for k, row in enumerate(joints.integers):
-        if row[LEADER] == k:
-            scales += worth.get(int(row[KIND]), [1.0] * int(FREEDOMS[row[KIND]]))
-    return np.array(scales)
+def _freedoms(joints: JointArrays) -> int:
+    own = joints.integers[:, LEADER] == np.arange(len(joints.integers))
+    return int(FREEDOMS[joints.integers[own, KIND]].sum())

@@ -1,7 +1,7 @@
 """What is asked of a solver, and what it answers."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 from numpy.typing import ArrayLike
 
@@ -83,18 +83,21 @@ def checked_targets(
         ValueError: if it is no position or target; if there is no such joint, two targets are for
             the same one, or target and argument name different ones.
     """
-    if not isinstance(target, Target):
-        several = isinstance(target, list | tuple) and any(isinstance(t, Target) for t in target)
-        if not several:
-            joint = model.index(effector, "effector")
-            return [Wanted(joint, _position(target), None, 1.0)]
-    targets = [target] if isinstance(target, Target) else list(target)
-    wanted = [_checked(model, one, effector) for one in targets]
+    if isinstance(target, Target):
+        return [_checked(model, target, effector)]
+    if not _are_targets(target):
+        joint = model.index(effector, "effector")
+        return [Wanted(joint, _position(target), None, 1.0)]
+    wanted = [_checked(model, one, effector) for one in target]
     joints = [one.joint for one in wanted]
     if len(set(joints)) < len(joints):
         twice = next(joint for joint in joints if joints.count(joint) > 1)
         raise ValueError(f"target: expected one an effector, got two for joint {twice}")
     return wanted
+
+
+def _are_targets(target: Any) -> TypeGuard[Sequence[Target]]:
+    return isinstance(target, list | tuple) and any(isinstance(one, Target) for one in target)
 
 
 def _checked(model: Skeleton | Articulation, target: Any, effector: int | str) -> Wanted:
@@ -116,13 +119,17 @@ def _position(value: Any) -> FloatArray:
     return arguments.floats("target", value, "...", 3)
 
 
-def check_numbers(wanted: list[Wanted]) -> None:
+def check_numbers(wanted: list[Wanted]) -> list[Wanted]:
     """Look at the numbers of what is wanted, where the kernels have found that something is amiss.
+
+    Return the same with unit rotations: their lengths may have been on the edge of the tolerance.
 
     Raises:
         ValueError: if a position is not finite or too large, or a rotation no unit quaternion.
     """
+    checked = []
     for one in wanted:
         arguments.coordinates("target", one.position, "...", 3)
-        if one.rotation is not None:
-            rotation.unit("rotation", one.rotation)
+        turn = one.rotation if one.rotation is None else rotation.unit("rotation", one.rotation)
+        checked.append(one._replace(rotation=turn))
+    return checked

@@ -38,6 +38,7 @@ from ..quaternion import (
     subtract,
     vector_at,
 )
+from .jacobian import ROUNDING
 from .mechanism import (
     LEVER,
     ORIENTED,
@@ -45,11 +46,15 @@ from .mechanism import (
     WEIGHT,
     axis_of,
     frame_of,
+    is_followed,
+    moves,
     place,
     position_error,
     tip,
     wrong_turn,
 )
+
+WHOLE = 2.0 * math.pi
 
 
 class Stack(NamedTuple):
@@ -75,7 +80,7 @@ class Stack(NamedTuple):
 
 def new_stack(mechanism):
     """Return room for the linear system of a mechanism."""
-    m, n = mechanism.equations, len(mechanism.scales)
+    m, n = mechanism.equations, mechanism.freedoms
     return Stack(
         np.empty(m), np.empty((n, m)), np.empty((m, m)), np.empty(m), np.empty(n), np.empty(n)
     )
@@ -98,15 +103,12 @@ def linearise_all(mechanism, goal, posture, stack):
         clear(stack.J[k])
     for j in range(len(joints.integers)):
         R = quaternion_at(posture.rotations, j)
-        kind, k, factor = (
-            joints.integers[j, KIND],
-            joints.integers[j, FREEDOM],
-            joints.numbers[j, MULTIPLIER],
-        )
+        kind, k = joints.integers[j, KIND], joints.integers[j, FREEDOM]
+        leader = joints.integers[j, LEADER]
+        factor = joints.numbers[j, MULTIPLIER] * freedom_worth(mechanism, leader)
         if kind == HINGE:
-            add_turn_row(
-                mechanism, goal, posture, stack, j, k, scale(factor, axis_of(joints, j, R))
-            )
+            axis = scale(factor, axis_of(joints, j, R))
+            add_turn_row(mechanism, goal, posture, stack, j, k, axis)
         elif kind == SLIDE:
             add_shift_row(mechanism, goal, stack, j, k, scale(factor, axis_of(joints, j, R)))
         elif kind == BALL:
@@ -125,30 +127,31 @@ def add_turn_rows(mechanism, goal, posture, stack, j, k, R):
 
 def add_shift_rows(mechanism, goal, stack, j, k, R):
     """Add to J the shifts of joint j along the axes of a frame, from freedom k on."""
-    add_shift_row(mechanism, goal, stack, j, k, rotate(R, (1.0, 0.0, 0.0)))
-    add_shift_row(mechanism, goal, stack, j, k + 1, rotate(R, (0.0, 1.0, 0.0)))
-    add_shift_row(mechanism, goal, stack, j, k + 2, rotate(R, (0.0, 0.0, 1.0)))
+    reach = mechanism.reach
+    add_shift_row(mechanism, goal, stack, j, k, rotate(R, (reach, 0.0, 0.0)))
+    add_shift_row(mechanism, goal, stack, j, k + 1, rotate(R, (0.0, reach, 0.0)))
+    add_shift_row(mechanism, goal, stack, j, k + 2, rotate(R, (0.0, 0.0, reach)))
 
 
 def add_turn_row(mechanism, goal, posture, stack, j, k, axis):
     """Add to row k what a turn of joint j about a world axis does to the effectors below."""
-    lever, worth = LEVER * mechanism.reach, mechanism.scales[k]
+    lever = LEVER * mechanism.reach
     x = vector_at(posture.positions, j)
     for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e]:
-            row, root = mechanism.effectors[e, ROW], worth * math.sqrt(goal[e, WEIGHT])
+        if moves(mechanism, j, e):
+            row, root = mechanism.effectors[e, ROW], math.sqrt(goal[e, WEIGHT])
             move = cross(axis, subtract(tip(mechanism, posture, e), x))
             put_sum(stack.J[k], row, scale(root, move))
             if mechanism.effectors[e, ORIENTED]:
                 put_sum(stack.J[k], row + 3, scale(root * lever, axis))
 
 
-def add_shift_row(mechanism, goal, stack, j, k, axis):
-    """Add to row k what a shift of joint j along a world axis does to the effectors below."""
+def add_shift_row(mechanism, goal, stack, j, k, way):
+    """Add to row k what a shift of joint j by a way in the world does to the effectors below."""
     for e in range(len(mechanism.effectors)):
-        if mechanism.moves[j, e]:
-            root = mechanism.scales[k] * math.sqrt(goal[e, WEIGHT])
-            put_sum(stack.J[k], mechanism.effectors[e, ROW], scale(root, axis))
+        if moves(mechanism, j, e):
+            root = math.sqrt(goal[e, WEIGHT])
+            put_sum(stack.J[k], mechanism.effectors[e, ROW], scale(root, way))
 
 
 def clear(row):
@@ -234,23 +237,34 @@ def stop_at_limits(mechanism, posture, stack):
     return any_held
 
 
+def freedom_worth(mechanism, j):
+    """Return what a unit of a hinge's or slide's freedom is worth: 1 rad, or the reach [m]."""
+    return mechanism.reach if mechanism.joints.integers[j, KIND] == SLIDE else 1.0
+
+
 def is_limited(joints, j):
     """Return whether a joint is a hinge or slide that moves by itself."""
     return joints.integers[j, KIND] in (HINGE, SLIDE) and joints.integers[j, LEADER] == j
 
 
 def fill_matrix(stack, damping):
-    """Fill the lower triangle of A = J J' + damping 1 over the freedoms that are not held."""
+    """Fill the lower triangle of A = J J' + damping 1 over the freedoms that are not held.
+
+    The damping is held above rounding, so that A has a factor even where J J' is singular.
+    """
     A, J, m = stack.A, stack.J, len(stack.e)
     for i in range(m):
         for j in range(i + 1):
             A[i, j] = 0.0
-        A[i, i] = damping
     for k in range(len(J)):
         if stack.held[k] == 0.0:
             for i in range(m):
                 for j in range(i + 1):
                     A[i, j] += J[k, i] * J[k, j]
+    for i in range(m):
+        damping += ROUNDING * A[i, i]
+    for i in range(m):
+        A[i, i] += damping
 
 
 def solve(stack):
@@ -289,10 +303,10 @@ def hold_limited(mechanism, posture, stack):
         kind, k = joints.integers[j, KIND], joints.integers[j, FREEDOM]
         if joints.integers[j, LEADER] != j or kind not in (HINGE, SLIDE) or stack.held[k] != 0.0:
             continue
-        q, worth = posture.q[joints.integers[j, AT]], mechanism.scales[k]
+        q, worth = posture.q[joints.integers[j, AT]], freedom_worth(mechanism, j)
         wanted = q + worth * stack.step[k]
         bounded = min(max(wanted, joints.numbers[j, LOWER]), joints.numbers[j, UPPER])
-        if bounded != wanted:
+        if bounded != wanted and not turns_round(mechanism, j):
             stack.held[k] = 1.0
             stack.step[k] = (bounded - q) / worth
             for i in range(len(stack.e)):
@@ -309,15 +323,34 @@ def take_step(mechanism, posture, stack):
         if joints.integers[j, LEADER] != j:
             continue
         if kind in (HINGE, SLIDE):
-            q[at] += mechanism.scales[k] * step[k]
+            q[at] += freedom_worth(mechanism, j) * step[k]
+            if turns_round(mechanism, j):
+                q[at] = same_turn(joints, j, q[at])
         elif kind == BALL:
             turn_by(q, at, step, k)
         elif kind == FREE:
             for i in range(3):
-                q[at + i] += mechanism.scales[k + i] * step[k + i]
+                q[at + i] += mechanism.reach * step[k + i]
             turn_by(q, at + 3, step, k + 3)
         clamp_joint(joints, j, q)
     place(mechanism, posture)
+
+
+def turns_round(mechanism, j):
+    """Return whether a hinge's limits leave a whole turn, so that none of them need stop it."""
+    joints = mechanism.joints
+    turn = joints.numbers[j, UPPER] - joints.numbers[j, LOWER]
+    return joints.integers[j, KIND] == HINGE and turn >= WHOLE and not is_followed(mechanism, j)
+
+
+def same_turn(joints, j, angle):
+    """Return the angle that is the same turn within the limits, the nearest to that given."""
+    lower, upper = joints.numbers[j, LOWER], joints.numbers[j, UPPER]
+    if angle > upper:
+        return angle - WHOLE * math.ceil((angle - upper) / WHOLE)
+    if angle < lower:
+        return angle + WHOLE * math.ceil((lower - angle) / WHOLE)
+    return angle
 
 
 def turn_by(q, at, step, k):
