@@ -111,6 +111,7 @@ def check(
 ) -> int:
     """Hold the reference against Pinocchio and MuJoCo: a verdict table, exit 1 on a miss."""
     from crosscheck.identities import CLAIMS, run_claims
+    from crosscheck.robots.models import left_out
 
     if names:
         for claim in CLAIMS.values():
@@ -123,6 +124,8 @@ def check(
             chosen, lambda claim: bar.update(task, description=claim.name, advance=1)
         )
     print_verdicts(verdicts)
+    if missing := left_out():
+        print(missing)
     return FINE if all(verdict.held for verdict in verdicts) else MISSED
 
 
@@ -147,7 +150,10 @@ def bench(
     """Measure problems with solvers. What is on record is kept, so a run can be taken up again."""
     chosen = tuple(dict.fromkeys(_known("suite", name, SUITES) for name in suites or SUITES))
     writable(output)
-    return run_suites(chosen, QUICK if quick else FULL, output, fresh)
+    code = run_suites(chosen, QUICK if quick else FULL, output, fresh)
+    if suites:
+        print_tables(chosen, output)
+    return code
 
 
 @app.command(
@@ -246,6 +252,29 @@ def write_report(output: Path) -> int:
         print(f"Missing: {sentence}")
     print(f"{written.page}: {len(written.tables)} tables, also as Markdown, LaTeX and CSV")
     return FINE
+
+
+def print_tables(suites: Sequence[str], output: Path) -> None:
+    """Print the tables that come from these suites, with what they say."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from .findings import Results, tables
+    from .record import RecordFile
+    from .tables import words
+
+    console = Console(width=None if sys.stdout.isatty() else 240, highlight=False)
+    for made in tables(Results(RecordFile(output).read().records), suites):
+        if not made.rows:
+            continue
+        shown = Table(box=None, header_style="bold", pad_edge=False)
+        for column in made.columns:
+            shown.add_column(column.heading, justify="left" if column.words else "right")
+        for row in made.rows:
+            shown.add_row(*(words(cell) for cell in row))
+        print(f"\n{made.title}\n  {made.answer.sentence}")
+        print("".join(f"    {point}\n" for point in made.answer.points), end="", flush=True)
+        console.print(shown, markup=False)
 
 
 def print_verdicts(verdicts: Iterable[Any]) -> None:

@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from . import metrics
+from .findings import robots
 from .findings.cloth import ONE_STEP
 from .findings.results import Results, label, problems, solvers
 from .record import Record
@@ -85,6 +86,7 @@ DOERS = {
 }
 OTHER_DOER = ("faint", "P")
 WIDTH = 7.4
+PANELS = 3
 
 
 class Drawing(NamedTuple):
@@ -225,6 +227,30 @@ def cloth_convergence(results: Results) -> Drawing | None:
         )  # fmt: skip
 
 
+def energy(results: Results) -> Drawing | None:
+    """Draw the energy that each integrator leaves against the time, without dampers and with."""
+    records = results.all("energy")
+    if not records:
+        return None
+    names, shown = problems(records), solvers(records)
+    with canvas(3.2, len(names), sharey=True) as (figure, axes):
+        for ax, problem in zip(axes, names, strict=True):
+            for record in (r for r in records if r.problem == problem):
+                style = _style(shown.index(record.solver))
+                ax.plot(
+                    record.arrays["time"], record.arrays["left"],
+                    label=label(record.solver), **style,
+                )  # fmt: skip
+            ax.set(title=label(problem.removeprefix("swing/")), xlabel="time [s]", xlim=(0, None))
+        axes[0].set(ylabel="energy above rest, of the start", ylim=(0, None))
+        figure.legend(*_every_handle(axes), loc="outside lower left", ncols=3)
+        return finished(
+            figure, "energy", "Energy of a swinging cloth by integrator",
+            "Without dampers all energy should stay. Lines that cover each other are the same "
+            "method.",
+        )  # fmt: skip
+
+
 def timing(
     subject: str, unit: str, scale: float, title: str
 ) -> Callable[[Results], Drawing | None]:
@@ -266,6 +292,64 @@ def _timing_marks(ax: Axes, records: list[Record], works: list[str], scale: floa
         )  # fmt: skip
 
 
+def robot_curves(
+    name: str,
+    kind: str,
+    titles: tuple[str, str, str],
+    curves: Callable[[list[Record], np.ndarray], dict[str, dict[str, np.ndarray]]],
+    along: np.ndarray,
+) -> Callable[[Results], Drawing | None]:
+    """Return what draws a share for each solver along an axis, a panel for each robot.
+
+    The titles are those of the figure, of the axis, and what it shows.
+    """
+
+    def draw(results: Results) -> Drawing | None:
+        panels = curves(robots.records_of(results, kind), along)
+        if not panels:
+            return None
+        names = list(dict.fromkeys(solver for panel in panels.values() for solver in panel))
+        rows = -(-len(panels) // PANELS)
+        with canvas(2.4 * rows + 0.22 * len(names), PANELS, rows, sharey=True) as (figure, axes):
+            for ax, (robot, panel) in zip(axes, panels.items(), strict=False):
+                for solver, shares in panel.items():
+                    ax.plot(along, 100 * shares, label=solver, **_style(names.index(solver)))
+                ax.set(title=robot, xscale="log", xlabel=titles[1], ylim=(-3, 103))
+                ax.minorticks_off()
+            for ax in axes[len(panels) :]:
+                ax.remove()
+            axes[0].set_ylabel("targets [%]")
+            figure.legend(*_every_handle(axes[: len(panels)]), loc="outside lower left", ncols=2)
+            return finished(figure, name, titles[0], titles[2])
+
+    return draw
+
+
+def _every_handle(axes: list[Axes]) -> tuple[list[Any], list[str]]:
+    """Return a handle and its label for each solver that is in any panel."""
+    found: dict[str, Any] = {}
+    for ax in axes:
+        found |= {
+            name: handle for handle, name in zip(*ax.get_legend_handles_labels(), strict=True)
+        }
+    return list(found.values()), list(found)
+
+
+def _style(i: int) -> dict[str, Any]:
+    """Return a colour and a line for the i-th of many solvers; all pairs differ for a while."""
+    colours = ("blue", "orange", "green", "purple", "brass", "ink")
+    lines = ("-", "--", "-.", ":")
+    return {"color": COLOURS[colours[i % len(colours)]], "linestyle": lines[i % len(lines)]}
+
+
+def _budget_curves(records: list[Record], along: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
+    panels: dict[str, dict[str, np.ndarray]] = {}
+    for record in robots.measured(records):
+        panel = panels.setdefault(robots.robot_of(record), {})
+        panel[record.solver] = robots.budget_curve(record, along)
+    return panels
+
+
 @contextlib.contextmanager
 def canvas(
     height: float, columns: int, rows: int = 1, *, sharex: bool = False, sharey: bool = False
@@ -286,7 +370,9 @@ def finished(figure: Figure, name: str, title: str, shows: str) -> Drawing:
 
 def _ik_panels(results: Results) -> dict[str, list[Record]]:
     records = [
-        r for r in results.all("ik") if "history_median" in r.arrays and "beyond" not in r.problem
+        r
+        for r in results.all("ik", "chain/")
+        if "history_median" in r.arrays and "beyond" not in r.problem
     ]
     return {problem: [r for r in records if r.problem == problem] for problem in problems(records)}
 
@@ -320,7 +406,37 @@ FIGURES: tuple[Callable[[Results], Drawing | None], ...] = (
     ik_residuals,
     jitter,
     cloth_convergence,
+    energy,
     timing("kinematics", "ns", 1e9, "Time of forward kinematics, for one pose"),
     timing("ik", "µs", 1e6, "Time of inverse kinematics, for one solve"),
     timing("cloth", "µs", 1e6, "Time of a cloth step, for one frame"),
+    *(
+        robot_curves(
+            f"budget_{end}",
+            kind,
+            (
+                f"Robots, {kind}: targets solved within a time",
+                "time for each target [s]",
+                "Share of the targets within reach that are solved within so much time for each.",
+            ),
+            _budget_curves,
+            np.logspace(-6, 0, 121),
+        )
+        for kind, end in robots.KINDS.items()
+    ),
+    *(
+        robot_curves(
+            f"profile_{end}",
+            kind,
+            (
+                f"Robots, {kind}: performance profiles",
+                "times the fastest on a target",
+                "Share of the targets that a solver solves within so many times the time of the "
+                "fastest on that target; where a line ends is what it solves at all.",
+            ),
+            robots.profiles,
+            np.logspace(0, 4, 121),
+        )
+        for kind, end in robots.KINDS.items()
+    ),
 )

@@ -16,6 +16,8 @@ PACKAGES = (
     "cholespy",
     "pin",
     "mujoco",
+    "example-robot-data",
+    "dm_control",
     "pytest-benchmark",
     "matplotlib",
 )
@@ -26,8 +28,12 @@ _SOURCES = (
     "bench/problems",
     "bench/solvers",
     "bench/timing",
+    "bench/isolation.py",
+    "bench/judge.py",
     "bench/metrics.py",
     "bench/run.py",
+    "bench/stopwatch.py",
+    "bench/worker.py",
     "bench/suites",
 )
 

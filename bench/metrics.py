@@ -28,6 +28,14 @@ class Spread(NamedTuple):
     largest: float
 
 
+class Effort(NamedTuple):
+    """Seconds over a sample, failures included; NaN throughout if it is empty."""
+
+    median: float
+    p95: float
+    mean: float
+
+
 class Timing(NamedTuple):
     """Seconds per operation over the rounds of one benchmark."""
 
@@ -63,6 +71,35 @@ def spread(values: Floats) -> Spread:
         return Spread(math.nan, math.nan, math.nan)
     median, p95 = np.quantile(values, [0.5, 0.95])
     return Spread(float(median), float(p95), float(values.max()))
+
+
+def effort(seconds: Floats) -> Effort:
+    """Return median, 95th percentile and mean of all solves, those that failed among them."""
+    median, p95, _ = spread(seconds)
+    return Effort(median, p95, mean(seconds))
+
+
+def within_budget(seconds: Floats, solved: NDArray[np.bool_], budgets: Floats) -> Floats:
+    """Return the share of all targets that were solved within each budget of time, (budget,)."""
+    if not np.size(seconds):
+        return np.full(np.shape(budgets), math.nan)
+    hits = np.sort(np.asarray(seconds)[np.asarray(solved, dtype=bool)])
+    return np.searchsorted(hits, budgets, side="right") / np.size(seconds)
+
+
+def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Floats) -> Floats:
+    """Return the share of targets that each solver solves within a ratio of the fastest's time.
+
+    Dolan & Moré 2002, eq. 2.1: rho(tau) over the targets that any of the solvers solves. The
+    arguments are (solver, target) and (ratio,), ascending; the result is (solver, ratio).
+    """
+    taken = np.where(solved, seconds, np.inf)
+    best = taken.min(axis=0, initial=np.inf)
+    taken, best = taken[:, np.isfinite(best)], best[np.isfinite(best)]
+    if not len(best):
+        return np.full((len(taken), len(ratios)), math.nan)
+    slower = np.sort(taken / best, axis=-1)
+    return np.array([np.searchsorted(row, ratios, side="right") for row in slower]) / len(best)
 
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
@@ -132,6 +169,11 @@ def counts(values: Floats, edges: Floats) -> NDArray[np.int64]:
 def ratio(a: float, b: float) -> float:
     """Return a / b; NaN where b is zero."""
     return a / b if b else math.nan
+
+
+def microseconds(seconds: float) -> float:
+    """Return a time in microseconds."""
+    return 1e6 * seconds
 
 
 def gigabytes_per_second(moved: float, seconds: float) -> float:

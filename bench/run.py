@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .isolation import one_thread
 from .machine import stamp
 from .record import FINISHED, Key, Record, RecordFile, key
 from .suites import SCALES, Block, blocks
@@ -185,7 +186,7 @@ def _relay(arguments: Sequence[str]) -> Iterator[Event]:
     """Run pytest and yield what it announces; all else it says is why, if it fails."""
     others: list[str] = []
     with subprocess.Popen(
-        [sys.executable, "-m", "pytest", *arguments], env=_one_thread(), text=True,
+        [sys.executable, "-m", "pytest", *arguments], env=_environment(), text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     ) as process:  # fmt: skip
         for line in process.stdout or ():
@@ -216,8 +217,6 @@ def timing_arguments(folder: Path, length: float, storage: str) -> list[str]:
     ]
 
 
-def _one_thread() -> dict[str, str]:
-    """Return an environment in which the linear algebra of NumPy and SciPy keeps to one core."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+def _environment() -> dict[str, str]:
     # Whatever else pytest is told to do here is not meant for the timing.
-    return {**os.environ, **dict.fromkeys(names, "1"), "PYTEST_ADDOPTS": ""}
+    return {**one_thread(), "PYTEST_ADDOPTS": ""}

@@ -151,8 +151,13 @@ def _share(share: Share) -> str:
     if share.total == 0:
         return "–"
     rates = (share.hits / share.total, share.low, share.high)
-    percent, low, high = (f"{100 * rate:.1f}".removesuffix(".0") for rate in rates)
+    digits = max(1, len(str(share.total - 1)) - 2)  # one missed of all is seen
+    percent, low, high = (_trimmed(f"{100 * rate:.{digits}f}") for rate in rates)
     return f"{share.hits}/{share.total} = {percent} % ({low}–{high})"
+
+
+def _trimmed(digits: str) -> str:
+    return digits.rstrip("0").rstrip(".")
 
 
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~])")

@@ -1,11 +1,12 @@
 """From records to tables and sentences: every number comes from a record through `metrics`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from ..tables import Table
-from . import check, cloth, kinematics, timing
+from . import check, cloth, energy, kinematics, published, robot_models, robots, timing
 from .results import Results
+from .robots import KINDS
 
 __all__ = ["SECTIONS", "Entry", "Results", "Section", "tables"]
 
@@ -19,12 +20,24 @@ class Entry(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A chapter of the report."""
+    """A chapter of the report, and the suites that it is made from."""
 
     name: str
     title: str
     about: str
     entries: tuple[Entry, ...]
+    suites: tuple[str, ...] = ()
+
+
+def _robot_entries(kind: str) -> tuple[Entry, ...]:
+    made, end = robots.TABLES[kind], KINDS[kind]
+    return (
+        Entry(f"With {kind}: how many targets are solved, how soon?", made.success),
+        Entry(f"With {kind}: which targets are hard?", made.strata),
+        Entry(f"With {kind}: what happens out of reach?", made.unreachable),
+        Entry(f"With {kind}: who is ahead at an equal budget?", made.budgets, (f"budget_{end}",)),
+        Entry(f"With {kind}: who is the fastest, how often?", made.profiles, (f"profile_{end}",)),
+    )
 
 
 SECTIONS = (
@@ -33,7 +46,11 @@ SECTIONS = (
         "Is it right?",
         "Nothing below counts unless the reference itself is right. Each claim computes one "
         "quantity twice, by Plumbob and by a physics engine that shares no code with it.",
-        (Entry("Do Pinocchio and MuJoCo agree with the reference?", check.verdicts),),
+        (
+            Entry("Do Pinocchio and MuJoCo agree with the reference?", check.verdicts),
+            Entry("On which robots and characters do they agree?", robot_models.agreement),
+        ),
+        ("check", "robot_models"),
     ),
     Section(
         "kinematics",
@@ -68,6 +85,23 @@ SECTIONS = (
                 ("arm_draws",),
             ),
         ),
+        ("arm", "ik", "pictures"),
+    ),
+    Section(
+        "robots",
+        "Robots and a character",
+        "Every solver that is installed, on real arms and on a character with two hands to place: "
+        "the same targets, starts and judge for all. Solvers that make one attempt and solvers "
+        "that start again answer different questions and stand in different tables.",
+        (
+            Entry("Who takes part?", robots.who),
+            Entry("On which robots?", robots.models),
+            *(entry for kind in KINDS for entry in _robot_entries(kind)),
+            Entry("What did TRAC-IK’s authors measure, and what do we?", published.trac_ik),
+            Entry("And those of the Robotics Toolbox?", published.toolbox),
+            Entry("And those of FABRIK?", published.fabrik),
+        ),
+        ("ik",),
     ),
     Section(
         "cloth",
@@ -86,7 +120,9 @@ SECTIONS = (
                 ("cloth_convergence",),
             ),
             Entry("Does Newton always get there?", cloth.newton_steps),
+            Entry("What happens to the energy over many steps?", energy.energy, ("energy",)),
         ),
+        ("cloth", "energy", "pictures"),
     ),
     Section(
         "speed",
@@ -98,10 +134,16 @@ SECTIONS = (
             Entry("Inverse kinematics", timing.inverse_kinematics, ("timing_ik",)),
             Entry("A step of the cloth", timing.cloth, ("timing_cloth",)),
         ),
+        ("timing",),
     ),
 )
 
 
-def tables(results: Results) -> list[Table]:
-    """Return all tables, in the order of the report."""
-    return [entry.table(results) for section in SECTIONS for entry in section.entries]
+def tables(results: Results, suites: Iterable[str] | None = None) -> list[Table]:
+    """Return the tables made from any of these suites, or all, in the order of the report."""
+    return [
+        entry.table(results)
+        for section in SECTIONS
+        if suites is None or set(suites) & set(section.suites)
+        for entry in section.entries
+    ]

@@ -84,7 +84,7 @@ def iterations(results: Results) -> Table:
         record
         for record in results.all("arm", warm=True)
         + results.all("arm", "arm/beyond")
-        + results.all("ik")
+        + results.all("ik", "chain/")
         if record.solver in RIVALS
     ]
     pairs = []
@@ -212,7 +212,7 @@ def _jitter_answer(pairs: Sequence[tuple[Record, Record]]) -> Answer:
 def accuracy(results: Results) -> Table:
     """Return success and residuals of every solver on every problem within reach."""
     records = results.all("arm", warm=False) + results.all("arm", warm=True)
-    records += [r for r in results.all("ik") if r.problem != "chain/beyond"]
+    records += [r for r in results.all("ik", "chain/") if r.problem != "chain/beyond"]
     order = problems(records)
     records.sort(key=lambda record: order.index(record.problem))
     return Table(

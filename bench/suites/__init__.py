@@ -10,9 +10,11 @@ __all__ = ["SCALES", "SUITES", "Block", "Measured", "Scale", "blocks"]
 # Name and what it answers, in the order of the report; each is a module beside this file.
 SUITES = {
     "check": "the reference against Pinocchio and MuJoCo, claim by claim",
+    "robot_models": "robots and characters from files of others, beside both engines",
     "arm": "the lab's arm on every curve, and reaching for what is too far",
-    "ik": "a chain of ten ball joints: targets near, far, at the edge and beyond",
+    "ik": "a chain of ten ball joints, robots and a character, beside every solver installed",
     "cloth": "the lab's cloth, 1, 10 and 100 times as stiff: convergence and error",
+    "energy": "what integrators do to the energy of a cloth over 10,000 steps",
     "timing": "forward kinematics, solves and steps beside both engines",
     "pictures": "the poses and cloths that the report draws",
 }

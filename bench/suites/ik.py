@@ -1,4 +1,4 @@
-"""Inverse kinematics of a ten-ball chain: ours, and the same method on both engines."""
+"""Inverse kinematics: a ten-ball chain by us and both engines, robots, published tables."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -14,6 +14,7 @@ from reference.arguments import FloatArray
 from .. import metrics
 from ..problems.chain import STRATA, TargetsForSkeleton, chain_targets
 from ..solvers.levenberg_marquardt import levenberg_marquardt
+from . import published, robots
 from .block import Block, Measured, Scale
 
 TOLERANCE = 1e-4
@@ -35,7 +36,13 @@ class Limits(NamedTuple):
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield every stratum for every solver of ours, then for every engine."""
+    """Yield the chain, every stratum for every solver; then robots and published tables."""
+    yield from _chain_blocks(scale)
+    yield from robots.blocks(scale)
+    yield from published.blocks(scale)
+
+
+def _chain_blocks(scale: Scale) -> Iterator[Block]:
     for stratum in STRATA:
         problem = chain_targets(stratum, scale.targets)
         tolerance = BEYOND_TOLERANCE if stratum == "beyond" else TOLERANCE

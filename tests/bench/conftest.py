@@ -98,11 +98,58 @@ def few(iterations):
     return record("cloth", "cloth/x1/few iterations", "local_global", settings, arrays)
 
 
+def swung(solver, problem="swing/undamped", left=(1.0, 0.5)):
+    """What an integrator leaves of the energy of a long swing."""
+    settings = {"h": 1 / 60, "steps": 100, "every": 10, "tolerance": 1e-10}
+    times = np.arange(len(left)) / 6
+    return record("energy", problem, solver, settings, {"time": times, "left": left})
+
+
 def stepping():
     """Three steps by Newton."""
     settings = {"h": 0.02, "first": 5, "steps": 3, "tolerance": 1e-10}
     arrays = {"iterations": [2, 2, 3], "residual": [1e-12, 1e-12, 1e-11], "outcome": [0, 0, 0]}
     return record("cloth", "cloth/x1", "newton", settings, arrays | {"at_floor": [True] * 3})
+
+
+def raced(solver, kind, family="robots", robot="arm", **changed):
+    """Four targets in two strata: one solved, one not, one denied, one beyond the limits."""
+    arrays = {
+        "solved": [True, False, False, True], "claimed": [1, 0, 1, 1], "stratum": [0, 1, 0, 1],
+        "seconds": [1e-5, 1e-3, 1e-4, 1e-4], "position": [1e-9, 0.5, 0.1, 1e-7],
+        "rotation": [1e-8, 0.5, 0.1, 1e-6], "beyond": [0.0, 0.0, 0.0, 0.0], "setup": 0.25,
+    } | changed  # fmt: skip
+    settings = {"kind": kind, "tolerance": 1e-3, "tolerance_rotation": 1e-3, "version": "1.2"}
+    notes = {"robot": f"the {robot}", "strata": "joint space, space", "remark": ""}
+    notes |= {"tips": "hand", "joints": "7", "freedom": "7", "wanted": "pose"}
+    return record("ik", f"{family}/{robot}", solver, settings, arrays, notes=notes, size=4)
+
+
+def lacking(solver, kind, why, robot="all"):
+    """A solver that is missing or cannot."""
+    notes = {"robot": "every robot", "remark": why}
+    return record("ik", f"robots/{robot}", solver, {"kind": kind, "version": ""}, notes=notes)
+
+
+def compared(engine, cause=""):
+    """One file beside one engine."""
+    sizes = {"links": 3, "joints": 2, "freedoms": 2}
+    apart = {"positions": 1e-15, "rotations": 2e-15, "jacobians": 3e-15}
+    notes = {"cause": cause, "free mimics": ""}
+    settings = {"configurations": 5}
+    return record("robot_models", "robots/arm", engine, settings, sizes | apart, notes=notes)
+
+
+def republished():
+    """One record for each published table."""
+    arrays = {"solved": [True, False], "claimed": [1, 0], "seconds": [1e-3, 3e-3], "setup": 0.1}
+    counts = {"iterations": [4, 6], "residual": [1e-7, 1e-8]}
+    return [
+        record("ik", "published/trac_ik/ur5", "TRAC-IK, 5 ms", {}, arrays),
+        record("ik", "published/toolbox/ur5", "ik_LM, NR", {"method": "NR"}, arrays),
+        *(record("ik", f"published/fabrik/{s}", "fabrik", {"tolerance": 1e-6}, counts)
+          for s in ("reachable", "unreachable")),
+    ]  # fmt: skip
 
 
 def pictured():
@@ -123,7 +170,16 @@ def pictured():
 def make():
     """The makers of records, by name."""
     return SimpleNamespace(
-        record=record, drawn=drawn, beyond=beyond, claim=claim, timed=timed, stepped=stepped
+        record=record,
+        drawn=drawn,
+        beyond=beyond,
+        claim=claim,
+        timed=timed,
+        stepped=stepped,
+        swung=swung,
+        raced=raced,
+        lacking=lacking,
+        republished=republished,
     )
 
 
@@ -142,6 +198,15 @@ def records():
         *(stepped(solver) for solver in ("local_global", "newton")),
         *(few(iterations) for iterations in (1, 10)),
         stepping(),
+        *(swung(s, f"swing/{c}") for c in ("undamped", "damped") for s in ("RK4", "discrete")),
+        *(
+            raced("Plumbob LM", kind, family)
+            for kind in ("one start", "restarts")
+            for family in ("robots", "unreachable")
+        ),
+        *republished(),
+        compared("MuJoCo"),
+        compared("Pinocchio", "it forgets the hand"),
         *pictured(),
         timed("Plumbob, compiled", 1e-6),
         timed("Pinocchio", 5e-7),

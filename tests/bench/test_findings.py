@@ -6,7 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.findings import SECTIONS, Results, check, cloth, kinematics, tables, timing
+from bench.findings import (
+    SECTIONS,
+    Results,
+    check,
+    cloth,
+    kinematics,
+    published,
+    robots,
+    tables,
+    timing,
+)
+from bench.suites import SUITES
 
 
 def column(table, heading):
@@ -103,3 +114,122 @@ def test_a_limit_stands_in_a_column_and_not_in_a_row(make):
 def test_a_failed_block_gives_no_row(make):
     failed = make.record("arm", "arm/beyond", "ccd", notes={"failed": "ValueError: no"})
     assert kinematics.beyond_reach(Results([failed])).rows == ()
+
+
+def test_every_suite_has_a_chapter_and_its_tables_are_some_of_all():
+    assert {suite for section in SECTIONS for suite in section.suites} == set(SUITES)
+    every = [table.name for table in tables(Results([]))]
+    some = [table.name for table in tables(Results([]), ["check"])]
+    assert "check" in some
+    assert "robots_solvers" not in some
+    assert [table.name for table in tables(Results([]), SUITES)] == every
+
+
+ONE, AGAIN = robots.TABLES["one start"], robots.TABLES["restarts"]
+
+
+def test_success_counts_what_the_judge_says_and_times_count_failures(make):
+    table = ONE.success(Results([make.raced("a", "one start")]))
+    (row,) = table.rows
+    assert row[:2] == ("the arm", "a")
+    assert [(share.hits, share.total) for share in row[2:4]] == [(1, 2), (2, 4)]
+    assert column(table, "time, median [µs]") == pytest.approx([100.0])
+    assert column(table, "time, mean [µs]") == pytest.approx([302.5])
+    assert column(table, "position residual, largest [m]") == [1e-7]
+    assert column(table, "rotation residual, median [rad]") == pytest.approx([5.05e-7])
+    assert column(table, "claimed but not so") == [1]
+    assert column(table, "set-up [ms]") == [250.0]
+
+
+def test_one_start_and_restarts_are_never_in_one_table(make):
+    results = Results([make.raced("a", "one start"), make.raced("b", "restarts")])
+    for name in robots.Tables._fields:
+        for kind, mine, other in (("one start", "a", "b"), ("restarts", "b", "a")):
+            table = getattr(robots.TABLES[kind], name)(results)
+            cells = [cell for row in table.rows for cell in row]
+            assert other not in cells
+            assert (mine in cells) == (name != "unreachable")
+
+
+def test_a_solver_that_says_nothing_is_not_said_to_lie(make):
+    silent = make.raced("a", "one start", claimed=[-1] * 4)
+    assert column(ONE.success(Results([silent])), "claimed but not so") == [None]
+
+
+def test_who_is_missing_or_cannot_has_a_row_that_says_why(make):
+    results = Results([
+        make.raced("a", "one start"),
+        make.lacking("b", "one start", "b is not installed"),
+        make.lacking("all solvers", "any", "the data is not installed", "panda"),
+    ])  # fmt: skip
+    table = ONE.success(results)
+    remarks = column(table, "remark")
+    assert remarks == ["", "b is not installed", "the data is not installed"]
+    assert table.rows[1][2:-1] == (None,) * 11
+    assert [row[1] for row in AGAIN.success(results).rows] == ["all solvers"]
+    assert len(ONE.strata(results).rows) == len(ONE.budgets(results).rows) == 1
+
+
+def test_solvers_that_are_not_installed_are_listed_as_such(make):
+    table = robots.who(Results([make.raced("Plumbob LM", "one start")]))
+    versions = dict(zip(column(table, "solver"), column(table, "version"), strict=True))
+    assert versions["Plumbob LM"] == "1.2"
+    assert versions["pink"] == "not installed"
+    assert robots.who(Results([])).rows == ()
+
+
+def test_strata_are_counted_apart_and_the_hardest_is_named(make):
+    hard = make.raced("a", "one start", solved=[True, False, True, True])
+    table = ONE.strata(Results([hard]))
+    assert [(share.hits, share.total) for share in table.rows[0][2:]] == [(2, 2), (1, 2)]
+    assert table.answer.sentence == "Hardest, counted over solvers and robots: space (1)."
+
+
+def test_claims_out_of_reach_are_named(make):
+    far = {"solved": [False] * 4, "position": [0.5, 0.7, np.nan, 0.6]}
+    liar = make.raced("a", "one start", "unreachable", **far)
+    table = ONE.unreachable(Results([liar]))
+    assert column(table, "claimed as solved") == [3]
+    assert column(table, "distance left, largest [m]") == [0.7]
+    assert column(table, "answers") == [3]
+    assert table.answer.points == ("the arm, a: 3 of 4",)
+    honest = make.raced("a", "one start", "unreachable", claimed=[0] * 4, **far)
+    assert ONE.unreachable(Results([honest])).answer.sentence.startswith("No solver claims")
+
+
+def test_budgets_and_profiles_show_who_is_ahead(make):
+    slow = make.raced("slow", "restarts", seconds=[1.0] * 4, solved=[True] * 4)
+    results = Results([make.raced("fast", "restarts"), slow])
+    budgets = AGAIN.budgets(results)
+    assert column(budgets, "within 10.0 µs [%]") == [25.0, 0.0]
+    assert column(budgets, "within 100 ms [%]") == [50.0, 0.0]
+    profile = AGAIN.profiles(results)
+    assert column(profile, "within 1.00 times the fastest [%]") == [50.0, 50.0]
+    assert column(profile, "within 1,000 times the fastest [%]") == [50.0, 50.0]
+
+
+def test_a_solver_given_few_targets_is_left_out_of_the_profile(make):
+    many = {name: np.tile(values, 5) for name, values in make.raced("a", "restarts").arrays.items()
+            if values.ndim}  # fmt: skip
+    for count, names in ((3, ["a", "b"]), (2, ["a"])):
+        few = {name: values[:count] for name, values in many.items()}
+        both = [make.raced("a", "restarts", **many), make.raced("b", "restarts", **few)]
+        assert column(AGAIN.profiles(Results(both)), "solver") == names
+
+
+def test_the_robots_are_listed_once(make):
+    both = [make.raced(s, "restarts", robot=r) for s in "ab" for r in ("arm", "leg")]
+    table = robots.models(Results(both))
+    assert column(table, "robot") == ["the arm", "the leg"]
+    assert column(table, "joints") == [7, 7]
+
+
+def test_published_numbers_stand_beside_those_measured_here(make):
+    results = Results(make.republished())
+    table = published.trac_ik(results)
+    assert column(table, "from") == ["TRAC-IK README, v1.1.0"] * 3 + ["here"]
+    assert column(table, "solved [%]") == [35.89, 88.71, 99.62, 50.0]
+    assert column(published.toolbox(results), "published, infeasible [%]") == [11.0]
+    assert column(published.toolbox(results), "here, by its own word [%]") == [50.0]
+    (row,) = published.fabrik(results).rows
+    assert row == ("FABRIK", 15.5, 5.0, 6, 67.6, 5.0, 6)

@@ -91,3 +91,75 @@ def test_first_below():
 def test_timing_is_the_median_between_tenths():
     took = metrics.timing(np.arange(11.0))
     assert took == (5.0, 1.0, 9.0, 11)
+
+
+def wilson_by_its_definition(hits, total, z=1.959963984540054):
+    """Where |rate - p| is z standard deviations of the true rate p, found by bisection."""
+    rate = hits / total
+    ends = []
+    for outer in (0.0, 1.0):
+        inner = rate
+        for _ in range(200):
+            p = (inner + outer) / 2
+            inside = abs(rate - p) <= z * math.sqrt(p * (1 - p) / total)
+            inner, outer = (p, outer) if inside else (inner, p)
+        ends.append(inner)
+    return ends
+
+
+@pytest.mark.parametrize(("hits", "total"), [(1, 7), (3, 5), (499, 500), (50, 200)])
+def test_wilsons_interval_is_what_defines_it(hits, total):
+    share = metrics.share(np.arange(total) < hits)
+    assert [share.low, share.high] == pytest.approx(
+        wilson_by_its_definition(hits, total), abs=1e-12
+    )
+
+
+def test_effort_counts_all():
+    assert metrics.effort(np.array([1.0, 1.0, 1.0, 9.0])) == (1.0, pytest.approx(7.8), 3.0)
+
+
+solves = st.lists(st.tuples(st.floats(1e-6, 10.0), st.booleans()), min_size=1, max_size=30)
+
+
+@given(solves)
+def test_a_budget_curve_rises_to_the_success(made):
+    seconds, solved = (np.array(column) for column in zip(*made, strict=True))
+    curve = metrics.within_budget(seconds, solved, np.array([0.0, 1e-4, 0.1, 1.0, 10.0]))
+    assert (np.diff(curve) >= 0).all()
+    assert curve[0] == 0
+    assert curve[-1] == metrics.share(solved).hits / len(solved)
+
+
+def test_a_budget_counts_what_is_solved_in_just_that_time():
+    seconds, solved = np.array([1.0, 2.0, 3.0, 0.5]), np.array([True, True, False, False])
+    curve = metrics.within_budget(seconds, solved, np.array([0.9, 1.0, 2.0, 5.0]))
+    assert curve.tolist() == [0.0, 0.25, 0.5, 0.5]
+    assert np.isnan(metrics.within_budget(np.array([]), np.array([]), np.ones(2))).all()
+
+
+@given(st.lists(st.tuples(*[st.tuples(st.floats(1e-6, 10.0), st.booleans())] * 3), min_size=1))
+def test_a_profile_rises_to_the_success_and_some_solver_is_first(made):
+    seconds, solved = np.moveaxis(np.array(made), 1, 0)[..., 0], np.moveaxis(
+        np.array(made), 1, 0)[..., 1].astype(bool)  # fmt: skip
+    ratios = np.array([1.0, 2.0, 10.0, 1e8])
+    curves = metrics.performance_profiles(seconds, solved, ratios)
+    possible = solved.any(axis=0)
+    if not possible.any():
+        assert np.isnan(curves).all()
+        return
+    assert (np.diff(curves, axis=-1) >= 0).all()
+    np.testing.assert_allclose(curves[:, -1], solved[:, possible].mean(axis=-1))
+    assert curves[:, 0].sum() >= 1 - 1e-12
+
+
+def test_the_profile_of_a_textbook():
+    """Two solvers, three targets, the last solved by none: the second is 4 times slower once."""
+    seconds = np.array([[1.0, 2.0, 1.0], [4.0, 1.0, 1.0]])
+    solved = np.array([[True, False, False], [True, True, False]])
+    curves = metrics.performance_profiles(seconds, solved, np.array([1.0, 3.9, 4.0]))
+    assert curves.tolist() == [[0.5, 0.5, 0.5], [0.5, 0.5, 1.0]]
+
+
+def test_microseconds():
+    assert metrics.microseconds(2e-6) == 2.0

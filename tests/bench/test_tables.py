@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench import tables
-from bench.metrics import share
+from bench.metrics import Share, share
 from bench.tables import Answer, Column, Table, words
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
@@ -109,3 +109,14 @@ def test_csv_keeps_all_digits_and_any_text():
 def test_an_answer_stands_in_markdown_with_its_points():
     answered = Table("t", "T", (Column("a"),), ((1,),), answer=Answer("Thus:", ("x", "y")))
     assert "Thus:\n\n- x\n- y\n" in tables.markdown(answered)
+
+
+@pytest.mark.parametrize("total", [2, 10, 999, 1000, 1001, 10_000, 123_456])
+def test_a_share_is_all_or_nothing_only_where_it_is(total):
+    def percent(hits):
+        return words(Share(hits, total, 0.0, 1.0)).split(" = ")[1].split(" %")[0]
+
+    assert percent(total) == "100"
+    assert percent(0) == "0"
+    assert percent(total - 1) != "100"
+    assert percent(1) != "0"

@@ -1,0 +1,162 @@
+"""The process in which solvers run: `python -m bench.worker`, jobs in, results out, as they come.
+
+A solver may print, crash or hang; whatever it does, it does it here. Results leave by the standard
+output that the process was born with; what a solver prints goes to the standard error.
+"""
+
+import importlib
+import os
+import pickle
+import sys
+from collections.abc import Iterator, Mapping
+from typing import Any, BinaryIO, NamedTuple, Protocol
+
+import numpy as np
+
+from .judge import Targets, Tolerance
+from .problems.robots import Robot
+from .solvers.protocol import Answer, Ask, UnableError
+from .solvers.restarts import restarted
+from .stopwatch import Budget, timed
+
+
+class Job(NamedTuple):
+    """What is to be solved, and by what.
+
+    Attributes:
+        module: the adapter's module, by its full name.
+        robot: the robot.
+        targets: solved in order.
+        tolerance: when a target counts as reached.
+        settings: what the adapter is prepared with.
+        restarts: further attempts from random poses, made here for solvers that make one.
+        budget: no further target is begun after so long [s].
+    """
+
+    module: str
+    robot: Robot
+    targets: Targets
+    tolerance: Tolerance
+    settings: Mapping[str, Any]
+    restarts: int
+    budget: float
+
+    def perform(self) -> Iterator["Message"]:
+        """Yield what comes of it, each part as soon as it is there."""
+        return perform(self)
+
+
+class Ready(NamedTuple):
+    """The solver is set up, in so long [s] without imports, and did one target, not counted."""
+
+    setup: float
+
+
+class Solved(NamedTuple):
+    """One target is done.
+
+    Attributes:
+        q: the coordinates, NaN if there are none.
+        claimed: 1 if the solver says that it is solved, 0 if not, -1 if it does not say.
+        seconds: how long it took.
+        trouble: what the solver raised, else "".
+    """
+
+    q: np.ndarray
+    claimed: int
+    seconds: float
+    trouble: str
+
+
+class Unfit(NamedTuple):
+    """The solver cannot do this job; `why` says what came of trying."""
+
+    why: str
+
+
+class Done(NamedTuple):
+    """There is nothing more to come."""
+
+
+Message = Ready | Solved | Unfit | Done
+
+
+class Work(Protocol):
+    """What a worker can be sent: it knows how it is done."""
+
+    def perform(self) -> Iterator[Message]:
+        """Yield what comes of it, each part as soon as it is there."""
+
+
+def perform(job: Job) -> Iterator[Message]:
+    """Yield what comes of a job, each part as soon as it is there."""
+    try:
+        adapter = importlib.import_module(job.module)
+        ask, setup = timed(lambda: _prepared(adapter, job))
+        _solve(ask, job, 0)  # may compile
+    except UnableError as error:
+        yield Unfit(str(error))
+        return
+    except Exception as error:  # whatever an engine raises is its result
+        yield Unfit(said(error))
+        return
+    yield Ready(setup)
+    budget = Budget(job.budget)
+    for i in range(len(job.targets.starts)):
+        if budget.is_spent:
+            break
+        yield _solve(ask, job, i)
+    yield Done()
+
+
+def _prepared(adapter: Any, job: Job) -> Ask:
+    ask = adapter.prepare(job.robot, job.tolerance, **job.settings)
+    return restarted(ask, job.robot, job.restarts) if job.restarts else ask
+
+
+def _solve(ask: Ask, job: Job, i: int) -> Solved:
+    positions, rotations, starts, _ = job.targets
+    trouble = ""
+    solve = ask(positions[i], rotations[i], starts[i].copy())
+
+    def attempt() -> Answer:
+        nonlocal trouble
+        try:
+            return solve()
+        except Exception as error:  # one target lost, not the rest
+            trouble = said(error)
+            return Answer(None, False)
+
+    answer, seconds = timed(attempt)
+    nothing = np.full(starts.shape[-1], np.nan)
+    q = nothing if answer.q is None else np.array(answer.q, dtype=float)
+    if q.shape != nothing.shape:
+        q, trouble = nothing, f"returned {q.shape} numbers, not {nothing.shape}"
+    claimed = -1 if answer.claimed is None else int(answer.claimed)
+    return Solved(q, claimed, seconds, trouble)
+
+
+def said(error: Exception) -> str:
+    """Return what an exception says, on one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())[:200]
+
+
+def serve(jobs: BinaryIO, results: BinaryIO) -> None:
+    """Perform jobs until there are none."""
+    while True:
+        try:
+            job = pickle.load(jobs)
+        except EOFError:
+            return
+        for message in job.perform():
+            pickle.dump(message, results)
+            results.flush()
+
+
+if __name__ == "__main__":
+    # As `__main__` these classes would be strangers to the process that reads them.
+    from bench.worker import serve as serve_as_named
+
+    own = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    serve_as_named(sys.stdin.buffer, own)

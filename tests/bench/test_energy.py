@@ -1,0 +1,72 @@
+"""The energy of a swinging cloth: the suite, its table, its sentences and its figure."""
+
+import numpy as np
+import pytest
+
+from bench import figures
+from bench.findings import Results
+from bench.findings import energy as findings
+from bench.suites import Scale, blocks
+from bench.suites import energy as suite
+
+STEPS = 100
+
+
+@pytest.fixture(scope="module")
+def swings():
+    """The energy left by every integrator over the first steps of the undamped cloth."""
+    return {name: suite.swing("undamped", name, STEPS).arrays["left"] for name in suite.INTEGRATORS}
+
+
+def test_every_swing_begins_with_all_its_energy_and_moves(swings):
+    for left in swings.values():
+        assert left[0] == 1.0
+        assert len(left) == STEPS // suite.EVERY + 1
+        assert np.ptp(left) > 1e-9
+
+
+def test_without_dampers_mujocos_implicit_ones_are_symplectic_euler(swings):
+    for name in ("implicit", "implicitfast"):
+        assert swings[name] == pytest.approx(swings["symplectic Euler"], abs=1e-12)
+
+
+def test_implicit_euler_loses_most_and_runge_kutta_least(swings):
+    lost = {name: 1.0 - left[-1] for name, left in swings.items()}
+    assert max(lost, key=lost.get) == "implicit Euler"
+    assert min(lost, key=lambda name: abs(lost[name])) == "RK4"
+
+
+def test_dampers_take_energy():
+    damped, undamped = (suite.swing(name, "RK4", STEPS) for name in ("damped", "undamped"))
+    assert damped.arrays["left"][-1] < undamped.arrays["left"][-1] - 1e-4
+
+
+def test_blocks_are_listed_without_measuring():
+    listed = list(blocks("energy", Scale(targets=1, seconds=0.1)))
+    assert len(listed) == 2 * len(suite.INTEGRATORS)
+
+
+def test_table_and_sentence_follow_the_records(make):
+    left = np.linspace(1.0, 0.5, 11)
+    records = [make.swung("RK4", left=left), make.swung("discrete", "swing/damped", left)]
+    table = findings.energy(Results(records))
+    assert [row[:2] for row in table.rows] == [("undamped", "RK4"), ("damped", "discrete")]
+    assert table.rows[0][2:5] == (50.0, None, None)
+    assert table.rows[0][5:] == (100.0, 50.0)
+    assert table.answer.points == ("RK4: 50.0, never less than 50.0 nor more than 100",)
+
+
+def test_without_a_swing_undamped_nothing_is_said(make):
+    assert findings.energy(Results([make.swung("RK4", "swing/damped")])).answer.sentence == ""
+
+
+def test_figure_has_a_panel_for_each_cloth_and_a_line_for_each_integrator(make):
+    records = [
+        make.swung(solver, f"swing/{cloth}")
+        for cloth in ("undamped", "damped")
+        for solver in ("RK4", "discrete")
+    ]
+    svg = figures.energy(Results(records)).svg
+    for text in ("undamped", "damped", "RK4", "discrete"):
+        assert text in svg
+    assert figures.energy(Results([])) is None

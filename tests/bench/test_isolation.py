@@ -1,0 +1,271 @@
+"""Solvers in a process of their own: one that hangs, crashes, raises or lies costs one row."""
+
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bench.isolation import Workshop, raised
+from bench.judge import Targets, Tolerance, judge
+from bench.problems.robots import robot
+from bench.solvers import ONE_START, Entry, Peer
+from bench.solvers.protocol import Answer
+from bench.solvers.restarts import restarted
+from bench.suites import Scale, robots
+from bench.worker import Done, Job, Ready, Solved, Unfit, perform, serve
+
+TOLERANCE = Tolerance(1e-3, 1e-3)
+COUNT = 4
+
+# Solvers that return the start, which solves the target; each has a manner of its own, some from
+# the target of number `at` on.
+FAKES = """
+import os, sys, time
+import numpy as np
+from bench.solvers.protocol import Answer, UnableError
+
+def prepare(robot, tolerance, manner="perfect", at=2):
+    if manner == "unable":
+        raise UnableError("takes no iiwas")
+    if manner == "no engine":
+        import an_engine_that_nobody_has
+    done = [-1]  # the warm-up does not count
+
+    def ask(positions, rotations, start):
+        def solve():
+            done[0] += 1
+            if manner == "prints":
+                print("noise", flush=True)
+                os.write(1, b"more noise")
+            if manner == "shapeless":
+                return Answer(start[:2], True)
+            if manner == "none":
+                return Answer(None, False)
+            if manner == "liar":
+                return Answer(start + 0.1, True)
+            if manner == "beyond":
+                return Answer(start + 2 * np.pi, True)
+            if manner == "silent":
+                return Answer(start, None)
+            if done[0] == at + 1:
+                if manner == "hangs":
+                    time.sleep(600)
+                if manner == "crashes":
+                    os._exit(3)
+                if manner == "raises":
+                    raise ArithmeticError("on\\none target")
+                if manner == "slow":
+                    time.sleep(0.3)
+            return Answer(start, True)
+        return solve
+    return ask
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def fakes(tmp_path_factory):
+    """Let this process and the worker import the fakes."""
+    folder = tmp_path_factory.mktemp("fakes")
+    (folder / "fake_solvers.py").write_text(FAKES)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(folder))
+        patch.syspath_prepend(folder)
+        yield
+    sys.modules.pop("fake_solvers", None)
+
+
+@pytest.fixture(scope="module")
+def shop(fakes):
+    """A workshop that loses patience with a target after half a second."""
+    shop = Workshop(start_patience=60.0, target_patience=0.5)
+    yield shop
+    shop.close()
+
+
+@pytest.fixture
+def targets(rng):
+    """Targets that their starts solve."""
+    mind = judge("iiwa14")
+    q = 0.9 * mind.robot.draw(rng, COUNT)
+    return Targets(*mind.forward(q), q, np.zeros(COUNT, dtype=int))
+
+
+def job(targets, manner, restarts=0, budget=60.0, **settings):
+    settings = {"manner": manner, **settings}
+    return Job(
+        "fake_solvers", robot("iiwa14"), targets, TOLERANCE, settings, restarts, budget
+    )  # fmt: skip
+
+
+def verdict(targets, solved):
+    answers = np.array([one.q for one in solved])
+    return judge("iiwa14").judge(targets, answers, TOLERANCE)
+
+
+def test_a_perfect_solver_is_found_perfect_in_its_own_process(shop, targets):
+    outcome = shop.perform(job(targets, "perfect"))
+    assert outcome.trouble == ""
+    assert not outcome.lost
+    assert [one.claimed for one in outcome.solved] == [1] * COUNT
+    assert all(0 <= one.seconds < 1 for one in outcome.solved)
+    assert outcome.setup > 0
+    assert verdict(targets, outcome.solved).solved.all()
+
+
+@pytest.mark.parametrize("manner", ["hangs", "crashes"])
+def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(shop, targets, manner):
+    outcome = shop.perform(job(targets, manner))
+    assert len(outcome.solved) == 2
+    assert outcome.lost
+    reason = {"hangs": "ended after 0.5 s of silence", "crashes": "its process ended with code 3"}
+    assert outcome.trouble == reason[manner]
+    again = shop.perform(job(targets, "perfect"))
+    assert len(again.solved) == COUNT
+    assert again.trouble == ""
+
+
+def test_what_a_solver_prints_does_not_disturb_its_results(shop, targets):
+    outcome = shop.perform(job(targets, "prints"))
+    assert len(outcome.solved) == COUNT
+    assert outcome.trouble == ""
+
+
+def messages(targets, manner, **more):
+    """What the worker says, in this process."""
+    return list(perform(job(targets, manner, **more)))
+
+
+def test_the_worker_says_when_it_is_ready_each_target_and_the_end(targets):
+    said = messages(targets, "perfect")
+    assert [type(message) for message in said] == [Ready, *[Solved] * COUNT, Done]
+
+
+def test_one_that_raises_loses_one_target_and_says_why(targets):
+    solved = [m for m in messages(targets, "raises") if isinstance(m, Solved)]
+    assert [one.trouble for one in solved] == ["", "", "ArithmeticError: on one target", ""]
+    assert verdict(targets, solved).solved.tolist() == [True, True, False, True]
+    assert raised(solved) == "ArithmeticError: on one target, on 1 of 4 targets"
+
+
+@pytest.mark.parametrize(
+    ("manner", "why"),
+    [("unable", "takes no iiwas"), ("no engine", "ModuleNotFoundError: No module named 'an_eng")],
+)
+def test_one_that_cannot_be_set_up_says_why(targets, manner, why):
+    (said,) = messages(targets, manner)
+    assert isinstance(said, Unfit)
+    assert said.why.startswith(why)
+
+
+@pytest.mark.parametrize(
+    ("manner", "claimed"), [("liar", 1), ("beyond", 1), ("none", 0), ("silent", -1)]
+)
+def test_what_is_claimed_and_what_is_so_are_kept_apart(targets, manner, claimed):
+    solved = [m for m in messages(targets, manner) if isinstance(m, Solved)]
+    assert {one.claimed for one in solved} == {claimed}
+    judgement = verdict(targets, solved)
+    assert judgement.solved.all() == (manner == "silent")
+    if manner == "beyond":
+        assert judgement.position.max() < 1e-12
+        assert judgement.beyond.min() > 1
+
+
+def test_an_answer_of_another_shape_is_none(targets):
+    solved = [m for m in messages(targets, "shapeless") if isinstance(m, Solved)]
+    assert all(np.isnan(one.q).all() for one in solved)
+    assert solved[0].trouble == "returned (2,) numbers, not (7,)"
+
+
+def test_a_solver_without_time_left_begins_no_further_target(targets):
+    said = messages(targets, "slow", at=0, budget=0.2)
+    assert [type(message) for message in said] == [Ready, Solved, Done]
+
+
+class Attempts:
+    """A solver that gives these answers one after the other, and counts its starts."""
+
+    def __init__(self, *answers):
+        self.answers, self.starts = list(answers), []
+
+    def __call__(self, positions, rotations, start):
+        self.starts.append(start)
+        return lambda: self.answers.pop(0)
+
+
+@pytest.mark.parametrize("end", [Answer(np.zeros(7), True), Answer(np.zeros(7), None)])
+def test_restarts_end_with_the_first_claim_within_the_limits(end):
+    """Neither an answer that is not claimed nor one that is beyond the limits ends them."""
+    beyond, nothing = Answer(np.full(7, 9.0), True), Answer(None, False)
+    attempts = Attempts(beyond, nothing, end, Answer(np.ones(7), True))
+    answer = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))()
+    assert (answer.q == (0.0 if end.claimed else 1.0)).all()
+    assert len(attempts.starts) == (3 if end.claimed else 4)
+    assert (attempts.starts[0] == 0.5).all()
+    assert len({tuple(start) for start in attempts.starts}) == len(attempts.starts)
+
+
+def test_restarts_that_all_fail_claim_nothing():
+    attempts = Attempts(*[Answer(np.full(7, 9.0), True)] * 3)
+    assert restarted(attempts, robot("iiwa14"), 2)(None, None, np.zeros(7))().claimed is False
+
+
+def test_a_worker_serves_job_after_job(targets):
+    import io
+    import pickle
+
+    jobs, results = io.BytesIO(), io.BytesIO()
+    for manner in ("perfect", "unable"):
+        pickle.dump(job(targets, manner), jobs)
+    jobs.seek(0)
+    serve(jobs, results)
+    results.seek(0)
+    kinds = [type(pickle.load(results)) for _ in range(COUNT + 3)]
+    assert kinds == [Ready, *[Solved] * COUNT, Done, Unfit]
+
+
+@pytest.fixture
+def suite(monkeypatch, shop):
+    """The suite with fakes for peers, on the iiwa and the character alone."""
+
+    def peer(title, package="numpy", **settings):
+        return Peer(title, "fake_solvers", package, "MIT", "", (Entry(ONE_START, settings),))
+
+    peers = [
+        peer("liar", manner="liar"),
+        peer("hangs", manner="hangs", at=1),
+        peer("gone", package="a-package-that-nobody-has"),
+        peer("unable", manner="unable"),
+    ]
+    monkeypatch.setattr(robots, "PEERS", peers)
+    monkeypatch.setattr(robots, "ROBOTS", ("iiwa14",))
+    monkeypatch.setattr(robots, "workshop", lambda: shop)
+    blocks = {(b.solver, b.problem): b for b in robots.blocks(Scale(targets=3, seconds=10.0))}
+    return SimpleNamespace(blocks=blocks)
+
+
+def test_a_missing_peer_costs_one_block_that_says_so(suite):
+    assert ("gone", "robots/all") in suite.blocks
+    assert sum(solver == "gone" for solver, _ in suite.blocks) == 1
+    arrays, notes = suite.blocks["gone", "robots/all"].measure()
+    assert not arrays
+    assert notes["remark"] == "a-package-that-nobody-has is not installed"
+
+
+def test_every_manner_becomes_one_record(suite):
+    arrays, notes = suite.blocks["liar", "robots/iiwa14"].measure()
+    assert arrays["claimed"].tolist() == [1] * 6
+    assert not arrays["solved"].any()
+    assert notes["remark"] == ""
+    arrays, notes = suite.blocks["unable", "robots/iiwa14"].measure()
+    assert "solved" not in arrays
+    assert notes["remark"] == "takes no iiwas"
+
+
+def test_the_target_that_a_solver_hangs_on_counts_as_failed_with_the_time_it_took(suite):
+    arrays, notes = suite.blocks["hangs", "robots/iiwa14"].measure()
+    assert len(arrays["solved"]) == 2
+    assert not arrays["solved"][1]
+    assert arrays["seconds"][1] == 0.5
+    assert np.isnan(arrays["position"][1])
+    assert "silence" in notes["remark"]

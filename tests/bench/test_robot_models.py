@@ -1,0 +1,79 @@
+"""Files beside both engines: what is measured, and how it is told."""
+
+import pytest
+
+from bench.findings import Results
+from bench.findings.robot_models import agreement
+from bench.suites.robot_models import compare
+from crosscheck.engines import ROBOT_ENGINES
+from crosscheck.robots.models import Model
+
+URDF = """<robot name="arm"><link name="base"/><link name="arm"/><link name="tip"/>
+  <joint name="shoulder" type="continuous">
+    <parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
+  </joint>
+  <joint name="elbow" type="continuous">
+    <parent link="arm"/><child link="tip"/><origin xyz="1 0 0"/><mimic joint="{leader}"/>
+  </joint>
+</robot>"""
+
+
+@pytest.fixture
+def compared(make, tmp_path):
+    """Return the records of a file, by both engines, from its text."""
+
+    def records(name, text):
+        path = tmp_path / name
+        path.write_text(text)
+        return [
+            make.record(
+                "robot_models", f"robots/{name}", engine, {"configurations": 5},
+                measured.arrays, notes=dict(measured.notes),
+            )
+            for engine in ROBOT_ENGINES
+            for measured in [compare(engine, Model(name, path))]
+        ]  # fmt: skip
+
+    return records
+
+
+def column(table, heading):
+    index = [c.heading for c in table.columns].index(heading)
+    return [row[index] for row in table.rows]
+
+
+def test_a_file_that_both_read_is_a_row_with_its_size_and_differences(compared):
+    table = agreement(Results(compared("arm.urdf", URDF.format(leader="shoulder"))))
+    assert table.rows[0][:4] == ("arm.urdf", 3, 2, 1)
+    assert 0.0 < column(table, "Jacobians")[0] < 1e-14
+    assert table.rows[0][-2:] == ("Pinocchio and MuJoCo", "")
+    assert table.answer.points == ("Pinocchio: 1 of 1 file read", "MuJoCo: 1 of 1 file read")
+
+
+def test_a_file_that_none_reads_says_why_and_no_path(compared, tmp_path):
+    table = agreement(Results(compared("cut.urdf", URDF[:100])))
+    assert column(table, "engines") == ["none"]
+    (why,) = column(table, "but")
+    assert why.count("does not read it") == 2
+    assert str(tmp_path) not in why
+    assert table.rows[0][1] is None
+    assert table.answer.sentence == ""
+
+
+def test_mimic_joints_left_free_are_told(compared, tmp_path):
+    table = agreement(Results(compared("free.urdf", URDF.format(leader="nobody"))))
+    (why,) = column(table, "but")
+    assert why.count("with mimic joints left free") == 2
+    assert str(tmp_path) not in why
+    assert column(table, "freedoms") == [2]
+
+
+def test_an_engine_with_a_known_cause_is_left_out_of_the_numbers(compared):
+    pinocchio, mujoco = compared("arm.urdf", URDF.format(leader="shoulder"))
+    pinocchio.notes["cause"] = "something is not read"
+    pinocchio.arrays["positions"][...] = 0.25
+    table = agreement(Results([pinocchio, mujoco]))
+    assert column(table, "positions, of the room")[0] < 1e-14
+    assert column(table, "engines") == ["MuJoCo"]
+    assert column(table, "but") == ["Pinocchio is off by 0.250: something is not read"]
+    assert table.answer.points[0].endswith("1 of them otherwise than MuJoCo's documentation says")

@@ -1,0 +1,227 @@
+"""Robots as problems: the same text for everyone, strata that are what they say, a fair judge."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bench.judge import LIMIT_TOLERANCE, Targets, Tolerance, angle_between, judge
+from bench.problems.robot_targets import (
+    STRATA,
+    farthest,
+    least_singular_values,
+    robot_targets,
+    root,
+    spread,
+    stratum_poses,
+    uniform_targets,
+    unreachable_targets,
+)
+from bench.problems.robots import ALL, CHARACTER, AbsentError, is_installed, links, robot
+from reference import rotation
+
+COUNT = 8
+TOLERANCE = Tolerance(1e-3, 1e-3)
+
+
+@pytest.fixture(params=ALL)
+def name(request):
+    """Every robot that is installed."""
+    if not is_installed(request.param):
+        pytest.skip("example-robot-data, the extra `robots`, is not installed")
+    return request.param
+
+
+def test_the_limits_and_joints_are_those_that_the_judge_reads(name):
+    known, model = robot(name), judge(name).model
+    hinges = model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)
+    finite = np.isfinite(known.lower)
+    np.testing.assert_array_equal(known.lower[finite], model.jnt_range[hinges, 0])
+    np.testing.assert_array_equal(known.upper[finite], model.jnt_range[hinges, 1])
+    assert len(known.lower) == model.nq
+    assert known.joints == tuple(model.joint(i).name for i in range(model.njnt))
+    assert list(known.balls) == model.jnt_qposadr[~hinges].tolist()
+    assert (known.lower < known.upper).all()
+
+
+def test_the_chain_of_links_is_the_judges_kinematics(name, rng):
+    """Some ten products of rotations, lengths of a metre: rounding is below 1e-14."""
+    known = robot(name)
+    if not known.is_chain:
+        pytest.skip("a tree has no chain of links")
+    q = known.draw(rng, 1)[0]
+    T, joint = np.eye(4), 0
+    for transform, axis in links(known):
+        T = T @ transform
+        if axis is not None:
+            T[:3, :3] = T[:3, :3] @ rotation.to_matrix(rotation.exponential(q[joint] * axis))
+            joint += 1
+    positions, rotations = judge(name).forward(q)
+    np.testing.assert_allclose(T[:3, 3], positions[0], atol=1e-14)
+    np.testing.assert_allclose(T[:3, :3], rotations[0], atol=1e-14)
+
+
+def test_the_character_has_twenty_joints_and_two_hands():
+    known = robot(CHARACTER)
+    assert len(known.joints) == 20
+    assert 0 < len(known.balls) < 20
+    assert known.tips == ("left_hand", "right_hand")
+    assert not known.posed
+
+
+def test_a_robot_that_is_not_installed_says_so(monkeypatch):
+    import importlib.metadata
+
+    def missing(name):
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "distribution", missing)
+    assert not is_installed("panda")
+    assert is_installed(CHARACTER)
+    robot.cache_clear()
+    with pytest.raises(AbsentError, match="example-robot-data is not installed"):
+        robot("panda")
+
+
+def test_targets_are_the_same_every_time_and_every_stratum_has_as_many(name):
+    targets = robot_targets(name, COUNT)
+    robot_targets.cache_clear()
+    for a, b in zip(targets, robot_targets(name, COUNT), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert np.bincount(targets.strata).tolist() == [COUNT] * len(STRATA)
+    assert targets.strata[: len(STRATA)].tolist() == list(range(len(STRATA)))
+
+
+def test_starts_are_within_the_limits_and_not_at_the_target(name):
+    mind = judge(name)
+    for targets in (robot_targets(name, COUNT), unreachable_targets(name, COUNT)):
+        assert (targets.starts >= mind.robot.lower).all()
+        assert (targets.starts <= mind.robot.upper).all()
+        assert not mind.judge(targets, targets.starts, TOLERANCE).solved.any()
+        for at in mind.robot.balls:
+            lengths = np.linalg.norm(targets.starts[:, at : at + 4], axis=-1)
+            np.testing.assert_allclose(lengths, 1.0, atol=1e-14)
+
+
+@pytest.fixture
+def poses(name):
+    """The judge, and sixty poses in each stratum."""
+    return judge(name), stratum_poses(judge(name), np.random.default_rng(4), 60)
+
+
+def test_the_shell_is_far_and_the_root_near(poses):
+    """Their medians are beyond the last and the first fifth of the uniform poses."""
+    mind, q = poses
+    distance = {
+        stratum: np.linalg.norm(mind.forward(q[stratum])[0] - root(mind), axis=-1).max(axis=-1)
+        for stratum in ("joint space", "outer shell", "near the root")
+    }
+    near, far = np.quantile(distance["joint space"], [0.2, 0.8])
+    assert np.median(distance["outer shell"]) > far
+    assert np.median(distance["near the root"]) < near
+
+
+def test_near_singular_is_near_singular(poses):
+    mind, q = poses
+    usual, near = (least_singular_values(mind, q[s]) for s in ("joint space", "near singular"))
+    assert np.median(near) < np.quantile(usual, 0.2)
+    assert near.min() >= 0
+
+
+def test_at_a_limit_one_joint_is_at_it_and_none_beyond(poses):
+    mind, q = poses
+    at = (q["at a limit"] == mind.robot.lower) | (q["at a limit"] == mind.robot.upper)
+    assert (at.sum(axis=-1) == 1).all()
+    assert at.any(axis=0).sum() > 1
+
+
+def test_a_crowd_of_tips_is_thinned_out(rng):
+    """Nine tenths of the tips are within one cell; of those spread out, hardly any are."""
+    crowd, others = 0.05 * rng.random((900, 1, 3)), rng.random((100, 1, 3))
+    tips = np.concatenate([crowd, others])
+    drawn = spread(rng, tips, 200)
+    assert (drawn < 900).mean() < 0.1
+    assert len(np.unique(drawn)) > 60
+
+
+def test_poses_are_within_the_limits(poses):
+    mind, q = poses
+    for stratum in STRATA:
+        assert (q[stratum] >= mind.robot.lower).all()
+        assert (q[stratum] <= mind.robot.upper).all()
+
+
+def test_nothing_reaches_farther_than_all_links_in_a_row(name, rng):
+    mind = judge(name)
+    tips, _ = mind.forward(mind.robot.draw(rng, 300))
+    assert np.linalg.norm(tips - root(mind), axis=-1).max() <= farthest(mind) * (1 + 1e-12)
+    away = np.linalg.norm(unreachable_targets(name, COUNT).positions - root(mind), axis=-1)
+    assert (away >= 1.05 * farthest(mind) * (1 - 1e-12)).all()
+
+
+def test_from_the_middle_means_the_middle():
+    targets = uniform_targets("iiwa14", 3, True)
+    np.testing.assert_allclose(targets.starts, 0.0, atol=1e-15)
+    assert not np.allclose(uniform_targets("iiwa14", 3, False).starts, 0.0)
+
+
+@pytest.fixture
+def asked(rng):
+    """The iiwa's judge, and targets whose solutions are known."""
+    mind = judge("iiwa14")
+    q = 0.9 * mind.robot.draw(rng, 5)
+    return mind, q, Targets(*mind.forward(q), mind.robot.draw(rng, 5), np.zeros(5, dtype=int))
+
+
+def test_the_judge_accepts_the_pose_that_made_the_target(asked):
+    mind, q, targets = asked
+    judgement = mind.judge(targets, q, Tolerance(1e-12, 1e-7))
+    assert judgement.solved.all()
+    assert not judgement.beyond.any()
+
+
+def test_the_judge_denies_whole_turns_beyond_the_limits_however_exact(asked):
+    mind, q, targets = asked
+    judgement = mind.judge(targets, q + 2.0 * np.pi, TOLERANCE)
+    assert judgement.position.max() < 1e-12
+    assert (judgement.beyond > 1.0).all()
+    assert not judgement.solved.any()
+
+
+@pytest.mark.parametrize(("over", "kept"), [(0.5, True), (2.0, False)])
+def test_the_judge_lets_a_limit_be_passed_by_no_more_than_its_tolerance(asked, over, kept):
+    mind, q, targets = asked
+    q[:, 3] = mind.robot.upper[3] + over * LIMIT_TOLERANCE
+    targets = targets._replace(
+        **dict(zip(("positions", "rotations"), mind.forward(q), strict=True))
+    )
+    assert mind.judge(targets, q, TOLERANCE).solved.all() == kept
+
+
+def test_the_judge_denies_a_tip_in_the_right_place_but_turned(asked):
+    mind, q, targets = asked
+    q[:, 6] += 0.01  # the last hinge of the iiwa turns about the flange's own axis
+    judgement = mind.judge(targets, q, TOLERANCE)
+    assert judgement.position.max() < 1e-12
+    np.testing.assert_allclose(judgement.rotation, 0.01, rtol=1e-9)
+    assert not judgement.solved.any()
+
+
+def test_no_answer_is_no_solution_and_costs_no_other(asked):
+    mind, q, targets = asked
+    q[1] = np.nan
+    judgement = mind.judge(targets, q, TOLERANCE)
+    assert judgement.solved.tolist() == [True, False, True, True, True]
+    assert np.isnan(judgement.position[1])
+
+
+def test_the_first_answers_are_judged_by_the_first_targets(asked):
+    mind, q, targets = asked
+    assert mind.judge(targets, q[:2], TOLERANCE).solved.tolist() == [True, True]
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.1, 3.0, np.pi])
+def test_the_angle_between_rotations_is_exact_where_it_is_tiny(angle, rng):
+    """An arc cosine would return 0 or 1.5e-8 for 1e-12."""
+    A = rotation.to_matrix(rotation.random(rng))
+    turn = rotation.to_matrix(rotation.exponential([0.0, angle, 0.0]))
+    assert angle_between(A, A @ turn) == pytest.approx(angle, rel=1e-7, abs=1e-15)
