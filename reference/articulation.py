@@ -287,7 +287,7 @@ class Articulation:
         _locals(self.arrays, one_batch(given), one_batch(offsets, 2), one_batch(rotations, 2))
         return offsets, rotations
 
-    def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def forward(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4).
 
         Raises:

@@ -128,16 +128,14 @@ def _jit(kernel: Kernel, cache: bool, relaxed: bool) -> Kernel:
     }
     rebuilt = _rebuild(kernel, kernel.__globals__ | callees)
     rebuilt.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{'_relaxed' * relaxed}"
-    options = {} if cache or allocates(kernel) else {"_nrt": False}
-    return numba.njit(
-        cache=cache,
-        error_model="numpy",
-        fastmath=RELAXATIONS if relaxed else False,
-        nogil=True,
-        no_cpython_wrapper=not cache,  # what Python never calls needs no door to it
-        no_cfunc_wrapper=True,
-        **options,
-    )(rebuilt)
+    options: dict[str, Any] = {
+        "no_cpython_wrapper": not cache,  # what Python never calls needs no door to it
+        "no_cfunc_wrapper": True,
+        "fastmath": RELAXATIONS if relaxed else False,
+    }
+    if not (cache or allocates(kernel)):
+        options["_nrt"] = False
+    return numba.njit(cache=cache, error_model="numpy", nogil=True, **options)(rebuilt)
 
 
 def _callee(kernel: Kernel, relaxed: bool) -> Kernel:

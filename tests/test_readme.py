@@ -10,13 +10,15 @@ def snippets(language):
     return re.findall(rf"```{language}\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
 
 
-def test_the_python_interface_runs_as_printed(capsys):
+def test_the_python_interface_runs_as_printed(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     for code in snippets("python"):
         exec(compile(code, str(README), "exec"), {})
     printed = capsys.readouterr().out
-    assert printed.count("CONVERGED") == 2
+    assert printed.count("CONVERGED") == 3
     assert "distance to the target: 0.8999" in printed
     assert "residual of the step: 1.0" in printed
+    assert (tmp_path / "heart.bvh").stat().st_size > 0
 
 
 LINKS = re.findall(r"\]\(([^)#:]+)\)", README.read_text(encoding="utf-8"))

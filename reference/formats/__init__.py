@@ -1,5 +1,6 @@
 """Files of other programs, read into our models: the only door for files in the reference."""
 
+from . import bvh, mjcf, urdf
 from .obj import Mesh, parse_obj, read_obj
 
-__all__ = ["Mesh", "parse_obj", "read_obj"]
+__all__ = ["Mesh", "bvh", "mjcf", "parse_obj", "read_obj", "urdf"]

@@ -213,12 +213,11 @@ def _solve_chains(
 def _solve_mechanisms(
     model: Skeleton | Articulation, start: ArrayLike, wanted: list[Wanted], settings: Settings
 ) -> IKSolution:
-    articulation, given = model, start
+    articulation = balls(model) if isinstance(model, Skeleton) else model
     if isinstance(model, Skeleton):
-        articulation = balls(model)
-        given = arguments.floats("local_rotations", start, "...", model.joint_count, 4)
-        given = given.reshape(*given.shape[:-2], -1)
-    starts = arguments.floats("local_rotations", given, "...", articulation.coordinate_count)
+        rotations = arguments.floats("local_rotations", start, "...", model.joint_count, 4)
+        start = rotations.reshape(*rotations.shape[:-2], -1)
+    starts = arguments.floats("local_rotations", start, "...", articulation.coordinate_count)
     effectors = tuple([one.joint for one in wanted])
     oriented = tuple([one.rotation is not None for one in wanted])
     prepared = prepare(articulation, effectors, oriented, settings.restarts, settings.seed)
@@ -293,13 +292,17 @@ def balls(skeleton: Skeleton) -> Articulation:
 
 
 def goals_of(wanted: list[Wanted], batch: tuple[int, ...]) -> FloatArray:
-    """Return what the kernels want to know of the targets, (target, effector, 8)."""
+    """Return what the kernels want to know of the targets, (target, effector, 8).
+
+    Weights count beside one another, so that the largest may be one.
+    """
+    heaviest = max(one.weight for one in wanted)
     goals = np.empty((*batch, len(wanted), 8))
     for e, one in enumerate(wanted):
         goal = goals[..., e, :]
         goal[..., :ROTATION] = one.position
         goal[..., ROTATION:WEIGHT] = IDENTITY if one.rotation is None else one.rotation
-        goal[..., WEIGHT] = one.weight
+        goal[..., WEIGHT] = one.weight / heaviest
     return goals.reshape(-1, len(wanted), 8)
 
 
@@ -367,5 +370,5 @@ def _solution(
     )  # fmt: skip
 
 
-def _shaped(values: FloatArray, batch: tuple[int, ...]) -> FloatArray:
+def _shaped(values: Any, batch: tuple[int, ...]) -> Any:
     return frozen(values.reshape(batch + values.shape[1:]))

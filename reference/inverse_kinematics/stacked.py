@@ -67,7 +67,7 @@ class Stack(NamedTuple):
         A: J J' + damping and then its Cholesky factor, (equation, equation).
         z: (A)^-1 e, (equation,).
         step: of the freedoms, over what a unit is worth, (freedom,).
-        held: 1 where a limit stops a freedom, (freedom,).
+        held: 1 where the upper limit stops a freedom, -1 where the lower does, (freedom,).
     """
 
     e: FloatArray
@@ -184,18 +184,38 @@ def damped_step(mechanism, posture, stack, damping):
     """Fill the step J' (J J' + damping 1)^-1 e within the limits of hinges and slides.
 
     A freedom that the step would take beyond its limit is held at it, its part of the way is taken
-    from e, and the others are asked again.
+    from e, and the others are asked again; one that would then rather step back is let go. What
+    remains is the constrained optimum of |e - J q|^2 + damping |q|^2.
     """
     clear(stack.held)
     clear(stack.step)
-    for _ in range(len(stack.step) + 1):
+    for _ in range(2 * len(stack.step) + 1):
         fill_matrix(stack, damping)
         solve(stack)
         for k in range(len(stack.step)):
             if stack.held[k] == 0.0:
                 stack.step[k] = inner(stack.J[k], stack.z)
-        if not hold_limited(mechanism, posture, stack):
+        if not hold_limited(mechanism, posture, stack) and not let_go(stack):
             return
+
+
+def let_go(stack):
+    """Let go of the held freedom that would most step back from its limit; return whether of any.
+
+    With z = (e - J q) / damping, a freedom k that is free steps J_k z.
+    """
+    worst, most = -1, 0.0
+    for k in range(len(stack.step)):
+        if stack.held[k] != 0.0:
+            back = stack.held[k] * (stack.step[k] - inner(stack.J[k], stack.z))
+            if back > most:
+                worst, most = k, back
+    if worst < 0:
+        return False
+    stack.held[worst] = 0.0
+    for i in range(len(stack.e)):
+        stack.e[i] += stack.step[worst] * stack.J[worst, i]
+    return True
 
 
 def transposed_step(mechanism, posture, stack):
@@ -307,7 +327,7 @@ def hold_limited(mechanism, posture, stack):
         wanted = q + worth * stack.step[k]
         bounded = min(max(wanted, joints.numbers[j, LOWER]), joints.numbers[j, UPPER])
         if bounded != wanted and not turns_round(mechanism, j):
-            stack.held[k] = 1.0
+            stack.held[k] = 1.0 if wanted > bounded else -1.0
             stack.step[k] = (bounded - q) / worth
             for i in range(len(stack.e)):
                 stack.e[i] -= stack.step[k] * stack.J[k, i]
