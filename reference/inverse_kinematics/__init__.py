@@ -15,6 +15,7 @@ from ..outcome import Outcome
 from ..parallel import in_slices
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
+from .alone import NO_HISTORY, finished, solve_alone
 from .attempts import Answers, answer_batch, answer_given, attempt, attempts
 from .batch import (
     ITERATIONS,
@@ -71,8 +72,6 @@ IK_SOLVERS = {
 
 # Targets in a slice of a batch: fewer are not worth a thread.
 LEAST = 16
-NO_HISTORY = frozen(np.empty(0))
-OUTCOMES = tuple(Outcome)
 
 
 class Settings(NamedTuple):
@@ -132,7 +131,8 @@ def solve_ik(
     settings = checked_settings(
         solver, tolerance, tolerance_rotation, max_iterations, restarts, seed, record
     )
-    return solve_targets(skeleton, local_rotations, target, effector, settings)
+    alone = solve_alone(skeleton, local_rotations, target, effector, settings)
+    return alone or solve_targets(skeleton, local_rotations, target, effector, settings)
 
 
 def checked_settings(*given: Any) -> Settings:
@@ -234,10 +234,10 @@ def _solve_mechanisms(
         ),
         answers,
     )  # fmt: skip
-    if not fine:
-        check_numbers(wanted)
-        again = articulation.checked("local_rotations", starts)
-        return _solve_mechanisms(articulation, again, wanted, settings)
+    if not fine:  # likewise
+        wanted = check_numbers(wanted)
+        again = articulation.checked("local_rotations", starts).reshape(np.shape(start))
+        return _solve_mechanisms(model, again, wanted, settings)
     if isinstance(model, Skeleton):
         local = answers.q.reshape(answers.local.shape)
         return _solution(local, local, answers, batch, settings)
@@ -361,13 +361,8 @@ def _solution(
             _shaped(figures[:, RESIDUAL_ROTATION].copy(), batch),
             _shaped(coordinates, batch),
         )  # fmt: skip
-    residual, angle, iterations, outcome = figures[0].tolist()
-    for rows in (local, coordinates, solved.positions):
-        rows.setflags(write=False)
-    return IKSolution(
-        local[0], solved.positions[0], residual, int(iterations), OUTCOMES[int(outcome)],
-        frozen(history[0]) if settings.record else NO_HISTORY, angle, coordinates[0],
-    )  # fmt: skip
+    one = frozen(history[0]) if settings.record else NO_HISTORY
+    return finished(local, solved.positions, figures, one, coordinates)
 
 
 def _shaped(values: Any, batch: tuple[int, ...]) -> Any:

@@ -190,8 +190,7 @@ def damped_step(mechanism, posture, stack, damping):
     clear(stack.held)
     clear(stack.step)
     for _ in range(2 * len(stack.step) + 1):
-        fill_matrix(stack, damping)
-        solve(stack)
+        solve_damped(stack, damping)
         for k in range(len(stack.step)):
             if stack.held[k] == 0.0:
                 stack.step[k] = inner(stack.J[k], stack.z)
@@ -267,12 +266,26 @@ def is_limited(joints, j):
     return joints.integers[j, KIND] in (HINGE, SLIDE) and joints.integers[j, LEADER] == j
 
 
-def fill_matrix(stack, damping):
-    """Fill the lower triangle of A = J J' + damping 1 over the freedoms that are not held.
+def solve_damped(stack, damping):
+    """Fill z of (J J' + damping 1) z = e over the freedoms that are not held."""
+    m = len(stack.e)
+    if m == 6:  # the compiler lays out what is of known size
+        fill_matrix(stack, damping, 6)
+        solve(stack, 6)
+    elif m == 3:
+        fill_matrix(stack, damping, 3)
+        solve(stack, 3)
+    else:
+        fill_matrix(stack, damping, m)
+        solve(stack, m)
 
-    The damping is held above rounding, so that A has a factor even where J J' is singular.
+
+def fill_matrix(stack, damping, m):
+    """Fill the lower triangle of A = J J' + damping 1, (m, m), over the freedoms not held.
+
+    The damping is held above rounding, so that A has factors even where J J' is singular.
     """
-    A, J, m = stack.A, stack.J, len(stack.e)
+    A, J = stack.A, stack.J
     for i in range(m):
         for j in range(i + 1):
             A[i, j] = 0.0
@@ -287,25 +300,26 @@ def fill_matrix(stack, damping):
         A[i, i] += damping
 
 
-def solve(stack):
-    """Fill z of A z = e by Cholesky's factors, which overwrite A."""
-    A, z, m = stack.A, stack.z, len(stack.e)
+def solve(stack, m):
+    """Fill z of A z = e by the factors L D L', which overwrite A; 1/D comes on the diagonal."""
+    A, z = stack.A, stack.z
     for i in range(m):
         z[i] = stack.e[i]
         for j in range(i):
             s = A[i, j]
             for k in range(j):
                 s -= A[i, k] * A[j, k]
-            s *= A[j, j]
             A[i, j] = s
-            A[i, i] -= s * s
+        for j in range(i):
+            s = A[i, j] * A[j, j]
+            A[i, i] -= s * A[i, j]
+            A[i, j] = s
             z[i] -= s * z[j]
-        A[i, i] = 1.0 / math.sqrt(A[i, i])
-        z[i] *= A[i, i]
+        A[i, i] = 1.0 / A[i, i]
     for i in range(m - 1, -1, -1):
+        z[i] *= A[i, i]
         for j in range(i + 1, m):
             z[i] -= A[j, i] * z[j]
-        z[i] *= A[i, i]
 
 
 def inner(a, b):

@@ -1,0 +1,128 @@
+"""One solve from arrays that need no conversion, with little between the caller and the kernel.
+
+It is what `solve_targets` does for anything, for the one case in which looking at the arguments
+would take longer than solving: one start and one target, float64 arrays of the right shape.
+Whatever else comes, or is amiss, is left to `solve_targets`.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from ..arguments import FLOAT64, FloatArray, frozen
+from ..articulation import Articulation
+from ..outcome import Outcome
+from ..quaternion import IDENTITY
+from ..skeleton import Skeleton
+from .mechanism import ROTATION, WEIGHT
+from .preparation import prepare
+from .problem import IKSolution, Target
+
+OUTCOMES = tuple(Outcome)
+NO_HISTORY = frozen(np.empty(0))
+UNWANTED = np.empty((1, 1))  # where the kernels may write a history that nobody reads
+
+
+def solve_alone(
+    model: Any, start: Any, target: Any, effector: Any, settings: Any
+) -> IKSolution | None:
+    """Return the solution, or None where the arguments are not that plain, or not fit."""
+    position, turn, weight = target, None, 1.0
+    if type(target) is Target:
+        if effector != -1:
+            return None
+        position, turn, effector, weight = target
+    if not (is_plain(position, (3,)) and (turn is None or is_plain(turn, (4,)))):
+        return None
+    if settings.record or type(effector) is not int or type(weight) is not float or weight <= 0.0:
+        return None
+    if type(model) is Articulation and is_plain(start, (model.coordinate_count,)):
+        goal = new_goal(position, turn, weight)
+        return solve_mechanism(model, start, goal, effector, turn is not None, settings)
+    if type(model) is Skeleton and turn is None and not settings.restarts:
+        return solve_chain(model, start, position, effector, settings)
+    return None
+
+
+def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
+    """Return whether values are a float64 array of a shape, one row after the other."""
+    return (
+        type(values) is np.ndarray
+        and values.dtype is FLOAT64
+        and values.shape == shape
+        and values.flags.c_contiguous
+    )
+
+
+def new_goal(position: FloatArray, turn: FloatArray | None, weight: float) -> FloatArray:
+    """Return what the kernels want to know of one target, (1, 1, 8)."""
+    goal = np.empty((1, 1, 8))
+    row = goal[0, 0]
+    row[:ROTATION] = position
+    row[ROTATION:WEIGHT] = IDENTITY if turn is None else turn
+    row[WEIGHT] = weight
+    return goal
+
+
+def solve_mechanism(
+    model: Articulation,
+    start: FloatArray,
+    goal: FloatArray,
+    effector: int,
+    oriented: bool,
+    settings: Any,
+) -> IKSolution | None:
+    """Solve on an articulation; None if there is no such effector, or a number is not fit."""
+    count = model.joint_count
+    if not -count <= effector < count:
+        return None
+    prepared = prepare(
+        model, (effector % count,), (oriented,), settings.restarts, settings.seed
+    )  # fmt: skip
+    q, local = np.empty((1, model.coordinate_count)), np.empty((1, count, 4))
+    positions, figures = np.empty((1, count, 3)), np.empty((1, 4))
+    fine = settings.solver.mechanism(
+        *prepared.flat, writable(start)[None], goal, settings.tolerance,
+        settings.tolerance_rotation, settings.max_iterations, prepared.restarts, prepared.tips,
+        False, q, local, positions, figures, UNWANTED,
+    )  # fmt: skip
+    return finished(local, positions, figures, NO_HISTORY, q) if fine else None
+
+
+def solve_chain(
+    model: Skeleton, start: Any, position: FloatArray, effector: int, settings: Any
+) -> IKSolution | None:
+    """Solve on a skeleton; None if start or effector or a number is not fit."""
+    count = model.joint_count
+    if not (is_plain(start, (count, 4)) and -count <= effector < count):
+        return None
+    local, positions = np.empty((1, count, 4)), np.empty((1, count, 3))
+    figures = np.empty((1, 4))
+    fine = settings.solver.chain(
+        *model.arrays, model.path_array(effector % count), writable(start)[None],
+        writable(position)[None], settings.tolerance, settings.max_iterations, False,
+        local, positions, figures, UNWANTED,
+    )  # fmt: skip
+    return finished(local, positions, figures, NO_HISTORY, local) if fine else None
+
+
+def writable(values: FloatArray) -> FloatArray:
+    """Return the values in an array that may be written to, as the kernels are compiled for."""
+    return values if values.flags.writeable else values.copy()
+
+
+def finished(
+    local: FloatArray,
+    positions: FloatArray,
+    figures: FloatArray,
+    history: FloatArray,
+    coordinates: FloatArray,
+) -> IKSolution:
+    """Return the solution of one target from the kernels' rows of one."""
+    for rows in (local, positions, coordinates):
+        rows.setflags(write=False)
+    residual, angle, iterations, outcome = figures[0].tolist()
+    return IKSolution(
+        local[0], positions[0], residual, int(iterations), OUTCOMES[int(outcome)], history, angle,
+        coordinates[0],
+    )  # fmt: skip
