@@ -12,6 +12,10 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
 # Below this the sine of half the angle is its argument to the last bit: x - x^3/6 rounds to x.
 SMALL_ANGLE = 1e-8
+# Below this |a| |b| + a.b, over |a| |b|, has lost some digits: |a + b| is 0.14 then, over |a|.
+NEARLY_OPPOSITE = 1e-2
+# Below this the product of two lengths has lost some.
+TINY = 1e-140
 # A quaternion given may be so far from unit length.
 UNIT_TOLERANCE = 1e-6
 
@@ -144,12 +148,32 @@ def perpendicular(a):
     return scale(1.0 / length, across)
 
 
+def renormalised(q):
+    """Return a quaternion that only rounding has taken from unit length, made unit."""
+    unit, _ = made_unit(q)
+    return unit
+
+
 def between(a, b):
     """Return the shortest-arc rotation that turns the direction of a into that of b.
 
-    With unit vectors, w = |a + b| / 2 and the vector part is (a x b) / |a + b|: no trigonometry,
-    and accurate for small angles. Antiparallel vectors turn by pi about `perpendicular(a)`; a zero
+    It is (|a| |b| + a.b, a x b) made unit: no trigonometry, and accurate for small angles. A zero
     vector has no direction and gives the identity.
+    """
+    lengths = math.sqrt(dot(a, a) * dot(b, b))
+    w = lengths + dot(a, b)
+    if lengths < TINY or w < NEARLY_OPPOSITE * lengths:
+        return between_opposite(a, b)
+    x, y, z = cross(a, b)
+    s = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+    return s * w, s * x, s * y, s * z
+
+
+def between_opposite(a, b):
+    """Return the same where |a| |b| + a.b would cancel or underflow.
+
+    With unit vectors, w = |a + b| / 2 and the vector part is (a x b) / |a + b|. Antiparallel
+    vectors turn by pi about `perpendicular(a)`.
     """
     length_a, length_b = norm(a), norm(b)
     if length_a == 0.0 or length_b == 0.0:

@@ -1,5 +1,7 @@
 """Cyclic coordinate descent (Wang & Chen 1991)."""
 
+import math
+
 from ..articulation import AT, BALL, FREE, FREEDOM, HINGE, KIND, LEADER, SLIDE
 from ..quaternion import (
     IDENTITY,
@@ -8,9 +10,9 @@ from ..quaternion import (
     conjugate,
     dot,
     multiply,
-    normalised,
     put_quaternion,
     quaternion_at,
+    renormalised,
     rotate,
     scale,
     subtract,
@@ -58,9 +60,9 @@ def ccd_sweep(chain, target):
         put_quaternion(chain.turns, k, turn)
     above = IDENTITY
     for k in range(n):
-        above = normalised(multiply(above, quaternion_at(chain.turns, k)))
+        above = renormalised(multiply(above, quaternion_at(chain.turns, k)))
         R = quaternion_at(chain.rotations, k)
-        put_quaternion(chain.rotations, k, normalised(multiply(above, R)))
+        put_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
     place_joints(chain)
 
 
@@ -70,9 +72,11 @@ def ccd_turn(joint, effector, target):
     The effector moves on a sphere about the joint, and the point nearest to the target lies on the
     ray from the joint to the target: the distance cannot grow.
     """
-    arm = subtract(effector, joint)
-    turn = between(arm, subtract(target, joint))
-    return turn, add(joint, rotate(turn, arm))
+    arm, way = subtract(effector, joint), subtract(target, joint)
+    square = dot(way, way)
+    if square == 0.0:
+        return IDENTITY, effector
+    return between(arm, way), add(joint, scale(math.sqrt(dot(arm, arm) / square), way))
 
 
 def ccd_update(mechanism, goal, posture, room):
@@ -142,7 +146,7 @@ def better_turn(mechanism, goal, posture, room, j, M):
     turn = best_turn(mechanism, goal, posture, room, j, M)
     before = ball_at(joints, posture.q, j)
     moved = turn_ball(joints, posture.q, j, frame_of(joints, j, posture), multiply(turn, R))
-    allowed = normalised(multiply(moved, conjugate(R)))
+    allowed = renormalised(multiply(moved, conjugate(R)))
     if joints.integers[j, KIND] == BALL and turn_value(M, allowed) < turn_value(M, IDENTITY):
         put_ball(joints, posture.q, j, before)
         return IDENTITY

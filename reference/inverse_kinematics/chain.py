@@ -13,11 +13,11 @@ from ..quaternion import (
     exponential,
     multiply,
     norm,
-    normalised,
     perpendicular,
     put_quaternion,
     put_vector,
     quaternion_at,
+    renormalised,
     rotate,
     scale,
     subtract,
@@ -98,7 +98,7 @@ def turn_links(chain):
         R = quaternion_at(chain.rotations, k)
         link = rotate(R, vector_at(chain.offsets, k + 1))
         way = subtract(vector_at(chain.positions, k + 1), vector_at(chain.positions, k))
-        put_quaternion(chain.rotations, k, normalised(multiply(between(link, way), R)))
+        put_quaternion(chain.rotations, k, renormalised(multiply(between(link, way), R)))
 
 
 def put_local(chain, path, local):
@@ -107,7 +107,7 @@ def put_local(chain, path, local):
     for k in range(1, len(chain.lengths)):
         R_parent = quaternion_at(chain.rotations, k - 1)
         q = multiply(conjugate(R_parent), quaternion_at(chain.rotations, k))
-        put_quaternion(local, path[k], normalised(q))
+        put_quaternion(local, path[k], renormalised(q))
 
 
 def tip_error(chain, target):
@@ -172,6 +172,6 @@ def bend(chain):
     for k in range(n):
         turn = exponential(scale(BEND * (k + 1) / n, axis))
         put_quaternion(
-            chain.rotations, k, normalised(multiply(turn, quaternion_at(chain.rotations, k)))
+            chain.rotations, k, renormalised(multiply(turn, quaternion_at(chain.rotations, k)))
         )
     place_joints(chain)

@@ -11,9 +11,9 @@ from ..quaternion import (
     exponential,
     multiply,
     norm,
-    normalised,
     put_quaternion,
     quaternion_at,
+    renormalised,
     subtract,
     vector_at,
 )
@@ -83,7 +83,7 @@ def turn_joints(chain, z):
     above = IDENTITY
     for k in range(n):
         turn = exponential(cross(subtract(tip, vector_at(chain.positions, k)), z))
-        above = normalised(multiply(above, turn))
+        above = renormalised(multiply(above, turn))
         R = quaternion_at(chain.rotations, k)
-        put_quaternion(chain.rotations, k, normalised(multiply(above, R)))
+        put_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
     place_joints(chain)
