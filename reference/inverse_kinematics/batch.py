@@ -99,7 +99,7 @@ def iterate(chain, target, tolerance, max_iterations, history):
     """Sweep until the effector is on the target, or as near as geometry allows.
 
     Returns:
-        The number of iterations, and whether the last one changed nothing but rounding.
+        The number of iterations, and whether they ended because no more would be of use.
     """
     d = root_distance(chain, target)
     # The residual is recomputed from the rotations in the end: leave that rounding some room.
@@ -110,13 +110,13 @@ def iterate(chain, target, tolerance, max_iterations, history):
         bend(chain)
     for i in range(max_iterations):
         if residual <= goal:
-            return i, False
+            return i, True
         before = residual
         sweep(chain, target)
         residual = tip_error(chain, target)
         fill_from(history, i + 1, residual)
         if abs(before - residual) <= rounding(chain, d):
-            return i + 1, residual > goal
+            return i + 1, True
     return max_iterations, False
 
 
