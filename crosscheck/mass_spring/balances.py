@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from reference.arguments import FloatArray
 from reference.implicit_euler import ImplicitEuler
@@ -27,16 +28,46 @@ def implicit_balances(cases: int, *, damped: bool) -> Iterator[Comparison]:
         euler = ImplicitEuler(
             system, h=h, solver="newton", tolerance=0.0, max_iterations=NEWTON_ITERATIONS
         )
-        x = euler.step(state, external).state.positions
-        y = state.positions + h * state.velocities
-        inertia = (system.masses[:, None] * (x - y))[system.free]
-        forces, tensions = forces_of_the_step(system, state, x, h)
-        yield Comparison(
-            ours=inertia,
-            theirs=h**2 * (forces + external[system.free]),
-            still=np.zeros_like(inertia),
-            scale=float(np.linalg.norm(inertia) + h**2 * tensions),
-        )
+        yield balance(system, state, euler.step(state, external).state.positions, h, external)
+
+
+def balance_residual(
+    system: MassSpring,
+    state: State,
+    x: FloatArray,
+    h: float,
+    external_forces: ArrayLike | None = None,
+) -> float:
+    """Return how far the end x of a step, (particle, 3), is from balance, all forces by MuJoCo.
+
+    It is |M (x - y) - h² f(x)| over the free particles, over |M (x - y)| + h² sum |spring force|,
+    f being MuJoCo's forces at x; see `forces_of_the_step` for the dampers.
+    """
+    sides = balance(system, state, x, h, external_forces)
+    return float(np.linalg.norm(sides.ours - sides.theirs) / sides.scale)
+
+
+def balance(
+    system: MassSpring,
+    state: State,
+    x: FloatArray,
+    h: float,
+    external_forces: ArrayLike | None = None,
+) -> Comparison:
+    """Return M (x - y), ours, and h² f(x) by MuJoCo, at the end x of a step of the free particles.
+
+    Pins play no part but in the forces: x has them where the step takes them.
+    """
+    y = state.positions + h * state.velocities
+    inertia = (system.masses[:, None] * (x - y))[system.free]
+    given = np.zeros_like(x) if external_forces is None else np.asarray(external_forces)
+    forces, tensions = forces_of_the_step(system, state, x, h)
+    return Comparison(
+        ours=inertia,
+        theirs=h**2 * (forces + given[system.free]),
+        still=np.zeros_like(inertia),
+        scale=float(np.linalg.norm(inertia) + h**2 * tensions),
+    )
 
 
 def forces_of_the_step(

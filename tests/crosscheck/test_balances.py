@@ -1,0 +1,49 @@
+"""How far the end of a step is from balance, all forces by MuJoCo."""
+
+import numpy as np
+import pytest
+
+from crosscheck import samples
+from crosscheck.mass_spring import balance_residual
+from crosscheck.tolerances import BALANCE
+from reference.implicit_euler import ImplicitEuler
+
+CASES = range(4)  # one pin and two, ropes in odd cases, and ends that coincide
+
+
+def stepped(case, damped, **settings):
+    """A motion, and the end of a step of it."""
+    motion = samples.motion(case, damped=damped)
+    integrator = ImplicitEuler(motion.system, h=motion.h, **settings)
+    x = integrator.step(motion.state, motion.external_forces).state.positions
+    assert np.abs(x - motion.state.positions).max() > 1e-3
+    return motion, x
+
+
+def residual(motion, x, external="its own"):
+    given = motion.external_forces if external == "its own" else external
+    return balance_residual(motion.system, motion.state, x, motion.h, given)
+
+
+@pytest.mark.parametrize("damped", [False, True])
+@pytest.mark.parametrize("case", CASES)
+def test_a_solved_step_is_balanced_and_one_cut_short_is_not(case, damped):
+    assert residual(*stepped(case, damped, tolerance=1e-14)) < BALANCE.value
+    assert residual(*stepped(case, damped, max_iterations=1)) > 1e3 * BALANCE.value
+
+
+def test_external_forces_and_gauss_newtons_linearisation_are_seen():
+    motion, x = stepped(0, damped=True, tolerance=1e-14)
+    assert residual(motion, x, external=None) > 1e-6
+    assert residual(*stepped(0, damped=True, solver="gauss_newton")) > 1e-6
+
+
+def test_moved_pins_are_where_the_step_took_them():
+    system, state, external, h = samples.motion(0, damped=False)
+    goal = state.positions[system.pinned] + 0.1
+    settings = {"h": h, "tolerance": 1e-14}
+    x = ImplicitEuler(system, **settings).step(state, external, goal).state.positions
+    assert balance_residual(system, state, x, h, external) < BALANCE.value
+    x = ImplicitEuler(system, **settings).step(state, external).state.positions
+    x = np.where(system.free[:, None], x, x + 0.1)
+    assert balance_residual(system, state, x, h, external) > 1e-6

@@ -1,0 +1,506 @@
+"""Laws of the certificate of a step: what it says is proven, and it says why where it is silent."""
+
+import math
+
+import numpy as np
+import pytest
+import scipy
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reference import rotation, scenes
+from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, certificate
+from reference.implicit_euler.certificate import (
+    Coverage,
+    Rounding,
+    certify,
+    hessian_change,
+    kantorovich_distance,
+    laplacian_norm,
+    least_curvature,
+    newton_length,
+)
+from reference.linear_solver import factorize
+from reference.mass_spring import MassSpring, State
+
+h = 0.05
+EPS = np.finfo(float).eps
+# At the minimisers found here rounding moves distances of 1 m by less.
+ROUNDED = 1e-10
+
+exponents = st.floats(-9.0, -2.0)
+seeds = st.integers(min_value=0, max_value=10**6)
+
+
+def step_of(system, state, **settings):
+    """The objective of a step and Newton's answer to it."""
+    integrator = ImplicitEuler(system, **{"h": h} | settings)
+    return integrator.objective(state), integrator.step(state).state.positions
+
+
+def beside(x, exponent, seed, free):
+    """A point at a distance of 10^exponent, nothing but free particles moved."""
+    way = np.random.default_rng(seed).standard_normal(x.shape) * free[:, None]
+    return x + 10.0**exponent * way / np.linalg.norm(way)
+
+
+def free_hessian(objective, x):
+    free = np.repeat(objective.system.free, 3)
+    return objective.hessian(x).toarray()[np.ix_(free, free)]
+
+
+def one_spring(pinned=(0,), springs=1):
+    """A mass beside a pin, h² k = 1, by a spring of 1 m or several alike, the length 0.8 m."""
+    system = MassSpring(
+        [1.0, 1.0], [[0, 1]] * springs, 1.0, 1 / (h * h), pinned=pinned, gravity=(0, 0, 0)
+    )
+    return system, State([[0, 0, 0], [0.8, 0, 0]], np.zeros((2, 3)))
+
+
+@pytest.fixture
+def swing():
+    """A 6 x 6 cloth in mid-swing."""
+    system, state = scenes.lab_cloth(size=6, stiffness=1000.0, damping=0.2, gravity=9.81)
+    integrator = ImplicitEuler(system, h=1 / 30)
+    for _ in range(10):
+        state = integrator.step(state).state
+    return system, state
+
+
+class TestCurvature:
+    def curvature_is_below_every_eigenvalue(self, objective, x):
+        least = np.linalg.eigvalsh(free_hessian(objective, x))[0]
+        known = certify(objective, x).curvature
+        # numpy's eigenvalues are rounded by some 1e-15 of the largest, 1e3 times the least.
+        assert known <= least * (1 + 1e-11)
+        assert known >= 0.95 * least
+
+    @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e4])
+    def test_it_is_below_every_eigenvalue_and_close(self, network, altered, scale):
+        """Pins are cut out: an identity in their place would be the least of great masses."""
+        system, state = network
+        heavy = altered(
+            system,
+            masses=scale * system.masses,
+            stiffnesses=scale * system.stiffnesses,
+            dampings=scale * system.dampings,
+        )
+        self.curvature_is_below_every_eigenvalue(*step_of(heavy, state))
+
+    def test_of_a_swinging_cloth(self, swing):
+        self.curvature_is_below_every_eigenvalue(*step_of(*swing, h=1 / 30))
+
+    def test_a_poor_estimate_costs_sharpness_only(self, swing, monkeypatch):
+        objective, x = step_of(*swing, h=1 / 30)
+        sharp = certify(objective, x).curvature
+        monkeypatch.setattr(certificate, "_estimate", lambda factor, n: 3.0 * sharp)
+        blunt = certify(objective, x)
+        assert blunt.covered
+        assert 0.3 * sharp < blunt.curvature < sharp
+
+    def test_ten_times_too_much_is_seen(self, network, monkeypatch):
+        objective, x = step_of(*network)
+        monkeypatch.setattr(
+            certificate, "least_curvature", lambda H, doubt: (10 * least(H)[0], least(H)[1])
+        )
+        with pytest.raises(AssertionError):
+            self.curvature_is_below_every_eigenvalue(objective, x)
+
+    def test_an_indefinite_matrix_has_none(self):
+        assert least(scipy.sparse.csc_array(np.diag([1.0, -1e-9, 2.0]))) == (0.0, None)
+
+    def test_a_matrix_singular_to_rounding_has_none(self):
+        H = scipy.sparse.csc_array(np.diag([1.0, 1e-15, 2.0]))
+        assert least(H) == (0.0, None)
+        mu, factor = least(scipy.sparse.csc_array(np.diag([1.0, 1e-12, 2.0])))
+        assert 0.9e-12 < mu < 1e-12
+        assert factor is not None
+
+    def test_doubt_about_the_matrix_is_subtracted(self):
+        H = scipy.sparse.csc_array(np.diag([1.0, 3.0, 2.0]))
+        assert least_curvature(H, 0.25)[0] == pytest.approx(least(H)[0] - 0.25, rel=1e-12)
+        assert least(H)[0] < certificate.SHARE - EPS
+
+
+def least(H):
+    return least_curvature(H, 0.0)
+
+
+class TestHessianChange:
+    def hessian_changes_no_faster(self, objective, x, radius, seed=0, pairs=40):
+        """Return how close to L it comes between random points within the radius."""
+        free, rng = objective.system.free, np.random.default_rng(seed)
+        coverage, L = hessian_change(objective, x, radius)
+        assert coverage == Coverage.COVERED
+        steepest = 0.0
+        for _ in range(pairs):
+            ways = rng.standard_normal((2, *x.shape)) * free[:, None]
+            a, b = (x + radius * rng.uniform(0.5, 1) * w / np.linalg.norm(w) for w in ways)
+            change = free_hessian(objective, a) - free_hessian(objective, b)
+            steepest = max(steepest, np.linalg.norm(change, 2) / np.linalg.norm(a - b))
+        assert steepest <= L
+        return steepest / L
+
+    @pytest.mark.parametrize("radius", [1e-3, 0.01])
+    def test_between_any_two_points_it_is_at_most_lipschitz(self, network, radius):
+        objective, x = step_of(*network)
+        assert self.hessian_changes_no_faster(objective, x, radius) > 0.05
+
+    def test_in_a_cloth(self, swing):
+        objective, x = step_of(*swing, h=1 / 30)
+        assert self.hessian_changes_no_faster(objective, x, 1e-3, pairs=10) > 0.05
+
+    def steepest_way(self, objective, x, pinned):
+        """Along (1, 2^1/2, 0) / 3^1/2 the length has its largest third derivative."""
+        way = np.zeros((2, 3))
+        way[1] = np.array([1.0, math.sqrt(2.0), 0.0]) / math.sqrt(3.0)
+        if not pinned:
+            way[0] = -way[1]
+        way /= np.linalg.norm(way)
+        nudge = 1e-6
+        change = free_hessian(objective, x + nudge * way) - free_hessian(objective, x - nudge * way)
+        return np.linalg.norm(change, 2) / (2 * nudge)
+
+    @pytest.mark.parametrize("pinned", [(0,), ()])
+    @pytest.mark.parametrize("springs", [1, 3])
+    def test_of_parallel_springs_it_is_no_larger_than_it_must_be(self, pinned, springs):
+        system, state = one_spring(pinned, springs)
+        objective = ImplicitEuler(system, h=h).objective(state)
+        _, L = hessian_change(objective, state.positions, 0.0)
+        # All bounds are taken 1e-8 too large to be on the safe side of their own rounding.
+        steepest = self.steepest_way(objective, state.positions, pinned)
+        assert pytest.approx(steepest, rel=1e-7) == L
+
+    @pytest.mark.parametrize(("pinned", "radius"), [((0,), 0.4), ((), 0.4 / math.sqrt(2.0))])
+    def test_within_a_radius_the_spring_may_be_half_as_long(self, pinned, radius):
+        """Both ends free and moving against each other, each goes 2^-1/2 of the radius."""
+        system, state = one_spring(pinned)
+        objective = ImplicitEuler(system, h=h).objective(state)
+        there, far = (hessian_change(objective, state.positions, r)[1] for r in (0.0, radius))
+        assert far == pytest.approx(4 * there, rel=1e-7)
+
+    @pytest.mark.parametrize(
+        "fault",
+        [
+            lambda free, springs, c: laplacian_norm(free, springs[1:], c[1:]),
+            lambda free, springs, c: laplacian_norm(free, springs, c) / 2,
+            lambda free, springs, c: max(c),
+        ],
+        ids=["a spring dropped", "halved", "the largest in place of the sum"],
+    )
+    def test_a_dropped_term_is_seen(self, monkeypatch, fault):
+        system, state = one_spring((), 3)
+        objective = ImplicitEuler(system, h=h).objective(state)
+        monkeypatch.setattr(certificate, "laplacian_norm", fault)
+        _, L = hessian_change(objective, state.positions, 0.0)
+        assert self.steepest_way(objective, state.positions, ()) > L * (1 + 1e-3)
+
+    def test_springs_that_are_linear_or_slack_or_pinned_do_not_count(self, altered):
+        system = MassSpring(
+            [1, 1, 1], [[0, 1], [0, 1], [0, 2], [0, 1]], [0.0, 2.0, 1.0, 1.0],
+            [10.0, 10.0, 10.0, 0.0], pinned=[0, 2], tension_only=[False, True, True, False],
+        )  # fmt: skip
+        x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+        objective = ImplicitEuler(system, h=h).objective(State(x, np.zeros((3, 3))))
+        assert hessian_change(objective, x, 0.1) == (Coverage.COVERED, 0.0)
+        stiff = altered(system, tension_only=False)  # and the spring of 2 m pushes
+        objective = ImplicitEuler(stiff, h=h).objective(State(x, np.zeros((3, 3))))
+        assert hessian_change(objective, x, 0.1)[1] > 0.01
+
+    def test_the_norm_is_no_less_than_the_laplacians(self, network, rng):
+        system, _ = network
+        weights = rng.uniform(0, 1, len(system.springs))
+        A = system.free_incidence.toarray()
+        norm = np.linalg.norm(A * weights @ A.T, 2)
+        bound = laplacian_norm(system.free, system.springs, weights)
+        assert norm <= bound <= 2 * norm
+
+    @pytest.mark.parametrize("order", [1, -1])
+    def test_of_a_star_it_is_the_hubs(self, order):
+        """The largest eigenvalue of a hub with three arms is 4, Gershgorin's bound 6."""
+        arms = np.array([[0, 1], [0, 2], [0, 3]])[:, ::order]
+        assert laplacian_norm(np.ones(4, dtype=bool), arms, np.ones(3)) == 6.0
+
+
+class TestNewtonStep:
+    """H = 2 I and grad g = (2, 0, 0): the step is 1 m long."""
+
+    @pytest.mark.parametrize(
+        ("doubts", "length"),
+        [((0.0, 0.0), 1.0), ((0.5, 0.0), 1.25), ((0.0, 0.5), 1.25)],
+        ids=["exactly known", "gradient in doubt", "Hessian in doubt"],
+    )
+    def test_it_is_longer_by_what_is_in_doubt(self, doubts, length):
+        H = scipy.sparse.csc_array(2.0 * np.eye(3))
+        given = H, factorize(H), np.array([2.0, 0, 0]), 2.0, Rounding(*doubts)
+        assert newton_length(*given) == pytest.approx(length, rel=1e-7)
+
+    @pytest.mark.parametrize("slip", [1.5, 0.5])
+    def test_a_poor_solve_does_not_make_it_shorter(self, slip):
+        H = scipy.sparse.csc_array(2.0 * np.eye(3))
+        given = factorize(slip * H), np.array([2.0, 0, 0]), 2.0, Rounding(0.0, 0.0)
+        assert newton_length(H, *given) >= 1.0
+
+
+class TestDistance:
+    @given(st.floats(0.0, 0.4999))
+    def test_it_solves_kantorovichs_equation(self, share):
+        """d = eta + L d² / (2 mu), the smaller root, with L eta / mu the share."""
+        d = kantorovich_distance(3.0, share)
+        assert d == pytest.approx(3.0 + share * d * d / 6.0, rel=1e-12)
+        assert 3.0 <= d <= 6.0
+
+    @given(exponents, seeds)
+    def test_newtons_answer_is_within_the_distance(self, exponent, seed):
+        system, state = scenes.random_network(particles=12, seed=seed % 5)
+        objective, exact = step_of(system, state)
+        x = beside(exact, exponent, seed, system.free)
+        known = certify(objective, x)
+        if known.covered:
+            error = np.linalg.norm(x - exact)
+            assert abs(error - known.newton_step) <= 0.5 * known.newton_step + ROUNDED
+            assert error <= known.distance + ROUNDED
+
+    @given(exponents, seeds)
+    def test_it_says_all_that_convexity_on_a_ball_does(self, exponent, seed):
+        """rho = 2 |grad g| / mu, and L rho <= mu / 2 with the L of that ball."""
+        system, state = scenes.random_network(particles=12, seed=seed % 5)
+        objective, exact = step_of(system, state)
+        x = beside(exact, exponent, seed, system.free)
+        known = certify(objective, x)
+        if known.curvature:
+            rho = 2 * objective.evaluate(x).gradient_norm / known.curvature
+            smooth, L = hessian_change(objective, x, rho + ROUNDED)
+            if smooth == Coverage.COVERED and L * (rho + ROUNDED) <= known.curvature / 2:
+                assert known.covered
+                assert known.distance <= rho + ROUNDED
+
+    def test_of_a_free_fall_it_is_rounding(self):
+        system = MassSpring([1.0, 2.0], np.empty((0, 2)), 1.0, 1.0)
+        objective, x = step_of(system, State(np.eye(3)[:2], np.ones((2, 3))))
+        known = certify(objective, x)
+        assert known.covered
+        assert known.lipschitz == 0
+        assert 0 < known.distance < 1e-13
+
+    def test_of_pins_alone_it_is_nothing(self):
+        system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
+        known = certify(*step_of(system, State(np.eye(3)[:2], np.ones((2, 3)))))
+        assert known.covered
+        assert (known.distance, known.alone_within) == (0.0, math.inf)
+
+    def test_a_turned_world_and_other_labels_change_nothing(
+        self, network, relabelled, altered, rng
+    ):
+        system, state = network
+        known = certify(*step_of(system, state, max_iterations=2))
+        R = rotation.to_matrix(rotation.random(rng, 1))[0]
+        turned = altered(system, gravity=R @ system.gravity)
+        moved = State(state.positions @ R.T, state.velocities @ R.T)
+        renamed = relabelled[:2]
+        for other in ((turned, moved), renamed):
+            again = certify(*step_of(*other, max_iterations=2))
+            assert again.covered
+            assert again.distance == pytest.approx(known.distance, rel=1e-3)
+            assert again.lipschitz == pytest.approx(known.lipschitz, rel=1e-3)
+
+    @pytest.mark.parametrize("factor", [2.0**-20, 2.0**20])
+    def test_other_units(self, network, altered, factor):
+        """Kilograms and newtons together; a power of two changes no digit of g."""
+        system, state = network
+        scaled = altered(
+            system,
+            masses=factor * system.masses,
+            stiffnesses=factor * system.stiffnesses,
+            dampings=factor * system.dampings,
+        )
+        one, other = (certify(*step_of(s, state, max_iterations=2)) for s in (system, scaled))
+        assert one.covered
+        assert other.distance == pytest.approx(one.distance, rel=1e-6)
+        assert other.curvature == pytest.approx(factor * one.curvature, rel=1e-2)
+
+    def test_a_result_is_certified_by_what_its_step_was_given(self, network, rng):
+        system, state = network
+        integrator = ImplicitEuler(system, h=h)
+        given = rng.standard_normal((7, 3)), state.positions[system.pinned] + 0.1
+        result = integrator.step(state, *given)
+        known = integrator.certify(state, result, *given)
+        assert known.covered
+        assert known.residual == result.residual
+        assert known == certify(integrator.objective(state, *given), result.state.positions)
+        assert integrator.certify(state, result).coverage == Coverage.PINS_ASTRAY
+
+    def test_wrong_positions_are_named(self, network):
+        objective, _ = step_of(*network)
+        with pytest.raises(ValueError, match=r"^positions: expected shape \(7, 3\)"):
+            certify(objective, np.zeros((6, 3)))
+
+
+class TestMinimisers:
+    """Whether two answers stand for one and the same minimiser."""
+
+    @pytest.fixture
+    def buckled(self):
+        """A mass pushed off the line between two pins, held to it across: up and down alike."""
+        pins = [[-0.5, 0, 0], [0.5, 0, 0], [0, 0, -2], [0, 0, 2]]
+        system = MassSpring(
+            np.ones(5), [[0, 1], [0, 2], [0, 3], [0, 4]], [1, 1, 0.5, 0.5], [100, 100, 60, 60],
+            pinned=[1, 2, 3, 4], gravity=(0, 0, 0),
+        )  # fmt: skip
+        objective = ImplicitEuler(system, h=1.0).objective(
+            State([[0, 0, 0], *pins], np.zeros((5, 3)))
+        )
+        up = objective.y.copy()
+        up[0, 1] = 0.7
+        for _ in range(20):
+            step = np.linalg.solve(free_hessian(objective, up), objective.gradient(up)[0])
+            up[0] -= step
+        return objective, up, up * [1, -1, 1]
+
+    def test_two_minima_are_told_apart(self, buckled):
+        objective, up, down = buckled
+        one, other = certify(objective, up), certify(objective, down)
+        assert objective.value(up) == pytest.approx(objective.value(down), rel=1e-12)
+        assert one.covered
+        assert one.shares_minimiser(other, np.linalg.norm(up - down)) is False
+        assert one.shares_minimiser(one, 0.0) is True
+
+    def test_every_solver_comes_to_newtons_minimiser(self, swing):
+        system, state = swing
+        objective, x = step_of(*swing, h=1 / 30)
+        newton = certify(objective, x)
+        for solver in set(STEP_SOLVERS) - {"gauss_newton"}:
+            integrator = ImplicitEuler(system, h=1 / 30, solver=solver, tolerance=1e-9)
+            result = integrator.step(state)
+            apart = np.linalg.norm(result.state.positions - x)
+            known = integrator.certify(state, result)
+            assert newton.shares_minimiser(known, apart) is True
+            assert known.shares_minimiser(newton, apart) is True
+            assert apart <= newton.distance + known.distance
+
+    def test_without_a_bound_nothing_is_proven(self, buckled):
+        objective, up, _ = buckled
+        flat = certify(objective, objective.y)
+        assert not flat.covered
+        assert certify(objective, up).shares_minimiser(flat, 0.0) is None
+        assert flat.shares_minimiser(flat, 0.0) is None
+
+    def test_a_gap_between_two_balls_is_proof_but_an_overlap_is_not(self):
+        one = certificate.Certificate(0.0, Coverage.COVERED, 1.0, 1.5, 1.0, 1.0, 0.4)
+        assert one.shares_minimiser(one, 0.4) is True
+        assert one.shares_minimiser(one, 1.0) is None
+        assert one.shares_minimiser(one, 2.1) is False
+
+
+class TestReasons:
+    """Each reason for no bound has its case."""
+
+    def rope(self, length):
+        """A mass on a tension-only spring of 1 m, h² k = 1."""
+        system = MassSpring(
+            [1, 1], [[0, 1]], 1.0, 1 / h**2, pinned=[0], gravity=(0, 0, 0), tension_only=True
+        )
+        return system, State([[0, 0, 0], [length, 0, 0]], np.zeros((2, 3)))
+
+    def start(self, system, state):
+        return certify(ImplicitEuler(system, h=h).objective(state), state.positions)
+
+    def test_a_gradient_that_overflows(self):
+        system, state = one_spring()
+        huge = State(1e200 * state.positions, np.zeros((2, 3)))
+        known = self.start(system, huge)
+        assert (known.coverage, known.residual) == (Coverage.OVERFLOWN, math.inf)
+
+    def test_a_gradient_that_overflows_here_alone(self):
+        system, state = one_spring()
+        objective = ImplicitEuler(system, h=h).objective(state)
+        x = objective.y * [1e200, 1, 1]
+        assert certify(objective, x).coverage == Coverage.OVERFLOWN
+
+    def test_a_gradient_that_overflows_at_the_start_alone(self, altered):
+        system, state = one_spring()
+        light = altered(system, masses=[1e-10, 1e-10], stiffnesses=1e10 / h**2)
+        fast = State(state.positions, [[0, 0, 0], [1e150, 0, 0]])
+        with np.errstate(over="ignore"):
+            objective = ImplicitEuler(light, h=h).objective(fast)
+        assert objective.evaluate(state.positions).finite
+        known = certify(objective, state.positions)
+        assert (known.coverage, known.residual) == (Coverage.OVERFLOWN, math.inf)
+
+    def test_a_step_that_overflows(self):
+        system = MassSpring([1.0, 2.0], [[0, 1]], 1.0, 100.0)
+        state = State(1e200 * np.eye(3)[:2], np.ones((2, 3)))
+        integrator = ImplicitEuler(system, h=1e3)
+        known = integrator.certify(state, integrator.step(state))
+        assert known.coverage == Coverage.OVERFLOWN
+
+    def test_a_pin_that_is_not_where_it_has_to_be(self):
+        system, state = one_spring()
+        objective = ImplicitEuler(system, h=h).objective(state)
+        assert certify(objective, state.positions + 1e-9).coverage == Coverage.PINS_ASTRAY
+
+    def test_a_saddle(self):
+        system = MassSpring(
+            [1, 1, 1], [[0, 1], [1, 2]], 1.0, 1000.0, pinned=[0, 2], gravity=(0, 0, 0)
+        )
+        state = State([[-0.5, 0, 0], [0, 0, 0], [0.5, 0, 0]], np.zeros((3, 3)))
+        known = self.start(system, state)
+        assert (known.coverage, known.residual, known.curvature) == (Coverage.NOT_CONVEX, 0.0, 0.0)
+
+    def test_ends_that_coincide(self):
+        system, state = one_spring()
+        known = self.start(system, State(0 * state.positions, np.zeros((2, 3))))
+        assert known.coverage == Coverage.COINCIDENT
+
+    def test_ends_that_may_meet_on_the_way(self):
+        """Stretched far, the spring will contract, and the bound cannot tell by how much."""
+        system = MassSpring([1, 1], [[0, 1]], 0.01, 1 / h**2, pinned=[0], gravity=(0, 0, 0))
+        state = State([[0, 0, 0], [0.8, 0, 0]], [[0, 0, 0], [-12.0, 0, 0]])
+        known = self.start(system, state)
+        assert known.coverage == Coverage.COINCIDENT
+        assert known.newton_step > 0.2
+
+    def test_coincident_ends_of_a_linear_spring_do_no_harm(self, altered):
+        system, state = one_spring()
+        linear = altered(system, rest_lengths=0.0, dampings=0.0)
+        assert self.start(linear, State(0 * state.positions, np.zeros((2, 3)))).covered
+
+    def test_a_rope_exactly_taut(self):
+        assert self.start(*self.rope(1.0)).coverage == Coverage.KINK
+
+    def test_a_rope_that_may_go_slack_on_the_way(self):
+        known = self.start(*self.rope(1.2))
+        assert known.coverage == Coverage.KINK
+        assert known.newton_step > 0.05
+
+    @pytest.mark.parametrize("length", [0.9, 1.1])
+    def test_a_rope_that_stays_as_it_is_does_no_harm(self, length):
+        """Slack, or carrying a load that h² k = 1 balances."""
+        system, state = self.rope(length)
+        load = np.array([[0, 0, 0], [max(length - 1, 0.0), 0, 0]]) / h**2
+        objective = ImplicitEuler(system, h=h).objective(state, load)
+        assert certify(objective, state.positions).covered
+
+    def test_a_point_too_far_away(self):
+        system, state = one_spring()
+        moving = State(state.positions, [[0, 0, 0], [0, 5.0, 0]])
+        known = self.start(system, moving)
+        assert known.coverage == Coverage.TOO_FAR
+        assert known.lipschitz * known.newton_step > 0.5 * known.curvature
+        assert known.distance == math.inf
+        assert known.alone_within == 0
+
+    def test_too_far_begins_where_kantorovichs_theorem_ends(self):
+        system, state = one_spring()
+        shares = []
+        for speed in np.linspace(0.5, 5.0, 19):
+            known = self.start(system, State(state.positions, [[0, 0, 0], [0, speed, 0]]))
+            shares.append(known.lipschitz * known.newton_step / known.curvature)
+            assert known.covered == (shares[-1] < 0.5)
+        assert any(0.25 < share < 0.5 for share in shares)
+        assert max(shares) > 0.5
+
+    def test_every_reason_has_a_sentence(self):
+        sentences = {reason.sentence for reason in Coverage}
+        assert len(sentences) == len(Coverage)
+        assert all(s.startswith("No bound") for s in sentences - {Coverage.COVERED.sentence})

@@ -1,0 +1,326 @@
+"""Forces, steps and certificates beside the same in 50 digits."""
+
+import itertools
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, certificate
+from reference.implicit_euler.certificate import (
+    Rounding,
+    certify,
+    laplacian_norm,
+    rounding,
+)
+from reference.mass_spring import (
+    MassSpring,
+    State,
+    damper_forces,
+    lengths,
+    spring_energy,
+    spring_forces,
+)
+
+EPS = np.finfo(float).eps
+# A spring's or a damper's force is made by some twenty roundings of half an EPS.
+TERM = 16 * EPS
+# Nudge and error of a central difference in 50 digits.
+NUDGE, DIFFERENCE = 1e-16, 1e-28
+CONVERGING = [name for name in STEP_SOLVERS if name != "gauss_newton"]
+
+# What a proof may forget: name and stand-in of a function of the certificate.
+FAULTS = {
+    "half of Newton's step": ("kantorovich_distance", lambda eta, share: eta / 2),
+    "the Hessian does not change": ("kantorovich_distance", lambda eta, share: eta),
+    "nothing is rounded": ("rounding", lambda objective, x: Rounding(0.0, 0.0)),
+    "L a hundredth": ("laplacian_norm", lambda *springs: laplacian_norm(*springs) / 100),
+}
+
+seeds = st.integers(min_value=0, max_value=10**6)
+
+
+@pytest.fixture(scope="module")
+def wide(extended_precision):
+    return extended_precision.wide
+
+
+def random_motion(seed, *, mildly=False):
+    """Two to five particles, some pinned, in any state: system, state, forces, pins' goal and h.
+
+    Springs and ropes, damped or not, some without a rest length, stretched and compressed by up to
+    a half, anywhere within 100 m; "mildly" not far from rest.
+    """
+    rng = np.random.default_rng([7, seed])
+    n = int(rng.integers(2, 6))
+    springs = np.array([(i, j) for i in range(n) for j in range(i) if rng.random() < 0.8 or j == 0])
+    x = rng.standard_normal((n, 3)) + rng.choice([0.0, 1.0, 100.0]) * rng.standard_normal(3)
+    length = np.linalg.norm(x[springs[:, 0]] - x[springs[:, 1]], axis=1)
+    s, strain = len(springs), 0.02 if mildly else 0.5
+    system = MassSpring(
+        masses=10.0 ** rng.uniform(-1, 1, n),
+        springs=springs,
+        rest_lengths=np.where(
+            rng.random(s) < 0.1, 0, length * (1 + rng.uniform(-strain, strain, s))
+        ),
+        stiffnesses=10.0 ** rng.uniform(0, 4 if mildly else 6, s),
+        dampings=np.where(rng.random(s) < 0.5, 0, rng.uniform(0.1, 5, s)),
+        pinned=rng.choice(n, int(rng.integers(0, 2)), replace=False),
+        gravity=rng.standard_normal(3) * 5,
+        tension_only=rng.random(s) < 0.2,
+    )
+    goal = x[system.pinned] + 0.01 * rng.standard_normal((len(system.pinned), 3))
+    h = float(rng.choice([1 / 240, 1 / 60, 1 / 30]))
+    return system, State(x, rng.standard_normal((n, 3))), rng.standard_normal((n, 3)), goal, h
+
+
+def disturbed(seed, exponent):
+    """The objective of a step and a point 10^exponent beside where Newton's method ends."""
+    system, state, forces, goal, h = random_motion(seed)
+    integrator = ImplicitEuler(system, h=h, tolerance=1e-14)
+    x = integrator.step(state, forces, goal).state.positions
+    way = np.random.default_rng([8, seed]).standard_normal(x.shape)
+    way[system.pinned] = 0.0
+    objective = integrator.objective(state, forces, goal)
+    return objective, x + 10.0**exponent * way / np.linalg.norm(way)
+
+
+class TestOracle:
+    """It is right by itself."""
+
+    @pytest.fixture
+    def step(self, network, extended_precision):
+        return extended_precision.Step(*network, 0.05)
+
+    @pytest.fixture
+    def x(self, step, wide, rng):
+        return step.x_n + np.where(step.free[:, None], wide(0.1 * rng.standard_normal((7, 3))), 0)
+
+    def test_gradient_and_hessian_are_slopes(self, step, x, wide, rng):
+        way = np.where(step.free[:, None], wide(rng.standard_normal((7, 3))), wide(np.zeros(3)))
+        there, back = x + NUDGE * way, x - NUDGE * way
+        slope = (step.value(there) - step.value(back)) / (2 * NUDGE)
+        assert abs(slope - np.sum(step.gradient(x) * way)) < DIFFERENCE * abs(slope)
+        bend = (step.gradient(there) - step.gradient(back))[step.free].ravel() / (2 * NUDGE)
+        product = step.hessian(x) @ way[step.free].ravel()
+        assert max(abs(bend - product)) < DIFFERENCE * max(abs(bend))
+
+    def test_a_linear_spring_in_closed_form(self, extended_precision, wide):
+        """A unit mass on a spring without rest length: x = (x_n + h v) / (1 + h² k)."""
+        system = MassSpring([1, 1], [[0, 1]], 0.0, 3.0, pinned=[0], gravity=(0, 0, 0))
+        state = State([[0, 0, 0], [1, 2, 3]], [[0, 0, 0], [0.5, 0, -1]])
+        step = extended_precision.Step(system, state, 0.25)
+        expected = wide([1.125, 2.0, 2.75]) / (1 + step.h**2 * 3)
+        end = step.minimiser(state.positions)
+        assert extended_precision.norm(end[1] - expected) < 1e-45
+
+    def test_it_finds_no_minimum_where_there_is_none(self, extended_precision):
+        """Compressed between two pins a particle on their line is at a saddle."""
+        system = MassSpring(
+            [1, 1, 1], [[0, 1], [1, 2]], 1.0, 100.0, pinned=[0, 2], gravity=(0, 0, 0)
+        )
+        state = State([[-0.5, 0, 0], [0, 0, 0], [0.5, 0, 0]], np.zeros((3, 3)))
+        assert extended_precision.Step(system, state, 1.0).minimiser(state.positions) is None
+
+
+class TestForces:
+    """They are off by some roundings of k (l + r), wherever the system lies."""
+
+    @given(seeds)
+    def test_spring_forces(self, extended_precision, seed):
+        system, state, *_ = random_motion(seed)
+        exact = extended_precision.spring_forces(
+            extended_precision.springs_of(system), extended_precision.wide(state.positions)
+        )
+        error = np.abs(exact - spring_forces(system, state.positions)).max()
+        assert error <= TERM * spring_scale(system, state.positions).sum()
+
+    @given(seeds)
+    def test_spring_energy(self, extended_precision, seed):
+        """An error of the force goes a length far."""
+        system, state, *_ = random_motion(seed)
+        exact = extended_precision.spring_energy(
+            extended_precision.springs_of(system), extended_precision.wide(state.positions)
+        )
+        far = lengths(system, state.positions) + system.rest_lengths
+        error = abs(exact - spring_energy(system, state.positions))
+        assert error <= TERM * np.sum(spring_scale(system, state.positions) * far)
+
+    @given(seeds)
+    def test_damper_forces(self, extended_precision, seed):
+        system, state, *_ = random_motion(seed)
+        exact = extended_precision.damper_forces(system, state)
+        error = np.abs(exact - damper_forces(system, state)).max()
+        fastest = np.linalg.norm(state.velocities, axis=1).max()
+        assert error <= TERM * 2 * fastest * system.dampings.sum()
+
+    @given(seeds, st.floats(-8.0, -1.0))
+    def test_gradient_and_hessian_are_off_by_no_more_than_allowed_for(
+        self, extended_precision, seed, exponent
+    ):
+        objective, x = disturbed(seed, exponent)
+        error = self.within_what_is_allowed(oracle_of(extended_precision, seed), objective, x)
+        assert error <= objective.evaluate(x).floor
+
+    @pytest.mark.parametrize("case", ["light masses", "close ends", "a blend"])
+    def test_where_one_term_is_all_the_error(self, extended_precision, case):
+        worst = 0.0
+        for seed in range(10):
+            system, state, h = one_term(case, seed)
+            objective = ImplicitEuler(system, h=h).objective(state)
+            oracle = extended_precision.Step(system, state, h)
+            error = self.within_what_is_allowed(oracle, objective, state.positions)
+            worst = max(worst, error / EPS)
+        assert worst > 100
+
+    def within_what_is_allowed(self, oracle, objective, x):
+        """Return by how much the gradient is off."""
+        allowed, there = rounding(objective, x), np.vectorize(mpmath.mpf, otypes=[object])(x)
+        error = objective.gradient(x) - oracle.gradient(there)
+        off = float(mpmath.sqrt(np.sum(error * error)))
+        assert off <= allowed.gradient
+        exact, free = oracle.hessian(there), np.repeat(objective.system.free, 3)
+        error = exact - objective.hessian(x)[free][:, free].toarray()
+        assert np.linalg.norm(error.astype(float), 2) <= allowed.hessian
+        return off
+
+
+class TestSteps:
+    @settings(max_examples=6)
+    @given(seeds)
+    def test_every_solver_ends_at_the_minimiser(self, extended_precision, seed):
+        system, state, forces, goal, h = random_motion(seed, mildly=True)
+        oracle = oracle_of(extended_precision, seed, mildly=True)
+        for solver in CONVERGING:
+            integrator = ImplicitEuler(
+                system, h=h, solver=solver, tolerance=1e-14, max_iterations=3000
+            )
+            result = integrator.step(state, forces, goal)
+            known = integrator.certify(state, result, forces, goal)
+            error = distance_to_minimiser(extended_precision, oracle, result.state.positions)
+            assert known.covered
+            assert error <= known.distance
+            assert known.distance <= 1e-11 * (1 + np.abs(state.positions).max())
+
+    @settings(max_examples=6)
+    @given(seeds)
+    def test_gauss_newton_is_its_linear_step(self, extended_precision, seed):
+        system, state, forces, _, h = random_motion(seed)
+        oracle = extended_precision.Step(system, state, h, forces)
+        exact = oracle.gauss_newton()
+        ours = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, forces).state.positions
+        # The gradient is rounded as any, and a positive definite solve amplifies it.
+        H = oracle.hessian(oracle.x_n, geometric=False).astype(float)
+        floor = ImplicitEuler(system, h=h).objective(state, forces).evaluate(ours).floor
+        error = extended_precision.norm(exact - ours)
+        assert error <= floor / np.linalg.eigvalsh(H)[0]
+
+
+@pytest.fixture(scope="module")
+def beside_minimisers(extended_precision):
+    """Points further and further from minimisers: objective, x, and the true distance or infinity.
+
+    It is infinite where Newton's method does not come from x to a minimiser.
+    """
+    points = []
+    for seed, exponent in itertools.product(range(8), (-14, -5, -2, -1)):
+        objective, x = disturbed(seed, exponent)
+        end = oracle_of(extended_precision, seed).minimiser(x)
+        error = np.inf if end is None else extended_precision.norm(end - extended_precision.wide(x))
+        points.append((objective, x, float(error)))
+    return points
+
+
+class TestCertificate:
+    @given(seeds, st.floats(-14.0, 0.0))
+    def test_a_minimiser_is_within_the_distance(self, extended_precision, seed, exponent):
+        objective, x = disturbed(seed, exponent)
+        known = certify(objective, x)
+        if known.covered:
+            oracle = oracle_of(extended_precision, seed)
+            error = distance_to_minimiser(extended_precision, oracle, x)
+            assert error <= known.distance
+            # |p| <= t + L t² / (2 mu) <= 3/2 t for the true distance t, and d <= 2 eta.
+            allowed = rounding(objective, x).gradient / known.curvature
+            assert known.distance <= 3.001 * error + 4 * allowed
+            assert known.newton_step <= known.distance <= known.alone_within
+
+    def test_it_is_no_idle_bound(self, beside_minimisers):
+        """Half of the points are covered, most of them by hardly a fifth too much."""
+        ratios = [
+            certify(objective, x).distance / error
+            for objective, x, error in beside_minimisers
+            if 1e-10 < error < np.inf
+        ]
+        assert np.mean(np.isfinite(ratios)) > 0.5
+        assert np.median(ratios) < 1.2
+
+    @pytest.mark.parametrize("fault", FAULTS)
+    def test_a_fault_in_the_distance_is_seen(self, beside_minimisers, monkeypatch, fault):
+        assert not any(is_broken(*point) for point in beside_minimisers)
+        monkeypatch.setattr(certificate, *FAULTS[fault])
+        assert any(is_broken(*point) for point in beside_minimisers)
+
+    @pytest.mark.parametrize("case", ["y", "external forces", "damper"])
+    def test_what_rounding_did_before_is_allowed_for(self, extended_precision, case):
+        """y, the external forces or the effective rest length are differences of large numbers."""
+        errors = []
+        for large in np.random.default_rng(11).uniform(1e6, 2e6, 10):
+            system, state, forces, h = cancelling(case, large)
+            integrator = ImplicitEuler(system, h=h, tolerance=1e-14)
+            result = integrator.step(state, forces)
+            oracle = extended_precision.Step(system, state, h, forces)
+            error = distance_to_minimiser(extended_precision, oracle, result.state.positions)
+            assert error <= integrator.certify(state, result, forces).distance
+            errors.append(error)
+        assert max(errors) > 1e4 * EPS
+
+
+def one_term(case, seed):
+    """One spring on a pin: where it is all, where l << r, where r is a difference."""
+    rng = np.random.default_rng([12, seed])
+    mass, length, rest, damping = {
+        "light masses": (1e-6, 1.0, 1.0, 0.0),
+        "close ends": (1.0, 1e-7, 1.0, 0.0),
+        "a blend": (1.0, 1.0, 1e7, 1e7),
+    }[case]
+    way = rng.standard_normal(3)
+    x = np.zeros((2, 3))
+    x[1] = length * rng.uniform(1, 2) * way / np.linalg.norm(way)
+    system = MassSpring([mass, mass], [[0, 1]], rest * rng.uniform(1, 2), 1e4, damping, pinned=[0])
+    return system, State(x, np.zeros((2, 3))), 0.3
+
+
+def cancelling(case, large):
+    """A mass beside a pin that all but comes to rest where its spring is at rest."""
+    at, speed, pull, rest, damping, h = 1.0, 0.0, 0.0, 1.0, 0.0, 0.3
+    if case == "y":
+        at, speed = large, -(large - 1.0) / h
+    elif case == "external forces":
+        pull = large
+    else:
+        rest, damping = large, 1e9
+    system = MassSpring([1.1, 1.1], [[0, 1]], rest, 1.0, damping, pinned=[0], gravity=(0, -pull, 0))
+    state = State([[0, 0, 0], [0, at, 0]], [[0, 0, 0], [0, speed, 0]])
+    return system, state, [[0, 0, 0], [0, 1.1 * pull, 0]], h
+
+
+def is_broken(objective, x, error):
+    """Whether a minimiser is further away than a bound says."""
+    return error > certify(objective, x).distance
+
+
+def oracle_of(extended_precision, seed, *, mildly=False):
+    system, state, forces, goal, h = random_motion(seed, mildly=mildly)
+    return extended_precision.Step(system, state, h, forces, goal)
+
+
+def distance_to_minimiser(extended_precision, oracle, x):
+    return extended_precision.norm(oracle.minimiser(x) - extended_precision.wide(x))
+
+
+def spring_scale(system, x):
+    """The k (l + r) of each spring [N], (spring,)."""
+    return system.stiffnesses * (lengths(system, x) + system.rest_lengths)
