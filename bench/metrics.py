@@ -176,6 +176,11 @@ def microseconds(seconds: float) -> float:
     return 1e6 * seconds
 
 
+def nanoseconds(seconds: float) -> float:
+    """Return a time in nanoseconds."""
+    return 1e9 * seconds
+
+
 def gigabytes_per_second(moved: float, seconds: float) -> float:
     """Return the bandwidth of so many bytes in so many seconds [GB/s]."""
     return moved / seconds / 1e9
@@ -210,3 +215,9 @@ def first_below(values: Floats, limit: float) -> int | None:
     """Return the index of the first value at or below the limit, None if there is none."""
     below = np.flatnonzero(np.asarray(values) <= limit)
     return int(below[0]) if below.size else None
+
+
+def cheapest_within(seconds: Floats, errors: Floats, limit: float) -> int | None:
+    """Return the index of the least time whose error is within the limit, None if none is."""
+    reached = np.flatnonzero(np.asarray(errors) <= limit)
+    return int(reached[np.argmin(np.asarray(seconds)[reached])]) if reached.size else None

@@ -50,8 +50,8 @@ def cloth(results: Results) -> Table:
         "µs",
         1e6,
         "The state is written into MuJoCo and read back, as a caller would. The limit of "
-        "local/global iterations counts their triangular solves alone: the factor’s nonzeros, an "
-        "index with each, read twice an iteration.",
+        "local/global iterations counts their triangular solves alone: the factor’s nonzeros, read "
+        "twice an iteration.",
     )
 
 

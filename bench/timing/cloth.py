@@ -5,11 +5,11 @@ from functools import partial
 from typing import Any
 
 import mujoco
-import scipy
 
 from crosscheck.engines import MujocoMassSpring
 from reference import ImplicitEuler, State, symplectic_euler
-from reference.implicit_euler.objective import global_matrix
+from reference.cholesky import CholeskyFactor
+from reference.implicit_euler.prefactored import global_factor
 
 from ..problems.cloth import ClothSwing, cloth_swing
 from ..suites.cloth import MIDDLE, converged_motion, motion
@@ -103,17 +103,10 @@ def solving(name: str, problem: ClothSwing) -> Case:
 
 
 def factor_bytes(problem: ClothSwing) -> int:
-    """Return the bytes of L of M + h² L: a value and a 4-byte index for each nonzero.
-
-    It is that of SuperLU by minimum degree ordering; cholespy's is about as large.
-    """
-    factor = scipy.sparse.linalg.splu(
-        global_matrix(problem.system, problem.h).tocsc(),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
-    return (8 + 4) * factor.L.nnz
+    """Return the bytes of L of M + h² L: its nonzeros; a block of them shares its indices."""
+    factor = global_factor(problem.system, problem.h)
+    assert isinstance(factor, CholeskyFactor)
+    return 8 * factor.entries
 
 
 def _repeat(step: Callable[[State], State], state: State) -> State:

@@ -15,26 +15,30 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..linear_solver import factorize
 from ..mass_spring import MassSpring
 from .objective import Iterate, Objective
+from .prefactored import hessian_factor
 
 
 class GaussNewton:
-    """Gauss-Newton steps from x_n, one unless more are asked for."""
+    """Gauss-Newton steps from x_n, one unless more are asked for; the pattern is analysed here."""
 
     default_iterations = 1
 
     def __init__(self, system: MassSpring, h: float) -> None:
-        """Keep nothing: the matrix is another in every step."""
+        """Analyse the pattern; the matrix is another in every step."""
+        self._analysed = hessian_factor(system)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield x_n, but for the pins, and then one iterate after the other, without end."""
         x = objective.x_n
-        gradient = objective.evaluate(x).gradient + objective.pull_of_pins(x, geometric=False)
-        iterate = objective.evaluate(np.where(objective.system.free[:, None], x, objective.y))
+        iterate = objective.evaluate(x)
+        gradient = iterate.gradient + objective.pull_of_pins(x, geometric=False)
+        if np.any(objective.y[objective.system.pinned] != x[objective.system.pinned]):
+            iterate = objective.evaluate(np.where(objective.system.free[:, None], x, objective.y))
         while True:
             yield iterate
-            correction = factorize(objective.hessian(x, geometric=False)).solve(gradient.ravel())
-            iterate = objective.evaluate(iterate.positions - correction.reshape(-1, 3))
+            factor = self._analysed.refactorize(objective.hessian(x, geometric=False))
+            correction = factor.solve(gradient.ravel()).reshape(-1, 3)
+            iterate = objective.evaluate(iterate.positions - correction)
             x, gradient = iterate.positions, iterate.gradient

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arguments import FloatArray
-from ..linear_solver import factorize
 from ..mass_spring import MassSpring
 from .line_search import line_search
-from .objective import Iterate, Objective, global_matrix
+from .objective import Iterate, Objective
+from .prefactored import global_factor
 
 WINDOW = 5  # steps remembered, as in the paper
 
@@ -33,7 +33,7 @@ class LBFGS:
         Raises:
             NotPositiveDefiniteError: if it is singular to rounding, masses being too small.
         """
-        self._factor = factorize(global_matrix(system, h))
+        self._factor = global_factor(system, h)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield the start y and then one iterate after the other; the last again once stuck."""

@@ -15,9 +15,9 @@ alone. One iteration is the lab's version.
 
 from collections.abc import Iterator
 
-from ..linear_solver import factorize
 from ..mass_spring import MassSpring
-from .objective import Iterate, Objective, global_matrix
+from .objective import Iterate, Objective
+from .prefactored import global_factor
 
 
 class LocalGlobal:
@@ -31,7 +31,7 @@ class LocalGlobal:
         Raises:
             NotPositiveDefiniteError: if it is singular to rounding, masses being too small.
         """
-        self._factor = factorize(global_matrix(system, h))
+        self._factor = global_factor(system, h)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield the start y and then one iterate after the other, without end."""

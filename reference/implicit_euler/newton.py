@@ -8,23 +8,28 @@ the metric of M).
 from collections.abc import Iterator
 from typing import Any
 
-from ..linear_solver import Factor, NotPositiveDefiniteError, factorize
+import numpy as np
+
+from ..linear_solver import Factor, NotPositiveDefiniteError
 from ..mass_spring import MassSpring
 from .line_search import line_search
 from .objective import Iterate, Objective
+from .prefactored import hessian_factor
 
 FIRST_SHIFT = 1e-2  # times M
 SHIFT_GROWTH, SHIFT_DECAY = 4.0, 2.0
 
 
 class Newton:
-    """Newton iterations from y."""
+    """Newton iterations from y; the Hessian's pattern is analysed here, once for all steps."""
 
     default_iterations = 100
 
     def __init__(self, system: MassSpring, h: float) -> None:
-        """Keep M, which shifts the Hessian."""
-        self._M = system.free_mass_matrix
+        """Analyse the pattern; keep M, which shifts the Hessian, and its place in it."""
+        self._analysed = hessian_factor(system)
+        self._M = np.repeat(system.free_masses, 3)
+        self._diagonal = system.dampers_apart.free_blocks.diagonal
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield the start y and then one iterate after the other; the last again once stuck."""
@@ -41,8 +46,10 @@ class Newton:
         The first one tried is below that of the last iteration, so that it fades out.
         """
         shift = shift / SHIFT_DECAY if shift > FIRST_SHIFT else 0.0
+        unshifted = hessian.data[self._diagonal]
         while True:
+            hessian.data[self._diagonal] = unshifted + shift * self._M
             try:
-                return factorize(hessian + shift * self._M if shift else hessian, "scipy"), shift
+                return self._analysed.refactorize(hessian), shift
             except NotPositiveDefiniteError:
                 shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)

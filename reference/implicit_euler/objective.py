@@ -13,11 +13,14 @@ Pinned particles are no variables: y has them at the end of their path, at x_n i
 their rows of the gradient are zero.
 """
 
+import functools
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import scipy
+from numpy import uint64 as at
 from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, array
@@ -38,9 +41,11 @@ from ..quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
 
 # Rounding errors in the gradient are a few units in the last place of the terms that it sums.
 ROUNDING = 64 * np.finfo(float).eps
+# What is said to be no less than the floor is rounded itself.
+MARGIN = 1.000001
 
 
-class Iterate(NamedTuple):
+class Iterate:
     """One point on the way to the minimum of g.
 
     Attributes:
@@ -48,26 +53,54 @@ class Iterate(NamedTuple):
         gradient: grad g(x), shape (particle, 3) [kg m], zero at the pins.
         value: g(x) [kg m²].
         gradient_norm: |grad g(x)|.
-        floor: what rounding alone can leave of |grad g|.
-        value_floor: how far rounding alone can move g(x).
+        most: no less than the floor, and quicker to know.
     """
 
-    positions: FloatArray
-    gradient: FloatArray
-    value: float
-    gradient_norm: float
-    floor: float
-    value_floor: float
+    def __init__(
+        self,
+        positions: FloatArray,
+        gradient: FloatArray,
+        value: float,
+        gradient_norm: float,
+        most: float,
+        measure: Callable[[FloatArray], tuple[float, float]],
+    ) -> None:
+        """Keep them, and how to measure what rounding can do."""
+        self.positions = positions
+        self.gradient = gradient
+        self.value = value
+        self.gradient_norm = gradient_norm
+        self.most = most
+        self._measure = measure
+
+    @functools.cached_property
+    def _rounding(self) -> tuple[float, float]:
+        return self._measure(self.positions)
+
+    @property
+    def floor(self) -> float:
+        """What rounding alone can leave of |grad g(x)|."""
+        return self._rounding[0]
+
+    @property
+    def value_floor(self) -> float:
+        """How far rounding alone can move g(x)."""
+        return self._rounding[1]
 
     @property
     def finite(self) -> bool:
-        """Whether neither g nor its gradient has overflowed."""
-        return math.isfinite(self.value + self.gradient_norm + self.floor)
+        """Whether neither g nor its gradient, nor what is needed for the floor, overflows."""
+        terms = self.most / ROUNDING
+        return math.isfinite(self.value + self.gradient_norm + terms * terms)
 
     @property
     def at_floor(self) -> bool:
         """Whether rounding alone may have left this gradient."""
-        return self.gradient_norm <= self.floor
+        return self.gradient_norm <= self.most and self.gradient_norm <= self.floor
+
+    def is_above(self, other: "Iterate") -> bool:
+        """Return whether g is greater than at the other, or no number, beyond rounding."""
+        return not (self.value <= other.value or self.value <= other.value + self.value_floor)
 
 
 class Objective:
@@ -111,17 +144,31 @@ class Objective:
             self.y, self.external, h, self._constant, arrays.masses, arrays.springs,
             arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only, arrays.pinned,
         )  # fmt: skip
+        self._most = _most_rounding(
+            self.y, self.external, h, arrays.masses, arrays.springs, arrays.rest_lengths,
+            arrays.stiffnesses, arrays.pinned,
+        )  # fmt: skip
         self.start = self.evaluate(self.y)
 
     def evaluate(self, positions: FloatArray) -> Iterate:
-        """Return g, its gradient and their rounding errors at unchecked positions."""
-        return Iterate(positions, *_evaluate(positions, *self._arguments))
+        """Return g and its gradient at unchecked positions."""
+        gradient, value, norm, reach = _evaluate(positions, *self._arguments)
+        still, moving = self._most
+        return Iterate(positions, gradient, value, norm, still + moving * reach, self._measure)
+
+    def _measure(self, positions: FloatArray) -> tuple[float, float]:
+        """Return what rounding can leave of the gradient's norm, and move of g."""
+        y, external, h, _, *springs = self._arguments
+        return _rounding(positions, y, external, h, *springs)
 
     def residual(self, iterate: Iterate) -> float:
         """Return |grad g(x)| / max(|grad g(y)|, floor)."""
         if iterate.gradient_norm == 0.0:
             return 0.0
-        return float(iterate.gradient_norm / max(self.start.gradient_norm, iterate.floor))
+        scale = self.start.gradient_norm
+        if scale < iterate.most:
+            scale = max(scale, iterate.floor)
+        return float(iterate.gradient_norm / scale)
 
     def value(self, positions: ArrayLike) -> float:
         """Return g(x) [kg m²]; the pins contribute what does not change.
@@ -150,7 +197,9 @@ class Objective:
         x = self._positions(positions)
         blocks = spring_blocks(self.effective, x, geometric=geometric)
         springs = self.system.dampers_apart.free_blocks
-        return self.system.free_mass_matrix + springs.matrix(self.h * self.h * blocks)
+        hessian = springs.matrix(self.h * self.h * blocks)
+        hessian.data[springs.diagonal] += np.repeat(self.system.free_masses, 3)
+        return hessian
 
     def pull_of_pins(self, positions: ArrayLike, *, geometric: bool = True) -> FloatArray:
         """Return h² K times the way of the pins from x_n to y, shape (particle, 3) [kg m].
@@ -162,6 +211,8 @@ class Objective:
             ValueError: if the positions have a wrong shape or are not finite.
         """
         way = np.where(self.system.free[:, None], 0.0, self.y - self.x_n)
+        if not way.any():
+            return way
         i, j = self.effective.springs.T
         blocks = spring_blocks(self.effective, self._positions(positions), geometric=geometric)
         pulls = np.einsum("sab,sb->sa", self.h * self.h * blocks, way[i] - way[j])
@@ -204,10 +255,8 @@ def global_matrix(system: MassSpring, h: float) -> Any:
     It is the Hessian of g with d held, the same for x, y and z and for all steps of length h. The
     pins are eliminated: their rows and columns are those of the identity.
     """
-    A = system.free_incidence
-    K = scipy.sparse.diags_array(effective_stiffnesses(system, h))
-    M = scipy.sparse.diags_array(system.free_masses)
-    return (M + h * h * (A @ K @ A.T)).tocsc()
+    weights = h * h * effective_stiffnesses(system, h)
+    return system.free_blocks.scalar_matrix(weights, system.free_masses)
 
 
 def effective_stiffnesses(system: MassSpring, h: float) -> FloatArray:
@@ -246,56 +295,89 @@ def blend_dampers(x_n, h, stiffnesses, system):
 def evaluate_objective(
     x, y, external, h, constant, masses, springs, rest_lengths, stiffnesses, tension_only, pinned
 ):
-    """Return grad g, g, |grad g|, and what rounding can leave of |grad g| and move of g."""
-    gradient, size, reach = np.empty(x.shape), np.empty(len(x)), np.empty(len(x))
-    inertia, inertia_size = add_inertia(x, y, external, h * h, masses, gradient, size, reach)
-    elastic, elastic_size = add_springs(
-        x, h * h, springs, rest_lengths, stiffnesses, tension_only, gradient, size, reach
-    )
-    for p in pinned:
-        put_vector(gradient, p, (0.0, 0.0, 0.0))
-        size[p] = 0.0
-    squares, size_squares = 0.0, 0.0
+    """Return grad g, g, |grad g| and the farthest that a particle is from the origin."""
+    gradient, value, farthest, squares = np.empty(x.shape), h * h * constant, 0.0, 0.0
     for i in range(len(x)):
-        squares += dot(vector_at(gradient, i), vector_at(gradient, i))
-        size_squares += size[i] * size[i]
-    value = inertia + elastic + h * h * constant
-    floor, value_floor = math.sqrt(size_squares), inertia_size + elastic_size
-    return gradient, value, math.sqrt(squares), ROUNDING * floor, ROUNDING * value_floor
-
-
-def add_inertia(x, y, external, hh, masses, gradient, size, reach):
-    """Set gradient to M (x - y) - h² f_ext, size to its terms', reach to |x|; return g's share."""
-    value, value_size = 0.0, 0.0
-    for i in range(len(x)):
-        x_i, y_i, f = vector_at(x, i), vector_at(y, i), scale(hh, vector_at(external, i))
-        away = subtract(x_i, y_i)
+        x_i, f = vector_at(x, i), scale(h * h, vector_at(external, i))
+        away = subtract(x_i, vector_at(y, i))
         inertia = scale(masses[i], away)
         put_vector(gradient, i, subtract(inertia, f))
-        reach[i] = norm(x_i)
-        size[i] = masses[i] * (reach[i] + norm(y_i)) + norm(f)
         value += 0.5 * dot(inertia, away) - dot(f, x_i)
-        value_size += 0.5 * dot(inertia, away) + norm(f) * reach[i]
-    return value, value_size
+        farthest = max(farthest, dot(x_i, x_i))
+    value += add_springs(x, h * h, springs, rest_lengths, stiffnesses, tension_only, gradient)
+    for p in pinned:
+        put_vector(gradient, p, (0.0, 0.0, 0.0))
+    for i in range(len(x)):
+        squares += dot(vector_at(gradient, i), vector_at(gradient, i))
+    return gradient, value, math.sqrt(squares), math.sqrt(farthest)
 
 
-def add_springs(x, hh, springs, rest_lengths, stiffnesses, tension_only, gradient, size, reach):
-    """Add h² times the springs' gradient, and the size of its terms; return g's share."""
-    value, value_size = 0.0, 0.0
+def add_springs(x, hh, springs, rest_lengths, stiffnesses, tension_only, gradient):
+    """Add h² times the springs' gradient; return their share of g."""
+    value = 0.0
     for s in range(len(springs)):
-        i, j = springs[s, 0], springs[s, 1]
+        i, j = at(springs[s, 0]), at(springs[s, 1])
         length, u = spring_frame(x, i, j)
         k, stretch = hh * stiffnesses[s], spring_stretch(length, rest_lengths[s], tension_only[s])
         pull = scale(k * stretch, u)
         put_vector(gradient, i, add(vector_at(gradient, i), pull))
         put_vector(gradient, j, subtract(vector_at(gradient, j), pull))
-        ends = reach[i] + reach[j]
+        value += 0.5 * k * stretch * stretch
+    return value
+
+
+def measure_rounding(
+    x, y, external, h, masses, springs, rest_lengths, stiffnesses, tension_only, pinned
+):
+    """Return what rounding can leave of |grad g| and move of g."""
+    size, reach, value_size, squares = np.empty(len(x)), np.empty(len(x)), 0.0, 0.0
+    for i in range(len(x)):
+        x_i, y_i, pull = vector_at(x, i), vector_at(y, i), h * h * norm(vector_at(external, i))
+        away = subtract(x_i, y_i)
+        reach[i] = norm(x_i)
+        size[i] = masses[i] * (reach[i] + norm(y_i)) + pull
+        value_size += 0.5 * masses[i] * dot(away, away) + pull * reach[i]
+    for s in range(len(springs)):
+        i, j = springs[s, 0], springs[s, 1]
+        length, _ = spring_frame(x, i, j)
+        k, ends = h * h * stiffnesses[s], reach[i] + reach[j]
+        stretch = abs(spring_stretch(length, rest_lengths[s], tension_only[s]))
         size[i] += k * (ends + rest_lengths[s])
         size[j] += k * (ends + rest_lengths[s])
-        value += 0.5 * k * stretch * stretch
-        value_size += k * abs(stretch) * (abs(stretch) + ends)
-    return value, value_size
+        value_size += k * stretch * (stretch + ends)
+    for p in pinned:
+        size[p] = 0.0
+    for i in range(len(x)):
+        squares += size[i] * size[i]
+    return ROUNDING * math.sqrt(squares), ROUNDING * value_size
+
+
+def most_rounding(y, external, h, masses, springs, rest_lengths, stiffnesses, pinned):
+    """Return a and b: wherever no particle is farther than r from the origin, a + b r is no less.
+
+    No less, that is, than what rounding can leave of |grad g|: its terms are summed with r for
+    every |x_i|, and the norm of a sum is at most the sum of norms.
+    """
+    still, moving = np.empty(len(y)), np.empty(len(y))
+    for i in range(len(y)):
+        still[i] = masses[i] * norm(vector_at(y, i)) + h * h * norm(vector_at(external, i))
+        moving[i] = masses[i]
+    for s in range(len(springs)):
+        i, j, k = springs[s, 0], springs[s, 1], h * h * stiffnesses[s]
+        still[i] += k * rest_lengths[s]
+        still[j] += k * rest_lengths[s]
+        moving[i] += 2.0 * k
+        moving[j] += 2.0 * k
+    for p in pinned:
+        still[p], moving[p] = 0.0, 0.0
+    a, b = 0.0, 0.0
+    for i in range(len(y)):
+        a += still[i] * still[i]
+        b += moving[i] * moving[i]
+    return MARGIN * ROUNDING * math.sqrt(a), MARGIN * ROUNDING * math.sqrt(b)
 
 
 _evaluate = TwoSpeeds(evaluate_objective)
+_rounding = TwoSpeeds(measure_rounding)
+_most_rounding = TwoSpeeds(most_rounding)
 _blend = TwoSpeeds(blend_dampers)

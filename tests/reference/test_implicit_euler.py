@@ -8,7 +8,9 @@ import pytest
 
 from reference import compiled, rotation, scenes
 from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from reference.implicit_euler.chebyshev import PLAIN
 from reference.implicit_euler.line_search import line_search
+from reference.implicit_euler.newton_cg import _product
 from reference.implicit_euler.objective import global_matrix
 from reference.mass_spring import (
     MassSpring,
@@ -19,6 +21,7 @@ from reference.mass_spring import (
     kinetic_energy,
     lengths,
     potential_energy,
+    spring_blocks,
 )
 from reference.outcome import Outcome
 
@@ -27,7 +30,7 @@ h = 0.05
 NUDGE = 6e-6
 DIFFERENCE = 1e-8
 
-CONVERGING = ["local_global", "lbfgs", "newton"]
+CONVERGING = ["local_global", "chebyshev", "lbfgs", "newton", "newton_cg"]
 
 
 @pytest.fixture(params=STEP_SOLVERS)
@@ -52,7 +55,8 @@ def stepped(system, state, solver="newton", external_forces=None, **settings):
 
 def converged(system, state, solver, **settings):
     """Return the state after a step solved as far as rounding allows."""
-    limit = {"local_global": 3000, "lbfgs": 500, "newton": 50, "gauss_newton": 1}[solver]
+    limits = {"local_global": 3000, "chebyshev": 500, "lbfgs": 500, "gauss_newton": 1}
+    limit = limits.get(solver, 50)
     result = stepped(system, state, solver, tolerance=1e-15, max_iterations=limit, **settings)
     assert result.at_floor or solver == "gauss_newton"
     return result.state
@@ -293,7 +297,7 @@ class TestStep:
         after = integrator.step(state, given).state
         np.testing.assert_allclose(after.positions, x, rtol=0, atol=1e-14)
 
-    @pytest.mark.parametrize("name", ["local_global", "lbfgs"])
+    @pytest.mark.parametrize("name", ["local_global", "chebyshev", "lbfgs", "newton_cg"])
     def test_every_solver_meets_newton(self, network, cloth, name):
         for system, state in (network, cloth):
             one, other = (converged(system, state, solver) for solver in (name, "newton"))
@@ -302,25 +306,25 @@ class TestStep:
             # M/2.
             np.testing.assert_allclose(one.positions, other.positions, rtol=0, atol=1e-12)
 
-    def test_lbfgs_without_a_past_steps_as_local_global(self, cloth, speed):
-        one, other = (stepped(*cloth, name, max_iterations=1) for name in ("lbfgs", "local_global"))
+    @pytest.mark.parametrize(("name", "iterations"), [("lbfgs", 1), ("chebyshev", PLAIN)])
+    def test_without_a_past_they_step_as_local_global(self, cloth, speed, name, iterations):
+        one, other = (
+            stepped(*cloth, solver, max_iterations=iterations) for solver in (name, "local_global")
+        )
         np.testing.assert_array_equal(one.state.positions, other.state.positions)
 
-    def test_lbfgs_needs_fewer_iterations_than_local_global(self, cloth):
+    @pytest.mark.parametrize("name", ["chebyshev", "lbfgs"])
+    def test_acceleration_saves_half_the_iterations(self, cloth, name):
         one, other = (
-            stepped(*cloth, name, tolerance=1e-9, max_iterations=3000)
-            for name in ("lbfgs", "local_global")
+            stepped(*cloth, solver, tolerance=1e-9, max_iterations=3000)
+            for solver in (name, "local_global")
         )
         assert one.outcome == other.outcome == Outcome.CONVERGED
         assert one.iterations < 0.5 * other.iterations
 
-    def test_g_never_grows_in_an_lbfgs_iteration(self, cloth, speed):
-        result = stepped(*cloth, "lbfgs", tolerance=0.0, max_iterations=30)
-        assert (np.diff(result.objectives) <= 1e-12).all()
-        assert result.objectives[-1] < result.objectives[0] - 1e-4
-
-    def test_g_never_grows_in_a_local_global_iteration(self, cloth, speed):
-        integrator = ImplicitEuler(*cloth[:1], h=h, solver="local_global")
+    @pytest.mark.parametrize("name", ["local_global", "chebyshev", "lbfgs", "newton_cg"])
+    def test_g_never_grows_in_an_iteration(self, cloth, speed, name):
+        integrator = ImplicitEuler(*cloth[:1], h=h, solver=name)
         iterates = list(itertools.islice(integrator.iterates(cloth[1]), 60))
         for before, after in itertools.pairwise(iterates):
             assert after.value <= before.value + after.value_floor
@@ -351,11 +355,28 @@ class TestStep:
         assert len(residuals) <= 6
         assert residuals[-2] < 10 * residuals[-3] ** 2
 
-    def test_newton_descends_from_a_point_where_g_is_not_convex(self, speed):
+    def test_conjugate_gradients_converge_faster_than_linearly(self, cloth):
+        residuals = stepped(*cloth, "newton_cg").history
+        assert residuals[-1] < 1e-10
+        assert len(residuals) <= 8
+        assert residuals[-2] < residuals[-3] ** 1.3
+
+    def test_the_hessian_product_is_that_of_the_hessian(self, network, rng, speed):
+        objective = ImplicitEuler(network[0], h=h).objective(network[1])
+        x, p = objective.y + 0.1 * outer(rng), outer(rng)
+        p[network[0].pinned] = 0
+        blocks = h * h * spring_blocks(objective.effective, x)
+        arrays = objective.effective.arrays
+        product = _product(blocks, p, arrays.masses, arrays.springs, arrays.pinned)
+        expected = (objective.hessian(x) @ p.ravel()).reshape(-1, 3)
+        np.testing.assert_allclose(product, expected, rtol=0, atol=1e-14)
+
+    @pytest.mark.parametrize("name", ["newton", "newton_cg"])
+    def test_newton_descends_from_a_point_where_g_is_not_convex(self, speed, name):
         """A flat cloth squeezed within its plane: the Hessian at y has negative eigenvalues."""
         system, state = scenes.lab_cloth(size=4, stiffness=1000.0)
         inwards = State(state.positions, 10 * (state.positions.mean(axis=0) - state.positions))
-        integrator = ImplicitEuler(system, h=h, max_iterations=200)
+        integrator = ImplicitEuler(system, h=h, solver=name, max_iterations=200)
         objective = integrator.objective(inwards)
         assert np.linalg.eigvalsh(objective.hessian(objective.y).toarray())[0] < -0.1
         result = integrator.step(inwards)
@@ -418,6 +439,12 @@ class TestResidual:
         x = network[1].positions + 0.1
         _, _, floor = self.residual(*network, x, given)
         assert objective.evaluate(x).floor == pytest.approx(float(floor), rel=1e-14, abs=0)
+
+    def test_the_most_is_no_less_than_the_floor_and_not_far_above(self, network, rng, speed):
+        objective = ImplicitEuler(network[0], h=h).objective(network[1], outer(rng))
+        for x in (objective.y, objective.x_n + 5.0, 1e-3 * objective.y, np.ones((7, 3))):
+            iterate = objective.evaluate(x)
+            assert iterate.floor <= iterate.most <= 3 * iterate.floor
 
     def test_at_the_floor_the_gradient_is_rounding(self, network, rng):
         given = outer(rng)
@@ -647,10 +674,11 @@ class TestSymmetries:
     def test_momentum_changes_by_the_outer_forces_alone(self, network, altered, rng, speed, solver):
         system, state = altered(network[0], pinned=()), network[1]
         given = outer(rng)
-        # Whole steps of M + h² L or more keep it all the way; a shortened step only in the end.
+        # Whole steps of M + h² L or more keep it all the way; shortened or truncated steps only
+        # in the end.
         after = (
             converged(system, state, solver, external_forces=given)
-            if solver == "lbfgs"
+            if solver in {"lbfgs", "newton_cg"}
             else self.after(system, state, solver, given)
         )
         mass = system.masses[:, None]
@@ -703,11 +731,21 @@ class TestSymmetries:
         )
         np.testing.assert_allclose(other.history, one.history, rtol=0, atol=self.ROUNDING)
 
-    def test_both_speeds_round_alike(self, network, solver):
+    def test_both_speeds_agree_to_the_rounding_of_their_factors(self, network, solver):
         ends = []
         for name in compiled.SPEEDS:
             with compiled.speed(name):
                 ends.append(self.after(*network, solver).positions)
+        np.testing.assert_allclose(*ends, rtol=0, atol=self.ROUNDING)
+
+    def test_both_speeds_round_g_and_its_derivatives_alike(self, network):
+        objective = ImplicitEuler(network[0], h=h).objective(network[1])
+        ends = []
+        for name in compiled.SPEEDS:
+            with compiled.speed(name):
+                iterate, hessian = objective.evaluate(objective.y), objective.hessian(objective.y)
+                floors = iterate.value, iterate.gradient_norm, iterate.floor, iterate.value_floor
+                ends.append(np.concatenate([iterate.gradient.ravel(), floors, hessian.data]))
         np.testing.assert_array_equal(*ends)
 
 
@@ -723,7 +761,7 @@ class TestInputs:
             (
                 "solver",
                 "simplex",
-                "one of local_global, lbfgs, newton, gauss_newton, got 'simplex'",
+                f"one of {', '.join(STEP_SOLVERS)}, got 'simplex'",
             ),
             ("tolerance", -1e-3, "at least 0"),
             ("tolerance", np.inf, "finite"),

@@ -1,0 +1,169 @@
+"""Cloths from a thousand particles to a million: factors, solves, iterations, memory.
+
+Each cloth is measured in a process of its own, `python -m bench.suites.cloth_scale`, since only a
+process can say how much memory it ever had.
+"""
+
+import importlib.util
+import json
+import resource
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from reference import ImplicitEuler, MassSpring, State, scenes
+from reference.cholesky import CholeskyFactor
+from reference.compiled import TwoSpeeds
+from reference.implicit_euler.objective import global_matrix
+from reference.implicit_euler.prefactored import prefactored
+from reference.linear_solver import factorize
+
+from ..isolation import one_thread
+from ..stopwatch import timed
+from .block import Block, Measured, Scale
+
+H = 1 / 60
+STIFFNESS = 1e4
+ITERATIONS = 10
+# Particles along a side, and how long a benchmark may take [s] where the cloth is to be measured.
+SIZES = {32: 0.0, 100: 0.0, 316: 1.0, 1000: 1.0}
+OURS = "supernodal"
+LIBRARIES = (OURS, "cholespy")
+# Rounds in which everything is timed in turn: so many particles in all, within limits.
+ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
+# What the limit of memory reads again and again: more than any cache holds [bytes].
+STRETCH = 2**28
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield every size by our own factorisation and by CHOLMOD."""
+    for size, seconds in SIZES.items():
+        if scale.seconds < seconds:
+            continue
+        cloth = {"particles": size * size, "h": H, "stiffness": STIFFNESS}
+        for library in LIBRARIES:
+            yield Block(
+                "cloth_scale", f"cloth/{size}x{size}", library,
+                partial(in_its_own_process, size, library), {**cloth, "iterations": ITERATIONS},
+            )  # fmt: skip
+
+
+def in_its_own_process(size: int, library: str) -> Measured:
+    """Measure one cloth, all by itself; say so where the library is not installed."""
+    if library != OURS and importlib.util.find_spec(library) is None:
+        return Measured({}, {"missing": f"{library} is not installed"})
+    done = subprocess.run(
+        [sys.executable, "-m", __name__, str(size), library],
+        env=one_thread(), capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if done.returncode:
+        raise RuntimeError(" ".join(done.stderr.split()[-40:]) or f"ended with {done.returncode}")
+    return Measured(json.loads(done.stdout))
+
+
+def billowing_cloth(size: int) -> tuple[MassSpring, State]:
+    """Return the lab's cloth, a hundred times as stiff, with two waves across it that rise."""
+    system, flat = scenes.lab_cloth(size=size, stiffness=STIFFNESS)
+    x = flat.positions.copy()
+    wave = np.sin(np.pi * x[:, 0]) * np.cos(np.pi * x[:, 2])
+    x[:, 1] += 0.1 * wave
+    v = np.zeros_like(x)
+    v[:, 1] = wave
+    return system, State(x, v)
+
+
+def measure(size: int, library: str) -> dict[str, Any]:
+    """Return the times [s] and the memory [bytes] of one cloth; what is compiled is so before."""
+    if size > min(SIZES):
+        measure(min(SIZES), library)
+    before = memory()
+    system, state = billowing_cloth(size)
+    rounds = int(np.clip(ROUNDS_PARTICLES // size**2, *ROUNDS))
+    if library != OURS:
+        matrix = global_matrix(system, H)
+        factor, seconds = timed(lambda: factorize(matrix, library))
+        sides = np.array(state.positions)
+        times = in_turn({"solve": lambda: factor.solve(sides)}, rounds)
+        return {"factor": seconds, **times, "memory": memory(), "before": before}
+    return {"before": before, **steps(system, state, rounds)}
+
+
+def steps(system: MassSpring, state: State, rounds: int) -> dict[str, Any]:
+    """Return what iterations cost and all their parts, in turn; and what they reach."""
+    matrix, assembly = timed(lambda: global_matrix(system, H))
+    factor, seconds = timed(lambda: prefactored(matrix))
+    assert isinstance(factor, CholeskyFactor)
+    integrator = ImplicitEuler(
+        system, h=H, solver="local_global", tolerance=0.0, max_iterations=ITERATIONS
+    )
+    objective = integrator.objective(state)
+    gradient = objective.start.gradient
+    limit = reading(2 * 8 * factor.entries + local_bytes(system))
+    work = {
+        "solve": lambda: factor.solve(gradient),
+        "local": lambda: objective.evaluate(objective.y),
+        "step": lambda: integrator.step(state),
+        "limit": limit,
+    }
+    times = in_turn(work, rounds)
+    used, result = memory(), integrator.step(state)
+    twice = global_matrix(system, 2 * H)
+    _, again = timed(lambda: factor.refactorize(twice))
+    return {
+        "assembly": assembly, "factor": seconds, "refactor": again, **times,
+        "entries": factor.entries, "matrix_entries": matrix.nnz, "residual": result.residual,
+        "history": result.history.tolist(), "memory": used,
+    }  # fmt: skip
+
+
+def in_turn(work: dict[str, Callable[[], Any]], rounds: int) -> dict[str, list[float]]:
+    """Return how long each took in each round; a first, uncounted round warms up."""
+    times: dict[str, list[float]] = {name: [] for name in work}
+    for _ in range(rounds + 1):
+        for name, call in work.items():
+            times[name].append(timed(call)[1])
+    return {name: seconds[1:] for name, seconds in times.items()}
+
+
+def local_bytes(system: MassSpring) -> int:
+    """Return what a local step has to read: the springs, and six numbers of each particle's."""
+    arrays = system.arrays
+    springs = (arrays.springs, arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only)
+    return sum(array.nbytes for array in springs) + 6 * 3 * 8 * system.particle_count
+
+
+def reading(size: int) -> Callable[[], float]:
+    """Return a call that reads so many bytes, as fast as memory or the caches give them."""
+    numbers = np.ones(min(size // 2, STRETCH) // 8)
+    passes, rest = divmod(size // 8, len(numbers))
+
+    def run() -> float:
+        whole = sum(_total(numbers) for _ in range(passes))
+        return whole + _total(numbers[:rest])
+
+    return run
+
+
+def total(numbers):
+    """Return the sum, in whatever order is fastest."""
+    result = 0.0
+    for i in range(len(numbers)):
+        result += numbers[i]
+    return result
+
+
+_total = TwoSpeeds(total, relaxed=True)
+
+
+def memory() -> int:
+    """Return the most memory that this process ever had [bytes]."""
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else 1024 * most
+
+
+if __name__ == "__main__":
+    print(json.dumps(measure(int(sys.argv[1]), sys.argv[2])))

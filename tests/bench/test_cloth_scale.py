@@ -1,0 +1,99 @@
+"""Growing cloths: what is measured adds up, and the tables follow the records."""
+
+import json
+
+import numpy as np
+import pytest
+
+from bench.findings import Results, cloth_scale
+from bench.suites import SCALES, blocks
+from bench.suites import cloth_scale as suite
+from reference.implicit_euler.objective import Objective
+
+SMALL = min(suite.SIZES)
+SETTINGS = {"particles": 10_000, "h": 1 / 60, "stiffness": 1e4, "iterations": 10}
+OURS = {
+    "entries": 500_000, "residual": 1e-3, "factor": 2.0, "refactor": 0.5, "memory": 2**31,
+    "solve": [0.01], "local": [0.02], "step": [0.3, 0.3, 0.5], "limit": [0.015],
+}  # fmt: skip
+THEIRS = {"factor": 4.0, "solve": [0.02, 0.02], "memory": 2**30}
+
+
+def measured(make, solver, arrays, **notes):
+    return make.record(
+        "cloth_scale", "cloth/100x100", solver, SETTINGS, arrays, size=0, notes=notes
+    )
+
+
+@pytest.fixture
+def ours():
+    """A small cloth measured in this process."""
+    return suite.measure(SMALL, suite.OURS)
+
+
+def test_what_is_measured_is_the_work_it_says(ours):
+    json.dumps(ours)
+    system, state = suite.billowing_cloth(SMALL)
+    objective = Objective(system, state, suite.H)
+    assert len(ours["history"]) == suite.ITERATIONS + 1
+    assert 0 < ours["residual"] < 0.1
+    assert objective.start.gradient_norm > 1e-3
+    assert system.particle_count < ours["entries"]
+    assert ours["memory"] >= ours["before"] > 1e7
+    for name in ("solve", "local", "step", "limit"):
+        assert len(ours[name]) == suite.ROUNDS[1]
+        assert min(ours[name]) > 0
+
+
+def test_a_failure_in_its_process_is_told():
+    with pytest.raises(RuntimeError, match="ValueError: library"):
+        suite.in_its_own_process(SMALL, "json")
+
+
+def test_a_library_that_is_missing_is_told(make):
+    notes = suite.in_its_own_process(SMALL, "no_such_library").notes
+    assert notes == {"missing": "no_such_library is not installed"}
+    table = cloth_scale.factors(Results([measured(make, "cholespy", {}, missing="is away")]))
+    assert table.rows[0][:3] == (10_000, "CHOLMOD (cholespy): is away", None)
+
+
+def test_the_limit_reads_what_it_says():
+    assert suite.reading(8 * 1000)() == 1000
+    system, _ = suite.billowing_cloth(3)
+    assert suite.local_bytes(system) == 26 * (16 + 8 + 8 + 1) + 9 * 144
+
+
+def test_the_quick_scale_stops_at_ten_thousand():
+    sizes = {
+        scale: {block.settings["particles"] for block in blocks("cloth_scale", SCALES[scale])}
+        for scale in SCALES
+    }
+    assert max(sizes["quick"]) == 10_000
+    assert max(sizes["full"]) == 1_000_000
+
+
+def test_iterations_are_told_by_particle_and_nonzero(make):
+    table = cloth_scale.iterations(Results([measured(make, "supernodal", OURS)]))
+    np.testing.assert_allclose(
+        table.rows[0], [10_000, 50, 20, 1000, 2000, 3000, 30, 2, 1e-3], rtol=1e-12
+    )
+    assert table.answer.sentence == (
+        "With 10,000 particles 10 iterations take 0.300 s, as long as 30.0 solves, and leave a "
+        "residual of 0.00100."
+    )
+
+
+def test_factors_stand_beside_cholmods(make):
+    records = [measured(make, "supernodal", OURS), measured(make, "cholespy", THEIRS)]
+    table = cloth_scale.factors(Results(records))
+    assert table.rows == (
+        (10_000, "ours", 2.0, 0.5, 10.0, 2.0),
+        (10_000, "CHOLMOD (cholespy)", 4.0, None, 20.0, 1.0),
+    )
+    assert table.answer.points == ("10,000 particles: factor 0.500, solve 0.500, memory 2.00",)
+
+
+def test_nothing_measured_is_nothing_said():
+    for table in (cloth_scale.iterations(Results([])), cloth_scale.factors(Results([]))):
+        assert table.rows == ()
+        assert table.answer.sentence == ""

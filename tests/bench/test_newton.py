@@ -1,0 +1,117 @@
+"""One step certified: the suite, its table and its sentence."""
+
+import numpy as np
+import pytest
+
+from bench.findings import Results
+from bench.findings import newton as findings
+from bench.suites import SCALES, Scale, blocks
+from bench.suites import newton as suite
+from reference import STEP_SOLVERS
+
+SIZE = 6
+
+
+@pytest.fixture(scope="module")
+def stiff():
+    """Answers to a small stiff cloth, by solver, start and most iterations."""
+    wanted = [
+        ("newton", suite.FROM_Y, 100),
+        ("lbfgs", suite.FROM_Y, 2000),
+        ("local_global", suite.FROM_Y, 3),
+        ("local_global", suite.FROM_BESIDE, 500),
+    ]
+    return {which: suite.certified_step(SIZE, 1e5, *which) for which in wanted}
+
+
+def stored(make, which, measured, **changed):
+    """A record of what was measured, some of it changed."""
+    solver, start, limit = which
+    arrays = dict(measured.arrays) | changed
+    settings = {"start": start, "iterations": limit}
+    return make.certified(solver, settings, arrays, measured.notes)
+
+
+def test_newton_reaches_the_tolerance_and_is_covered(stiff):
+    found = stiff["newton", suite.FROM_Y, 100].arrays
+    assert found["residual"] <= suite.TOLERANCE or found["at_floor"]
+    assert found["covered"]
+    assert found["same"]
+    assert found["balance"] < 1e-10
+    assert 0 < found["distance"] < 1e-9
+
+
+@pytest.mark.parametrize(
+    "which", [("lbfgs", suite.FROM_Y, 2000), ("local_global", suite.FROM_BESIDE, 500)]
+)
+def test_the_others_limits_are_newtons_wherever_both_are_covered(stiff, which):
+    found = stiff[which].arrays
+    assert found["covered"]
+    assert found["same"]
+    newton = stiff["newton", suite.FROM_Y, 100].arrays
+    assert 0 < found["apart"] <= found["distance"] + newton["distance"]
+
+
+def test_an_answer_far_from_the_limit_has_no_bound_but_an_error(stiff):
+    measured = stiff["local_global", suite.FROM_Y, 3]
+    found = measured.arrays
+    assert not any(found[name] for name in ("covered", "same", "different"))
+    assert found["distance"] == np.inf
+    assert found["error"] > 0.1
+    assert found["above"] > 0
+    assert measured.notes["why"].startswith("No bound")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stiffness", suite.STIFFNESSES)
+def test_on_thirty_by_thirty_newton_converges_and_the_others_limits_agree(stiffness):
+    here = [
+        block
+        for block in blocks("newton", SCALES["full"])
+        if block.problem == f"swing/k{stiffness:g}" and block.settings["iterations"] > suite.USUAL
+    ]
+    found = {(b.solver, b.settings["start"]): b.measure().arrays for b in here}
+    newton = found["newton", suite.FROM_Y]
+    assert newton["residual"] <= suite.TOLERANCE or newton["at_floor"]
+    assert newton["covered"]
+    for arrays in found.values():
+        if arrays["covered"]:
+            assert arrays["same"]
+            assert arrays["apart"] <= arrays["distance"] + newton["distance"]
+    others = set(STEP_SOLVERS) - {"newton", "gauss_newton"}
+    start = suite.FROM_BESIDE if stiffness >= suite.STIFF else suite.FROM_Y
+    assert all(found[solver, start]["covered"] for solver in others)
+
+
+def test_every_solver_has_a_block_at_every_stiffness():
+    listed = list(blocks("newton", Scale(targets=1, seconds=0.1)))
+    for stiffness in suite.STIFFNESSES:
+        here = {b.solver for b in listed if b.problem == f"swing/k{stiffness:g}"}
+        assert here == set(STEP_SOLVERS)
+    assert {b.size for b in listed} == {suite.QUICK}
+    assert {b.size for b in blocks("newton", SCALES["full"])} == {suite.FULL}
+
+
+def test_table_and_sentence_follow_the_records(make, stiff):
+    records = [stored(make, which, measured) for which, measured in stiff.items()]
+    table = findings.certified(Results(records))
+    columns = [column.title for column in table.columns]
+    bound, same = (columns.index(name) for name in ("bound", "Newton’s minimiser"))
+    assert [row[same] for row in table.rows] == ["yes", "yes", "not proven", "yes"]
+    assert [row[bound] == "yes" for row in table.rows] == [True, True, False, True]
+    assert table.rows[2][columns.index("a minimiser within")] is None
+    assert table.rows[0][0] == 1e5
+    assert "in 1 of 1 cloth." in table.answer.sentence
+    assert "3 answers, 2 are proven" in table.answer.sentence
+
+
+def test_another_minimiser_and_a_newton_that_fails_are_said(make, stiff):
+    (which, measured), *_ = stiff.items()
+    failed = stored(make, which, measured, residual=1.0, at_floor=False, same=False, different=True)
+    table = findings.certified(Results([failed]))
+    assert table.rows[0][-1] == "no"
+    assert "in 0 of 1 cloth." in table.answer.sentence
+
+
+def test_without_records_nothing_is_said():
+    assert findings.certified(Results([])).answer.sentence == ""

@@ -1,0 +1,85 @@
+"""Laws of the acceleration of local/global iterations."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from reference import ImplicitEuler, scenes
+from reference.implicit_euler import chebyshev
+from reference.implicit_euler.chebyshev import PLAIN, Pace
+
+h = 1 / 30
+
+
+def errors(rho, iterations):
+    """Return the size of the plain step before each iteration of a linear problem, and R's end.
+
+    A plain iteration multiplies the errors of 200 unknowns by numbers from 0 to rho.
+    """
+    share = np.linspace(0, rho, 200)
+    x = before = np.ones(200)
+    pace, sizes = Pace(), []
+    for _ in range(iterations):
+        step = -(1 - share) * x
+        sizes.append(math.sqrt(np.sum(step**2)))
+        weight, relaxation = pace.next(sizes[-1])
+        x, before = x + (weight - 1) * (x - before) + weight * relaxation * step, x
+    return np.array(sizes), pace._R
+
+
+@pytest.mark.parametrize("rho", [0.5, 0.9, 0.99, 0.999])
+def test_the_acceleration_finds_the_rate_by_itself(rho):
+    _, R = errors(rho, iterations=int(60 / math.sqrt(1 - rho)))
+    # Errors shrink by R / (1 + sqrt(1 - R²)) an iteration, and that by which R is in doubt is a
+    # part of it.
+    assert pytest.approx(rho / (2 - rho), abs=0.5 * (1 - rho)) == R
+
+
+@pytest.mark.parametrize("rho", [0.9, 0.99, 0.999])
+def test_accelerated_iterations_number_as_the_square_root_of_plain_ones(rho):
+    plain = math.log(1e-8) / math.log(rho)
+    sizes, _ = errors(rho, iterations=int(6 * math.sqrt(plain) + 30))
+    assert sizes[-1] < 1e-6 * sizes[0]
+
+
+def test_iterations_are_plain_first():
+    pace = Pace()
+    assert [pace.next(0.5**k) for k in range(PLAIN)] == [(1.0, 1.0)] * PLAIN
+    weight, relaxation = pace.next(0.5**PLAIN)
+    assert (weight, relaxation) == (1.0, pytest.approx(4 / 3))
+    R = relaxation - 1
+    second, _ = pace.next(0.01)
+    assert second == pytest.approx(2 / (2 - R**2))
+    assert pace.next(0.001)[0] == pytest.approx(4 / (4 - R**2 * second))
+
+
+@pytest.mark.parametrize("sizes", [[0.0], [1.0, 0.0], [1e-300, 1e-320], [1.0], [1e-150, 1e150]])
+def test_whatever_the_steps_the_weights_are_finite(sizes):
+    pace = Pace()
+    for size in itertools.islice(itertools.cycle(sizes), 3000):
+        weight, relaxation = pace.next(size)
+        assert 1 <= weight <= 2
+        assert 1 <= relaxation < 2
+
+
+def test_g_does_not_grow_whatever_the_weights(monkeypatch):
+    """A plain iteration takes the place of one that leaps too far."""
+    system, state = scenes.lab_cloth(size=5, stiffness=1000.0)
+    swinging = state.of(state.positions, np.cross(state.positions, [0.3, 0.5, 2.0]))
+    leaps = []
+
+    def leaping(pace, size):
+        leaps.append(size)
+        return (1.0, 10.0) if len(leaps) % 3 == 2 else (1.0, 1.0)
+
+    monkeypatch.setattr(chebyshev.Pace, "next", leaping)
+    integrator = ImplicitEuler(system, h=h, solver="chebyshev")
+    iterates = list(itertools.islice(integrator.iterates(swinging), 31))
+    for before, after in itertools.pairwise(iterates):
+        assert after.value <= before.value + after.value_floor
+    start, x = iterates[1:3]
+    correction = integrator._solver._factor.solve(start.gradient)
+    np.testing.assert_array_equal(x.positions, start.positions - correction)
+    assert len(leaps) == 30

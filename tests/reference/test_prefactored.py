@@ -1,0 +1,126 @@
+"""Laws of factors that are kept: found again where they fit, and never where they do not."""
+
+import gc
+
+import numpy as np
+import pytest
+
+from reference.cholesky import factor
+from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, prefactored
+from reference.implicit_euler.objective import Objective, global_matrix
+from reference.linear_solver import NotPositiveDefiniteError
+from reference.mass_spring import State
+
+h = 0.05
+
+
+@pytest.fixture(autouse=True)
+def nothing_alive():
+    """Start without the factors that other tests may have left to the garbage collector."""
+    prefactored.forget()
+
+
+@pytest.fixture
+def analyses(monkeypatch):
+    """Return the list to which every analysis of a pattern adds its number of rows."""
+    counted, analyse = [], factor._analyse
+
+    def counting(graph, order):
+        counted.append(len(order))
+        return analyse(graph, order)
+
+    monkeypatch.setattr(factor, "_analyse", counting)
+    return counted
+
+
+@pytest.fixture(params=["twice the step", "another pin", "a stiffer spring", "a longer spring"])
+def change(request, network, altered):
+    """Return another system and step, one thing of the network's changed."""
+    system, k, r = network[0], network[0].stiffnesses.copy(), network[0].rest_lengths.copy()
+    k[3], r[3] = 2 * k[3], 1.5 * r[3]
+    return {
+        "twice the step": (system, 2 * h),
+        "another pin": (altered(system, pinned=[4]), h),
+        "a stiffer spring": (altered(system, stiffnesses=k), h),
+        "a longer spring": (altered(system, rest_lengths=r), h),
+    }[request.param]
+
+
+@pytest.mark.parametrize("solver", STEP_SOLVERS)
+def test_a_change_between_steps_gives_what_a_fresh_integrator_gives(network, change, solver):
+    before = ImplicitEuler(network[0], h=h, solver=solver)
+    state = before.step(network[1]).state
+    system, step = change
+    after = ImplicitEuler(system, h=step, solver=solver).step(state)
+    prefactored.forget()
+    fresh = ImplicitEuler(system, h=step, solver=solver).step(state)
+    np.testing.assert_array_equal(after.state.positions, fresh.state.positions)
+    np.testing.assert_array_equal(after.history, fresh.history)
+    unchanged = before.step(state).state
+    assert np.abs(after.state.positions - unchanged.positions).max() > 1e-4
+
+
+@pytest.mark.parametrize("solver", STEP_SOLVERS)
+def test_a_pattern_is_analysed_once(network, altered, analyses, solver):
+    system, state = network
+    one = ImplicitEuler(system, h=h, solver=solver)
+    one.step(one.step(state).state)
+    other = ImplicitEuler(altered(system, stiffnesses=2.0), h=2 * h, solver=solver)
+    other.step(state)
+    assert len(analyses) == 1
+    pinned = ImplicitEuler(altered(system, pinned=[4]), h=h, solver=solver)
+    pinned.step(state)
+    assert len(analyses) == 2
+
+
+def test_solvers_share_what_is_alike(network, analyses):
+    integrators = [ImplicitEuler(network[0], h=h, solver=solver) for solver in STEP_SOLVERS]
+    assert sorted(analyses) == [7, 21]
+    assert len(integrators) == len(STEP_SOLVERS)
+
+
+def test_the_same_matrix_is_factorised_once(network):
+    one = prefactored.global_factor(network[0], h)
+    assert prefactored.global_factor(network[0], h) is one
+    assert prefactored.global_factor(network[0], 2 * h) is not one
+
+
+def test_a_factor_that_nobody_holds_is_let_go(network, analyses):
+    for _ in range(2):
+        ImplicitEuler(network[0], h=h, solver="local_global")
+        gc.collect()
+        assert not prefactored._alike
+        assert not prefactored._same
+    assert len(analyses) == 2
+
+
+def test_the_factor_is_that_of_the_matrix(network, rng, speed):
+    system, b = network[0], rng.standard_normal((7, 3))
+    kept = prefactored.global_factor(system, h)
+    for step in (h, 2 * h):
+        x = prefactored.global_factor(system, step).solve(b)
+        np.testing.assert_allclose(global_matrix(system, step) @ x, b, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(global_matrix(system, h) @ kept.solve(b), b, rtol=0, atol=1e-13)
+
+
+def test_every_hessian_has_the_pattern_that_was_analysed(network, altered, analyses):
+    """Also where springs are slack, without stiffness, or all at rest length."""
+    system, state = network
+    made = prefactored.hessian_factor(system)
+    loose = altered(system, stiffnesses=np.arange(len(system.springs)) % 2 * 10.0)
+    for model, x in ((system, state.positions), (loose, 0.5 * state.positions)):
+        for geometric in (False, True):
+            objective = Objective(model, State(x, state.velocities), h)
+            hessian = objective.hessian(x, geometric=geometric)
+            np.testing.assert_array_equal(hessian.toarray(), hessian.T.toarray())
+            try:
+                made.refactorize(hessian)
+            except NotPositiveDefiniteError:
+                assert geometric
+    assert analyses == [21]
+
+
+def test_the_pattern_of_a_matrix_cannot_be_changed_for_others(network):
+    matrix = global_matrix(network[0], h)
+    with pytest.raises(ValueError, match="read-only"):
+        matrix.indices[0] = 1
