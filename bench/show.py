@@ -1,4 +1,4 @@
-"""Animations and pictures of the named scenes."""
+"""Animations and pictures of the named scenes, and motions for animation programs."""
 
 from collections.abc import Callable
 from functools import partial
@@ -11,8 +11,18 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reference import IK_SOLVERS, STEP_SOLVERS, ImplicitEuler, curves, resample, scenes, track
+from reference import (
+    IK_SOLVERS,
+    STEP_SOLVERS,
+    IKSolution,
+    ImplicitEuler,
+    curves,
+    resample,
+    scenes,
+    track,
+)
 from reference.arguments import FloatArray, choice
+from reference.formats import bvh
 
 from .figures import COLOURS, STYLE
 from .pictures import ARM_VIEW, CLOTH_VIEW, draw_arm, draw_cloth, seen
@@ -29,6 +39,8 @@ FRAMES = SECONDS * RATE
 # A picture shows so many moments beside each other.
 MOMENTS = 4
 MARGIN = 0.1
+GIF, SVG, BVH = ".gif", ".svg", ".bvh"
+PICTURES = (GIF, SVG)
 
 
 class Motion(NamedTuple):
@@ -45,21 +57,43 @@ class Motion(NamedTuple):
     draw: Callable[[Axes, int], None]
 
 
-def write(scene: str, path: Path, solver: str | None, progress: Callable[[int, int], None]) -> None:
-    """Write a scene as an animated GIF or, by the file's suffix, as an SVG picture.
+class Drawn(NamedTuple):
+    """A curve and how the arm follows it, a frame a point."""
+
+    curve: FloatArray
+    motion: IKSolution
+
+
+def write(
+    scene: str,
+    path: Path,
+    solver: str | None,
+    progress: Callable[[int, int], None],
+    coherent: bool = False,
+) -> None:
+    """Write a scene as an animated GIF or, by the file's suffix, an SVG picture or a BVH motion.
 
     Raises:
-        ValueError: if the suffix is another, or scene or solver are unknown.
+        ValueError: if the suffix is another or not one for this scene, scene or solver are unknown,
+            or a cloth is to be coherent.
     """
-    choice("suffix of the file", path.suffix, (".gif", ".svg"))
-    if choice("scene", scene, SCENES) == CLOTH:
+    is_cloth = choice("scene", scene, SCENES) == CLOTH
+    choice("suffix of the file", path.suffix, PICTURES if is_cloth else (*PICTURES, BVH))
+    if is_cloth and coherent:
+        raise ValueError("coherent: expected an arm that follows a curve, got a cloth")
+    if is_cloth:
         motion = _falling(choice("solver", solver or "newton", STEP_SOLVERS))
     else:
-        curve = CUSTOM if scene == ARM else scene
-        motion = _drawing(curve, choice("solver", solver or "fabrik", IK_SOLVERS))
+        drawn = _drawn(scene, choice("solver", solver or "fabrik", IK_SOLVERS), coherent)
+        if path.suffix == BVH:
+            skeleton, _ = scenes.lab_arm()
+            frame_time = SECONDS / len(drawn.curve)
+            return bvh.write(path, skeleton, drawn.motion.local_rotations, frame_time)
+        motion = _drawing(drawn)
     white: dict[Any, Any] = {"savefig.facecolor": "white", "figure.facecolor": "white"}
     with mpl.rc_context({**STYLE, **white}):
-        (_animate if path.suffix == ".gif" else _picture)(motion, path, progress)
+        (_animate if path.suffix == GIF else _picture)(motion, path, progress)
+    return None
 
 
 def _animate(motion: Motion, path: Path, progress: Callable[[int, int], None]) -> None:
@@ -90,11 +124,18 @@ def _frame(ax: Axes, motion: Motion, i: int) -> tuple[()]:
     return ()
 
 
-def _drawing(curve: str, solver: str) -> Motion:
-    """Return the arm drawing a curve, evened out, each frame from the last solution."""
+def _drawn(scene: str, solver: str, coherent: bool) -> Drawn:
+    """Return the arm drawing a curve, evened out; a coherent motion can be repeated for ever."""
     skeleton, rest = scenes.lab_arm()
-    points = resample(curves[curve](), min_spacing=MIN_SPACING, max_spacing=MAX_SPACING)
-    positions = track(skeleton, points, solver, rest).positions
+    points = curves[CUSTOM if scene == ARM else scene]()
+    even = resample(points, min_spacing=MIN_SPACING, max_spacing=MAX_SPACING, closed=coherent)
+    motion = track(skeleton, even, solver, rest, coherent=coherent, closed=coherent)
+    return Drawn(even, motion)
+
+
+def _drawing(drawn: Drawn) -> Motion:
+    """Return what is seen of the arm and its curve."""
+    points, positions = drawn.curve, drawn.motion.positions
     shown = np.linspace(0, len(points) - 1, min(len(points), FRAMES)).round().astype(int)
     x, y, _ = seen(points, ARM_VIEW)
 

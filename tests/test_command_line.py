@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from bench import cli
@@ -42,6 +43,8 @@ MISUSE = {
     "scene unlike any": (["show", "qqq"], "expected one of arm, cloth, circle"),
     "solver": (["show", "heart", "--solver", "jacobi"], "expected one of ccd, fabrik"),
     "suffix": (["show", "heart", "-o", "heart.png"], "expected one of .gif, .svg"),
+    "suffix of a cloth": (["show", "cloth", "-o", "cloth.bvh"], "expected one of .gif, .svg"),
+    "coherent cloth": (["show", "cloth", "--coherent"], "coherent: expected an arm"),
     "no scene": (["show"], "SCENE"),
     "no records": (["report"], "no records in report"),
     "options before the command": (["--output", "x", "report"], "behind the command: report"),
@@ -195,6 +198,27 @@ def test_a_picture_of_a_scene_is_written_and_named(capsys, empty_folder):
     code, out, err = plumbob(capsys, "show", "heart", "-o", "pictures/heart.svg")
     assert (code, out, err) == (0, "pictures/heart.svg\n", "")
     assert "<svg" in (empty_folder / "pictures" / "heart.svg").read_text()
+
+
+@pytest.mark.parametrize("coherent", [False, True])
+def test_a_motion_is_written_for_animation_programs(capsys, empty_folder, coherent):
+    """Six decimals leave joint n of the arm off by (n + 1) 9e-7 + n 2.6 m 2.7e-8 at the most."""
+    from bench.problems.arm import MAX_SPACING, MIN_SPACING
+    from reference import curves, resample, scenes, track
+    from reference.formats import bvh
+
+    options = ["--coherent"] if coherent else []
+    code, out, err = plumbob(capsys, "show", "heart", "-o", "heart.bvh", *options)
+    assert (code, out, err) == (0, "heart.bvh\n", "")
+    spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
+    points = resample(curves["heart"](), closed=coherent, **spacing)
+    tracked = track(scenes.lab_arm()[0], points, "fabrik", coherent=coherent, closed=coherent)
+    motion = bvh.read(empty_folder / "heart.bvh")
+    assert motion.frame_time * len(points) == pytest.approx(5.0)
+    off = np.linalg.norm(motion.pose().positions - tracked.positions, axis=-1).max(axis=0)
+    joints = np.arange(5)
+    assert (off <= (joints + 1) * 9e-7 + joints * 2.6 * 2.7e-8).all()
+    assert np.ptp(tracked.positions[:, -1], axis=0).max() > 0.5
 
 
 @pytest.mark.slow

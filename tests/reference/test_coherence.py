@@ -1,0 +1,500 @@
+"""Coherent motions: on the path, within the limits, and of the least squared jumps nearby."""
+
+import functools
+import itertools
+
+import numpy as np
+import pytest
+
+from reference import (
+    IK_SOLVERS,
+    Articulation,
+    Mimic,
+    Outcome,
+    Skeleton,
+    Target,
+    coherence,
+    curves,
+    forward_kinematics,
+    rotation,
+    scenes,
+    solve_ik,
+    track,
+)
+from reference.coherence import descent
+from reference.coherence.course import Course, moved, path, restored, stuck, worth_of
+from reference.coherence.descent import cost, expanded, limited, projected
+from reference.coherence.ring import Ring
+from reference.differential import difference, integrate, jacobian
+from reference.inverse_kinematics import balls, goals_of
+from reference.inverse_kinematics.preparation import prepare
+from reference.inverse_kinematics.problem import checked_targets
+
+ARM = scenes.lab_arm()[0]
+FRAMES = 60
+LM = "levenberg_marquardt"
+TOLERANCE = 1e-6
+
+
+@functools.cache
+def drawn(name="heart", solver=LM, coherent=True, closed=False, rounds=1):
+    """The lab's arm drawing a curve."""
+    curve = np.tile(curves[name](FRAMES), (rounds, 1))
+    options = {"coherent": coherent, "closed": closed, "tolerance": TOLERANCE}
+    return track(ARM, curve, solver, max_iterations=1000, **options)
+
+
+def jumps(model, q, closed=False):
+    """How the pose changes from frame to frame, (jump, freedom)."""
+    found = difference(model, np.roll(q, -1, axis=0), q)
+    return found if closed else found[:-1]
+
+
+def squares(model, q, closed=False):
+    return 0.5 * (jumps(model, q, closed) ** 2).sum()
+
+
+def largest(model, q, closed=False):
+    return np.linalg.norm(jumps(model, q, closed), axis=-1).max()
+
+
+def slides(count=2, **limits):
+    """A gantry: slides along x on top of each other, and a tip a metre away, its reach."""
+    offsets = np.zeros((count + 1, 3))
+    offsets[-1] = 0.0, 0.0, 1.0
+    kinds = ["slide"] * count + ["fixed"]
+    return Articulation(Skeleton(np.arange(-1, count), offsets), kinds, (1, 0, 0), **limits)
+
+
+def hinges(count=2, **limits):
+    """A chain of hinges about z, links of a metre in the plane."""
+    offsets = np.zeros((count + 1, 3))
+    offsets[1:, 0] = 1.0
+    kinds = ["hinge"] * count + ["fixed"]
+    return Articulation(Skeleton(np.arange(-1, count), offsets), kinds, (0, 0, 1), **limits)
+
+
+def line(start, end, frames=FRAMES):
+    return np.linspace(start, end, frames)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("solver", IK_SOLVERS)
+@pytest.mark.parametrize("name", ["heart", "triangle"])
+def test_a_coherent_motion_is_on_its_path_and_its_jumps_are_smaller(name, solver, closed):
+    warm, motion = drawn(name, solver, coherent=False), drawn(name, solver, closed=closed)
+    assert (motion.outcome == Outcome.CONVERGED).all()
+    off = np.linalg.norm(motion.positions[:, -1] - curves[name](FRAMES), axis=-1)
+    assert off.max() <= TOLERANCE
+    before, after = (squares(ARM, some.local_rotations, closed) for some in (warm, motion))
+    assert after < before
+    assert largest(ARM, motion.local_rotations, closed) < largest(ARM, warm.local_rotations, closed)
+
+
+@pytest.mark.parametrize("name", ["circle", "heart", "star"])
+def test_a_closed_motion_returns_as_calmly_as_it_goes(name):
+    """Solved frame by frame the arm comes back to another pose; the seam is where that shows."""
+    for coherent in (False, True):
+        motion = drawn(name, "ccd", coherent, closed=coherent)
+        steps = np.linalg.norm(jumps(ARM, motion.local_rotations, closed=True), axis=-1)
+        assert (steps[-1] <= 1.5 * np.median(steps)) == coherent
+
+
+def test_a_closed_motion_does_not_drift():
+    """After a round the arm is in the same pose; solved frame by frame it has wandered off."""
+    for coherent, least, most in ((False, 1e-2, np.inf), (True, 0.0, 1e-5)):
+        q = drawn("heart", "ccd", coherent, closed=coherent, rounds=3).local_rotations
+        drift = rotation.angle(q[0], q[2 * FRAMES]).max()
+        assert least <= drift <= most
+
+
+def tangents(q, rng, count):
+    """Random changes of a motion that keep the tip on its path to first order, of norm 1."""
+    J = jacobian(ARM, q)[:, :3]
+    along = np.eye(15) - np.linalg.pinv(J) @ J
+    for _ in range(count):
+        v = (along @ rng.standard_normal((len(q), 15, 1)))[..., 0]
+        v[:, 12:] = 0.0
+        yield v / np.linalg.norm(v)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_no_small_change_makes_a_coherent_motion_calmer(closed, rng):
+    """To first order the sum stays; a warm motion's does not. Further on it only grows."""
+    slopes = {}
+    for coherent in (False, True):
+        q = drawn("heart", "ccd", coherent, closed=coherent and closed).local_rotations
+        h, found = 1e-4, []
+        for v in tangents(q, rng, 10):
+            sums = [squares(ARM, integrate(ARM, q, s * h * v), closed) for s in (1, -1)]
+            found.append(abs(sums[0] - sums[1]) / (2.0 * h))
+        slopes[coherent] = max(found)
+    assert slopes[True] < 1e-8 < 1e-3 < slopes[False]
+    least = squares(ARM, q, closed)
+    for v in tangents(q, rng, 5):
+        other = integrate(ARM, q, 0.05 * v)
+        back = solve_ik(ARM, other, curves["heart"](FRAMES), LM, tolerance=1e-12).local_rotations
+        assert squares(ARM, back, closed) > least
+
+
+def test_the_reversed_curve_gives_the_reversed_motion():
+    there = drawn("heart")
+    back = track(
+        ARM, curves["heart"](FRAMES)[::-1], LM, coherent=True,
+        tolerance=TOLERANCE,
+    )  # fmt: skip
+    np.testing.assert_allclose(back.positions[::-1], there.positions, rtol=0, atol=1e-6)
+
+
+def test_a_closed_motion_does_not_depend_on_where_it_begins():
+    curve = np.roll(curves["heart"](FRAMES), -17, axis=0)
+    later = track(ARM, curve, "fabrik", coherent=True, closed=True, tolerance=TOLERANCE)
+    whole = drawn("heart", closed=True).positions
+    np.testing.assert_allclose(later.positions, np.roll(whole, -17, axis=0), rtol=0, atol=1e-6)
+
+
+def test_two_rounds_at_once_are_one_round_twice():
+    one, two = drawn("heart", closed=True), drawn("heart", closed=True, rounds=2)
+    np.testing.assert_allclose(two.positions[:FRAMES], one.positions, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(two.positions[FRAMES:], one.positions, rtol=0, atol=1e-5)
+
+
+def test_a_turned_world_gives_the_turned_motion(rng):
+    turn = rotation.random(rng)
+    offsets = ARM.offsets.copy()
+    offsets[0] = rotation.rotate(turn, offsets[0])
+    start = rotation.identity(5)
+    start[0] = turn
+    curve = rotation.rotate(turn, curves["heart"](FRAMES))
+    motion = track(
+        Skeleton(ARM.parents, offsets), curve, LM, start, coherent=True,
+        tolerance=TOLERANCE,
+    )  # fmt: skip
+    upright = drawn("heart").positions
+    np.testing.assert_allclose(motion.positions, rotation.rotate(turn, upright), rtol=0, atol=1e-6)
+
+
+def test_a_finer_drawing_gives_the_same_motion():
+    """The sums are those of an integral: halving the steps leaves a quarter of the difference."""
+    found = []
+    for frames in (32, 64, 128, 256):
+        curve = curves["circle"](frames) * 0.5 + [0.7, 0.0, 0.0]
+        motion = track(ARM, curve, LM, coherent=True, closed=True)
+        found.append(motion.positions[:: frames // 32])
+    errors = [np.abs(a - b).max() for a, b in itertools.pairwise(found)]
+    assert 3.5 < errors[0] / errors[1] < 4.5
+    assert 3.5 < errors[1] / errors[2] < 4.5
+
+
+@pytest.mark.parametrize("elbow", [1.0, -1.0])
+def test_two_hinges_follow_a_line_as_trigonometry_says(elbow, speed):
+    arm, curve = hinges(), line([0.5, -0.8, 0.0], [0.9, 0.9, 0.0], 9)
+    motion = track(arm, curve, LM, [0.0, elbow], coherent=True, tolerance=1e-9)
+    x, y = curve[:, 0], curve[:, 1]
+    bend = elbow * np.arccos(0.5 * (x * x + y * y) - 1.0)
+    expected = np.column_stack([np.arctan2(y, x) - 0.5 * bend, bend])
+    np.testing.assert_allclose(motion.coordinates, expected, rtol=0, atol=1e-8)
+
+
+def test_slides_share_a_way_evenly(speed):
+    motion = track(slides(), line([0, 0, 1], [3, 0, 1], 7), LM, coherent=True)
+    steps = np.diff(motion.coordinates, axis=0)
+    np.testing.assert_allclose(steps, 0.25, rtol=0, atol=1e-9)
+
+
+def test_a_slide_with_limits_goes_as_far_as_they_let_it(speed):
+    """Of 3 m the second slide may go 0.6: all of it, evenly, and the first one the rest."""
+    gantry = slides(lower=[-9, -0.1, 0], upper=[9, 0.5, 0])
+    motion = track(gantry, line([0, 0, 1], [3, 0, 1], 7), LM, coherent=True)
+    assert gantry.within_limits(motion.coordinates, 0.0).all()
+    np.testing.assert_allclose(motion.coordinates[:, 1], np.linspace(-0.1, 0.5, 7), atol=1e-9)
+    assert (motion.outcome == Outcome.CONVERGED).all()
+
+
+def test_an_endless_hinge_goes_on_where_a_turn_ends():
+    """Round its own axis an arm need only turn, on and on; at the seam it is back all the same."""
+    circle = 2.0 * curves["circle"](FRAMES)[:, [0, 2, 1]]
+    q = track(hinges(3), circle, LM, [0.0, 1.0, 1.0], coherent=True, closed=True).coordinates
+    np.testing.assert_allclose(np.diff(q[:, 0]), 2 * np.pi / FRAMES, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(q[:, 1:], q[[0] * FRAMES, 1:], rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("solver", ["ccd", "fabrik", LM])
+def test_points_out_of_reach_are_said_so_and_the_motion_stays_calm(solver):
+    curve = 2.2 * curves["heart"](FRAMES)
+    far = np.linalg.norm(curve - ARM.offsets[0], axis=-1) > ARM.reach()
+    motion = track(ARM, curve, solver, coherent=True, closed=True)
+    assert 5 < far.sum() < FRAMES - 5
+    assert (motion.outcome[far] == Outcome.UNREACHABLE).all()
+    excess = motion.residual - np.linalg.norm(curve - ARM.offsets[0], axis=-1) + ARM.reach()
+    assert excess[far].max() < 0.02
+    steps = np.linalg.norm(jumps(ARM, motion.local_rotations, True), axis=-1)
+    way = np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=-1)
+    assert (steps < 2.0 * way + 0.02).all()
+
+
+def test_a_frame_that_limits_keep_from_its_point_says_what_its_solver_said():
+    arm = hinges(3, lower=[-3, 0.1, 0.1, 0], upper=[3, 1.0, 1.0, 0])
+    curve = line([1.0, 0.5, 0.0], [2.6, 0.5, 0.0])
+    warm = track(arm, curve, LM, [0.0, 0.8, 0.8])
+    motion = track(arm, curve, LM, [0.0, 0.8, 0.8], coherent=True)
+    assert set(warm.outcome) == {Outcome.CONVERGED, Outcome.STALLED}
+    np.testing.assert_array_equal(motion.outcome, warm.outcome)
+    off = warm.outcome == Outcome.STALLED
+    assert motion.residual[off].mean() < 1.1 * warm.residual[off].mean()
+    assert largest(arm, motion.coordinates) < 0.2
+
+
+def test_a_straight_arm_closes_its_round_too():
+    """At exactly full reach no pose can move the tip outwards, and every ball may be twisted."""
+    curve = curves["circle"](FRAMES) * np.sqrt(ARM.reach() ** 2 - 1.7**2) / 0.6
+    motion = track(ARM, curve, "fabrik", coherent=True, closed=True)
+    assert (motion.outcome == Outcome.CONVERGED).all()
+    steps = np.linalg.norm(jumps(ARM, motion.local_rotations, True), axis=-1)
+    assert steps[-1] < 1.5 * np.median(steps)
+
+
+def test_a_rotation_is_followed_as_well():
+    turns = rotation.exponential(line([0, 0, 0], [0.3, 0.8, -0.2]))
+    target = Target(curves["circle"](FRAMES), turns)
+    motion = track(ARM, target, LM, coherent=True, tolerance_rotation=1e-6)
+    assert motion.residual_rotation.max() <= 1e-6
+    pose = forward_kinematics(ARM, motion.local_rotations)
+    assert rotation.angle(pose.rotations[:, -1], turns).max() <= 1e-6
+    warm = track(ARM, target, LM, tolerance_rotation=1e-6)
+    assert squares(ARM, motion.local_rotations) < squares(ARM, warm.local_rotations)
+
+
+def test_two_hands_are_led_at_once():
+    offsets = [[0, 0, 0], [0, 0.5, 0], [0.5, 0, 0], [0.5, 0, 0], [-0.5, 0, 0], [-0.5, 0, 0]]
+    tree = Skeleton([-1, 0, 1, 2, 1, 4], offsets)
+    circle = 0.3 * curves["circle"](FRAMES)[:, [0, 2, 1]] + [0, 0.4, 0]
+    aside = np.array([0.6, 0, 0])
+    targets = [Target(circle + aside, effector=3), Target(circle - aside, effector=5)]
+    start = rotation.exponential(np.full((6, 3), 0.2))
+    motion = track(tree, targets, LM, start, coherent=True, closed=True, tolerance=1e-8)
+    assert motion.residual.max() <= 1e-8
+    steps = np.linalg.norm(jumps(tree, motion.local_rotations, True), axis=-1)
+    assert steps[-1] < 1.5 * np.median(steps)
+
+
+def test_joints_that_do_not_move_the_effector_stay_as_they_are(rng):
+    tree = Skeleton([-1, 0, 1, 0, 3], [[0, 1, 0]] * 5)
+    start = rotation.random(rng, 5)
+    curve = line([0.3, 1.0, 0.2], [0.2, 1.5, -0.9], 12)
+    motion = track(tree, curve, "ccd", start, effector=2, coherent=True)
+    np.testing.assert_allclose(motion.local_rotations[:, 2:], [start[2:]] * 12, atol=1e-15)
+
+
+def test_a_long_motion_is_the_same_whether_it_is_first_found_in_few_frames_or_not(monkeypatch):
+    curve, found = curves["heart"](300), []
+    for fewest in (32, 10_000):
+        monkeypatch.setattr(coherence, "FEWEST", fewest)
+        found.append(track(ARM, curve, LM, coherent=True, tolerance=TOLERANCE).positions)
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-6)
+
+
+def test_a_motion_is_never_less_calm_than_the_one_it_is_made_from(monkeypatch):
+    """Were another motion found in few frames that is less calm, the search begins again."""
+
+    def shaken(course, q):
+        step = 0.1 * np.cos(np.arange(q.shape[0] * 12.0)).reshape(-1, 12)
+        return restored(course, moved(course, q, step))[0], 1
+
+    monkeypatch.setattr(coherence, "refined", shaken)
+    motion = track(ARM, curves["heart"](FRAMES), LM, coherent=True, tolerance=TOLERANCE)
+    calm = squares(ARM, drawn("heart").local_rotations)
+    assert squares(ARM, motion.local_rotations) == pytest.approx(calm, rel=1e-9)
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+@pytest.mark.parametrize("closed", [False, True])
+def test_few_frames_are_a_motion_too(frames, closed, speed):
+    curve = curves["circle"](FRAMES)[:frames]
+    motion = track(ARM, curve, "fabrik", coherent=True, closed=closed)
+    assert (motion.outcome == Outcome.CONVERGED).all()
+
+
+def test_a_point_that_stays_is_followed_by_an_arm_that_stays():
+    """The tip is within the tolerance of the path at once, then on it: half of the tolerance."""
+    motion = track(ARM, np.tile([0.6, 0.1, 0.2], (9, 1)), coherent=True, closed=True)
+    np.testing.assert_allclose(motion.positions, motion.positions[[0] * 9], rtol=0, atol=1e-12)
+
+
+def test_an_effector_that_nothing_moves_is_left_alone():
+    motion = track(ARM, line([0, 1.7, 0], [0, 1.7, 0], 3), effector=0, coherent=True)
+    assert (motion.outcome == Outcome.CONVERGED).all()
+
+
+def test_iterations_are_counted_and_residuals_are_those_before():
+    warm, motion = (
+        track(ARM, curves["circle"](9), coherent=coherent, record=True)
+        for coherent in (False, True)
+    )
+    steps = motion.iterations - warm.iterations
+    assert (steps == steps[0]).all()
+    assert steps[0] > 0
+    np.testing.assert_array_equal(motion.history, warm.history)
+
+
+def test_only_a_coherent_motion_can_be_closed():
+    with pytest.raises(ValueError, match="closed: expected False where coherent is False"):
+        track(ARM, curves["circle"](3), closed=True)
+
+
+MODELS = {
+    "balls": (ARM.joint_count * ["ball"], {}, [-1], False),
+    "pose": (["hinge", "ball", "slide", "ball", "hinge"], {}, [-1], True),
+    "free": (["free", "hinge", "ball", "hinge", "fixed"], {}, [-1], True),
+    "mimic": (["hinge", "slide", "hinge", "ball", "hinge"], {2: Mimic(0, -0.7, 0.1),
+              1: Mimic(4, 0.3)}, [-1], False),
+    "two": (["ball", "hinge", "slide", "ball", "ball"], {}, [2, 4], True),
+}  # fmt: skip
+
+
+def course_of(name, closed, rng, drawn_to=()):
+    """A random tree of joints, on a path that its poses are on, and these poses."""
+    kinds, mimics, effectors, oriented = MODELS[name]
+    parents = [-1, 0, 1, 1, 3] if len(effectors) > 1 else np.arange(-1, 4)
+    axes, frames = rng.standard_normal((5, 3)), rotation.random(rng, 5)
+    tree = Skeleton(parents, rng.standard_normal((5, 3)))
+    model = Articulation(tree, kinds, axes, frames=frames, mimics=mimics, lower=-0.4, upper=0.4)
+    prepared = prepare(model, tuple(e % 5 for e in effectors), (oriented,) * len(effectors))
+    q0 = Articulation(tree, kinds, axes, frames=frames, mimics=mimics).random(rng)
+    q = integrate(model, q0, 0.3 * rng.standard_normal((4, model.freedom_count)))
+    pose = forward_kinematics(model, q)
+    targets = [
+        Target(pose.positions[:, e], pose.rotations[:, e] if oriented else None, e, 1.0 + k)
+        for k, e in enumerate(effectors)
+    ]
+    goals = goals_of(checked_targets(model, targets, -1), (4,))
+    strict = ~np.isin(np.arange(4), drawn_to)
+    goals[~strict, :, :3] += 0.1
+    mechanism = prepared.mechanism
+    columns = np.concatenate([
+        np.arange(model.coordinate_count)[model.coordinates_of(j)] for j in range(5)
+        if j not in mimics and j in joints_of(mechanism, model)
+    ])  # fmt: skip
+    return Course(mechanism, worth_of(mechanism), goals, strict, closed), q[:, columns].copy()
+
+
+def joints_of(mechanism, model):
+    """The articulation's joints that are the mechanism's."""
+    sources = set(mechanism.sources.tolist())
+    return [j for j in range(5) if model.coordinates_of(j).start in sources]
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("name", MODELS)
+def test_the_second_order_model_is_that_of_the_cost_along_the_path(name, closed, rng, speed):
+    """Balls have no limits that are felt here: the curvature of those is left out of the model."""
+    course, q = course_of(name, closed, rng, drawn_to=[2])
+    z = rng.uniform(0.0, 0.1, (4, len(course.mechanism.joints.integers), 3))
+    felt = course.mechanism.joints.integers[:, 1] != 3
+    course.mechanism.joints.numbers[~felt, 10:13] = [-np.inf, np.inf, np.inf]
+    model = expanded(course, q, z)
+    gradient, within = slopes(course, q, z, model)
+    assert model.cost == pytest.approx(cost(course, q, z))
+    v = rng.standard_normal(gradient.shape)
+    v = np.einsum("fkl,fl->fk", null_spaces(course, q), v)
+
+    def along(h):
+        there, on = restored(course, moved(course, q, h * v))
+        assert on[course.strict].all()
+        return cost(course, there, z)
+
+    h = 1e-4
+    first = (along(h) - along(-h)) / (2 * h)
+    assert first == pytest.approx((gradient * v).sum(), rel=1e-5, abs=1e-6)
+    after = np.roll(v, -1, axis=0)[: len(model.between)]
+    second = np.einsum("fk,fkl,fl", v, within, v)
+    second += 2.0 * np.einsum("fk,fkl,fl", after, model.between, v[: len(after)])
+    coarse, fine = ((along(h) - 2.0 * model.cost + along(-h)) / h**2 for h in (1e-3, 5e-4))
+    assert (4.0 * fine - coarse) / 3.0 == pytest.approx(second, rel=1e-5)
+
+
+def slopes(course, q, z, model):
+    """The gradient and the second derivatives by each frame, with the limits where it is."""
+    touched = np.full(z.shape, -1)
+    gradient, within, surplus, same = limited(
+        course, q, z, model, np.zeros_like(model.gradient), touched
+    )
+    assert (surplus, same) == (0.0, False)
+    return projected(model.P, gradient, within)
+
+
+@pytest.mark.parametrize("seed", [2, 9, 11])
+def test_no_step_raises_the_cost(monkeypatch, seed):
+    """Even from poses that have nothing to do with one another; whole Newton steps would here."""
+    curve, frames = curves["heart"](5), 5
+    mechanism = prepare(balls(ARM), (4,), (False,)).mechanism
+    goals = goals_of(checked_targets(ARM, curve, -1), (frames,))
+    course = Course(mechanism, worth_of(mechanism), goals, np.ones(frames, dtype=bool), True)
+    start = rotation.random(np.random.default_rng(seed), frames, 5)
+    q = solve_ik(ARM, start, curve, LM).local_rotations
+    q, on = restored(course, q[:, :4].reshape(frames, -1))
+    assert on.all()
+    free = np.zeros((frames, 4, 3))
+    costs = [cost(course, q, free)]
+    for steps in range(1, 14):
+        monkeypatch.setattr(descent, "MOST_STEPS", steps)
+        costs.append(cost(course, descent.descend(course, q)[0], free))
+    assert (np.diff(costs) <= 1e-12).all()
+    assert costs[-1] < 0.5 * costs[0]
+
+
+def null_spaces(course, q):
+    """Projections onto the changes that keep the strict frames on the path, by differences."""
+    n, h = course.mechanism.freedoms, 1e-6
+    columns = [
+        (path(course, moved(course, q, h * e))[0] - path(course, moved(course, q, -h * e))[0])
+        / (2 * h)
+        for e in np.eye(n)[:, None, :] * np.ones((1, len(q), 1))
+    ]
+    J = np.stack(columns, axis=-1)
+    P = np.eye(n) - np.linalg.pinv(J, rcond=1e-6) @ J
+    P[~course.strict] = np.eye(n)
+    return P
+
+
+def test_the_limits_of_balls_push_as_the_cost_says(rng, speed):
+    course, q = course_of("balls", False, rng)
+    course = course._replace(strict=np.zeros(4, dtype=bool))
+    course.mechanism.joints.numbers[:, 12] = 0.2
+    z = rng.uniform(0.0, 0.1, (4, len(course.mechanism.joints.integers), 3))
+    gradient, _ = slopes(course, q, z, expanded(course, q, z))
+    v, h = rng.standard_normal(gradient.shape), 1e-6
+    found = cost(course, moved(course, q, h * v), z) - cost(course, moved(course, q, -h * v), z)
+    assert found / (2 * h) == pytest.approx((gradient * v).sum(), rel=1e-6)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+@pytest.mark.parametrize("frames", [3, 4, 7, 8])
+def test_a_ring_is_solved_like_a_dense_system(frames, closed, rng, speed):
+    n = 2
+    within = np.eye(n) * 8.0 + np.ones((frames, n, n))
+    between = rng.standard_normal((frames if closed else frames - 1, n, n))
+    A = np.zeros((frames, n, frames, n))
+    for f in range(frames):
+        A[f, :, f] = within[f] + 0.5 * np.eye(n)
+    for f, block in enumerate(between):
+        g = (f + 1) % frames
+        A[g, :, f] += block
+        A[f, :, g] += block.T
+    b = rng.standard_normal((frames, n))
+    ring = Ring(frames, n, closed)
+    ring.fill(within, between)
+    dense = np.linalg.solve(A.reshape(frames * n, -1), b.ravel()).reshape(b.shape)
+    np.testing.assert_allclose(ring.solve(b, 0.5), dense, rtol=0, atol=1e-13)
+    assert ring.solve(b, -100.0) is None
+
+
+def test_a_straight_arm_is_stuck():
+    """Hinges in a plane can never leave it: they are not stuck for that."""
+    q = np.array([[0.3, 0.0, 0.0], [0.3, 0.0, 0.5]])
+    arm = hinges(3)
+    mechanism = prepare(arm, (3,), (False,)).mechanism
+    goals = np.zeros((2, 1, 8))
+    goals[..., 7] = 1.0
+    course = Course(mechanism, worth_of(mechanism), goals, np.ones(2, dtype=bool), False)
+    assert stuck(course, q).tolist() == [True, False]
