@@ -236,7 +236,9 @@ def _solve_mechanisms(
     )  # fmt: skip
     if not fine:  # likewise
         wanted = check_numbers(wanted)
-        again = articulation.checked("local_rotations", starts).reshape(np.shape(start))
+        again = articulation.checked("local_rotations", starts)
+        if isinstance(model, Skeleton):
+            again = again.reshape(*again.shape[:-1], -1, 4)
         return _solve_mechanisms(model, again, wanted, settings)
     if isinstance(model, Skeleton):
         local = answers.q.reshape(answers.local.shape)

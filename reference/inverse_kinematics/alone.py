@@ -5,6 +5,7 @@ would take longer than solving: one start and one target, float64 arrays of the 
 Whatever else comes, or is amiss, is left to `solve_targets`.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -34,10 +35,12 @@ def solve_alone(
         position, turn, effector, weight = target
     if not (is_plain(position, (3,)) and (turn is None or is_plain(turn, (4,)))):
         return None
-    if settings.record or type(effector) is not int or type(weight) is not float or weight <= 0.0:
+    if settings.record or type(effector) is not int:
+        return None
+    if type(weight) is not float or not 0.0 < weight < math.inf:  # alone, it counts for nothing
         return None
     if type(model) is Articulation and is_plain(start, (model.coordinate_count,)):
-        goal = new_goal(position, turn, weight)
+        goal = new_goal(position, turn)
         return solve_mechanism(model, start, goal, effector, turn is not None, settings)
     if type(model) is Skeleton and turn is None and not settings.restarts:
         return solve_chain(model, start, position, effector, settings)
@@ -54,13 +57,13 @@ def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
     )
 
 
-def new_goal(position: FloatArray, turn: FloatArray | None, weight: float) -> FloatArray:
+def new_goal(position: FloatArray, turn: FloatArray | None) -> FloatArray:
     """Return what the kernels want to know of one target, (1, 1, 8)."""
     goal = np.empty((1, 1, 8))
     row = goal[0, 0]
     row[:ROTATION] = position
     row[ROTATION:WEIGHT] = IDENTITY if turn is None else turn
-    row[WEIGHT] = weight
+    row[WEIGHT] = 1.0
     return goal
 
 

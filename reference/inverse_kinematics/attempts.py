@@ -54,6 +54,9 @@ from .stacked import Stack, new_stack
 # An attempt that may be followed by another is given up once this many iterations have not brought
 # it this much nearer.
 PATIENCE, PROGRESS = 3, 0.5
+# One that stalls within so few is stuck, such as a straight chain, perhaps folded since, whose
+# target lies on its own line.
+STUCK = 6
 INFINITY = math.inf
 # A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
 NUDGE_AXIS = (0.48, 0.6, 0.64)
@@ -197,7 +200,8 @@ def attempts(mechanism, goal, posture, room, request, best, history):
     fill_from(history, 0, distance)
     done, stalled, merit = attempt(mechanism, goal, posture, room, request, history, 0, more > 0)
     copy(posture.q, best)
-    if done < PATIENCE and stalled and merit > ROUNDING * mechanism.reach:
+    few = PATIENCE if more > 0 else STUCK
+    if done < few and stalled and merit > ROUNDING * mechanism.reach:
         nudge(mechanism, posture)
         done, stuck, nudged = attempt(
             mechanism, goal, posture, room, request, history, done, more > 0

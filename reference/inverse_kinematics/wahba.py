@@ -7,7 +7,7 @@ sum of w b a'. For a quaternion q of S that is q' K q with Davenport's symmetric
 
 import math
 
-from ..quaternion import IDENTITY, dot
+from ..quaternion import dot
 
 # Many rotations are best where the arms are all on one line: this share of M's size, given to the
 # identity, picks the least turn. It can bring no arm further away, and is nothing once all fit.
@@ -59,7 +59,7 @@ def best_angle(M, axis):
     )
     cosine = M[0] + M[4] + M[8] - along
     sine = dot(axis, (M[7] - M[5], M[2] - M[6], M[3] - M[1]))
-    if abs(sine) + abs(cosine) <= ROUNDING * entries(M):
+    if abs(sine) + abs(cosine) <= ROUNDING * magnitude(M):
         return 0.0
     return math.atan2(sine, cosine)
 
@@ -73,12 +73,12 @@ def turn_value(M, S):
     return total
 
 
-def entries(M):
-    """Return the sum of the entries' magnitudes."""
-    size = 0.0
+def magnitude(M):
+    """Return the root of the sum of the entries' squares, the same however the world is turned."""
+    total = 0.0
     for m in M:
-        size += abs(m)
-    return size
+        total += m * m
+    return math.sqrt(total)
 
 
 def best_rotation(M, K, V):
@@ -86,10 +86,7 @@ def best_rotation(M, K, V):
 
     Jacobi's rotations diagonalise K; V collects them, and the column of the largest is q.
     """
-    size = entries(M)
-    if size == 0.0:
-        return IDENTITY
-    extra = LEAST_TURN * size
+    extra = LEAST_TURN * magnitude(M)
     trace = M[0] + M[4] + M[8] + 3.0 * extra
     K[0, 0], K[0, 1], K[0, 2], K[0, 3] = trace, M[7] - M[5], M[2] - M[6], M[3] - M[1]
     K[1, 1], K[1, 2], K[1, 3] = 2.0 * (M[0] + extra) - trace, M[1] + M[3], M[2] + M[6]

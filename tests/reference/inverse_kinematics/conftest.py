@@ -1,0 +1,139 @@
+"""Solvers, mechanisms and targets for the inverse kinematics tests."""
+
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from reference import (
+    IK_SOLVERS,
+    Articulation,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    rotation,
+)
+from reference.inverse_kinematics.mechanism import new_posture, place, take_coordinates
+from reference.inverse_kinematics.preparation import prepare
+from reference.inverse_kinematics.stacked import new_stack
+
+
+@pytest.fixture(params=IK_SOLVERS)
+def solver(request):
+    return request.param
+
+
+def targets_by_pose(model, rng, count=1, oriented=0.5):
+    """Return targets for some joints that one pose within the limits reaches, and that pose."""
+    q = model.random(rng)
+    pose = forward_kinematics(model, q)
+    effectors = rng.choice(model.joint_count, min(count, model.joint_count), replace=False)
+    return [
+        Target(
+            pose.positions[e],
+            pose.rotations[e] if rng.random() < oriented else None,
+            int(e),
+            float(10.0 ** rng.uniform(-0.5, 0.5)),
+        )
+        for e in effectors
+    ], q
+
+
+@pytest.fixture(scope="session")
+def reachable():
+    """Return the function that makes targets which some pose within the limits reaches."""
+    return targets_by_pose
+
+
+def joints_on_the_way(model, targets):
+    """Return the joints that may be moved: those above the effectors, and leaders of those."""
+    found = set()
+    for target in targets:
+        path = [int(j) for j in model.skeleton.path(target.effector)]
+        own = target.rotation is not None or model.kinds[path[-1]] in ("slide", "free")
+        found.update(path if own else path[:-1])
+    found.update(model.mimics[j].leader for j in list(found) if j in model.mimics)
+    return found - set(model.mimics)
+
+
+@pytest.fixture(scope="session")
+def on_the_way():
+    """Return the function that tells which joints may be moved."""
+    return joints_on_the_way
+
+
+def outside(model, rng, *shape):
+    """Return coordinates without regard to limits, (..., coordinate)."""
+    free = Articulation(model.skeleton, model.kinds, mimics=model.mimics)
+    q = free.random(rng, *shape)
+    for j, kind in enumerate(model.kinds):
+        if kind in ("hinge", "slide") and j not in model.mimics:
+            q[..., model.coordinates_of(j)] *= 2.0
+    return q
+
+
+@pytest.fixture(scope="session")
+def beyond_limits():
+    """Return the function that draws coordinates without regard to limits."""
+    return outside
+
+
+def chain_of(kind, rng, links=4, **limits):
+    """Return a chain of joints of one kind with random axes and links of 0.3 to 0.7 m."""
+    directions = rng.standard_normal((links + 1, 3))
+    offsets = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    offsets *= rng.uniform(0.3, 0.7, (links + 1, 1))
+    axes = rotation.rotate(rotation.random(rng, links + 1), [0.0, 0.0, 1.0])
+    return Articulation(Skeleton(range(-1, links), offsets), kind, axes, **limits)
+
+
+@pytest.fixture(scope="session")
+def chain_of_joints():
+    """Return the function that makes a chain of joints of one kind."""
+    return chain_of
+
+
+class Machine(NamedTuple):
+    """What a kernel that updates a mechanism is given."""
+
+    mechanism: Any
+    goal: np.ndarray
+    posture: Any
+    room: Any
+
+
+def machine_of(model, q, targets):
+    """Return the mechanism that moves some effectors, placed, and room for solvers."""
+    oriented = tuple(target.rotation is not None for target in targets)
+    mechanism = prepare(model, tuple(target.effector for target in targets), oriented).mechanism
+    goal = np.zeros((len(targets), 8))
+    for row, (position, turn, _, weight) in zip(goal, targets, strict=True):
+        row[:] = [*position, *(rotation.identity() if turn is None else turn), weight]
+    posture = new_posture(mechanism)
+    take_coordinates(mechanism, np.array(q), posture.q)
+    place(mechanism, posture)
+    count = len(mechanism.joints.integers)
+    room = SimpleNamespace(
+        stack=new_stack(mechanism), wishes=np.empty((count, 4)), eigen=np.empty((2, 4, 4))
+    )
+    return Machine(mechanism, goal, posture, room)
+
+
+@pytest.fixture(scope="session")
+def machine():
+    """Return the function that prepares what a kernel is given."""
+    return machine_of
+
+
+def without_limits(model):
+    """Return the same articulation, its limits left out."""
+    return Articulation(
+        model.skeleton, model.kinds, model.axes, frames=model.frames, mimics=model.mimics
+    )
+
+
+@pytest.fixture(scope="session")
+def unlimited():
+    """Return the function that leaves the limits of an articulation out."""
+    return without_limits

@@ -1,0 +1,278 @@
+"""Always an answer: places where directions vanish, limits close, and nothing can move."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from reference import (
+    IK_SOLVERS,
+    Articulation,
+    Outcome,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    rotation,
+    scenes,
+    solve_ik,
+)
+from reference.articulation import KINDS
+
+shared = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+# A target on a straight chain's line is reached within few hundred iterations by all but FABRIK on
+# hinges, whose turns are bound to axes that the points it wishes for know nothing of.
+ITERATIONS = 500
+
+
+def straight(kind, direction, links=4):
+    """Return joints in line, a metre apart, hinges about an axis across it."""
+    offsets = np.outer([0.0] + [1.0] * links, direction)
+    across = np.cross(direction, [0.0, 0.3, 1.0])
+    return Articulation(Skeleton(range(-1, links), offsets), kind, across)
+
+
+DIRECTIONS = [np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.48, 0.64])]
+
+
+@pytest.mark.parametrize("direction", DIRECTIONS, ids=["axis", "oblique"])
+@pytest.mark.parametrize("kind", ["ball", "hinge"])
+@pytest.mark.parametrize("height", [-3.0, -2.0, -0.3, 0.0, 0.5, 1.0, 2.0, 2.5, 3.8])
+def test_a_straight_chain_is_freed_from_a_target_on_its_own_line(direction, kind, height, solver):
+    if solver == "fabrik" and kind == "hinge":
+        return
+    model = straight(kind, direction)
+    target = Target(height * direction)
+    solution = solve_ik(
+        model, model.zero(), target, solver, tolerance=1e-3, max_iterations=ITERATIONS
+    )
+    assert solution.outcome is Outcome.CONVERGED
+    again = solve_ik(model, model.zero(), target, solver, tolerance=1e-3, max_iterations=ITERATIONS)
+    assert (again.coordinates == solution.coordinates).all()
+
+
+def test_a_hinge_at_its_limit_is_bent_the_other_way(solver, speed):
+    """The target is straight behind, half a turn in the one direction that the limits leave."""
+    arm = Articulation(
+        Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"], lower=-3.2, upper=0.0
+    )
+    solution = solve_ik(arm, [0.0], [-1.0, 0.0, 0.0], solver, max_iterations=300)
+    assert solution.outcome is Outcome.CONVERGED
+    assert solution.coordinates[0] == pytest.approx(-np.pi, abs=1e-3)
+
+
+def test_a_stuck_start_is_not_given_up_for_something_worse(solver, speed):
+    """A limit keeps the hinge from its target; bent away from it, one iteration may not return."""
+    arm = Articulation(
+        Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"], lower=-3.0, upper=0.5
+    )
+    target = [np.cos(1.2), np.sin(1.2), 0.0]
+    for iterations in (1, 3, 100):
+        solution = solve_ik(arm, [0.5], target, solver, max_iterations=iterations)
+        assert solution.coordinates[0] == pytest.approx(0.5, abs=1e-9)
+        assert solution.outcome is Outcome.STALLED
+
+
+@pytest.mark.parametrize("where", ["root", "effector", "reach", "beyond"])
+@pytest.mark.parametrize("kind", ["ball", "hinge", "slide", "free"])
+@pytest.mark.parametrize("oriented", [False, True])
+def test_special_targets_are_answered(where, kind, oriented, solver, chain_of_joints, rng):
+    model = chain_of_joints(kind, rng, links=3)
+    q = model.random(rng)
+    pose = forward_kinematics(model, q)
+    reach = model.skeleton.reach()
+    x = {
+        "root": pose.positions[0],
+        "effector": pose.positions[-1],
+        "reach": pose.positions[0] + reach * np.array([0.6, 0.0, 0.8]),
+        "beyond": pose.positions[0] + 2.0 * reach * np.array([0.6, 0.0, 0.8]),
+    }[where]
+    target = Target(x, pose.rotations[-1] if oriented else None)
+    solution = solve_ik(model, q, target, solver, max_iterations=50, record=True)
+    assert np.isfinite(solution.coordinates).all()
+    assert np.isfinite(solution.history).all()
+    if where == "effector":
+        assert (solution.outcome, solution.iterations) == (Outcome.CONVERGED, 0)
+    if where == "beyond" and kind in ("ball", "hinge"):
+        assert solution.outcome is Outcome.UNREACHABLE
+        assert solution.residual >= reach * (1.0 - 1e-12)
+
+
+def test_without_freedom_the_start_is_the_answer(solver, speed):
+    statue = Articulation(Skeleton([-1, 0], [[1.0, 0, 0], [0, 1.0, 0]]), "fixed")
+    at = solve_ik(statue, [], [1.0, 1.0, 0.0], solver)
+    assert (at.outcome, at.iterations, at.residual) == (Outcome.CONVERGED, 0, 0.0)
+    off = solve_ik(statue, np.empty((2, 0)), Target([1.0, 1.0, 3.0]), solver, restarts=2)
+    assert (off.outcome == Outcome.UNREACHABLE).all()
+    assert (off.residual == 3.0).all()
+    assert off.coordinates.shape == (2, 0)
+    turned = Target([1.0, 1.0, 0.0], rotation.exponential([0.5, 0, 0]))
+    wrong = solve_ik(statue, [], turned, solver, restarts=1)
+    assert wrong.outcome is Outcome.STALLED
+    assert wrong.residual_rotation == pytest.approx(0.5, abs=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["hinge", "ball"])
+def test_the_root_as_effector_can_turn_but_not_move(kind, solver, speed):
+    model = Articulation(Skeleton([-1, 0], [[1.0, 0, 0], [0, 1.0, 0]]), kind)
+    off = solve_ik(model, model.zero(), [1.0, 3.0, 4.0], solver, effector=0)
+    assert (off.residual, off.outcome) == (5.0, Outcome.UNREACHABLE)
+    turn = rotation.exponential([0.0, 0.0, 0.7])
+    posed = solve_ik(model, model.zero(), Target([1.0, 0, 0], turn, 0), solver, max_iterations=300)
+    assert posed.outcome is Outcome.CONVERGED
+
+
+def test_limits_without_width_hold_fast(solver, speed, rng, beyond_limits):
+    model = Articulation(
+        Skeleton(range(-1, 4), rng.standard_normal((5, 3))),
+        ["hinge", "ball", "slide", "hinge", "fixed"],
+        lower=[0.3, 0.2, -0.1, -2.0, 0],
+        upper=[0.3, 0.2, -0.1, 2.0, 0],
+        cones=0.0,
+    )
+    goal = forward_kinematics(model, model.clamp(model.random(rng)))
+    q = beyond_limits(model, rng)
+    solution = solve_ik(model, q, goal.positions[-1], solver, max_iterations=200)
+    twist = rotation.exponential([0.0, 0.0, 0.2])
+    np.testing.assert_allclose(solution.coordinates[:1], [0.3], rtol=0, atol=1e-15)
+    assert rotation.angle(solution.coordinates[1:5], twist) < 1e-12
+    np.testing.assert_allclose(solution.coordinates[5:6], [-0.1], rtol=0, atol=1e-15)
+    if solver != "jacobian_transpose":  # whose step length counts what the ball cannot do
+        assert solution.outcome is Outcome.CONVERGED  # by the one hinge that can move
+
+
+def test_no_iterations_leave_the_start_within_its_limits(
+    articulated, reachable, beyond_limits, on_the_way, rng, solver, speed
+):
+    model = articulated(["hinge", "ball", "slide", "ball"], 3)
+    targets, _ = reachable(model, rng, 2)
+    q = beyond_limits(model, rng)
+    solution = solve_ik(model, q, targets, solver, max_iterations=0)
+    assert solution.iterations == 0
+    expected, clamped = q.copy(), model.clamp(q)
+    for j in on_the_way(model, targets):
+        expected[model.coordinates_of(j)] = clamped[model.coordinates_of(j)]
+    np.testing.assert_allclose(solution.coordinates, expected, rtol=0, atol=1e-12)
+
+
+def test_tolerance_zero_ends(solver, chain_of_joints, rng):
+    for kind in ("ball", "hinge"):
+        model = chain_of_joints(kind, rng)
+        targets = forward_kinematics(model, model.random(rng, 20)).positions[:, -1]
+        solution = solve_ik(
+            model, model.random(rng), targets, solver, tolerance=0.0, max_iterations=300
+        )
+        limit = solution.outcome == Outcome.ITERATION_LIMIT
+        assert (solution.iterations[limit] >= 300).all()
+        reached = solution.outcome == Outcome.CONVERGED
+        assert (solution.residual[reached] == 0.0).all()
+        if solver == "levenberg_marquardt" and kind == "ball":
+            assert solution.residual.max() < 1e-13
+            assert not limit.any()
+
+
+def test_what_rounding_alone_keeps_from_its_target_is_stalled(rng):
+    """Some arrive where fixed joints are merged, and are a rounding off where they are not."""
+    model = Articulation(
+        Skeleton(range(-1, 6), rng.standard_normal((7, 3))),
+        ["hinge", "fixed", "hinge", "fixed", "ball", "fixed", "fixed"],
+        [0.3, 0.4, 1.2],
+        frames=rotation.random(rng, 7),
+    )
+    targets = forward_kinematics(model, model.random(rng, 300)).positions[:, -1]
+    solution = solve_ik(model, model.random(rng), targets, "levenberg_marquardt", tolerance=4e-16)
+    soon = solution.iterations < 100
+    assert soon.sum() > 200
+    off = soon & (solution.residual > 4e-16)
+    assert off.any()
+    assert (solution.outcome[off] == Outcome.STALLED).all()
+
+
+def test_the_lab_s_arm_of_hinges_draws_in_its_plane(solver, speed):
+    arm, _ = scenes.lab_arm()
+    model = Articulation(arm, "hinge", [0.0, 0.0, 1.0], lower=-2.8, upper=2.8)
+    angles = np.linspace(0.0, 2.0 * np.pi, 5)
+    curve = np.stack([0.5 + 0.4 * np.cos(angles), 0.3 * np.sin(angles), 0.0 * angles], axis=-1)
+    solution = solve_ik(model, model.zero(), curve, solver, max_iterations=1000)
+    if solver in ("levenberg_marquardt", "ccd", "damped_least_squares"):
+        assert (solution.outcome == Outcome.CONVERGED).all()
+    np.testing.assert_allclose(solution.positions[..., 2], 0.0, rtol=0, atol=1e-15)
+
+
+# ---- anything at all
+
+coordinate = st.sampled_from([0.0, 0.5, 1.0, -1.0, 2.0]) | st.floats(-3.0, 3.0)
+point = st.lists(coordinate, min_size=3, max_size=3)
+turn = point.map(rotation.exponential)
+wanted = st.tuples(
+    point, st.none() | turn, st.integers(-5, 4), st.sampled_from([1.0, 1e-300, 1e300, 1e-6, 7.0])
+)
+
+
+@st.composite
+def trees(draw):
+    """Return a tree of joints, many offsets zero or in line, with limits that may have no width."""
+    count = draw(st.integers(1, 5))
+    parents = [-1] + [draw(st.integers(0, j - 1)) for j in range(1, count)]
+    offsets = draw(st.lists(point, min_size=count, max_size=count))
+    kinds = draw(st.lists(st.sampled_from(KINDS), min_size=count, max_size=count))
+    axis = draw(point.filter(lambda v: np.linalg.norm(v) > 0.1))
+    low = draw(st.sampled_from([-np.inf, -1.0, 0.0]))
+    high = draw(st.sampled_from([np.inf, 1.0, 0.0]))
+    return Articulation(
+        Skeleton(parents, offsets), kinds, axis, lower=low, upper=high,
+        cones=draw(st.sampled_from([np.inf, 0.5, 0.0])),
+    )  # fmt: skip
+
+
+ANYTHING = {
+    "model": trees(),
+    "asked": st.lists(wanted, min_size=1, max_size=3),
+    "solver": st.sampled_from(list(IK_SOLVERS)),
+    "tolerance": st.sampled_from([0.0, 1e-9, 1e-3]),
+    "seed": st.integers(0, 100),
+    "restarts": st.integers(0, 1),
+}
+
+
+@shared
+@given(**ANYTHING)
+@example(
+    model=Articulation(Skeleton([-1, 0], np.zeros((2, 3)))), asked=[([0, 0, 0], None, 1, 1.0)],
+    solver="levenberg_marquardt", tolerance=0.0, seed=0, restarts=0,
+)  # fmt: skip
+def test_there_is_always_an_answer_and_it_is_true(model, asked, solver, tolerance, seed, restarts):
+    answer_is_true(model, asked, solver, tolerance, seed, restarts)
+
+
+@pytest.mark.slow
+@settings(max_examples=5000)
+@given(**ANYTHING)
+def test_there_is_always_an_answer_in_many_more_places(
+    model, asked, solver, tolerance, seed, restarts
+):
+    answer_is_true(model, asked, solver, tolerance, seed, restarts)
+
+
+def answer_is_true(model, asked, solver, tolerance, seed, restarts):
+    """Assert that an answer is finite, within its limits, and says what forward kinematics says."""
+    targets = {}
+    for position, R, joint, weight in asked:
+        targets[joint % model.joint_count] = Target(position, R, joint % model.joint_count, weight)
+    solution = solve_ik(
+        model, model.random(np.random.default_rng(seed)), list(targets.values()), solver,
+        tolerance=tolerance, tolerance_rotation=tolerance, max_iterations=15, restarts=restarts,
+        record=True,
+    )  # fmt: skip
+    pose = forward_kinematics(model, solution.coordinates)
+    ways = [np.linalg.norm(pose.positions[t.effector] - t.position) for t in targets.values()]
+    assert solution.residual == pytest.approx(max(ways), abs=1e-12)
+    assert np.isfinite(solution.history).all()
+    assert solution.iterations <= 15 * (restarts + 2)
+    assert model.within_limits(solution.coordinates, 1e-7)
+    reached = solution.residual <= tolerance and solution.residual_rotation <= tolerance
+    assert (solution.outcome is Outcome.CONVERGED) == reached
+    if solution.outcome is Outcome.ITERATION_LIMIT:
+        assert solution.iterations >= 15
+    if solution.outcome is Outcome.UNREACHABLE:
+        assert solution.residual > tolerance

@@ -1,0 +1,237 @@
+"""Several effectors at once: trees, weights, what reaches, what cannot."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from reference import (
+    Articulation,
+    Mimic,
+    Outcome,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    rotation,
+    solve_ik,
+)
+from reference.articulation import KINDS
+from reference.inverse_kinematics.mechanism import too_far
+
+TREES = {
+    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
+    "seed": st.integers(0, 2**32 - 1),
+}
+shared = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+# Both hands of a trunk of three joints, arms of three.
+PARENTS = [-1, 0, 1, 2, 3, 4, 2, 6, 7]
+
+
+def figure(kind="ball", **limits):
+    """Return a trunk with two arms, the hands joints 5 and 8."""
+    offsets = [[0, 0, 0], [0, 0.4, 0], [0, 0.4, 0], [0.2, 0.1, 0], [0.4, 0, 0], [0.3, 0, 0]]
+    offsets += [[-0.2, 0.1, 0], [-0.4, 0, 0], [-0.3, 0, 0]]
+    axes = np.array([[1, 0, 0.2], [0, 0.3, 1], [0, 1, 0]])[np.arange(9) % 3]
+    return Articulation(Skeleton(PARENTS, offsets), kind, axes, **limits)
+
+
+def hands(model, rng):
+    """Return targets for both hands that one pose reaches."""
+    goal = forward_kinematics(model, model.random(rng)).positions
+    return [Target(goal[5], effector=5), Target(goal[8], effector=8)]
+
+
+# Of 40 pairs; alternating projections need not converge, and limits bar the way of single joints.
+REACHED = {
+    ("levenberg_marquardt", "ball", False): 40,
+    ("damped_least_squares", "ball", False): 40,
+    ("ccd", "ball", False): 30,
+    ("fabrik", "ball", False): 30,
+    ("jacobian_transpose", "ball", False): 30,
+    ("levenberg_marquardt", "ball", True): 35,
+    ("levenberg_marquardt", "hinge", False): 30,
+    ("levenberg_marquardt", "hinge", True): 28,
+}
+
+
+@pytest.mark.parametrize(("solver", "kind", "limits"), REACHED)
+def test_pairs_of_targets_that_a_pose_reaches_are_reached(solver, kind, limits, rng):
+    bounds = {"lower": -1.5, "upper": 1.5, "cones": 1.5} if limits else {}
+    model, reached = figure(kind, **bounds), 0
+    for _ in range(40):
+        targets = hands(model, rng)
+        options = {"max_iterations": 1000, "restarts": 0 if kind == "ball" else 5}
+        solution = solve_ik(model, model.random(rng), targets, solver, **options)
+        reached += solution.outcome is Outcome.CONVERGED
+        ways = [solution.positions[t.effector] - t.position for t in targets]
+        assert solution.residual == pytest.approx(np.linalg.norm(ways, axis=1).max(), abs=1e-14)
+    assert reached >= REACHED[solver, kind, limits]
+
+
+def test_an_effector_above_another_has_its_own_target(solver, speed, rng):
+    chain = Articulation(Skeleton(range(-1, 6), np.outer([0.0] + [0.3] * 6, [1.0, 0, 0])))
+    goal = forward_kinematics(chain, chain.random(rng)).positions
+    targets = [Target(goal[3], effector=3), Target(goal[6], effector=6)]
+    solution = solve_ik(chain, chain.random(rng), targets, solver, max_iterations=300)
+    assert solution.outcome is Outcome.CONVERGED
+    np.testing.assert_allclose(solution.positions[[3, 6]], goal[[3, 6]], rtol=0, atol=1e-4)
+
+
+def test_targets_in_another_order_give_the_same_answer(solver, speed, rng):
+    model = figure("hinge", lower=-2.0, upper=2.0)
+    targets, q = hands(model, rng), model.random(rng)
+    targets[0] = targets[0]._replace(rotation=rotation.random(rng), weight=2.0)
+    here = solve_ik(model, q, targets, solver, max_iterations=8, record=True)
+    there = solve_ik(model, q, targets[::-1], solver, max_iterations=8, record=True)
+    assert here.iterations == there.iterations
+    np.testing.assert_allclose(there.history, here.history, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(there.coordinates, here.coordinates, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["ccd", "fabrik", "levenberg_marquardt"], indirect=True)
+def test_the_heavier_target_is_missed_by_less(solver, speed):
+    """Both ends of a T are wanted up, where one turn cannot bring both."""
+    tee = Articulation(Skeleton([-1, 0, 0], [[0, 0, 0], [1.0, 0, 0], [-1.0, 0.5, 0]]))
+    misses = []
+    for weight in (0.1, 1.0, 10.0):
+        targets = [Target([0, 1.0, 0], effector=1, weight=weight), Target([0, 1.2, 0], effector=2)]
+        start = rotation.exponential([0.0, 0.0, 0.4])
+        q = np.concatenate([start, rotation.identity(2).ravel()])
+        x = solve_ik(tee, q, targets, solver, max_iterations=300).positions
+        misses.append([np.linalg.norm(x[t.effector] - t.position) for t in targets])
+    first, second = np.transpose(misses)
+    assert first[0] > first[1] + 0.05 > first[2] + 0.1
+    assert second[0] < second[1] - 0.05 < second[2] - 0.1
+
+
+def test_only_the_ratio_of_weights_counts(solver, speed, rng):
+    model = figure()
+    targets, q = hands(model, rng), model.random(rng)
+    here = solve_ik(model, q, targets, solver, max_iterations=5)
+    heavy = [target._replace(weight=1024.0) for target in targets]
+    assert (
+        solve_ik(model, q, heavy, solver, max_iterations=5).coordinates == here.coordinates
+    ).all()
+    one = solve_ik(model, q, targets[0], solver, max_iterations=5)
+    alone = solve_ik(model, q, heavy[0], solver, max_iterations=5)
+    assert (alone.coordinates == one.coordinates).all()
+
+
+@pytest.mark.parametrize("solver", ["ccd", "fabrik", "damped_least_squares"], indirect=True)
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_target_out_of_reach_does_not_keep_another_arm_from_its_own(solver, order, speed):
+    """The arms part at the root; the one that cannot arrive is soon as near as it can be."""
+    parents = [-1, 0, 1, 2, 0, 4, 5]
+    offsets = [[0, 0, 0], [0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 0], [0, 1, 0], [0, 1, 0]]
+    model = Articulation(Skeleton(parents, offsets), ["fixed"] + ["ball"] * 6)
+    targets = [Target([9.0, 0, 0], effector=3), Target([0.5, 0.7, 0.6], effector=6)][::order]
+    solution = solve_ik(model, model.zero(), targets, solver, max_iterations=300)
+    assert solution.outcome is Outcome.UNREACHABLE
+    assert solution.residual == pytest.approx(7.0, abs=1e-3)
+    np.testing.assert_allclose(solution.positions[6], [0.5, 0.7, 0.6], rtol=0, atol=1e-4)
+
+
+def test_targets_that_exclude_each_other_are_not_called_unreachable(solver, speed):
+    """Each could be reached alone: geometry proves nothing about one."""
+    model = figure()
+    targets = [Target([1.2, 0.8, 0.0], effector=5), Target([-1.2, 0.8, 0.0], effector=8)]
+    alone = [solve_ik(model, model.zero(), t, solver, max_iterations=200) for t in targets]
+    assert all(one.outcome is Outcome.CONVERGED for one in alone)
+    solution = solve_ik(model, model.zero(), targets, solver, max_iterations=50)
+    assert solution.outcome in (Outcome.STALLED, Outcome.ITERATION_LIMIT)
+    assert solution.residual > 0.1
+
+
+@shared
+@given(**TREES, stretched=st.booleans())
+def test_what_some_pose_reaches_is_never_called_too_far(
+    articulated, machine, kinds, seed, stretched
+):
+    """By any margin but rounding; limits, slides at their ends and mimics regarded."""
+    model, rng = articulated(kinds, seed), np.random.default_rng(seed)
+    if stretched:
+        straight = (0.1 + np.abs(model.skeleton.offsets)) * [1.0, 0.0, 0.0]
+        model = Articulation(
+            Skeleton(model.skeleton.parents, straight), model.kinds, [1, 0, 0],
+            lower=model.lower, upper=model.upper, mimics=model.mimics,
+        )  # fmt: skip
+    q = model.random(rng)
+    for j in set(range(len(kinds))) - set(model.mimics):
+        if kinds[j] in ("hinge", "slide") and np.isfinite(model.upper[j]):
+            q[model.coordinates_of(j)] = model.upper[j]
+    pose = forward_kinematics(model, q)
+    targets = [Target(x, None, j) for j, x in enumerate(pose.positions)]
+    mechanism, goal, _, _ = machine(model, q, targets)
+    assert not too_far(mechanism, goal, 0.0)
+
+
+@pytest.mark.parametrize("links", [2, 30])
+@pytest.mark.parametrize("away", [0.0, 1e6])
+def test_full_reach_is_not_too_far_however_long_or_far_off(links, away, machine, rng):
+    directions = np.tile(rotation.rotate(rotation.random(rng), [1.0, 0.0, 0.0]), (links + 1, 1))
+    offsets = directions * rng.uniform(0.1, 1.0, (links + 1, 1))
+    offsets[0] = away
+    model = Articulation(Skeleton(range(-1, links), offsets))
+    for turn in rotation.random(rng, 20):
+        q = np.vstack([turn, rotation.identity(links)]).ravel()
+        tip = forward_kinematics(model, q).positions[-1]
+        mechanism, goal, _, _ = machine(model, q, [Target(tip, effector=links)])
+        assert not too_far(mechanism, goal, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "limits", "reach"),
+    [
+        (["hinge", "hinge", "fixed"], {}, 3.0),
+        (["ball", "slide", "fixed"], {"lower": -0.5, "upper": 1.0}, 4.0),
+        (["slide", "hinge", "fixed"], {"lower": -2.0, "upper": 1.0}, 5.0),
+        (["hinge", "slide", "fixed"], {"mimics": {1: Mimic(0, 0.5, 0.25)}, "upper": 1.0,
+                                       "lower": -2.0}, 4.25),
+        (["fixed", "fixed", "fixed"], {}, 0.0),
+    ],
+)  # fmt: skip
+def test_beyond_all_links_and_slides_a_target_is_unreachable(kinds, limits, reach, solver, speed):
+    """Links of one and two metres along x from a root at (5, 0, 0)."""
+    chain = Skeleton([-1, 0, 1], [[5.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
+    model = Articulation(chain, kinds, [0.0, 0.0, 1.0], **limits)
+    start = 8.0 if kinds[0] == "fixed" else 5.0
+    for excess, unreachable in ((1e-3, True), (-1e-3, False)):
+        target = [start + reach + excess, 0.0, 0.0]
+        solution = solve_ik(model, model.neutral(), target, solver, max_iterations=5)
+        if unreachable:
+            assert solution.outcome is Outcome.UNREACHABLE
+        elif reach:
+            assert solution.outcome is not Outcome.UNREACHABLE
+    assert solve_ik(model, model.neutral(), [start + reach + 1e-5, 0, 0], solver).outcome not in (
+        Outcome.UNREACHABLE,
+    )
+
+
+@pytest.mark.parametrize("kind", ["slide", "free"])
+def test_without_an_end_nothing_is_too_far(kind, solver, speed):
+    model = Articulation(Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), [kind, "fixed"])
+    solution = solve_ik(model, model.zero(), [1e3, 1e3, 0.0], solver, max_iterations=5)
+    assert solution.outcome is not Outcome.UNREACHABLE
+
+
+def test_a_leader_off_the_way_is_moved_and_all_above_it_is_not(solver, speed):
+    """The finger's hinge follows a motor in another branch, below a joint that moves no effector.
+
+    That joint mimics another one yet.
+    """
+    parents = [-1, 0, 0, 2, 0]
+    offsets = [[0, 0, 0], [1.0, 0, 0], [0, 1.0, 0], [0, 1.0, 0], [0, 0, 1.0]]
+    tip = Skeleton([*parents, 1], [*offsets, [1.0, 0, 0]])
+    model = Articulation(
+        tip, ["fixed", "hinge", "hinge", "hinge", "hinge", "fixed"],
+        mimics={1: Mimic(3, 0.5, 0.1), 2: Mimic(4, 2.0)},
+    )  # fmt: skip
+    assert model.coordinate_count == 2
+    target = [1.0 + np.cos(0.8), np.sin(0.8), 0.0]
+    q = np.array([0.2, 0.3])
+    solution = solve_ik(model, q, Target(target, effector=5), solver, restarts=1)
+    assert solution.coordinates[1] == 0.3
+    if solver != "fabrik":  # which turns joints to what hangs on them, and nothing hangs here
+        assert solution.outcome is Outcome.CONVERGED
+        assert solution.coordinates[0] == pytest.approx(1.4, abs=1e-3)

@@ -1,0 +1,334 @@
+"""What CCD and FABRIK do joint by joint: never worse, limits on the way, one turn at a branch."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from reference import (
+    Articulation,
+    Mimic,
+    Outcome,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    rotation,
+    solve_ik,
+)
+from reference.articulation import KINDS, LEADER
+from reference.inverse_kinematics.ccd import descend, move_joint
+from reference.inverse_kinematics.fabrik import (
+    WISHED,
+    fabrik_update,
+    move_towards_wishes,
+    put_frame,
+    wish,
+)
+from reference.inverse_kinematics.mechanism import is_followed, misfit, place
+from reference.inverse_kinematics.preparation import prepare
+
+# Squared distances of a few metres, and quaternions normalised after a turn.
+ROUNDING = 1e-12
+
+TREES = {
+    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
+    "seed": st.integers(0, 2**32 - 1),
+}
+EXAMPLES = (
+    example(kinds=["ball", "hinge", "slide", "ball", "free", "hinge"], seed=1),
+    example(kinds=["hinge", "hinge", "ball", "slide", "hinge", "ball"], seed=2),
+    example(kinds=["slide", "ball", "hinge", "hinge", "fixed", "ball"], seed=3),
+    example(kinds=["hinge", "slide", "hinge", "slide", "hinge", "hinge"], seed=4),
+)
+
+
+def with_examples(law):
+    """Add trees of many joints to those that are drawn, of which the first are small."""
+    for one in EXAMPLES:
+        law = one(law)
+    return law
+
+
+shared = settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def planar(links, **limits):
+    """Return hinges in a plane, links of one metre along x, a fixed joint at the end."""
+    chain = Skeleton(range(-1, links), np.outer([0.0] + [1.0] * links, [1.0, 0.0, 0.0]))
+    return Articulation(chain, ["hinge"] * links + ["fixed"], **limits)
+
+
+# ---- CCD
+
+
+def updates(machine):
+    """Update joint after joint as CCD does; yield the joint and the misfit before and after."""
+    mechanism, goal, posture, room = machine
+    joints = mechanism.joints
+    for j in range(len(joints.integers) - 1, -1, -1):
+        before = misfit(mechanism, goal, posture)
+        if is_followed(mechanism, j):
+            descend(mechanism, goal, posture, room, j)
+        elif joints.integers[j, LEADER] == j:
+            move_joint(mechanism, goal, posture, room, j)
+        tips = posture.positions.copy(), posture.rotations.copy()
+        yield j, before, misfit(mechanism, goal, posture), tips
+    place(mechanism, posture)
+
+
+@shared
+@with_examples
+@given(**TREES)
+def test_no_update_of_a_joint_makes_the_misfit_larger(articulated, machine, reachable, kinds, seed):
+    """Whatever the kind, whatever limits stop it, and whoever follows."""
+    model, rng = articulated(kinds, seed), np.random.default_rng(seed)
+    targets, _ = reachable(model, rng, 3)
+    ready = machine(model, model.random(rng), targets)
+    for _ in range(2):
+        for _, before, after, _ in updates(ready):
+            assert after <= before + ROUNDING
+
+
+@shared
+@with_examples
+@given(**TREES)
+def test_after_an_update_effectors_are_where_the_coordinates_put_them(
+    articulated, machine, reachable, kinds, seed
+):
+    """Joints below the one that moves are not placed yet; the effectors are."""
+    model, rng = articulated(kinds, seed), np.random.default_rng(seed)
+    targets, _ = reachable(model, rng, 2)
+    ready = machine(model, model.random(rng), targets)
+    count = len(ready.mechanism.joints.integers)
+    for _, _, _, (positions, rotations) in updates(ready):
+        placed = machine(model, model.random(rng), targets)
+        placed.posture.q[:] = ready.posture.q
+        place(placed.mechanism, placed.posture)
+        tips = placed.posture.positions[count:], placed.posture.rotations[count:]
+        np.testing.assert_allclose(positions[count:], tips[0], rtol=0, atol=ROUNDING)
+        turned = rotation.angle(_units(rotations[count:]), _units(tips[1]))
+        np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-9)
+
+
+def _units(quaternions):
+    return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
+
+
+@pytest.mark.parametrize("kind", ["hinge", "slide", "ball", "free"])
+def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, machine, rng):
+    """No small move of the joint alone, in any direction, makes the misfit smaller."""
+    model = chain_of_joints(kind, rng, links=3)
+    pose = forward_kinematics(model, model.random(rng))
+    targets = [
+        Target(pose.positions[3] + rng.standard_normal(3), pose.rotations[3], 3, 2.0),
+        Target(pose.positions[2] + rng.standard_normal(3), None, 2, 0.7),
+    ]
+    ready = machine(model, model.random(rng), targets)
+    move_joint(*ready, 1)
+    place(ready.mechanism, ready.posture)
+    least, q = misfit(*ready[:3]), ready.posture.q.copy()
+    width = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}[kind]
+    for _ in range(20):
+        ready.posture.q[:] = q
+        own = ready.posture.q[width : 2 * width]
+        own += 1e-3 * rng.standard_normal(width)
+        if width > 1:
+            own[-4:] /= np.linalg.norm(own[-4:])
+        place(ready.mechanism, ready.posture)
+        # A free joint turns first and then shifts, so that its optimum is one of each alone.
+        if kind != "free":
+            assert misfit(*ready[:3]) >= least - 1e-9
+
+
+def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, speed):
+    """By turns and shifts in alternation."""
+    body = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0.3, 0.4, 0.5]]), ["free", "fixed"])
+    goal, q = forward_kinematics(body, body.random(rng)), body.random(rng)
+    target = Target(goal.positions[1], goal.rotations[1])
+    solution = solve_ik(body, q, target, "ccd", tolerance=1e-5, tolerance_rotation=1e-5)
+    assert solution.outcome is Outcome.CONVERGED
+
+
+@pytest.mark.parametrize(
+    ("start", "upper", "wanted", "expected"),
+    [
+        (-1.0, 0.5, 0.3, 0.3),  # the way is free
+        (-1.0, 0.5, 1.2, 0.5),  # the limit stops it on the way
+        (0.5, 0.5, 1.2, 0.5),  # it is there already
+        (-3.0, 0.5, 2.9, -3.0),  # the short way leads through half a turn, where the lower limit is
+    ],
+)
+def test_a_hinge_stops_at_its_limit_along_the_arc(start, upper, wanted, expected, speed):
+    arm = planar(1, lower=-3.0, upper=upper)
+    target = [np.cos(wanted), np.sin(wanted), 0.0]
+    solution = solve_ik(arm, [start], target, "ccd", tolerance=0.0, max_iterations=1)
+    assert solution.coordinates[0] == pytest.approx(expected, abs=1e-15)
+
+
+@pytest.mark.parametrize(("upper", "expected"), [(5.0, 2.0), (1.5, 1.5)])
+def test_a_slide_goes_as_far_as_its_limit_allows(upper, expected, speed):
+    rail = Articulation(Skeleton([-1], [[1.0, 0, 0]]), "slide", [0, 0, 2.0], upper=upper)
+    solution = solve_ik(rail, [0.5], [4.0, 3.0, 2.0], "ccd", max_iterations=1)
+    assert solution.coordinates[0] == pytest.approx(expected, abs=1e-15)
+
+
+def test_inside_a_cone_an_update_that_would_be_worse_is_refused(machine, rng):
+    """Cutting the swing of the best turn down to the cone may lead away from the target."""
+    refused = taken = 0
+    for _ in range(200):
+        ball = Articulation(
+            Skeleton([-1, 0], [[0, 0, 0], [1.0, 0.3, 0.2]]), ["ball", "fixed"],
+            rotation.rotate(rotation.random(rng), [0.0, 0.0, 1.0]),
+            cones=0.8, lower=-0.3, upper=0.5,
+        )  # fmt: skip
+        target = Target(rotation.rotate(rotation.random(rng), [1.0, 0.3, 0.2]), effector=1)
+        ready = machine(ball, ball.random(rng), [target])
+        before, q = misfit(*ready[:3]), ready.posture.q.copy()
+        move_joint(*ready, 0)
+        assert misfit(*ready[:3]) <= before + ROUNDING
+        assert ball.within_limits(ready.posture.q, 1e-9)
+        refused += (ready.posture.q == q).all()
+        taken += misfit(*ready[:3]) < before - 1e-3
+    assert refused > 3
+    assert taken > 50
+
+
+@pytest.mark.parametrize("gears", [(0.7, -0.2), (5.0, -3.0)])
+def test_a_leader_descends_by_all_that_its_followers_do(gears, machine, rng):
+    """A finger curls by one coordinate; where gears are high, a full step would lead too far."""
+    finger = Articulation(
+        planar(3).skeleton,
+        ["hinge"] * 3 + ["fixed"],
+        mimics={1: Mimic(0, gears[0]), 2: Mimic(0, gears[1])},
+    )
+    for _ in range(20):
+        q, wanted = rng.uniform(-1.0, 1.0, (2, 1))
+        position = forward_kinematics(finger, wanted).positions[3]
+        target = [Target(position, effector=3)]
+        ready = machine(finger, q, target)
+        before = misfit(*ready[:3])
+        steps = 0
+        while misfit(*ready[:3]) > 1e-9 and steps < 200:
+            last = misfit(*ready[:3])
+            descend(*ready, 0)
+            assert misfit(*ready[:3]) <= last + ROUNDING
+            steps += 1
+        assert misfit(*ready[:3]) < before
+    assert steps > 0
+
+
+# ---- FABRIK
+
+
+def test_backward_a_branch_takes_the_weighted_mean_of_what_its_children_ask(machine):
+    """A trunk with two arms of one metre, both targets straight ahead of their arms."""
+    tree = Skeleton([-1, 0, 1, 1], [[0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]])
+    model = Articulation(tree)
+    targets = [
+        Target([2.5, 0.0, 0.0], effector=2, weight=3.0),
+        Target([1.0, 1.2, 0.0], effector=3, weight=1.0),
+    ]
+    ready = machine(model, rotation.identity(4).ravel(), targets)
+    wish(*ready)
+    expected = (3.0 * np.array([1.5, 0.0, 0.0]) + np.array([1.0, 0.2, 0.0])) / 4.0
+    np.testing.assert_allclose(ready.room.wishes[1, :3], expected, rtol=0, atol=1e-15)
+    assert ready.room.wishes[1, WISHED] == 4.0
+
+
+def test_forward_a_branch_turns_all_its_children_alike(machine, rng):
+    """A ball with three arms: one iteration turns it as singular values say, weights regarded."""
+    arms = rng.standard_normal((3, 3))
+    tree = Skeleton([-1, 0, 0, 0], np.vstack([np.zeros(3), arms]))
+    model, R, weights = Articulation(tree), rotation.random(rng), np.array([0.5, 1.0, 3.0])
+    lengths = np.linalg.norm(arms, axis=1, keepdims=True)
+    ends = rotation.rotate(R, arms) + 0.3 * rng.standard_normal((3, 3))
+    ends *= lengths / np.linalg.norm(ends, axis=1, keepdims=True)
+    targets = [Target(ends[k], effector=k + 1, weight=weights[k]) for k in range(3)]
+    ready = machine(model, rotation.identity(4).ravel(), targets)
+    fabrik_update(*ready)
+    U, _, Vt = np.linalg.svd(np.einsum("k,ki,kj->ij", weights, ends, arms))
+    kabsch = rotation.from_matrix(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
+    assert rotation.angle(ready.posture.q[:4], kabsch) < 1e-4
+
+
+@pytest.mark.parametrize("kind", ["hinge", "slide", "ball", "free"])
+@pytest.mark.parametrize("oriented", [False, True])
+def test_a_pose_that_reaches_all_targets_is_a_fixed_point(
+    kind, oriented, chain_of_joints, machine, rng
+):
+    """The hand is a fixed joint with a frame of its own, which hangs on the last one that moves."""
+    chain = chain_of_joints(kind, rng)
+    model = Articulation(
+        chain.skeleton, [*[kind] * 4, "fixed"], chain.axes, frames=rotation.random(rng, 5)
+    )
+    q = model.random(rng)
+    pose = forward_kinematics(model, q)
+    targets = [
+        Target(pose.positions[j], pose.rotations[j] if oriented else None, j) for j in (4, 2)
+    ]
+    ready = machine(model, q, targets)
+    before = ready.posture.positions.copy()
+    fabrik_update(*ready)
+    np.testing.assert_allclose(ready.posture.positions, before, rtol=0, atol=1e-9)
+
+
+@shared
+@with_examples
+@given(**TREES)
+def test_forward_each_joint_is_left_where_the_coordinates_put_it(
+    articulated, machine, reachable, kinds, seed
+):
+    """The joints below count on it; but for followers, which move again when their leader does."""
+    drawn, rng = articulated(kinds, seed), np.random.default_rng(seed)
+    model = Articulation(
+        drawn.skeleton, drawn.kinds, drawn.axes, frames=drawn.frames,
+        lower=drawn.lower, upper=drawn.upper, cones=drawn.cones,
+    )  # fmt: skip
+    targets, _ = reachable(model, rng, 2)
+    mechanism, goal, posture, room = machine(model, model.random(rng), targets)
+    wish(mechanism, goal, posture, room)
+    count = len(mechanism.joints.integers)
+    for j in range(count):
+        put_frame(mechanism.joints, posture, room, j)
+        move_towards_wishes(mechanism, goal, posture, room, j)
+    positions, rotations = posture.positions[:count].copy(), posture.rotations[:count].copy()
+    place(mechanism, posture)
+    np.testing.assert_allclose(positions, posture.positions[:count], rtol=0, atol=ROUNDING)
+    turned = rotation.angle(_units(rotations), _units(posture.rotations[:count]))
+    np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-9)
+
+
+def test_fabrik_turns_a_hinge_to_its_child_s_wish_within_its_limits(speed):
+    for upper, expected in ((2.0, 1.0), (0.4, 0.4)):
+        arm = planar(1, lower=-2.0, upper=upper)
+        target = [np.cos(1.0), np.sin(1.0), 0.0]
+        solution = solve_ik(arm, [-0.5], target, "fabrik", max_iterations=1)
+        assert solution.coordinates[0] == pytest.approx(expected, abs=1e-15)
+
+
+# ---- what is merged and seen
+
+
+def test_what_a_joint_leaves_in_place_it_does_not_see():
+    """A wrist of three hinges, the second on the first's axis, the third in the second's place."""
+    offsets = [[0, 0, 0], [0, 0, 1.0], [0, 0, 0.2], [0, 0, 0], [0.5, 0, 0]]
+    axes = [[1, 0, 0], [0, 0, 1], [0, 1, 0], [0, 0, 1], [0, 0, 1]]
+    arm = Articulation(Skeleton(range(-1, 4), offsets), ["hinge"] * 4 + ["fixed"], axes)
+    mechanism = prepare(arm, (4,), (False,)).mechanism
+    sees = mechanism.bonds[:, 1:]
+    assert sees[0, 1] == 1
+    assert not sees[1:, :].any()
+    assert mechanism.bonds[:, 0].tolist() == [1, 2, 2, 2]
+
+
+def test_the_reach_counts_links_and_not_the_root_s_offset(rng):
+    model = Articulation(
+        Skeleton([-1, 0, 1, 2], [[9.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 0.5]]),
+        ["hinge", "fixed", "slide", "ball"],
+        lower=-0.25,
+        upper=0.75,
+    )
+    mechanism = prepare(model, (3,), (False,)).mechanism
+    merged = np.hypot(1.0, 2.0)
+    assert mechanism.reach == pytest.approx(merged + 0.5, abs=1e-15)
+    assert mechanism.tips[0, 7] == pytest.approx(merged + 0.5 + 0.75, abs=1e-15)

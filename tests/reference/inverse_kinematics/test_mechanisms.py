@@ -1,0 +1,531 @@
+"""What every solver promises of every mechanism: any joints, limits, effectors, poses."""
+
+import gc
+import weakref
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from reference import (
+    IK_SOLVERS,
+    Articulation,
+    Mimic,
+    Outcome,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    rotation,
+    solve_ik,
+)
+from reference.arguments import frozen
+from reference.articulation import KINDS
+from reference.inverse_kinematics import checked_settings, solve_targets
+from reference.parallel import cores
+
+# Distances of a few metres over six joints, positions recomputed.
+ROUNDING = 1e-13
+# Each iteration may amplify rounding; those of a dozen stay far below this.
+PATH = 1e-7
+# A twist is known only to 1e-16 over the cosine of half the tilt.
+LIMIT = 1e-7
+
+TREES = {
+    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
+    "seed": st.integers(0, 2**32 - 1),
+}
+EXAMPLES = (
+    example(kinds=["ball", "hinge", "slide", "ball", "free", "hinge"], seed=1),
+    example(kinds=["hinge", "hinge", "ball", "slide", "hinge", "ball"], seed=2),
+    example(kinds=["slide", "ball", "hinge", "hinge", "fixed", "ball"], seed=3),
+    example(kinds=["hinge", "slide", "hinge", "slide", "hinge", "hinge"], seed=4),
+)
+
+
+def with_examples(law):
+    """Add trees of many joints to those that are drawn, of which the first are small."""
+    for one in EXAMPLES:
+        law = one(law)
+    return law
+
+
+at_both_speeds = settings(
+    max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+@pytest.fixture
+def problem(articulated, reachable, beyond_limits):
+    """Return the function that makes a model, a start outside of its limits, and two targets."""
+
+    def make(kinds, seed):
+        model, rng = articulated(kinds, seed), np.random.default_rng(seed)
+        targets, _ = reachable(model, rng, 2)
+        return model, beyond_limits(model, rng), targets
+
+    return make
+
+
+def residuals(model, q, targets):
+    """Return the largest distance and angle from effectors to targets, by forward kinematics."""
+    pose = forward_kinematics(model, q)
+    ways = [np.linalg.norm(pose.positions[t.effector] - t.position) for t in targets]
+    turns = [
+        rotation.angle(pose.rotations[t.effector], t.rotation)
+        for t in targets
+        if t.rotation is not None
+    ]
+    return max(ways), max(turns, default=0.0)
+
+
+# ---- the same as chains
+
+
+def test_on_balls_without_limits_the_path_is_that_of_chains(skeleton, local, rng, solver, speed):
+    target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
+    balls = Articulation(skeleton)
+    chain = solve_ik(skeleton, local, target, solver, max_iterations=40, record=True)
+    general = solve_ik(balls, local.ravel(), target, solver, max_iterations=40, record=True)
+    assert general.iterations == chain.iterations > 1
+    np.testing.assert_allclose(general.history, chain.history, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(general.positions, chain.positions, rtol=0, atol=1e-11)
+    if solver != "fabrik":  # whose chains are turned once, after the last sweep: another twist
+        turned = rotation.angle(general.local_rotations, chain.local_rotations)
+        np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-11)
+    assert general.coordinates.shape == (24,)
+    assert (general.coordinates.reshape(6, 4) == general.local_rotations).all()
+    assert (chain.coordinates == chain.local_rotations).all()
+
+
+def test_one_iteration_on_balls_turns_them_as_it_does_a_chain_s(
+    skeleton, local, rng, solver, speed
+):
+    """FABRIK's twist included: of each link the shortest arc."""
+    target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
+    chain = solve_ik(skeleton, local, target, solver, max_iterations=1)
+    general = solve_ik(Articulation(skeleton), local.ravel(), target, solver, max_iterations=1)
+    turned = rotation.angle(general.local_rotations, chain.local_rotations)
+    np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-12)
+
+
+def test_fixed_joints_are_parts_of_their_links(rng, solver, speed):
+    """Every second joint of a chain fixed, or left out and its offset and frame merged by hand."""
+    offsets, frames = rng.standard_normal((7, 3)), rotation.random(rng, 7)
+    kinds = ["ball", "fixed", "hinge", "fixed", "ball", "fixed", "fixed"]
+    whole = Articulation(Skeleton(range(-1, 6), offsets), kinds, [1.0, 2.0, 2.0], frames=frames)
+    x = [offsets[j] + rotation.rotate(frames[j], offsets[j + 1]) for j in (1, 3)]
+    last = offsets[5] + rotation.rotate(frames[5], offsets[6])
+    R = [rotation.multiply(frames[j], frames[j + 1]) for j in (1, 3, 5)]
+    merged = Articulation(
+        Skeleton(range(-1, 3), [offsets[0], *x, last]),
+        ["ball", "hinge", "ball", "fixed"],
+        [1.0, 2.0, 2.0],
+        frames=[frames[0], *R],
+    )
+    goal = forward_kinematics(merged, merged.random(rng))
+    target, q = Target(goal.positions[-1], goal.rotations[-1]), merged.random(rng)
+    there = solve_ik(whole, q, target, solver, max_iterations=10)
+    here = solve_ik(merged, q, target, solver, max_iterations=10)
+    assert there.iterations == here.iterations
+    np.testing.assert_allclose(there.coordinates, here.coordinates, rtol=0, atol=PATH)
+
+
+# ---- what comes out
+
+
+@at_both_speeds
+@with_examples
+@given(**TREES)
+def test_the_answer_is_forward_kinematics_of_its_coordinates(problem, solver, speed, kinds, seed):
+    model, q, targets = problem(kinds, seed)
+    solution = solve_ik(model, q, targets, solver, max_iterations=5)
+    pose = forward_kinematics(model, solution.coordinates)
+    np.testing.assert_allclose(solution.positions, pose.positions, rtol=0, atol=ROUNDING)
+    _, local = model.local_transforms(solution.coordinates)
+    np.testing.assert_allclose(solution.local_rotations, local, rtol=0, atol=ROUNDING)
+    distance, angle = residuals(model, solution.coordinates, targets)
+    assert solution.residual == pytest.approx(distance, abs=ROUNDING)
+    assert solution.residual_rotation == pytest.approx(angle, abs=ROUNDING)
+    reached = distance <= 1e-4 and angle <= 1e-4
+    assert (solution.outcome is Outcome.CONVERGED) == reached
+    assert solution.outcome is not Outcome.UNREACHABLE  # some pose reaches the targets
+
+
+@at_both_speeds
+@with_examples
+@given(**TREES)
+def test_limits_are_kept_and_joints_off_the_way_left_alone(
+    problem, on_the_way, solver, speed, kinds, seed
+):
+    model, q, targets = problem(kinds, seed)
+    found = solve_ik(model, q, targets, solver, max_iterations=5).coordinates
+    clamped, way = model.clamp(found), on_the_way(model, targets)
+    for j in set(range(len(kinds))) - set(model.mimics):
+        own = model.coordinates_of(j)
+        expected = clamped if j in way else q
+        np.testing.assert_allclose(found[own], expected[own], rtol=0, atol=LIMIT)
+
+
+@at_both_speeds
+@with_examples
+@given(**TREES)
+def test_the_history_holds_the_distance_before_and_after_each_iteration(
+    articulated, reachable, solver, speed, kinds, seed
+):
+    model, rng = articulated(kinds, seed), np.random.default_rng(seed)
+    targets, _ = reachable(model, rng, 2)
+    q = model.random(rng)
+    solution = solve_ik(model, q, targets, solver, max_iterations=3, record=True)
+    assert solution.history.shape == (solution.iterations + 1,)
+    start, _ = residuals(model, q, targets)
+    assert solution.history[0] == pytest.approx(start, abs=ROUNDING)
+    one = solve_ik(model, q, targets, solver, max_iterations=1)
+    if one.iterations == 1:
+        assert solution.history[1] == pytest.approx(one.residual, abs=ROUNDING)
+    if solution.outcome is not Outcome.STALLED:
+        assert solution.history[-1] == pytest.approx(solution.residual, abs=ROUNDING)
+
+
+def test_both_speeds_take_the_same_path(problem, solver):
+    from reference import speed
+
+    for seed in range(5):
+        model, q, targets = problem(["ball", "hinge", "slide", "free", "hinge", "ball"], seed)
+        fast = solve_ik(model, q, targets, solver, max_iterations=10, record=True)
+        with speed("plain"):
+            plain = solve_ik(model, q, targets, solver, max_iterations=10, record=True)
+        assert plain.iterations == fast.iterations
+        np.testing.assert_allclose(plain.history, fast.history, rtol=0, atol=PATH)
+        np.testing.assert_allclose(plain.coordinates, fast.coordinates, rtol=0, atol=PATH)
+
+
+def test_inputs_are_unchanged_and_answers_read_only(problem, solver, speed):
+    model, q, targets = problem(["ball", "hinge", "ball"], 1)
+    targets = [t._replace(rotation=(1.0 + 1e-7) * rotation.identity()) for t in targets]
+    q = q * (1.0 + 1e-7)
+    before = q.copy(), [(t.position.copy(), t.rotation.copy()) for t in targets]
+    solution = solve_ik(model, q, targets, solver, max_iterations=3)
+    assert (q == before[0]).all()
+    for target, (position, turn) in zip(targets, before[1], strict=True):
+        assert (target.position == position).all()
+        assert (target.rotation == turn).all()
+    arrays = solution.coordinates, solution.local_rotations, solution.positions, solution.history
+    for values in arrays:
+        assert not values.flags.writeable
+
+
+def test_a_skeleton_s_coordinates_are_its_local_rotations(skeleton, local, solver, speed):
+    goal = forward_kinematics(skeleton, local[::-1])
+    target = Target(goal.positions[-1], goal.rotations[-1])
+    pose = solve_ik(skeleton, local, target, solver, max_iterations=5)
+    balls = solve_ik(Articulation(skeleton), local.ravel(), target, solver, max_iterations=5)
+    assert pose.coordinates.shape == pose.local_rotations.shape == (6, 4)
+    assert (pose.coordinates == pose.local_rotations).all()
+    assert (pose.coordinates.ravel() == balls.coordinates).all()
+
+
+def test_a_skeleton_that_was_solved_for_is_let_go_of(local):
+    chain = Skeleton(range(-1, 5), np.ones((6, 3)))
+    solve_ik(chain, local, Target([1.0, 1.0, 1.0], rotation.identity()), max_iterations=1)
+    gone = weakref.ref(chain)
+    del chain
+    gc.collect()
+    assert gone() is None
+
+
+# ---- batches
+
+
+@pytest.fixture
+def many(articulated, rng):
+    """Return a model, starts (2, 1), and two targets, one of them (3,)."""
+    model = articulated(["hinge", "ball", "slide", "ball", "hinge", "fixed", "ball"], 3)
+    goal = forward_kinematics(model, model.random(rng, 3))
+    near = Target(goal.positions[:, -1], goal.rotations[0, -1])
+    return model, model.random(rng, 2, 1), [near, Target(goal.positions[0, 2], effector=2)]
+
+
+def test_a_batch_is_its_solves(many, solver, speed):
+    model, starts, (near, far) = many
+    options = {"max_iterations": 6, "record": True, "restarts": 1}
+    batch = solve_ik(model, starts, [near, far], solver, **options)
+    assert batch.positions.shape == (2, 3, 7, 3)
+    assert batch.coordinates.shape == (2, 3, model.coordinate_count)
+    for i in range(2):
+        for j in range(3):
+            target = [near._replace(position=near.position[j]), far]
+            one = solve_ik(model, starts[i, 0], target, solver, **options)
+            assert (batch.coordinates[i, j] == one.coordinates).all()
+            assert (batch.local_rotations[i, j] == one.local_rotations).all()
+            assert batch.residual[i, j] == one.residual
+            assert batch.residual_rotation[i, j] == one.residual_rotation
+            assert batch.iterations[i, j] == one.iterations
+            assert Outcome(batch.outcome[i, j]) is one.outcome
+            assert (batch.history[i, j, : one.iterations + 1] == one.history).all()
+            assert (batch.history[i, j, one.iterations :] == one.history[-1]).all()
+
+
+def test_rotations_alone_make_a_batch_too(many, solver, speed):
+    model, starts, (near, _) = many
+    turns = rotation.random(np.random.default_rng(4), 4)
+    batch = solve_ik(model, starts[0, 0], Target(near.position[0], turns), solver, max_iterations=2)
+    assert batch.residual_rotation.shape == (4,)
+    for i in range(4):
+        one = Target(near.position[0], turns[i])
+        alone = solve_ik(model, starts[0, 0], one, solver, max_iterations=2)
+        assert (batch.coordinates[i] == alone.coordinates).all()
+
+
+def test_a_batch_in_another_order_gives_the_same(many, solver, rng):
+    model, starts, (near, far) = many
+    order = np.array([2, 0, 1])
+    here = solve_ik(model, starts[0], [near, far], solver, restarts=2)
+    there = solve_ik(
+        model, starts[0], [near._replace(position=near.position[order]), far], solver, restarts=2
+    )
+    assert (here.coordinates[order] == there.coordinates).all()
+    assert (here.iterations[order] == there.iterations).all()
+
+
+def test_a_batch_on_all_cores_is_the_same_as_on_one(many, rng, solver):
+    model, _, (near, _) = many
+    starts = model.random(rng, 100)
+    target = Target(near.position[0], near.rotation)
+    with cores(1):
+        here = solve_ik(model, starts, target, solver, max_iterations=2)
+    with cores(3):
+        there = solve_ik(model, starts, target, solver, max_iterations=2)
+    assert (here.coordinates == there.coordinates).all()
+    assert (here.residual_rotation == there.residual_rotation).all()
+
+
+def test_chained_each_target_starts_from_the_last_solution(many, solver, speed):
+    model, starts, (near, far) = many
+    chained = checked_settings(solver, 1e-4, 1e-4, 4, 0, 0, False)._replace(chained=True)
+    motion = solve_targets(model, starts[0, 0], [near, far], -1, chained)
+    q = starts[0, 0]
+    for i in range(3):
+        target = [near._replace(position=near.position[i]), far]
+        q = solve_ik(model, q, target, solver, max_iterations=4).coordinates
+        np.testing.assert_allclose(motion.coordinates[i], q, rtol=0, atol=1e-11)
+    assert np.ptp(motion.coordinates, axis=0).max() > 1e-3
+
+
+def test_whatever_comes_in_the_kernel_is_compiled_once(many, solver):
+    model, starts, (near, far) = many
+    solve_ik(model, starts[0, 0].tolist(), near._replace(position=near.position[0]), solver)
+    solve_ik(model, np.repeat(starts, 2, axis=-1)[..., ::2], [near, far], solver, restarts=1)
+    solve_ik(model, np.float32(model.neutral()), np.float32([1, 2, 3]), solver, tolerance=1)
+    alone = near._replace(position=frozen(near.position[0]), rotation=frozen(near.rotation))
+    solve_ik(model, frozen(starts[0, 0]), alone, solver)
+    assert len(IK_SOLVERS[solver].mechanism.compiled.signatures) == 1
+
+
+def test_however_arguments_come_the_answer_is_the_same(many, skeleton, local, solver, speed):
+    """Plain arrays take a shorter way to the kernel than lists, arrays to convert, or batches."""
+    model, starts, (near, far) = many
+    chain_target = far.position
+    pose = Target(near.position[0], near.rotation, weight=3.0)
+    cases = [
+        (model, starts[0, 0], pose, -1),
+        (model, starts[0, 0], far, -1),
+        (model, starts[0, 0], far.position, -2),
+        (skeleton, local, chain_target, -1),
+        (skeleton, local, Target(chain_target, effector=3), -1),
+        (skeleton, local, chain_target, 4),
+    ]
+    for tree, start, target, effector in cases:
+        options = {"effector": effector, "max_iterations": 3}
+        plain = solve_ik(tree, start, target, solver, **options)
+        for others in (
+            solve_ik(tree, start.tolist(), target, solver, **options),
+            solve_ik(tree, np.float64(np.stack([start, start]))[1:], target, solver, **options),
+            solve_ik(tree, frozen(start), target, solver, **options),
+            solve_ik(tree, start, target, solver, record=True, **options),
+        ):
+            for name in ("coordinates", "local_rotations", "positions", "residual"):
+                value = np.squeeze(getattr(others, name))
+                assert (value == np.squeeze(getattr(plain, name))).all()
+            assert np.squeeze(others.iterations) == plain.iterations
+            assert np.squeeze(others.outcome) == plain.outcome
+            assert np.squeeze(others.residual_rotation) == plain.residual_rotation
+        for values in (plain.coordinates, plain.local_rotations, plain.positions, plain.history):
+            assert not values.flags.writeable
+        assert isinstance(plain.outcome, Outcome)
+
+
+def test_no_targets_give_no_solutions(many, solver, speed):
+    model, starts, _ = many
+    solution = solve_ik(model, starts[0, 0], Target(np.empty((0, 3)), rotation.identity()), solver)
+    assert solution.residual.shape == (0,)
+    assert solution.coordinates.shape == (0, model.coordinate_count)
+
+
+# ---- the same world seen otherwise
+
+
+def moved(model, targets, turn, shift):
+    """Return the model and the targets turned about the origin and shifted."""
+    offsets, frames = model.skeleton.offsets.copy(), model.frames.copy()
+    offsets[0] = shift + rotation.rotate(turn, offsets[0])
+    frames[0] = rotation.multiply(turn, frames[0])
+    there = Articulation(
+        Skeleton(model.skeleton.parents, offsets), model.kinds, model.axes, frames=frames,
+        lower=model.lower, upper=model.upper, cones=model.cones, mimics=model.mimics,
+    )  # fmt: skip
+    return there, [
+        t._replace(
+            position=shift + rotation.rotate(turn, t.position),
+            rotation=None if t.rotation is None else rotation.multiply(turn, t.rotation),
+        )
+        for t in targets
+    ]
+
+
+@at_both_speeds
+@with_examples
+@given(**TREES)
+def test_a_moved_world_changes_nothing(problem, solver, speed, kinds, seed):
+    model, q, targets = problem(kinds, seed)
+    rng = np.random.default_rng(seed)
+    there, goals = moved(model, targets, rotation.random(rng), rng.standard_normal(3))
+    here = solve_ik(model, q, targets, solver, max_iterations=4, record=True)
+    again = solve_ik(there, q, goals, solver, max_iterations=4, record=True)
+    same = min(len(here.history), len(again.history))
+    assert same == len(here.history) or here.outcome is not Outcome.CONVERGED
+    np.testing.assert_allclose(again.history[:same], here.history[:same], rtol=0, atol=PATH)
+
+
+def scaled(model, q, targets, s):
+    """Return the model, coordinates and targets with all lengths s times as large."""
+    worth = np.array([s if kind == "slide" else 1.0 for kind in model.kinds])
+    mimics = {
+        j: Mimic(m.leader, m.multiplier * worth[j] / worth[m.leader], m.shift * worth[j])
+        for j, m in model.mimics.items()
+    }
+    large = Articulation(
+        Skeleton(model.skeleton.parents, s * model.skeleton.offsets), model.kinds, model.axes,
+        frames=model.frames, lower=worth * model.lower, upper=worth * model.upper,
+        cones=model.cones, mimics=mimics,
+    )  # fmt: skip
+    return large, to_scale(model, q, s), [t._replace(position=s * t.position) for t in targets]
+
+
+def to_scale(model, q, s):
+    q = q.copy()
+    for j in set(range(model.joint_count)) - set(model.mimics):
+        if model.kinds[j] in ("slide", "free"):
+            q[..., model.coordinates_of(j)][..., :3] *= s
+    return q
+
+
+@at_both_speeds
+@with_examples
+@given(**TREES)
+def test_another_unit_of_length_changes_nothing(problem, solver, speed, kinds, seed):
+    """The unit is a power of two, so that nothing is rounded otherwise."""
+    model, q, targets = problem(kinds, seed)
+    large, start, goals = scaled(model, q, targets, 1024.0)
+    here = solve_ik(model, q, targets, solver, max_iterations=6)
+    there = solve_ik(large, start, goals, solver, max_iterations=6, tolerance=1024e-4)
+    if any(len(model.skeleton.path(t.effector)) > 1 for t in targets):  # there is some length
+        assert there.iterations == here.iterations
+        expected = to_scale(model, here.coordinates, 1024.0)
+        np.testing.assert_allclose(there.coordinates, expected, rtol=1e-9, atol=1e-9)
+        assert there.residual_rotation == pytest.approx(here.residual_rotation, abs=1e-9)
+
+
+# ---- bad input
+
+
+def as_arrays(value):
+    """Return numbers as float64 arrays, in targets too."""
+    if isinstance(value, Target):
+        turn = value.rotation if value.rotation is None else np.array(value.rotation, dtype=float)
+        return value._replace(position=np.array(value.position, dtype=float), rotation=turn)
+    numbers = isinstance(value, list) and not any(isinstance(one, Target) for one in value)
+    return np.array(value, dtype=float) if numbers else value
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"local_rotations": np.ones(5)}, r"local_rotations: expected shape \(..., 6\), got \(5,"),
+        ({"local_rotations": [np.nan, 1, 0, 0, 0, 0]}, "local_rotations: expected finite numbers"),
+        ({"local_rotations": [np.inf, 1, 0, 0, 0, 0]}, "local_rotations: expected finite numbers"),
+        ({"local_rotations": [1e80, 1, 0, 0, 0, 0]}, "local_rotations: expected coordinates of at"),
+        ({"local_rotations": [0, 1.1, 0, 0, 0, 0]}, "local_rotations: expected unit quaternions"),
+        ({"local_rotations": "rest"}, "local_rotations: expected an array of numbers"),
+        ({"target": [np.nan, 0, 0]}, "target: expected finite numbers, got nan"),
+        ({"target": Target([0, np.inf, 0])}, "target: expected finite numbers, got inf"),
+        ({"target": Target([1e80, 0, 0])}, "target: expected coordinates of at most"),
+        ({"target": Target([0, 0])}, r"target: expected shape \(..., 3\), got \(2,\)"),
+        ({"target": []}, r"target: expected shape \(..., 3\), got \(0,\)"),
+        ({"target": Target([0, 0, 0], [1, 0, 0])}, r"rotation: expected shape \(..., 4\), got"),
+        ({"target": Target([0, 0, 0], [1, 1, 0, 0])}, "rotation: expected unit quaternions"),
+        ({"target": Target([0, 0, 0], [0, 0, 0, 0])}, "rotation: expected unit quaternions"),
+        ({"target": Target([0, 0, 0], [np.nan, 0, 0, 0])}, "rotation: expected finite numbers"),
+        ({"target": Target([0, 0, 0], weight=0)}, "weight: expected a number greater than 0"),
+        ({"target": Target([0, 0, 0], weight=-1.0)}, "weight: expected a number greater than 0"),
+        ({"target": Target([0, 0, 0], weight=np.nan)}, "weight: expected a finite number"),
+        ({"target": Target([0, 0, 0], weight=[1, 1])}, "weight: expected one number"),
+        ({"target": Target([0, 0, 0], effector="hand")}, "effector: expected one of"),
+        ({"target": Target([0, 0, 0], effector=4)}, "effector: expected an integer"),
+        (
+            {"target": [Target([0, 0, 0], effector=2), Target([1, 0, 0], effector="joint2")]},
+            "target: expected one an effector, got two for joint 2",
+        ),
+        (
+            {"target": [Target([0, 0, 0]), [1.0, 0.0, 0.0]]},
+            r"target: expected only Targets beside others, got \[1.0, 0.0, 0.0\]",
+        ),
+        (
+            {"target": Target([0, 0, 0], effector=2), "effector": 1},
+            "effector: expected that of the target, 2, got 1",
+        ),
+        (
+            {"target": [Target(np.zeros((2, 3))), Target(np.zeros((3, 3)), effector=1)]},
+            r"target: expected leading axes that broadcast .* \(2,\), got \(3,\)",
+        ),
+        (
+            {"target": Target(np.zeros((2, 3)), np.tile([1, 0, 0, 0], (3, 1)))},
+            r"target: expected leading axes that broadcast .* \(2,\), got \(3,\)",
+        ),
+        ({"restarts": -1}, "restarts: expected an integer of at least 0, got -1"),
+        ({"restarts": 1.0}, "restarts: expected an integer, got 1.0"),
+        ({"seed": -1}, "seed: expected an integer of at least 0"),
+        ({"seed": "now"}, "seed: expected an integer, got 'now'"),
+        ({"tolerance_rotation": -1e-3}, "tolerance_rotation: expected a number of at least 0"),
+        ({"tolerance_rotation": np.nan}, "tolerance_rotation: expected a finite number"),
+        ({"tolerance": [1e-3, 1e-3]}, "tolerance: expected one number"),
+        ({"max_iterations": True}, "max_iterations: expected an integer"),
+        ({"solver": "lm"}, "solver: expected one of ccd, fabrik, .*, got 'lm'"),
+        ({"skeleton": "arm"}, "skeleton: expected a Skeleton or an Articulation, got str"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("plain", [False, True])
+def test_bad_input_is_named(change, message, plain, speed):
+    kinds = ["hinge", "ball", "slide", "fixed"]
+    if plain:  # what is a float64 array already takes a shorter way
+        change = {name: as_arrays(value) for name, value in change.items()}
+    arguments = {
+        "skeleton": Articulation(Skeleton([-1, 0, 1, 2], np.eye(4, 3)), kinds),
+        "local_rotations": np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]),
+        "target": np.zeros(3),
+        "solver": "levenberg_marquardt",
+    }
+    with pytest.raises(ValueError, match=message):
+        solve_ik(**(arguments | change))
+
+
+@pytest.mark.parametrize("excess", [1e-6 - 1e-13, -1e-6 + 1e-13])
+def test_lengths_on_the_edge_of_the_unit_tolerance_are_unit(skeleton, local, solver, excess, speed):
+    goal = forward_kinematics(skeleton, local[::-1])
+    target, long = Target(goal.positions[-1], goal.rotations[-1]), 1.0 + excess
+    edge = target._replace(rotation=long * goal.rotations[-1])
+    exact = solve_ik(skeleton, local, target, solver, max_iterations=2)
+    for start, wanted in ((local, edge), (long * local, target), (long * local, edge)):
+        there = solve_ik(skeleton, start, wanted, solver, max_iterations=2)
+        assert there.coordinates.shape == (6, 4)
+        np.testing.assert_allclose(there.positions, exact.positions, rtol=0, atol=1e-12)

@@ -1,0 +1,143 @@
+"""Targets of position and rotation."""
+
+import numpy as np
+import pytest
+
+from reference import (
+    Articulation,
+    Outcome,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    rotation,
+    solve_ik,
+)
+from reference.inverse_kinematics.mechanism import (
+    LEVER,
+    misfit,
+    residuals,
+    turn_weight,
+    wrong_turn,
+)
+
+# Of 20 targets that a pose reaches, from one start and then up to five more; limits as the models'.
+REACHED = {
+    ("levenberg_marquardt", "ball", "one"): 20,
+    ("levenberg_marquardt", "hinge", "one"): 6,
+    ("levenberg_marquardt", "hinge", "more"): 15,
+    ("damped_least_squares", "ball", "one"): 18,
+    ("ccd", "ball", "one"): 10,
+    ("fabrik", "ball", "one"): 3,
+}
+
+
+@pytest.mark.parametrize(("solver", "kind", "starts"), REACHED)
+def test_poses_that_can_be_reached_are(solver, kind, starts, chain_of_joints, rng):
+    links = {"ball": 4, "hinge": 7}[kind]
+    model, reached = chain_of_joints(kind, rng, links), 0
+    for _ in range(20):
+        goal = forward_kinematics(model, model.random(rng))
+        target = Target(goal.positions[-1], goal.rotations[-1])
+        solution = solve_ik(
+            model, model.random(rng), target, solver, max_iterations=500,
+            tolerance=1e-3, tolerance_rotation=2e-3, restarts=5 if starts == "more" else 0,
+        )  # fmt: skip
+        pose = forward_kinematics(model, solution.coordinates)
+        angle = rotation.angle(pose.rotations[-1], target.rotation)
+        assert solution.residual_rotation == pytest.approx(angle, abs=1e-13)
+        here = np.linalg.norm(pose.positions[-1] - target.position) <= 1e-3 and angle <= 2e-3
+        assert (solution.outcome is Outcome.CONVERGED) == here
+        reached += here
+    assert reached >= REACHED[solver, kind, starts]
+
+
+def test_a_skeleton_s_effector_turns_where_its_rotation_is_asked_for(
+    skeleton, local, solver, rng, speed
+):
+    goal = forward_kinematics(skeleton, rotation.random(rng, 6))
+    alone = solve_ik(skeleton, local, Target(goal.positions[-1]), solver, max_iterations=3)
+    posed = solve_ik(
+        skeleton, local, Target(goal.positions[-1], goal.rotations[-1]), solver, max_iterations=3
+    )
+    np.testing.assert_allclose(alone.local_rotations[-1], local[-1], rtol=0, atol=1e-15)
+    assert rotation.angle(posed.local_rotations[-1], local[-1]) > 1e-3
+    before = rotation.angle(forward_kinematics(skeleton, local).rotations[-1], goal.rotations[-1])
+    assert posed.residual_rotation < before
+    assert alone.residual_rotation == 0.0
+
+
+def test_the_sign_of_the_target_s_quaternion_does_not_matter(solver, speed, articulated, rng):
+    model = articulated(["ball", "hinge", "ball", "slide", "hinge", "ball"], 5)
+    goal, q = forward_kinematics(model, model.random(rng)), model.random(rng)
+    target = Target(goal.positions[-1], goal.rotations[-1])
+    here = solve_ik(model, q, target, solver, max_iterations=5)
+    there = solve_ik(model, q, target._replace(rotation=-target.rotation), solver, max_iterations=5)
+    assert (there.coordinates == here.coordinates).all()
+    assert there.residual_rotation == here.residual_rotation
+
+
+def test_the_sign_of_the_start_s_quaternions_does_not_matter(solver, speed, skeleton, local, rng):
+    goal = forward_kinematics(skeleton, rotation.random(rng, 6))
+    target = Target(goal.positions[-1], goal.rotations[-1])
+    here = solve_ik(skeleton, local, target, solver, max_iterations=5)
+    there = solve_ik(skeleton, -local, target, solver, max_iterations=5)
+    np.testing.assert_allclose(there.positions, here.positions, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [np.pi, np.pi - 1e-9, 3.0])
+def test_half_a_turn_is_made_good(solver, angle, speed):
+    """Where both ways round are as long, one is taken."""
+    joint = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0.5, 0, 0]]), ["ball", "fixed"])
+    turn = rotation.exponential([0.0, 0.0, angle])
+    target = Target(rotation.rotate(turn, [0.5, 0, 0]), turn)
+    solution = solve_ik(joint, joint.zero(), target, solver, max_iterations=300)
+    assert solution.outcome is Outcome.CONVERGED
+    assert solution.residual_rotation <= 1e-4
+
+
+def test_both_tolerances_must_be_kept(solver, speed):
+    """A hinge far off the axis: position and rotation are met together, at different pace."""
+    arm = Articulation(Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"])
+    turn = rotation.exponential([0.0, 0.0, 1e-3])
+    near = Target([np.cos(1e-3), np.sin(1e-3), 0.0], turn)
+    for tolerances, iterations in (((1e-2, 1e-2), 0), ((1e-2, 1e-4), 1), ((1e-4, 1e-2), 1)):
+        solution = solve_ik(
+            arm, [0.0], near, solver, tolerance=tolerances[0], tolerance_rotation=tolerances[1]
+        )
+        assert min(solution.iterations, 1) == iterations
+        assert solution.outcome is Outcome.CONVERGED
+
+
+def test_a_rotation_that_no_joint_can_make_is_not_reached(solver, speed):
+    arm = Articulation(Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"])
+    target = Target([1.0, 0.0, 0.0], rotation.exponential([0.5, 0.0, 0.0]))
+    solution = solve_ik(arm, [0.2], target, solver, max_iterations=300)
+    assert solution.outcome in (Outcome.STALLED, Outcome.ITERATION_LIMIT)
+    assert solution.residual_rotation == pytest.approx(0.5, abs=0.05)
+
+
+def test_rotations_count_by_lever_and_reach(chain_of_joints, machine, rng):
+    model = chain_of_joints("ball", rng)
+    pose = forward_kinematics(model, model.random(rng))
+    targets = [
+        Target(pose.positions[4], pose.rotations[4], 4, 0.5),
+        Target(pose.positions[2] + 1.0, pose.rotations[2], 2, 2.0),
+    ]
+    q = model.random(rng)
+    mechanism, goal, posture, _ = machine(model, q, targets)
+    goal[:, 7] = [t.weight for t in targets]
+    here, lever = forward_kinematics(model, q), LEVER * mechanism.reach
+    total = largest = furthest = nearness = 0.0
+    for e, (position, turn, joint, weight) in enumerate(targets):
+        way = np.linalg.norm(position - here.positions[joint])
+        angle = rotation.angle(here.rotations[joint], turn)
+        matrices = rotation.to_matrix(np.stack([here.rotations[joint], turn]))
+        total += weight * (way**2 + lever**2 * (3.0 - np.trace(matrices[0].T @ matrices[1])))
+        largest, furthest = max(largest, angle), max(furthest, way)
+        nearness += way + lever * angle
+        turned = rotation.multiply(wrong_turn(mechanism, goal, posture, e), here.rotations[joint])
+        assert rotation.angle(turned, turn) < 1e-13
+    assert misfit(mechanism, goal, posture) == pytest.approx(total, rel=1e-13)
+    assert turn_weight(mechanism) == pytest.approx(0.5 * lever**2, rel=1e-15)
+    found = residuals(mechanism, goal, posture)
+    np.testing.assert_allclose(found, [furthest, largest, nearness], rtol=1e-13, atol=0)

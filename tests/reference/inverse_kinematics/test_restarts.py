@@ -1,0 +1,152 @@
+"""Further attempts from random poses."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from reference import Outcome, Target, forward_kinematics, rotation, solve_ik
+from reference.inverse_kinematics.attempts import rank_restarts, take_nearest
+from reference.inverse_kinematics.mechanism import LEVER
+from reference.inverse_kinematics.preparation import prepare
+
+
+@pytest.fixture
+def arm(chain_of_joints, rng):
+    """Return seven hinges with limits."""
+    return chain_of_joints("hinge", rng, links=7, lower=-1.8, upper=1.8)
+
+
+@pytest.fixture
+def poses(arm, rng):
+    """Return 30 poses that the arm can take."""
+    goal = forward_kinematics(arm, arm.random(rng, 30))
+    return Target(goal.positions[:, -1], goal.rotations[:, -1])
+
+
+def reached(solution):
+    return solution.outcome == Outcome.CONVERGED
+
+
+@pytest.mark.parametrize("solver", ["levenberg_marquardt", "damped_least_squares"], indirect=True)
+def test_more_restarts_reach_more_targets(arm, poses, rng, solver):
+    q = arm.random(rng)
+    counts = [
+        np.count_nonzero(reached(solve_ik(arm, q, poses, solver, restarts=n))) for n in (0, 3, 20)
+    ]
+    assert counts[0] < counts[1] < counts[2]
+
+
+def test_what_one_start_reaches_soon_takes_no_restart(arm, rng, solver, speed):
+    """A start near the target: the very same answer."""
+    q = 0.9 * arm.random(rng)
+    goal = forward_kinematics(arm, q + 1e-3)
+    target = Target(goal.positions[-1], goal.rotations[-1])
+    options = {"tolerance": 2e-3, "tolerance_rotation": 2e-3, "record": True}
+    one = solve_ik(arm, q, target, solver, **options)
+    more = solve_ik(arm, q, target, solver, restarts=5, **options)
+    if one.outcome is Outcome.CONVERGED and one.iterations < 3:
+        assert (more.coordinates == one.coordinates).all()
+        assert more.iterations == one.iterations
+    else:
+        assert solver in ("fabrik", "ccd", "jacobian_transpose")
+
+
+def test_one_restart_from_the_very_goal_arrives(arm, solver, speed, rng):
+    """The start is bent the wrong way and given no iterations, so that restarts alone count."""
+    random = prepare(arm, (7,), (True,), 3, 11).restarts
+    assert random.shape == (3, 8)
+    goal = forward_kinematics(arm, random[1])
+    target = Target(goal.positions[-1], goal.rotations[-1])
+    solution = solve_ik(arm, arm.random(rng), target, solver, restarts=3, seed=11, max_iterations=0)
+    assert solution.outcome is Outcome.CONVERGED
+    assert solution.iterations == 0
+    np.testing.assert_allclose(solution.coordinates, random[1], rtol=0, atol=1e-15)
+    other = solve_ik(arm, arm.random(rng), target, solver, restarts=3, seed=12, max_iterations=0)
+    assert other.outcome is Outcome.ITERATION_LIMIT
+
+
+def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
+    prepared = prepare(arm, (7, 3), (True, False), 9, 5)
+    targets = [
+        Target(poses.position[0], poses.rotation[0], 7),
+        Target(poses.position[1] / 2.0, None, 3),
+    ]
+    goal = machine(arm, arm.neutral(), targets).goal
+    request = SimpleNamespace(restarts=prepared.restarts, tips=prepared.tips)
+    room = SimpleNamespace(ranks=np.empty(9))
+    rank_restarts(prepared.mechanism, goal, request, room)
+    full = np.hstack([prepared.restarts, np.zeros((9, arm.coordinate_count))])[:, :8]
+    pose = forward_kinematics(arm, full)
+    ways = [np.linalg.norm(pose.positions[:, t.effector] - t.position, axis=1) for t in targets]
+    angles = rotation.angle(pose.rotations[:, 7], targets[0].rotation)
+    expected = np.max(ways, axis=0) + LEVER * prepared.mechanism.reach * angles
+    np.testing.assert_allclose(room.ranks, expected, rtol=1e-12, atol=0)
+    taken = np.empty((9, prepared.mechanism.coordinates))
+    for q in taken:
+        take_nearest(request, room, q)
+    assert (taken == prepared.restarts[np.argsort(expected)]).all()
+
+
+def test_the_best_of_all_attempts_is_returned(arm, poses, rng, solver, speed):
+    """With no iterations the attempts are the start and the random poses as they are."""
+    q, wanted = arm.random(rng), Target(poses.position[0])
+    random = prepare(arm, (7,), (False,), 6, 5).restarts
+    starts = np.vstack([q[:7], random])
+    full = np.hstack([starts, np.full((7, 1), q[7])])
+    ways = forward_kinematics(arm, full).positions[:, -1] - wanted.position
+    best = np.linalg.norm(ways, axis=1)
+    solution = solve_ik(arm, q, wanted, solver, restarts=6, seed=5, max_iterations=0)
+    assert solution.residual == pytest.approx(best.min(), abs=1e-14)
+    np.testing.assert_allclose(solution.coordinates, full[best.argmin()], rtol=0, atol=1e-15)
+
+
+def test_restarts_follow_from_the_seed(arm, poses, rng):
+    q = arm.random(rng)
+    first = solve_ik(arm, q, poses, "levenberg_marquardt", restarts=5, seed=1)
+    again = solve_ik(arm, q, poses, "levenberg_marquardt", restarts=5, seed=1)
+    other = solve_ik(arm, q, poses, "levenberg_marquardt", restarts=5, seed=2)
+    assert (first.coordinates == again.coordinates).all()
+    assert (first.coordinates != other.coordinates).any()
+
+
+def test_restarts_are_the_same_alone_and_in_a_batch(arm, poses, rng, solver):
+    q = arm.random(rng)
+    batch = solve_ik(arm, q, poses, solver, restarts=3, max_iterations=20)
+    for i in (0, 7, 29):
+        target = Target(poses.position[i], poses.rotation[i])
+        one = solve_ik(arm, q, target, solver, restarts=3, max_iterations=20)
+        assert (batch.coordinates[i] == one.coordinates).all()
+        assert batch.iterations[i] == one.iterations
+
+
+def test_restarts_keep_limits_and_leave_joints_off_the_way(
+    articulated, reachable, on_the_way, rng, solver, speed
+):
+    for seed in range(4):
+        model = articulated(["ball", "hinge", "ball", "slide", "hinge", "ball", "hinge"], seed)
+        targets, _ = reachable(model, rng, 1, oriented=0.0)
+        q = model.random(rng)
+        solution = solve_ik(model, q, targets, solver, restarts=3, max_iterations=3)
+        assert model.within_limits(solution.coordinates, 1e-7)
+        for j in set(range(7)) - on_the_way(model, targets) - set(model.mimics):
+            own = model.coordinates_of(j)
+            np.testing.assert_allclose(solution.coordinates[own], q[own], rtol=0, atol=1e-15)
+
+
+def test_the_iterations_of_all_attempts_are_counted_and_recorded(arm, rng, solver, speed):
+    far = Target([100.0, 0.0, 0.0])
+    q = arm.random(rng)
+    solution = solve_ik(arm, q, far, solver, restarts=2, max_iterations=4, record=True)
+    assert solution.outcome is Outcome.UNREACHABLE
+    assert 3 <= solution.iterations <= 16
+    assert solution.history.shape == (solution.iterations + 1,)
+    assert np.isfinite(solution.history).all()
+    assert (solution.history >= 90.0).all()
+
+
+def test_a_skeleton_may_be_restarted_too(skeleton, local, rng, solver, speed):
+    target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
+    solution = solve_ik(skeleton, local, target, solver, restarts=2, max_iterations=300)
+    assert solution.outcome is Outcome.CONVERGED
+    assert solution.local_rotations.shape == (6, 4)

@@ -1,0 +1,318 @@
+"""The Jacobian methods on mechanisms: rows, steps, and steps that limits hold."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
+
+from reference import (
+    Articulation,
+    Mimic,
+    Outcome,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    rotation,
+    solve_ik,
+)
+from reference.articulation import KINDS
+from reference.differential import integrate, jacobian
+from reference.inverse_kinematics.damped_least_squares import DAMPING
+from reference.inverse_kinematics.levenberg_marquardt import DAMPING as OF_POSITIONS
+from reference.inverse_kinematics.levenberg_marquardt import DAMPING_OF_POSES
+from reference.inverse_kinematics.mechanism import LEVER
+from reference.inverse_kinematics.stacked import (
+    damped_step,
+    linearise_all,
+    solve_damped,
+    take_step,
+    transposed_step,
+)
+
+# A dozen products and sums of numbers of order one to ten.
+ROUNDING = 1e-12
+# The damped matrix has a condition of at most a few thousand here.
+SOLVED = 1e-9
+
+TREES = {
+    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
+    "seed": st.integers(0, 2**32 - 1),
+}
+EXAMPLES = (
+    example(kinds=["ball", "hinge", "slide", "ball", "free", "hinge"], seed=1),
+    example(kinds=["hinge", "hinge", "ball", "slide", "hinge", "ball"], seed=2),
+    example(kinds=["slide", "ball", "hinge", "hinge", "fixed", "ball"], seed=3),
+    example(kinds=["hinge", "slide", "hinge", "slide", "hinge", "hinge"], seed=4),
+)
+
+
+def with_examples(law):
+    """Add trees of many joints to those that are drawn, of which the first are small."""
+    for one in EXAMPLES:
+        law = one(law)
+    return law
+
+
+at_both_speeds = settings(
+    max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+
+
+@pytest.fixture
+def problem(articulated, reachable, unlimited):
+    """Return the function that makes a model without limits, a start and two targets."""
+
+    def make(kinds, seed):
+        model, rng = unlimited(articulated(kinds, seed)), np.random.default_rng(seed)
+        targets, _ = reachable(model, rng, 2)
+        return model, model.random(rng), targets
+
+    return make
+
+
+def worth_of_freedoms(model, reach):
+    """Return what a unit of each freedom is worth: 1 rad, or the reach [m]."""
+    worth = np.ones(model.freedom_count)
+    for j, kind in enumerate(model.kinds):
+        if j not in model.mimics and kind in ("slide", "free"):
+            worth[model.freedoms_of(j)][:3] = reach
+    return worth
+
+
+def stacked(model, q, targets, reach):
+    """Return e (equation,) and J (equation, freedom) of all targets, by `differential.jacobian`."""
+    pose, errors, rows = forward_kinematics(model, q), [], []
+    for position, turn, joint, weight in targets:
+        root, J = np.sqrt(weight), jacobian(model, q, joint)
+        errors.append(root * (position - pose.positions[joint]))
+        rows.append(root * J[:3])
+        if turn is not None:
+            wrong = rotation.multiply(turn, rotation.conjugate(pose.rotations[joint]))
+            errors.append(root * LEVER * reach * rotation.logarithm(wrong))
+            rows.append(root * LEVER * reach * J[3:])
+    return np.concatenate(errors), np.concatenate(rows) * worth_of_freedoms(model, reach)
+
+
+def freedoms_on_the_way(model, joints):
+    """Return the freedoms of some joints, in their order."""
+    return np.concatenate([np.r_[model.freedoms_of(j)] for j in sorted(joints)] + [[]]).astype(int)
+
+
+@at_both_speeds
+@with_examples
+@given(**TREES)
+def test_errors_and_rows_are_those_of_the_jacobians(problem, machine, on_the_way, kinds, seed):
+    model, q, targets = problem(kinds, seed)
+    mechanism, goal, posture, room = machine(model, q, targets)
+    linearise_all(mechanism, goal, posture, room.stack)
+    e, J = stacked(model, q, targets, mechanism.reach)
+    own = freedoms_on_the_way(model, on_the_way(model, targets))
+    np.testing.assert_allclose(room.stack.e, e, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(room.stack.J, J[:, own].T, rtol=0, atol=ROUNDING)
+    others = np.setdiff1d(np.arange(model.freedom_count), own)
+    assert not J[:, others].any()  # whoever is left out moves no effector
+
+
+def test_a_follower_of_another_kind_adds_to_its_leader_s_row(machine):
+    """A hinge drives a slide, as a screw does, and a slide a hinge, as a rack does."""
+    chain = Skeleton(range(-1, 4), 2.0 * np.eye(5, 3))
+    model = Articulation(
+        chain, ["hinge", "slide", "slide", "hinge", "fixed"], [1.0, 2.0, 3.0],
+        mimics={1: Mimic(0, 0.3, 0.1), 3: Mimic(2, -2.0)},
+    )  # fmt: skip
+    q, targets = np.array([0.4, -0.3]), [Target([1.0, 2.0, 0.5], rotation.identity(), 4)]
+    mechanism, goal, posture, room = machine(model, q, targets)
+    linearise_all(mechanism, goal, posture, room.stack)
+    _, J = stacked(model, q, targets, mechanism.reach)
+    np.testing.assert_allclose(room.stack.J, J.T, rtol=0, atol=ROUNDING)
+
+
+def damped(J, e, damping):
+    return J.T @ np.linalg.solve(J @ J.T + damping * np.eye(len(e)), e)
+
+
+def sugihara(J, e, targets, reach):
+    poses = any(target.rotation is not None for target in targets)
+    return damped(J, e, (DAMPING_OF_POSES if poses else OF_POSITIONS) * e @ e)
+
+
+def transposed(J, e, targets, reach):
+    g = J.T @ e
+    move = J @ g
+    return g * (e @ move) / (move @ move) if g.any() else g
+
+
+STEPS = {
+    "levenberg_marquardt": sugihara,
+    "damped_least_squares": lambda J, e, targets, reach: damped(J, e, DAMPING * reach**2),
+    "jacobian_transpose": transposed,
+}
+
+
+@pytest.mark.parametrize("solver", STEPS)
+@at_both_speeds
+@with_examples
+@given(**TREES)
+def test_one_iteration_is_the_textbook_s(problem, machine, solver, speed, kinds, seed):
+    model, q, targets = problem(kinds, seed)
+    targets = [target._replace(weight=target.weight / 2.0) for target in targets]
+    reach = machine(model, q, targets).mechanism.reach
+    heaviest = max(target.weight for target in targets)
+    shares = [target._replace(weight=target.weight / heaviest) for target in targets]
+    e, J = stacked(model, q, shares, reach)
+    if not J.any():
+        return
+    step = worth_of_freedoms(model, reach) * STEPS[solver](J, e, targets, reach)
+    solution = solve_ik(
+        model, q, targets, solver, tolerance=0.0, tolerance_rotation=0.0, max_iterations=1
+    )
+    if solution.iterations == 1:  # else nothing moves, or it is bent and asked again
+        arrived = forward_kinematics(model, integrate(model, q, step))
+        np.testing.assert_allclose(solution.positions, arrived.positions, rtol=0, atol=SOLVED)
+
+
+@pytest.mark.parametrize("solver", ["levenberg_marquardt"])
+def test_levenberg_marquardt_converges_quadratically_to_poses(chain_of_joints, rng, solver, speed):
+    model = chain_of_joints("hinge", rng, links=7)
+    q = model.random(rng)
+    goal = forward_kinematics(model, q + 0.3)
+    target = Target(goal.positions[-1], goal.rotations[-1])
+    history = solve_ik(model, q, target, solver, tolerance=1e-13, record=True).history
+    errors = history[(history > 1e-13) & (history < 1e-2)]
+    assert len(errors) >= 2
+    assert (errors[1:] < 30.0 * errors[:-1] ** 1.7).all()
+
+
+# ---- limits
+
+
+def limited(rng, machine, chain_of_joints, targets=1):
+    """Return hinges whose limits are near, slides among them, and a far target."""
+    model = chain_of_joints("hinge", rng, links=5)
+    kinds = np.where(rng.random(6) < 0.7, "hinge", "slide")
+    q = rng.uniform(-1.0, 1.0, 6)
+    model = Articulation(
+        model.skeleton, list(kinds), model.axes,
+        lower=q - rng.uniform(0.0, 0.3, 6), upper=q + rng.uniform(0.0, 0.3, 6),
+    )  # fmt: skip
+    goal = forward_kinematics(model, q + rng.standard_normal(6))
+    wanted = [Target(goal.positions[j], effector=j) for j in (5, 3)[:targets]]
+    return model, q, wanted, machine(model, q, wanted)
+
+
+def bounds(model, q, reach):
+    worth = worth_of_freedoms(model, reach)[: len(q)]
+    return (model.lower[: len(q)] - q) / worth, (model.upper[: len(q)] - q) / worth
+
+
+def test_a_held_step_is_the_least_squares_solution_within_the_limits(rng, machine, chain_of_joints):
+    held = 0
+    for _ in range(60):
+        model, _, _, (mechanism, goal, posture, room) = limited(rng, machine, chain_of_joints)
+        own = posture.q.copy()
+        linearise_all(mechanism, goal, posture, room.stack)
+        J, e = room.stack.J.T.copy(), room.stack.e.copy()
+        damping = 0.1 * mechanism.reach**2
+        damped_step(mechanism, posture, room.stack, damping)
+        lower, upper = bounds(model, own, mechanism.reach)
+        system = np.vstack([J, np.sqrt(damping) * np.eye(len(own))])
+        wanted = np.concatenate([e, np.zeros(len(own))])
+        best = lsq_linear(system, wanted, (lower, upper + 1e-15), tol=1e-14)
+        step = room.stack.step
+        assert (step >= lower - ROUNDING).all()
+        assert (step <= upper + ROUNDING).all()
+        cost = 0.5 * np.sum((system @ step - wanted) ** 2)
+        assert cost == pytest.approx(best.cost, rel=1e-9)
+        held += np.count_nonzero(room.stack.held)
+    assert held > 100
+
+
+def test_a_transposed_step_leaves_out_what_limits_stop(rng, machine, chain_of_joints):
+    for _ in range(20):
+        _, _, _, (mechanism, goal, posture, room) = limited(rng, machine, chain_of_joints)
+        joints = mechanism.joints.numbers
+        posture.q[:] = np.where(rng.random(len(posture.q)) < 0.5, joints[:, 10], joints[:, 11])
+        linearise_all(mechanism, goal, posture, room.stack)
+        J, e = room.stack.J.T.copy(), room.stack.e.copy()
+        transposed_step(mechanism, posture, room.stack)
+        g = J.T @ e
+        free = np.where(posture.q == joints[:, 10], g > 0.0, g < 0.0)
+        expected = np.zeros(len(g))
+        expected[free] = transposed(J[:, free], e, None, None)
+        np.testing.assert_allclose(room.stack.step, expected, rtol=0, atol=ROUNDING)
+
+
+def test_steps_end_within_the_limits(rng, machine, chain_of_joints):
+    for _ in range(20):
+        model, _, _, (mechanism, goal, posture, room) = limited(rng, machine, chain_of_joints)
+        linearise_all(mechanism, goal, posture, room.stack)
+        damped_step(mechanism, posture, room.stack, 1e-6)
+        take_step(mechanism, posture, room.stack)
+        assert (posture.q >= mechanism.joints.numbers[:, 10]).all()
+        assert (posture.q <= mechanism.joints.numbers[:, 11]).all()
+
+
+@pytest.mark.parametrize("solver", STEPS)
+def test_a_hinge_of_whole_turns_goes_round_where_it_must(solver, speed):
+    """From near its upper limit the short way to the target leads beyond it."""
+    arm = Articulation(
+        Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"], lower=-4.0, upper=4.0
+    )
+    q = 4.0 + 0.3 - 2.0 * np.pi
+    target = [np.cos(q), np.sin(q), 0.0]
+    solution = solve_ik(arm, [3.9], target, solver, max_iterations=200)
+    assert solution.outcome is Outcome.CONVERGED
+    assert solution.coordinates[0] == pytest.approx(q, abs=1e-3)
+
+
+# ---- equations without a solution of their own
+
+
+@pytest.mark.parametrize("rank", [0, 1, 2, 3])
+@pytest.mark.parametrize("damping", [0.0, 1e-30, 1e-12, 1.0])
+def test_a_singular_system_has_a_finite_answer(chain_of_joints, machine, rng, rank, damping):
+    """Rows of low rank in a turned world; the damping is held above rounding, whatever is asked."""
+    for _ in range(20):
+        model = chain_of_joints("ball", rng, links=3)
+        target = Target([1.0, 2.0, 3.0], rotation.identity(), 3)
+        stack = machine(model, model.random(rng), [target]).room.stack
+        span = rng.standard_normal((rank, 6))
+        stack.J[:] = rng.standard_normal((len(stack.J), rank)) @ span
+        stack.e[:] = rng.standard_normal(rank) @ span
+        stack.held[:] = 0.0
+        if rank == 0 and damping == 0.0:
+            continue
+        solve_damped(stack, damping)
+        assert np.isfinite(stack.z).all()
+        if rank and damping < 1e-11:
+            moved = stack.J.T @ (stack.J @ stack.z)
+            np.testing.assert_allclose(moved, stack.e, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly(rng, size, speed):
+    """J J' is singular, and the damping falls below rounding with the error."""
+    for _ in range(10):
+        axis = rotation.rotate(rotation.random(rng), [0.0, 0.0, 1.0])
+        across = np.cross(axis, [0.6, 0.0, 0.8])
+        offsets = size * np.outer([0, 1, 1, 1], across / np.linalg.norm(across))
+        arm = Articulation(Skeleton(range(-1, 3), offsets), ["hinge"] * 3 + ["fixed"], axis)
+        goal = forward_kinematics(arm, rng.uniform(-1.0, 1.0, 3))
+        solution = solve_ik(
+            arm, [0.3, 0.2, 0.1], goal.positions[-1], "levenberg_marquardt", tolerance=0.0
+        )
+        assert solution.residual <= 1e-14 * size
+
+
+@pytest.mark.parametrize("solver", STEPS)
+def test_huge_and_tiny_weights_do_no_harm(chain_of_joints, rng, solver, speed):
+    model = chain_of_joints("ball", rng)
+    goal, q = forward_kinematics(model, model.random(rng)), model.random(rng)
+    for weights in ((1e-20, 1e20), (1e20, 1e20), (1e-20, 1e-20), (1e-150, 1e150)):
+        targets = [
+            Target(goal.positions[j], effector=j, weight=weight)
+            for j, weight in zip((2, 4), weights, strict=True)
+        ]
+        solution = solve_ik(model, q, targets, solver, max_iterations=10)
+        assert np.isfinite(solution.coordinates).all()

@@ -1,0 +1,147 @@
+"""Wahba's problem: the turn that brings arms nearest to where they are wanted."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from reference import rotation
+from reference.inverse_kinematics.wahba import (
+    LEAST_TURN,
+    NOTHING,
+    add_outer,
+    add_turn,
+    best_angle,
+    best_rotation,
+    magnitude,
+    turn_value,
+)
+
+# Sums of nine products, an eigenvector of a 4 x 4 matrix: a few dozen roundings of M's size.
+ROUNDING = 1e-14
+
+numbers = st.floats(-1.0, 1.0)
+vectors = st.lists(numbers, min_size=3, max_size=3)
+matrices = st.lists(numbers, min_size=9, max_size=9).map(tuple)
+turns = vectors.map(lambda v: rotation.exponential(3.0 * np.array(v)))
+axes = vectors.filter(lambda v: np.linalg.norm(v) > 0.1).map(lambda v: v / np.linalg.norm(v))
+
+
+def best(M):
+    return np.array(best_rotation(M, np.full((4, 4), np.nan), np.full((4, 4), np.nan)))
+
+
+def outer(weights, ends, arms):
+    """Return M of weighted arms and ends, as the kernels add it up."""
+    M = NOTHING
+    for weight, b, a in zip(weights, ends, arms, strict=True):
+        M = add_outer(M, weight, tuple(b), tuple(a))
+    return M
+
+
+def largest_value(M):
+    """Return the maximum of tr(S M') over rotations, by singular values (Kabsch 1976)."""
+    U, s, Vt = np.linalg.svd(np.reshape(M, (3, 3)))
+    return s[0] + s[1] + s[2] * np.sign(np.linalg.det(U @ Vt))
+
+
+def value(M, S):
+    return np.einsum("...ij,ij->...", rotation.to_matrix(S), np.reshape(M, (3, 3)))
+
+
+def test_outer_products_and_turns_are_added_by_weight(rng):
+    b, a, R = rng.standard_normal(3), rng.standard_normal(3), rotation.random(rng)
+    M = add_turn(add_outer(NOTHING, 2.0, tuple(b), tuple(a)), 3.0, tuple(R))
+    expected = 2.0 * np.outer(b, a) + 3.0 * rotation.to_matrix(R)
+    np.testing.assert_allclose(np.reshape(M, (3, 3)), expected, rtol=0, atol=ROUNDING)
+    assert magnitude(M) == pytest.approx(np.linalg.norm(expected), rel=ROUNDING)
+
+
+@given(M=matrices, S=turns)
+def test_the_value_of_a_turn_is_the_trace_with_its_matrix(M, S):
+    assert turn_value(M, tuple(S)) == pytest.approx(value(M, S), abs=ROUNDING)
+
+
+@given(M=matrices)
+@example(M=(0.0,) * 9)
+@example(M=(1.0,) + (0.0,) * 8)
+@example(M=(-1.0,) + (0.0,) * 8)
+@example(M=(-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0))
+@example(M=(-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0))
+@example(M=(0.0, 0.0, 0.0, 1e-150, 0.0, 0.0, 0.0, 0.0, 0.0))
+def test_no_rotation_is_better_than_the_best(M):
+    """The least turn's share of M's size can cost no more than itself times the four of a trace."""
+    S = best(M)
+    assert np.linalg.norm(S) == pytest.approx(1.0, abs=ROUNDING)
+    assert S[0] >= 0.0
+    size = np.abs(M).sum()
+    assert value(M, S) >= largest_value(M) - (4.0 * LEAST_TURN + ROUNDING) * size
+
+
+@given(M=matrices)
+def test_the_best_rotation_is_never_worse_than_none(M):
+    """Whatever the least turn is worth: this is why CCD never moves away."""
+    assert value(M, best(M)) >= value(M, rotation.identity()) - ROUNDING * np.abs(M).sum()
+
+
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(3, 6))
+def test_noisy_arms_are_fitted_as_by_singular_values(seed, count):
+    rng = np.random.default_rng(seed)
+    R, arms = rotation.random(rng), rng.standard_normal((count, 3))
+    ends = rotation.rotate(R, arms) + 0.1 * rng.standard_normal((count, 3))
+    M = outer(rng.uniform(0.5, 2.0, count), ends, arms)
+    U, s, Vt = np.linalg.svd(np.reshape(M, (3, 3)))
+    sign = np.sign(np.linalg.det(U @ Vt))
+    kabsch = rotation.from_matrix(U @ np.diag([1.0, 1.0, sign]) @ Vt)
+    # The least turn shifts the optimum by its share of M over the curvature there.
+    allowed = 10.0 * LEAST_TURN * np.abs(M).sum() / (s[1] + sign * s[2])
+    assert rotation.angle(best(M), kabsch) <= allowed + ROUNDING
+
+
+@given(arms=st.lists(vectors, min_size=1, max_size=4))
+def test_arms_that_are_there_already_are_not_turned(arms):
+    M = outer([1.0] * len(arms), arms, arms)
+    assert rotation.angle(best(M), rotation.identity()) <= 1e-13
+
+
+@given(a=axes, b=axes, lengths=st.lists(st.floats(0.1, 3.0), min_size=1, max_size=3))
+def test_arms_on_one_line_take_the_least_turn(a, b, lengths):
+    """Any twist about the line fits as well; the share of M's size that picks one shortens it."""
+    M = outer([1.0] * len(lengths), np.outer(lengths, b), np.outer(lengths, a))
+    turn, shortest = best(M), rotation.between(a, b)
+    if np.dot(a, b) > -0.99:
+        assert rotation.angle(turn, shortest) <= 1e-3
+    assert np.dot(rotation.rotate(turn, a), b) >= 1.0 - 1e-5
+
+
+def test_nothing_to_fit_is_no_turn():
+    assert (best(NOTHING) == rotation.identity()).all()
+
+
+@given(M=matrices, axis=axes)
+@example(M=(0.0,) * 9, axis=np.array([0.0, 0.0, 1.0]))
+def test_no_angle_about_an_axis_is_better_than_the_best(M, axis):
+    angle = best_angle(M, tuple(axis))
+    assert -np.pi <= angle <= np.pi
+    scan = rotation.exponential(np.linspace(-np.pi, np.pi, 181)[:, None] * axis)
+    least = value(M, scan).max() - ROUNDING * np.abs(M).sum()
+    assert value(M, rotation.exponential(angle * axis)) >= least
+
+
+@pytest.mark.parametrize("height", [0.0, 2.0])
+def test_arms_along_the_axis_are_not_turned_about_it(height):
+    arm, end = (0.0, 0.0, height), (1.0, 2.0, 3.0)
+    assert best_angle(outer([1.0], [end], [arm]), (0.0, 0.0, 1.0)) == 0.0
+
+
+def test_rounding_about_the_axis_turns_nothing(rng):
+    for axis in rotation.rotate(rotation.random(rng, 50), [0.0, 0.0, 1.0]):
+        arms = np.outer(rng.uniform(-2.0, 2.0, 2), axis)
+        M = outer([1.0, 1.0], rng.standard_normal((2, 3)), arms)
+        assert best_angle(M, tuple(axis)) == 0.0
+
+
+def test_an_arm_is_turned_about_its_axis_by_the_angle_between():
+    M = outer([1.0], [(0.0, 2.0, 5.0)], [(3.0, 0.0, 1.0)])
+    assert best_angle(M, (0.0, 0.0, 1.0)) == pytest.approx(np.pi / 2, abs=1e-15)
+    assert best_angle(M, (0.0, 0.0, -1.0)) == pytest.approx(-np.pi / 2, abs=1e-15)
