@@ -174,6 +174,7 @@ def report(output: Output = REPORT) -> int:
         "plumbob show arm",
         "plumbob show heart --solver fabrik",
         "plumbob show star --output star.svg",
+        "plumbob show heart --coherent --output heart.bvh",
     )
 )
 def show(
@@ -181,13 +182,19 @@ def show(
         str, typer.Argument(metavar="SCENE", help="arm, cloth, or a curve that the arm draws.")
     ],
     file: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="FILE", help="A .gif or a .svg.")
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="A .gif, .svg or .bvh.")
     ] = None,
     solver: Annotated[
         str | None, typer.Option(help="For an arm fabrik, ccd, ...; for the cloth newton, ...")
     ] = None,
+    coherent: Annotated[
+        bool, typer.Option("--coherent", help="Let the arm move as calmly as it can, in a loop.")
+    ] = False,
 ) -> int:
-    """Write an animation (GIF) or a picture (SVG) of the arm drawing a curve, or of the cloth."""
+    """Write an animation (GIF) or a picture (SVG) of the arm drawing a curve, or of the cloth.
+
+    The arm's motion can also be written as BVH, which animation programs open.
+    """
     from .show import SCENES, write
 
     _known("scene", scene, SCENES)
@@ -196,8 +203,9 @@ def show(
     with progress() as bar:
         task = bar.add_task(scene, total=None)
         write(
-            scene, path, solver, lambda done, total: bar.update(task, completed=done, total=total)
-        )
+            scene, path, solver,
+            lambda done, total: bar.update(task, completed=done, total=total), coherent,
+        )  # fmt: skip
     print(path)
     return FINE
 

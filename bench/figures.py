@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from . import metrics
-from .findings import robots
+from .findings import cloth_peers, robots
 from .findings.cloth import ONE_STEP
 from .findings.results import Results, label, problems, solvers
 from .record import Record
@@ -85,7 +85,11 @@ DOERS = {
     LIMIT: ("ink", "|"),
 }
 OTHER_DOER = ("faint", "P")
+# The markers of solvers for cloths, whose names begin with the engine's.
+ENGINES = {"Plumbob": "o", "MuJoCo": "s", "Newton": "^"}
 WIDTH = 7.4
+# Errors beyond this are left out: of a motion that blew up.
+MOST_DRAWN = 10.0
 PANELS = 3
 
 
@@ -350,6 +354,62 @@ def _budget_curves(records: list[Record], along: np.ndarray) -> dict[str, dict[s
     return panels
 
 
+def work_precision(
+    name: str, family: str, error: str, titles: tuple[str, str, str]
+) -> Callable[[Results], Drawing | None]:
+    """Return what draws an error against the time for a frame: a curve for each solver.
+
+    A column for each stiffness, a row for each size. The titles are those of the figure, of the
+    error's axis, and what it shows.
+    """
+
+    def draw(results: Results) -> Drawing | None:
+        found = [p for p in cloth_peers.points(results, family) if _can_be_drawn(p, error)]
+        if not found:
+            return None
+        stiffnesses, sizes = (
+            sorted({p.stiffness for p in found}),
+            sorted({p.particles for p in found}),
+        )
+        names = list(dict.fromkeys(p.solver for p in found))
+        height = 2.3 * len(sizes) + 0.2 * len(names)
+        with canvas(height, len(stiffnesses), len(sizes), sharex=True, sharey=True) as (
+            figure, axes,
+        ):  # fmt: skip
+            cells = [(size, stiffness) for size in sizes for stiffness in stiffnesses]
+            for ax, (size, stiffness) in zip(axes, cells, strict=True):
+                here = [p for p in found if (p.particles, p.stiffness) == (size, stiffness)]
+                _work_precision_curves(ax, here, names, error)
+                ax.set(xscale="log", yscale="log", title=f"{size} × {size}, {stiffness:,.0f} N/m")
+                ax.minorticks_off()
+            for ax in axes[-len(stiffnesses) :]:
+                ax.set_xlabel("time for a frame [ms]")
+            for ax in axes[:: len(stiffnesses)]:
+                ax.set_ylabel(titles[1])
+            figure.legend(*_every_handle(axes), loc="outside lower left", ncols=2)
+            return finished(figure, name, titles[0], titles[2])
+
+    return draw
+
+
+def _work_precision_curves(
+    ax: Axes, found: list[cloth_peers.Point], names: list[str], error: str
+) -> None:
+    for solver in dict.fromkeys(p.solver for p in found):
+        mine = [p for p in found if p.solver == solver]
+        ax.plot(
+            [1e3 * p.values["seconds"] for p in mine], [p.values[error] for p in mine],
+            marker=ENGINES.get(solver.split()[0], OTHER_SERIES[2]), markersize=3.5, label=solver,
+            **_style(names.index(solver)),
+        )  # fmt: skip
+
+
+def _can_be_drawn(point: cloth_peers.Point, error: str) -> bool:
+    """Return whether a point has got to its end and lies within what anyone wants to see."""
+    whole = "wanted" not in point.values or cloth_peers.is_whole(point)
+    return whole and point.values["seconds"] > 0 and 0 < point.values[error] < MOST_DRAWN
+
+
 @contextlib.contextmanager
 def canvas(
     height: float, columns: int, rows: int = 1, *, sharex: bool = False, sharey: bool = False
@@ -407,6 +467,38 @@ FIGURES: tuple[Callable[[Results], Drawing | None], ...] = (
     jitter,
     cloth_convergence,
     energy,
+    work_precision(
+        "work_precision_step",
+        cloth_peers.ONE_STEP,
+        "error",
+        (
+            "Work and precision in one step",
+            "error |x − x*| / |y − x*|",
+            "What is left of the error to the converged step of implicit Euler.",
+        ),
+    ),
+    work_precision(
+        "work_precision_implicit",
+        cloth_peers.MOTION,
+        "implicit",
+        (
+            "Work and precision, to implicit Euler",
+            "rms distance [m]",
+            "Distance to converged implicit Euler after the last frame; motions that diverged or "
+            "ran out of time are left out.",
+        ),
+    ),
+    work_precision(
+        "work_precision_truth",
+        cloth_peers.MOTION,
+        "true",
+        (
+            "Work and precision, to the truth",
+            "rms distance [m]",
+            "Distance to the motion itself after the last frame; motions that diverged or ran out "
+            "of time are left out.",
+        ),
+    ),
     timing("kinematics", "ns", 1e9, "Time of forward kinematics, for one pose"),
     timing("ik", "µs", 1e6, "Time of inverse kinematics, for one solve"),
     timing("cloth", "µs", 1e6, "Time of a cloth step, for one frame"),

@@ -4,7 +4,20 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from ..tables import Table
-from . import check, cloth, energy, kinematics, published, robot_models, robots, timing
+from . import (
+    check,
+    cloth,
+    cloth_peers,
+    cloth_scale,
+    energy,
+    kinematics,
+    newton,
+    published,
+    robot_models,
+    robots,
+    timing,
+    tracking,
+)
 from .results import Results
 from .robots import KINDS
 
@@ -71,9 +84,11 @@ SECTIONS = (
             ),
             Entry(
                 "Q3. Joints may jitter from frame to frame: how is it avoided?",
-                kinematics.jitter,
+                tracking.jitter,
                 ("jitter",),
             ),
+            Entry("What does a calm motion cost?", tracking.price),
+            Entry("Does a motion drift from round to round?", tracking.drift),
             Entry(
                 "How often, and how closely, is the target met?",
                 kinematics.accuracy,
@@ -85,7 +100,7 @@ SECTIONS = (
                 ("arm_draws",),
             ),
         ),
-        ("arm", "ik", "pictures"),
+        ("arm", "tracking", "ik", "pictures"),
     ),
     Section(
         "robots",
@@ -120,9 +135,23 @@ SECTIONS = (
                 ("cloth_convergence",),
             ),
             Entry("Does Newton always get there?", cloth.newton_steps),
+            Entry("Which answers to a hard step are proven?", newton.certified),
+            Entry("How many iterations does an error of 1e-8 take?", cloth_peers.iterations),
+            Entry(
+                "Which of all solvers is soonest near the converged step?",
+                cloth_peers.one_step,
+                ("work_precision_step",),
+            ),
+            Entry(
+                "And frame after frame, near implicit Euler and near the truth?",
+                cloth_peers.motion,
+                ("work_precision_implicit", "work_precision_truth"),
+            ),
+            Entry("How long may the steps of explicit solvers be?", cloth_peers.stability),
+            Entry("What did Liu et al. (2013) measure, and what do we?", cloth_peers.liu_2013),
             Entry("What happens to the energy over many steps?", energy.energy, ("energy",)),
         ),
-        ("cloth", "energy", "pictures"),
+        ("cloth", "newton", "energy", "pictures"),
     ),
     Section(
         "speed",
@@ -133,8 +162,10 @@ SECTIONS = (
             Entry("Forward kinematics", timing.kinematics, ("timing_kinematics",)),
             Entry("Inverse kinematics", timing.inverse_kinematics, ("timing_ik",)),
             Entry("A step of the cloth", timing.cloth, ("timing_cloth",)),
+            Entry("Iterations, up to a million particles", cloth_scale.iterations),
+            Entry("Factors, up to a million particles", cloth_scale.factors),
         ),
-        ("timing",),
+        ("timing", "cloth_scale"),
     ),
 )
 

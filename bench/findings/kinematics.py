@@ -144,71 +144,6 @@ def _rival_answer(pairs: Sequence[tuple[Record, Record]]) -> Answer:
     )
 
 
-def jitter(results: Results) -> Table:
-    """Return Q3: how far joints turn from frame to frame, cold and warm."""
-    pairs = []
-    for cold in results.all("arm", warm=False):
-        warm = results.one("arm", cold.problem, cold.solver, warm=True)
-        if warm is not None:
-            pairs.append((cold, warm))
-    return Table(
-        "q3_jitter",
-        "How far joints turn from frame to frame",
-        (
-            Column("curve", words=True),
-            Column("solver", words=True),
-            Column("frames"),
-            Column("from rest, largest", "°"),
-            Column("from rest, mean", "°"),
-            Column("from the last solution, largest", "°"),
-            Column("from the last solution, mean", "°"),
-            Column("largest, rest / last"),
-        ),
-        tuple(_jitter_row(*pair) for pair in pairs),
-        shows="Geodesic angle by which a joint’s local rotation changes between neighbouring "
-        "frames: the largest over all frames and joints, and the mean over both. The step from the "
-        "last frame back to the first is left out.",
-        measured="The lab’s arm draws each curve twice: every frame solved from the rest pose, and "
-        "every frame started from the solution before it.",
-        answer=_jitter_answer(pairs),
-    )
-
-
-def _curve(record: Record) -> str:
-    return label(record.problem.removeprefix("arm/"))
-
-
-def _jitter_row(cold: Record, warm: Record) -> tuple[Cell, ...]:
-    (cold_largest, cold_mean), (warm_largest, warm_mean) = _turns(cold), _turns(warm)
-    return (
-        _curve(cold), label(cold.solver), int(cold.arrays["residual"].size),
-        cold_largest, cold_mean, warm_largest, warm_mean,
-        metrics.ratio(cold_largest, warm_largest),
-    )  # fmt: skip
-
-
-def _turns(record: Record) -> tuple[float, float]:
-    """Return the largest and the mean turn [°]."""
-    return (
-        metrics.degrees(metrics.spread(record.arrays["largest_turn"]).largest),
-        metrics.degrees(metrics.mean(record.arrays["mean_turn"])),
-    )
-
-
-def _jitter_answer(pairs: Sequence[tuple[Record, Record]]) -> Answer:
-    if not pairs:
-        return Answer()
-    calmer = sum(_turns(warm)[0] < _turns(cold)[0] for cold, warm in pairs)
-    worst = max((_turns(cold)[0], _curve(cold), label(cold.solver)) for cold, _ in pairs)
-    calm = max((_turns(warm)[0], _curve(warm), label(warm.solver)) for _, warm in pairs)
-    return Answer(
-        "Start each frame from the solution before it, which is the nearest at hand: the largest "
-        f"turn of a joint between frames is then smaller in {calmer} of {len(pairs)} cases. Of all "
-        f"cases the largest is {words(calm[0])}° so ({calm[1]}, {calm[2]}), and {words(worst[0])}° "
-        f"from the rest pose ({worst[1]}, {worst[2]})."
-    )
-
-
 def accuracy(results: Results) -> Table:
     """Return success and residuals of every solver on every problem within reach."""
     records = results.all("arm", warm=False) + results.all("arm", warm=True)
@@ -301,6 +236,14 @@ def _resampling_row(record: Record) -> tuple[Cell, ...]:
         gap.largest, mean, largest, metrics.whole(record.arrays["iterations"])[2],
         metrics.spread(record.arrays["residual"]).largest,
     )  # fmt: skip
+
+
+def _turns(record: Record) -> tuple[float, float]:
+    """Return the largest and the mean turn [°]."""
+    return (
+        metrics.degrees(metrics.spread(record.arrays["largest_turn"]).largest),
+        metrics.degrees(metrics.mean(record.arrays["mean_turn"])),
+    )
 
 
 def _resampling_answer(records: Sequence[Record]) -> Answer:

@@ -69,7 +69,8 @@ class PublishedFrame(NamedTuple):
 
 
 # Liu, Bargteil, O'Brien, Kavan 2013: a cloth of 6,561 vertices. Secondary: abstract and captions;
-# springs, stiffness, step and machine of theirs are not known to us. Ours: 81 x 81, steps of 1/30 s.
+# springs, stiffness, step and machine of theirs are not known to us. Ours has 81 x 81 particles and
+# steps of 1/30 s.
 LIU_2013 = {
     "local_global": PublishedFrame(0.050, "10 iterations", {"iterations": 10}),
     "newton": PublishedFrame(13.0, "Newton", {"tolerance": 1e-6}),

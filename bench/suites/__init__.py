@@ -12,9 +12,12 @@ SUITES = {
     "check": "the reference against Pinocchio and MuJoCo, claim by claim",
     "robot_models": "robots and characters from files of others, beside both engines",
     "arm": "the lab's arm on every curve, and reaching for what is too far",
+    "tracking": "closed curves: frames from rest, from the last solution, and coherently",
     "ik": "a chain of ten ball joints, robots and a character, beside every solver installed",
-    "cloth": "the lab's cloth, 1, 10 and 100 times as stiff: convergence and error",
+    "cloth": "the lab's cloth at three stiffnesses: convergence; one cloth for every solver",
     "energy": "what integrators do to the energy of a cloth over 10,000 steps",
+    "newton": "one step of a heavy cloth by every solver: how far from a minimiser, proven",
+    "cloth_scale": "cloths of a thousand particles and more: factors, solves, memory",
     "timing": "forward kinematics, solves and steps beside both engines",
     "pictures": "the poses and cloths that the report draws",
 }

@@ -8,6 +8,7 @@ from reference import ImplicitEuler, State
 
 from .. import metrics
 from ..problems.cloth import FACTORS, ClothSwing, H, cloth_swing
+from . import peers_cloth
 from .block import Block, Measured, Scale
 
 # The cloth falls for three seconds; the steps of the next second are looked at.
@@ -23,8 +24,13 @@ FEW = (1, 10, 100)
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield, for each stiffness: consecutive Newton steps, one step's iterations, few iterations.
 
-    The cloth is the same at every scale.
+    The cloth is the same at every scale. Then one cloth for every solver that is installed.
     """
+    yield from _lab_blocks()
+    yield from peers_cloth.blocks(scale)
+
+
+def _lab_blocks() -> Iterator[Block]:
     for factor in FACTORS:
         problem = cloth_swing(factor)
         swinging = {"h": H, "first": FALLING, "steps": STEPS}

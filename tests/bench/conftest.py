@@ -39,6 +39,34 @@ def drawn(solver, warm, turn):
     )
 
 
+def followed(solver, **turns):
+    """A closed curve of three points followed in three ways; every second turn is half as large."""
+    return [
+        record(
+            "tracking",
+            "arm/circle",
+            solver,
+            {"tolerance": 1e-4, "max_iterations": 100, "way": way},
+            {
+                "residual": [1e-5, 2e-5, 3e-5 if way == "coherent" else 3e-4],
+                "iterations": [12, 11, 10] if way == "coherent" else [5, 4, 3],
+                "largest_turn": [turn, turn / 2, turn / 2],
+                "mean_turn": [turn / 4, turn / 4, turn / 8],
+            },
+        )
+        for way, turn in turns.items()
+    ]
+
+
+def drifted(solver):
+    """Three rounds, warm and coherent."""
+    ways = {"warm": [0.1, 0.2, 0.3], "coherent": [0.0, 1e-9, 0.0]}
+    return [
+        record("tracking", "drift/heart", solver, {"way": way}, {"drift": drift})
+        for way, drift in ways.items()
+    ]
+
+
 def beyond(solver, bend):
     """Two targets out of the arm's reach of 2 m."""
     return record(
@@ -105,6 +133,16 @@ def swung(solver, problem="swing/undamped", left=(1.0, 0.5)):
     return record("energy", problem, solver, settings, {"time": times, "left": left})
 
 
+def certified(solver="newton", settings=None, arrays=None, notes=None):
+    """One step of a cloth in mid-swing, its answer covered unless told otherwise."""
+    usual = {"h": 1 / 30, "start": "y", "iterations": 100, "tolerance": 1e-10}
+    found = {"size": 10, "iterations": 4, "residual": 1e-12, "balance": 1e-15, "distance": 1e-11}
+    found |= {"at_floor": True, "apart": 0.0, "error": 0.0, "above": 0.0}
+    found |= {"covered": True, "same": True, "different": False}
+    return record("newton", "swing/k100000", solver, usual | (settings or {}),
+                  found | (arrays or {}), notes=notes or {"coverage": "COVERED"})  # fmt: skip
+
+
 def stepping():
     """Three steps by Newton."""
     settings = {"h": 0.02, "first": 5, "steps": 3, "tolerance": 1e-10}
@@ -140,6 +178,16 @@ def compared(engine, cause=""):
     return record("robot_models", "robots/arm", engine, settings, sizes | apart, notes=notes)
 
 
+def scaled(solver):
+    """A cloth of a thousand particles: factored by one library, and stepped if by ours."""
+    settings = {"particles": 1024, "iterations": 10, "stiffness": 1000.0, "h": 0.02}
+    arrays = {"entries": 30_000, "factor": 0.01, "refactor": 0.004, "memory": 2**28}
+    arrays |= {"residual": 0.1, "solve": [1e-4] * 3, "local": [5e-5] * 3, "step": [2e-3] * 3}
+    return record(
+        "cloth_scale", "cloth/32x32", solver, settings, arrays | {"limit": [1e-4] * 3}
+    )
+
+
 def republished():
     """One record for each published table."""
     arrays = {"solved": [True, False], "claimed": [1, 0], "seconds": [1e-3, 3e-3], "setup": 0.1}
@@ -166,20 +214,70 @@ def pictured():
     ]
 
 
+def worked(solver, stiffness=1e3, sizes=(20, 20), seconds=(1e-3, 1e-2), error=(0.5, 1e-4)):
+    """One step of a cloth with ever more work."""
+    arrays = {"particles": sizes, "seconds": seconds, "error": error}
+    labels = "; ".join(f"{10**i} iterations" for i in range(len(sizes)))
+    settings = {"stiffness": stiffness, "frame": 1 / 60, "version": "1"}
+    notes = {"rungs": labels, "remark": "20 × 20, 10 iterations: tired"}
+    return record("cloth", f"peers/one step/k{stiffness:g}", solver, settings, arrays, notes=notes)
+
+
+def fell(solver, stiffness=1e3, **changed):
+    """A motion of a cloth by three settings: whole, cut short, diverged."""
+    arrays = {
+        "particles": [20, 20, 20], "frames": [6, 3, 2], "wanted": [6, 6, 6],
+        "seconds": [1e-3, 1.0, 1e-3], "setup": [0.1, 0.2, 0.3],
+        "implicit": [1e-2, 1e-3, np.nan], "true": [2e-2, 1e-3, np.nan],
+        "diverged": [False, False, True], "order": [3.5], "unsure": [1e-9],
+    } | changed  # fmt: skip
+    settings = {"stiffness": stiffness, "frame": 1 / 60, "version": "1"}
+    notes = {"rungs": "1 step; 4 steps; 16 steps", "remark": ""}
+    return record("cloth", f"peers/motion/k{stiffness:g}", solver, settings, arrays, notes=notes)
+
+
+def needed(solver, counts, tried=100):
+    """Iterations to each power of ten."""
+    settings = {"size": 20, "stiffness": 1e3, "frame": 1 / 60}
+    arrays = {"needed": counts, "tried": tried, "least": 1e-3}
+    return record("cloth", "peers/iterations/k1000", solver, settings, arrays)
+
+
+def bounded(solver, limit):
+    """The longest stable step at a frequency of 100 rad/s."""
+    arrays = {"stiffness": [1e3], "limit": [limit], "frequency": [100.0]}
+    notes = {"remark": ""}
+    return record("cloth", "peers/stability", solver, {"size": 6}, arrays, notes=notes)
+
+
+def as_liu(solver, seconds):
+    """A frame of as many vertices as in the paper."""
+    arrays = {"seconds": [seconds], "error": 0.5, "vertices": 6561}
+    return record("cloth", "peers/liu2013", solver, {"size": 81}, arrays)
+
+
 @pytest.fixture
 def make():
     """The makers of records, by name."""
     return SimpleNamespace(
         record=record,
         drawn=drawn,
+        followed=followed,
+        drifted=drifted,
         beyond=beyond,
         claim=claim,
         timed=timed,
         stepped=stepped,
         swung=swung,
+        certified=certified,
         raced=raced,
         lacking=lacking,
         republished=republished,
+        worked=worked,
+        fell=fell,
+        needed=needed,
+        bounded=bounded,
+        as_liu=as_liu,
     )
 
 
@@ -192,12 +290,15 @@ def records():
     return [
         claim(),
         *arm,
+        *followed("ccd", cold=1.0, warm=0.5, coherent=0.25),
+        *drifted("ccd"),
         beyond("ccd", 0.5),
         beyond("fabrik", 0.0),
         *(reached("near", solver) for solver in ("ccd", "fabrik")),
         *(stepped(solver) for solver in ("local_global", "newton")),
         *(few(iterations) for iterations in (1, 10)),
         stepping(),
+        certified(),
         *(swung(s, f"swing/{c}") for c in ("undamped", "damped") for s in ("RK4", "discrete")),
         *(
             raced("Plumbob LM", kind, family)
@@ -205,8 +306,14 @@ def records():
             for family in ("robots", "unreachable")
         ),
         *republished(),
+        *(scaled(solver) for solver in ("supernodal", "cholespy")),
         compared("MuJoCo"),
         compared("Pinocchio", "it forgets the hand"),
+        *(worked(solver) for solver in ("Plumbob Newton", "MuJoCo Euler")),
+        fell("Plumbob Newton"),
+        needed("newton", [1, 2, 3, 4, 5, 6, 7, np.nan]),
+        bounded("MuJoCo Euler", 0.02),
+        as_liu("local_global", 0.03),
         *pictured(),
         timed("Plumbob, compiled", 1e-6),
         timed("Pinocchio", 5e-7),

@@ -16,6 +16,7 @@ from bench.findings import (
     robots,
     tables,
     timing,
+    tracking,
 )
 from bench.suites import SUITES
 
@@ -62,17 +63,37 @@ def test_iterations_count_for_whoever_needs_fewer(records):
     assert "fewer iterations than CCD on 1 of 3 problems" in table.answer.sentence
 
 
-def test_jitter_is_the_largest_turn_in_degrees(make):
-    records = [make.drawn("ccd", False, 1.0), make.drawn("ccd", True, 0.5)]
-    table = kinematics.jitter(Results(records))
-    assert column(table, "from rest, largest [°]") == [pytest.approx(math.degrees(1.0))]
-    assert column(table, "largest, rest / last") == [2.0]
-    assert "smaller in 1 of 1 cases" in table.answer.sentence
+def test_jitter_is_the_largest_turn_in_degrees_and_the_seam_stands_apart(make):
+    table = tracking.jitter(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
+    for way, turn in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
+        assert column(table, f"{way}, largest [°]") == [pytest.approx(math.degrees(turn))]
+        assert column(table, f"{way}, mean [°]") == [pytest.approx(math.degrees(turn / 4))]
+    assert column(table, "coherent, last to first [°]") == [pytest.approx(math.degrees(0.125))]
+    assert "in 1 of 1 cases, and in 1 the way" in table.answer.sentence
+    assert table.answer.points[0] == "cold: 57.3° (arm, circle, CCD)"
 
 
 def test_jitter_that_grows_is_said_too(make):
-    records = [make.drawn("ccd", False, 0.5), make.drawn("ccd", True, 1.0)]
-    assert "smaller in 0 of 1 cases" in kinematics.jitter(Results(records)).answer.sentence
+    table = tracking.jitter(Results(make.followed("ccd", cold=0.1, warm=0.1, coherent=1.0)))
+    assert "in 0 of 1 cases" in table.answer.sentence
+
+
+def test_a_curve_that_was_not_followed_in_all_ways_has_no_row(make):
+    records = make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)[:2]
+    assert tracking.jitter(Results(records)).rows == ()
+
+
+def test_iterations_over_all_frames_are_those_that_every_frame_has_more(make):
+    table = tracking.price(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
+    assert column(table, "of these over all frames at once") == [7]
+    assert [share.hits for share in column(table, "coherent, within tolerance")] == [3]
+    assert "together 7 to 7 times" in table.answer.sentence
+
+
+def test_drift_is_shown_after_each_round(make):
+    table = tracking.drift(Results(make.drifted("ccd")))
+    assert [round(x) for x in table.rows[0][1:]] == [6, 11, 17, 0, 0, 0]
+    assert "17.2 to 17.2° from its first pose" in table.answer.sentence
 
 
 def test_success_is_counted_by_the_residual_not_by_the_solver(records):

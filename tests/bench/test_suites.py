@@ -50,6 +50,21 @@ def test_the_arm_draws_within_tolerance_cold_and_warm(solver):
         assert (arrays["mean_turn"] <= arrays["largest_turn"]).all()
 
 
+def test_a_coherent_motion_is_the_calmest_and_ends_where_it_began():
+    cold, warm, coherent = (
+        found("tracking", "arm/heart", "ccd", way=way).measure().arrays
+        for way in ("cold", "warm", "coherent")
+    )
+    assert coherent["residual"].max() <= 1e-4
+    assert coherent["largest_turn"].max() < warm["largest_turn"][:-1].max()
+    assert warm["largest_turn"][:-1].max() < cold["largest_turn"][:-1].max()
+    assert warm["largest_turn"][-1] > 10 * coherent["largest_turn"][-1]
+    for way, least, most in (("warm", 0.1, 2.0), ("coherent", 0.0, 1e-9)):
+        left = found("tracking", "drift/heart", "ccd", way=way).measure().arrays["drift"]
+        assert (left >= least).all()
+        assert (left <= most).all()
+
+
 @pytest.mark.parametrize("solver", ["ccd", "fabrik", "lm/Pinocchio"])
 def test_no_residual_is_below_distance_less_reach(solver):
     arrays = found("ik", "chain/beyond", solver).measure().arrays

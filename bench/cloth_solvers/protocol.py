@@ -1,0 +1,39 @@
+"""What the bench asks of a solver for cloths.
+
+An adapter is a module with one function, `prepare(system, frame, **settings)`: it sets the engine
+up once for particles and springs and returns what moves them on, a frame at a time. Only `advance`
+is timed, so conversions cost no solver anything, and set-up is timed apart.
+"""
+
+from typing import Protocol
+
+from reference import MassSpring, State
+from reference.arguments import FloatArray
+
+
+class Mover(Protocol):
+    """A solver that is set up for a system and the length of a frame."""
+
+    def begin(self, state: State) -> None:
+        """Put the particles into a state; what the solver remembers of others is forgotten."""
+
+    def advance(self) -> None:
+        """Move on by one frame.
+
+        Raises:
+            FloatingPointError: if the motion leaves the finite numbers.
+        """
+
+    def positions(self) -> FloatArray:
+        """Return where the particles are now [m], (particle, 3), not finite if they blew up."""
+
+
+class Prepare(Protocol):
+    """Sets a solver up."""
+
+    def __call__(self, system: MassSpring, frame: float, **settings: float | str) -> Mover:
+        """Return the solver, set up for a system and frames of so many seconds.
+
+        Raises:
+            ValueError: if it cannot move this system; the message says why.
+        """

@@ -1,0 +1,629 @@
+"""One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
+
+import importlib
+import sys
+
+import numpy as np
+import pytest
+
+from bench import figures, metrics
+from bench.cloth_job import ClothJob
+from bench.cloth_solvers import CLOTH_PEERS, EXPLICIT, LINEARISED, ClothPeer, Rung
+from bench.cloth_truth import cloth_truth, implicit_motion, true_motion
+from bench.findings import Results
+from bench.findings import cloth_peers as findings
+from bench.isolation import Outcome, Workshop
+from bench.problems.cloth_peers import (
+    FRAME,
+    MASS,
+    FallingCloth,
+    explicit_substeps,
+    falling_cloth,
+    hanging_cloth,
+    highest_frequency,
+    highest_mode,
+)
+from bench.suites import Scale, peers_cloth
+from bench.worker import Done, Ready, Solved, Unfit
+from reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
+from reference.mass_spring import stiffness_matrix
+
+SIZE, STIFFNESS = 5, 100.0
+# Single precision rounds positions of two metres to 1e-7, over and over.
+DOUBLE, SINGLE = 1e-12, 2e-5
+PRECISION = {"Plumbob": DOUBLE, "MuJoCo": DOUBLE, "Newton": SINGLE}
+# To compile these takes Newton a minute.
+LONG_TO_COMPILE = ("VBD", "XPBD")
+
+
+def slow_if_long_to_compile(peer):
+    marks = [pytest.mark.slow] if any(name in peer.title for name in LONG_TO_COMPILE) else []
+    return pytest.param(peer, marks=marks, id=peer.title)
+
+
+@pytest.fixture(params=map(slow_if_long_to_compile, CLOTH_PEERS))
+def peer(request):
+    """Every solver that is installed."""
+    if not request.param.version:
+        pytest.skip(f"{request.param.package} is not installed")
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def cloth():
+    """A small soft cloth in mid-fall."""
+    return falling_cloth(SIZE, STIFFNESS)
+
+
+def moved(peer, cloth, frames=1, frame=FRAME, **settings):
+    """Where a solver takes the cloth."""
+    adapter = importlib.import_module(peer.module)
+    mover = adapter.prepare(cloth.system, frame, **{**peer.settings, **settings})
+    mover.begin(cloth.start)
+    for _ in range(frames):
+        mover.advance()
+    return mover.positions()
+
+
+def one_spring(stiffness=7.0, mass=2.0, stretched=0.01):
+    """A mass on a spring along its axis: exactly linear, its frequency sqrt(k / m)."""
+    system = MassSpring([1.0, mass], [[0, 1]], 1.0, stiffness, pinned=[0], gravity=(0, 0, 0))
+    state = State([[0.0, 0, 0], [1.0 + stretched, 0, 0]], np.zeros((2, 3)))
+    return FallingCloth(2, stiffness, system, state, np.sqrt(stiffness / mass))
+
+
+# The problem.
+
+
+@pytest.mark.parametrize("size", [4, 7])
+def test_the_cloth_weighs_the_same_whatever_its_particles_and_has_fallen(size):
+    cloth = falling_cloth(size, STIFFNESS)
+    assert cloth.system.masses.sum() == pytest.approx(MASS)
+    assert cloth.start.positions[:, 1].min() < 1.0 < 1.5 == cloth.start.positions[0, 1]
+    assert not cloth.system.damped
+
+
+def test_the_highest_mode_is_one_and_none_is_higher(cloth):
+    """The eigenvalues of a matrix this small are found all at once."""
+    square, mode = highest_mode(cloth.system, cloth.start.positions)
+    free = np.repeat(cloth.system.free, 3)
+    K = stiffness_matrix(cloth.system, cloth.start.positions).toarray()[free][:, free]
+    masses = np.repeat(cloth.system.masses, 3)[free]
+    np.testing.assert_allclose(K @ mode.ravel()[free], square * masses * mode.ravel()[free],
+                               atol=1e-9 * square * masses.max())  # fmt: skip
+    assert np.linalg.eigvalsh(K / masses[0]).max() == pytest.approx(square)
+    assert not mode[cloth.system.pinned].any()
+    near = highest_frequency(cloth.system, cloth.start.positions)
+    assert near == pytest.approx(square**0.5, rel=5e-3)
+
+
+def test_explicit_steps_are_counted_from_the_limit():
+    assert explicit_substeps(2.0 / FRAME, 1.0) == 1
+    assert explicit_substeps(2.0 / FRAME, 1.1) == 2
+
+
+# The answers that others are held against.
+
+
+def test_the_truth_is_of_order_four_and_surer_than_any_error_measured():
+    truth = cloth_truth(SIZE, STIFFNESS, 2)
+    assert 3.5 < truth.order < 4.5
+    error = metrics.rms_distance(truth.implicit[-1], truth.true[-1])
+    assert truth.unsure < 0.01 * error < 0.01
+
+
+def test_the_truth_is_where_symplectic_euler_goes_at_order_one(cloth):
+    true = true_motion(cloth, 1, 40)[-1]
+    apart = []
+    for steps in (200, 400):
+        state = cloth.start
+        for _ in range(steps):
+            state = symplectic_euler(cloth.system, state, FRAME / steps)
+        apart.append(metrics.rms_distance(state.positions, true))
+    assert np.log2(apart[0] / apart[1]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_converged_implicit_euler_is_the_same_by_another_solver(cloth):
+    integrator = ImplicitEuler(
+        cloth.system, h=FRAME, solver="lbfgs", tolerance=1e-12, max_iterations=2000
+    )
+    after = integrator.step(integrator.step(cloth.start).state).state.positions
+    np.testing.assert_allclose(implicit_motion(cloth, 2)[-1], after, atol=1e-9)
+
+
+def test_newton_that_does_not_converge_is_no_answer(cloth, monkeypatch):
+    monkeypatch.setattr("bench.cloth_truth.MOST_ITERATIONS", 1)
+    with pytest.raises(ArithmeticError, match="frame 0 as ITERATION_LIMIT"):
+        implicit_motion(cloth, 1)
+
+
+# The errors.
+
+
+def test_the_error_of_a_step_is_zero_at_the_answer_one_at_the_start_and_infinite_beyond():
+    truth = cloth_truth(SIZE, STIFFNESS, 1)
+    assert peers_cloth.step_error(truth.implicit[0], truth) == 0.0
+    assert peers_cloth.step_error(truth.inertial, truth) == 1.0
+    half = 0.5 * (truth.implicit[0] + truth.inertial)
+    assert peers_cloth.step_error(half, truth) == pytest.approx(0.5)
+    for lost in (np.nan, np.inf, 1e200):
+        assert peers_cloth.step_error(np.full_like(truth.inertial, lost), truth) == np.inf
+
+
+def test_errors_do_not_care_how_the_world_is_turned_or_particles_are_numbered(rng):
+    x, exact, start = rng.standard_normal((3, 7, 3))
+    R, order = rotation.to_matrix(rotation.random(rng)), rng.permutation(7)
+    turned = [(points @ R.T + 5.0)[order] for points in (x, exact, start)]
+    assert metrics.relative_error(*turned) == pytest.approx(metrics.relative_error(x, exact, start))
+    assert metrics.rms_distance(*turned[:2]) == pytest.approx(metrics.rms_distance(x, exact))
+
+
+def test_a_motion_has_diverged_if_one_particle_is_ever_too_far(rng):
+    true = rng.standard_normal((4, 7, 3))
+    assert not peers_cloth.diverged(true + 1.9, true)
+    for bad in (3.0, np.nan, -np.inf):
+        positions = true.copy()
+        positions[1, 2, 0] += bad
+        assert peers_cloth.diverged(positions, true)
+    assert not peers_cloth.diverged(true[:0], true[:0])
+
+
+def test_the_cheapest_that_suffices_is_not_the_first():
+    seconds, errors = np.array([1.0, 5.0, 3.0, 9.0]), np.array([1.0, 0.1, 0.05, 0.0])
+    assert metrics.cheapest_within(seconds, errors, 0.1) == 2
+    assert metrics.cheapest_within(seconds, errors, 1.0) == 0
+    assert metrics.cheapest_within(seconds, errors, -1.0) is None
+
+
+# The adapters.
+
+
+def test_a_solver_begins_anew_from_where_it_is_put(peer, cloth):
+    adapter = importlib.import_module(peer.module)
+    settings = {"substeps": 8} if peer.kind == EXPLICIT else {}
+    mover = adapter.prepare(cloth.system, FRAME, **{**peer.settings, **settings})
+    ends = []
+    for _ in range(2):
+        mover.begin(cloth.start)
+        mover.advance()
+        ends.append(np.array(mover.positions()))
+        mover.advance()
+    tolerance = PRECISION[peer.engine]
+    np.testing.assert_allclose(ends[0], ends[1], atol=tolerance)
+    assert metrics.rms_distance(ends[0], cloth.start.positions) > 1e-2
+    pinned = cloth.system.pinned
+    np.testing.assert_allclose(ends[0][pinned], cloth.start.positions[pinned], atol=tolerance)
+
+
+def test_a_frame_of_many_steps_is_many_frames_of_one(peer, cloth):
+    iterations = {} if peer.kind != "iterations" else {"iterations": 10}
+    many = moved(peer, cloth, substeps=4, frame=FRAME / 4, **iterations)
+    few = moved(peer, cloth, frames=4, frame=FRAME / 16, **iterations)
+    np.testing.assert_allclose(many, few, atol=PRECISION[peer.engine])
+
+
+EULERS = ("symplectic", "Euler", "implicitfast", "semi-implicit")
+
+
+def test_all_who_say_so_are_symplectic_euler(peer, cloth):
+    if not any(name in peer.title for name in EULERS):
+        pytest.skip("says nothing of the kind")
+    state = cloth.start
+    for _ in range(16):
+        state = symplectic_euler(cloth.system, state, FRAME / 8)
+    ends = moved(peer, cloth, frames=2, substeps=8)
+    np.testing.assert_allclose(ends, state.positions, atol=PRECISION[peer.engine])
+
+
+def test_one_linear_solve_is_the_gauss_newton_step(peer, cloth):
+    """MuJoCo's conjugate gradients end at 1e-8, if not told to go on."""
+    if peer.kind != LINEARISED:
+        pytest.skip("solves no linear system, or several")
+    result = ImplicitEuler(cloth.system, h=FRAME, solver="gauss_newton").step(cloth.start)
+    tolerance = 1e-6 if peer.title == "MuJoCo discrete" else 1e-10
+    np.testing.assert_allclose(moved(peer, cloth), result.state.positions, atol=tolerance)
+
+
+@pytest.mark.parametrize("stiffness", [50.0, 200.0])
+def test_a_model_kept_by_mujoco_takes_on_the_stiffness_asked_for(stiffness):
+    cloth = falling_cloth(SIZE, stiffness)
+    level = falling_cloth(SIZE, STIFFNESS).system
+    assert not np.array_equal(cloth.system.stiffnesses, level.stiffnesses)
+    for peer in (p for p in CLOTH_PEERS if p.engine == "MuJoCo" and p.kind == EXPLICIT):
+        moved(peer, falling_cloth(SIZE, STIFFNESS), substeps=8)
+        state = cloth.start
+        for _ in range(8):
+            state = symplectic_euler(cloth.system, state, FRAME / 8)
+        ends = moved(peer, cloth, substeps=8)
+        np.testing.assert_allclose(ends, state.positions, atol=DOUBLE)
+
+
+def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
+    """XPBD, which adds what all springs want, need not: it is tried on one spring."""
+    if peer.kind != "iterations":
+        pytest.skip("does not iterate")
+    many = 200 if "Newton engine" in peer.title else 1000
+    if "XPBD" in peer.title or "its own" in peer.title:
+        cloth = one_spring()
+    exact = implicit_motion(cloth, 1)[-1]
+    ends = moved(peer, cloth, iterations=many)
+    assert metrics.rms_distance(ends, exact) < 20 * PRECISION[peer.engine] + 1e-9
+
+
+def test_colours_are_proper_and_few(cloth):
+    newton_model = pytest.importorskip("bench.cloth_solvers.newton_model", exc_type=ImportError)
+    groups = newton_model.colours(cloth.system.springs, cloth.system.particle_count)
+    colour = np.full(cloth.system.particle_count, -1)
+    for number, group in enumerate(groups):
+        colour[group] = number
+    i, j = cloth.system.springs.T
+    assert (colour >= 0).all()
+    assert (colour[i] != colour[j]).all()
+    assert len(groups) <= 13  # no particle has more than twelve neighbours
+
+
+def test_by_itself_newton_gives_springs_one_colour(cloth):
+    newton_model = pytest.importorskip("bench.cloth_solvers.newton_model", exc_type=ImportError)
+    model = newton_model.model(cloth.system, own_colours=True)
+    assert len(model.particle_color_groups) == 1
+
+
+def test_every_entry_has_a_name_and_every_rung_a_label_of_its_own():
+    titles = [peer.title for peer in CLOTH_PEERS]
+    assert len(set(titles)) == len(titles)
+    for peer in CLOTH_PEERS:
+        assert peer.title.startswith(peer.engine)
+        for rungs in (peer.step_rungs(1000.0), peer.motion_rungs(1000.0)):
+            labels = [rung.label for rung in rungs]
+            assert len(set(labels)) == len(labels) > 0
+
+
+# Isolation.
+
+FAKES = """
+import os, time
+import numpy as np
+
+class Mover:
+    def __init__(self, manner):
+        self.manner = manner
+
+    def begin(self, state):
+        self.x, self.done = np.array(state.positions), 0
+
+    def advance(self):
+        self.done += 1
+        self.x = self.x + 0.01
+        if self.done == 3 and len(self.x) > 9:  # not while it is tried out
+            if self.manner == "hangs":
+                time.sleep(600)
+            if self.manner == "crashes":
+                os._exit(3)
+            if self.manner == "raises":
+                raise ArithmeticError("in one frame")
+            if self.manner == "overflows":
+                raise FloatingPointError("too large a step")
+            if self.manner == "explodes":
+                self.x = self.x * 1e300 * 1e300
+        if self.manner == "slow":
+            time.sleep(0.2)
+
+    def positions(self):
+        return self.x
+
+def prepare(system, frame, manner="fine"):
+    if manner == "unable":
+        raise ValueError("takes no cloths")
+    return Mover(manner)
+"""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def fakes(tmp_path_factory):
+    """Let this process and the worker import the fakes."""
+    folder = tmp_path_factory.mktemp("fakes")
+    (folder / "fake_cloth_solvers.py").write_text(FAKES)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", str(folder))
+        patch.syspath_prepend(folder)
+        yield
+    sys.modules.pop("fake_cloth_solvers", None)
+
+
+def job(cloth, manner, frames=5, repeats=1, budget=60.0):
+    return peers_cloth.job(
+        "fake_cloth_solvers", cloth, Rung("", {"manner": manner}),
+        frames=frames, repeats=repeats, budget=budget,
+    )  # fmt: skip
+
+
+def messages(*args, **more):
+    return list(job(*args, **more).perform())
+
+
+def test_a_job_says_when_it_is_ready_each_frame_and_the_end(cloth):
+    said = messages(cloth, "fine", frames=2, repeats=2)
+    assert [type(message) for message in said] == [Ready, *[Solved] * 4, Done]
+    ends = [message.q for message in said if isinstance(message, Solved)]
+    np.testing.assert_array_equal(ends[1], ends[3])
+    assert not np.array_equal(ends[0], ends[1])
+
+
+@pytest.mark.parametrize("manner", ["overflows", "explodes"])
+def test_one_that_blows_up_ends_with_positions_that_are_not_finite(cloth, manner):
+    solved = [m for m in messages(cloth, manner) if isinstance(m, Solved)]
+    assert [bool(np.isfinite(one.q).all()) for one in solved] == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("manner", "frames", "why"),
+    [("raises", 2, "ArithmeticError: in one frame"), ("unable", 0, "ValueError: takes no cloths")],
+)
+def test_one_that_raises_keeps_its_frames_and_says_why(cloth, manner, frames, why):
+    said = messages(cloth, manner)
+    assert sum(isinstance(message, Solved) for message in said) == frames
+    assert said[-1] == Unfit(why)
+
+
+def test_a_job_without_time_left_begins_no_further_frame(cloth):
+    said = messages(cloth, "slow", budget=0.1)
+    assert [type(message) for message in said] == [Ready, Solved, Done]
+
+
+@pytest.fixture(scope="module")
+def shop(fakes):
+    """A workshop that loses patience with a frame after half a second."""
+    shop = Workshop(start_patience=60.0, target_patience=0.5)
+    yield shop
+    shop.close()
+
+
+def fake_peer(manner, package="numpy"):
+    return ClothPeer(
+        manner, "Fake", "fake_cloth_solvers", package, LINEARISED, {"manner": manner}
+    )  # fmt: skip
+
+
+class OneRung(ClothPeer):
+    """A solver that knows no substeps."""
+
+    def motion_rungs(self, frequency):
+        return [Rung("as it is", self.settings)]
+
+    step_rungs = motion_rungs
+
+
+LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("manner", "frames", "lost", "why"),
+    [
+        ("fine", 5, False, ""),
+        ("hangs", 2, False, "5 × 5, as it is: ended after 0.5 s of silence"),
+        ("crashes", 2, False, "5 × 5, as it is: its process ended with code 3"),
+        ("explodes", 3, True, ""),
+    ],
+)
+def test_every_manner_becomes_one_point(shop, monkeypatch, manner, frames, lost, why):
+    monkeypatch.setattr(peers_cloth, "workshop", lambda: shop)
+    arrays, notes = peers_cloth.motion(OneRung(*fake_peer(manner)), STIFFNESS, (LEVEL,))
+    assert arrays["frames"].tolist() == [frames]
+    assert arrays["diverged"].tolist() == [lost]
+    assert np.isfinite(arrays["true"]).all() == (not lost)
+    assert notes == {"rungs": "as it is", "remark": why}
+
+
+class InThisProcess:
+    """A workshop without a process of its own."""
+
+    def perform(self, job):
+        said = list(job.perform())
+        solved = [message for message in said if isinstance(message, Solved)]
+        trouble = said[-1].why if isinstance(said[-1], Unfit) else ""
+        return Outcome(0.0, solved, trouble)
+
+
+@pytest.fixture
+def here(monkeypatch):
+    monkeypatch.setattr(peers_cloth, "workshop", InThisProcess)
+
+
+def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch):
+    tried = []
+
+    class Silent:
+        def perform(self, job):
+            tried.append(job)
+            return Outcome(0.0, [], "ended after 300 s of silence")
+
+    monkeypatch.setattr(peers_cloth, "workshop", Silent)
+    monkeypatch.setattr(peers_cloth, "_given_up", {})
+    arrays, notes = peers_cloth.motion(fake_peer("fine"), STIFFNESS, (LEVEL, LEVEL))
+    assert len(tried) == 1
+    assert arrays["frames"].tolist() == [0, 0]
+    assert np.isnan(arrays["true"]).all()
+    assert "silence" in notes["remark"]
+
+
+def test_a_ladder_ends_where_it_arrives(here):
+    """Two iterations of Newton and three are asked for, and no more once 1e-9 is reached."""
+    newton = next(peer for peer in CLOTH_PEERS if peer.title == "Plumbob Newton")
+    arrays, notes = peers_cloth.one_step(newton, STIFFNESS, (LEVEL,))
+    assert arrays["error"][0] > arrays["error"][-1] <= peers_cloth.NEAR_ENOUGH
+    assert (arrays["error"][:-1] > peers_cloth.NEAR_ENOUGH).all()
+    assert len(notes["rungs"].split("; ")) == len(arrays["error"])
+
+
+def test_a_ladder_whose_time_is_used_is_climbed_no_further(here):
+    newton = next(peer for peer in CLOTH_PEERS if peer.title == "Plumbob Newton")
+    arrays, _ = peers_cloth.one_step(newton, STIFFNESS, (LEVEL._replace(budget=1e-9),))
+    assert len(arrays["error"]) == 1
+
+
+def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
+    gone = [fake_peer(name, "a-package-that-nobody-has") for name in ("one", "two")]
+    monkeypatch.setattr(peers_cloth, "CLOTH_PEERS", gone)
+    missing = [b for b in peers_cloth.blocks(Scale(1, 0.1)) if b.problem == "peers/all"]
+    (block,) = missing
+    arrays, notes = block.measure()
+    assert not arrays
+    assert notes["remark"] == "a-package-that-nobody-has is not installed"
+
+
+def test_iterations_are_counted_to_each_power_of_ten():
+    arrays, _ = peers_cloth.iterations_needed("newton", 100.0)
+    counts = np.array(arrays["needed"])
+    assert (np.diff(counts) >= 0).all()
+    assert 1 <= counts[0] <= counts[-1] <= arrays["tried"] < 20
+    assert arrays["least"] <= 1e-8
+
+
+# Limits of stability.
+
+
+@pytest.mark.parametrize(("limit", "guess"), [(0.3, 1.0), (0.3, 1e-3), (0.3, 0.25)])
+def test_bisection_finds_a_limit_from_either_side(limit, guess):
+    found = peers_cloth.stability_limit(lambda h: h <= limit, guess)
+    assert found == pytest.approx(limit, rel=peers_cloth.STABILITY_DIGITS)
+
+
+@pytest.mark.parametrize("answer", [True, False])
+def test_where_there_is_no_limit_bisection_says_so(answer):
+    with pytest.raises(ArithmeticError, match="no limit of stability"):
+        peers_cloth.stability_limit(lambda h: answer, 1.0)
+
+
+def longest_step(peer, cloth, monkeypatch):
+    monkeypatch.setattr(peers_cloth, "hanging_cloth", lambda size, k: (cloth.system, REST))
+    return peers_cloth.stability(peer, (cloth.stiffness,)).arrays
+
+
+REST = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+# h omega at the limit: that of the trapezium of Runge-Kutta's stability region on the imaginary
+# axis is the square root of 8.
+LIMITS = {"Plumbob symplectic Euler": 2.0, "Plumbob Runge-Kutta": 8.0**0.5, "MuJoCo Euler": 2.0}
+
+
+@pytest.mark.parametrize(
+    "title",
+    [pytest.param(title, marks=[pytest.mark.slow] if "Kutta" in title else []) for title in LIMITS],
+)
+def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
+    """A growth of a hundredfold shows a little beyond it: (h omega)² - 4 is 7e-5, or for
+    Runge-Kutta, of which |R(ih omega)| climbs with a slope of 2.5, h omega is 0.005 too large.
+    """
+    peer = next(peer for peer in CLOTH_PEERS if peer.title == title)
+    arrays = longest_step(peer, one_spring(), monkeypatch)
+    assert arrays["frequency"] == pytest.approx([np.sqrt(7.0 / 2.0)])
+    reached = np.array(arrays["limit"]) * np.array(arrays["frequency"])
+    assert reached == pytest.approx([LIMITS[title]], rel=2e-3 if "Kutta" in title else 5e-4)
+
+
+def test_a_solver_that_does_not_get_through_has_no_limit(monkeypatch, here):
+    peer = fake_peer("unable")
+    arrays, notes = peers_cloth.stability(peer, (STIFFNESS,))
+    assert np.isnan(arrays["limit"]).all()
+    assert "TypeError" in notes["remark"] or "takes no cloths" in notes["remark"]
+
+
+def test_a_hanging_cloth_is_at_rest():
+    system, rest = hanging_cloth(4, STIFFNESS)
+    state = symplectic_euler(system, State(rest, np.zeros_like(rest)), 1e-3)
+    np.testing.assert_allclose(state.velocities, 0.0, atol=1e-9)
+
+
+# Tables and figures.
+
+
+def column(table, heading):
+    index = [c.heading for c in table.columns].index(heading)
+    return [row[index] for row in table.rows]
+
+
+def test_the_table_of_one_step_names_the_cheapest_setting_and_the_fastest_solver(make):
+    records = [
+        make.worked("Plumbob Newton"),
+        make.worked("Newton engine, VBD", seconds=(1e-3, 0.5)),
+        make.worked("MuJoCo Euler", error=(0.5, 0.4)),
+    ]
+    table = findings.one_step(Results(records))
+    assert column(table, "time to 1e-3 [ms]") == [10.0, 500.0, None]
+    assert column(table, "1e-3 by") == ["10 iterations", "10 iterations", None]
+    assert column(table, "time to 1e-6 [ms]") == [None] * 3
+    assert column(table, "least error") == [1e-4, 1e-4, 0.4]
+    assert column(table, "remark") == ["20 × 20, 10 iterations: tired"] * 3
+    (point,) = table.answer.points
+    assert point == (
+        "20 × 20, 1,000 N/m: to 1e-3 Plumbob Newton, 10.0 ms (then Newton engine, VBD, 500 ms) "
+        "and to 1e-6 none"
+    )
+
+
+def test_the_table_of_motions_says_what_diverged_and_what_was_cut_short(make):
+    table = findings.motion(Results([make.fell("MuJoCo Euler")]))
+    assert column(table, "distance from the truth [m]") == [2e-2, 1e-3, None]
+    assert column(table, "time for a simulated second [s]") == pytest.approx([0.06, 60.0, 0.06])
+    assert column(table, "remark") == ["", "out of time before frame 4", "diverged"]
+    assert "diverged: MuJoCo Euler" in table.answer.sentence
+    assert table.answer.points == ("20 × 20, 1,000 N/m: MuJoCo Euler by 1 step, 0.0200 m",)
+    assert "order of 3.50" in table.measured
+
+
+def test_a_missing_engine_has_a_row_in_both_tables(make):
+    missing = make.record("cloth", "peers/all", "newton", notes={"remark": "not installed"})
+    for table in (findings.one_step(Results([missing])), findings.motion(Results([missing]))):
+        (row,) = table.rows
+        assert row[:2] == ("every cloth", "newton")
+        assert row[-1] == "not installed"
+
+
+def test_iterations_that_did_not_suffice_are_said_so(make):
+    table = findings.iterations(Results([make.needed("lbfgs", [1, 2, 3, 4] + [np.nan] * 4)]))
+    assert table.rows[0][2:10] == (1, 2, 3, 4, None, None, None, None)
+    assert table.answer.points == ("1,000 N/m: L-BFGS more than 100",)
+
+
+def test_a_limit_is_shown_in_units_of_the_theory(make):
+    table = findings.stability(Results([make.bounded("a", 0.02), make.bounded("b", np.nan)]))
+    assert column(table, "of 2 / ω") == [pytest.approx(1.0), None]
+    assert table.answer.points == ("a: 1.00 × 2 / ω",)
+
+
+def test_the_published_times_stand_beside_ours(make):
+    table = findings.liu_2013(Results([make.as_liu("local_global", 0.03)]))
+    assert table.rows == (("local/global", "10 iterations", 50.0, 30.0, 0.5),)
+    assert "abstract" in table.measured
+
+
+@pytest.mark.parametrize(
+    ("name", "maker"),
+    [
+        ("work_precision_step", "worked"),
+        ("work_precision_implicit", "fell"),
+        ("work_precision_truth", "fell"),
+    ],
+)
+def test_a_work_precision_diagram_has_a_panel_for_each_cloth_and_a_curve_for_each_solver(
+    make, name, maker
+):
+    records = [
+        getattr(make, maker)(solver, k)
+        for solver in ("Plumbob Newton", "MuJoCo Euler")
+        for k in (1e2, 1e4)
+    ]
+    drawn = {drawing.name: drawing.svg for drawing in figures.figures(Results(records))}
+    for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", "Plumbob Newton", "MuJoCo Euler"):
+        assert text in drawn[name]
+
+
+def test_a_job_of_a_worker_is_known_by_its_arrays(cloth):
+    """What travels between processes is rebuilt there: the same system, to the last bit."""
+    import pickle
+
+    sent = peers_cloth.job("m", cloth, Rung("", {}), frames=1, repeats=1, budget=1.0)
+    got = pickle.loads(pickle.dumps(sent))
+    assert isinstance(got, ClothJob)
+    system = MassSpring(**got.system._asdict())
+    for name, values in cloth.system.arrays._asdict().items():
+        np.testing.assert_array_equal(getattr(system.arrays, name), values)
