@@ -57,7 +57,7 @@ def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
     )
 
 
-def new_goal(position: FloatArray, turn: FloatArray | None) -> FloatArray:
+def new_goal(position: Any, turn: Any) -> FloatArray:
     """Return what the kernels want to know of one target, (1, 1, 8)."""
     goal = np.empty((1, 1, 8))
     row = goal[0, 0]

@@ -183,9 +183,7 @@ def scaled(solver):
     settings = {"particles": 1024, "iterations": 10, "stiffness": 1000.0, "h": 0.02}
     arrays = {"entries": 30_000, "factor": 0.01, "refactor": 0.004, "memory": 2**28}
     arrays |= {"residual": 0.1, "solve": [1e-4] * 3, "local": [5e-5] * 3, "step": [2e-3] * 3}
-    return record(
-        "cloth_scale", "cloth/32x32", solver, settings, arrays | {"limit": [1e-4] * 3}
-    )
+    return record("cloth_scale", "cloth/32x32", solver, settings, arrays | {"limit": [1e-4] * 3})
 
 
 def republished():

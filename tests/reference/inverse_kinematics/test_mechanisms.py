@@ -37,9 +37,7 @@ TREES = {
 }
 EXAMPLES = (
     example(kinds=["ball", "hinge", "slide", "ball", "free", "hinge"], seed=1),
-    example(kinds=["hinge", "hinge", "ball", "slide", "hinge", "ball"], seed=2),
     example(kinds=["slide", "ball", "hinge", "hinge", "fixed", "ball"], seed=3),
-    example(kinds=["hinge", "slide", "hinge", "slide", "hinge", "hinge"], seed=4),
 )
 
 
@@ -51,7 +49,7 @@ def with_examples(law):
 
 
 at_both_speeds = settings(
-    max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=5, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 
