@@ -71,8 +71,9 @@ class ClothPeer(NamedTuple):
             return [self._rung(_counted(n, "step"), substeps=n) for n in parts]
         rungs = [self._rung(_counted(n, "iteration"), iterations=n) for n in iterations]
         if self.settings.get("solver") in EXACT and len(parts) > 1:
+            enough = f"{ENOUGH:g}".replace("e-0", "e-")
             rungs += [
-                self._rung(f"{_counted(n, 'step')} to {ENOUGH:g}", tolerance=ENOUGH, substeps=n)
+                self._rung(f"{_counted(n, 'step')} to {enough}", tolerance=ENOUGH, substeps=n)
                 for n in parts
             ]
         return rungs

@@ -53,7 +53,6 @@ STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
 STABILITY_DIGITS = 2e-4
 _DOUBLINGS = 30
 
-
 # Numbers, and a label in the end.
 Row = tuple[Any, ...]
 

@@ -30,7 +30,7 @@ def solve_alone(
     """Return the solution, or None where the arguments are not that plain, or not fit."""
     position, turn, weight = target, None, 1.0
     if type(target) is Target:
-        if effector != -1:
+        if type(effector) is not int or effector != -1:
             return None
         position, turn, effector, weight = target
     if not (is_plain(position, (3,)) and (turn is None or is_plain(turn, (4,)))):

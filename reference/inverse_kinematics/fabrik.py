@@ -212,7 +212,11 @@ def turn_to_wishes(mechanism, goal, posture, room, j):
 
 
 def arms_to_wishes(mechanism, goal, posture, room, j):
-    """Return Wahba's M of the arms from joint j to what it sees below, and of the wishes."""
+    """Return Wahba's M of the arms from joint j to what it sees below, and of the wishes.
+
+    All effectors below count as well: a hinge often cannot meet its child's wish, and would else
+    never make up for what that leaves.
+    """
     M = NOTHING
     for e in range(len(mechanism.effectors)):
         if moves(mechanism, j, e):

@@ -62,7 +62,8 @@ class Mechanism(NamedTuple):
         bonds: first for each effector 1 where a joint moves it, 2 where no joint does between, else
             0; then for each joint below 1 where a turn moves it and no joint does between, else 0;
             on the diagonal 1 where others follow a joint, (joint, effector + joint).
-        reach: the longest way from root to effector, slides left out [m].
+        reach: the longest way from root to effector, slides left out unless there is nothing else
+            [m].
         coordinates: how many.
         freedoms: how many.
         equations: how many in all.

@@ -83,11 +83,12 @@ def _prepared(
     arms = np.array([x for _, x, _ in hanging])
     moves = _moves(joints, hangs)
     ways = _ways(joints, moves, hangs, arms)
-    reach = float(ways.max()) or 1.0
+    furthest = ways + np.where(moves, _travel(joints)[:, None], 0.0).sum(axis=0)
+    most = furthest.max(where=np.isfinite(furthest), initial=0.0)
+    reach = float(ways.max() or most or 1.0)
     sizes = np.where(oriented, 6, 3)
     tops = [np.flatnonzero(column)[0] if column.any() else -1 for column in moves.T]
     sees, sees_tip = _sight(joints, hangs, reach)
-    furthest = ways + np.where(moves, _travel(joints)[:, None], 0.0).sum(axis=0)
     rows = np.cumsum(sizes) - sizes
     mechanism = Mechanism(
         joints,

@@ -325,6 +325,21 @@ def test_a_skeleton_of_nothing_but_a_point_answers(solver, speed):
     assert (solution.residual, solution.outcome) == (1.0, Outcome.UNREACHABLE)
 
 
+@pytest.mark.parametrize("links", [1, 2, 5])
+def test_a_hair_from_a_straight_chain_s_tip_the_answer_is_finite(links, solver, rng):
+    """J J^T is singular there, and the damping of Levenberg-Marquardt is below rounding."""
+    for direction in rotation.rotate(rotation.random(rng, 50), [1.0, 0.0, 0.0]):
+        chain = Skeleton(range(-1, links), np.outer([0.0] + [1.0] * links, direction))
+        hair = 10.0 ** rng.uniform(-16.0, -6.0) * rng.standard_normal(3)
+        target = links * direction + hair
+        solution = solve_ik(
+            chain, rotation.identity(links + 1), target, solver, tolerance=0.0, max_iterations=20
+        )
+        assert np.isfinite(solution.local_rotations).all()
+        assert np.isfinite(solution.residual)
+        assert solution.residual < 2.0
+
+
 coordinates = st.floats(-3.0, 3.0)
 points = st.lists(coordinates, min_size=3, max_size=3)
 

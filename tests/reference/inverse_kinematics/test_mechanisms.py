@@ -434,6 +434,21 @@ def test_another_unit_of_length_changes_nothing(problem, solver, speed, kinds, s
         assert there.residual_rotation == pytest.approx(here.residual_rotation, abs=1e-9)
 
 
+def test_another_unit_changes_nothing_where_all_length_is_in_the_slides(solver, speed):
+    """A gantry: three slides across one another, no links."""
+    gantry = Articulation(
+        Skeleton([-1, 0, 1, 2], np.zeros((4, 3))), ["slide"] * 3 + ["fixed"],
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 1]], lower=-1.0, upper=1.0,
+    )  # fmt: skip
+    target = [Target(np.array([0.3, -0.2, 0.4]), effector=3)]
+    large, start, goals = scaled(gantry, gantry.zero(), target, 1024.0)
+    here = solve_ik(gantry, gantry.zero(), target, solver)
+    there = solve_ik(large, start, goals, solver, tolerance=1024e-4)
+    assert here.outcome is Outcome.CONVERGED
+    assert there.iterations == here.iterations
+    np.testing.assert_allclose(there.coordinates, 1024.0 * here.coordinates, rtol=1e-12, atol=0)
+
+
 # ---- bad input
 
 

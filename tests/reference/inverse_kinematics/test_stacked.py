@@ -25,6 +25,7 @@ from reference.inverse_kinematics.mechanism import LEVER
 from reference.inverse_kinematics.stacked import (
     damped_step,
     linearise_all,
+    same_turn,
     solve_damped,
     take_step,
     transposed_step,
@@ -264,6 +265,25 @@ def test_a_hinge_of_whole_turns_goes_round_where_it_must(solver, speed):
     solution = solve_ik(arm, [3.9], target, solver, max_iterations=200)
     assert solution.outcome is Outcome.CONVERGED
     assert solution.coordinates[0] == pytest.approx(q, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper"), [(-4.0, 4.0), (-1.0, 9.0), (-np.inf, 2.0), (0, np.inf)]
+)
+def test_beyond_its_limits_a_hinge_takes_the_nearest_angle_of_the_same_turn(lower, upper, machine):
+    arm = Articulation(
+        Skeleton([-1, 0], np.eye(2, 3)), ["hinge", "fixed"], lower=lower, upper=upper
+    )
+    joints = machine(arm, arm.neutral(), [Target(np.ones(3), effector=1)]).mechanism.joints
+    for angle in np.linspace(-20.0, 20.0, 101):
+        same = same_turn(joints, 0, angle)
+        rounds = (same - angle) / (2.0 * np.pi)
+        assert rounds == pytest.approx(np.round(rounds), abs=1e-12)
+        assert lower <= same <= upper
+        further = np.clip(angle, lower, upper)
+        assert abs(same - further) < 2.0 * np.pi
+        if lower <= angle <= upper:
+            assert same == angle
 
 
 # ---- equations without a solution of their own
