@@ -82,7 +82,7 @@ def plumbob(
     """Validate, measure and report: skeleton kinematics and implicit mass-spring dynamics.
 
     Alone, it does the main job: check the reference against Pinocchio and MuJoCo, run the quick
-    bench, and write report/index.html, in a minute or two.
+    bench, and write report/index.html, in a few minutes.
     """
     if version:
         import importlib.metadata
@@ -214,7 +214,7 @@ def main_job(output: Path, fresh: bool) -> int:
     """Say what comes, then check, measure quickly and report."""
     print(
         "Plumbob checks its reference against Pinocchio and MuJoCo, measures every suite quickly\n"
-        f"and writes {output / 'index.html'}. That takes a minute or two, compilation included;\n"
+        f"and writes {output / 'index.html'}. That takes a few minutes, compilation included;\n"
         f"what {output} has on record already is kept. Other commands: plumbob --help\n",
         flush=True,
     )
