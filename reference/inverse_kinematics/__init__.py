@@ -321,6 +321,7 @@ def _batch_shape(starts: tuple[int, ...], targets: tuple[int, ...]) -> tuple[int
 
 
 def batch_of(starts: tuple[int, ...], wanted: list[Wanted]) -> tuple[int, ...]:
+    """Return the leading axes of starts and targets, broadcast against one another."""
     batch = starts
     for one in wanted:
         if one.position.ndim == 1 and (one.rotation is None or one.rotation.ndim == 1):
