@@ -24,6 +24,7 @@ from .quaternion import (
     add,
     dot,
     exponential,
+    half_turn,
     logarithm,
     made_unit,
     multiply,
@@ -61,8 +62,9 @@ LIMIT_TOLERANCE = 1e-9
 # degrees of freedom among all (a mimic joint's are its leader's), and the leader, or the joint.
 PARENT, KIND, AT, FREEDOM, LEADER = range(5)
 # Columns of JointArrays.numbers: where the three of the offset [m], the four of the frame and the
-# three of the axis begin; the limits [rad or m]; multiplier and shift of the coordinate.
-OFFSET, FRAME, AXIS, LOWER, UPPER, CONE, MULTIPLIER, SHIFT = 0, 3, 7, 10, 11, 12, 13, 14
+# three of the axis begin; the limits [rad or m]; multiplier and shift of the coordinate; where the
+# four of the frame turned by pi about the axis begin.
+OFFSET, FRAME, AXIS, LOWER, UPPER, CONE, MULTIPLIER, SHIFT, TURNED = 0, 3, 7, 10, 11, 12, 13, 14, 15
 
 
 class JointArrays(NamedTuple):
@@ -70,7 +72,7 @@ class JointArrays(NamedTuple):
 
     Attributes:
         integers: (joint, 5).
-        numbers: (joint, 15).
+        numbers: (joint, 19).
     """
 
     integers: IndexArray
@@ -166,7 +168,9 @@ class Articulation:
         bounds = np.column_stack([lower, upper, cones])
         arrays = JointArrays(
             np.column_stack([skeleton.parents, *layout]).astype(np.int64),
-            np.column_stack([skeleton.offsets, frames, axes, bounds, *linear]),
+            np.column_stack(
+                [skeleton.offsets, frames, axes, bounds, *linear, half_turned(frames, axes)]
+            ),
         )
         self.__dict__.update(
             skeleton=skeleton, kinds=names, mimics=follows, arrays=arrays, mechanisms={},
@@ -345,7 +349,7 @@ def joint_transform(joints, j, q):
     kind, at = joints.integers[j, KIND], joints.integers[j, AT]
     if kind == HINGE:
         angle = joints.numbers[j, MULTIPLIER] * q[at] + joints.numbers[j, SHIFT]
-        R = multiply(R, turn_about(vector_at(joints.numbers, j, AXIS), angle))
+        R = between_turns(R, quaternion_at(joints.numbers, j, TURNED), half_turn(angle))
     elif kind == SLIDE:
         way = joints.numbers[j, MULTIPLIER] * q[at] + joints.numbers[j, SHIFT]
         x = add(x, rotate(R, scale(way, vector_at(joints.numbers, j, AXIS))))
@@ -355,6 +359,25 @@ def joint_transform(joints, j, q):
         x = add(x, rotate(R, (q[at], q[at + 1], q[at + 2])))
         R = multiply(R, (q[at + 3], q[at + 4], q[at + 5], q[at + 6]))
     return x, R
+
+
+def half_turned(frames: FloatArray, axes: FloatArray) -> FloatArray:
+    """Return each frame turned by pi about its axis, (joint, 4)."""
+    return rotation.multiply(frames, np.column_stack([np.zeros(len(axes)), axes]))
+
+
+def between_turns(R, turned, half):
+    """Return R turned about the axis about which `turned` is R turned by pi.
+
+    With c, s of half the angle, R (c + s axis) is c R + s (R axis).
+    """
+    c, s = half
+    return (
+        c * R[0] + s * turned[0],
+        c * R[1] + s * turned[1],
+        c * R[2] + s * turned[2],
+        c * R[3] + s * turned[3],
+    )
 
 
 def swing_twist(Q, axis):

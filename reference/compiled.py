@@ -118,7 +118,11 @@ def digest(kernel: Kernel) -> str:
 
 @functools.cache
 def _jit(kernel: Kernel, cache: bool, relaxed: bool) -> Kernel:
-    """Compile; a callee is part of its caller's cached code and needs no cache of its own."""
+    """Compile; a callee is part of its caller's cached code and needs no cache of its own.
+
+    Callees are inlined, whatever their size: a call hands over every number of every array in its
+    tuples, a hundred and more, and costs more than most kernels do.
+    """
     import numba
 
     callees = {
@@ -131,6 +135,7 @@ def _jit(kernel: Kernel, cache: bool, relaxed: bool) -> Kernel:
     options: dict[str, Any] = {
         "no_cpython_wrapper": not cache,  # what Python never calls needs no door to it
         "no_cfunc_wrapper": True,
+        "forceinline": not cache,
         "fastmath": RELAXATIONS if relaxed else False,
     }
     if not (cache or allocates(kernel)):

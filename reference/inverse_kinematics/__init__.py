@@ -70,8 +70,8 @@ IK_SOLVERS = {
 }
 
 
-# Targets in a slice of a batch: fewer are not worth a thread.
-LEAST = 16
+# Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.
+LEAST_ON_CHAINS, LEAST = 128, 16
 
 
 class Settings(NamedTuple):
@@ -203,6 +203,7 @@ def _solve_chains(
         (_in_turn(starts, batch, 2), targets),
         (settings.tolerance, settings.max_iterations, settings.chained),
         solved,
+        LEAST_ON_CHAINS,
     )
     if not fine:  # raise, or the lengths were on the very edge of the tolerance
         check_numbers([wanted])
@@ -233,6 +234,7 @@ def _solve_mechanisms(
             prepared.restarts, prepared.tips, settings.chained,
         ),
         answers,
+        LEAST,
     )  # fmt: skip
     if not fine:  # likewise
         wanted = check_numbers(wanted)
@@ -252,10 +254,11 @@ def _run(
     given: tuple[FloatArray, FloatArray],
     rest: tuple[Any, ...],
     filled: Solved | Answers,
+    least: int,
 ) -> bool:
     """Run a kernel on starts and targets, on all cores where they do not depend on one another."""
     count, chained = len(given[1]), rest[-1]
-    if chained or count < 2 * LEAST:
+    if chained or count < 2 * least:
         return kernel(*model, *given, *rest, *filled)
     return all(
         in_slices(
@@ -265,7 +268,7 @@ def _run(
                 *model, *[_part(rows, part) for rows in given],
                 *rest, *[_part(rows, part) for rows in filled],
             ),
-            least=LEAST,
+            least=least,
         )
     )  # fmt: skip
 

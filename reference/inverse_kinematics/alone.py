@@ -29,12 +29,16 @@ def solve_alone(
 ) -> IKSolution | None:
     """Return the solution, or None where the arguments are not that plain, or not fit."""
     position, turn, weight = target, None, 1.0
+    if type(target) is list and len(target) == 1:
+        target = target[0]
     if type(target) is Target:
         if type(effector) is not int or effector != -1:
             return None
         position, turn, effector, weight = target
     if not (is_plain(position, (3,)) and (turn is None or is_plain(turn, (4,)))):
         return None
+    if type(effector) is str and type(model) in (Articulation, Skeleton):
+        effector = model.index(effector, "effector")
     if settings.record or type(effector) is not int:
         return None
     if type(weight) is not float or not 0.0 < weight < math.inf:  # alone, it counts for nothing
@@ -122,9 +126,9 @@ def finished(
     coordinates: FloatArray,
 ) -> IKSolution:
     """Return the solution of one target from the kernels' rows of one."""
-    for rows in (local, positions, coordinates):
-        rows.setflags(write=False)
-    residual, angle, iterations, outcome = figures[0].tolist()
+    for rows in (local, positions) if coordinates is local else (local, positions, coordinates):
+        rows.setflags(False)  # no longer to be written to; by its name it takes twice as long
+    residual, angle, iterations, outcome = figures.tolist()[0]
     return IKSolution(
         local[0], positions[0], residual, int(iterations), OUTCOMES[int(outcome)], history, angle,
         coordinates[0],

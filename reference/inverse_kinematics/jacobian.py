@@ -83,7 +83,7 @@ def turn_joints(chain, z):
     above = IDENTITY
     for k in range(n):
         turn = exponential(cross(subtract(tip, vector_at(chain.positions, k)), z))
-        above = renormalised(multiply(above, turn))
+        above = multiply(above, turn)
         R = quaternion_at(chain.rotations, k)
         put_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
     place_joints(chain)

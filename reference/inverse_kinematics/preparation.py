@@ -22,10 +22,12 @@ from ..articulation import (
     PARENT,
     SHIFT,
     SLIDE,
+    TURNED,
     UPPER,
     WIDTHS,
     Articulation,
     JointArrays,
+    half_turned,
 )
 from ..quaternion import IDENTITY, add, multiply, quaternion_at, rotate, vector_at
 from .mechanism import Mechanism
@@ -154,6 +156,8 @@ def _moving_joints(
     for k, j in enumerate(active):
         integers[k, PARENT], x, R = _merged(whole, int(j), number)
         numbers[k, OFFSET : OFFSET + 3], numbers[k, FRAME : FRAME + 4] = x, R
+    frames, axes = numbers[:, FRAME : FRAME + 4], numbers[:, AXIS : AXIS + 3]
+    numbers[:, TURNED : TURNED + 4] = half_turned(frames, axes)
     columns = [np.arange(a, a + w) for a, w in zip(at, widths, strict=True)]
     return JointArrays(integers, numbers), np.concatenate([*columns, np.empty(0, dtype=np.int64)])
 

@@ -189,12 +189,15 @@ def damped_step(mechanism, posture, stack, damping):
     """
     clear(stack.held)
     clear(stack.step)
+    any_held = False
     for _ in range(2 * len(stack.step) + 1):
         solve_damped(stack, damping)
         for k in range(len(stack.step)):
             if stack.held[k] == 0.0:
                 stack.step[k] = inner(stack.J[k], stack.z)
-        if not hold_limited(mechanism, posture, stack) and not let_go(stack):
+        if hold_limited(mechanism, posture, stack):
+            any_held = True
+        elif not (any_held and let_go(stack)):
             return
 
 

@@ -5,10 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference import rotation
-from reference.quaternion import perpendicular
+from reference.quaternion import half_turn, perpendicular
 
 # Products of unit quaternions round to a few eps; 32 leaves room for a dozen operations.
 ROUNDING = 32 * np.finfo(float).eps
+# A series sums terms below one: a few halves of an eps, where one term too few leaves six.
+FEW_ROUNDINGS = 2 * np.finfo(float).eps
 
 
 @pytest.fixture
@@ -155,13 +157,23 @@ def test_the_logarithm_undoes_the_exponential(v):
             assert_close(back, shorter, 1e-13)
 
 
-@pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 1e-8, 1e-7, 0.1, 3.1])
+# The last two of each lie beside the end of its series.
+@pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 0.1, 3.1, 6.2, 50.0, 1.5748, 1.5749])
 def test_the_exponential_agrees_with_extended_precision(angle, speed):
     with mpmath.workdps(40):
         w, x = float(mpmath.cos(mpmath.mpf(angle) / 2)), float(mpmath.sin(mpmath.mpf(angle) / 2))
-    np.testing.assert_allclose(
-        rotation.exponential([angle, 0.0, 0.0]), [w, x, 0.0, 0.0], rtol=ROUNDING
-    )
+    turn = rotation.exponential([angle, 0.0, 0.0])
+    np.testing.assert_allclose(turn, [w, x, 0.0, 0.0], rtol=ROUNDING)
+    assert_close(turn, [w, x, 0.0, 0.0], FEW_ROUNDINGS)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-300, -1e-9, 0.1, -3.1, 6.2, -50.0, 3.1496, -3.1497])
+def test_half_a_turn_agrees_with_extended_precision(angle):
+    with mpmath.workdps(40):
+        half = mpmath.mpf(angle) / 2
+        c, s = float(mpmath.cos(half)), float(mpmath.sin(half))
+    assert_close(half_turn(angle), [c, s], FEW_ROUNDINGS)
+    assert half_turn(angle)[1] == pytest.approx(s, rel=ROUNDING, abs=0)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 1e-8, 1e-7, 0.1, 3.1, np.pi - 1e-7])
