@@ -74,8 +74,8 @@ def forward_kinematics(skeleton: Skeleton | Articulation, local_rotations: Array
         fine = _in_slices(_forward_batch, tree, local, positions, rotations)
     if not fine:  # raise, or the lengths were on the very edge of the tolerance
         return forward_kinematics(skeleton, rotation.unit("local_rotations", local))
-    positions.setflags(False)
-    rotations.setflags(False)
+    positions.setflags(write=False)
+    rotations.setflags(write=False)
     return Pose(positions, rotations)
 
 

@@ -127,7 +127,7 @@ def finished(
 ) -> IKSolution:
     """Return the solution of one target from the kernels' rows of one."""
     for rows in (local, positions) if coordinates is local else (local, positions, coordinates):
-        rows.setflags(False)  # no longer to be written to; by its name it takes twice as long
+        rows.setflags(False)  # type: ignore[call-arg]  # by its name it takes twice as long
     residual, angle, iterations, outcome = figures.tolist()[0]
     return IKSolution(
         local[0], positions[0], residual, int(iterations), OUTCOMES[int(outcome)], history, angle,

@@ -240,7 +240,7 @@ def rank_restarts(mechanism, goal, request, room):
 
 
 def rough_angle(a, b):
-    """Return the angle from a to b [rad] by its quarter's sine, a tenth too small at half a turn."""
+    """Return the angle from a to b [rad] by its quarter's sine, at most a tenth too small."""
     w = abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3])
     return 4.0 * math.sqrt(max(0.5 - 0.5 * w, 0.0))
 
