@@ -657,7 +657,8 @@ def spring_rest_vectors(x, system):
 
 def spring_stretch(length, rest_length, tension_only):
     """Return l - r, or 0 for a slack spring."""
-    return 0.0 if is_slack(length, rest_length, tension_only) else length - rest_length
+    stretch = length - rest_length
+    return 0.0 if tension_only and stretch < 0.0 else stretch
 
 
 def is_slack(length, rest_length, tension_only):
@@ -669,9 +670,10 @@ def spring_frame(x, i, j):
     """Return the length and the direction from particle j to i; (1, 0, 0) where they coincide."""
     p = subtract(vector_at(x, i), vector_at(x, j))
     length = norm(p)
+    s = 1.0 / max(length, COINCIDENT)
     if length < COINCIDENT:
-        return length, (1.0, 0.0, 0.0)
-    return length, scale(1.0 / length, p)
+        p, s = (1.0, 0.0, 0.0), 1.0
+    return length, scale(s, p)
 
 
 _joined = TwoSpeeds(join_ends)

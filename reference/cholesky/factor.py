@@ -80,7 +80,8 @@ class CholeskyFactor:
         n, pattern = len(self.pattern.order), self.pattern
         if b.shape == (n, SIDES):
             x = np.empty(b.shape)
-            _solve(pattern.order, *pattern.blocks, self._values, _plain_layout(b), x)
+            columns, starts, rows, _ = pattern.blocks
+            _solve(pattern.order, columns, starts, rows, self._values, _plain_layout(b), x)
             return x
         given = b.reshape(n, -1)
         x, some = np.empty(given.shape), np.zeros((n, SIDES))
