@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from .arguments import FloatArray, IndexArray, array, frozen, indices, shape
 from .compiled import TwoSpeeds
 from .quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
+from .regions import LARGE, Regions, cut
 
 BoolArray = NDArray[np.bool_]
 
@@ -151,6 +152,24 @@ class MassSpring:
     def particle_count(self) -> int:
         """Number of particles, the pinned ones included."""
         return len(self.arrays.masses)
+
+    @functools.cached_property
+    def weights(self) -> FloatArray:
+        """The weight of each particle [N], shape (particle, 3); never to be written to."""
+        return self.masses[:, None] * self.gravity
+
+    @functools.cached_property
+    def spring_sums(self) -> FloatArray:
+        """The sums of k r [N] and of 2 k [N/m] over the springs of each particle, (particle, 2)."""
+        sums = np.zeros((self.particle_count, 2))
+        _sums(self.arrays.springs, self.arrays.rest_lengths, self.arrays.stiffnesses, sums)
+        return sums
+
+    @functools.cached_property
+    def regions(self) -> Regions | None:
+        """How a large system is summed side by side; None for a small one."""
+        large = len(self.arrays.springs) >= LARGE
+        return cut(self.arrays.springs, self.particle_count) if large else None
 
     @functools.cached_property
     def free_incidence(self) -> Any:
@@ -279,8 +298,7 @@ def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
         ValueError: if the positions have a wrong shape or are not finite.
     """
     x = _positions(system, positions)
-    weight = system.masses[:, None] * system.gravity
-    return spring_energy(system, x) - float(np.sum(weight * x))
+    return spring_energy(system, x) - float(np.sum(system.weights * x))
 
 
 def spring_energy(system: MassSpring, positions: ArrayLike) -> float:
@@ -323,10 +341,9 @@ def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None
     Raises:
         ValueError: if the external forces have another shape or are not finite.
     """
-    weight = system.masses[:, None] * system.gravity
     if external_forces is None:
-        return weight
-    return weight + array("external_forces", external_forces, system.particle_count, 3)
+        return system.weights.copy()
+    return system.weights + array("external_forces", external_forces, system.particle_count, 3)
 
 
 def spring_forces(system: MassSpring, positions: ArrayLike) -> FloatArray:
@@ -634,6 +651,16 @@ def spring_lengths(x, springs):
     return lengths
 
 
+def sum_springs(springs, rest_lengths, stiffnesses, sums):
+    """Add k r and 2 k of every spring to the sums of both its particles, (particle, 2)."""
+    for s in range(len(springs)):
+        k = stiffnesses[s]
+        for end in range(2):
+            i = at(springs[s, end])
+            sums[i, 0] += k * rest_lengths[s]
+            sums[i, 1] += 2.0 * k
+
+
 def spring_stretches(x, system):
     """Return l - r of every spring, 0 if slack, shape (spring,)."""
     stretches = np.empty(len(system.springs))
@@ -684,6 +711,7 @@ _summed_weights = TwoSpeeds(sum_weights)
 _pulls = TwoSpeeds(spring_pulls)
 _blocks = TwoSpeeds(stiffness_blocks)
 _lengths = TwoSpeeds(spring_lengths)
+_sums = TwoSpeeds(sum_springs)
 _stretches = TwoSpeeds(spring_stretches)
 _rest_vectors = TwoSpeeds(spring_rest_vectors)
 

@@ -131,6 +131,7 @@ def _measured(records: Sequence[Record]) -> str:
     stiffness, h = settings(records, "stiffness"), settings(records, "h")
     return (
         f"The lab’s cloth, with more particles, a stiffness of {stiffness or '–'} N/m and two "
-        f"waves that rise; steps of {h or '–'} s. Each cloth in a process of its own, on one core; "
-        "times are medians of rounds in which everything takes its turn."
+        f"waves that rise; steps of {h or '–'} s. Each cloth in a process of its own, on one core "
+        "but for the springs of the largest, which are summed on all; times are medians of rounds "
+        "in which everything takes its turn."
     )

@@ -9,7 +9,7 @@ from ..compiled import TwoSpeeds
 from .analysis import analyse
 from .dissection import Graph
 from .multifrontal import factorize
-from .triangular import SIDES, solve
+from .triangular import LANES, SIDES, solve
 
 
 class NotPositiveDefiniteError(ValueError):
@@ -51,6 +51,7 @@ class CholeskyFactor:
             pattern = Pattern(indptr, indices)
         self.pattern = pattern
         self._values = np.empty(pattern.family.entries)
+        self._spare: list[FloatArray] = []  # room for the unknowns: one for each call at a time
         data = np.array(columns.data, dtype=np.float64)
         failed = _factorize(
             pattern.graph, data, pattern.order, pattern.place, pattern.blocks, pattern.family,
@@ -81,7 +82,9 @@ class CholeskyFactor:
         if b.shape == (n, SIDES):
             x = np.empty(b.shape)
             columns, starts, rows, _ = pattern.blocks
-            _solve(pattern.order, columns, starts, rows, self._values, _plain_layout(b), x)
+            y = self._spare.pop() if self._spare else np.empty((n, LANES))
+            _solve(pattern.order, columns, starts, rows, self._values, _plain_layout(b), y, x)
+            self._spare.append(y)
             return x
         given = b.reshape(n, -1)
         x, some = np.empty(given.shape), np.zeros((n, SIDES))

@@ -15,19 +15,19 @@ from numpy import uint64 as at
 
 from .sides import ask_for, less, put_row, row_at, scaled
 
-SIDES = 3
+SIDES, LANES = 3, 4
 # A longer L does not stay in a near cache, and is asked for so many entries ahead.
 NEAR, AHEAD = 2**20, 1024
 LINE = 8  # entries that come from memory together
 
 
-def solve(order, columns, starts, rows, values, b, x):
-    """Set x to the solution of A x = b, three right-hand sides, shape (n, 3).
+def solve(order, columns, starts, rows, values, b, y, x):
+    """Set x to the solution of A x = b, three right-hand sides, shape (n, 3); y is room, (n, 4).
 
     The arguments are those of `Supernodes`, one by one: a tuple takes longer to hand over than a
     small system to solve.
     """
-    y, p, ahead = np.empty((len(order), 4)), starts[0], AHEAD if len(values) > NEAR else 0
+    p, ahead = starts[0], AHEAD if len(values) > NEAR else 0
     for j in range(len(order)):
         v = order[j]
         y[j, 0], y[j, 1], y[j, 2], y[j, 3] = b[v, 0], b[v, 1], b[v, 2], 0.0
@@ -47,7 +47,7 @@ class Below(NamedTuple):
 
     rows: np.ndarray
     start: int
-    count: int
+    length: int
 
 
 def row_below(below, i):
@@ -62,7 +62,7 @@ def eliminate(values, p, first, last, below, y, ahead):
     """
     j = first
     while j + 4 <= last:
-        size = last - j + below.count
+        size = last - j + below.length
         if ahead > 0:
             ask_for_columns(values, p + ahead, size)
         p = eliminate_four(values, p, size, j, last, below, y)
@@ -74,7 +74,7 @@ def eliminate(values, p, first, last, below, y, ahead):
         for i in range(j + 1, last):
             put_row(y, at(i), less(row_at(y, at(i)), values[at(p)], a))
             p += 1
-        for i in range(below.count):
+        for i in range(below.length):
             row = row_below(below, i)
             put_row(y, row, less(row_at(y, row), values[at(p)], a))
             p += 1
@@ -90,18 +90,18 @@ def substitute(values, p, first, last, below, y, ahead):
     j = last
     while (j - first) % 4 > 0:
         j -= 1
-        p -= last - j + below.count
+        p -= last - j + below.length
         a, q = row_at(y, at(j)), p + 1
         for i in range(j + 1, last):
             a = less(a, values[at(q)], row_at(y, at(i)))
             q += 1
-        for i in range(below.count):
+        for i in range(below.length):
             a = less(a, values[at(q)], row_at(y, row_below(below, i)))
             q += 1
         put_row(y, at(j), scaled(1.0 / values[at(p)], a))
     while j > first:
         j -= 4
-        size = last - j + below.count
+        size = last - j + below.length
         p -= 4 * size - 6
         if ahead > 0:
             ask_for_columns(values, p - ahead, size)
@@ -142,11 +142,11 @@ def eliminate_four(values, p, size, j, last, below, y):
         put_row(y, row, less(less(z, values[at(r + i)], c), values[at(s + i)], d))
     k = last - j - 4
     p, q, r, s = p + k, q + k, r + k, s + k
-    for i in range(below.count):
+    for i in range(below.length):
         row = row_below(below, i)
         z = less(less(row_at(y, row), values[at(p + i)], a), values[at(q + i)], b)
         put_row(y, row, less(less(z, values[at(r + i)], c), values[at(s + i)], d))
-    return s + below.count
+    return s + below.length
 
 
 def substitute_four(values, p, size, j, last, below, y):
@@ -158,7 +158,7 @@ def substitute_four(values, p, size, j, last, below, y):
         a, b = less(a, values[at(p + 4 + i)], z), less(b, values[at(q + 3 + i)], z)
         c, d = less(c, values[at(r + 2 + i)], z), less(d, values[at(s + 1 + i)], z)
     k = last - j
-    for i in range(below.count):
+    for i in range(below.length):
         z = row_at(y, row_below(below, i))
         a, b = less(a, values[at(p + k + i)], z), less(b, values[at(q + k - 1 + i)], z)
         c, d = less(c, values[at(r + k - 2 + i)], z), less(d, values[at(s + k - 3 + i)], z)

@@ -228,7 +228,8 @@ def _result(
     values: list[float],
 ) -> StepResult:
     if last is not None:
-        velocities = (last.positions - objective.x_n) / objective.h
+        velocities = last.positions - objective.x_n
+        velocities /= objective.h
         if np.isfinite(velocities).all():
             return StepResult(
                 state=State.of(last.positions, velocities),

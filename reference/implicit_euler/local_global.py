@@ -15,6 +15,8 @@ alone. One iteration is the lab's version.
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ..mass_spring import MassSpring
 from .objective import Iterate, Objective
 from .prefactored import global_factor
@@ -38,5 +40,5 @@ class LocalGlobal:
         iterate = objective.start
         while True:
             yield iterate
-            correction = self._factor.solve(iterate.gradient)
-            iterate = objective.evaluate(iterate.positions - correction)
+            x = self._factor.solve(iterate.gradient)
+            iterate = objective.evaluate(np.subtract(iterate.positions, x, out=x))

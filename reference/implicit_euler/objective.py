@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy import uint64 as at
 from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, array
@@ -34,15 +33,17 @@ from ..mass_spring import (
     pin_goal,
     rest_vectors,
     spring_blocks,
-    spring_frame,
-    spring_stretch,
 )
-from ..quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
-
-# Rounding errors in the gradient are a few units in the last place of the terms that it sums.
-ROUNDING = 64 * np.finfo(float).eps
-# What is said to be no less than the floor is rounded itself.
-MARGIN = 1.000001
+from ..parallel import in_slices
+from .terms import (
+    ROUNDING,
+    blend_dampers,
+    evaluate_objective,
+    evaluate_regions,
+    join_regions,
+    measure_rounding,
+    most_rounding,
+)
 
 
 class Iterate:
@@ -134,10 +135,13 @@ class Objective:
         self.system = system
         self.h = h
         self.x_n, v_n = motion(system, state)
-        self.y = self.x_n + h * v_n
+        self.y = np.multiply(v_n, h, out=v_n)
+        self.y += self.x_n
         if pin_positions is not None:
             self.y[system.pinned] = pin_goal(system, pin_positions)
-        self.external = constant_forces(system, external_forces)
+        self.external = system.weights
+        if external_forces is not None:
+            self.external = constant_forces(system, external_forces)
         self.effective, self._constant = _effective(system, self.x_n, h)
         arrays = self.effective.arrays
         self._arguments = (
@@ -145,14 +149,17 @@ class Objective:
             arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only, arrays.pinned,
         )  # fmt: skip
         self._most = _most_rounding(
-            self.y, self.external, h, arrays.masses, arrays.springs, arrays.rest_lengths,
-            arrays.stiffnesses, arrays.pinned,
-        )  # fmt: skip
+            self.y, self.external, h, arrays.masses, self.effective.spring_sums, system.free
+        )
         self.start = self.evaluate(self.y)
 
     def evaluate(self, positions: FloatArray) -> Iterate:
         """Return g and its gradient at unchecked positions."""
-        gradient, value, norm, reach = _evaluate(positions, *self._arguments)
+        regions = self.system.dampers_apart.regions
+        if regions is None:
+            gradient, value, norm, reach = _evaluate(positions, *self._arguments)
+        else:
+            gradient, value, norm, reach = _side_by_side(positions, *self._arguments, regions)
         still, moving = self._most
         return Iterate(positions, gradient, value, norm, still + moving * reach, self._measure)
 
@@ -275,109 +282,28 @@ def _effective(system: MassSpring, x_n: FloatArray, h: float) -> tuple[MassSprin
     return apart.replaced(**springs, dampings=np.zeros(len(stiffnesses))), constant
 
 
-def blend_dampers(x_n, h, stiffnesses, system):
-    """Return the effective rest lengths, and the constant that completes the square.
-
-    k/2 (l - a)² + b/2 (l - e)² = (k + b)/2 (l - rest)² + k b / (k + b) / 2 (a - e)².
-    """
-    rest_lengths = system.rest_lengths.copy()
-    constant = 0.0
-    for s in range(len(system.springs)):
-        damper, stiffness = system.dampings[s] / h, stiffnesses[s]
-        if damper > 0.0:
-            length, _ = spring_frame(x_n, system.springs[s, 0], system.springs[s, 1])
-            share, gap = damper / stiffness, length - system.rest_lengths[s]
-            rest_lengths[s] += share * gap
-            constant += 0.5 * share * system.stiffnesses[s] * (gap * gap)
-    return rest_lengths, constant
-
-
-def evaluate_objective(
-    x, y, external, h, constant, masses, springs, rest_lengths, stiffnesses, tension_only, pinned
-):
-    """Return grad g, g, |grad g| and the farthest that a particle is from the origin."""
-    gradient, value, farthest, squares = np.empty(x.shape), h * h * constant, 0.0, 0.0
-    for i in range(len(x)):
-        x_i, f = vector_at(x, i), scale(h * h, vector_at(external, i))
-        away = subtract(x_i, vector_at(y, i))
-        inertia = scale(masses[i], away)
-        put_vector(gradient, i, subtract(inertia, f))
-        value += 0.5 * dot(inertia, away) - dot(f, x_i)
-        farthest = max(farthest, dot(x_i, x_i))
-    value += add_springs(x, h * h, springs, rest_lengths, stiffnesses, tension_only, gradient)
-    for p in pinned:
-        put_vector(gradient, p, (0.0, 0.0, 0.0))
-    for i in range(len(x)):
-        squares += dot(vector_at(gradient, i), vector_at(gradient, i))
-    return gradient, value, math.sqrt(squares), math.sqrt(farthest)
-
-
-def add_springs(x, hh, springs, rest_lengths, stiffnesses, tension_only, gradient):
-    """Add h² times the springs' gradient; return their share of g."""
-    value = 0.0
-    for s in range(len(springs)):
-        i, j = at(springs[s, 0]), at(springs[s, 1])
-        length, u = spring_frame(x, i, j)
-        k, stretch = hh * stiffnesses[s], spring_stretch(length, rest_lengths[s], tension_only[s])
-        pull = scale(k * stretch, u)
-        put_vector(gradient, i, add(vector_at(gradient, i), pull))
-        put_vector(gradient, j, subtract(vector_at(gradient, j), pull))
-        value += 0.5 * k * stretch * stretch
-    return value
-
-
-def measure_rounding(
-    x, y, external, h, masses, springs, rest_lengths, stiffnesses, tension_only, pinned
-):
-    """Return what rounding can leave of |grad g| and move of g."""
-    size, reach, value_size, squares = np.empty(len(x)), np.empty(len(x)), 0.0, 0.0
-    for i in range(len(x)):
-        x_i, y_i, pull = vector_at(x, i), vector_at(y, i), h * h * norm(vector_at(external, i))
-        away = subtract(x_i, y_i)
-        reach[i] = norm(x_i)
-        size[i] = masses[i] * (reach[i] + norm(y_i)) + pull
-        value_size += 0.5 * masses[i] * dot(away, away) + pull * reach[i]
-    for s in range(len(springs)):
-        i, j = springs[s, 0], springs[s, 1]
-        length, _ = spring_frame(x, i, j)
-        k, ends = h * h * stiffnesses[s], reach[i] + reach[j]
-        stretch = abs(spring_stretch(length, rest_lengths[s], tension_only[s]))
-        size[i] += k * (ends + rest_lengths[s])
-        size[j] += k * (ends + rest_lengths[s])
-        value_size += k * stretch * (stretch + ends)
-    for p in pinned:
-        size[p] = 0.0
-    for i in range(len(x)):
-        squares += size[i] * size[i]
-    return ROUNDING * math.sqrt(squares), ROUNDING * value_size
-
-
-def most_rounding(y, external, h, masses, springs, rest_lengths, stiffnesses, pinned):
-    """Return a and b: wherever no particle is farther than r from the origin, a + b r is no less.
-
-    No less, that is, than what rounding can leave of |grad g|: its terms are summed with r for
-    every |x_i|, and the norm of a sum is at most the sum of norms.
-    """
-    still, moving = np.empty(len(y)), np.empty(len(y))
-    for i in range(len(y)):
-        still[i] = masses[i] * norm(vector_at(y, i)) + h * h * norm(vector_at(external, i))
-        moving[i] = masses[i]
-    for s in range(len(springs)):
-        i, j, k = springs[s, 0], springs[s, 1], h * h * stiffnesses[s]
-        still[i] += k * rest_lengths[s]
-        still[j] += k * rest_lengths[s]
-        moving[i] += 2.0 * k
-        moving[j] += 2.0 * k
-    for p in pinned:
-        still[p], moving[p] = 0.0, 0.0
-    a, b = 0.0, 0.0
-    for i in range(len(y)):
-        a += still[i] * still[i]
-        b += moving[i] * moving[i]
-    return MARGIN * ROUNDING * math.sqrt(a), MARGIN * ROUNDING * math.sqrt(b)
+def _side_by_side(
+    x, y, external, h, constant, masses, springs, rest_lengths, stiffnesses, tension_only, pinned,
+    regions,
+):  # fmt: skip
+    """Return what `evaluate_objective` does, summed region by region on all cores."""
+    gradient, sums = np.empty(x.shape), np.empty((len(regions.particles) - 1, 2))
+    elastic = rest_lengths, stiffnesses, tension_only
+    in_slices(
+        _regions,
+        len(sums),
+        lambda part: (
+            x, y, external, h, masses, *elastic, regions, part.start, part.stop, gradient, sums,
+        ),
+        least=1,
+    )  # fmt: skip
+    joined = _join(x, h, constant, *elastic, pinned, regions, gradient, sums)
+    return gradient, *joined
 
 
 _evaluate = TwoSpeeds(evaluate_objective)
+_regions = TwoSpeeds(evaluate_regions)
+_join = TwoSpeeds(join_regions)
 _rounding = TwoSpeeds(measure_rounding)
 _most_rounding = TwoSpeeds(most_rounding)
 _blend = TwoSpeeds(blend_dampers)
