@@ -12,6 +12,8 @@ import typer
 
 from .suites import SUITES
 
+# The width of the names of suites in the help.
+INDENT = 2 + max(map(len, SUITES))
 QUICK, FULL = "quick", "full"
 REPORT = Path("report")
 FINE, MISSED, MISUSED, INTERRUPTED = 0, 1, 2, 130
@@ -137,7 +139,7 @@ def check(
         "plumbob bench cloth --fresh    forget the cloth's records and measure anew",
     )
     + "\n\n"
-    + _block("Suites", *(f"{name:<10}{about}" for name, about in SUITES.items()))
+    + _block("Suites", *(f"{name:<{INDENT}}{about}" for name, about in SUITES.items()))
 )
 def bench(
     suites: Annotated[

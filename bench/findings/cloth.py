@@ -8,7 +8,9 @@ from ..tables import Answer, Cell, Column, Table, words
 from .results import Results, counted, label, settings
 
 LISTED = (1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000)
-RIVALS = ("local_global", "newton")
+RIVALS = ("local_global", "chebyshev", "lbfgs", "newton_cg", "newton")
+# Those whose residual is listed beside the error.
+CHECKED = ("local_global", "newton")
 ONE_STEP = "/one step"
 FEW = "/few iterations"
 # The answer in a sentence counts the iterations to this error.
@@ -72,48 +74,50 @@ def _newton_answer(records: Sequence[Record]) -> Answer:
 def convergence(results: Results) -> Table:
     """Return residual and error after each of some iterations of one step."""
     problems = [r.problem for r in results.all("cloth") if r.problem.endswith(ONE_STEP)]
-    pairs = {
-        problem: [results.one("cloth", problem, rival) for rival in RIVALS]
+    solved = {
+        problem: {rival: results.one("cloth", problem, rival) for rival in RIVALS}
         for problem in dict.fromkeys(problems)
     }
     rows = [
-        (_cloth(problem), k, *_after(pair[0], k), *_after(pair[1], k))
-        for problem, pair in pairs.items()
+        (
+            _cloth(problem),
+            k,
+            *(_after(by[rival], "error", k) for rival in RIVALS),
+            *(_after(by[rival], "residual", k) for rival in CHECKED),
+        )
+        for problem, by in solved.items()
         for k in LISTED
-        if any(record is not None and k < record.arrays["error"].size for record in pair)
+        if any(_after(record, "error", k) is not None for record in by.values())
     ]
-    records = [record for pair in pairs.values() for record in pair if record is not None]
+    records = [record for by in solved.values() for record in by.values() if record is not None]
     return Table(
         "cloth_convergence",
         "Convergence of one implicit Euler step",
         (
             Column("cloth", words=True),
             Column("iterations"),
-            *(
-                Column(f"{label(rival)}: {what}")
-                for rival in RIVALS
-                for what in ("residual", "error")
-            ),
+            *(Column(f"{label(rival)}: error") for rival in RIVALS),
+            *(Column(f"{label(rival)}: residual") for rival in CHECKED),
         ),
         tuple(rows),
         shows="The error is |x − x*| / |y − x*|: what is left of the distance between the "
         "inertial start y and the converged step x*. Where it stands still, rounding is reached.",
         measured=f"Step {settings(records, 'step')} of the motion, {_milliseconds(records)} ms; "
         "x* by Newton, iterated far beyond the rounding floor.",
-        answer=_convergence_answer(pairs),
+        answer=_convergence_answer(solved),
     )
 
 
-def _after(record: Record | None, k: int) -> tuple[float | None, float | None]:
-    if record is None or k >= record.arrays["error"].size:
-        return None, None
-    return float(record.arrays["residual"][k]), float(record.arrays["error"][k])
+def _after(record: Record | None, what: str, k: int) -> float | None:
+    if record is None or k >= record.arrays[what].size:
+        return None
+    return float(record.arrays[what][k])
 
 
-def _convergence_answer(pairs: dict[str, list[Record | None]]) -> Answer:
+def _convergence_answer(solved: dict[str, dict[str, Record | None]]) -> Answer:
     points = []
-    for problem, records in pairs.items():
-        needed = [f"{label(r.solver)} {_needed(r)}" for r in records if r is not None]
+    for problem, by in solved.items():
+        needed = [f"{label(r.solver)} {_needed(r)}" for r in by.values() if r is not None]
         points.append(f"{_cloth(problem)}: {', '.join(needed)}")
     return Answer(f"Iterations until the error is {words(TARGET_ERROR)}:", tuple(points))
 

@@ -17,7 +17,9 @@ STEPS = 60
 TOLERANCE = 1e-10
 # The step whose convergence is followed iteration by iteration.
 MIDDLE = FALLING + STEPS // 2
-CONVERGENCE = {"local_global": 1000, "newton": 12}
+CONVERGENCE = {
+    "local_global": 1000, "chebyshev": 1000, "lbfgs": 200, "newton_cg": 12, "newton": 12,
+}  # fmt: skip
 FEW = (1, 10, 100)
 
 

@@ -36,8 +36,8 @@ STABILITY, LIU = "peers/stability", "peers/liu2013"
 EVERY_CLOTH = "peers/all"
 # Between the rungs' names in a record's notes.
 LIST = "; "
-# One step is timed so often, but for no more than a tenth of the time for its ladder.
-_REPEATS, _REPEATING = 5, 0.1
+# One step is timed so often, but for no more than a twentieth of its ladder's time.
+_REPEATS, _REPEATING = 5, 0.05
 # A ladder ends with the first rung this near to the answer.
 NEAR_ENOUGH = 1e-9
 # A silent frame of a large cloth is given up after so long [s], and so is one being set up.
@@ -66,7 +66,7 @@ class Level(NamedTuple):
 
 
 QUICK = (Level(20, 3, 0.2),)
-FULL = (Level(20, 30, 2.0), Level(40, 10, 3.0), Level(100, 2, 8.0))
+FULL = (Level(20, 30, 2.0), Level(40, 10, 3.0), Level(100, 2, 30.0))
 QUICK_STIFFNESS = STIFFNESSES[1:2]
 # The benchmarks of a scale that is full take so long [s].
 _FULL = 1.0
