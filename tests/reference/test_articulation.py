@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from drawn_trees import TREES, drawn
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -14,11 +15,7 @@ ROUNDING = 1e-13
 # Where a ball is tilted by nearly half a turn, its twist is known only to 1e-16 over the rest.
 ANGLE = 1e-9
 
-TREES = {
-    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=8),
-    "seed": st.integers(0, 2**32 - 1),
-}
-at_both_speeds = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+at_both_speeds = drawn()
 
 
 def coordinates_by_joint(articulation, q):

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from drawn_trees import TREES, drawn
+from hypothesis import given
 
 from reference import Articulation, Mimic, Skeleton, forward_kinematics, rotation
 from reference.articulation import KINDS
@@ -13,11 +13,7 @@ from reference.differential import difference, integrate, jacobian, jacobians
 STEP, DIFFERENCE = 1e-5, 1e-8
 ROUNDING = 1e-13
 
-TREES = {
-    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
-    "seed": st.integers(0, 2**32 - 1),
-}
-at_both_speeds = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+at_both_speeds = drawn()
 
 
 def by_differences(model, q):

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from drawn_trees import TREES, drawn
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reference import (
@@ -15,14 +16,9 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.articulation import KINDS
 from reference.inverse_kinematics.mechanism import too_far
 
-TREES = {
-    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
-    "seed": st.integers(0, 2**32 - 1),
-}
-shared = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+shared = drawn()
 
 # Both hands of a trunk of three joints, arms of three.
 PARENTS = [-1, 0, 1, 2, 3, 4, 2, 6, 7]

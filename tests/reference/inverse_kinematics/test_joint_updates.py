@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
-from hypothesis import strategies as st
+from drawn_trees import TREES, drawn, with_examples
+from hypothesis import given
 
 from reference import (
     Articulation,
@@ -15,7 +15,7 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.articulation import KINDS, LEADER
+from reference.articulation import LEADER
 from reference.inverse_kinematics.ccd import descend, move_joint
 from reference.inverse_kinematics.fabrik import (
     WISHED,
@@ -30,26 +30,7 @@ from reference.inverse_kinematics.preparation import prepare
 # Squared distances of a few metres, and quaternions normalised after a turn.
 ROUNDING = 1e-12
 
-TREES = {
-    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
-    "seed": st.integers(0, 2**32 - 1),
-}
-EXAMPLES = (
-    example(kinds=["ball", "hinge", "slide", "ball", "free", "hinge"], seed=1),
-    example(kinds=["hinge", "hinge", "ball", "slide", "hinge", "ball"], seed=2),
-    example(kinds=["slide", "ball", "hinge", "hinge", "fixed", "ball"], seed=3),
-    example(kinds=["hinge", "slide", "hinge", "slide", "hinge", "hinge"], seed=4),
-)
-
-
-def with_examples(law):
-    """Add trees of many joints to those that are drawn, of which the first are small."""
-    for one in EXAMPLES:
-        law = one(law)
-    return law
-
-
-shared = settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+shared = drawn(max_examples=40)
 
 
 def planar(links, **limits):

@@ -5,8 +5,8 @@ import weakref
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
-from hypothesis import strategies as st
+from drawn_trees import TREES, drawn, with_examples
+from hypothesis import given
 
 from reference import (
     IK_SOLVERS,
@@ -20,7 +20,6 @@ from reference import (
     solve_ik,
 )
 from reference.arguments import frozen
-from reference.articulation import KINDS
 from reference.inverse_kinematics import checked_settings, solve_targets
 from reference.parallel import cores
 
@@ -31,26 +30,7 @@ PATH = 1e-7
 # A twist is known only to 1e-16 over the cosine of half the tilt.
 LIMIT = 1e-7
 
-TREES = {
-    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
-    "seed": st.integers(0, 2**32 - 1),
-}
-EXAMPLES = (
-    example(kinds=["ball", "hinge", "slide", "ball", "free", "hinge"], seed=1),
-    example(kinds=["slide", "ball", "hinge", "hinge", "fixed", "ball"], seed=3),
-)
-
-
-def with_examples(law):
-    """Add trees of many joints to those that are drawn, of which the first are small."""
-    for one in EXAMPLES:
-        law = one(law)
-    return law
-
-
-at_both_speeds = settings(
-    max_examples=5, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+at_both_speeds = drawn(max_examples=5)
 
 
 @pytest.fixture

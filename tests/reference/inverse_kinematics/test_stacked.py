@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, example, given, settings
-from hypothesis import strategies as st
+from drawn_trees import TREES, drawn, with_examples
+from hypothesis import given
 from scipy.optimize import lsq_linear
 
 from reference import (
@@ -16,7 +16,6 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.articulation import KINDS
 from reference.differential import integrate, jacobian
 from reference.inverse_kinematics.damped_least_squares import DAMPING
 from reference.inverse_kinematics.levenberg_marquardt import DAMPING as OF_POSITIONS
@@ -36,28 +35,7 @@ ROUNDING = 1e-12
 # The damped matrix has a condition of at most a few thousand here.
 SOLVED = 1e-9
 
-TREES = {
-    "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),
-    "seed": st.integers(0, 2**32 - 1),
-}
-EXAMPLES = (
-    example(kinds=["ball", "hinge", "slide", "ball", "free", "hinge"], seed=1),
-    example(kinds=["hinge", "hinge", "ball", "slide", "hinge", "ball"], seed=2),
-    example(kinds=["slide", "ball", "hinge", "hinge", "fixed", "ball"], seed=3),
-    example(kinds=["hinge", "slide", "hinge", "slide", "hinge", "hinge"], seed=4),
-)
-
-
-def with_examples(law):
-    """Add trees of many joints to those that are drawn, of which the first are small."""
-    for one in EXAMPLES:
-        law = one(law)
-    return law
-
-
-at_both_speeds = settings(
-    max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+at_both_speeds = drawn(max_examples=10)
 
 
 @pytest.fixture
