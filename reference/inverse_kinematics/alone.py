@@ -28,6 +28,8 @@ def solve_alone(
     model: Any, start: Any, target: Any, effector: Any, settings: Any
 ) -> IKSolution | None:
     """Return the solution, or None where the arguments are not that plain, or not fit."""
+    if settings.record:
+        return None
     position, turn, weight = target, None, 1.0
     if type(target) is list and len(target) == 1:
         target = target[0]
@@ -35,30 +37,23 @@ def solve_alone(
         if type(effector) is not int or effector != -1:
             return None
         position, turn, effector, weight = target
-    if not (is_plain(position, (3,)) and (turn is None or is_plain(turn, (4,)))):
-        return None
     if type(effector) is str and type(model) in (Articulation, Skeleton):
         effector = model.index(effector, "effector")
-    if settings.record or type(effector) is not int:
+    if not (type(effector) is int and is_plain(position, (3,))):
         return None
     if type(weight) is not float or not 0.0 < weight < math.inf:  # alone, it counts for nothing
         return None
-    if type(model) is Articulation and is_plain(start, (model.coordinate_count,)):
-        goal = new_goal(position, turn)
-        return solve_mechanism(model, start, goal, effector, turn is not None, settings)
     if type(model) is Skeleton and turn is None and not settings.restarts:
         return solve_chain(model, start, position, effector, settings)
+    if type(model) is Articulation and (turn is None or is_plain(turn, (4,))):
+        goal = new_goal(position, turn)
+        return solve_mechanism(model, start, goal, effector, turn is not None, settings)
     return None
 
 
 def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
-    """Return whether values are a float64 array of a shape, one row after the other."""
-    return (
-        type(values) is np.ndarray
-        and values.dtype is FLOAT64
-        and values.shape == shape
-        and values.flags.c_contiguous
-    )
+    """Return whether values are a float64 array of a shape."""
+    return type(values) is np.ndarray and values.dtype is FLOAT64 and values.shape == shape
 
 
 def new_goal(position: Any, turn: Any) -> FloatArray:
@@ -81,7 +76,7 @@ def solve_mechanism(
 ) -> IKSolution | None:
     """Solve on an articulation; None if there is no such effector, or a number is not fit."""
     count = model.joint_count
-    if not -count <= effector < count:
+    if not (is_plain(start, (model.coordinate_count,)) and -count <= effector < count):
         return None
     prepared = prepare(
         model, (effector % count,), (oriented,), settings.restarts, settings.seed
@@ -114,8 +109,8 @@ def solve_chain(
 
 
 def writable(values: FloatArray) -> FloatArray:
-    """Return the values in an array that may be written to, as the kernels are compiled for."""
-    return values if values.flags.writeable else values.copy()
+    """Return the values row after row in an array that may be written to, as kernels expect."""
+    return values if values.flags.carray else values.copy()
 
 
 def finished(
@@ -126,10 +121,11 @@ def finished(
     coordinates: FloatArray,
 ) -> IKSolution:
     """Return the solution of one target from the kernels' rows of one."""
-    for rows in (local, positions) if coordinates is local else (local, positions, coordinates):
+    shown = local[0]
+    for rows in (shown, positions) if coordinates is local else (shown, positions, coordinates):
         rows.setflags(False)  # type: ignore[call-arg]  # by its name it takes twice as long
     residual, angle, iterations, outcome = figures.tolist()[0]
     return IKSolution(
-        local[0], positions[0], residual, int(iterations), OUTCOMES[int(outcome)], history, angle,
-        coordinates[0],
+        shown, positions[0], residual, int(iterations), OUTCOMES[int(outcome)], history, angle,
+        shown if coordinates is local else coordinates[0],
     )  # fmt: skip
