@@ -5,7 +5,8 @@ from .articulation import Articulation, Mimic
 from .compiled import speed
 from .curve import curves, resample
 from .explicit import runge_kutta, symplectic_euler
-from .implicit_euler import STEP_SOLVERS, Certificate, Coverage, ImplicitEuler, StepResult
+from .implicit_euler import STEP_SOLVERS, ImplicitEuler, StepResult
+from .implicit_euler.certificate import Certificate, Coverage
 from .inverse_kinematics import IK_SOLVERS, IKSolution, Target, solve_ik
 from .kinematics import forward_kinematics, local_from_global
 from .mass_spring import MassSpring, State

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..arguments import FloatArray, choice, frozen, integer, number
 from ..mass_spring import MassSpring, State
 from ..outcome import Outcome
-from .certificate import Certificate, Coverage, certify
+from .certificate import Certificate, certify
 from .chebyshev import Chebyshev
 from .gauss_newton import GaussNewton
 from .lbfgs import LBFGS
