@@ -98,24 +98,28 @@ def markdown(table: Table) -> str:
 
 
 def latex(table: Table) -> str:
-    """Return the table as LaTeX for the package booktabs."""
+    """Return the table as LaTeX for the packages booktabs and graphicx.
+
+    A table that is wider than the line is shrunk to it.
+    """
     align = "".join("l" if column.words else "r" for column in table.columns)
     head = " & ".join(_latex(column.heading) for column in table.columns)
     caption = " ".join(_latex(text) for text in (table.title + ".", table.shows) if text)
     return "\n".join(
         [
-            r"% needs \usepackage{booktabs}",
+            r"% needs \usepackage{booktabs,graphicx}",
             r"\begin{table}",
             r"  \centering",
             rf"  \caption{{{caption}}}",
             rf"  \label{{tab:{table.name}}}",
+            r"  \resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
             rf"  \begin{{tabular}}{{{align}}}",
             r"    \toprule",
             rf"    {head} \\",
             r"    \midrule",
             *(f"    {line}" for line in _latex_rows(table)),
             r"    \bottomrule",
-            r"  \end{tabular}",
+            r"  \end{tabular}}",
             r"\end{table}",
             "",
         ]

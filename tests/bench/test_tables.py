@@ -81,6 +81,19 @@ def test_latex_specials_are_escaped():
     assert "50" in rest
 
 
+def test_latex_braces_and_environments_close_in_turn():
+    text = re.sub(r"%.*|\\\\[{}%]", "", tables.latex(table((HOSTILE, 1.0), ("b", 2e9))))
+    depths = np.cumsum([{"{": 1, "}": -1}.get(character, 0) for character in text])
+    assert depths.min() == depths[-1] == 0
+    opened = []
+    for what, name in re.findall(r"\\(begin|end){(\w+)}", text):
+        if what == "begin":
+            opened.append(name)
+        else:
+            assert opened.pop() == name
+    assert opened == []
+
+
 def test_latex_sets_powers_of_ten():
     assert r"$1.0 \cdot 10^{-5}$" in tables.latex(table(("x", 1e-5)))
 
