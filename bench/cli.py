@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from .news import heard_by
 from .suites import SUITES
 
 # The width of the names of suites in the help.
@@ -234,13 +235,14 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
     done, failures = {run.KEPT: 0, run.MEASURED: 0, run.FAILED: 0}, []
     with progress() as bar:
         task = bar.add_task("starting", total=run.count(suites, scale))
-        for event in run.run(suites, scale, output):
-            bar.update(task, description=f"{event.suite}: {event.what}")
-            if event.state in done:
-                done[event.state] += 1
-                bar.advance(task)
-            if event.state == run.FAILED:
-                failures.append(f"{event.suite}: {event.what}: {event.message}")
+        with heard_by(lambda what: bar.update(task, description=what)):
+            for event in run.run(suites, scale, output):
+                bar.update(task, description=f"{event.suite}: {event.what}")
+                if event.state in done:
+                    done[event.state] += 1
+                    bar.advance(task)
+                if event.state == run.FAILED:
+                    failures.append(f"{event.suite}: {event.what}: {event.message}")
     print(f"{done[run.MEASURED]} measured, {done[run.KEPT]} kept as on record, in {output}")
     for failure in [*failures, *run.missed_claims(suites, output)]:
         print(f"plumbob: {failure}", file=sys.stderr)

@@ -9,7 +9,7 @@ import json
 import resource
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
 
@@ -23,6 +23,7 @@ from reference.implicit_euler.prefactored import forget, prefactored
 from reference.linear_solver import factorize
 
 from ..isolation import one_thread
+from ..news import tell
 from ..stopwatch import timed
 from .block import Block, Measured, Scale
 
@@ -37,6 +38,8 @@ LIBRARIES = (OURS, "cholespy")
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
 # What the limit of memory reads again and again: more than any cache holds [bytes].
 STRETCH = 2**28
+# How a line begins in which a child says what it is doing.
+NOW = "now: "
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -56,13 +59,29 @@ def in_its_own_process(size: int, library: str) -> Measured:
     """Measure one cloth, all by itself; say so where the library is not installed."""
     if library != OURS and importlib.util.find_spec(library) is None:
         return Measured({}, {"missing": f"{library} is not installed"})
-    done = subprocess.run(
+    with subprocess.Popen(
         [sys.executable, "-m", __name__, str(size), library],
-        env=one_thread(), capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    if done.returncode:
-        raise RuntimeError(" ".join(done.stderr.split()[-40:]) or f"ended with {done.returncode}")
-    return Measured(json.loads(done.stdout))
+        env=one_thread(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as child:  # fmt: skip
+        complaints = list(_told(child.stderr))
+        found, code = child.stdout.read() if child.stdout else "", child.wait()
+    if code:
+        raise RuntimeError(" ".join("".join(complaints).split()[-40:]) or f"ended with {code}")
+    return Measured(json.loads(found))
+
+
+def _told(lines: Iterable[str] | None) -> Iterator[str]:
+    """Pass on what a child says that it is doing; yield all else that it writes."""
+    for line in lines or ():
+        if line.startswith(NOW):
+            tell(line.removeprefix(NOW).strip())
+        else:
+            yield line
+
+
+def _say(size: int, library: str, what: str) -> None:
+    """Say on the way what is being done now."""
+    print(f"{NOW}cloth/{size}x{size}, {library}: {what}", file=sys.stderr, flush=True)
 
 
 def billowing_cloth(size: int) -> tuple[MassSpring, State]:
@@ -78,21 +97,27 @@ def billowing_cloth(size: int) -> tuple[MassSpring, State]:
 
 def measure(size: int, library: str) -> dict[str, Any]:
     """Return the times [s] and the memory [bytes] of one cloth."""
-    before = memory()
+    before, say = memory(), partial(_say, size, library)
+    say("cloth")
     system, state = billowing_cloth(size)
     rounds = int(np.clip(ROUNDS_PARTICLES // size**2, *ROUNDS))
     if library != OURS:
         matrix = global_matrix(system, H)
+        say("factor")
         factor, seconds = timed(lambda: factorize(matrix, library))
         sides = np.array(state.positions)
-        times = in_turn({"solve": lambda: factor.solve(sides)}, rounds)
+        times = in_turn({"solve": lambda: factor.solve(sides)}, rounds, say)
         return {"factor": seconds, **times, "memory": memory(), "before": before}
-    return {"before": before, **steps(system, state, rounds)}
+    return {"before": before, **steps(system, state, rounds, say)}
 
 
-def steps(system: MassSpring, state: State, rounds: int) -> dict[str, Any]:
+def steps(
+    system: MassSpring, state: State, rounds: int, say: Callable[[str], None]
+) -> dict[str, Any]:
     """Return what iterations cost and all their parts, in turn; and what they reach."""
+    say("matrix")
     matrix, assembly = timed(lambda: global_matrix(system, H))
+    say("factor")
     factor, seconds = timed(lambda: prefactored(matrix))
     assert isinstance(factor, CholeskyFactor)
     integrator = ImplicitEuler(
@@ -107,7 +132,8 @@ def steps(system: MassSpring, state: State, rounds: int) -> dict[str, Any]:
         "step": lambda: integrator.step(state),
         "limit": limit,
     }
-    times = in_turn(work, rounds)
+    times = in_turn(work, rounds, say)
+    say("factor, once more")
     used, result = memory(), integrator.step(state)
     twice = global_matrix(system, 2 * H)
     _, again = timed(lambda: factor.refactorize(twice))
@@ -118,10 +144,13 @@ def steps(system: MassSpring, state: State, rounds: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def in_turn(work: dict[str, Callable[[], Any]], rounds: int) -> dict[str, list[float]]:
+def in_turn(
+    work: dict[str, Callable[[], Any]], rounds: int, say: Callable[[str], None]
+) -> dict[str, list[float]]:
     """Return how long each took in each round; a first, uncounted round warms up."""
     times: dict[str, list[float]] = {name: [] for name in work}
-    for _ in range(rounds + 1):
+    for done in range(rounds + 1):
+        say(f"round {done} of {rounds}")
         for name, call in work.items():
             times[name].append(timed(call)[1])
     return {name: seconds[1:] for name, seconds in times.items()}

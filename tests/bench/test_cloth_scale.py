@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bench.findings import Results, cloth_scale
+from bench.news import heard_by
 from bench.suites import SCALES, blocks
 from bench.suites import cloth_scale as suite
 from reference.implicit_euler.objective import Objective
@@ -43,6 +44,15 @@ def test_what_is_measured_is_the_work_it_says(ours):
     for name in ("solve", "local", "step", "limit"):
         assert len(ours[name]) == suite.ROUNDS[1]
         assert min(ours[name]) > 0
+
+
+def test_what_it_is_doing_is_told_on_the_way():
+    heard = []
+    with heard_by(heard.append):
+        suite.in_its_own_process(SMALL, suite.OURS)
+    assert heard[0] == f"cloth/{SMALL}x{SMALL}, supernodal: cloth"
+    assert heard[-1].endswith("factor, once more")
+    assert sum("round" in what for what in heard) == 2 * (suite.ROUNDS[1] + 1)
 
 
 def test_a_failure_in_its_process_is_told():
