@@ -15,7 +15,7 @@ from .arguments import IndexArray
 
 # A system with fewer springs is summed sooner than another thread begins.
 LARGE = 1_000_000
-REGIONS = 16
+REGIONS = 32
 
 
 class Regions(NamedTuple):
