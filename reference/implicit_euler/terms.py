@@ -8,8 +8,8 @@ import math
 import numpy as np
 from numpy import uint64 as at
 
-from ..mass_spring import spring_frame, spring_stretch
 from ..quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
+from ..springs import spring_frame, spring_stretch
 
 # Rounding errors in the gradient are a few units in the last place of the terms that it sums.
 ROUNDING = 64 * np.finfo(float).eps

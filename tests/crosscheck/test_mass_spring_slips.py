@@ -12,10 +12,10 @@ from crosscheck.mass_spring import forces as force_claims
 from crosscheck.mass_spring.claims import MASS_SPRING_CLAIMS
 from crosscheck.mass_spring.steps import damper_blocks, semi_implicit
 from crosscheck.verdict import judge
+from reference.block_sum import BlockSum
 from reference.explicit import symplectic_euler
 from reference.implicit_euler import ImplicitEuler
 from reference.mass_spring import (
-    BlockSum,
     MassSpring,
     State,
     damper_forces,
