@@ -152,7 +152,7 @@ def shape(lengths: Sequence[int | str]) -> str:
 
 
 def _floats(name: str, value: Any) -> FloatArray:
-    if type(value) is np.ndarray and value.dtype is FLOAT64 and value.flags.carray:
+    if type(value) is np.ndarray and value.dtype == FLOAT64 and value.flags.carray:
         return value
     try:
         given = np.asarray(value)

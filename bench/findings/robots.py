@@ -24,7 +24,8 @@ ENOUGH = 8
 _MEASURED = (
     "Every solver has the same text of the robot, the same targets and the same seeded random "
     "starts. It works in a process of its own, on one core (TRAC-IK on two), and is timed target "
-    "by target, after one that does not count; conversions are left out. What it returns is judged "
+    "by target, as in a loop of solves: after the target before, solved again without counting "
+    "where that takes less than a millisecond; conversions are left out. What it returns is judged "
     "by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a busy "
     "machine. Solved means: "
 )

@@ -37,9 +37,7 @@ def solve_alone(
         if type(effector) is not int or effector != -1:
             return None
         position, turn, effector, weight = target
-    if type(effector) is str and type(model) in (Articulation, Skeleton):
-        effector = model.index(effector, "effector")
-    if not (type(effector) is int and is_plain(position, (3,))):
+    if not (type(effector) in (int, str) and is_plain(position, (3,))):
         return None
     if type(weight) is not float or not 0.0 < weight < math.inf:  # alone, it counts for nothing
         return None
@@ -53,7 +51,7 @@ def solve_alone(
 
 def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
     """Return whether values are a float64 array of a shape."""
-    return type(values) is np.ndarray and values.dtype is FLOAT64 and values.shape == shape
+    return type(values) is np.ndarray and values.dtype == FLOAT64 and values.shape == shape
 
 
 def new_goal(position: Any, turn: Any) -> FloatArray:
@@ -70,17 +68,19 @@ def solve_mechanism(
     model: Articulation,
     start: FloatArray,
     goal: FloatArray,
-    effector: int,
+    effector: int | str,
     oriented: bool,
     settings: Any,
 ) -> IKSolution | None:
-    """Solve on an articulation; None if there is no such effector, or a number is not fit."""
-    count = model.joint_count
-    if not (is_plain(start, (model.coordinate_count,)) and -count <= effector < count):
+    """Solve on an articulation; None if a number is not fit."""
+    if not is_plain(start, (model.coordinate_count,)):
         return None
-    prepared = prepare(
-        model, (effector % count,), (oriented,), settings.restarts, settings.seed
-    )  # fmt: skip
+    count, asked = model.joint_count, (effector, oriented, settings.restarts, settings.seed)
+    prepared = model.mechanisms.get(asked)
+    if prepared is None:
+        joint = model.index(effector, "effector")
+        prepared = prepare(model, (joint,), (oriented,), settings.restarts, settings.seed)
+        model.mechanisms[asked] = prepared
     q, local = np.empty((1, model.coordinate_count)), np.empty((1, count, 4))
     positions, figures = np.empty((1, count, 3)), np.empty((1, 4))
     fine = settings.solver.mechanism(
@@ -92,16 +92,17 @@ def solve_mechanism(
 
 
 def solve_chain(
-    model: Skeleton, start: Any, position: FloatArray, effector: int, settings: Any
+    model: Skeleton, start: Any, position: FloatArray, effector: int | str, settings: Any
 ) -> IKSolution | None:
-    """Solve on a skeleton; None if start or effector or a number is not fit."""
+    """Solve on a skeleton; None if start or a number is not fit."""
     count = model.joint_count
-    if not (is_plain(start, (count, 4)) and -count <= effector < count):
+    if not is_plain(start, (count, 4)):
         return None
+    joint = count - 1 if effector == -1 else model.index(effector, "effector")
     local, positions = np.empty((1, count, 4)), np.empty((1, count, 3))
     figures = np.empty((1, 4))
     fine = settings.solver.chain(
-        *model.arrays, model.path_array(effector % count), writable(start)[None],
+        *model.arrays, model.path_array(joint), writable(start)[None],
         writable(position)[None], settings.tolerance, settings.max_iterations, False,
         local, positions, figures, UNWANTED,
     )  # fmt: skip

@@ -1,11 +1,13 @@
 """Solvers in a process of their own: one that hangs, crashes, raises or lies costs one row."""
 
+import importlib
 import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from bench import stopwatch
 from bench.isolation import Workshop, raised
 from bench.judge import Targets, Tolerance, judge
 from bench.problems.robots import robot
@@ -13,7 +15,7 @@ from bench.solvers import ONE_START, Entry, Peer
 from bench.solvers.protocol import Answer
 from bench.solvers.restarts import restarted
 from bench.suites import Scale, robots
-from bench.worker import Done, Job, Ready, Solved, Unfit, perform, serve
+from bench.worker import AGAIN, Done, Job, Ready, Solved, Unfit, perform, serve
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4
@@ -30,11 +32,13 @@ def prepare(robot, tolerance, manner="perfect", at=2):
         raise UnableError("takes no iiwas")
     if manner == "no engine":
         import an_engine_that_nobody_has
-    done = [-1]  # the warm-up does not count
+    asked = [-2]  # the first is for the warm-up
 
     def ask(positions, rotations, start):
+        asked[0] += 1
+        number = asked[0]
+
         def solve():
-            done[0] += 1
             if manner == "prints":
                 print("noise", flush=True)
                 os.write(1, b"more noise")
@@ -48,7 +52,7 @@ def prepare(robot, tolerance, manner="perfect", at=2):
                 return Answer(start + 2 * np.pi, True)
             if manner == "silent":
                 return Answer(start, None)
-            if done[0] == at + 1:
+            if number == at:
                 if manner == "hangs":
                     time.sleep(600)
                 if manner == "crashes":
@@ -123,6 +127,43 @@ def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(shop, target
     again = shop.perform(job(targets, "perfect"))
     assert len(again.solved) == COUNT
     assert again.trouble == ""
+
+
+def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monkeypatch):
+    """What is timed is timed as in a loop of solves and nothing else."""
+    monkeypatch.setattr("bench.worker.QUICK", 0.1)
+    counts, called = [], 0
+
+    def timed(call):
+        nonlocal called
+        counts.append(called)
+        called = 0
+        return stopwatch.timed(call)
+
+    monkeypatch.setattr("bench.worker.timed", timed)
+    fake = importlib.import_module("fake_solvers")
+    prepare = fake.prepare
+
+    def counting(*given, **settings):
+        ask = prepare(*given, **settings)
+
+        def asked(*target):
+            solve = ask(*target)
+
+            def one():
+                nonlocal called
+                called += 1
+                return solve()
+
+            return one
+
+        return asked
+
+    monkeypatch.setattr(fake, "prepare", counting)
+    messages(targets, "slow", at=1)
+    setup, warm, *each = counts
+    assert (setup, warm) == (0, 0)
+    assert each == [1, 1 + AGAIN, 1, 1 + AGAIN]
 
 
 def test_what_a_solver_prints_does_not_disturb_its_results(shop, targets):

@@ -1,5 +1,7 @@
 """Targets of position and rotation."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,8 @@ from reference import (
     rotation,
     solve_ik,
 )
+from reference.inverse_kinematics import checked_settings, solve_targets
+from reference.inverse_kinematics.alone import solve_alone
 from reference.inverse_kinematics.mechanism import (
     LEVER,
     misfit,
@@ -141,3 +145,17 @@ def test_rotations_count_by_lever_and_reach(chain_of_joints, machine, rng):
     assert turn_weight(mechanism) == pytest.approx(0.5 * lever**2, rel=1e-15)
     found = residuals(mechanism, goal, posture)
     np.testing.assert_allclose(found, [furthest, largest, nearness], rtol=1e-13, atol=0)
+
+
+@pytest.mark.parametrize("change", [lambda x: x, np.array, lambda x: pickle.loads(pickle.dumps(x))])
+def test_a_solve_alone_takes_the_short_way_wherever_its_arrays_come_from(change, articulated):
+    """A pickled array has a type of its own, equal to that of others."""
+    arm = articulated(["hinge"] * 6, 3)
+    pose = forward_kinematics(arm, arm.random(np.random.default_rng(5)))
+    target = Target(change(pose.positions[-1]), change(pose.rotations[-1]), arm.names[-1])
+    settings = checked_settings("levenberg_marquardt", 1e-6, 1e-6, 100, 3, 0, False)
+    for one in (target, [target], target._replace(effector=5)):
+        alone = solve_alone(arm, change(arm.neutral()), one, -1, settings)
+        usual = solve_targets(arm, arm.neutral(), target, -1, settings)
+        assert alone is not None
+        np.testing.assert_array_equal(alone.coordinates, usual.coordinates)
