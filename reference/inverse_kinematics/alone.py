@@ -30,6 +30,8 @@ def solve_alone(
     """Return the solution, or None where the arguments are not that plain, or not fit."""
     if settings.record:
         return None
+    if type(target) is np.ndarray and type(model) is Skeleton:
+        return solve_chain(model, start, target, effector, settings)
     position, turn, weight = target, None, 1.0
     if type(target) is list and len(target) == 1:
         target = target[0]
@@ -37,12 +39,12 @@ def solve_alone(
         if type(effector) is not int or effector != -1:
             return None
         position, turn, effector, weight = target
-    if not (type(effector) in (int, str) and is_plain(position, (3,))):
-        return None
     if type(weight) is not float or not 0.0 < weight < math.inf:  # alone, it counts for nothing
         return None
-    if type(model) is Skeleton and turn is None and not settings.restarts:
+    if type(model) is Skeleton and turn is None:
         return solve_chain(model, start, position, effector, settings)
+    if not (type(effector) in (int, str) and is_plain(position, (3,))):
+        return None
     if type(model) is Articulation and (turn is None or is_plain(turn, (4,))):
         goal = new_goal(position, turn)
         return solve_mechanism(model, start, goal, effector, turn is not None, settings)
@@ -92,11 +94,13 @@ def solve_mechanism(
 
 
 def solve_chain(
-    model: Skeleton, start: Any, position: FloatArray, effector: int | str, settings: Any
+    model: Skeleton, start: Any, position: Any, effector: Any, settings: Any
 ) -> IKSolution | None:
-    """Solve on a skeleton; None if start or a number is not fit."""
+    """Solve on a skeleton; None if there is more to it, or a number is not fit."""
     count = model.joint_count
-    if not is_plain(start, (count, 4)):
+    if not (is_plain(start, (count, 4)) and is_plain(position, (3,))):
+        return None
+    if settings.restarts or type(effector) not in (int, str):
         return None
     joint = count - 1 if effector == -1 else model.index(effector, "effector")
     local, positions = np.empty((1, count, 4)), np.empty((1, count, 3))
