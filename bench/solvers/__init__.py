@@ -76,7 +76,7 @@ OURS = Peer(
     "poses, positions and limits of several tips, balls",
     (
         Entry(ONE_START, {"restarts": 0}),
-        Entry(RESTARTS, {"restarts": 50}, note="50 restarts"),
+        Entry(RESTARTS, {"restarts": 100}, note="100 restarts"),
     ),
 )  # fmt: skip
 PEERS = (

@@ -51,9 +51,9 @@ from .mechanism import (
 )
 from .stacked import Stack, new_stack
 
-# An attempt that may be followed by another is given up once this many iterations have not brought
-# it this much nearer.
-PATIENCE, PROGRESS = 3, 0.5
+# An attempt that others may follow is given up once this many iterations have not brought it this
+# much nearer; but for the last of all, and one in so many before it.
+PATIENCE, PROGRESS, PATIENT = 3, 0.5, 4
 # One that stalls within so few is stuck, such as a straight chain, perhaps folded since, whose
 # target lies on its own line.
 STUCK = 6
@@ -217,7 +217,7 @@ def attempts(mechanism, goal, posture, room, request, best, history):
         take_nearest(request, room, posture.q)
         place(mechanism, posture)
         done, stuck, again = attempt(
-            mechanism, goal, posture, room, request, history, done, r + 1 < more
+            mechanism, goal, posture, room, request, history, done, r < more - 1 - more // PATIENT
         )
         if again < merit:
             copy(posture.q, best)
