@@ -112,7 +112,7 @@ class Objective:
         h: the step [s].
         x_n: the positions before the step, shape (particle, 3).
         y: where the particles would go by themselves, and the pins do, shape (particle, 3).
-        external: gravity and other given forces [N], shape (particle, 3).
+        external: gravity and other given forces [N], shape (particle, 3); never to be written to.
         effective: the system with its dampers made into springs, as above; those that belong to
             tension-only springs come after all others.
     """
