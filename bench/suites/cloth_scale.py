@@ -63,8 +63,12 @@ def in_its_own_process(size: int, library: str) -> Measured:
         [sys.executable, "-m", __name__, str(size), library],
         env=one_thread(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as child:  # fmt: skip
-        complaints = list(_told(child.stderr))
-        found, code = child.stdout.read() if child.stdout else "", child.wait()
+        try:
+            complaints = list(_told(child.stderr))
+            found, code = child.stdout.read() if child.stdout else "", child.wait()
+        except BaseException:
+            child.kill()
+            raise
     if code:
         raise RuntimeError(" ".join("".join(complaints).split()[-40:]) or f"ended with {code}")
     return Measured(json.loads(found))

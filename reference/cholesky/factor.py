@@ -51,7 +51,7 @@ class CholeskyFactor:
             pattern = Pattern(indptr, indices)
         self.pattern = pattern
         self._values = np.empty(pattern.family.entries)
-        self._spare: list[FloatArray] = []  # room for the unknowns: one for each call at a time
+        self._spare: list[FloatArray] = []  # room for the unknowns, one a call
         data = np.array(columns.data, dtype=np.float64)
         failed = _factorize(
             pattern.graph, data, pattern.order, pattern.place, pattern.blocks, pattern.family,
@@ -82,7 +82,10 @@ class CholeskyFactor:
         if b.shape == (n, SIDES):
             x = np.empty(b.shape)
             columns, starts, rows, _ = pattern.blocks
-            y = self._spare.pop() if self._spare else np.empty((n, LANES))
+            try:
+                y = self._spare.pop()
+            except IndexError:  # none yet, or other threads have them all
+                y = np.empty((n, LANES))
             _solve(pattern.order, columns, starts, rows, self._values, _plain_layout(b), y, x)
             self._spare.append(y)
             return x

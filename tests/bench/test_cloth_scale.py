@@ -1,6 +1,8 @@
 """Growing cloths: what is measured adds up, and the tables follow the records."""
 
 import json
+import signal
+import subprocess
 
 import numpy as np
 import pytest
@@ -53,6 +55,23 @@ def test_what_it_is_doing_is_told_on_the_way():
     assert heard[0] == f"cloth/{SMALL}x{SMALL}, supernodal: cloth"
     assert heard[-1].endswith("factor, once more")
     assert sum("round" in what for what in heard) == 2 * (suite.ROUNDS[1] + 1)
+
+
+def test_an_interrupt_ends_its_process(monkeypatch):
+    children = []
+
+    class Watched(subprocess.Popen):
+        def __init__(self, *arguments, **settings):
+            super().__init__(*arguments, **settings)
+            children.append(self)
+
+    def interrupt(what):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(subprocess, "Popen", Watched)
+    with heard_by(interrupt), pytest.raises(KeyboardInterrupt):
+        suite.in_its_own_process(SMALL, suite.OURS)
+    assert children[0].wait(10) == -signal.SIGKILL
 
 
 def test_a_failure_in_its_process_is_told():

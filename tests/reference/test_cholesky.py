@@ -1,5 +1,7 @@
 """Laws of the sparse Cholesky factor and of each step towards it."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 import scipy.sparse
@@ -10,6 +12,7 @@ from reference import compiled, scenes
 from reference.cholesky import CholeskyFactor, NotPositiveDefiniteError
 from reference.cholesky.dense import PANEL, STRIP, eliminate
 from reference.cholesky.dissection import HARD, LEAF
+from reference.cholesky.triangular import NEAR
 from reference.implicit_euler.objective import global_matrix
 from reference.linear_solver import factorize
 
@@ -132,6 +135,24 @@ def test_the_residual_is_of_the_size_of_rounding(speed, matrix, rng):
     x = CholeskyFactor(matrix).solve(b)
     bound = rounding(matrix) * np.abs(x).sum()
     assert np.abs(matrix @ x - b).max() <= bound + EPS
+
+
+def test_a_factor_too_large_for_a_near_cache_solves_as_well(rng):
+    n = 1500
+    A, x = definite(np.ones((n, n))), rng.standard_normal((n, 3))
+    factor = factorize(A)
+    assert factor.entries > NEAR
+    # Dominance by 0.1 over sums of a few hundred: a condition number of some thousands.
+    np.testing.assert_allclose(factor.solve(A @ x), x, rtol=0, atol=1e4 * EPS)
+
+
+def test_threads_may_solve_with_one_factor_side_by_side(rng):
+    A, sides = definite(grid(40, 40)), rng.standard_normal((64, 1600, 3))
+    factor = factorize(A)
+    alone = [factor.solve(b) for b in sides]
+    with ThreadPoolExecutor(4) as pool:
+        for together, expected in zip(pool.map(factor.solve, sides), alone, strict=True):
+            np.testing.assert_array_equal(together, expected)
 
 
 @pytest.mark.parametrize("sides", [(), (1,), (2,), (3,), (4,), (6,), (7,)])
