@@ -1,6 +1,6 @@
 """Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
 
-Three ways stand behind one interface: our own `cholesky`, the default, CHOLMOD through cholespy
+Three libraries stand behind one interface: our own, the default, CHOLMOD through cholespy
 where that is installed, and SciPy's SuperLU. cholespy prints a warning at an indefinite matrix.
 """
 
@@ -10,8 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from .arguments import FloatArray, choice
-from .cholesky import CholeskyFactor, NotPositiveDefiniteError
+from ..arguments import FloatArray, choice
+from . import CholeskyFactor, NotPositiveDefiniteError
 
 
 class Factor(Protocol):

@@ -6,7 +6,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from reference import compiled
+from reference.backend import compiled
 
 FACTOR = 3.0
 
@@ -247,8 +247,8 @@ CALLEE = textwrap.dedent("""
 CALLER = textwrap.dedent("""
     import numpy as np
     from callee import callee
-    from reference.compiled import TwoSpeeds
-    from reference.lanes import LANES, put_vectors, vectors_at
+    from reference.backend.compiled import TwoSpeeds
+    from reference.backend.simd.lanes import LANES, put_vectors, vectors_at
 
     def caller(tile):
         a, b, c = vectors_at(tile, 0)
