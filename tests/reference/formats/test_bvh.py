@@ -14,7 +14,7 @@ from reference import (
     solve_ik,
     track,
 )
-from reference.formats import bvh
+from reference.formats import FormatWarning, bvh
 from reference.formats.bvh.writer import ORDERS, euler_angles
 
 ONE_JOINT = """HIERARCHY
@@ -260,6 +260,14 @@ def test_a_file_of_many_manners_is_read():
     np.testing.assert_allclose(legs["left leg"][0], [1, 2, 3] + R @ [0.5, -1, 0], atol=1e-14)
 
 
+def test_a_frame_too_many_is_left_out_with_a_warning():
+    said = "line 25: expected the end after 1 frames, got one more, which is left out"
+    with pytest.warns(FormatWarning, match=said):
+        motion = bvh.parse(WALK.replace("Frames: 2", "Frames: 1"))
+    assert motion.offsets.shape[0] == 1
+    assert motion.offsets[:, 0].tolist() == [[1, 2, 3]]
+
+
 def test_no_frames_are_a_skeleton():
     text = WALK[: WALK.index("Frames")] + "Frames: 0\nFrame Time: 0.04\n"
     motion = bvh.parse(text)
@@ -374,7 +382,11 @@ WRONG = {
     "no whole count": (WALK.replace("Frames: 2", "Frames: 2.5"), "a count of frames, got '2.5'"),
     "a negative count": (WALK.replace("Frames: 2", "Frames: -2"), "a count of frames, got '-2'"),
     "frames not there": (WALK.replace("Frames: 2", "Frames: 3"), "expected 3 frames, got the end"),
-    "a frame too many": (WALK.replace("Frames: 2", "Frames: 1"), "expected the end after 1 fr"),
+    "two frames too many": (
+        WALK.replace("Frames: 2", "Frames: 0"), "line 25: expected the end after 0 frames"
+    ),
+    "words too many": (WALK + "the end", "expected the end after 2 frames, got 'the end'"),
+    "a short frame too many": (WALK + "1 2 3", "expected the end after 2 frames, got '1 2 3'"),
     "a million frames": (WALK.replace("Frames: 2", "Frames: 1000000"), "got a shorter file"),
     "a billion frames": (WALK.replace("Frames: 2", "Frames: 999999999"), "at most 20,000,000"),
     "many digits": (WALK.replace("Frames: 2", "Frames: " + "9" * 5000), "a count of frames"),
