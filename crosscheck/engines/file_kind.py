@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 from reference.formats.source import LARGEST
 
@@ -13,6 +14,18 @@ FIRST = re.compile(r"\s*(?:<\?.*?\?>|<!--.*?-->|<![A-Za-z].*?>|\s+)*<([^\s<>/!?]
 BY_SUFFIX = {".urdf": URDF, ".bvh": BVH}
 BY_ROOT = {"robot": URDF, "mujoco": MJCF, "mujocoinclude": FRAGMENT}
 XML = (".xml", ".mjcf")
+
+
+def xml_root(path: Path) -> ElementTree.Element:
+    """Return the root element of an XML file, white space before the declaration left out.
+
+    Raises:
+        ValueError: if it cannot be opened, or is not well-formed.
+    """
+    try:
+        return ElementTree.fromstring(path.read_bytes().lstrip())
+    except (OSError, ElementTree.ParseError) as error:
+        raise ValueError(str(error)) from None
 
 
 def file_kind(path: Path) -> str:

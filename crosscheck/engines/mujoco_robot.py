@@ -1,7 +1,6 @@
 """Robots and characters in MuJoCo, which reads URDF and MJCF files itself."""
 
 import contextlib
-import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -12,17 +11,16 @@ import numpy as np
 
 from reference.arguments import FloatArray
 
-from .file_kind import URDF, file_kind
+from .file_kind import URDF, file_kind, xml_root
 from .robot_engine import Placement, UnreadableError, columns
 
 # What MuJoCo would refuse or lose in a URDF, and kinematics does not read.
 LEFT_OUT = ("visual", "collision", "inertial")
-# What is left out of an MJCF file whose shapes are in files that are not there, users first.
+# What is left out of an MJCF file that MuJoCo refuses as it is: what uses others comes first.
 SHAPES = (
     "keys", "sensors", "actuators", "tendons", "equalities", "pairs", "excludes", "skins",
     "flexes", "sites", "geoms", "meshes", "hfields", "materials", "textures",
 )  # fmt: skip
-NO_FILE = re.compile(r"Error opening file '.*\.(?!xml)\w+'", re.IGNORECASE)
 KINDS = ("free", "ball", "slide", "hinge")  # by MuJoCo's number
 
 
@@ -58,7 +56,7 @@ class MujocoRobot:
             with silent():
                 self.model = (mujoco_urdf if is_urdf else mujoco_mjcf)(path)
             self.followers = _followers(self.model) if is_urdf and mimic else []
-        except (ValueError, OSError) as error:
+        except (ValueError, OSError, RecursionError) as error:
             raise UnreadableError(" ".join(str(error).split())) from None
         self.data = mujoco.MjData(self.model)
         bodies = [self.model.body(i).name or f"body#{i}" for i in range(self.model.nbody)]
@@ -107,10 +105,7 @@ def mujoco_urdf(path: Path) -> mujoco.MjModel:
     Raises:
         ValueError: if MuJoCo does not read it.
     """
-    try:
-        root = ElementTree.parse(path).getroot()
-    except ElementTree.ParseError as error:
-        raise ValueError(str(error)) from None
+    root = xml_root(path)
     for link in root.findall("link"):
         for child in [child for child in link if child.tag in LEFT_OUT]:
             link.remove(child)
@@ -127,7 +122,9 @@ def mujoco_urdf(path: Path) -> mujoco.MjModel:
 
 
 def mujoco_mjcf(path: Path) -> mujoco.MjModel:
-    """Return the model of an MJCF file, read as it is, or without shapes if their files are gone.
+    """Return the model of an MJCF file, read as it is, or else without shapes and masses.
+
+    Files of shapes may not be there, and some masses MuJoCo refuses.
 
     Raises:
         ValueError: if MuJoCo does not read it.
@@ -135,9 +132,9 @@ def mujoco_mjcf(path: Path) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
-        if not NO_FILE.search(str(error)):
-            raise
-    return _without_shapes(path)
+        with contextlib.suppress(ValueError):
+            return _without_shapes(path)
+        raise error
 
 
 def _without_shapes(path: Path) -> mujoco.MjModel:

@@ -11,7 +11,7 @@ import pinocchio
 from reference import rotation
 from reference.arguments import FloatArray
 
-from .file_kind import URDF, file_kind
+from .file_kind import URDF, file_kind, xml_root
 from .robot_engine import Placement, UnreadableError, columns
 
 COMPOSITE = "JointModelComposite"
@@ -46,10 +46,10 @@ class PinocchioRobot:
 
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
         try:
-            root = ElementTree.parse(path).getroot()
+            root = xml_root(path)
             is_urdf = file_kind(path) == URDF
             self.model = pinocchio_urdf(path, root, mimic) if is_urdf else _mjcf(path, root)
-        except (ValueError, RuntimeError, LookupError, ElementTree.ParseError, OSError) as error:
+        except (ValueError, RuntimeError, LookupError, OSError) as error:
             said = str(error).rpartition("message:")[2]  # before it comes where in Pinocchio
             if isinstance(error, LookupError):
                 said = f"it ends in an {type(error).__name__}: {said}"

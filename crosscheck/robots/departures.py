@@ -5,9 +5,9 @@ Each is a test of its own, on a file that holds little else.
 
 from collections.abc import Callable
 from pathlib import Path
-from xml.etree.ElementTree import Element, ParseError, parse
+from xml.etree.ElementTree import Element
 
-from ..engines.file_kind import MJCF, file_kind
+from ..engines.file_kind import MJCF, file_kind, xml_root
 
 JOINTS = ("joint", "freejoint")
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
@@ -18,14 +18,14 @@ CLASS_ANCHOR = "the anchor (pos) that a joint has from its default class is not 
 SHARED_REF = "the ref of one of several joints of a body is not read"
 FRAME = "a <frame> is passed over with the joints and bodies in it"
 INCLUDE = "included files are not read"
-NAMELESS = "the joints of a body without a name are not read"
+NAMELESS = "bodies without a name are passed over, or taken for each other"
 
 
 def departures(path: Path) -> list[str]:
     """Return what in a file Pinocchio is known to read otherwise, in sentences; none in a URDF."""
     try:
-        root = parse(path).getroot() if file_kind(path) == MJCF else Element("robot")
-    except (ParseError, OSError):
+        root = xml_root(path) if file_kind(path) == MJCF else Element("robot")
+    except (ValueError, OSError):
         return []
     return [said for said, holds in DEPARTURES.items() if holds(root)]
 
@@ -65,7 +65,7 @@ def _include(root: Element) -> bool:
 
 
 def _nameless(root: Element) -> bool:
-    return any(_joints(body) and not body.get("name") for body in root.iter("body"))
+    return any(not body.get("name") for body in root.iter("body"))
 
 
 def _joints(body: Element) -> list[Element]:

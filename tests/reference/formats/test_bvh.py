@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from crosscheck.robots.second_bvh import placements
 from reference import (
     Articulation,
     Skeleton,
@@ -68,45 +69,8 @@ def turn(axis, degrees):
 
 
 def positions_by_a_second_reader(text):
-    """The joints' global positions by name, frame by frame, read another way.
-
-    A list of words, one recursion, matrices, end sites of any length; nothing is checked.
-    """
-    words = text.split()
-    frames = int(words[words.index("Frames:") + 1])
-    rows = np.array(words[words.index("Time:") + 2 :], dtype=float).reshape(frames, -1)
-    words = words[1 : words.index("MOTION")]
-
-    def joint(columns, x, R, found, above=""):
-        kind = words.pop(0)
-        name = words.pop(0)
-        while words[0] != "{":
-            name += " " + words.pop(0)
-        name = f"{above} end" if kind == "End" else name
-        del words[:2]  # { OFFSET
-        offset = np.array([float(words.pop(0)) for _ in range(3)])
-        channels = []
-        if words[0] == "CHANNELS":
-            channels = words[2 : 2 + int(words[1])]
-            del words[: 2 + int(words[1])]
-        local = np.eye(3)
-        for channel in channels:
-            if channel.endswith("position"):
-                offset["XYZ".index(channel[0])] = columns.pop(0)
-            else:
-                local = local @ turn(channel[0], columns.pop(0))
-        found[name] = x + R @ offset
-        while words[0] != "}":
-            joint(columns, found[name], R @ local, found, name)
-        del words[0]
-
-    poses = []
-    hierarchy = list(words)
-    for row in rows:
-        words[:] = hierarchy
-        poses.append({})
-        joint(list(row), np.zeros(3), np.eye(3), poses[-1])
-    return {name: np.array([pose[name] for pose in poses]) for name in poses[0]}
+    """The joints' global positions by name, frame by frame, read another way."""
+    return {name: positions for name, positions, _ in placements(text)}
 
 
 def bound(skeleton):
@@ -272,6 +236,7 @@ def test_no_frames_are_a_skeleton():
     text = WALK[: WALK.index("Frames")] + "Frames: 0\nFrame Time: 0.04\n"
     motion = bvh.parse(text)
     assert motion.local_rotations.shape == (0, 4, 4)
+    assert motion.pose().positions.shape == (0, 4, 3)
     assert motion.skeleton.offsets[1].tolist() == [0.5, -1, 0]
     assert "Frames: 0\n" in bvh.format(*motion)
 
