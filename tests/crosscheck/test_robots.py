@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from crosscheck.engines import ROBOT_ENGINES
+from crosscheck.engines import ROBOT_ENGINES, mujoco_robot, pinocchio_robot
 from crosscheck.engines.robot_engine import UnreadableError
 from crosscheck.robots import comparisons, models
 from crosscheck.robots.claims import ROBOT_CLAIMS, robot_claims
@@ -415,6 +415,71 @@ def test_a_mimic_of_a_mimic_moves_and_is_in_the_jacobian(order, tmp_path):
     ahead, behind = (ours(swept.robot, swept.q + h, swept.links).positions for h in (1e-5, -1e-5))
     rates = (ahead - behind) / 2e-5  # off by h² times the third derivative, and 1e-16 / h
     np.testing.assert_allclose(swept.theirs.jacobians[..., :3, 0], rates, atol=1e-9)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3), (3, 2, 1, 0)])
+def test_pinocchio_refuses_a_mimic_of_a_mimic_and_both_are_left_free(order, tmp_path):
+    swept = sweep("Pinocchio", written(tmp_path, chain_of_mimics(4, order), "a.urdf"))
+    assert swept.free_mimics
+    assert swept.robot.articulation.freedom_count == 4
+    assert max(differences(swept)) < 1e-14
+
+
+@pytest.mark.parametrize("engine", ROBOT_ENGINES)
+def test_mimics_in_a_ring_are_left_free(engine, tmp_path):
+    text = chain_of_mimics(2, (0, 1))
+    ring = text.replace("</joint></robot>", '<mimic joint="j0"/></joint></robot>')
+    assert ring != text
+    swept = sweep(engine, written(tmp_path, ring, "a.urdf"))
+    assert swept.free_mimics
+    assert max(differences(swept)) < 1e-14
+
+
+def by_name_alone(model, bodies, joint):
+    return model.joint(joint).name or f"unnamed{joint}"
+
+
+def as_the_file_has_them(model):
+    return sorted(found_followers(model), key=lambda follower: follower.joint)
+
+
+def places_reversed(model, root):
+    names, places = zip(*found_places(model, root), strict=True)
+    return zip(names, places[::-1], strict=True)
+
+
+found_followers, found_places = mujoco_robot._followers, pinocchio_robot._places_by_body
+UNNAMED_TWO = ("a.xml", NESTED.format(JOINTS))
+CHAIN = ("a.urdf", chain_of_mimics(4, (0, 1, 2, 3)))
+# What an adapter may get wrong: (engine, what of it, what in its place, a file that shows it).
+ADAPTERS = {
+    "joints by name alone": (
+        "MuJoCo", "mujoco_robot._joint_name", by_name_alone, UNNAMED_TWO
+    ),
+    "followers before their leaders": (
+        "MuJoCo", "mujoco_robot._followers", as_the_file_has_them, CHAIN
+    ),
+    "a chain of followers added leaders first": (
+        "MuJoCo", "mujoco_robot.reversed", list, CHAIN
+    ),
+    "unnamed joints by Pinocchio's names": (
+        "Pinocchio", "pinocchio_robot._kind", lambda joint: "Joint_", UNNAMED_TWO
+    ),
+    "joints of bodies in another order": (
+        "Pinocchio", "pinocchio_robot._places_by_body", places_reversed, UNNAMED_TWO
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("slip", ADAPTERS)
+def test_differences_show_the_slip_of_an_adapter(slip, tmp_path, monkeypatch):
+    engine, name, instead, (file, text) = ADAPTERS[slip]
+    model = written(tmp_path, text, file)
+    assert max(differences(sweep(engine, model))) < 1e-14
+    monkeypatch.setattr(f"crosscheck.engines.{name}", instead, raising=False)
+    sweep.cache_clear()
+    assert max(differences(sweep(engine, model))) > 0.01
+    sweep.cache_clear()
 
 
 CLASS_C = '<x><default><default class="c"/></default></x>'
