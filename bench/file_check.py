@@ -45,20 +45,27 @@ def report(found: Found, checked: Sequence[Checked]) -> Report:
         *(Column(name, words=True) for name in NAMES)), tuple(rows), shows=SHOWS,
         answer=Answer("", tuple(point for one in checked for point in _points(one))),
     )  # fmt: skip
-    counts = [
-        (kind, engine, [r for one in checked if one.file.kind == kind
-                        for r in one.readings if r.engine == engine])
+    return Report(files, *_summary(found, checked))
+
+
+def _summary(found: Found, checked: Sequence[Checked]) -> tuple[Table, int]:
+    """Return a row for each kind and engine, of the outcomes that there are, and disagreements."""
+    readings = {
+        (kind, engine): [r for one in checked if one.file.kind == kind
+                         for r in one.readings if r.engine == engine]
         for kind, engines in ENGINES.items() for engine in engines
-    ]  # fmt: skip
-    disagreements = sum(r.outcome == DIFFERS for one in checked for r in one.readings)
+    }  # fmt: skip
+    found_outcomes = {r.outcome for of in readings.values() for r in of}
+    outcomes = [name for name in OUTCOMES if name in (AGREES, DIFFERS, *found_outcomes)]
+    disagreements = sum(r.outcome == DIFFERS for of in readings.values() for r in of)
     summary = Table(
         "summary", "Who reads and who agrees",
         (Column("format", words=True), Column("beside", words=True), Column("files"),
-         *map(Column, OUTCOMES), Column("largest difference where it agrees")),
-        tuple(_count(kind, engine, of) for kind, engine, of in counts if of),
+         *map(Column, outcomes), Column("agrees within")),
+        tuple((*of, *_count(these, outcomes)) for of, these in readings.items() if these),
         answer=Answer(_sentence(found, checked, disagreements)),
     )  # fmt: skip
-    return Report(files, summary, disagreements)
+    return summary, disagreements
 
 
 def _row(one: Checked) -> tuple[str, ...]:
@@ -84,10 +91,11 @@ def _points(one: Checked) -> list[str]:
     return [f"{_name(one)}: {sentence}" for sentence in (*said, *notes)]
 
 
-def _count(kind: str, engine: str, readings: list[Reading]) -> tuple[str | int | float | None, ...]:
+def _count(readings: list[Reading], outcomes: list[str]) -> list[int | float | None]:
+    """Return how many files there are, how many of each outcome, and the largest difference."""
     agreed = [r.difference or 0.0 for r in readings if r.outcome == AGREES]
-    counts = [sum(r.outcome == outcome for r in readings) for outcome in OUTCOMES]
-    return kind, engine, len(readings), *counts, max(agreed, default=None)
+    counts = [sum(r.outcome == outcome for r in readings) for outcome in outcomes]
+    return [len(readings), *counts, max(agreed, default=None)]
 
 
 def _sentence(found: Found, checked: Sequence[Checked], disagreements: int) -> str:

@@ -31,7 +31,8 @@ def xml_root(path: Path) -> ElementTree.Element:
 def file_kind(path: Path) -> str:
     """Return URDF, MJCF, BVH or FRAGMENT, "" if it is none of these.
 
-    An XML file of MJCF that neither holds nor includes a <worldbody> is a fragment.
+    An XML file of MJCF that neither holds nor includes a <worldbody> is a fragment; one whose root
+    is a <robot> without a <link> is none of these.
 
     Raises:
         OSError: if it cannot be opened.
@@ -45,4 +46,4 @@ def file_kind(path: Path) -> str:
     kind = BY_ROOT.get(found[1], "") if found else ""
     if kind == MJCF and not ("<worldbody" in text or "<include" in text):
         return FRAGMENT
-    return kind
+    return "" if kind == URDF and "<link" not in text else kind
