@@ -59,7 +59,7 @@ def refuse_includes(root: Element) -> None:
 
 
 def _holding(main: Path, top: str | Path) -> Path:
-    found = Path(top).resolve() if isinstance(top, str | Path) else None
+    found = _resolved(Path(top)) if isinstance(top, str | Path) else None
     if found is None or not (found.is_dir() and main.is_relative_to(found)):
         raise ValueError(f"root: expected a folder that holds {main.name!r:.80}, got {top!r:.80}")
     return found
@@ -68,12 +68,23 @@ def _holding(main: Path, top: str | Path) -> Path:
 def _included(include: Element, file: Path, folders: _Folders) -> Path:
     """Return the file meant: beside the main one, or else beside the one that includes it."""
     name = include.word("file")
-    found = [(folder / name).resolve() for folder in (folders.main, file.parent)]
-    inside = [path for path in found if path.is_relative_to(folders.top)]
+    found = [_resolved(folder / name) for folder in (folders.main, file.parent)]
+    possible = [path for path in found if path is not None]
+    inside = [path for path in possible if path.is_relative_to(folders.top)]
     for path in inside:
         if path.is_file():
             return path
-    fault = "not there" if inside else "outside; root= names a wider folder"
+    outside = possible and not inside
+    fault = "outside; root= names a wider folder" if outside else "not there"
     raise include.error(
         f"expected a file in {folders.top.name!r:.60}, got {name!r:.80}, which is {fault}"
     )
+
+
+def _resolved(path: Path) -> Path | None:
+    """Return where a path leads, links followed; None if no file can have it."""
+    try:
+        path.exists()  # which says so of names too long and of rings of links
+        return path.resolve()
+    except (OSError, RuntimeError):
+        return None

@@ -288,6 +288,16 @@ def test_nothing_leaves_the_root_by_dots_or_links(shared, refusal):
             assert f"got {name!r}, which is {fate}" in refusal(mjcf.read, shared, root=root)
 
 
+@pytest.mark.parametrize("name", ["a" * 1000, "loop", "loop/a.xml", "main.xml/a", "/" * 999])
+def test_a_name_that_no_file_can_have_is_not_there(name, shared, refusal):
+    (shared.parent / "loop").symlink_to(shared.parent / "loop")
+    shared.write_text(f'<mujoco><include file="{name}"/></mujoco>')
+    message = refusal(mjcf.read, shared)
+    assert "which is outside" in message if name[0] == "/" else "which is not there" in message
+    message = refusal(mjcf.read, shared, root=shared.parent / name / "a")
+    assert message.startswith("root: expected a folder that holds 'main.xml', got ")
+
+
 def test_a_root_is_a_folder_that_holds_the_file(shared, refusal):
     for root in (shared.parents[1] / "parts", shared, "no such folder", 3):
         message = refusal(mjcf.read, shared, root=root)
