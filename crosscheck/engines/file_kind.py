@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 from reference.formats.source import LARGEST
 
 URDF, MJCF, BVH = "URDF", "MJCF", "BVH"
-# What takes the place of <include> in other files, and is no model alone.
+# What takes the place of <include> in other files, and is no model by itself.
 FRAGMENT = "fragment"
 # The first element, behind a declaration, a document type and comments.
 FIRST = re.compile(r"\s*(?:<\?.*?\?>|<!--.*?-->|<![A-Za-z].*?>|\s+)*<([^\s<>/!?]+)", re.DOTALL)

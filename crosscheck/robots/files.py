@@ -98,7 +98,7 @@ def find(paths: Iterable[str | Path]) -> Found:
 
 
 def check(files: Iterable[File], patience: float = 60.0) -> Iterator[Checked]:
-    """Yield what comes of each file; one that crashes an engine or never ends costs that alone.
+    """Yield what comes of each file; one that crashes an engine or never ends costs only itself.
 
     Args:
         files: as `find` returns them.

@@ -1,4 +1,4 @@
-"""A second reader of BVH, written another way: words, a stack and matrices; nothing is checked."""
+"""A second reader of BVH, written independently: words, a stack, matrices; nothing is checked."""
 
 import re
 from collections.abc import Iterator
