@@ -6,12 +6,15 @@ import sys
 from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from .news import heard_by
 from .suites import SUITES
+
+if TYPE_CHECKING:
+    from .tables import Table
 
 # The width of the names of suites in the help.
 INDENT = 2 + max(map(len, SUITES))
@@ -104,15 +107,22 @@ def plumbob(
         "Examples",
         "plumbob check",
         'plumbob check "spring forces" "Gauss-Newton step"',
+        "plumbob check --files robots/  your URDF, MJCF and BVH files: who reads them, who agrees",
     )
 )
 def check(
     claims: Annotated[
-        list[str] | None, typer.Argument(metavar="CLAIM", help="Only these; see --list.")
+        list[str] | None,
+        typer.Argument(metavar="CLAIM", help="Only these; see --list. With --files, paths."),
     ] = None,
     names: Annotated[bool, typer.Option("--list", help="List the claims and stop.")] = False,
+    files: Annotated[
+        bool, typer.Option("--files", help="Read files and folders of files with both engines.")
+    ] = False,
 ) -> int:
     """Hold the reference against Pinocchio and MuJoCo: a verdict table, exit 1 on a miss."""
+    if files:
+        return check_files(claims or [])
     from crosscheck.identities import CLAIMS, run_claims
     from crosscheck.robots.models import left_out
 
@@ -266,27 +276,70 @@ def write_report(output: Path) -> int:
     return FINE
 
 
+def check_files(paths: Sequence[str]) -> int:
+    """Compare every URDF, MJCF and BVH file at some paths; return 1 if a reading disagrees."""
+    if not paths:
+        raise ValueError("--files: expected folders or files, got none")
+    from crosscheck.robots.files import check, find
+
+    from .file_check import report
+
+    found = find(paths)
+    checked = []
+    with progress() as bar:
+        task = bar.add_task("", total=len(found.files))
+        for one in check(found.files):
+            checked.append(one)
+            bar.update(task, description=one.file.path.name, advance=1)
+    files, summary, disagreements = report(found, checked)
+    for table in (files, summary):
+        print_table(table)
+    return MISSED if disagreements else FINE
+
+
+def print_table(table: "Table") -> None:
+    """Print a table with what it says: aligned on a terminal, as Markdown in a pipe."""
+    from .tables import markdown
+
+    if not sys.stdout.isatty():
+        print(markdown(table))
+        return
+    from rich.console import Console
+
+    print(f"\n{table.title}\n  {table.answer.sentence}".rstrip())
+    Console(highlight=False).print(_aligned(table), markup=False)
+    print("".join(f"    {point}\n" for point in table.answer.points), end="", flush=True)
+
+
 def print_tables(suites: Sequence[str], output: Path) -> None:
     """Print the tables that come from these suites, with what they say."""
     from rich.console import Console
-    from rich.table import Table
 
     from .findings import Results, tables
     from .record import RecordFile
-    from .tables import words
 
     console = Console(width=None if sys.stdout.isatty() else 240, highlight=False)
     for made in tables(Results(RecordFile(output).read().records), suites):
         if not made.rows:
             continue
-        shown = Table(box=None, header_style="bold", pad_edge=False)
-        for column in made.columns:
-            shown.add_column(column.heading, justify="left" if column.words else "right")
-        for row in made.rows:
-            shown.add_row(*(words(cell) for cell in row))
         print(f"\n{made.title}\n  {made.answer.sentence}")
         print("".join(f"    {point}\n" for point in made.answer.points), end="", flush=True)
-        console.print(shown, markup=False)
+        console.print(_aligned(made), markup=False)
+
+
+def _aligned(table: "Table") -> Any:
+    """Return a table as rich prints it."""
+    import rich.table
+    from rich.text import Text
+
+    from .tables import words
+
+    shown = rich.table.Table(box=None, header_style="bold", pad_edge=False)
+    for column in table.columns:
+        shown.add_column(column.heading, justify="left" if column.words else "right")
+    for row in table.rows:
+        shown.add_row(*(Text(words(cell)) for cell in row))
+    return shown
 
 
 def print_verdicts(verdicts: Iterable[Any]) -> None:

@@ -49,6 +49,9 @@ MISUSE = {
     "no records": (["report"], "no records in report"),
     "options before the command": (["--output", "x", "report"], "behind the command: report"),
     "too much": (["report", "now"], "now"),
+    "no files": (["check", "--files"], "--files: expected folders or files, got none"),
+    "no such folder": (["check", "--files", "here"], "here: there is no such file or folder"),
+    "nothing to read": (["check", "--files", "."], "expected URDF, MJCF or BVH files, got none"),
 }
 
 
@@ -143,6 +146,56 @@ def test_the_claims_can_be_listed(capsys):
     code, out, _ = plumbob(capsys, "check", "--list")
     assert code == 0
     assert len(out.splitlines()) == len(CLAIMS)
+
+
+BODY = '<body name="b"><geom size="0.1"/><joint name="j"/>{}</body>'.format
+CHARACTER = "<mujoco><worldbody>{}</worldbody></mujoco>".format
+
+
+@pytest.fixture
+def robots(empty_folder, monkeypatch):
+    """A folder of files, read without a process of their own."""
+    from crosscheck import child_process
+    from crosscheck.robots import files
+
+    monkeypatch.setattr(
+        child_process.ChildProcess, "call", lambda self, function, *given: function(*given)
+    )
+    monkeypatch.setattr(files, "departures", lambda path: [])
+    folder = empty_folder / "robots"
+    (folder / "arms").mkdir(parents=True)
+    (folder / "arms" / "arm|1.urdf").write_text('<robot name="r"><link name="a"/></robot>')
+    (folder / "b.xml").write_text(CHARACTER(BODY("")))
+    (folder / "c.xml").write_text(CHARACTER('<body name="a"><composite/></body>'))
+    (folder / "d.xml").write_text("<other/>")
+    (folder / "e.xml").write_text("<mujocoinclude/>")
+    return folder
+
+
+def test_files_are_checked_and_the_tables_are_markdown(capsys, robots):
+    code, out, err = plumbob(capsys, "check", "--files", "robots")
+    assert (code, err) == (0, "")
+    assert "| robots/arms/arm\\|1.urdf | URDF | agrees (0.0e+00) | agrees" in out
+    assert "- robots/c.xml: Pinocchio: not read by us: c.xml, line 1: \\<composite\\>: exp" in out
+    assert "Of 3 files nothing disagrees; 1 is a part that others include, 1 XML file is of" in out
+    assert "| MJCF | Pinocchio | 2 | 1 | 0 | 1 |" in out
+
+
+def test_files_that_differ_exit_1(capsys, robots):
+    (robots / "b.xml").write_text(CHARACTER(BODY("<frame><joint name='k'/></frame>")))
+    code, out, _ = plumbob(capsys, "check", "--files", "robots/b.xml", "robots/arms")
+    assert code == 1
+    assert "| robots/b.xml | MJCF | differs (" in out
+    assert "Of 2 files 1 reading disagrees; 0 are parts that others include, 0 XML files are" in out
+
+
+def test_a_terminal_shows_the_files_in_columns(capsys, robots, monkeypatch):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    (robots / "[red]b.xml").write_text(CHARACTER(BODY("")))
+    code, out, _ = plumbob(capsys, "check", "--files", "robots")
+    assert code == 0
+    assert "robots/[red]b.xml" in out
+    assert "|" not in out.replace("arm|1", "")
 
 
 @pytest.mark.parametrize("command", [(), ("check",), ("bench",), ("report",), ("show",)])

@@ -13,6 +13,9 @@ from reference.articulation import Articulation
 from reference.formats import mjcf, urdf
 from reference.formats.robot import Robot
 
+from ..engines.file_kind import URDF, file_kind
+from .departures import CLASS_ANCHOR, OUTER_ROOT, TURNED_ROOT
+
 ROBOTS, CHARACTERS = "robots", "characters"
 PACKAGES = {ROBOTS: "example-robot-data", CHARACTERS: "dm_control"}
 EXTRA = "robots"
@@ -41,9 +44,6 @@ _CHARACTERS = (
     "mujoco/testing/assets/model_with_ball_joints.xml",
 )
 # What an engine is known to place elsewhere, and why; each cause is a test of its own.
-OUTER_ROOT = "a first body without a joint is put at the world's origin"
-TURNED_ROOT = "a free body that the file shows at x, turned by R, is shifted by x - R x"
-CLASS_ANCHOR = "the anchor (pos) that a joint has from its default class is not read"
 CAUSES = {
     ("Pinocchio", "suite/dog.xml"): CLASS_ANCHOR,
     ("Pinocchio", "suite/humanoid_CMU.xml"): TURNED_ROOT,
@@ -73,10 +73,12 @@ class Model:
     Attributes:
         name: its path below the folder of its family.
         path: of the file.
+        root: the folder that files which it includes must be in; its own if None.
     """
 
     name: str
     path: Path
+    root: Path | None = None
 
     def read(self, *, mimic: bool = True) -> Robot:
         """Return what the reference makes of it.
@@ -84,9 +86,9 @@ class Model:
         Raises:
             ValueError: if the file is wrong.
         """
-        if self.path.suffix == ".urdf":
+        if file_kind(self.path) == URDF:
             return urdf.read(self.path, mimic=mimic)
-        return mjcf.read(self.path)
+        return mjcf.read(self.path, root=self.root)
 
 
 @functools.cache

@@ -1,9 +1,19 @@
 """Text from files that nobody has vouched for."""
 
 import os
+import warnings
 from pathlib import Path
 
 LARGEST = 256 * 2**20  # bytes
+
+
+class FormatWarning(UserWarning):
+    """A file departs from its format in what can be read all the same; the message says how."""
+
+
+def warn(problem: str) -> None:
+    """Warn of what a file says, by a sentence that names the file and the line."""
+    warnings.warn(problem, FormatWarning, stacklevel=3)
 
 
 def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST) -> str:

@@ -33,4 +33,6 @@ class Motion(NamedTuple):
         """
         here = Skeleton(self.skeleton.parents, np.zeros_like(self.skeleton.offsets))
         q = np.concatenate([self.offsets, self.local_rotations], axis=-1)
-        return forward_kinematics(Articulation(here, "free"), q.reshape(len(q), -1))
+        return forward_kinematics(
+            Articulation(here, "free"), q.reshape(len(q), 7 * here.joint_count)
+        )
