@@ -1,7 +1,8 @@
 """Particles joined by damped springs: the model, its state, energies, forces and their matrices.
 
 A spring from particle i to particle j has length l = |x_i - x_j| and direction
-u = (x_i - x_j) / l. It stores k/2 (l - r)² and pulls i with -(k (l - r) + c (v_i - v_j)·u) u.
+u = (x_i - x_j) / l. It stores k/2 (l - r)² and pulls i with -(k (l - r) + c (v_i - v_j)·u) u; the
+dampers of an implicit Euler step have another law, see `damper_forces`.
 
 A tension-only spring, such as a rope, stores nothing and does not pull while it is slack, l <= r;
 its damper acts all the same, as in MuJoCo. Its stiffness jumps where l passes r: exactly there it
@@ -370,8 +371,8 @@ def damper_forces(system: MassSpring, state: State) -> FloatArray:
 
     Those of slack springs act as well. A step of implicit Euler has another law, in which the
     dampers have an energy: -(c/h) (l - l_n) u, l_n being the length before the step. At the end of
-    a step the two differ by the rotation of a spring within it, h/2 |w across u|² / l, w being
-    v_i - v_j: in proportion to h.
+    a step the two differ by the rotation of a spring within it, about c h/2 |w across u|² / l with
+    w = v_i - v_j: in proportion to h.
 
     Raises:
         ValueError: if the state has another number of particles.

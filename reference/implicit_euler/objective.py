@@ -9,6 +9,9 @@ where f_ext is gravity and what else is given. A damper adds c/(2h) (l(x) - l_n)
 a damped spring acts through the step as a spring of stiffness k + c/h and of rest length
 (k r + c l_n/h) / (k + c/h). A tension-only spring stores nothing where it is slack, but its damper
 acts all the same: the damper becomes a spring of its own, of stiffness c/h and rest length l_n.
+So a step's damper pulls with -(c/h) (l - l_n) u, a law with an energy, and not with the rate at the
+end of the step, -c ((v_i - v_j)·u) u, as `mass_spring.damper_forces` and explicit integrators do;
+the two differ in proportion to h, by how far the spring rotates within the step.
 Pinned particles are no variables: y has them at the end of their path, at x_n if they stay, and
 their rows of the gradient are zero.
 """
