@@ -23,9 +23,9 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import FloatArray, IndexArray, coordinates, frozen, indices, magnitudes, shape
-from .block_sum import BlockSum
-from .compiled import TwoSpeeds
-from .regions import LARGE, Regions, cut
+from .backend.compiled import TwoSpeeds
+from .backend.partition import LARGE, Regions, cut
+from .sparse.assembly import BlockSum
 from .springs import (
     spring_lengths,
     spring_pulls,

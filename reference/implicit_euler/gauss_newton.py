@@ -15,10 +15,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..linear_solver import NotPositiveDefiniteError
 from ..mass_spring import MassSpring
+from ..sparse.linear_solver import NotPositiveDefiniteError
+from .factor_cache import hessian_factor
 from .objective import Iterate, Objective
-from .prefactored import hessian_factor
 
 
 class GaussNewton:

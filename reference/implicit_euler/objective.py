@@ -26,7 +26,8 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, choice, coordinates, number
-from ..compiled import TwoSpeeds
+from ..backend.compiled import TwoSpeeds
+from ..backend.threads import in_slices
 from ..mass_spring import (
     MassSpring,
     State,
@@ -37,7 +38,6 @@ from ..mass_spring import (
     pin_goal,
     rest_vectors,
 )
-from ..parallel import in_slices
 from .terms import (
     EPS,
     ROUNDING,

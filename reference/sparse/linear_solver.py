@@ -10,9 +10,9 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from .arguments import FloatArray, choice
-from .cholesky import CholeskyFactor, NotPositiveDefiniteError
-from .cholesky.factor import square
+from ..arguments import FloatArray, choice
+from . import CholeskyFactor, NotPositiveDefiniteError
+from .factor import square
 
 
 class Factor(Protocol):

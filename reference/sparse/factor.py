@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from ..arguments import FLOAT64, FloatArray, floats
-from ..compiled import TwoSpeeds
+from ..backend.compiled import TwoSpeeds
 from .analysis import analyse
 from .dissection import Graph
 from .multifrontal import factorize
