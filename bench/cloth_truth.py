@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import ImplicitEuler, Outcome, State, runge_kutta
+from reference import ImplicitEuler, State, runge_kutta
 from reference.arguments import FloatArray
 
 from . import metrics
@@ -80,7 +80,7 @@ def implicit_motion(cloth: FallingCloth, frames: int, frame: float = FRAME) -> F
     positions = []
     for i in range(frames):
         result = integrator.step(state)
-        if result.outcome is not Outcome.CONVERGED:
+        if not result.outcome.solved:
             raise ArithmeticError(f"Newton ended frame {i} as {result.outcome.name}")
         state = result.state
         positions.append(state.positions)

@@ -37,14 +37,16 @@ def coordinates(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray
     Raises:
         ValueError: as `array` does, and if a coordinate is beyond 1e75.
     """
-    result = floats(name, value, *trailing)
-    largest = np.abs(result).max(initial=0.0)
-    if not largest <= LARGEST_COORDINATE:
-        array(name, result, *trailing)
-        raise ValueError(
-            f"{name}: expected coordinates of at most {LARGEST_COORDINATE:g}, got {largest:g}"
-        )
-    return result
+    return _bounded("coordinates", name, value, *trailing)
+
+
+def magnitudes(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
+    """Return the same as `coordinates`, for other quantities that are squared and multiplied.
+
+    Raises:
+        ValueError: as `array` does, and if a number is beyond 1e75.
+    """
+    return _bounded("numbers", name, value, *trailing)
 
 
 def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
@@ -149,6 +151,17 @@ def shape(lengths: Sequence[int | str]) -> str:
     """Write a shape for an error message: (joint, 4)."""
     inner = ", ".join(str(length) for length in lengths)
     return f"({inner},)" if len(lengths) == 1 else f"({inner})"
+
+
+def _bounded(kind: str, name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
+    result = floats(name, value, *trailing)
+    largest = np.abs(result).max(initial=0.0)
+    if not largest <= LARGEST_COORDINATE:
+        array(name, result, *trailing)
+        raise ValueError(
+            f"{name}: expected {kind} of at most {LARGEST_COORDINATE:g}, got {largest:g}"
+        )
+    return result
 
 
 def _floats(name: str, value: Any) -> FloatArray:

@@ -149,6 +149,7 @@ SECTIONS = (
             ),
             Entry("How long may the steps of explicit solvers be?", cloth_peers.stability),
             Entry("What did Liu et al. (2013) measure, and what do we?", cloth_peers.liu_2013),
+            Entry("How far apart are the two laws of dampers?", cloth.dampers),
             Entry("What happens to the energy over many steps?", energy.energy, ("energy",)),
         ),
         ("cloth", "newton", "energy", "pictures"),

@@ -8,6 +8,7 @@ from reference import MassSpring, State, scenes
 STIFFNESS = 100.0
 FACTORS = (1, 10, 100)
 H = 1 / 60
+DAMPING = 0.2  # of the lab's own cloth; those that swing here have none unless it is asked for
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class ClothSwing:
 
 
 @functools.cache
-def cloth_swing(factor: float, size: int = 11) -> ClothSwing:
+def cloth_swing(factor: float, size: int = 11, damping: float = 0.0) -> ClothSwing:
     """Return the lab's cloth of size x size particles, `factor` times as stiff."""
-    system, start = scenes.lab_cloth(stiffness=factor * STIFFNESS, size=size)
+    system, start = scenes.lab_cloth(stiffness=factor * STIFFNESS, size=size, damping=damping)
     name = f"cloth/x{factor:g}" if size == 11 else f"cloth/x{factor:g}/{size}x{size}"
     return ClothSwing(name, system, start, H)

@@ -4,10 +4,14 @@ import functools
 from collections.abc import Iterator
 from functools import partial
 
+import numpy as np
+
 from reference import ImplicitEuler, State
+from reference.arguments import FloatArray
+from reference.mass_spring import MassSpring, damper_forces, lengths, spring_forces
 
 from .. import metrics
-from ..problems.cloth import FACTORS, ClothSwing, H, cloth_swing
+from ..problems.cloth import DAMPING, FACTORS, ClothSwing, H, cloth_swing
 from . import peers_cloth
 from .block import Block, Measured, Scale
 
@@ -21,6 +25,8 @@ CONVERGENCE = {
     "local_global": 1000, "chebyshev": 1000, "lbfgs": 200, "newton_cg": 12, "newton": 12,
 }  # fmt: skip
 FEW = (1, 10, 100)
+# Steps in which the two laws of dampers are compared [s], each half the one before.
+HALVED = tuple(H / 2**i for i in range(-1, 6))
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -52,6 +58,12 @@ def _lab_blocks() -> Iterator[Block]:
                 partial(few_iterations, problem, iterations),
                 {**swinging, "iterations": iterations},
             )  # fmt: skip
+        damped = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
+        halved = {"longest": HALVED[0], "halvings": len(HALVED) - 1}
+        yield Block(
+            "cloth", f"{problem.name}/dampers", "newton", damped,
+            {"first": MIDDLE, "damping": DAMPING, **halved},
+        )  # fmt: skip
 
 
 def newton_steps(problem: ClothSwing) -> Measured:
@@ -114,6 +126,28 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
     ]
     path = [metrics.rms_distance(exact, true[0].positions) for exact in positions]
     return Measured({"error": errors, "distance": distances, "drift": drift, "path": path})
+
+
+def two_dampers(problem: ClothSwing, first: int = MIDDLE) -> Measured:
+    """Take one step of each length after the first ones; compare the two laws at its end."""
+    state, apart = motion(problem.start, first, converging(problem))[-1], []
+    for h in HALVED:
+        end = ImplicitEuler(problem.system, h=h).step(state).state
+        rates = damper_forces(problem.system, end)
+        differences = step_damper_forces(problem.system, state, end, h)
+        apart.append(np.linalg.norm(differences - rates) / np.linalg.norm(rates))
+    return Measured({"h": HALVED, "apart": apart})
+
+
+def step_damper_forces(system: MassSpring, before: State, after: State, h: float) -> FloatArray:
+    """Return the forces -(c/h) (l - l_n) u of a step's dampers at its end [N], (particle, 3)."""
+    count = len(system.springs)
+    dampers = system.replaced(
+        stiffnesses=system.dampings / h,
+        rest_lengths=lengths(system, before.positions),
+        tension_only=np.zeros(count, dtype=bool),
+    )
+    return spring_forces(dampers, after.positions)
 
 
 def converging(

@@ -3,8 +3,9 @@
 from typing import Any
 
 import numpy as np
+import scipy
 
-from ..arguments import FloatArray
+from ..arguments import FLOAT64, FloatArray, floats
 from ..backend.compiled import TwoSpeeds
 from .analysis import analyse
 from .dissection import Graph
@@ -20,9 +21,16 @@ class Pattern:
     """The analysis of a symmetric pattern, shared by the factors of all matrices that have it."""
 
     def __init__(self, indptr: Any, indices: Any) -> None:
-        """Order the columns and find out which entries L has."""
-        self.graph = Graph(indptr, indices)
+        """Order the columns and find out which entries L has.
+
+        Raises:
+            ValueError: if the pattern is not symmetric.
+        """
         n = len(indptr) - 1
+        ones = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
+        if (ones != ones.T).nnz:
+            raise ValueError("matrix: expected both triangles with the same pattern")
+        self.graph = Graph(indptr, indices)
         self.order, self.place, self.blocks, self.family = _analyse(
             self.graph, np.arange(n, dtype=np.int32)
         )
@@ -44,8 +52,12 @@ class CholeskyFactor:
 
         Raises:
             NotPositiveDefiniteError: if a pivot is not positive, or not finite.
+            ValueError: if the matrix is not sparse or square, or its pattern not symmetric.
         """
-        columns = matrix.tocsc()
+        columns = square(matrix).tocsc()
+        if not columns.has_canonical_format:
+            columns = columns.copy()
+            columns.sum_duplicates()
         indptr, indices = columns.indptr.astype(np.int32), columns.indices.astype(np.int32)
         if pattern is None or not pattern.fits(indptr, indices):
             pattern = Pattern(indptr, indices)
@@ -77,8 +89,14 @@ class CholeskyFactor:
         return CholeskyFactor(matrix, self.pattern)
 
     def solve(self, b: FloatArray) -> FloatArray:
-        """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side)."""
+        """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side).
+
+        Raises:
+            ValueError: if b has another shape or is not numeric.
+        """
         n, pattern = len(self.pattern.order), self.pattern
+        if type(b) is not np.ndarray or b.dtype != FLOAT64 or not b.flags.carray:
+            b = floats("b", b, "...")
         if b.shape == (n, SIDES):
             x = np.empty(b.shape)
             columns, starts, rows, _ = pattern.blocks
@@ -86,9 +104,11 @@ class CholeskyFactor:
                 y = self._spare.pop()
             except IndexError:  # none yet, or other threads have them all
                 y = np.empty((n, LANES))
-            _solve(pattern.order, columns, starts, rows, self._values, _plain_layout(b), y, x)
+            _solve(pattern.order, columns, starts, rows, self._values, b, y, x)
             self._spare.append(y)
             return x
+        if b.ndim not in (1, 2) or len(b) != n:
+            raise ValueError(f"b: expected shape ({n},) or ({n}, right-hand side), got {b.shape}")
         given = b.reshape(n, -1)
         x, some = np.empty(given.shape), np.zeros((n, SIDES))
         for first in range(0, given.shape[1], SIDES):
@@ -99,8 +119,6 @@ class CholeskyFactor:
 
     def lower(self) -> Any:
         """Return L, sparse (n, n), with the explicit zeros of its blocks."""
-        import scipy
-
         columns, starts, rows, _ = self.pattern.blocks
         lists = []
         for s in range(len(columns) - 1):
@@ -110,10 +128,16 @@ class CholeskyFactor:
         return scipy.sparse.csc_array((self._values, np.concatenate(lists), indptr))
 
 
-def _plain_layout(b: FloatArray) -> FloatArray:
-    if b.dtype == np.float64 and b.flags.carray:
-        return b
-    return np.array(b, dtype=np.float64, order="C")
+def square(matrix: Any) -> Any:
+    """Return a matrix that is sparse and square.
+
+    Raises:
+        ValueError: if it is not.
+    """
+    if scipy.sparse.issparse(matrix) and matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]:
+        return matrix
+    got = f"{type(matrix).__name__} of shape {np.shape(matrix)}"
+    raise ValueError(f"matrix: expected a square sparse matrix, got {got}")
 
 
 _analyse = TwoSpeeds(analyse)

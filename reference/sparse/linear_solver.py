@@ -1,6 +1,6 @@
 """Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
 
-Three libraries stand behind one interface: our own, the default, CHOLMOD through cholespy
+Three ways stand behind one interface: our own `cholesky`, the default, CHOLMOD through cholespy
 where that is installed, and SciPy's SuperLU. cholespy prints a warning at an indefinite matrix.
 """
 
@@ -12,6 +12,7 @@ import scipy
 
 from ..arguments import FloatArray, choice
 from . import CholeskyFactor, NotPositiveDefiniteError
+from .factor import square
 
 
 class Factor(Protocol):
@@ -35,10 +36,10 @@ def factorize(matrix: Any, library: str = "supernodal") -> Factor:
 
     Raises:
         NotPositiveDefiniteError: if the matrix is not positive definite.
-        ValueError: if the library is unknown.
+        ValueError: if the library is unknown, or the matrix is not sparse and square.
     """
     factor = LIBRARIES[choice("library", library, LIBRARIES)]
-    if not np.isfinite(matrix.data).all():
+    if not np.isfinite(square(matrix).data).all():
         raise NotPositiveDefiniteError("matrix: expected finite entries, got NaN or infinity")
     return factor(matrix)
 

@@ -126,6 +126,13 @@ def few(iterations):
     return record("cloth", "cloth/x1/few iterations", "local_global", settings, arrays)
 
 
+def two_dampers(apart=(0.04, 0.02)):
+    """How far the two laws of dampers are apart in two steps."""
+    settings = {"first": 5, "longest": 0.02, "halvings": len(apart) - 1, "damping": 0.2}
+    h = 0.02 / 2.0 ** np.arange(len(apart))
+    return record("cloth", "cloth/x1/dampers", "newton", settings, {"h": h, "apart": apart})
+
+
 def swung(solver, problem="swing/undamped", left=(1.0, 0.5)):
     """What an integrator leaves of the energy of a long swing."""
     settings = {"h": 1 / 60, "steps": 100, "every": 10, "tolerance": 1e-10}
@@ -267,6 +274,8 @@ def make():
         timed=timed,
         stepped=stepped,
         swung=swung,
+        two_dampers=two_dampers,
+        stepping=stepping,
         certified=certified,
         raced=raced,
         lacking=lacking,
@@ -296,6 +305,7 @@ def records():
         *(stepped(solver) for solver in ("local_global", "newton")),
         *(few(iterations) for iterations in (1, 10)),
         stepping(),
+        two_dampers(),
         certified(),
         *(swung(s, f"swing/{c}") for c in ("undamped", "damped") for s in ("RK4", "discrete")),
         *(

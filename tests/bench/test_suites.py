@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from bench.problems.cloth import cloth_swing
 from bench.record import key
-from bench.suites import SUITES, Scale, blocks
+from bench.suites import SUITES, Scale, blocks, cloth
 from bench.timing import cases
 
 TINY = Scale(targets=3, seconds=0.001)
@@ -101,3 +102,24 @@ def test_one_step_of_the_cloth_starts_at_one_and_converges():
         arrays = found("cloth", "cloth/x1/one step", solver).measure().arrays
         assert arrays["residual"][0] == arrays["error"][0] == 1.0
         assert arrays["error"][last] < 1e-10
+
+
+def test_the_two_laws_of_dampers_come_together_with_h_to_first_order():
+    swing = cloth_swing(1, size=5, damping=0.2)
+    found = cloth.two_dampers(swing, first=30).arrays
+    apart = np.array(found["apart"])
+    assert np.log2(found["h"][0] / found["h"][-1]) == len(apart) - 1
+    orders = np.log2(apart[:-1] / apart[1:])
+    assert orders[-1] == pytest.approx(1.0, abs=0.05)
+    assert 1e-4 < apart[-1] < apart[0] < 1
+
+
+def test_a_law_of_dampers_with_the_wrong_factor_does_not_come_together(monkeypatch):
+    """Twice the damper, or half of it, is as far off however short the step."""
+    right = cloth.damper_forces
+    for slip in (0.5, 2.0, -1.0):
+        monkeypatch.setattr(
+            cloth, "damper_forces", lambda system, state, slip=slip: slip * right(system, state)
+        )
+        apart = cloth.two_dampers(cloth_swing(1, size=5, damping=0.2), first=30).arrays["apart"]
+        assert apart[-1] > 0.4
