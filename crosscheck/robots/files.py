@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import Articulation, Skeleton, differential, forward_kinematics, rotation
+from reference import Articulation, Skeleton, forward_kinematics, jacobians, rotation
 from reference.formats import bvh
 from reference.formats.source import LARGEST, read_text
 
@@ -139,7 +139,7 @@ def prepare() -> None:
     """Compile what every comparison runs."""
     arm = Articulation(Skeleton([-1, 0], np.eye(2, 3)), ["free", "hinge"])
     forward_kinematics(arm, arm.neutral()[None])
-    differential.jacobians(arm, arm.neutral()[None])
+    jacobians.jacobians(arm, arm.neutral()[None])
 
 
 def _robots(engine: str, file: File) -> float:
