@@ -77,13 +77,17 @@ def source_digest() -> str:
 
 def source_files() -> list[Path]:
     """Return all files of the three packages but those that only show numbers."""
-    found = (path for name in _PACKAGES for path in sorted((_ROOT / name).rglob("*")))
-    return [path for path in found if path.is_file() and not _is_left_out(path.relative_to(_ROOT))]
+    found = [
+        Path(folder, file)
+        for name in _PACKAGES for folder, _, files in os.walk(_ROOT / name) for file in files
+        if not _is_left_out(os.path.relpath(os.path.join(folder, file), _ROOT).split(os.sep))
+    ]  # fmt: skip
+    return sorted(found)
 
 
-def _is_left_out(path: Path) -> bool:
-    shows = any(path.is_relative_to(name) for name in PRESENTATION)
-    return shows or "__pycache__" in path.parts
+def _is_left_out(parts: list[str]) -> bool:
+    shows = any("/".join(parts[:n]) in PRESENTATION for n in (2, 3))
+    return shows or "__pycache__" in parts
 
 
 def _processor() -> str:

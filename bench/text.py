@@ -1,7 +1,7 @@
 """Names from elsewhere as text that no terminal, browser or parser takes for an instruction."""
 
-# A name that is longer is cut where it is shown.
-LONGEST = 120
+from collections.abc import Mapping
+from typing import Any
 
 
 def visible(text: str) -> str:
@@ -15,6 +15,15 @@ def visible(text: str) -> str:
     )
 
 
-def shortened(text: str, length: int = LONGEST) -> str:
+def all_visible(value: Any) -> Any:
+    """Return a value with every text in it, keys of mappings included, made visible."""
+    if isinstance(value, str):
+        return visible(value)
+    if isinstance(value, Mapping):
+        return {all_visible(key): all_visible(inner) for key, inner in value.items()}
+    return value
+
+
+def shortened(text: str, length: int) -> str:
     """Return the text, its end cut off if it is longer."""
     return text if len(text) <= length else f"{text[: length - 1]}…"
