@@ -13,22 +13,22 @@ from reference import (
     Outcome,
     Skeleton,
     Target,
-    coherence,
     curves,
     forward_kinematics,
     rotation,
     scenes,
     solve_ik,
     track,
+    trajectory,
 )
-from reference.coherence import descent
-from reference.coherence.course import Course, moved, path, restored, stuck, worth_of
-from reference.coherence.descent import cost, expanded, limited, projected
-from reference.coherence.ring import Ring
-from reference.differential import difference, integrate, jacobian
 from reference.inverse_kinematics import balls, goals_of
-from reference.inverse_kinematics.preparation import prepare
 from reference.inverse_kinematics.problem import checked_targets
+from reference.inverse_kinematics.reduce import prepare
+from reference.jacobians import difference, integrate, jacobian
+from reference.trajectory import riemannian_newton as descent
+from reference.trajectory.cyclic_banded import Ring
+from reference.trajectory.problem import Course, moved, path, restored, stuck, worth_of
+from reference.trajectory.riemannian_newton import cost, expanded, limited, projected
 
 ARM = scenes.lab_arm()[0]
 FRAMES = 60
@@ -289,7 +289,7 @@ def test_joints_that_do_not_move_the_effector_stay_as_they_are(rng):
 def test_a_long_motion_is_the_same_whether_it_is_first_found_in_few_frames_or_not(monkeypatch):
     curve, found = curves["heart"](300), []
     for fewest in (32, 10_000):
-        monkeypatch.setattr(coherence, "FEWEST", fewest)
+        monkeypatch.setattr(trajectory, "FEWEST", fewest)
         found.append(track(ARM, curve, LM, coherent=True, tolerance=TOLERANCE).positions)
     np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-6)
 
@@ -301,7 +301,7 @@ def test_a_motion_is_never_less_calm_than_the_one_it_is_made_from(monkeypatch):
         step = 0.1 * np.cos(np.arange(q.shape[0] * 12.0)).reshape(-1, 12)
         return restored(course, moved(course, q, step))[0], 1
 
-    monkeypatch.setattr(coherence, "refined", shaken)
+    monkeypatch.setattr(trajectory, "refined", shaken)
     motion = track(ARM, curves["heart"](FRAMES), LM, coherent=True, tolerance=TOLERANCE)
     calm = squares(ARM, drawn("heart").local_rotations)
     assert squares(ARM, motion.local_rotations) == pytest.approx(calm, rel=1e-9)
