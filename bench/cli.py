@@ -1,7 +1,7 @@
 """The command line. Engines, the reference and matplotlib are imported inside the commands."""
 
 import difflib
-import signal
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
@@ -12,6 +12,7 @@ import typer
 
 from .news import heard_by
 from .suites import SUITES
+from .text import visible
 
 if TYPE_CHECKING:
     from .tables import Table
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 INDENT = 2 + max(map(len, SUITES))
 QUICK, FULL = "quick", "full"
 REPORT = Path("report")
-FINE, MISSED, MISUSED, INTERRUPTED = 0, 1, 2, 130
+FINE, MISSED, MISUSED, INTERRUPTED, UNREAD = 0, 1, 2, 130, 141
 _UsageError: Any = typer.BadParameter.__base__
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -40,15 +41,25 @@ Fresh = Annotated[bool, typer.Option("--fresh", help="Forget what is on record; 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code.
 
-    A reader that has seen enough, such as `head`, ends the program as it ends any other.
+    A reader that has seen enough, such as `head`, ends the program without a word. The signal for
+    it stays ignored: it would also strike where a worker has ended that we are writing to.
     """
-    if hasattr(signal, "SIGPIPE"):
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-    sys.exit(run_command(arguments))
+    try:
+        code = run_command(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        code = UNREAD
+    if code == UNREAD:  # what is not yet written has nowhere to go
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    sys.exit(code)
 
 
 def run_command(arguments: Sequence[str] | None = None) -> int:
-    """Return the exit code: 0 fine, 1 a check failed, 2 bad usage or input, 130 interrupted."""
+    """Return the exit code.
+
+    0 fine, 1 a check failed, 2 bad usage or input, 130 interrupted, 141 nobody reads the output.
+    """
     try:
         code = app(arguments, prog_name="plumbob", standalone_mode=False)
         if code == INTERRUPTED:  # typer's own answer to Ctrl-C
@@ -59,6 +70,12 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except _UsageError as error:
         return _complain(error.format_message())
+    except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):  # typer's own answer to that
+            return UNREAD
+        raise
+    except BrokenPipeError:
+        return UNREAD
     except OSError as error:
         return _complain(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "))
     except ValueError as error:
@@ -208,10 +225,12 @@ def show(
 
     The arm's motion can also be written as BVH, which animation programs open.
     """
+    from .record import check_regular
     from .show import SCENES, write
 
     _known("scene", scene, SCENES)
     path = file or REPORT / f"{scene}.gif"
+    check_regular(path)
     writable(path.parent)
     with progress() as bar:
         task = bar.add_task(scene, total=None)
@@ -219,7 +238,7 @@ def show(
             scene, path, solver,
             lambda done, total: bar.update(task, completed=done, total=total), coherent,
         )  # fmt: skip
-    print(path)
+    print(visible(str(path)))
     return FINE
 
 
@@ -239,23 +258,28 @@ def main_job(output: Path, fresh: bool) -> int:
 def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> int:
     """Run suites with a progress bar; return 1 if a claim is missed or a block failed."""
     from . import run
+    from .record import RecordFile
 
+    RecordFile(output).read()  # before anything is measured that could not be kept
     if fresh:
         run.forget(suites, output)
     done, failures = {run.KEPT: 0, run.MEASURED: 0, run.FAILED: 0}, []
     with progress() as bar:
         task = bar.add_task("starting", total=run.count(suites, scale))
-        with heard_by(lambda what: bar.update(task, description=what)):
+        with heard_by(lambda news: bar.update(task, description=visible(news.what))):
             for event in run.run(suites, scale, output):
-                bar.update(task, description=f"{event.suite}: {event.what}")
+                bar.update(task, description=visible(f"{event.suite}: {event.what}"))
                 if event.state in done:
                     done[event.state] += 1
                     bar.advance(task)
                 if event.state == run.FAILED:
                     failures.append(f"{event.suite}: {event.what}: {event.message}")
-    print(f"{done[run.MEASURED]} measured, {done[run.KEPT]} kept as on record, in {output}")
+    kept = visible(f"{done[run.KEPT]} kept as on record, in {output}")
+    print(f"{done[run.MEASURED]} measured, {kept}")
+    if warning := RecordFile(output).read().warning:
+        print(f"plumbob: {visible(warning)}", file=sys.stderr)
     for failure in [*failures, *run.missed_claims(suites, output)]:
-        print(f"plumbob: {failure}", file=sys.stderr)
+        print(f"plumbob: {visible(failure)}", file=sys.stderr)
         done[run.FAILED] += 1
     return MISSED if done[run.FAILED] else FINE
 
@@ -272,7 +296,8 @@ def write_report(output: Path) -> int:
     print()
     for sentence in written.missing:
         print(f"Missing: {sentence}")
-    print(f"{written.page}: {len(written.tables)} tables, also as Markdown, LaTeX and CSV")
+    page = visible(str(written.page))
+    print(f"{page}: {len(written.tables)} tables, also as Markdown, LaTeX and CSV")
     return FINE
 
 
@@ -315,16 +340,20 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
     """Print the tables that come from these suites, with what they say."""
     from rich.console import Console
 
-    from .findings import Results, tables
+    from .findings import Results, plain, sift, tables
     from .record import RecordFile
 
-    console = Console(width=None if sys.stdout.isatty() else 240, highlight=False)
-    for made in tables(Results(RecordFile(output).read().records), suites):
+    console = Console(
+        width=None if sys.stdout.isatty() else 240, highlight=False, markup=False, emoji=False
+    )
+    records = [plain(record) for record in RecordFile(output).read().records]
+    records, _ = sift(lambda results: tables(results, suites), records)
+    for made in tables(Results(records), suites):
         if not made.rows:
             continue
         print(f"\n{made.title}\n  {made.answer.sentence}")
         print("".join(f"    {point}\n" for point in made.answer.points), end="", flush=True)
-        console.print(_aligned(made), markup=False)
+        console.print(_aligned(made))
 
 
 def _aligned(table: "Table") -> Any:
@@ -363,7 +392,9 @@ def print_verdicts(verdicts: Iterable[Any]) -> None:
             "held" if verdict.held else f"MISSED: {verdict.missed}",
             style=None if verdict.held else "bold red",
         )
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+    console = Console(
+        width=None if sys.stdout.isatty() else 120, highlight=False, markup=False, emoji=False
+    )
     console.print(table)
     print(f"{held} of {table.row_count} claims held")
 
@@ -392,7 +423,7 @@ def progress() -> Any:
         BarColumn(24),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
     )
     return Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=2)
 
@@ -402,9 +433,13 @@ def writable(folder: Path) -> None:
 
     Raises:
         OSError: naming it, if nothing can be written there.
+        ValueError: if it is something else than a folder.
     """
     import tempfile
 
+    from .record import check_folder
+
+    check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     try:
         with tempfile.TemporaryFile(dir=folder):
@@ -423,5 +458,5 @@ def _known(kind: str, name: str, valid: Iterable[str]) -> str:
 
 
 def _complain(message: str) -> int:
-    print(f"plumbob: {' '.join(message.split())}", file=sys.stderr)
+    print(f"plumbob: {visible(message)}", file=sys.stderr)
     return MISUSED

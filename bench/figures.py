@@ -6,6 +6,7 @@ its own in their place. Series differ in line style or marker as well as in colo
 
 import contextlib
 import io
+import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -19,6 +20,7 @@ from .findings import cloth_peers, robots
 from .findings.cloth import ONE_STEP
 from .findings.results import Results, label, problems, solvers
 from .record import Record
+from .text import shortened
 from .timing.case import COMPILED, LIMIT, OURS, PLAIN
 
 COLOURS = {
@@ -94,6 +96,8 @@ WIDTH = 7.4
 # Errors beyond this are left out: of a motion that blew up.
 MOST_DRAWN = 10.0
 PANELS = 3
+# Letters of a name in a figure.
+LONGEST = 60
 
 
 class Drawing(NamedTuple):
@@ -105,12 +109,10 @@ class Drawing(NamedTuple):
     svg: str
 
 
-def figures(results: Results) -> Iterator[Drawing]:
-    """Yield every figure that the records suffice for."""
-    for draw in FIGURES:
-        drawing = draw(results)
-        if drawing is not None:
-            yield drawing
+def written(name: str) -> str:
+    """Return a name as matplotlib writes it letter by letter: no formula, no label to be hidden."""
+    short = shortened(name, LONGEST).replace("$", r"\$")
+    return f" {short}" if short.startswith("_") else short or "–"
 
 
 def iterations(results: Results) -> Drawing | None:
@@ -126,9 +128,9 @@ def iterations(results: Results) -> Drawing | None:
                 ax.stairs(
                     metrics.counts(record.arrays["iterations"], edges), edges,
                     color=COLOURS[colour], linestyle=line, fill=False, linewidth=1.6,
-                    label=label(record.solver),
+                    label=written(label(record.solver)),
                 )  # fmt: skip
-            ax.set(title=label(problem), xscale="log", xlabel="iterations, log scale")
+            ax.set(title=written(label(problem)), xscale="log", xlabel="iterations, log scale")
             _plain_powers(ax)
         axes[0].set_ylabel("targets")
         axes[0].legend(loc="upper right")
@@ -154,14 +156,14 @@ def ik_residuals(results: Results) -> Drawing | None:
                 k = np.arange(len(median))
                 ax.fill_between(k, low, high, color=COLOURS[colour], alpha=0.15, linewidth=0)
                 shown = {"linestyle": line, "color": COLOURS[colour]}
-                ax.plot(k, median, **shown, label=label(record.solver))
+                ax.plot(k, median, **shown, label=written(label(record.solver)))
                 ax.axhline(
                     record.settings["tolerance"],
                     color=COLOURS["faint"],
                     linewidth=0.8,
                     dashes=(2, 2),
                 )
-            ax.set(title=label(problem), yscale="log", xlabel="iteration", xlim=(0, None))
+            ax.set(title=written(label(problem)), yscale="log", xlabel="iteration", xlim=(0, None))
             ax.minorticks_off()
         axes[0].set_ylabel("residual [m]")
         axes[0].legend(loc="upper right")
@@ -178,7 +180,8 @@ def jitter(results: Results) -> Drawing | None:
     if not records:
         return None
     curves, names = problems(records), solvers(records)
-    with canvas(0.32 * len(curves) + 1.1, 1) as (figure, axes):
+    height = 0.32 * len(curves) + 1.1 + _legend_height(names, 1)
+    with canvas(height, 1) as (figure, axes):
         for record in records:
             colour, _, marker = SERIES.get(record.solver, OTHER_SERIES)
             y = curves.index(record.problem) + _aside(record.solver, names)
@@ -188,9 +191,9 @@ def jitter(results: Results) -> Drawing | None:
             for x, filled in zip(ends, ("none", COLOURS[colour]), strict=False):
                 axes[0].plot(
                     x, y, marker, color=COLOURS[colour], markerfacecolor=filled, markersize=5.5,
-                    linestyle="none", label=_once(axes[0], label(record.solver), filled),
+                    linestyle="none", label=_once(axes[0], written(label(record.solver)), filled),
                 )  # fmt: skip
-        axes[0].set_yticks(range(len(curves)), [label(curve.partition("/")[2]) for curve in curves])
+        axes[0].set_yticks(range(len(curves)), _ticks(curves))
         axes[0].set(xscale="log", xlabel="largest turn of a joint between frames [°], log scale")
         axes[0].invert_yaxis()
         _plain_powers(axes[0])
@@ -218,12 +221,12 @@ def cloth_convergence(results: Results) -> Drawing | None:
                     values = record.arrays[quantity]
                     shown = {"linestyle": line, "color": COLOURS[colour]}
                     k = np.arange(1, len(values))
-                    ax.plot(k, values[1:], **shown, label=label(record.solver))
+                    ax.plot(k, values[1:], **shown, label=written(label(record.solver)))
                 ax.set(xscale="log", yscale="log", ylim=(1e-14, 2))
                 _plain_powers(ax)
             axes[i * len(names)].set_ylabel(ylabel)
         for ax, problem in zip(axes, names, strict=False):
-            ax.set_title(label(problem.removesuffix(ONE_STEP)))
+            ax.set_title(written(label(problem.removesuffix(ONE_STEP))))
         for ax in axes[len(names) :]:
             ax.set_xlabel("iteration, log scale")
         axes[0].legend(loc="upper right")
@@ -240,15 +243,19 @@ def energy(results: Results) -> Drawing | None:
     if not records:
         return None
     names, shown = problems(records), solvers(records)
-    with canvas(3.2, len(names), sharey=True) as (figure, axes):
+    with canvas(3.2 + _legend_height(shown, 3), len(names), sharey=True) as (figure, axes):
         for ax, problem in zip(axes, names, strict=True):
             for record in (r for r in records if r.problem == problem):
                 style = _style(shown.index(record.solver))
                 ax.plot(
                     record.arrays["time"], record.arrays["left"],
-                    label=label(record.solver), **style,
+                    label=written(label(record.solver)), **style,
                 )  # fmt: skip
-            ax.set(title=label(problem.removeprefix("swing/")), xlabel="time [s]", xlim=(0, None))
+            ax.set(
+                title=written(label(problem.removeprefix("swing/"))),
+                xlabel="time [s]",
+                xlim=(0, None),
+            )
         axes[0].set(ylabel="energy above rest, of the start", ylim=(0, None))
         figure.legend(*_every_handle(axes), loc="outside lower left", ncols=3)
         return finished(
@@ -268,10 +275,10 @@ def timing(
         if not records:
             return None
         works = problems(records)
-        with canvas(0.27 * len(works) + 1.2, 1) as (figure, axes):
+        height = 0.27 * len(works) + 1.2 + _legend_height(solvers(records), 3)
+        with canvas(height, 1) as (figure, axes):
             _timing_marks(axes[0], records, works, scale)
-            names = [label(work.partition("/")[2]) for work in works]
-            axes[0].set_yticks(range(len(works)), names)
+            axes[0].set_yticks(range(len(works)), _ticks(works))
             axes[0].set(xscale="log", xlabel=f"median [{unit}], log scale")
             axes[0].set_ylim(-0.6, len(works) - 0.4)
             _plain_powers(axes[0])
@@ -295,7 +302,7 @@ def _timing_marks(ax: Axes, records: list[Record], works: list[str], scale: floa
             [works.index(record.problem) for record in mine],
             marker, markersize=11 if solver == LIMIT else 5.5, markeredgewidth=1.4,
             color=COLOURS[colour], markerfacecolor="none" if solver == PLAIN else None,
-            linestyle="none", label=solver,
+            linestyle="none", label=written(solver),
         )  # fmt: skip
 
 
@@ -320,8 +327,10 @@ def robot_curves(
         with canvas(2.4 * rows + 0.22 * len(names), PANELS, rows, sharey=True) as (figure, axes):
             for ax, (robot, panel) in zip(axes, panels.items(), strict=False):
                 for solver, shares in panel.items():
-                    ax.plot(along, 100 * shares, label=solver, **_style(names.index(solver)))
-                ax.set(title=robot, xscale="log", xlabel=titles[1], ylim=(-3, 103))
+                    ax.plot(
+                        along, 100 * shares, label=written(solver), **_style(names.index(solver))
+                    )
+                ax.set(title=written(robot), xscale="log", xlabel=titles[1], ylim=(-3, 103))
                 ax.minorticks_off()
             for ax in axes[len(panels) :]:
                 ax.remove()
@@ -402,8 +411,8 @@ def _work_precision_curves(
         mine = [p for p in found if p.solver == solver]
         ax.plot(
             [1e3 * p.values["seconds"] for p in mine], [p.values[error] for p in mine],
-            marker=ENGINES.get(solver.split()[0], OTHER_SERIES[2]), markersize=3.5, label=solver,
-            **_style(names.index(solver)),
+            marker=ENGINES.get(solver.partition(" ")[0], OTHER_SERIES[2]), markersize=3.5,
+            label=written(solver), **_style(names.index(solver)),
         )  # fmt: skip
 
 
@@ -427,7 +436,10 @@ def canvas(
 def finished(figure: Figure, name: str, title: str, shows: str) -> Drawing:
     """Return the figure as a drawing, the same for the same figure."""
     text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None, "Title": title})
+    with warnings.catch_warnings():  # the page's fonts have all letters, and names may be many
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        warnings.filterwarnings("ignore", "constrained_layout not applied")
+        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None, "Title": title})
     return Drawing(name, title, shows, text.getvalue())
 
 
@@ -442,6 +454,15 @@ def _ik_panels(results: Results) -> dict[str, list[Record]]:
 
 def _largest_turn(record: Record) -> float:
     return metrics.degrees(metrics.spread(record.arrays["largest_turn"]).largest)
+
+
+def _legend_height(names: list[str], columns: int) -> float:
+    """Return how much higher [inch] a figure is for a legend of more than two rows."""
+    return 0.2 * max(0, -(-len(names) // columns) - 2)
+
+
+def _ticks(works: list[str]) -> list[str]:
+    return [written(label(work.partition("/")[2])) for work in works]
 
 
 def _aside(solver: str, names: list[str]) -> float:

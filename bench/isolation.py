@@ -3,19 +3,31 @@
 import atexit
 import contextlib
 import os
-import pickle
 import queue
+import signal
+import socket
 import subprocess
 import sys
 import threading
 from collections import Counter
-from typing import NamedTuple
+from collections.abc import Generator, Iterator, Mapping
+from multiprocessing import Pipe
+from multiprocessing.reduction import ForkingPickler
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from .worker import Done, Message, Ready, Solved, Unfit, Work
+from .news import News, tell
+from .worker import LAST, Begun, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
 
 # A worker that says nothing for so long [s] is ended: before it is ready it may compile.
 START_PATIENCE = 180.0
 TARGET_PATIENCE = 10.0
+# A process whose connection has ended is given so long [s] to end by itself.
+_LEAVE = 1.0
+# In safe-path mode (-P) nothing is imported from where one works; the bench comes from where ours
+# is, before any other that the path may lead to.
+_ROOT = Path(__file__).resolve().parent.parent
+_START = "import sys; sys.path.insert(0, sys.argv[1]); import bench.worker as w; w.main({})"
 
 
 class Outcome(NamedTuple):
@@ -26,12 +38,14 @@ class Outcome(NamedTuple):
         solved: the targets that were done, in order.
         trouble: why there are no more, or what was raised and how often; else "".
         lost: whether the worker was lost over the next target.
+        found: what was measured, if that was the job.
     """
 
     setup: float
     solved: list[Solved]
     trouble: str
     lost: bool = False
+    found: Mapping[str, Any] | None = None
 
 
 class Workshop:
@@ -52,84 +66,130 @@ class Workshop:
 
     def perform(self, job: Work) -> Outcome:
         """Return what came of a job, however it ended."""
-        setup, ready, solved = 0.0, False, list[Solved]()
+        outcome, ready = Outcome(0.0, [], ""), False
+        with contextlib.closing(self.stream(job)) as messages:
+            for message in messages:
+                match message:
+                    case Ready():
+                        outcome, ready = outcome._replace(setup=message.setup), True
+                    case News():
+                        tell(*message)
+                    case Solved():
+                        outcome.solved.append(message)
+                    case Found():
+                        outcome = outcome._replace(found=message.values)
+                    case Unfit() | Lost():
+                        lost = ready and isinstance(message, Lost)
+                        outcome = outcome._replace(trouble=message.why, lost=lost)
+                    case Done():
+                        outcome = outcome._replace(trouble=raised(outcome.solved))
+        return outcome
+
+    def stream(self, job: Work) -> Generator[Message, None, None]:
+        """Yield what a worker says of a job as it comes; the last is Done, Unfit or Lost.
+
+        A worker that was lost since its last job costs nothing: a new one takes the job.
+        """
+        used = self._worker is not None
+        messages = self._once(job)
+        first = next(messages)
+        if used and isinstance(first, Lost):
+            messages = self._once(job)
+            first = next(messages)
+        if not isinstance(first, Begun):
+            yield first
+        yield from messages
+
+    def _once(self, job: Work) -> Iterator[Message]:
+        ready = False
         try:
             worker = self._worker = self._worker or _Worker()
             worker.send(job)
-            while True:
-                message = worker.messages.get(timeout=self._patience[ready])
-                match message:
-                    case Ready():
-                        setup, ready = message.setup, True
-                    case Solved():
-                        solved.append(message)
-                    case Unfit():
-                        return Outcome(setup, solved, message.why)
-                    case Done():
-                        return Outcome(setup, solved, raised(solved))
-                    case None:
-                        return Outcome(setup, solved, self._crash(worker), ready)
-        except queue.Empty:
-            self.close()
-            silent = f"ended after {self._patience[ready]:g} s of silence"
-            return Outcome(setup, solved, silent, ready)
+            message: Message | None = None
+            while not isinstance(message, LAST):
+                message = worker.receive(self._patience[ready])
+                ready = ready or isinstance(message, Ready)
+                if isinstance(message, Lost):
+                    self.close()
+                yield message
         except BaseException:  # what is still under way must not answer the next job
             self.close()
             raise
 
     def close(self) -> None:
-        """End the worker, if there is one."""
+        """End the worker, if there is one, and whatever it has started."""
         worker, self._worker = self._worker, None
         if worker is not None:
             worker.end()
 
-    def _crash(self, worker: "_Worker") -> str:
-        code = worker.code()
-        self.close()
-        return f"its process ended with code {code}"
-
 
 class _Worker:
-    """A process that performs jobs, and a thread that passes on what it says, None at the end."""
+    """A process that performs jobs, and a thread that talks with it, so that we never wait."""
 
     def __init__(self) -> None:
-        self.messages: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "bench.worker"], env=one_thread(),
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        self._relay = threading.Thread(target=self._pass_on, daemon=True)
-        self._relay.start()
+        self._jobs: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._messages: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._connection, theirs = Pipe()
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-c", _START.format(theirs.fileno()), str(_ROOT)],
+                pass_fds=[theirs.fileno()], env=one_thread(), process_group=0,
+                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+        self._thread = threading.Thread(target=self._talk, daemon=True)
+        self._thread.start()
 
     def send(self, job: Work) -> None:
-        """Send a job; if the process is gone, the end of its messages says so."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):
-            pickle.dump(job, self._process.stdin)
-            self._process.stdin.flush()
+        """Send a job; if the process is gone, the next message says so."""
+        self._jobs.put(bytes(ForkingPickler.dumps(job)))
 
-    def code(self) -> int | None:
-        """Return the code of a process that has no more to say."""
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(timeout=1.0)
-        return self._process.returncode
+    def receive(self, patience: float) -> Message:
+        """Return the next message, Lost if there will be none or none came in time [s]."""
+        try:
+            message = self._messages.get(timeout=patience)
+        except queue.Empty:
+            return Lost(f"ended after {patience:g} s of silence")
+        if isinstance(message, Message):
+            return message
+        return Lost(self._end_of_process())
 
     def end(self) -> None:
-        """End the process."""
+        """End the process and those that it has started."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
         self._process.kill()
         self._process.wait()
-        self._relay.join()
-        for pipe in (self._process.stdin, self._process.stdout):
-            with contextlib.suppress(BrokenPipeError):
-                assert pipe is not None
-                pipe.close()
+        self._jobs.put(None)
+        with (
+            socket.socket(fileno=os.dup(self._connection.fileno())) as ours,
+            contextlib.suppress(OSError),
+        ):
+            ours.shutdown(socket.SHUT_RDWR)  # whoever else may hold the other end
+        self._thread.join()
+        self._connection.close()
+        assert self._process.stdin is not None
+        self._process.stdin.close()
 
-    def _pass_on(self) -> None:
-        assert self._process.stdout is not None
-        with contextlib.suppress(EOFError, OSError, ValueError, pickle.UnpicklingError):
-            while True:
-                self.messages.put(pickle.load(self._process.stdout))
-        self.messages.put(None)
+    def _talk(self) -> None:
+        """Pass on jobs and messages; None is the end, by whatever the process does or sends."""
+        with contextlib.suppress(Exception):
+            while (job := self._jobs.get()) is not None:
+                self._connection.send_bytes(job)
+                message = None
+                while not isinstance(message, LAST):
+                    message = self._connection.recv()
+                    self._messages.put(message)
+        self._messages.put(None)
+
+    def _end_of_process(self) -> str:
+        try:
+            code = self._process.wait(timeout=_LEAVE)
+        except subprocess.TimeoutExpired:
+            return "its process broke off the connection, or sent what is no message"
+        if code >= 0:
+            return f"its process ended with code {code}"
+        names = {int(known): known.name for known in signal.Signals}
+        return f"its process was ended by {names.get(-code, f'signal {-code}')}"
 
 
 def raised(solved: list[Solved]) -> str:

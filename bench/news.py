@@ -3,12 +3,22 @@
 import contextlib
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
+from typing import NamedTuple
 
-_listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
+
+class News(NamedTuple):
+    """What is being done, and where that changes a case's state, the state and why."""
+
+    what: str
+    state: str = ""
+    message: str = ""
+
+
+_listener: ContextVar[Callable[[News], None] | None] = ContextVar("listener", default=None)
 
 
 @contextlib.contextmanager
-def heard_by(listener: Callable[[str], None]) -> Iterator[None]:
+def heard_by(listener: Callable[[News], None]) -> Iterator[None]:
     """Let somebody hear what is told inside the block."""
     token = _listener.set(listener)
     try:
@@ -17,8 +27,8 @@ def heard_by(listener: Callable[[str], None]) -> Iterator[None]:
         _listener.reset(token)
 
 
-def tell(what: str) -> None:
+def tell(what: str, state: str = "", message: str = "") -> None:
     """Say what is being done now."""
     listener = _listener.get()
     if listener is not None:
-        listener(what)
+        listener(News(what, state, message))

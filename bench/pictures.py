@@ -25,12 +25,6 @@ COLUMNS = 3
 LIGHT = np.array([0.4, 0.8, 0.45])
 
 
-def pictures(results: Results) -> list[Drawing]:
-    """Return every picture that the records suffice for."""
-    drawn = [arm_draws(results), falling_cloth(results)]
-    return [drawing for drawing in drawn if drawing is not None]
-
-
 def arm_draws(results: Results) -> Drawing | None:
     """Draw the arm on the custom curve, before and after resampling, points by their spacing."""
     records = results.all("pictures", "arm/")
@@ -133,3 +127,6 @@ def _ghosts(ax: Axes, ghosts: Floats) -> None:
 def _bare(ax: Axes) -> None:
     ax.set_aspect("equal")
     ax.axis("off")
+
+
+PICTURES = (arm_draws, falling_cloth)

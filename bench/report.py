@@ -1,22 +1,25 @@
 """The report: tables in three formats, figures, and one page that needs nothing but itself."""
 
 import base64
+import contextlib
 import html
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from string import Template
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from . import tables
-from .figures import COLOURS, Drawing, figures
-from .findings import SECTIONS, Entry, Results, Section
-from .pictures import pictures
-from .record import FINISHED, Record, RecordFile
+from .figures import COLOURS, FIGURES, Drawing
+from .findings import SECTIONS, Entry, Results, Section, plain, sift
+from .pictures import PICTURES
+from .record import FINISHED, Record, RecordFile, check_folder, check_regular
 from .suites import SUITES
 from .tables import Cell, Column, Table
 
 _HERE = Path(__file__).parent
+DRAWINGS = (*FIGURES, *PICTURES)
 FORMATS = {
     "md": (tables.markdown, "Markdown", "text/markdown"),
     "tex": (tables.latex, "LaTeX", "application/x-tex"),
@@ -39,17 +42,56 @@ def write(folder: Path) -> Written:
         ValueError: if there are no records, or they cannot be read.
         OSError: if the folder cannot be written to.
     """
-    records, warning = RecordFile(folder).read()
-    if not records:
+    check_folder(folder)
+    stored, warning = RecordFile(folder).read()
+    if not stored:
         raise ValueError(f"no records in {folder}: run `plumbob bench` first")
-    results = Results(records)
-    made = {entry: entry.table(results) for section in SECTIONS for entry in section.entries}
-    drawings = {drawing.name: drawing for drawing in [*figures(results), *pictures(results)]}
-    missing = [*([warning] if warning else []), *_missing(records)]
-    _write_files(folder, made.values(), drawings.values())
+    shown, left_out = sound([plain(record) for record in stored])
+    missing = [*([warning] if warning else []), *left_out, *_missing(shown.records)]
+    _write_files(folder, shown.tables.values(), shown.drawings.values())
     page = folder / "index.html"
-    page.write_text(_page(records, made, drawings, missing), encoding="utf-8")
-    return Written(page, list(made.values()), missing)
+    _write(page, _page(shown, missing))
+    return Written(page, list(shown.tables.values()), missing)
+
+
+class Shown(NamedTuple):
+    """All that a report shows: its records, and what is made of them."""
+
+    records: Sequence[Record]
+    tables: dict[Entry, Table]
+    drawings: dict[str, Drawing]
+
+
+def sound(records: Sequence[Record]) -> tuple[Shown, list[str]]:
+    """Return what can be shown, and a sentence on each record of which nothing can be made."""
+    with contextlib.suppress(Exception):
+        return _shown(records), []
+    said: list[str] = []
+    for make in _makers():
+        records, sentences = sift(make, records)
+        said += sentences
+    return _shown(records), list(dict.fromkeys(said))
+
+
+def _shown(records: Sequence[Record]) -> Shown:
+    results = Results(records)
+    made = {entry: _checked(entry, results) for section in SECTIONS for entry in section.entries}
+    drawn = [draw(results) for draw in DRAWINGS]
+    return Shown(records, made, {drawing.name: drawing for drawing in drawn if drawing})
+
+
+def _makers() -> Iterator[Callable[[Results], Any]]:
+    """Yield all that makes something of records, one by one."""
+    for section in SECTIONS:
+        yield from (partial(_checked, entry) for entry in section.entries)
+    yield from DRAWINGS
+
+
+def _checked(entry: Entry, results: Results) -> Table:
+    """Return a table that can be written in every form."""
+    table = entry.table(results)
+    _table(table)
+    return table
 
 
 def _write_files(folder: Path, made: Iterable[Table], drawings: Iterable[Drawing]) -> None:
@@ -58,9 +100,14 @@ def _write_files(folder: Path, made: Iterable[Table], drawings: Iterable[Drawing
     for table in made:
         for suffix, (write_as, _, _) in FORMATS.items():
             path = folder / "tables" / f"{table.name}.{suffix}"
-            path.write_text(write_as(table), encoding="utf-8")
+            _write(path, write_as(table))
     for drawing in drawings:
-        (folder / "figures" / f"{drawing.name}.svg").write_text(drawing.svg, encoding="utf-8")
+        _write(folder / "figures" / f"{drawing.name}.svg", drawing.svg)
+
+
+def _write(path: Path, text: str) -> None:
+    check_regular(path)
+    path.write_text(text, encoding="utf-8")
 
 
 def _missing(records: Sequence[Record]) -> list[str]:
@@ -82,7 +129,7 @@ def _missing(records: Sequence[Record]) -> list[str]:
         if record.failed
     ]
     sentences += [
-        f"{package} is not installed." for package, v in newest.stamp["versions"].items() if not v
+        f"{package} is not installed." for package, v in _versions_of(newest).items() if not v
     ]
     others = sum(record.stamp != newest.stamp for record in records)
     if others:
@@ -97,12 +144,12 @@ def _newest(records: Sequence[Record]) -> Record:
     return max(records, key=lambda record: record.when)
 
 
-def _page(
-    records: Sequence[Record],
-    made: dict[Entry, Table],
-    drawings: dict[str, Drawing],
-    missing: Sequence[str],
-) -> str:
+def _versions_of(record: Record) -> Mapping[str, str]:
+    return record.stamp.get("versions", {})
+
+
+def _page(shown: Shown, missing: Sequence[str]) -> str:
+    records, made, drawings = shown
     newest = _newest(records)
     return Template((_HERE / "page.html").read_text(encoding="utf-8")).substitute(
         style=(_HERE / "page.css").read_text(encoding="utf-8"),
@@ -118,13 +165,13 @@ def _page(
 
 
 def _facts(record: Record) -> str:
-    machine = record.stamp["machine"]
-    memory = machine["memory_gib"]
+    machine, versions = record.stamp.get("machine", {}), _versions_of(record)
+    memory = machine.get("memory_gib")
     facts = {
-        "Machine": machine["processor"],
-        "Cores": f"{machine['cores']}" + (f", {memory} GiB memory" if memory else ""),
-        "System": f"{machine['system']}, Python {record.stamp['versions']['python']}",
-        "Plumbob": f"{record.stamp['versions']['plumbob']}, sources {record.stamp['source']}",
+        "Machine": machine.get("processor", "–"),
+        "Cores": f"{machine.get('cores', '–')}" + (f", {memory} GiB memory" if memory else ""),
+        "System": f"{machine.get('system', '–')}, Python {versions.get('python', '–')}",
+        "Plumbob": f"{versions.get('plumbob', '–')}, sources {record.stamp.get('source', '–')}",
     }
     return "\n".join(
         f"<div><dt>{_text(name)}</dt><dd>{_text(value)}</dd></div>" for name, value in facts.items()
@@ -134,7 +181,7 @@ def _facts(record: Record) -> str:
 def _versions(record: Record) -> str:
     return ", ".join(
         f"{_text(package)} {_text(version or 'not installed')}"
-        for package, version in record.stamp["versions"].items()
+        for package, version in _versions_of(record).items()
     )
 
 
@@ -209,21 +256,29 @@ def _drawing(drawing: Drawing) -> str:
 def inline_svg(drawing: Drawing) -> str:
     """Return an SVG fit to stand in a page: own ids, colours by name, no links, the page's fonts.
 
-    Ids are made unique, since all drawings of a page share one name space.
+    Ids are made unique, since all drawings of a page share one name space. What is written between
+    tags stays as it is.
     """
     svg = drawing.svg[drawing.svg.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", "", svg, flags=re.DOTALL)
-    svg = re.sub(r' xmlns(:\w+)?="[^"]*"| version="[^"]*"', "", svg)
-    svg = svg.replace("xlink:href", "href")
-    svg = re.sub(r"<title>.*?</title>", "", svg, flags=re.DOTALL)
-    svg = re.sub(r'\bid="', f'id="{drawing.name}-', svg)
-    svg = re.sub(r'(href="#|url\(#)', rf"\g<1>{drawing.name}-", svg)
+    svg = re.sub(
+        r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->|<title>.*?</title>", "", svg,
+        flags=re.DOTALL,
+    )  # fmt: skip
     svg = re.sub(r' width="[^"]*pt" height="[^"]*pt"', "", svg, count=1)
-    svg = re.sub(r"font-family: [^;\"]*;?|font: ([\d.]+px) [^;\"]*", _font, svg)
-    for name, colour in COLOURS.items():
-        svg = svg.replace(colour, f"var(--{name})")
+    svg = re.sub(r"<[^<>]+>", partial(_inline_tag, drawing.name), svg)
     label = f'<svg role="img" aria-label="{_text(drawing.title)}"'
     return svg.replace("<svg", label, 1).strip()
+
+
+def _inline_tag(name: str, match: re.Match[str]) -> str:
+    tag = re.sub(r' xmlns(:\w+)?="[^"]*"| version="[^"]*"', "", match[0])
+    tag = tag.replace("xlink:href", "href")
+    tag = re.sub(r'\bid="', f'id="{name}-', tag)
+    tag = re.sub(r'(href="#|url\(#)', rf"\g<1>{name}-", tag)
+    tag = re.sub(r"font-family: [^;\"]*;?|font: ([\d.]+px) [^;\"]*", _font, tag)
+    for colour_name, colour in COLOURS.items():
+        tag = tag.replace(colour, f"var(--{colour_name})")
+    return tag
 
 
 def _font(match: re.Match[str]) -> str:

@@ -1,8 +1,8 @@
 """Run suites: measure the blocks that are not yet on record, and store each as it is done."""
 
+import contextlib
+import io
 import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -13,15 +13,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .isolation import one_thread
+from .isolation import Workshop
 from .machine import stamp
+from .news import News
 from .record import FINISHED, Key, Record, RecordFile, key
 from .suites import SCALES, Block, blocks
 from .timing import cases as timing_cases
-from .timing.case import MARK, TIMING
+from .timing.case import TIMING
+from .worker import Done, Lost, Message, Unfit
 
 # At most so many rounds of a benchmark are kept.
 ROUNDS = 200
+# So long [s] a case may take; and the lines of pytest's that say why it failed.
+_CASE_PATIENCE, _LAST_LINES = 1800.0, 20
 KEPT, MEASURING, MEASURED, FAILED = "kept", "measuring", "measured", "failed"
 
 
@@ -86,11 +90,13 @@ def _is_left_over(suite: str, known: set[Key], record: Record) -> bool:
 
 def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
     """Return a sentence for each claim on record, of the suites given, that does not hold."""
+    if "check" not in suites:
+        return []
+    checks = [r for r in RecordFile(folder).read().records if r.suite == "check"]
     return [
-        f"claim {record.problem!r} missed: {record.notes['missed']}"
-        for record in RecordFile(folder).read().records
-        if record.suite == "check" and "check" in suites and not record.arrays.get("held", True)
-    ]
+        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}"
+        for record in checks if not np.all(record.arrays.get("held", True))
+    ]  # fmt: skip
 
 
 def forget(suites: Sequence[str], folder: Path) -> None:
@@ -183,20 +189,31 @@ def _run_timing(scale: str, folder: Path, present: dict[Key, Record]) -> Iterato
 
 
 def _relay(arguments: Sequence[str]) -> Iterator[Event]:
-    """Run pytest and yield what it announces; all else it says is why, if it fails."""
-    others: list[str] = []
-    with subprocess.Popen(
-        [sys.executable, "-m", "pytest", *arguments], env=_environment(), text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-    ) as process:  # fmt: skip
-        for line in process.stdout or ():
-            if line.startswith(MARK):
-                state, what, message = line.removeprefix(MARK).rstrip("\n").split("\t")
-                yield Event(state, TIMING, what, message)
-            else:
-                others.append(line)
-    if process.returncode:
-        yield Event(FAILED, TIMING, "pytest-benchmark", "".join(others[-20:]).strip())
+    """Run pytest in a worker's process and yield what it tells, and why it fails if it does."""
+    with contextlib.closing(Workshop(_CASE_PATIENCE)) as shop:
+        for message in shop.stream(TimingJob(tuple(arguments))):
+            match message:
+                case News():
+                    yield Event(message.state, TIMING, message.what, message.message)
+                case Unfit() | Lost():
+                    yield Event(FAILED, TIMING, "pytest-benchmark", message.why)
+
+
+class TimingJob(NamedTuple):
+    """All cases to be timed by pytest in a worker's process, given its arguments."""
+
+    arguments: tuple[str, ...]
+
+    def perform(self) -> Iterator[Message]:
+        """Yield the end; what happens until then is told as news."""
+        import pytest
+
+        os.environ["PYTEST_ADDOPTS"] = ""  # what pytest is told to do elsewhere is not meant here
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            code = pytest.main(list(self.arguments))
+        last = "".join(said.getvalue().splitlines(keepends=True)[-_LAST_LINES:]).strip()
+        yield Unfit(last) if code else Done()
 
 
 def timing_arguments(folder: Path, length: float, storage: str) -> list[str]:
@@ -215,8 +232,3 @@ def timing_arguments(folder: Path, length: float, storage: str) -> list[str]:
         f"--benchmark-min-time={length / ROUNDS}",
         *("--benchmark-min-rounds=5", "--benchmark-disable-gc", "--benchmark-warmup=off"),
     ]
-
-
-def _environment() -> dict[str, str]:
-    # Whatever else pytest is told to do here is not meant for the timing.
-    return {**one_thread(), "PYTEST_ADDOPTS": ""}

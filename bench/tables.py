@@ -164,7 +164,7 @@ def _trimmed(digits: str) -> str:
     return digits.rstrip("0").rstrip(".")
 
 
-_MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~])")
+_MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=]|(?<=^\d)[.)])")
 
 
 def _markdown(text: str) -> str:
@@ -175,6 +175,9 @@ _LATEX = {
     "\\": r"\textbackslash{}",
     "{": r"\{",
     "}": r"\}",
+    "[": "{[}",  # else an option of the end of the row before
+    "]": "{]}",
+    "*": "{*}",
     "$": r"\$",
     "&": r"\&",
     "#": r"\#",

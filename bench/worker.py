@@ -1,53 +1,22 @@
-"""The process in which solvers run: `python -m bench.worker`, jobs in, results out, as they come.
+"""What a worker says, and its side of the connection: jobs in, messages out, as they come.
 
-A solver may print, crash or hang; whatever it does, it does it here. Results leave by the standard
-output that the process was born with; what a solver prints goes to the standard error.
+A solver may print, crash or hang; whatever it does, it does it in a worker's process, which
+`isolation` starts. Nothing else than messages goes through the connection.
 """
 
-import contextlib
-import importlib
 import os
-import pickle
-import sys
+import threading
 from collections.abc import Iterator, Mapping
-from typing import Any, BinaryIO, NamedTuple, Protocol
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from .judge import Targets, Tolerance
-from .problems.robots import Robot
-from .solvers.protocol import Answer, Ask, Solve, UnableError
-from .solvers.restarts import restarted
-from .stopwatch import Budget, timed
-
-# A solve that took less [s] is made again so often, uncounted, right before the next.
-QUICK, AGAIN = 1e-3, 4
+from .news import News, heard_by
 
 
-class Job(NamedTuple):
-    """What is to be solved, and by what.
-
-    Attributes:
-        module: the adapter's module, by its full name.
-        robot: the robot.
-        targets: solved in order.
-        tolerance: when a target counts as reached.
-        settings: what the adapter is prepared with.
-        restarts: further attempts from random poses, made here for solvers that make one.
-        budget: no further target is begun after so long [s].
-    """
-
-    module: str
-    robot: Robot
-    targets: Targets
-    tolerance: Tolerance
-    settings: Mapping[str, Any]
-    restarts: int
-    budget: float
-
-    def perform(self) -> Iterator["Message"]:
-        """Yield what comes of it, each part as soon as it is there."""
-        return perform(self)
+class Begun(NamedTuple):
+    """The job was read and is begun."""
 
 
 class Ready(NamedTuple):
@@ -82,7 +51,21 @@ class Done(NamedTuple):
     """There is nothing more to come."""
 
 
-Message = Ready | Solved | Unfit | Done
+class Found(NamedTuple):
+    """What was measured, by name."""
+
+    values: Mapping[str, Any]
+
+
+class Lost(NamedTuple):
+    """The process is gone, or was ended since it was silent; `why` says which."""
+
+    why: str
+
+
+Message = Begun | Ready | News | Solved | Found | Unfit | Done | Lost
+# After one of these there is no more to come.
+LAST = (Unfit, Done, Lost)
 
 
 class Work(Protocol):
@@ -92,85 +75,35 @@ class Work(Protocol):
         """Yield what comes of it, each part as soon as it is there."""
 
 
-def perform(job: Job) -> Iterator[Message]:
-    """Yield what comes of a job, each part as soon as it is there."""
-    try:
-        adapter = importlib.import_module(job.module)
-        ask, setup = timed(lambda: _prepared(adapter, job))
-        _solve(_asked(ask, job, 0), job)  # may compile
-    except UnableError as error:
-        yield Unfit(str(error))
-        return
-    except Exception as error:  # whatever an engine raises is its result
-        yield Unfit(said(error))
-        return
-    yield Ready(setup)
-    budget, before = Budget(job.budget), None
-    for i in range(len(job.targets.starts)):
-        if budget.is_spent:
-            break
-        solve = _asked(ask, job, i)
-        if before is not None:  # so that caches are as in a loop of solves and nothing else
-            with contextlib.suppress(Exception):
-                for _ in range(AGAIN):
-                    before()
-        solved = _solve(solve, job)
-        before = solve if solved.seconds < QUICK else None
-        yield solved
-    yield Done()
-
-
-def _prepared(adapter: Any, job: Job) -> Ask:
-    ask = adapter.prepare(job.robot, job.tolerance, **job.settings)
-    return restarted(ask, job.robot, job.restarts) if job.restarts else ask
-
-
-def _asked(ask: Ask, job: Job, i: int) -> Solve:
-    positions, rotations, starts, _ = job.targets
-    return ask(positions[i], rotations[i], starts[i].copy())
-
-
-def _solve(solve: Solve, job: Job) -> Solved:
-    trouble, starts = "", job.targets.starts
-
-    def attempt() -> Answer:
-        nonlocal trouble
-        try:
-            return solve()
-        except Exception as error:  # one target lost, not the rest
-            trouble = said(error)
-            return Answer(None, False)
-
-    answer, seconds = timed(attempt)
-    nothing = np.full(starts.shape[-1], np.nan)
-    q = nothing if answer.q is None else np.array(answer.q, dtype=float)
-    if q.shape != nothing.shape:
-        q, trouble = nothing, f"returned {q.shape} numbers, not {nothing.shape}"
-    claimed = -1 if answer.claimed is None else int(answer.claimed)
-    return Solved(q, claimed, seconds, trouble)
-
-
 def said(error: Exception) -> str:
     """Return what an exception says, on one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:200]
 
 
-def serve(jobs: BinaryIO, results: BinaryIO) -> None:
-    """Perform jobs until there are none."""
-    while True:
-        try:
-            job = pickle.load(jobs)
-        except EOFError:
-            return
-        for message in job.perform():
-            pickle.dump(message, results)
-            results.flush()
+def serve(connection: Connection) -> None:
+    """Perform jobs until the other end is closed."""
+    with heard_by(connection.send):
+        while True:
+            try:
+                job = connection.recv()
+            except EOFError:
+                return
+            except Exception as error:  # a class that cannot be imported here, or is another
+                connection.send(Unfit(said(error)))
+                continue
+            connection.send(Begun())
+            for message in job.perform():
+                connection.send(message)
 
 
-if __name__ == "__main__":
-    # As `__main__` these classes would be strangers to the process that reads them.
-    from bench.worker import serve as serve_as_named
+def main(descriptor: int) -> None:
+    """Serve at a connection that this process was born with, for as long as its parent lives."""
+    os.set_inheritable(descriptor, False)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    serve(Connection(descriptor))
 
-    own = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    serve_as_named(sys.stdin.buffer, own)
+
+def _end_with_parent() -> None:
+    """Wait for the end of the input, which only the parent holds open, and leave."""
+    os.read(0, 1)
+    os._exit(1)

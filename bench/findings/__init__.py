@@ -18,10 +18,10 @@ from . import (
     timing,
     tracking,
 )
-from .results import Results
+from .results import Results, plain, sift
 from .robots import KINDS
 
-__all__ = ["SECTIONS", "Entry", "Results", "Section", "tables"]
+__all__ = ["SECTIONS", "Entry", "Results", "Section", "plain", "sift", "tables"]
 
 
 class Entry(NamedTuple):

@@ -1,10 +1,12 @@
 """The records of a report, and how problems and solvers are written."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ..record import Record
 from ..tables import words
+from ..text import all_visible, shortened, visible
 
 LABELS = {
     "ccd": "CCD",
@@ -47,6 +49,47 @@ class Results:
             if record.problem == problem and record.solver == solver:
                 return record
         return None
+
+
+def plain(record: Record) -> Record:
+    """Return a record whose names and notes can be shown anywhere."""
+    names = ("suite", "problem", "solver", "settings", "notes", "stamp")
+    return replace(record, **{name: all_visible(getattr(record, name)) for name in names})
+
+
+def sift(
+    make: Callable[[Results], Any], records: Sequence[Record]
+) -> tuple[list[Record], list[str]]:
+    """Return the records without those over which `make` raises, and a sentence on each of these.
+
+    Raises:
+        Exception: whatever `make` raises without any record.
+    """
+    make(Results([]))
+    return _joined(make, [], list(records))
+
+
+def _joined(
+    make: Callable[[Results], Any], fit: list[Record], more: list[Record]
+) -> tuple[list[Record], list[str]]:
+    """Return what of more records fits to those that fit already, by halves, and what is said."""
+    try:
+        make(Results([*fit, *more]))
+        return [*fit, *more], []
+    except Exception as error:  # a record may hold anything
+        if len(more) == 1:
+            return fit, [_does_not_fit(more[0], error)]
+    half, said = len(more) // 2, []
+    for part in (more[:half], more[half:]):
+        fit, sentences = _joined(make, fit, part)
+        said += sentences
+    return fit, said
+
+
+def _does_not_fit(record: Record, error: Exception) -> str:
+    names = ", ".join(shortened(name, 40) for name in (record.problem, record.solver))
+    why = shortened(visible(f"{type(error).__name__}: {error}"), 100)
+    return f"The record of {names} is left out, for no table can be made of what it holds ({why})."
 
 
 def label(name: str) -> str:

@@ -1,17 +1,16 @@
 """Cloths from a thousand particles to a million: factors, solves, iterations, memory.
 
-Each cloth is measured in a process of its own, `python -m bench.suites.cloth_scale`, since only a
-process can say how much memory it ever had.
+Each cloth is measured in a process of its own, since only a process can say how much memory it ever
+had.
 """
 
+import contextlib
 import importlib.util
-import json
 import resource
-import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,9 +21,10 @@ from reference.implicit_euler.objective import global_matrix
 from reference.sparse import CholeskyFactor
 from reference.sparse.linear_solver import factorize
 
-from ..isolation import one_thread
+from ..isolation import Workshop
 from ..news import tell
 from ..stopwatch import timed
+from ..worker import Done, Found, Message, Unfit, said
 from .block import Block, Measured, Scale
 
 H = 1 / 60
@@ -38,8 +38,8 @@ LIBRARIES = (OURS, "cholespy")
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
 # What the limit of memory reads again and again: more than any cache holds [bytes].
 STRETCH = 2**28
-# How a line begins in which a child says what it is doing.
-NOW = "now: "
+# So long [s] a part may take, such as the factor of a million particles, compilation included.
+PATIENCE = 1800.0
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -56,36 +56,36 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def in_its_own_process(size: int, library: str) -> Measured:
-    """Measure one cloth, all by itself; say so where the library is not installed."""
+    """Measure one cloth in a process that does nothing else; say so if there is no such library."""
     if library != OURS and importlib.util.find_spec(library) is None:
         return Measured({}, {"missing": f"{library} is not installed"})
-    with subprocess.Popen(
-        [sys.executable, "-m", __name__, str(size), library],
-        env=one_thread(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as child:  # fmt: skip
+    with contextlib.closing(Workshop(PATIENCE)) as shop:
+        outcome = shop.perform(LargeCloth(size, library))
+    if outcome.found is None:
+        raise RuntimeError(outcome.trouble)
+    return Measured(dict(outcome.found))
+
+
+class LargeCloth(NamedTuple):
+    """A cloth to be measured in a worker's process, by particles along a side and library."""
+
+    size: int
+    library: str
+
+    def perform(self) -> Iterator[Message]:
+        """Yield what is measured, after a small cloth for which everything is compiled."""
         try:
-            complaints = list(_told(child.stderr))
-            found, code = child.stdout.read() if child.stdout else "", child.wait()
-        except BaseException:
-            child.kill()
-            raise
-    if code:
-        raise RuntimeError(" ".join("".join(complaints).split()[-40:]) or f"ended with {code}")
-    return Measured(json.loads(found))
-
-
-def _told(lines: Iterable[str] | None) -> Iterator[str]:
-    """Pass on what a child says that it is doing; yield all else that it writes."""
-    for line in lines or ():
-        if line.startswith(NOW):
-            tell(line.removeprefix(NOW).strip())
-        else:
-            yield line
+            measure(min(SIZES), self.library)
+            forget()
+            yield Found(measure(self.size, self.library))
+            yield Done()
+        except Exception as error:
+            yield Unfit(said(error))
 
 
 def _say(size: int, library: str, what: str) -> None:
-    """Say on the way what is being done now."""
-    print(f"{NOW}cloth/{size}x{size}, {library}: {what}", file=sys.stderr, flush=True)
+    """Say what is being done now."""
+    tell(f"cloth/{size}x{size}, {library}: {what}")
 
 
 def billowing_cloth(size: int) -> tuple[MassSpring, State]:
@@ -194,9 +194,3 @@ def memory() -> int:
     """Return the most memory that this process ever had [bytes]."""
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return most if sys.platform == "darwin" else 1024 * most
-
-
-if __name__ == "__main__":
-    measure(min(SIZES), sys.argv[2])  # compiles
-    forget()
-    print(json.dumps(measure(int(sys.argv[1]), sys.argv[2])))

@@ -14,8 +14,9 @@ from ..isolation import Workshop
 from ..judge import Targets, Tolerance, judge
 from ..problems.robot_targets import STRATA, robot_targets, unreachable_targets
 from ..problems.robots import PACKAGE, ROBOTS, is_installed, title
+from ..robot_job import Job
 from ..solvers import PEERS, Entry, Peer
-from ..worker import Job, Solved
+from ..worker import Solved
 from .block import Block, Measured, Scale
 
 SUITE = "ik"

@@ -13,8 +13,6 @@ from reference.backend.threads import in_slices
 from ..record import Key, key
 
 TIMING = "timing"
-# Before each line by which the process that takes the times tells what it does.
-MARK = "plumbob\t"
 # The same names in every subject, so that the tables find their columns.
 COMPILED = "Plumbob, compiled"
 PLAIN = "Plumbob, plain Python"
@@ -58,12 +56,6 @@ class Case:
     def settings(self) -> dict[str, Any]:
         """What distinguishes it from another case of the same problem and solver."""
         return {"operations": self.operations}
-
-
-def announce(state: str, case: Case, message: str = "") -> None:
-    """Tell the process that waits what happens to a case."""
-    line = "\t".join([state, case.name, " ".join(message.split())])
-    print(f"{MARK}{line}", flush=True)
 
 
 def copying(problem: str, size: int, *, passes: int = 1, operations: int = 1) -> Case:

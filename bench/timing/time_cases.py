@@ -1,12 +1,12 @@
 """The one benchmark, run on every case by `pytest -p bench.timing.plugin`."""
 
-from bench.timing.case import announce
+from bench.news import tell
 from reference import cores, speed
 
 
 def test_speed(benchmark, case, keep):
     """Time a case; the first call, which may compile, is not counted."""
-    announce("measuring", case)
+    tell(case.name, "measuring")
     try:
         with speed(case.speed), cores(case.cores):
             call = case.prepare()
@@ -15,7 +15,7 @@ def test_speed(benchmark, case, keep):
     except Exception as error:  # one that fails must not cost the others
         failed = f"{type(error).__name__}: {error}"
         keep(case, [], failed)
-        announce("failed", case, failed)
+        tell(case.name, "failed", failed)
         return
     keep(case, benchmark.stats.stats.data, "")
-    announce("measured", case)
+    tell(case.name, "measured")

@@ -50,7 +50,7 @@ def test_what_is_measured_is_the_work_it_says(ours):
 
 def test_what_it_is_doing_is_told_on_the_way():
     heard = []
-    with heard_by(heard.append):
+    with heard_by(lambda news: heard.append(news.what)):
         suite.in_its_own_process(SMALL, suite.OURS)
     assert heard[0] == f"cloth/{SMALL}x{SMALL}, supernodal: cloth"
     assert heard[-1].endswith("factor, once more")
@@ -65,7 +65,7 @@ def test_an_interrupt_ends_its_process(monkeypatch):
             super().__init__(*arguments, **settings)
             children.append(self)
 
-    def interrupt(what):
+    def interrupt(news):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(subprocess, "Popen", Watched)

@@ -2,6 +2,8 @@
 
 import importlib
 import sys
+import threading
+from multiprocessing import Pipe
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,11 +13,12 @@ from bench import stopwatch
 from bench.isolation import Workshop, raised
 from bench.judge import Targets, Tolerance, judge
 from bench.problems.robots import robot
+from bench.robot_job import AGAIN, Job, perform
 from bench.solvers import ONE_START, Entry, Peer
 from bench.solvers.protocol import Answer
 from bench.solvers.restarts import restarted
 from bench.suites import Scale, robots
-from bench.worker import AGAIN, Done, Job, Ready, Solved, Unfit, perform, serve
+from bench.worker import Begun, Done, Ready, Solved, Unfit, serve
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4
@@ -131,7 +134,7 @@ def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(shop, target
 
 def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monkeypatch):
     """What is timed is timed as in a loop of solves and nothing else."""
-    monkeypatch.setattr("bench.worker.QUICK", 0.1)
+    monkeypatch.setattr("bench.robot_job.QUICK", 0.1)
     counts, called = [], 0
 
     def timed(call):
@@ -140,7 +143,7 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
         called = 0
         return stopwatch.timed(call)
 
-    monkeypatch.setattr("bench.worker.timed", timed)
+    monkeypatch.setattr("bench.robot_job.timed", timed)
     fake = importlib.import_module("fake_solvers")
     prepare = fake.prepare
 
@@ -252,17 +255,19 @@ def test_restarts_that_all_fail_claim_nothing():
 
 
 def test_a_worker_serves_job_after_job(targets):
-    import io
-    import pickle
-
-    jobs, results = io.BytesIO(), io.BytesIO()
-    for manner in ("perfect", "unable"):
-        pickle.dump(job(targets, manner), jobs)
-    jobs.seek(0)
-    serve(jobs, results)
-    results.seek(0)
-    kinds = [type(pickle.load(results)) for _ in range(COUNT + 3)]
-    assert kinds == [Ready, *[Solved] * COUNT, Done, Unfit]
+    ours, theirs = Pipe()
+    with ours, theirs:
+        serving = threading.Thread(target=serve, args=(theirs,))
+        serving.start()
+        kinds = []
+        for manner in ("perfect", "unable"):
+            ours.send(job(targets, manner))
+            kinds.append(type(ours.recv()))
+            while kinds[-1] not in (Done, Unfit):
+                kinds.append(type(ours.recv()))
+        ours.close()
+        serving.join()
+    assert kinds == [Begun, Ready, *[Solved] * COUNT, Done, Begun, Unfit]
 
 
 @pytest.fixture

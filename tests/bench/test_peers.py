@@ -9,9 +9,10 @@ import pytest
 from bench.judge import Targets, Tolerance, judge
 from bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
 from bench.problems.robots import CHARACTER, is_installed, robot
+from bench.robot_job import Job, perform
 from bench.solvers import ONE_START, OURS, PEERS, RESTARTS
 from bench.solvers.protocol import UnableError
-from bench.worker import Job, Solved, perform
+from bench.worker import Solved
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several tips.

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from bench.machine import stamp
 from bench.problems.cloth import cloth_swing
-from bench.record import key
+from bench.record import Record, decode, encode, key
+from bench.run import now
 from bench.suites import SUITES, Scale, blocks, cloth
 from bench.timing import cases
 
@@ -28,6 +30,15 @@ def test_no_two_blocks_have_the_same_key(suite):
     keys = [key(b.suite, b.problem, b.solver, b.settings) for b in blocks(suite, TINY)]
     assert len(keys) == len(set(keys)) > 0
     assert {name for name, *_ in keys} == {suite}
+
+
+@pytest.mark.parametrize("suite", MEASURED)
+def test_the_settings_of_every_block_can_be_read_again(suite):
+    for b in blocks(suite, TINY):
+        made = Record(b.suite, b.problem, b.solver, b.settings, b.size, stamp=stamp(), when=now())
+        back = decode(encode(made))
+        assert back.key == made.key
+        assert back.stamp == made.stamp
 
 
 def test_no_two_cases_of_the_timing_have_the_same_key():
