@@ -52,6 +52,12 @@ def test_every_file_that_is_linked_exists(page, link):
     assert (page.parent / link).exists()
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_path_that_a_page_names_exists(page):
+    named = re.findall(r"`([a-z_]+/[a-z_/.]*)`", page.read_text(encoding="utf-8"))
+    assert [path for path in named if not (README.parent / path).exists()] == []
+
+
 @pytest.mark.parametrize("picture", sorted((README.parent / "docs").glob("lab_*.svg")))
 def test_pictures_of_pages_are_small(picture):
     assert picture.stat().st_size < 100_000
