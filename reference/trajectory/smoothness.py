@@ -21,8 +21,8 @@ SMALL_ANGLE = 1e-4
 def fill_displacements(problem, q, d):
     """Fill the displacements d, (displacement, freedom), between frames q, (frame, coordinate).
 
-    With as many as frames the last one leads to the first frame; a continuous hinge then goes the
-    shorter way round.
+    With as many as frames the last one leads to the first frame; a continuous hinge then takes the
+    smaller angle.
     """
     joints, units = problem.mechanism.joints, problem.units
     for f in range(len(d)):
