@@ -2,6 +2,7 @@
 # make test     the tests, a few minutes; `make test-all` adds the heavy sweeps
 # make lint     ruff and mypy
 # make bench    every benchmark at full length, then the report
+# make drawing  draw the pictures of docs/ anew, the architecture's from the imports
 # make locks    renew the two lock files (needs uv)
 # make clean    remove everything made here
 #
@@ -10,7 +11,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: help report test test-all lint bench locks clean
+.PHONY: help report test test-all lint bench drawing locks clean
 
 help:
 	@sed -n 's/^# \{0,1\}//p' $(MAKEFILE_LIST)
@@ -32,6 +33,10 @@ lint: .venv/installed
 bench: .venv/installed
 	$(BIN)/plumbob bench
 	$(BIN)/plumbob report
+
+drawing: .venv/installed
+	$(BIN)/python docs/draw_architecture.py
+	$(BIN)/python docs/draw_lab.py
 
 .venv/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and \

@@ -1,4 +1,4 @@
-"""Following a curve frame by frame, and coherently."""
+"""Following a curve: frame by frame, or by a smooth trajectory over all frames."""
 
 from collections.abc import Sequence
 from typing import Any, TypeGuard, cast
@@ -45,15 +45,15 @@ def track(
     max_iterations: int = 100,
     record: bool = False,
 ) -> IKSolution:
-    """Return the poses in which the effector follows a curve, a frame a point.
+    """Return the poses in which the effector follows a curve, one frame for each of its points.
 
-    A coherent motion is first solved frame by frame. Then all its frames are changed together until
-    the sum of the squared jumps between neighbours, over hinges [rad], rotation vectors of balls
-    [rad] and ways over the reach, cannot be lowered by a small change, with every effector on its
-    target and every joint within its limits: it is the nearest to the last frame that leaves no
-    frame worse off. Frames whose target is not reached are drawn to it as near as they come. The
-    first pose is as free as the others; `start` only says where the search begins. In the end every
-    frame that is not within the tolerance yet is solved once more from there.
+    A coherent motion is a smooth trajectory (`trajectory/`): solved frame by frame first, then in
+    all frames together, until no small change lowers the sum of the squared displacements between
+    neighbouring frames, over angles of hinges [rad], rotation vectors of balls [rad] and lengths
+    over the reach, with every effector on its target and every joint within its limits. Frames
+    whose target is not reached come as near to it as a penalty draws them. The first pose is as
+    free as the others; `start` is where the search begins. In the end every frame that is not
+    within the tolerance yet is solved once more from there.
 
     Args:
         skeleton: the tree; an Articulation for joints of other kinds and for limits.
@@ -65,9 +65,9 @@ def track(
         effector: the joint that follows, by index or name.
         warm: start each frame from the last one's solution, which keeps neighbouring frames alike;
             if False, each starts from `start`, and the joints may jump from frame to frame.
-        coherent: make the motion coherent.
-        closed: count the jump from the last frame to the first as well, so that the motion ends
-            where it began and can be repeated without drift; for coherent motions only.
+        coherent: make the motion a smooth trajectory.
+        closed: count the displacement from the last frame to the first as well, so that the motion
+            ends where it began and can be repeated without drift; needs coherent=True.
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that counts as reached [rad].
         max_iterations: the most to make in a frame.
@@ -145,7 +145,7 @@ def _solved(
 def _smoothed(
     skeleton: Skeleton | Articulation, motion: IKSolution, wanted: list[Wanted], closed: bool
 ) -> tuple[FloatArray, np.ndarray, int]:
-    """Return the coherent motion, which frames meet their targets, and the steps over all."""
+    """Return the smooth trajectory, which frames meet their targets, and its Newton steps."""
     articulation = skeleton if isinstance(skeleton, Articulation) else balls(skeleton)
     effectors = tuple(one.joint for one in wanted)
     oriented = tuple(one.rotation is not None for one in wanted)
