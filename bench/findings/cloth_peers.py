@@ -156,12 +156,16 @@ def _step_answer(found: Sequence[Point]) -> Answer:
     return Answer("The fastest of all solvers in one step:", tuple(said)) if said else Answer()
 
 
+def _engine(point: Point) -> str:
+    return point.solver.partition(" ")[0]
+
+
 def _fastest(groups: Sequence[Sequence[Point]], target: float) -> str:
     reached = [point for group in groups if (point := _reached(group, target)) is not None]
     if not reached:
         return "none"
     best = min(reached, key=_milliseconds)
-    others = [p for p in reached if p.solver.split()[0] != best.solver.split()[0]]
+    others = [p for p in reached if _engine(p) != _engine(best)]
     after = min(others, key=_milliseconds) if others else None
     beside = "" if after is None else f" (then {after.solver}, {words(_milliseconds(after))} ms)"
     return f"{best.solver}, {words(_milliseconds(best))} ms{beside}"
