@@ -2,7 +2,8 @@
 
 from . import rotation, scenes
 from .articulation import Articulation, Mimic
-from .compiled import speed
+from .backend.compiled import speed
+from .backend.threads import cores
 from .curve import curves, resample
 from .explicit import runge_kutta, symplectic_euler
 from .implicit_euler import STEP_SOLVERS, ImplicitEuler, StepResult
@@ -11,7 +12,6 @@ from .inverse_kinematics import IK_SOLVERS, IKSolution, Target, solve_ik
 from .kinematics import forward_kinematics, local_from_global
 from .mass_spring import MassSpring, State
 from .outcome import Outcome
-from .parallel import cores
 from .skeleton import Pose, Skeleton
 from .tracking import track
 from .wind import wind_forces

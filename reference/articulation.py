@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from . import arguments, rotation
 from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray, frozen
-from .compiled import TwoSpeeds
+from .backend.compiled import TwoSpeeds
 from .quaternion import (
     IDENTITY,
     add,

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from . import arguments
 from .arguments import FloatArray
-from .compiled import TwoSpeeds
+from .backend.compiled import TwoSpeeds
 
 # All named curves lie in the plane y = 0 [m]; the closed ones do not repeat their first point.
 

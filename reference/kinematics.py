@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from . import arguments, rotation
 from .arguments import FloatArray, frozen
 from .articulation import Articulation
-from .compiled import TwoSpeeds, bind
-from .lanes import (
+from .backend.compiled import TwoSpeeds, bind
+from .backend.simd.lanes import (
     LANES,
     all_within,
     lanes_at,
@@ -19,7 +19,7 @@ from .lanes import (
     quaternions_at,
     vectors_at,
 )
-from .parallel import in_slices
+from .backend.threads import in_slices
 from .quaternion import (
     add,
     conjugate,

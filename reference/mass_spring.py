@@ -22,9 +22,9 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from .arguments import FloatArray, IndexArray, array, frozen, indices, shape
-from .block_sum import BlockSum
-from .compiled import TwoSpeeds
-from .regions import LARGE, Regions, cut
+from .backend.compiled import TwoSpeeds
+from .backend.partition import LARGE, Regions, cut
+from .sparse.assembly import BlockSum
 from .springs import (
     spring_lengths,
     spring_pulls,

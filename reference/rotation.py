@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from . import arguments, quaternion
 from .arguments import FloatArray
-from .compiled import TwoSpeeds
+from .backend.compiled import TwoSpeeds
 from .quaternion import UNIT_TOLERANCE, put_quaternion, put_vector, quaternion_at, vector_at
 from .quaternion import between as between_two
 from .quaternion import exponential as exponential_of

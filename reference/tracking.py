@@ -6,7 +6,7 @@ from typing import Any, TypeGuard, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import arguments, coherence, rotation
+from . import arguments, rotation, trajectory
 from .arguments import FloatArray, IndexArray
 from .articulation import Articulation
 from .inverse_kinematics import (
@@ -21,8 +21,8 @@ from .inverse_kinematics import (
     solve_targets,
 )
 from .inverse_kinematics.mechanism import Mechanism, take_coordinates
-from .inverse_kinematics.preparation import prepare
 from .inverse_kinematics.problem import Wanted, check_numbers, checked_targets
+from .inverse_kinematics.reduce import prepare
 from .skeleton import Skeleton, checked_skeleton
 
 # A frame that is nearer to its target than this, over the reach, or than this angle [rad], has met
@@ -157,7 +157,7 @@ def _smoothed(
     q = motion.coordinates.reshape(-1, articulation.coordinate_count).copy()
     if mechanism.freedoms:
         own, goals = np.ascontiguousarray(q[:, columns]), goals_of(wanted, (len(q),))
-        q[:, columns], steps = coherence.smooth(mechanism, goals, own, reached, closed)
+        q[:, columns], steps = trajectory.smooth(mechanism, goals, own, reached, closed)
     return q.reshape(motion.coordinates.shape), reached, steps
 
 

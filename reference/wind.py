@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import FloatArray, array, indices, number
-from .compiled import TwoSpeeds
+from .backend.compiled import TwoSpeeds
 from .mass_spring import State
 from .quaternion import add, cross, dot, norm, put_vector, scale, subtract, vector_at
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from reference import compiled
+from reference.backend import compiled
 
 # The first example of a law may compile a kernel: no deadline.
 settings.register_profile("plumbob", max_examples=20, deadline=None, derandomize=True)

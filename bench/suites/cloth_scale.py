@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from reference import ImplicitEuler, MassSpring, State, scenes
-from reference.cholesky import CholeskyFactor
-from reference.compiled import TwoSpeeds
+from reference.backend.compiled import TwoSpeeds
+from reference.implicit_euler.factor_cache import forget, prefactored
 from reference.implicit_euler.objective import global_matrix
-from reference.implicit_euler.prefactored import forget, prefactored
-from reference.linear_solver import factorize
+from reference.sparse import CholeskyFactor
+from reference.sparse.linear_solver import factorize
 
 from ..isolation import one_thread
 from ..news import tell

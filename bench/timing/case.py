@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from reference.compiled import TwoSpeeds
-from reference.parallel import in_slices
+from reference.backend.compiled import TwoSpeeds
+from reference.backend.threads import in_slices
 
 from ..record import Key, key
 

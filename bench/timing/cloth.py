@@ -8,8 +8,8 @@ import mujoco
 
 from crosscheck.engines import MujocoMassSpring
 from reference import ImplicitEuler, State, symplectic_euler
-from reference.cholesky import CholeskyFactor
-from reference.implicit_euler.prefactored import global_factor
+from reference.implicit_euler.factor_cache import global_factor
+from reference.sparse import CholeskyFactor
 
 from ..problems.cloth import ClothSwing, cloth_swing
 from ..suites.cloth import MIDDLE, converged_motion, motion

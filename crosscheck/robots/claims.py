@@ -24,7 +24,7 @@ def robot_claims(family: str, engine: str) -> list[Claim]:
             f"{READS[family]}, forward_kinematics in random configurations: all links",
             ROTATION,
         ),
-        "Jacobians": (f"{READS[family]}, differential.jacobians: all links", JACOBIAN),
+        "Jacobians": (f"{READS[family]}, jacobians.jacobians: all links", JACOBIAN),
     }
     return [
         Claim(

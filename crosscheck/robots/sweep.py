@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import differential, rotation
+from reference import jacobians, rotation
 from reference.arguments import FloatArray
 from reference.formats.robot import Robot
 from reference.kinematics import forward_kinematics
@@ -72,7 +72,7 @@ def ours(robot: Robot, q: FloatArray, links: np.ndarray) -> Motion:
     return Motion(
         pose.positions[:, links],
         rotation.to_matrix(pose.rotations[:, links]),
-        differential.jacobians(robot.articulation, q)[:, links],
+        jacobians.jacobians(robot.articulation, q)[:, links],
     )
 
 

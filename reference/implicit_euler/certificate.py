@@ -30,8 +30,8 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, IndexArray, array
-from ..linear_solver import Factor, NotPositiveDefiniteError, factorize
 from ..mass_spring import BoolArray, lengths
+from ..sparse.linear_solver import Factor, NotPositiveDefiniteError, factorize
 from .objective import Objective
 
 EPS = float(np.finfo(float).eps)

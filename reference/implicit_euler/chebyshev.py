@@ -26,8 +26,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..mass_spring import MassSpring
+from .factor_cache import global_factor
 from .objective import Iterate, Objective
-from .prefactored import global_factor
 
 PLAIN = 5  # iterations before the acceleration begins
 TRIAL = 5  # accelerated iterations at least before R is doubted

@@ -16,8 +16,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..mass_spring import MassSpring
+from .factor_cache import hessian_factor
 from .objective import Iterate, Objective
-from .prefactored import hessian_factor
 
 
 class GaussNewton:

@@ -13,9 +13,9 @@ import numpy as np
 
 from ..arguments import FloatArray
 from ..mass_spring import MassSpring
+from .factor_cache import global_factor
 from .line_search import line_search
 from .objective import Iterate, Objective
-from .prefactored import global_factor
 
 WINDOW = 5  # steps remembered, as in the paper
 

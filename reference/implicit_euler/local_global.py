@@ -18,8 +18,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..mass_spring import MassSpring
+from .factor_cache import global_factor
 from .objective import Iterate, Objective
-from .prefactored import global_factor
 
 
 class LocalGlobal:

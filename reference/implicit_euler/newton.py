@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..linear_solver import Factor, NotPositiveDefiniteError
 from ..mass_spring import MassSpring
+from ..sparse.linear_solver import Factor, NotPositiveDefiniteError
+from .factor_cache import hessian_factor
 from .line_search import line_search
 from .objective import Iterate, Objective
-from .prefactored import hessian_factor
 
 FIRST_SHIFT = 1e-2  # times M
 SHIFT_GROWTH, SHIFT_DECAY = 4.0, 2.0

@@ -15,12 +15,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arguments import FloatArray
-from ..compiled import TwoSpeeds
+from ..backend.compiled import TwoSpeeds
 from ..mass_spring import MassSpring, spring_blocks
 from ..quaternion import add, put_vector, scale, subtract, vector_at
+from .factor_cache import global_factor
 from .line_search import line_search
 from .objective import Iterate, Objective
-from .prefactored import global_factor
 
 LOOSEST = 0.1  # share of the Newton step's size that may be left of its error
 TIGHTENING = 0.3  # times the square root of what is left of the gradient

@@ -23,7 +23,8 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, array
-from ..compiled import TwoSpeeds
+from ..backend.compiled import TwoSpeeds
+from ..backend.threads import in_slices
 from ..mass_spring import (
     MassSpring,
     State,
@@ -34,7 +35,6 @@ from ..mass_spring import (
     rest_vectors,
     spring_blocks,
 )
-from ..parallel import in_slices
 from .terms import (
     ROUNDING,
     blend_dampers,

@@ -10,13 +10,12 @@ from numpy.typing import ArrayLike
 from .. import arguments, rotation
 from ..arguments import FloatArray, frozen
 from ..articulation import Articulation, one_batch
-from ..compiled import TwoSpeeds, bind
+from ..backend.compiled import TwoSpeeds, bind
+from ..backend.threads import in_slices
 from ..outcome import Outcome
-from ..parallel import in_slices
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
 from .alone import NO_HISTORY, finished, solve_alone
-from .attempts import Answers, answer_batch, answer_given, attempt, attempts
 from .batch import (
     ITERATIONS,
     OUTCOME,
@@ -33,8 +32,9 @@ from .fabrik import fabrik_sweep, fabrik_update
 from .jacobian_transpose import jacobian_transpose_sweep, jacobian_transpose_update
 from .levenberg_marquardt import levenberg_marquardt_sweep, levenberg_marquardt_update
 from .mechanism import ROTATION, WEIGHT
-from .preparation import prepare
 from .problem import IKSolution, Target, Wanted, check_numbers, checked_targets
+from .reduce import prepare
+from .restarts import Answers, answer_batch, answer_given, attempt, attempts
 
 __all__ = ["IK_SOLVERS", "IKSolution", "Outcome", "Target", "solve_ik"]
 

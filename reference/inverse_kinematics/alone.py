@@ -16,8 +16,8 @@ from ..outcome import Outcome
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
 from .mechanism import ROTATION, WEIGHT
-from .preparation import prepare
 from .problem import IKSolution, Target
+from .reduce import prepare
 
 OUTCOMES = tuple(Outcome)
 NO_HISTORY = frozen(np.empty(0))

@@ -20,7 +20,7 @@ from ..quaternion import (
     vector_at,
 )
 from .chain import place_joints
-from .joint_moves import ball_at, move_by, put_ball, shift_free, turn_ball
+from .joint_updates import ball_at, move_by, put_ball, shift_free, turn_ball
 from .mechanism import (
     ORIENTED,
     POSITION,

@@ -24,7 +24,7 @@ from ..quaternion import (
     vector_at,
 )
 from .chain import in_hole, out_of_reach, root_distance
-from .joint_moves import move_by, shift_free, turn_ball
+from .joint_updates import move_by, shift_free, turn_ball
 from .mechanism import (
     ARM,
     HANGS,

@@ -2,7 +2,7 @@
 
 Chains of unlimited balls with one position to reach have `chain.py` to themselves. Everything else
 is a mechanism: joints of all kinds with limits, several effectors, positions and rotations. Fixed
-joints are merged into the ones below them. See `preparation.py` for how one is made.
+joints are merged into the ones below them. See `reduce.py` for how one is made.
 """
 
 from typing import NamedTuple

@@ -11,7 +11,7 @@ from crosscheck.identities import CLAIMS, MASS_SPRING_CLAIMS, run_claims, skelet
 from crosscheck.robots.claims import ROBOT_CLAIMS
 from crosscheck.tolerances import ORDER, STIFFNESS
 from crosscheck.verdict import judge
-from reference.compiled import speed
+from reference.backend.compiled import speed
 
 # A chain and a tree, one pin and two.
 FEW = 2

@@ -12,7 +12,6 @@ from crosscheck.mass_spring import forces as force_claims
 from crosscheck.mass_spring.claims import MASS_SPRING_CLAIMS
 from crosscheck.mass_spring.steps import damper_blocks, semi_implicit
 from crosscheck.verdict import judge
-from reference.block_sum import BlockSum
 from reference.explicit import symplectic_euler
 from reference.implicit_euler import ImplicitEuler
 from reference.mass_spring import (
@@ -28,6 +27,7 @@ from reference.mass_spring import (
     spring_forces,
     stiffness_matrix,
 )
+from reference.sparse.assembly import BlockSum
 
 # One pin and two, and a spring whose ends coincide.
 FEW = 2

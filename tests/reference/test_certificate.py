@@ -20,8 +20,8 @@ from reference.implicit_euler.certificate import (
     least_curvature,
     newton_length,
 )
-from reference.linear_solver import factorize
 from reference.mass_spring import MassSpring, State
+from reference.sparse.linear_solver import factorize
 
 h = 0.05
 EPS = np.finfo(float).eps

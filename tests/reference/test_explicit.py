@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference import compiled
+from reference.backend import compiled
 from reference.explicit import runge_kutta, symplectic_euler
 from reference.mass_spring import MassSpring, State, forces
 

@@ -6,7 +6,8 @@ import itertools
 import numpy as np
 import pytest
 
-from reference import compiled, rotation, scenes
+from reference import rotation, scenes
+from reference.backend import compiled
 from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
 from reference.implicit_euler.chebyshev import PLAIN
 from reference.implicit_euler.line_search import line_search

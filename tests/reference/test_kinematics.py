@@ -3,7 +3,6 @@ import pytest
 
 from reference import (
     Skeleton,
-    compiled,
     cores,
     forward_kinematics,
     kinematics,
@@ -11,7 +10,8 @@ from reference import (
     rotation,
     scenes,
 )
-from reference.lanes import LANES
+from reference.backend import compiled
+from reference.backend.simd.lanes import LANES
 
 # Six joints: a dozen products and sums of numbers of order one.
 ROUNDING = 1e-14

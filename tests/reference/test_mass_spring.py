@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from reference import compiled, rotation
+from reference import rotation
+from reference.backend import compiled
 from reference.mass_spring import (
     MassSpring,
     State,

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from reference import compiled, rotation, scenes
+from reference import rotation, scenes
+from reference.backend import compiled
 from reference.implicit_euler import ImplicitEuler
 from reference.mass_spring import State
 from reference.wind import wind_forces

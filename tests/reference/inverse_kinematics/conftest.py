@@ -15,7 +15,7 @@ from reference import (
     rotation,
 )
 from reference.inverse_kinematics.mechanism import new_posture, place, take_coordinates
-from reference.inverse_kinematics.preparation import prepare
+from reference.inverse_kinematics.reduce import prepare
 from reference.inverse_kinematics.stacked import new_stack
 
 

@@ -25,7 +25,7 @@ from reference.inverse_kinematics.fabrik import (
     wish,
 )
 from reference.inverse_kinematics.mechanism import is_followed, misfit, place
-from reference.inverse_kinematics.preparation import prepare
+from reference.inverse_kinematics.reduce import prepare
 
 # Squared distances of a few metres, and quaternions normalised after a turn.
 ROUNDING = 1e-12

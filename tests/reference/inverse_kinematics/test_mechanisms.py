@@ -20,8 +20,8 @@ from reference import (
     solve_ik,
 )
 from reference.arguments import frozen
+from reference.backend.threads import cores
 from reference.inverse_kinematics import checked_settings, solve_targets
-from reference.parallel import cores
 
 # Distances of a few metres over six joints, positions recomputed.
 ROUNDING = 1e-13

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from reference import Outcome, Target, forward_kinematics, rotation, solve_ik
-from reference.compiled import bind
-from reference.inverse_kinematics.attempts import STUCK, attempts, rank_restarts, take_nearest
+from reference.backend.compiled import bind
 from reference.inverse_kinematics.mechanism import LEVER
-from reference.inverse_kinematics.preparation import prepare
+from reference.inverse_kinematics.reduce import prepare
+from reference.inverse_kinematics.restarts import STUCK, attempts, rank_restarts, take_nearest
 
 
 @pytest.fixture

@@ -16,7 +16,6 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.differential import integrate, jacobian
 from reference.inverse_kinematics.damped_least_squares import DAMPING
 from reference.inverse_kinematics.levenberg_marquardt import DAMPING as OF_POSITIONS
 from reference.inverse_kinematics.levenberg_marquardt import DAMPING_OF_POSES
@@ -29,6 +28,7 @@ from reference.inverse_kinematics.stacked import (
     take_step,
     transposed_step,
 )
+from reference.jacobians import integrate, jacobian
 
 # A dozen products and sums of numbers of order one to ten.
 ROUNDING = 1e-12
@@ -60,7 +60,7 @@ def worth_of_freedoms(model, reach):
 
 
 def stacked(model, q, targets, reach):
-    """Return e (equation,) and J (equation, freedom) of all targets, by `differential.jacobian`."""
+    """Return e (equation,) and J (equation, freedom) of all targets, by `jacobians.jacobian`."""
     pose, errors, rows = forward_kinematics(model, q), [], []
     for position, turn, joint, weight in targets:
         root, J = np.sqrt(weight), jacobian(model, q, joint)

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
-from reference import compiled, lanes, quaternion
-from reference.lanes import (
+from reference import quaternion
+from reference.backend import compiled
+from reference.backend.simd import lanes
+from reference.backend.simd.lanes import (
     LANES,
     all_within,
     lanes_at,
@@ -161,7 +163,7 @@ def test_one_lane_out_of_bounds_is_out_of_bounds(lane, value, numbers, speed):
 
 
 def test_every_function_of_lanes_has_its_instructions():
-    from reference import lane_instructions
+    from reference.backend.simd import lane_instructions
 
     marked = [value for value in vars(lanes).values() if hasattr(value, "compiled_in")]
     assert len(marked) == 7

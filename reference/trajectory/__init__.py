@@ -15,8 +15,8 @@ import numpy as np
 
 from ..arguments import FloatArray, IndexArray
 from ..inverse_kinematics.mechanism import Mechanism
-from .course import Course, jumps, moved, restored, stuck, worth_of
-from .descent import cost, descend
+from .problem import Course, jumps, moved, restored, stuck, worth_of
+from .riemannian_newton import cost, descend
 
 __all__ = ["smooth"]
 

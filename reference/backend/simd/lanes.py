@@ -11,12 +11,12 @@ them. A *scratch* array, (joint, component, lane), holds lanes as the registers 
 
 import numpy as np
 
-from .compiled import compiled_in
+from ..compiled import compiled_in
 
 # A row of doubles that fills an AVX-512 register, or two of AVX.
 LANES = 8
 
-in_vector_registers = compiled_in("reference.lane_instructions")
+in_vector_registers = compiled_in("reference.backend.simd.lane_instructions")
 
 
 @in_vector_registers

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ..articulation import BALL, FREE, FREEDOM, HINGE, KIND, LEADER, LOWER, UPPER
-from ..differential import joint_difference, move_joint
+from ..jacobians import joint_difference, move_joint
 
 # Below this angle the series of c to its square is exact to rounding.
 SMALL = 1e-4

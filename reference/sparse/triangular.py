@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import uint64 as at
 
-from .sides import ask_for, less, put_row, row_at, scaled
+from ..backend.simd.rows import ask_for, less, put_row, row_at, scaled
 
 SIDES, LANES = 3, 4
 # A longer L does not stay in a near cache, and is asked for so many entries ahead.

@@ -2,12 +2,12 @@
 
 A row of an array (unknown, 4) is read, changed and written whole. Here, for the plain speed, a row
 is an array; compiled it is a register of four doubles, and the functions are the instructions in
-`side_instructions.py`. Three right-hand sides leave the fourth at zero.
+`row_instructions.py`. Three right-hand sides leave the fourth at zero.
 """
 
 from ..compiled import compiled_in
 
-in_vector_registers = compiled_in("reference.cholesky.side_instructions")
+in_vector_registers = compiled_in("reference.backend.simd.row_instructions")
 
 
 @in_vector_registers

@@ -11,8 +11,8 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from ..linear_solver import Factor, factorize
 from ..mass_spring import MassSpring
+from ..sparse.linear_solver import Factor, factorize
 from .objective import global_matrix
 
 # By digests of the matrix, and of its pattern alone.

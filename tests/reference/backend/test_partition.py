@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from reference import ImplicitEuler, State, scenes
+from reference.backend.partition import cut
+from reference.backend.threads import cores
 from reference.implicit_euler.objective import Objective
-from reference.parallel import cores
-from reference.regions import cut
 
 H = 1 / 30
 EPS = np.finfo(float).eps

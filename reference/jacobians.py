@@ -28,7 +28,7 @@ from .articulation import (
     articulated_pose,
     one_batch,
 )
-from .compiled import TwoSpeeds
+from .backend.compiled import TwoSpeeds
 from .quaternion import (
     conjugate,
     cross,

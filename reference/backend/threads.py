@@ -11,7 +11,7 @@ from contextvars import ContextVar, copy_context
 from itertools import pairwise
 from typing import Any
 
-from . import arguments
+from .. import arguments
 
 # More slices than cores, so that a core whose slices were easy takes some of the others'.
 SLICES_PER_CORE = 4

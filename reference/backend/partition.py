@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .arguments import IndexArray
+from ..arguments import IndexArray
 
 # A system with fewer springs is summed sooner than another thread begins.
 LARGE = 1_000_000

@@ -13,22 +13,22 @@ from reference import (
     Outcome,
     Skeleton,
     Target,
-    coherence,
     curves,
     forward_kinematics,
     rotation,
     scenes,
     solve_ik,
     track,
+    trajectory,
 )
-from reference.coherence import descent
-from reference.coherence.course import Course, moved, path, restored, stuck, worth_of
-from reference.coherence.descent import cost, expanded, limited, projected
-from reference.coherence.ring import Ring
-from reference.differential import difference, integrate, jacobian
 from reference.inverse_kinematics import balls, goals_of
-from reference.inverse_kinematics.preparation import prepare
 from reference.inverse_kinematics.problem import checked_targets
+from reference.inverse_kinematics.reduce import prepare
+from reference.jacobians import difference, integrate, jacobian
+from reference.trajectory import riemannian_newton as descent
+from reference.trajectory.cyclic_banded import Ring
+from reference.trajectory.problem import Course, moved, path, restored, stuck, worth_of
+from reference.trajectory.riemannian_newton import cost, expanded, limited, projected
 
 ARM = scenes.lab_arm()[0]
 FRAMES = 60

@@ -33,7 +33,7 @@ from ..quaternion import (
 )
 from .batch import ITERATIONS, OUTCOME, RESIDUAL, RESIDUAL_ROTATION, fill_from
 from .chain import BEND, ROUNDING
-from .joint_moves import ball_at, move_by, put_ball
+from .joint_updates import ball_at, move_by, put_ball
 from .levenberg_marquardt import levenberg_marquardt_update as update  # bound to each solver's
 from .mechanism import (
     EFFECTOR,

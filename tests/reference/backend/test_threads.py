@@ -4,8 +4,10 @@ import threading
 import numpy as np
 import pytest
 
-from reference import compiled, cores, parallel
-from reference.parallel import SLICES_PER_CORE, in_slices
+from reference import cores
+from reference.backend import compiled
+from reference.backend import threads as parallel
+from reference.backend.threads import SLICES_PER_CORE, in_slices
 
 CORES = [1, 2, 3]
 

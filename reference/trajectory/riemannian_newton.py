@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import FloatArray
-from ..compiled import TwoSpeeds
-from .course import Course, jumps, moved, path, pseudoinverse, restored
-from .jumps import add_jumps
-from .limits import add_limits, limits_cost, push_limits, raise_multipliers
-from .path import subtract_second
-from .ring import Ring
+from ..backend.compiled import TwoSpeeds
+from .augmented_lagrangian import add_limits, limits_cost, push_limits, raise_multipliers
+from .cyclic_banded import Ring
+from .problem import Course, jumps, moved, path, pseudoinverse, restored
+from .smoothness import add_jumps
+from .task_derivatives import subtract_second
 
 # The penalty of overstepping a limit by 1 rad, and that of a goal that a frame is only drawn to, by
 # the reach.

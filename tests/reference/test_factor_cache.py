@@ -5,11 +5,12 @@ import gc
 import numpy as np
 import pytest
 
-from reference.cholesky import factor
-from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, prefactored
+from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from reference.implicit_euler import factor_cache as prefactored
 from reference.implicit_euler.objective import Objective, global_matrix
-from reference.linear_solver import NotPositiveDefiniteError
 from reference.mass_spring import State
+from reference.sparse import factor
+from reference.sparse.linear_solver import NotPositiveDefiniteError
 
 h = 0.05
 

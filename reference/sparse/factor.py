@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..arguments import FloatArray
-from ..compiled import TwoSpeeds
+from ..backend.compiled import TwoSpeeds
 from .analysis import analyse
 from .dissection import Graph
 from .multifrontal import factorize

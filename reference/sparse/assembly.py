@@ -8,8 +8,8 @@ import numpy as np
 import scipy
 from numpy import uint64 as at
 
-from .arguments import FloatArray, IndexArray, frozen
-from .compiled import TwoSpeeds
+from ..arguments import FloatArray, IndexArray, frozen
+from ..backend.compiled import TwoSpeeds
 
 
 class BlockSum:

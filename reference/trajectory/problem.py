@@ -6,10 +6,10 @@ import numpy as np
 
 from ..arguments import FloatArray, IndexArray
 from ..articulation import FREE, FREEDOM, KIND, LEADER, SLIDE
-from ..compiled import TwoSpeeds
+from ..backend.compiled import TwoSpeeds
 from ..inverse_kinematics.mechanism import Mechanism
-from .jumps import fill_jumps, move_frames
-from .path import fill_path
+from .smoothness import fill_jumps, move_frames
+from .task_derivatives import fill_path
 
 # Errors count as none below this, over the reach.
 ON_PATH = 1e-12

@@ -6,7 +6,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from reference import compiled
+from reference.backend import compiled
 
 FACTOR = 3.0
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from ..arguments import FloatArray
-from ..compiled import TwoSpeeds
+from ..backend.compiled import TwoSpeeds
 
 
 class Ring:

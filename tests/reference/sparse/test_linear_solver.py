@@ -6,7 +6,7 @@ import scipy.sparse
 
 from reference import scenes
 from reference.implicit_euler.objective import global_matrix
-from reference.linear_solver import LIBRARIES, NotPositiveDefiniteError, factorize
+from reference.sparse.linear_solver import LIBRARIES, NotPositiveDefiniteError, factorize
 
 
 @pytest.fixture(params=LIBRARIES)

@@ -8,13 +8,14 @@ import scipy.sparse
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import compiled, scenes
-from reference.cholesky import CholeskyFactor, NotPositiveDefiniteError
-from reference.cholesky.dense import PANEL, STRIP, eliminate
-from reference.cholesky.dissection import HARD, LEAF
-from reference.cholesky.triangular import NEAR
+from reference import scenes
+from reference.backend import compiled
 from reference.implicit_euler.objective import global_matrix
-from reference.linear_solver import factorize
+from reference.sparse import CholeskyFactor, NotPositiveDefiniteError
+from reference.sparse.dense import PANEL, STRIP, eliminate
+from reference.sparse.dissection import HARD, LEAF
+from reference.sparse.linear_solver import factorize
+from reference.sparse.triangular import NEAR
 
 EPS = np.finfo(float).eps
 

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 import scipy
 
-from .arguments import FloatArray, choice
-from .cholesky import CholeskyFactor, NotPositiveDefiniteError
+from ..arguments import FloatArray, choice
+from . import CholeskyFactor, NotPositiveDefiniteError
 
 
 class Factor(Protocol):
