@@ -22,7 +22,7 @@ EPS = np.finfo(float).eps
 
 def definite(pattern, seed=0):
     """Return a matrix with the given pattern of neighbours, diagonally dominant by a little."""
-    entries = scipy.sparse.coo_array(scipy.sparse.triu(pattern, 1))
+    entries = scipy.sparse.triu(scipy.sparse.coo_array(pattern), 1)
     values = np.random.default_rng(seed).uniform(-1, 1, entries.nnz)
     upper = scipy.sparse.coo_array((values, (entries.row, entries.col)), pattern.shape).tocsc()
     both = upper + upper.T
