@@ -12,6 +12,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -41,7 +42,7 @@ def _refusal(lock: Path, python: str, platform: str) -> str:
     run = subprocess.run(
         [uv(), "pip", "install", "--dry-run", "--quiet", "--python", sys.executable, *target,
          "--only-binary", ":all:", "--require-hashes", "--requirements", str(lock)],
-        capture_output=True, text=True, check=False, env=_environment(), cwd=VENVS.parent,
+        capture_output=True, text=True, check=False, env=_environment(), cwd=tempfile.gettempdir(),
     )  # fmt: skip
     return " ".join(run.stderr.split()) or "uv fails silently" if run.returncode else ""
 
