@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .news import heard_by
-from .suites import SUITES
-from .text import visible
+from .experiments import SUITES
+from .harness.progress import heard_by
+from .presentation.text import visible
 
 if TYPE_CHECKING:
-    from .tables import Table
+    from .presentation.tables import Table
 
 # The width of the names of suites in the help.
 INDENT = 2 + max(map(len, SUITES))
@@ -225,7 +225,7 @@ def show(
 
     The arm's motion can also be written as BVH, which animation programs open.
     """
-    from .record import check_regular
+    from .harness.record import check_regular
     from .show import SCENES, write
 
     _known("scene", scene, SCENES)
@@ -257,8 +257,8 @@ def main_job(output: Path, fresh: bool) -> int:
 
 def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> int:
     """Run suites with a progress bar; return 1 if a claim is missed or a block failed."""
-    from . import run
-    from .record import RecordFile
+    from .harness import run
+    from .harness.record import RecordFile
 
     RecordFile(output).read()  # before anything is measured that could not be kept
     if fresh:
@@ -286,7 +286,7 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
 
 def write_report(output: Path) -> int:
     """Write the report and say where it is, what it found and what is missing."""
-    from .report import write
+    from .presentation.report import write
 
     written = write(output)
     for table in written.tables:
@@ -307,7 +307,7 @@ def check_files(paths: Sequence[str]) -> int:
         raise ValueError("--files: expected folders or files, got none")
     from crosscheck.robots.files import check, find
 
-    from .file_check import report
+    from .experiments.check.files import report
 
     found = find(paths)
     checked = []
@@ -324,7 +324,7 @@ def check_files(paths: Sequence[str]) -> int:
 
 def print_table(table: "Table") -> None:
     """Print a table with what it says: aligned on a terminal, as Markdown in a pipe."""
-    from .tables import markdown
+    from .presentation.tables import markdown
 
     if not sys.stdout.isatty():
         print(markdown(table))
@@ -340,8 +340,8 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
     """Print the tables that come from these suites, with what they say."""
     from rich.console import Console
 
-    from .findings import Results, plain, sift, tables
-    from .record import RecordFile
+    from .harness.record import RecordFile
+    from .presentation.sections import Results, plain, sift, tables
 
     console = Console(
         width=None if sys.stdout.isatty() else 240, highlight=False, markup=False, emoji=False
@@ -361,7 +361,7 @@ def _aligned(table: "Table") -> Any:
     import rich.table
     from rich.text import Text
 
-    from .tables import words
+    from .presentation.tables import words
 
     shown = rich.table.Table(box=None, header_style="bold", pad_edge=False)
     for column in table.columns:
@@ -376,7 +376,7 @@ def print_verdicts(verdicts: Iterable[Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from .tables import words
+    from .presentation.tables import words
 
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in ("claim", "cases", "largest difference", "tolerance", "verdict"):
@@ -437,7 +437,7 @@ def writable(folder: Path) -> None:
     """
     import tempfile
 
-    from .record import check_folder
+    from .harness.record import check_folder
 
     check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)

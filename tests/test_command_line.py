@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bench import cli
-from bench.record import Record, RecordFile
+from bench.harness.record import Record, RecordFile
 from crosscheck.identities import CLAIMS
 from crosscheck.verdict import Verdict
 
@@ -171,7 +171,7 @@ HOSTILE = ("[red]x", "[/]", ":smile:", "\x1b[2J", "\x00", "right\u202eleft", "$\
 
 
 def test_hostile_names_are_data_on_the_terminal(capsys, empty_folder):
-    from bench import run
+    from bench.harness import run
 
     records = [a_record(name) for name in HOSTILE]
     RecordFile("out").append(records)
@@ -380,7 +380,7 @@ def test_a_picture_of_a_scene_is_written_and_named(capsys, empty_folder):
 @pytest.mark.parametrize("coherent", [False, True])
 def test_a_motion_is_written_for_animation_programs(capsys, empty_folder, coherent):
     """Six decimals leave joint n of the arm off by (n + 1) 9e-7 + n 2.6 m 2.7e-8 at the most."""
-    from bench.problems.arm import MAX_SPACING, MIN_SPACING
+    from bench.experiments.arm.problem import MAX_SPACING, MIN_SPACING
     from reference import curves, resample, scenes, track
     from reference.formats import bvh
 

@@ -98,7 +98,7 @@ SLIPS = [
     (arrows_against_the_direction, "reference/a.py", "from crosscheck.verdict import judge"),
     (arrows_against_the_direction, "reference/formats/a.py", "from bench import cli"),
     (arrows_against_the_direction, "crosscheck/a.py", "def f():\n    import bench.run"),
-    (arrows_against_the_direction, "crosscheck/a.py", "import_module('bench.run')"),
+    (arrows_against_the_direction, "crosscheck/a.py", "import_module('bench.harness.run')"),
     (arrows_against_the_direction, "bench/a.py", "from tests import conftest"),
     (arrows_against_the_direction, "bench/a.py", "from plumbob import solve_ik"),
     (arrows_against_the_direction, "reference/a.py", "import plumbob"),

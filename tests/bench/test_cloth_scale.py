@@ -7,10 +7,11 @@ import subprocess
 import numpy as np
 import pytest
 
-from bench.findings import Results, cloth_scale
-from bench.news import heard_by
-from bench.suites import SCALES, blocks
-from bench.suites import cloth_scale as suite
+from bench.experiments import SCALES, blocks
+from bench.experiments.cloth_scale import measurement as suite
+from bench.experiments.cloth_scale import tables as cloth_scale
+from bench.harness.progress import heard_by
+from bench.presentation.sections import Results
 from reference.implicit_euler.objective import Objective
 
 SMALL = min(suite.SIZES)

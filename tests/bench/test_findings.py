@@ -6,19 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.findings import (
-    SECTIONS,
-    Results,
-    check,
-    cloth,
-    kinematics,
-    published,
-    robots,
-    tables,
-    timing,
-    tracking,
-)
-from bench.suites import SUITES
+from bench.experiments import SUITES
+from bench.experiments.chain import tables as kinematics
+from bench.experiments.check import tables as check
+from bench.experiments.closed_curves import tables as tracking
+from bench.experiments.cloth import tables as cloth
+from bench.experiments.published import tables as published
+from bench.experiments.robots import tables as robots
+from bench.experiments.timing import tables as timing
+from bench.presentation.sections import SECTIONS, Results, tables
 
 
 def column(table, heading):

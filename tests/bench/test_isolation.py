@@ -9,16 +9,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench import stopwatch
-from bench.isolation import Workshop, raised
-from bench.judge import Targets, Tolerance, judge
-from bench.problems.robots import robot
-from bench.robot_job import AGAIN, Job, perform
-from bench.solvers import ONE_START, Entry, Peer
-from bench.solvers.protocol import Answer
-from bench.solvers.restarts import restarted
-from bench.suites import Scale, robots
-from bench.worker import Begun, Done, Ready, Solved, Unfit, serve
+from bench.experiments import Scale
+from bench.experiments.robots import measurement as robots
+from bench.experiments.robots.evaluate import Targets, Tolerance, judge
+from bench.experiments.robots.job import AGAIN, Job, perform
+from bench.experiments.robots.problem import robot
+from bench.harness import stopwatch
+from bench.harness.isolation import Workshop, raised
+from bench.harness.worker import Begun, Done, Ready, Solved, Unfit, serve
+from bench.peers.ik import ONE_START, Entry, Peer
+from bench.peers.ik.protocol import Answer
+from bench.peers.ik.restarts import restarted
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4
@@ -28,7 +29,7 @@ COUNT = 4
 FAKES = """
 import os, sys, time
 import numpy as np
-from bench.solvers.protocol import Answer, UnableError
+from bench.peers.ik.protocol import Answer, UnableError
 
 def prepare(robot, tolerance, manner="perfect", at=2):
     if manner == "unable":
@@ -134,7 +135,7 @@ def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(shop, target
 
 def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monkeypatch):
     """What is timed is timed as in a loop of solves and nothing else."""
-    monkeypatch.setattr("bench.robot_job.QUICK", 0.1)
+    monkeypatch.setattr("bench.experiments.robots.job.QUICK", 0.1)
     counts, called = [], 0
 
     def timed(call):
@@ -143,7 +144,7 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
         called = 0
         return stopwatch.timed(call)
 
-    monkeypatch.setattr("bench.robot_job.timed", timed)
+    monkeypatch.setattr("bench.experiments.robots.job.timed", timed)
     fake = importlib.import_module("fake_solvers")
     prepare = fake.prepare
 

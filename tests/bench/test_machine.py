@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from bench import machine
+from bench.harness import machine
 
 PACKAGES = ("reference", "crosscheck", "bench")
-ROOT = Path(machine.__file__).parent.parent
+ROOT = Path(machine.__file__).parents[2]
 
 
 @pytest.fixture
@@ -29,7 +29,10 @@ def every_file(root):
 
 
 def only_shows(path):
-    return any(path.is_relative_to(name) for name in machine.PRESENTATION)
+    in_experiment = path.is_relative_to("bench/experiments")
+    return any(path.is_relative_to(name) for name in machine.PRESENTATION) or (
+        in_experiment and path.name in machine.PRESENTATION_FILES
+    )
 
 
 def test_an_edit_of_any_file_changes_the_digest_unless_it_only_shows_numbers(copy):
@@ -44,7 +47,12 @@ def test_an_edit_of_any_file_changes_the_digest_unless_it_only_shows_numbers(cop
 
 
 @pytest.mark.parametrize(
-    "name", ["bench/cloth_solvers/explicit.py", "bench/cloth_job.py", "bench/cloth_truth.py"]
+    "name",
+    [
+        "bench/peers/cloth/explicit.py",
+        "bench/experiments/cloth_peers/job.py",
+        "bench/experiments/cloth_peers/truth.py",
+    ],
 )
 def test_the_files_that_were_once_left_out_count(name):
     assert ROOT / name in machine.source_files()
@@ -52,7 +60,7 @@ def test_the_files_that_were_once_left_out_count(name):
 
 def test_a_new_file_and_a_new_name_change_the_digest_and_a_compiled_cache_does_not(copy):
     digests = {machine.source_digest()}
-    new = copy / "bench" / "solvers" / "new.py"
+    new = copy / "bench" / "peers" / "new.py"
     new.write_text("")
     digests.add(machine.source_digest())
     new.rename(new.with_name("newer.py"))
@@ -106,16 +114,16 @@ def test_what_measures_never_imports_what_only_shows():
 @pytest.mark.parametrize(
     "line",
     [
-        "import bench.report",
-        "from . import tables",
-        "from .findings import results",
-        "from bench import figures",
-        "def f():\n    from .findings.results import label",
-        'importlib.import_module("bench.text")',
+        "import bench.presentation.report",
+        "from ..presentation import tables",
+        "from ..presentation import results",
+        "from bench.presentation import figures",
+        "def f():\n    from ..presentation.results import label",
+        'importlib.import_module("bench.presentation.text")',
     ],
 )
 def test_an_import_of_what_only_shows_is_found(copy, line):
-    path = copy / "bench" / "metrics.py"
+    path = copy / "bench" / "harness" / "metrics.py"
     path.write_text(f"{path.read_text()}\n{line}\n")
     assert measuring_files_that_import_what_shows(copy)
 

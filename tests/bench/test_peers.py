@@ -6,13 +6,13 @@ import importlib.metadata
 import numpy as np
 import pytest
 
-from bench.judge import Targets, Tolerance, judge
-from bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
-from bench.problems.robots import CHARACTER, is_installed, robot
-from bench.robot_job import Job, perform
-from bench.solvers import ONE_START, OURS, PEERS, RESTARTS
-from bench.solvers.protocol import UnableError
-from bench.worker import Solved
+from bench.experiments.robots.evaluate import Targets, Tolerance, judge
+from bench.experiments.robots.job import Job, perform
+from bench.experiments.robots.problem import CHARACTER, is_installed, robot
+from bench.experiments.robots.targets import robot_targets, uniform_targets, unreachable_targets
+from bench.harness.worker import Solved
+from bench.peers.ik import ONE_START, OURS, PEERS, RESTARTS
+from bench.peers.ik.protocol import UnableError
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several tips.

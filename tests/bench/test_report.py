@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import pytest
 
-from bench import report
-from bench.findings import SECTIONS
-from bench.record import RecordFile
+from bench.harness.record import RecordFile
+from bench.presentation import report
+from bench.presentation.sections import SECTIONS
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from bench.machine import stamp
-from bench.problems.cloth import cloth_swing
-from bench.record import Record, decode, encode, key
-from bench.run import now
-from bench.suites import SUITES, Scale, blocks, cloth
-from bench.timing import cases
+from bench.experiments import SUITES, Scale, blocks
+from bench.experiments.cloth import measurement as cloth
+from bench.experiments.cloth.problem import cloth_swing
+from bench.experiments.timing import cases
+from bench.harness.machine import stamp
+from bench.harness.record import Record, decode, encode, key
+from bench.harness.run import now
 
 TINY = Scale(targets=3, seconds=0.001)
 MEASURED = [suite for suite in SUITES if suite != "timing"]

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench import tables
-from bench.metrics import Share, share
-from bench.tables import Answer, Column, Table, words
+from bench.harness.metrics import Share, share
+from bench.presentation import tables
+from bench.presentation.tables import Answer, Column, Table, words
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from bench import run
-from bench.machine import stamp
-from bench.record import RecordFile
-from bench.timing import case as timing_case
-from bench.timing import kinematics
-from bench.timing.case import LIMIT, copying, stream, streaming
+from bench.experiments.timing import case as timing_case
+from bench.experiments.timing import kinematics
+from bench.experiments.timing.case import LIMIT, copying, stream, streaming
+from bench.harness import run
+from bench.harness.machine import stamp
+from bench.harness.record import RecordFile
 from reference import cores, forward_kinematics
 
 

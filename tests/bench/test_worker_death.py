@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from bench import isolation
-from bench.isolation import Workshop
-from bench.worker import Ready
+from bench.harness import isolation
+from bench.harness.isolation import Workshop
+from bench.harness.worker import Ready
 
 ROOT = Path(isolation.__file__).parent.parent
 PATIENCE = 3.0
@@ -23,7 +23,7 @@ JOBS = """
 import ctypes, gc, os, pickle, signal, struct, subprocess, sys, time
 from multiprocessing.connection import Connection
 import numpy as np
-from bench.worker import Done, Ready, Solved
+from bench.harness.worker import Done, Ready, Solved
 
 def descriptor():
     (own,) = [o for o in gc.get_objects() if isinstance(o, Connection)]
@@ -237,7 +237,8 @@ def test_nothing_is_left_running_not_even_what_a_solver_started(jobs, tmp_path, 
 def test_a_worker_ends_with_the_program_that_started_it(jobs, tmp_path):
     """Even if that is killed while a solver sleeps."""
     script = (
-        "import sys; from pathlib import Path; from bench.isolation import Workshop; import os\n"
+        "import sys; import os; from pathlib import Path\n"
+        "from bench.harness.isolation import Workshop\n"
         "from dying_jobs import WithChild\n"
         "next(Workshop().stream(WithChild(sys.argv[1]))); os.kill(os.getpid(), 9)"
     )
@@ -282,8 +283,10 @@ def test_another_bench_on_the_path_is_not_imported(jobs, tmp_path, monkeypatch):
 COMMAND = """
 import sys
 from functools import partial
-from bench import cli, isolation, run, suites
-from bench.suites import Block, robots, Measured
+from bench import cli, experiments as suites
+from bench.harness import isolation, run
+from bench.experiments import Block, Measured
+from bench.experiments.robots import measurement as robots
 isolation._START = "raise SystemExit(3)"
 import dying_jobs
 
@@ -298,7 +301,7 @@ cli.main(["bench", "ik", "--quick", "-o", sys.argv[1]])
 
 
 def test_the_command_survives_a_worker_that_dies_before_it_reads_its_job(jobs, tmp_path):
-    from bench.record import RecordFile
+    from bench.harness.record import RecordFile
 
     done = subprocess.run(
         [sys.executable, "-c", COMMAND.format(load=LARGE), str(tmp_path)],
