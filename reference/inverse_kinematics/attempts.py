@@ -31,7 +31,15 @@ from ..quaternion import (
     turn_about,
     vector_at,
 )
-from .batch import ITERATIONS, OUTCOME, RESIDUAL, RESIDUAL_ROTATION, fill_from
+from .batch import (
+    EXCESS,
+    ITERATIONS,
+    MERIT,
+    OUTCOME,
+    RESIDUAL,
+    RESIDUAL_ROTATION,
+    put_if_room,
+)
 from .chain import BEND, ROUNDING
 from .joint_moves import ball_at, move_by, put_ball
 from .levenberg_marquardt import levenberg_marquardt_update as update  # bound to each solver's
@@ -41,22 +49,34 @@ from .mechanism import (
     ORIENTED,
     POSITION,
     ROTATION,
+    WEIGHT,
     Mechanism,
     give_coordinates,
+    least_residual,
+    merit_of,
     new_posture,
     place,
     residuals,
     take_coordinates,
-    too_far,
+    weighted_square,
 )
 from .stacked import Stack, new_stack
 
 # An attempt that others may follow is given up once this many iterations have not brought it this
-# much nearer; but for the last of all, and one in so many before it.
-PATIENCE, PROGRESS, PATIENT = 3, 0.5, 4
-# One that stalls within so few is stuck, such as a straight chain, perhaps folded since, whose
+# much nearer. It is finished later if none of the others reaches the target either.
+PATIENCE, PROGRESS = 3, 0.5
+# One that settles within so few is stuck, such as a straight chain, perhaps folded since, whose
 # target lies on its own line.
 STUCK = 6
+# How an attempt ended: within the tolerances, or of the nearest point that geometry allows; with no
+# more progress; with its iterations used; given up early.
+REACHED, SETTLED, LIMITED, GIVEN_UP = range(4)
+# Columns of Room.progress, (attempt, 4): iterations made, how it ended, its merit [m], and 1 where
+# its stuck start has been bent.
+MADE, STATE, COST, BENT = range(4)
+# Entries of Room.best: merit [m] and ending of the best attempt that is finished; how many poses to
+# restart from have been taken; how many attempts' iterations the first one may make.
+BEST_COST, BEST_STATE, TAKEN, PERIODS = range(4)
 INFINITY = math.inf
 # A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
 NUDGE_AXIS = (0.48, 0.6, 0.64)
@@ -70,12 +90,19 @@ class Room(NamedTuple):
         wishes: where FABRIK wishes joints to be [m], and by what weight, (joint, 4).
         eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
         ranks: how far from the goal the poses to restart from are [m], (restart,).
+        q: coordinates of the mechanism where each attempt is, the first from the start,
+            (1 + restart, coordinate).
+        progress: of each attempt, see above, (1 + restart, 4).
+        best: see above, (4,).
     """
 
     stack: Stack
     wishes: FloatArray
     eigen: FloatArray
     ranks: FloatArray
+    q: FloatArray
+    progress: FloatArray
+    best: FloatArray
 
 
 class Request(NamedTuple):
@@ -86,6 +113,7 @@ class Request(NamedTuple):
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that does [rad].
         max_iterations: of each attempt.
+        far_iterations: the same where geometry proves a target out of reach.
         restarts: coordinates of the mechanism for further attempts, (restart, coordinate).
         tips: where they put the effectors, positions [m] and rotations, (restart, effector, 7).
         chained: whether each target but the first starts from the solution before it.
@@ -95,6 +123,7 @@ class Request(NamedTuple):
     tolerance: float
     tolerance_rotation: float
     max_iterations: int
+    far_iterations: int
     restarts: FloatArray
     tips: FloatArray
     chained: bool
@@ -107,7 +136,7 @@ class Answers(NamedTuple):
         q: coordinates of the articulation, (target, coordinate).
         local: local rotations, (target, joint, 4).
         positions: of all joints [m], (target, joint, 3).
-        figures: see `batch.py`, (target, 4).
+        figures: see `batch.py`, (target, 6).
         history: distances before and after each iteration [m], (target, iteration), or (1, 1).
     """
 
@@ -121,7 +150,8 @@ class Answers(NamedTuple):
 def answer_given(
     integers, numbers, own_integers, own_numbers, sources, effectors, tips, bonds, reach,
     coordinates, freedoms, equations, starts, goals, tolerance, tolerance_rotation,
-    max_iterations, restarts, restart_tips, chained, q, local, positions, figures, history,
+    max_iterations, far_iterations, restarts, restart_tips, chained, q, local, positions, figures,
+    history,
 ):  # fmt: skip
     """Do what `answer_batch` does, called from Python: single arrays come in faster than tuples."""
     own = JointArrays(own_integers, own_numbers)
@@ -129,8 +159,9 @@ def answer_given(
         own, sources, effectors, tips, bonds, reach, coordinates, freedoms, equations
     )
     request = Request(
-        goals, tolerance, tolerance_rotation, max_iterations, restarts, restart_tips, chained
-    )
+        goals, tolerance, tolerance_rotation, max_iterations, far_iterations, restarts,
+        restart_tips, chained,
+    )  # fmt: skip
     answers = Answers(q, local, positions, figures, history)
     return answer_batch(JointArrays(integers, numbers), mechanism, starts, request, answers)
 
@@ -153,14 +184,14 @@ def answer_batch(joints, mechanism, starts, request, answers):
             return False
         take_coordinates(mechanism, q, posture.q)
         history = answers.history[i % len(answers.history)]
-        iterations, stalled = attempts(mechanism, goal, posture, room, request, best, history)
+        iterations, settled = attempts(mechanism, goal, posture, room, request, best, history)
         give_coordinates(mechanism, best, q)
         articulated_pose(joints, q, answers.positions[i], rotations)
         for j in range(len(joints.integers)):
             _, Q = joint_transform(joints, j, q)
             put_quaternion(answers.local[i], j, Q)
         answers.figures[i, ITERATIONS] = iterations
-        conclude(mechanism, goal, request, answers, i, rotations, stalled)
+        conclude(mechanism, goal, request, answers, i, rotations, settled)
     return True
 
 
@@ -179,50 +210,114 @@ def fit_goal(goal):
 def new_room(mechanism, restarts):
     """Return room for a solver of a mechanism."""
     n = len(mechanism.joints.integers)
-    return Room(new_stack(mechanism), np.empty((n, 4)), np.empty((2, 4, 4)), np.empty(restarts))
+    return Room(
+        new_stack(mechanism), np.empty((n, 4)), np.empty((2, 4, 4)), np.empty(restarts),
+        np.empty((restarts + 1, mechanism.coordinates)), np.empty((restarts + 1, 4)), np.empty(4),
+    )  # fmt: skip
 
 
 def attempts(mechanism, goal, posture, room, request, best, history):
-    """Attempt from the posture, then from a bent one if that is stuck, then from the restarts.
+    """Attempt from the posture, then from the restarts, until one reaches the goal.
 
-    Of the poses to restart from, the one that brings the effectors nearest to the goal comes first.
+    While others may follow an attempt is given up early. If none reaches the goal, all are
+    finished, and the first makes as many iterations as all of them may: its ends after one
+    attempt's iterations, two and so on count as attempts too. So what restarts give is the best
+    of more than one start gives, or fewer restarts, and can be no worse.
 
     Fills `best` with the coordinates of the best attempt.
 
     Returns:
-        The iterations of all attempts, and whether the best one stalled.
+        The iterations of all attempts, and whether the best one settled.
     """
-    more = len(request.restarts)
+    start_attempts(mechanism, posture, room)
+    count, least = iterations_for(mechanism, goal, request)
+    done, k, limit, hasty = 0, 0, count, len(request.restarts) > 0
+    while k >= 0:
+        place(mechanism, posture)
+        done += attempt(
+            mechanism, goal, posture, room, request, history, done, k, limit, least, hasty
+        )
+        keep_better(mechanism, goal, posture, room, best, k)
+        k, limit, hasty = next_attempt(
+            mechanism, goal, posture, room, request, k, count, limit, hasty
+        )
+    return done, room.best[BEST_STATE] <= SETTLED
+
+
+def start_attempts(mechanism, posture, room):
+    """Bring the start within its limits, and note that no attempt has been made."""
     for joint in range(len(mechanism.joints.integers)):
         clamp_joint(mechanism.joints, joint, posture.q)
-    place(mechanism, posture)
-    distance, _, _ = residuals(mechanism, goal, posture)
-    fill_from(history, 0, distance)
-    done, stalled, merit = attempt(mechanism, goal, posture, room, request, history, 0, more > 0)
-    copy(posture.q, best)
-    few = PATIENCE if more > 0 else STUCK
-    if done < few and stalled and merit > ROUNDING * mechanism.reach:
+    room.best[BEST_COST], room.best[BEST_STATE] = INFINITY, LIMITED
+    room.best[TAKEN], room.best[PERIODS] = 0.0, 1.0
+    for k in range(len(room.progress)):
+        for column in range(4):
+            room.progress[k, column] = 0.0
+
+
+def iterations_for(mechanism, goal, request):
+    """Return how many iterations an attempt may make, and the least residual if it is one's own.
+
+    It is where a single effector, its rotation free, has come as near as geometry allows.
+    """
+    least = least_residual(mechanism, goal)
+    count = request.far_iterations if least > request.tolerance else request.max_iterations
+    single = len(goal) == 1 and not mechanism.effectors[0, ORIENTED]
+    return count, least if single else 0.0
+
+
+def next_attempt(mechanism, goal, posture, room, request, k, count, limit, hasty):
+    """Give the posture the coordinates from which an attempt goes on, after one of k.
+
+    Returns:
+        Which attempt, -1 if none; how many iterations it may make; whether to give it up early.
+    """
+    plan, more = room.best, len(request.restarts)
+    if plan[BEST_STATE] == REACHED:
+        return -1, limit, hasty
+    if k == 0 and is_stuck(mechanism, room.progress[0]):
         nudge(mechanism, posture)
-        done, stuck, nudged = attempt(
-            mechanism, goal, posture, room, request, history, done, more > 0
-        )
-        if nudged < merit:
-            copy(posture.q, best)
-            stalled, merit = stuck, nudged
-    if merit > 0.0:
-        rank_restarts(mechanism, goal, request, room)
-    for r in range(more):
-        if merit == 0.0:
-            break
+        room.progress[0, BENT] = 1.0
+        return 0, limit, hasty
+    if plan[TAKEN] < more:
+        if plan[TAKEN] == 0.0:
+            rank_restarts(mechanism, goal, request, room)
         take_nearest(request, room, posture.q)
-        place(mechanism, posture)
-        done, stuck, again = attempt(
-            mechanism, goal, posture, room, request, history, done, r < more - 1 - more // PATIENT
-        )
-        if again < merit:
-            copy(posture.q, best)
-            stalled, merit = stuck, again
-    return done, stalled
+        plan[TAKEN] += 1.0
+        return int(plan[TAKEN]), count, True
+    again = most_promising(room)
+    if again < 0 and plan[PERIODS] <= more and room.progress[0, STATE] == LIMITED:
+        again = 0
+        plan[PERIODS] += 1.0
+    if again >= 0:
+        copy(room.q[again], posture.q)
+    return again, int(plan[PERIODS]) * count, False
+
+
+def is_stuck(mechanism, row):
+    """Return whether an attempt settled at once, away from its goal, and has not been bent yet."""
+    away = row[COST] > ROUNDING * mechanism.reach
+    return row[STATE] == SETTLED and row[MADE] < STUCK and row[BENT] == 0.0 and away
+
+
+def most_promising(room):
+    """Return the attempt of the least merit of those that were given up, -1 if there is none."""
+    found = -1
+    for k in range(len(room.progress)):
+        better = found < 0 or room.progress[k, COST] < room.progress[found, COST]
+        if room.progress[k, STATE] == GIVEN_UP and better:
+            found = k
+    return found
+
+
+def keep_better(mechanism, goal, posture, room, best, k):
+    """Note where an attempt is, and keep it if it is finished and the best so far."""
+    cost, state = merit_of(mechanism, goal, posture), room.progress[k, STATE]
+    room.progress[k, COST] = cost
+    copy(posture.q, room.q[k])
+    if state == REACHED or (state != GIVEN_UP and cost < room.best[BEST_COST]):
+        room.best[BEST_COST], room.best[BEST_STATE] = cost, state
+        copy(posture.q, best)
 
 
 def rank_restarts(mechanism, goal, request, room):
@@ -255,39 +350,50 @@ def take_nearest(request, room, q):
     copy(request.restarts[nearest], q)
 
 
-def attempt(mechanism, goal, posture, room, request, history, done, hasty):
-    """Update a placed posture until it reaches its goal, stalls, or has had its iterations.
+def attempt(mechanism, goal, posture, room, request, history, done, k, count, least, hasty):
+    """Update a placed posture until it reaches its goal, settles, or has had its iterations.
+
+    `done` iterations have been made by all attempts; how this one, k, ends is noted.
 
     Returns:
-        All iterations so far, whether it ended before its last, and how far it is from its goal
-        [m], 0 if it reached that.
+        The iterations made.
     """
-    distance, angle, merit = residuals(mechanism, goal, posture)
-    milestone, since = merit, 0
-    for i in range(request.max_iterations + 1):
-        if within(mechanism, request, distance, angle):
-            return done + i, True, 0.0
-        if i == request.max_iterations:
+    distance, angle, total = residuals(mechanism, goal, posture)
+    if done == 0 and k == 0:
+        put_if_room(history, 0, distance)
+    milestone, since = total, 0
+    first, state = int(room.progress[k, MADE]), LIMITED
+    made = first
+    while state == LIMITED:
+        if within(mechanism, request, distance, angle, least):
+            state = REACHED
+        if state == REACHED or made >= count:
             break
-        before = merit
+        before = total
         update(mechanism, goal, posture, room)
-        distance, angle, merit = residuals(mechanism, goal, posture)
-        fill_from(history, done + i + 1, distance)
+        made += 1
+        distance, angle, total = residuals(mechanism, goal, posture)
+        put_if_room(history, done + made - first, distance)
         since += 1
-        if merit < PROGRESS * milestone:
-            milestone, since = merit, 0
-        still = abs(before - merit) <= ROUNDING * mechanism.reach
-        if still or (hasty and since >= PATIENCE):
-            reached = within(mechanism, request, distance, angle)
-            return done + i + 1, True, 0.0 if reached else merit
-    return done + request.max_iterations, False, merit
+        if total < PROGRESS * milestone:
+            milestone, since = total, 0
+        if abs(before - total) <= ROUNDING * mechanism.reach:
+            state = REACHED if within(mechanism, request, distance, angle, least) else SETTLED
+        elif hasty and since >= PATIENCE:
+            state = REACHED if within(mechanism, request, distance, angle, least) else GIVEN_UP
+    room.progress[k, MADE], room.progress[k, STATE] = made, state
+    return made - first
 
 
-def within(mechanism, request, distance, angle):
-    """Return whether the tolerances are kept, with some room for the rounding of another pose."""
+def within(mechanism, request, distance, angle, least):
+    """Return whether the tolerances are kept, with some room for the rounding of another pose.
+
+    A single target out of reach counts as kept within the tolerance of the least distance.
+    """
     room = min(ROUNDING * mechanism.reach, 0.5 * request.tolerance)
     angular = min(ROUNDING, 0.5 * request.tolerance_rotation)
-    return distance <= request.tolerance - room and angle <= request.tolerance_rotation - angular
+    near = distance <= least + request.tolerance - room
+    return near and angle <= request.tolerance_rotation - angular
 
 
 def nudge(mechanism, posture):
@@ -303,31 +409,35 @@ def nudge(mechanism, posture):
             turn = turn_about(NUDGE_AXIS, angle)
             put_ball(joints, q, j, normalised(multiply(ball_at(joints, q, j), turn)))
             clamp_joint(joints, j, q)
-    place(mechanism, posture)
 
 
-def conclude(mechanism, goal, request, answers, i, rotations, stalled):
-    """Fill residuals and outcome of a target from the pose of all joints."""
-    distance, angle = 0.0, 0.0
+def conclude(mechanism, goal, request, answers, i, rotations, settled):
+    """Fill residuals, merit and outcome of a target from the pose of all joints."""
+    distance, angle, total = 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
-        j = mechanism.effectors[e, EFFECTOR]
-        way = subtract(vector_at(goal, e, POSITION), vector_at(answers.positions[i], j))
-        distance = max(distance, norm(way))
+        j, apart, off = mechanism.effectors[e, EFFECTOR], 0.0, 0.0
+        apart = norm(subtract(vector_at(goal, e, POSITION), vector_at(answers.positions[i], j)))
         if mechanism.effectors[e, ORIENTED]:
-            wanted = quaternion_at(goal, e, ROTATION)
-            angle = max(angle, angle_between(quaternion_at(rotations, j), wanted))
-    answers.figures[i, RESIDUAL], answers.figures[i, RESIDUAL_ROTATION] = distance, angle
-    outcome = outcome_of(mechanism, goal, request, distance, angle, stalled)
-    answers.figures[i, OUTCOME] = outcome.value
+            off = angle_between(quaternion_at(rotations, j), quaternion_at(goal, e, ROTATION))
+        distance, angle = max(distance, apart), max(angle, off)
+        total += weighted_square(mechanism, goal[e, WEIGHT], apart, off)
+    least, figures = least_residual(mechanism, goal), answers.figures[i]
+    figures[RESIDUAL], figures[RESIDUAL_ROTATION], figures[MERIT] = (
+        distance,
+        angle,
+        math.sqrt(total),
+    )
+    figures[EXCESS] = max(0.0, distance - least)
+    figures[OUTCOME] = outcome_of(request, distance, angle, least, settled).value
 
 
-def outcome_of(mechanism, goal, request, distance, angle, stalled):
+def outcome_of(request, distance, angle, least, settled):
     """Return how a solve ended: UNREACHABLE only where geometry proves it."""
     if distance <= request.tolerance and angle <= request.tolerance_rotation:
         return Outcome.CONVERGED
-    if too_far(mechanism, goal, request.tolerance):
-        return Outcome.UNREACHABLE
-    return Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT
+    if least > request.tolerance:
+        return Outcome.UNREACHABLE if settled else Outcome.UNREACHABLE_UNSETTLED
+    return Outcome.STALLED if settled else Outcome.ITERATION_LIMIT
 
 
 def copy(source, target):

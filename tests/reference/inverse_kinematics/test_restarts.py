@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from reference import Outcome, Target, forward_kinematics, rotation, solve_ik
-from reference.compiled import bind
-from reference.inverse_kinematics.attempts import STUCK, attempts, rank_restarts, take_nearest
+from reference.inverse_kinematics.attempts import rank_restarts, take_nearest
 from reference.inverse_kinematics.mechanism import LEVER
 from reference.inverse_kinematics.preparation import prepare
 
@@ -89,29 +88,6 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
     assert (taken == prepared.restarts[np.argsort(expected)]).all()
 
 
-@pytest.mark.parametrize(
-    ("restarts", "hasty"),
-    [(0, [0]), (1, [1, 0]), (4, [1, 1, 1, 0, 0]), (9, [1] * 7 + [0] * 3)],
-)
-def test_all_but_the_last_quarter_of_the_attempts_are_in_haste(
-    arm, poses, machine, restarts, hasty
-):
-    found = []
-
-    def attempt(mechanism, goal, posture, room, request, history, done, in_haste):
-        found.append(in_haste)
-        return done + STUCK, True, 1.0
-
-    target = Target(poses.position[0], poses.rotation[0], 7)
-    mechanism, goal, posture, _ = machine(arm, arm.neutral(), [target])
-    prepared = prepare(arm, (7,), (True,), restarts, 5)
-    request = SimpleNamespace(restarts=prepared.restarts, tips=prepared.tips)
-    room, best = SimpleNamespace(ranks=np.empty(restarts)), np.empty(mechanism.coordinates)
-    trial = bind(attempts, attempt=attempt)
-    trial(mechanism, goal, posture, room, request, best, np.empty(1))
-    assert found == hasty
-
-
 def test_the_best_of_all_attempts_is_returned(arm, poses, rng, solver, speed):
     """With no iterations the attempts are the start and the random poses as they are."""
     q, wanted = arm.random(rng), Target(poses.position[0])
@@ -162,8 +138,8 @@ def test_the_iterations_of_all_attempts_are_counted_and_recorded(arm, rng, solve
     far = Target([100.0, 0.0, 0.0])
     q = arm.random(rng)
     solution = solve_ik(arm, q, far, solver, restarts=2, max_iterations=4, record=True)
-    assert solution.outcome is Outcome.UNREACHABLE
-    assert 3 <= solution.iterations <= 16
+    assert solution.outcome.unreachable
+    assert 3 <= solution.iterations <= 20
     assert solution.history.shape == (solution.iterations + 1,)
     assert np.isfinite(solution.history).all()
     assert (solution.history >= 90.0).all()
