@@ -63,19 +63,21 @@ from .mechanism import (
 from .stacked import Stack, new_stack
 
 # An attempt that others may follow is given up once this many iterations have not brought it this
-# much nearer. It is finished later if none of the others reaches the target either.
-PATIENCE, PROGRESS = 3, 0.5
+# much nearer. If none of the others reaches the target either it goes on, so many times as patient
+# whenever it does.
+PATIENCE, PROGRESS, MORE_PATIENT = 3, 0.5, 4
 # One that settles within so few is stuck, such as a straight chain, perhaps folded since, whose
 # target lies on its own line.
 STUCK = 6
 # How an attempt ended: within the tolerances, or of the nearest point that geometry allows; with no
 # more progress; with its iterations used; given up early.
 REACHED, SETTLED, LIMITED, GIVEN_UP = range(4)
-# Columns of Room.progress, (attempt, 4): iterations made, how it ended, its merit [m], and 1 where
-# its stuck start has been bent.
-MADE, STATE, COST, BENT = range(4)
-# Entries of Room.best: merit [m] and ending of the best attempt that is finished; how many poses to
-# restart from have been taken; how many attempts' iterations the first one may make.
+# Columns of Room.progress, (attempt, 6): iterations made, how it ended, its merit [m], 1 where its
+# stuck start has been bent, its patience, and how far the pose it starts from is from the goal [m].
+MADE, STATE, COST, BENT, WAIT, RANK = range(6)
+# Entries of the last row of Room.progress: merit [m] and ending of the best attempt that is
+# finished; how many poses to restart from have been taken; how many attempts' iterations the first
+# one may make.
 BEST_COST, BEST_STATE, TAKEN, PERIODS = range(4)
 INFINITY = math.inf
 # A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
@@ -89,20 +91,16 @@ class Room(NamedTuple):
         stack: of the Jacobian methods.
         wishes: where FABRIK wishes joints to be [m], and by what weight, (joint, 4).
         eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
-        ranks: how far from the goal the poses to restart from are [m], (restart,).
         q: coordinates of the mechanism where each attempt is, the first from the start,
-            (1 + restart, coordinate).
-        progress: of each attempt, see above, (1 + restart, 4).
-        best: see above, (4,).
+            and in the last row the best end of one, (1 + restart + 1, coordinate).
+        progress: of each attempt and of all, see above, (1 + restart + 1, 6).
     """
 
     stack: Stack
     wishes: FloatArray
     eigen: FloatArray
-    ranks: FloatArray
     q: FloatArray
     progress: FloatArray
-    best: FloatArray
 
 
 class Request(NamedTuple):
@@ -171,27 +169,25 @@ def answer_batch(joints, mechanism, starts, request, answers):
 
     `starts`, (start, coordinate), are used in turn.
     """
-    posture, best = new_posture(mechanism), np.empty(mechanism.coordinates)
-    room, rotations = (
-        new_room(mechanism, len(request.restarts)),
-        np.empty((len(joints.integers), 4)),
-    )
+    posture, rotations = new_posture(mechanism), np.empty((len(joints.integers), 4))
+    room = new_room(mechanism, len(request.restarts))
     for i in range(len(request.goals)):
         q, goal = answers.q[i], request.goals[i]
         chained = request.chained and i > 0
-        copy(answers.q[i - 1] if chained else starts[i % len(starts)], q)
+        copy_row(answers.q[i - 1] if chained else starts[i % len(starts)], q)
         if not (fit_start(joints, q) and fit_goal(goal)):
             return False
         take_coordinates(mechanism, q, posture.q)
         history = answers.history[i % len(answers.history)]
-        iterations, settled = attempts(mechanism, goal, posture, room, request, best, history)
-        give_coordinates(mechanism, best, q)
+        least = least_residual(mechanism, goal)
+        iterations, settled = attempts(mechanism, goal, posture, room, request, history, least)
+        give_coordinates(mechanism, room.q[-1], q)
         articulated_pose(joints, q, answers.positions[i], rotations)
         for j in range(len(joints.integers)):
             _, Q = joint_transform(joints, j, q)
             put_quaternion(answers.local[i], j, Q)
         answers.figures[i, ITERATIONS] = iterations
-        conclude(mechanism, goal, request, answers, i, rotations, settled)
+        conclude(mechanism, goal, request, answers, i, rotations, least, settled)
     return True
 
 
@@ -211,12 +207,12 @@ def new_room(mechanism, restarts):
     """Return room for a solver of a mechanism."""
     n = len(mechanism.joints.integers)
     return Room(
-        new_stack(mechanism), np.empty((n, 4)), np.empty((2, 4, 4)), np.empty(restarts),
-        np.empty((restarts + 1, mechanism.coordinates)), np.empty((restarts + 1, 4)), np.empty(4),
+        new_stack(mechanism), np.empty((n, 4)), np.empty((2, 4, 4)),
+        np.empty((restarts + 2, mechanism.coordinates)), np.empty((restarts + 2, 6)),
     )  # fmt: skip
 
 
-def attempts(mechanism, goal, posture, room, request, best, history):
+def attempts(mechanism, goal, posture, room, request, history, least):
     """Attempt from the posture, then from the restarts, until one reaches the goal.
 
     While others may follow an attempt is given up early. If none reaches the goal, all are
@@ -224,74 +220,63 @@ def attempts(mechanism, goal, posture, room, request, best, history):
     attempt's iterations, two and so on count as attempts too. So what restarts give is the best
     of more than one start gives, or fewer restarts, and can be no worse.
 
-    Fills `best` with the coordinates of the best attempt.
+    Fills the last row of `room.q` with the coordinates of the best attempt; no pose has a lesser
+    residual than `least` [m].
 
     Returns:
         The iterations of all attempts, and whether the best one settled.
     """
     start_attempts(mechanism, posture, room)
-    count, least = iterations_for(mechanism, goal, request)
-    done, k, limit, hasty = 0, 0, count, len(request.restarts) > 0
+    count = request.far_iterations if least > request.tolerance else request.max_iterations
+    single = len(goal) == 1 and not mechanism.effectors[0, ORIENTED]
+    nearest = least if single else 0.0
+    done, k, limit = 0, 0, count
     while k >= 0:
         place(mechanism, posture)
-        done += attempt(
-            mechanism, goal, posture, room, request, history, done, k, limit, least, hasty
-        )
-        keep_better(mechanism, goal, posture, room, best, k)
-        k, limit, hasty = next_attempt(
-            mechanism, goal, posture, room, request, k, count, limit, hasty
-        )
-    return done, room.best[BEST_STATE] <= SETTLED
+        done += attempt(mechanism, goal, posture, room, request, history, done, k, limit, nearest)
+        keep_better(mechanism, goal, posture, room, k)
+        k, limit = next_attempt(mechanism, goal, posture, room, request, k, count, limit)
+    return done, room.progress[-1, BEST_STATE] <= SETTLED
 
 
 def start_attempts(mechanism, posture, room):
     """Bring the start within its limits, and note that no attempt has been made."""
     for joint in range(len(mechanism.joints.integers)):
         clamp_joint(mechanism.joints, joint, posture.q)
-    room.best[BEST_COST], room.best[BEST_STATE] = INFINITY, LIMITED
-    room.best[TAKEN], room.best[PERIODS] = 0.0, 1.0
-    for k in range(len(room.progress)):
-        for column in range(4):
-            room.progress[k, column] = 0.0
+    plan, several = room.progress[-1], len(room.progress) > 2
+    plan[BEST_COST], plan[BEST_STATE], plan[TAKEN], plan[PERIODS] = INFINITY, LIMITED, 0.0, 1.0
+    for k in range(len(room.progress) - 1):
+        row = room.progress[k]
+        row[MADE], row[STATE], row[COST], row[BENT] = 0.0, LIMITED, INFINITY, 0.0
+        row[WAIT] = PATIENCE if several else INFINITY
 
 
-def iterations_for(mechanism, goal, request):
-    """Return how many iterations an attempt may make, and the least residual if it is one's own.
-
-    It is where a single effector, its rotation free, has come as near as geometry allows.
-    """
-    least = least_residual(mechanism, goal)
-    count = request.far_iterations if least > request.tolerance else request.max_iterations
-    single = len(goal) == 1 and not mechanism.effectors[0, ORIENTED]
-    return count, least if single else 0.0
-
-
-def next_attempt(mechanism, goal, posture, room, request, k, count, limit, hasty):
+def next_attempt(mechanism, goal, posture, room, request, k, count, limit):
     """Give the posture the coordinates from which an attempt goes on, after one of k.
 
     Returns:
-        Which attempt, -1 if none; how many iterations it may make; whether to give it up early.
+        Which attempt, -1 if none, and how many iterations it may have made in the end.
     """
-    plan, more = room.best, len(request.restarts)
+    plan, first, more = room.progress[-1], room.progress[0], len(request.restarts)
     if plan[BEST_STATE] == REACHED:
-        return -1, limit, hasty
-    if k == 0 and is_stuck(mechanism, room.progress[0]):
+        return -1, limit
+    if k == 0 and is_stuck(mechanism, first):
         nudge(mechanism, posture)
-        room.progress[0, BENT] = 1.0
-        return 0, limit, hasty
+        first[BENT] = 1.0
+        return 0, limit
     if plan[TAKEN] < more:
         if plan[TAKEN] == 0.0:
             rank_restarts(mechanism, goal, request, room)
         take_nearest(request, room, posture.q)
         plan[TAKEN] += 1.0
-        return int(plan[TAKEN]), count, True
+        return int(plan[TAKEN]), count
     again = most_promising(room)
-    if again < 0 and plan[PERIODS] <= more and room.progress[0, STATE] == LIMITED:
+    if again < 0 and plan[PERIODS] <= more and first[STATE] == LIMITED:
         again = 0
         plan[PERIODS] += 1.0
     if again >= 0:
-        copy(room.q[again], posture.q)
-    return again, int(plan[PERIODS]) * count, False
+        copy_row(room.q[again], posture.q)
+    return again, int(plan[PERIODS]) * count
 
 
 def is_stuck(mechanism, row):
@@ -301,23 +286,30 @@ def is_stuck(mechanism, row):
 
 
 def most_promising(room):
-    """Return the attempt of the least merit of those that were given up, -1 if there is none."""
-    found = -1
-    for k in range(len(room.progress)):
-        better = found < 0 or room.progress[k, COST] < room.progress[found, COST]
-        if room.progress[k, STATE] == GIVEN_UP and better:
-            found = k
+    """Return the attempt to go on with of those given up, -1 if there is none.
+
+    The least patient come first, and among them the one of the least merit.
+    """
+    found, row = -1, room.progress[-1]
+    for k in range(len(room.progress) - 1):
+        other = room.progress[k]
+        if other[STATE] == GIVEN_UP:
+            sooner = found < 0 or other[WAIT] < row[WAIT]
+            if sooner or (other[WAIT] == row[WAIT] and other[COST] < row[COST]):
+                found, row = k, other
     return found
 
 
-def keep_better(mechanism, goal, posture, room, best, k):
+def keep_better(mechanism, goal, posture, room, k):
     """Note where an attempt is, and keep it if it is finished and the best so far."""
-    cost, state = merit_of(mechanism, goal, posture), room.progress[k, STATE]
-    room.progress[k, COST] = cost
-    copy(posture.q, room.q[k])
-    if state == REACHED or (state != GIVEN_UP and cost < room.best[BEST_COST]):
-        room.best[BEST_COST], room.best[BEST_STATE] = cost, state
-        copy(posture.q, best)
+    row, plan, cost = room.progress[k], room.progress[-1], merit_of(mechanism, goal, posture)
+    row[COST] = cost
+    copy_row(posture.q, room.q[k])
+    if row[STATE] == GIVEN_UP:
+        row[WAIT] *= MORE_PATIENT
+    elif row[STATE] == REACHED or cost < plan[BEST_COST]:
+        plan[BEST_COST], plan[BEST_STATE] = cost, row[STATE]
+        copy_row(posture.q, room.q[-1])
 
 
 def rank_restarts(mechanism, goal, request, room):
@@ -331,7 +323,7 @@ def rank_restarts(mechanism, goal, request, room):
             if mechanism.effectors[e, ORIENTED]:
                 wanted = quaternion_at(goal, e, ROTATION)
                 angle = max(angle, rough_angle(quaternion_at(request.tips[r], e, 3), wanted))
-        room.ranks[r] = distance + lever * angle
+        room.progress[1 + r, RANK] = distance + lever * angle
 
 
 def rough_angle(a, b):
@@ -343,14 +335,14 @@ def rough_angle(a, b):
 def take_nearest(request, room, q):
     """Copy the nearest of the poses to restart from that has not yet been taken."""
     nearest = 0
-    for r in range(1, len(room.ranks)):
-        if room.ranks[r] < room.ranks[nearest]:
+    for r in range(1, len(request.restarts)):
+        if room.progress[1 + r, RANK] < room.progress[1 + nearest, RANK]:
             nearest = r
-    room.ranks[nearest] = INFINITY
-    copy(request.restarts[nearest], q)
+    room.progress[1 + nearest, RANK] = INFINITY
+    copy_row(request.restarts[nearest], q)
 
 
-def attempt(mechanism, goal, posture, room, request, history, done, k, count, least, hasty):
+def attempt(mechanism, goal, posture, room, request, history, done, k, count, least):
     """Update a placed posture until it reaches its goal, settles, or has had its iterations.
 
     `done` iterations have been made by all attempts; how this one, k, ends is noted.
@@ -379,7 +371,7 @@ def attempt(mechanism, goal, posture, room, request, history, done, k, count, le
             milestone, since = total, 0
         if abs(before - total) <= ROUNDING * mechanism.reach:
             state = REACHED if within(mechanism, request, distance, angle, least) else SETTLED
-        elif hasty and since >= PATIENCE:
+        elif since >= room.progress[k, WAIT]:
             state = REACHED if within(mechanism, request, distance, angle, least) else GIVEN_UP
     room.progress[k, MADE], room.progress[k, STATE] = made, state
     return made - first
@@ -411,7 +403,7 @@ def nudge(mechanism, posture):
             clamp_joint(joints, j, q)
 
 
-def conclude(mechanism, goal, request, answers, i, rotations, settled):
+def conclude(mechanism, goal, request, answers, i, rotations, least, settled):
     """Fill residuals, merit and outcome of a target from the pose of all joints."""
     distance, angle, total = 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
@@ -421,7 +413,7 @@ def conclude(mechanism, goal, request, answers, i, rotations, settled):
             off = angle_between(quaternion_at(rotations, j), quaternion_at(goal, e, ROTATION))
         distance, angle = max(distance, apart), max(angle, off)
         total += weighted_square(mechanism, goal[e, WEIGHT], apart, off)
-    least, figures = least_residual(mechanism, goal), answers.figures[i]
+    figures = answers.figures[i]
     figures[RESIDUAL], figures[RESIDUAL_ROTATION], figures[MERIT] = (
         distance,
         angle,
@@ -440,7 +432,7 @@ def outcome_of(request, distance, angle, least, settled):
     return Outcome.STALLED if settled else Outcome.ITERATION_LIMIT
 
 
-def copy(source, target):
+def copy_row(source, target):
     """Copy one row of numbers into another."""
     for k in range(len(source)):
         target[k] = source[k]

@@ -96,16 +96,17 @@ def solve_batch(tree, path, starts, targets, limits, chained, solved):
             return False
         history = solved.history[i % len(solved.history)]
         pose_chain(chain, path, local)
-        iterations, settled = iterate_periods(chain, kept, target, limits, history)
+        d = root_distance(chain, target)
+        iterations, settled = iterate_periods(chain, kept, target, d, limits, history)
         if iterations > 0:
             turn_links(chain)
             put_local(chain, path, local)
         forward_pose(tree.parents, tree.offsets, local, solved.positions[i], rotations)
         residual = norm(subtract(vector_at(solved.positions[i], path[-1]), target))
-        least = least_distance(chain, root_distance(chain, target))
+        least = least_distance(chain, d)
         figures[RESIDUAL], figures[RESIDUAL_ROTATION] = residual, 0.0
         figures[ITERATIONS] = iterations
-        figures[OUTCOME] = judge(chain, target, residual, limits.tolerance, settled).value
+        figures[OUTCOME] = judge(chain, d, least, residual, limits.tolerance, settled).value
         figures[MERIT], figures[EXCESS] = residual, max(0.0, residual - least)
     return True
 
@@ -116,27 +117,29 @@ def largest(v):
     return x + y + z if x + y + z != x + y + z else max(x, y, z)
 
 
-def iterate_periods(chain, kept, target, limits, history):
+def iterate_periods(chain, kept, target, d, limits, history):
     """Iterate for some periods of so many iterations each; leave the best end of a period.
+
+    The target is at distance d from the root [m].
 
     Returns:
         The number of iterations, and whether the best settled.
     """
-    d, residual = root_distance(chain, target), tip_error(chain, target)
+    residual, least, margin = tip_error(chain, target), least_distance(chain, d), rounding(chain, d)
     put_if_room(history, 0, residual)
-    tolerance = kept_tolerance(chain, d, limits.tolerance)
-    far = least_distance(chain, d) > limits.tolerance
-    count = limits.far_iterations if far else limits.max_iterations
+    # The residual is recomputed from the rotations in the end: leave that rounding some room.
+    tolerance = least + limits.tolerance - min(8.0 * margin, 0.5 * limits.tolerance)
+    count = limits.far_iterations if least > limits.tolerance else limits.max_iterations
     if residual > tolerance and not out_of_reach(chain, d) and on_one_line(chain, target):
         bend(chain)
-    done, settled = iterate(chain, target, tolerance, count, history, 0)
+    done, settled = iterate(chain, target, tolerance, margin, count, history, 0)
     if settled or limits.periods == 1:
         return done, settled
     best = tip_error(chain, target)
     copy_pose(chain, kept)
     best_settled = False
     for _ in range(limits.periods - 1):
-        made, settled = iterate(chain, target, tolerance, count, history, done)
+        made, settled = iterate(chain, target, tolerance, margin, count, history, done)
         done += made
         residual = tip_error(chain, target)
         if residual < best:
@@ -148,21 +151,14 @@ def iterate_periods(chain, kept, target, limits, history):
     return done, best_settled
 
 
-def kept_tolerance(chain, d, tolerance):
-    """Return what counts as reached, or as nearest, at distance d from the root [m].
-
-    The residual is recomputed from the rotations in the end: that rounding is left some room.
-    """
-    return least_distance(chain, d) + tolerance - min(8.0 * rounding(chain, d), 0.5 * tolerance)
-
-
-def iterate(chain, target, tolerance, max_iterations, history, done):
+def iterate(chain, target, tolerance, margin, max_iterations, history, done):
     """Sweep until the effector is within the tolerance of the target, or makes no more progress.
+
+    Distances are known to a margin [m].
 
     Returns:
         The number of iterations, and whether they ended because no more would be of use.
     """
-    margin = rounding(chain, root_distance(chain, target))
     residual = tip_error(chain, target)
     for i in range(max_iterations):
         if residual <= tolerance:
@@ -182,11 +178,10 @@ def put_if_room(row, i, value):
         row[i] = value
 
 
-def judge(chain, target, residual, tolerance, settled):
+def judge(chain, d, least, residual, tolerance, settled):
     """Return the outcome, by the residual recomputed and by geometry."""
-    d = root_distance(chain, target)
     if residual <= tolerance:
         return Outcome.CONVERGED
-    if least_distance(chain, d) > tolerance + rounding(chain, d):
+    if least > tolerance + rounding(chain, d):
         return Outcome.UNREACHABLE if settled else Outcome.UNREACHABLE_UNSETTLED
     return Outcome.STALLED if settled else Outcome.ITERATION_LIMIT

@@ -274,4 +274,4 @@ def test_with_a_free_root_and_five_effectors_the_merit_does_not_grow():
             for n in (0, 1, 3, 10, 30, 100, 300, 1000, 3000)
         ]
         assert merits[-1] < 0.9 * merits[0]
-        assert (np.diff(merits) <= 1e-3 * np.array(merits[:-1])).all()
+        assert (np.diff(merits) <= 1e-12).all()  # some roundings of a metre

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reference import Outcome, Target, forward_kinematics, rotation, solve_ik
-from reference.inverse_kinematics.attempts import rank_restarts, take_nearest
+from reference.inverse_kinematics.attempts import RANK, rank_restarts, take_nearest
 from reference.inverse_kinematics.mechanism import LEVER
 from reference.inverse_kinematics.preparation import prepare
 
@@ -74,14 +74,14 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
     ]
     goal = machine(arm, arm.neutral(), targets).goal
     request = SimpleNamespace(restarts=prepared.restarts, tips=prepared.tips)
-    room = SimpleNamespace(ranks=np.empty(9))
+    room = SimpleNamespace(progress=np.empty((11, 6)))
     rank_restarts(prepared.mechanism, goal, request, room)
     full = np.hstack([prepared.restarts, np.zeros((9, arm.coordinate_count))])[:, :8]
     pose = forward_kinematics(arm, full)
     ways = [np.linalg.norm(pose.positions[:, t.effector] - t.position, axis=1) for t in targets]
     angles = rotation.angle(pose.rotations[:, 7], targets[0].rotation)
     expected = np.max(ways, axis=0) + LEVER * prepared.mechanism.reach * 4.0 * np.sin(angles / 4.0)
-    np.testing.assert_allclose(room.ranks, expected, rtol=1e-12, atol=0)
+    np.testing.assert_allclose(room.progress[1:10, RANK], expected, rtol=1e-12, atol=0)
     taken = np.empty((9, prepared.mechanism.coordinates))
     for q in taken:
         take_nearest(request, room, q)
