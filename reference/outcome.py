@@ -12,6 +12,12 @@ class Outcome(IntEnum):
     ITERATION_LIMIT = 3
     DIVERGED = 4
     AT_ROUNDING = 5
+    UNREACHABLE_UNSETTLED = 6
+
+    @property
+    def unreachable(self) -> bool:
+        """Whether geometry proves that no pose reaches the target, settled or not."""
+        return self in (Outcome.UNREACHABLE, Outcome.UNREACHABLE_UNSETTLED)
 
     @property
     def sentence(self) -> str:
@@ -26,12 +32,14 @@ class Outcome(IntEnum):
 
 _SENTENCES = {
     Outcome.CONVERGED: "The residual is within the tolerance.",
-    Outcome.UNREACHABLE: "No pose reaches the target: geometry forbids it; the residual says how "
-    "far this one is.",
+    Outcome.UNREACHABLE: "No pose reaches the target: geometry forbids it; the iterations settled "
+    "at this one.",
     Outcome.STALLED: "The iterations stopped making progress before the tolerance was met.",
     Outcome.ITERATION_LIMIT: "All iterations were used before the tolerance was met.",
     Outcome.DIVERGED: "The iterations left the finite numbers; what is returned is the last finite "
     "iterate.",
     Outcome.AT_ROUNDING: "The residual is above the tolerance, but no larger than rounding may "
     "leave it, and the iterations no longer make it smaller.",
+    Outcome.UNREACHABLE_UNSETTLED: "No pose reaches the target: geometry forbids it; all "
+    "iterations were used before they settled, and some pose may be nearer.",
 }

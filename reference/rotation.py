@@ -40,6 +40,24 @@ def unit(name: str, q: ArrayLike) -> FloatArray:
     return values / lengths
 
 
+def normalise(quaternions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return quaternions made unit, (..., 4), and how far their lengths were from one, (...).
+
+    Raises:
+        ValueError: if they are not finite, or one has no length.
+    """
+    given = arguments.array("quaternions", quaternions, "...", 4)
+    largest = np.abs(given).max(axis=-1, keepdims=True)
+    if not largest.all():
+        where = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
+        raise ValueError(f"quaternions: expected lengths above 0, got 0 at index {where}")
+    scaled = given / largest  # no square overflows or vanishes
+    lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
+    with np.errstate(over="ignore"):  # the length of the largest numbers is none itself
+        deviation = np.abs(lengths * largest - 1.0)[..., 0]
+    return scaled / lengths, deviation
+
+
 def check_unit(name: str, lengths: FloatArray) -> None:
     """Raise a ValueError that names the first length further than 1e-6 from one."""
     off = np.abs(lengths - 1.0) > UNIT_TOLERANCE

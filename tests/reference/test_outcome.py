@@ -5,8 +5,9 @@ import pytest
 from reference.outcome import Outcome
 
 
-def test_the_outcomes_are_the_six_of_the_interface():
+def test_the_outcomes_are_those_of_the_interface():
     names = ["CONVERGED", "UNREACHABLE", "STALLED", "ITERATION_LIMIT", "DIVERGED", "AT_ROUNDING"]
+    names.append("UNREACHABLE_UNSETTLED")
     assert [outcome.name for outcome in Outcome] == names
 
 

@@ -381,7 +381,7 @@ def problem_of(name, closed, rng, drawn_to=()):
         Target(pose.positions[:, e], pose.rotations[:, e] if oriented else None, e, 1.0 + k)
         for k, e in enumerate(effectors)
     ]
-    goals = goals_of(checked_targets(model, targets, -1), (4,))
+    goals = goals_of(checked_targets(model, targets, None), (4,))
     constrained = ~np.isin(np.arange(4), drawn_to)
     goals[~constrained, :, :3] += 0.1
     mechanism = prepared.mechanism
