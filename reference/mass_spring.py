@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .arguments import FloatArray, IndexArray, array, frozen, indices, shape
+from .arguments import BoolArray, FloatArray, IndexArray, array, flags, frozen, indices
 from .block_sum import BlockSum
 from .compiled import TwoSpeeds
 from .regions import LARGE, Regions, cut
@@ -33,8 +33,6 @@ from .springs import (
     stiffness_blocks,
     sum_springs,
 )
-
-BoolArray = NDArray[np.bool_]
 
 
 class SystemArrays(NamedTuple):
@@ -107,7 +105,7 @@ class MassSpring:
                 _per_spring("rest_lengths", rest_lengths, len(ends)),
                 _per_spring("stiffnesses", stiffnesses, len(ends)),
                 _per_spring("dampings", dampings, len(ends)),
-                _flags("tension_only", tension_only, len(ends)),
+                flags("tension_only", tension_only, len(ends)),
                 np.unique(indices("pinned", pinned, "pinned", least=0, below=len(mass))),
                 array("gravity", gravity, 3).copy(),
             )
@@ -475,15 +473,6 @@ def _per_spring(name: str, value: ArrayLike, count: int) -> FloatArray:
     if given.ndim == 0:
         return _not_negative(name, np.full(count, given))
     return _not_negative(name, array(name, given, count).copy())
-
-
-def _flags(name: str, value: ArrayLike, count: int) -> BoolArray:
-    given = np.asarray(value)
-    if given.dtype != bool:
-        raise ValueError(f"{name}: expected booleans, got {given.dtype} values")
-    if given.shape not in {(), (count,)}:
-        raise ValueError(f"{name}: expected shape ({count},), got {shape(given.shape)}")
-    return np.array(np.broadcast_to(given, (count,)))
 
 
 def _not_negative(name: str, values: FloatArray) -> FloatArray:

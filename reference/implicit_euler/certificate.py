@@ -29,9 +29,9 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, IndexArray, array
+from ..arguments import BoolArray, FloatArray, IndexArray, array
 from ..linear_solver import Factor, NotPositiveDefiniteError, factorize
-from ..mass_spring import BoolArray, lengths
+from ..mass_spring import lengths
 from .objective import Objective
 
 EPS = float(np.finfo(float).eps)
