@@ -58,9 +58,13 @@ def number(
 ) -> float:
     """Return a float, at least `least`, greater than `above`, and at most 1e75.
 
+    One that has to be greater than zero has to be at least 1e-75, so that one can divide by it.
+
     Raises:
         ValueError: if it is not a finite number in that range.
     """
+    if above == 0.0:
+        least = max(least, 1.0 / LARGEST_COORDINATE)
     if type(value) is float and least <= value <= LARGEST_COORDINATE and value > above:
         return value
     if isinstance(value, str | bool):

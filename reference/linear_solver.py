@@ -9,10 +9,10 @@ from typing import Any, Protocol
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
-from .arguments import FloatArray, choice, floats, shape, shown
+from .arguments import FloatArray, choice
 from .cholesky import CholeskyFactor, NotPositiveDefiniteError
+from .cholesky.factor import right_sides, square
 
 
 class Factor(Protocol):
@@ -39,34 +39,9 @@ def factorize(matrix: Any, library: str = "supernodal") -> Factor:
         ValueError: if the library is unknown, or the matrix not sparse, real and square.
     """
     factor = LIBRARIES[choice("library", library, LIBRARIES)]
-    matrix = checked_matrix(matrix)
-    if not np.isfinite(matrix.data).all():
+    if not np.isfinite(square(matrix).data).all():
         raise NotPositiveDefiniteError("matrix: expected finite entries, got NaN or infinity")
     return factor(matrix)
-
-
-def checked_matrix(matrix: Any) -> Any:
-    """Return the argument if it is a sparse, real and square matrix.
-
-    Raises:
-        ValueError: if it is anything else.
-    """
-    square = scipy.sparse.issparse(matrix) and matrix.ndim == 2 and len({*matrix.shape}) == 1
-    if not square or matrix.dtype.kind not in "fiu":
-        raise ValueError(f"matrix: expected a sparse, real, square one, got {shown(matrix)}")
-    return matrix
-
-
-def checked_sides(b: ArrayLike, n: int) -> FloatArray:
-    """Return right-hand sides, (n,) or (n, right-hand side), whatever numbers they hold.
-
-    Raises:
-        ValueError: if they are no numbers or have another shape.
-    """
-    given = floats("b", b, "...")
-    if given.ndim not in (1, 2) or len(given) != n:
-        raise ValueError(f"b: expected shape ({n},) or ({n}, side), got {shape(given.shape)}")
-    return given
 
 
 class SuperLUFactor:
@@ -75,7 +50,7 @@ class SuperLUFactor:
     def __init__(self, matrix: Any):
         try:
             self._lu = scipy.sparse.linalg.splu(
-                checked_matrix(matrix).tocsc(),
+                square(matrix).tocsc(),
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.0,
                 options={"SymmetricMode": True},
@@ -93,7 +68,7 @@ class SuperLUFactor:
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Return x of A x = b."""
-        return np.ascontiguousarray(self._lu.solve(checked_sides(b, self._lu.shape[0])))
+        return np.ascontiguousarray(self._lu.solve(right_sides(b, self._lu.shape[0])))
 
     def refactorize(self, matrix: Any) -> Factor:
         """Return the factor of another matrix."""
@@ -106,7 +81,7 @@ class CholespyFactor:
     def __init__(self, matrix: Any):
         import cholespy
 
-        entries = checked_matrix(matrix).astype(np.float64).tocoo()
+        entries = square(matrix).astype(np.float64).tocoo()
         self._size = matrix.shape[0]
         rows, columns = entries.row.astype(np.int32), entries.col.astype(np.int32)
         layout = cholespy.MatrixType.COO
@@ -119,7 +94,7 @@ class CholespyFactor:
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Return x of A x = b."""
-        b = checked_sides(b, self._size)
+        b = right_sides(b, self._size)
         x = np.empty_like(b, order="C")
         self._solver.solve(b, x)
         return x

@@ -18,9 +18,9 @@ import warnings
 
 import numpy as np
 import scipy
-from public_calls import PENDING, calls, robot, system, tree
+from public_calls import calls, robot, system, tree
 
-from reference import Articulation, MassSpring, Skeleton, State
+from reference import Articulation, MassSpring, Skeleton, State, StepJudgement
 from reference.implicit_euler.certificate import Certificate
 from reference.implicit_euler.objective import Iterate, Objective
 
@@ -121,6 +121,8 @@ def all_finite(result):
         return all_finite(result.forward(result.neutral()))
     if isinstance(result, Certificate | Objective | MassSpring):
         return True
+    if isinstance(result, StepJudgement):
+        return all_finite(result.minimiser)
     if isinstance(result, Iterate):
         return not result.finite or np.isfinite(result.gradient).all()
     if hasattr(result, "outcome") and np.size(result.residual) == 1 and result.outcome == 4:
@@ -340,9 +342,7 @@ def main(law, only="", *options):
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     with tempfile.TemporaryDirectory() as folder:  # a wrong path may be written to
         os.chdir(folder)
-        table = {
-            name: call for name, call in calls().items() if only in name and name not in PENDING
-        }
+        table = {name: call for name, call in calls().items() if only in name}
         print(json.dumps(walk(law, table, *map(int, options), before=before)))
         os.chdir("/")
 
