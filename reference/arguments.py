@@ -15,6 +15,8 @@ FLOAT64 = np.dtype(np.float64)
 
 # The one rule for magnitudes: no number given is beyond this, so that its fourth power is finite.
 LARGEST_COORDINATE = 1e75
+# Nor is a number that has to be positive below this.
+SMALLEST_POSITIVE = 1e-75
 # What arrays are counted in.
 LARGEST_INTEGER = 2**63 - 1
 
@@ -44,7 +46,8 @@ def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
         ValueError: if it is not numeric or has another shape.
     """
     if type(value) is np.ndarray and value.dtype == FLOAT64 and value.flags.carray:
-        check_shape(name, value, *trailing)
+        if not _fits(value.shape, trailing):
+            check_shape(name, value, *trailing)
         return value
     given = _converted(name, value)
     if given.dtype.kind not in "fiu":
@@ -64,7 +67,7 @@ def number(
         ValueError: if it is not a finite number in that range.
     """
     if above == 0.0:
-        least = max(least, 1.0 / LARGEST_COORDINATE)
+        least = max(least, SMALLEST_POSITIVE)
     if type(value) is float and least <= value <= LARGEST_COORDINATE and value > above:
         return value
     if isinstance(value, str | bool):
@@ -191,7 +194,7 @@ def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
         ValueError: if it is of another, such as the pair that a scene returns.
     """
     if not isinstance(value, kind):
-        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
         raise ValueError(f"{name}: expected {article} {kind.__name__}, got {type(value).__name__}")
     return value
 

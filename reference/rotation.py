@@ -98,6 +98,7 @@ def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
         ValueError: if an argument does not hold finite vectors.
     """
     a, b = _together(arguments.array("a", a, "...", 3), "b", arguments.array("b", b, "...", 3))
+    a, b = _scaled(a), _scaled(b)
     result = np.empty((*a.shape[:-1], 4))
     _between(_rows(a), _rows(b), result.reshape(-1, 4))
     return result
@@ -190,6 +191,12 @@ def _together(a: FloatArray, name: str, b: FloatArray) -> tuple[FloatArray, Floa
         np.broadcast_to(a, (*batch, a.shape[-1])),
         np.broadcast_to(b, (*batch, b.shape[-1])),
     )
+
+
+def _scaled(v: FloatArray) -> FloatArray:
+    """Return vectors times powers of two, so that the squares of none underflow."""
+    _, exponents = np.frexp(np.abs(v).max(axis=-1, keepdims=True))
+    return np.ldexp(v, -exponents)
 
 
 def _parts(values: FloatArray) -> tuple[FloatArray, ...]:

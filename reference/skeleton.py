@@ -76,7 +76,7 @@ class Skeleton:
         count = self.joint_count
         if type(joint) is int and -count <= joint < count:
             return joint % count
-        arguments.text("argument", argument)
+        argument = arguments.text("argument", argument) or "joint"
         if isinstance(joint, str):
             return self._numbers[arguments.choice(argument, joint, self._numbers)]
         return arguments.integer(argument, joint, least=-count, below=count) % count
@@ -120,6 +120,8 @@ def checked_skeleton(skeleton: Skeleton, name: str = "skeleton") -> Skeleton:
     Raises:
         ValueError: if it is anything else, such as the pair that a scene returns.
     """
+    if type(skeleton) is Skeleton:
+        return skeleton
     return arguments.instance(name, skeleton, Skeleton)
 
 

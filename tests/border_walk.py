@@ -24,7 +24,7 @@ from reference import Articulation, MassSpring, Skeleton, State, StepJudgement
 from reference.implicit_euler.certificate import Certificate
 from reference.implicit_euler.objective import Iterate, Objective
 
-PATIENCE = 100  # seconds until a call counts as endless
+PATIENCE = 600  # seconds until a call counts as endless; compiling is part of it
 MEMORY = 8 * 2**30  # bytes: what asks for more gets a MemoryError
 LARGE = (1e70, 1e76, 1e155, 1e200, 1e308)
 # What is right: an error that names the argument; that or any finite answer.
