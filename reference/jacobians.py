@@ -254,18 +254,12 @@ def _coordinates(
     """Return the articulation, and its coordinates checked, (..., coordinate)."""
     if isinstance(model, Articulation):
         return model, model.checked(name, q)
-    balls = Articulation(checked_skeleton(model))
+    balls = Articulation(checked_skeleton(model, "articulation"))
     local = arguments.floats(name, q, "...", model.joint_count, 4)
     return balls, balls.checked(name, local.reshape(*local.shape[:-2], balls.coordinate_count))
 
 
 def _spread(name: str, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return both with the same leading axes; `name` is the second's, for the error."""
-    try:
-        batch = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
-    except ValueError:
-        raise ValueError(
-            f"{name}: expected leading axes that broadcast with {arguments.shape(a.shape[:-1])}, "
-            f"got {arguments.shape(b.shape[:-1])}"
-        ) from None
+    batch = arguments.broadcast(name, a.shape[:-1], b.shape[:-1])
     return arguments.spread(a, (*batch, a.shape[-1])), arguments.spread(b, (*batch, b.shape[-1]))

@@ -81,13 +81,20 @@ def track(
         ValueError: as `solve_ik` does, and if the curve is not of that shape or has no points, or a
             motion is to be closed but not coherent.
     """
-    if closed and not coherent:
+    if arguments.boolean("closed", closed) and not arguments.boolean("coherent", coherent):
         raise ValueError("closed: expected False where coherent is False, got True")
     if not isinstance(skeleton, Articulation):
         checked_skeleton(skeleton)
     wanted = _along(skeleton, curve, effector)
     settings = checked_settings(
-        solver, tolerance, tolerance_rotation, max_iterations, 0, 0, record, bool(warm)
+        solver,
+        tolerance,
+        tolerance_rotation,
+        max_iterations,
+        0,
+        0,
+        record,
+        arguments.boolean("warm", warm),
     )
     motion = _solved(skeleton, _start(skeleton, start), wanted, settings)
     if not coherent:
@@ -126,10 +133,17 @@ def _spread(one: Wanted, frames: int) -> Wanted:
 
 def _start(skeleton: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
     if isinstance(skeleton, Articulation):
-        given = skeleton.neutral() if start is None else start
-        return arguments.floats("start", given, skeleton.coordinate_count)
+        if start is None:
+            return skeleton.neutral()
+        given = arguments.floats("start", start, skeleton.coordinate_count)
+        skeleton.checked("start", given)
+        return given
     count = skeleton.joint_count
-    return arguments.floats("start", rotation.identity(count) if start is None else start, count, 4)
+    if start is None:
+        return rotation.identity(count)
+    given = arguments.floats("start", start, count, 4)
+    rotation.unit("start", given)
+    return given
 
 
 def _solved(

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from .. import arguments
 from ..articulation import Mimic
 from ..quaternion import exponential, multiply, rotate
 from . import xml
@@ -66,6 +67,7 @@ def _robot(root: Element, origin: str, mimic: bool) -> Robot:
     joints = _distinct([_joint(element) for element in root.named("joint")])
     below = _joints_below(root, joints)
     base = _base(root, joints, below)
+    follows = arguments.boolean("mimic", mimic)
     links, at, carriers = [Link(base, -1)], {base: 0}, {}
     waiting = below[base][::-1]
     while waiting:
@@ -76,7 +78,7 @@ def _robot(root: Element, origin: str, mimic: bool) -> Robot:
     for joint in joints.values():
         if joint.child not in at:
             raise joint.element.error(f"expected a way to the root {base!r}, got a ring of links")
-    return assemble(origin, links, carriers, _mimics(joints, carriers) if mimic else {})
+    return assemble(origin, links, carriers, _mimics(joints, carriers) if follows else {})
 
 
 def _joint(element: Element) -> _Joint:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 from xml.parsers import expat
 
+from .. import arguments
 from ..arguments import LARGEST_COORDINATE
 from .source import read_text
 
@@ -119,7 +120,7 @@ def parse(text: str, origin: str) -> Element:
         ValueError: if it is not well-formed, has a document type, more than MOST_ELEMENTS
             elements, or some nested deeper than MOST_DEPTH.
     """
-    builder = _Builder(origin)
+    builder, text = _Builder(origin), arguments.text("text", text)
     try:
         builder.parser.Parse(text.encode(errors="replace"), True)
     except expat.ExpatError as error:

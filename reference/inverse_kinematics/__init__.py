@@ -158,7 +158,7 @@ def _settings(
         arguments.integer("max_iterations", max_iterations, least=0),
         arguments.integer("restarts", restarts, least=0),
         arguments.integer("seed", seed, least=0),
-        record,
+        arguments.boolean("record", record),
         chained,
     )
 
@@ -217,7 +217,7 @@ def _solve_mechanisms(
     articulation = balls(model) if isinstance(model, Skeleton) else model
     if isinstance(model, Skeleton):
         rotations = arguments.floats("local_rotations", start, "...", model.joint_count, 4)
-        start = rotations.reshape(*rotations.shape[:-2], -1)
+        start = rotations.reshape(*rotations.shape[:-2], 4 * model.joint_count)
     starts = arguments.floats("local_rotations", start, "...", articulation.coordinate_count)
     effectors = tuple([one.joint for one in wanted])
     oriented = tuple([one.rotation is not None for one in wanted])
@@ -240,7 +240,7 @@ def _solve_mechanisms(
         wanted = check_numbers(wanted)
         again = articulation.checked("local_rotations", starts)
         if isinstance(model, Skeleton):
-            again = again.reshape(*again.shape[:-1], -1, 4)
+            again = again.reshape(*again.shape[:-1], model.joint_count, 4)
         return _solve_mechanisms(model, again, wanted, settings)
     if isinstance(model, Skeleton):
         local = answers.q.reshape(answers.local.shape)

@@ -174,7 +174,7 @@ def test_inputs_stay_as_they_were(arm, q, speed):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda m, q: jacobian("arm", q), "skeleton: expected a Skeleton, got str"),
+        (lambda m, q: jacobian("arm", q), "articulation: expected a Skeleton, got str"),
         (lambda m, q: jacobian(m, q[:-1]), "q: expected shape"),
         (lambda m, q: jacobians(m, 2.0 * q), "q: expected unit quaternions"),
         (lambda m, q: jacobian(m, q, 7), "effector: expected an integer"),
