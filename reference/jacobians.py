@@ -259,11 +259,5 @@ def _coordinates(name: str, given: Model, q: ArrayLike) -> tuple[Articulation, F
 
 def _spread(name: str, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return both with the same leading axes; `name` is the second's, for the error."""
-    try:
-        batch = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
-    except ValueError:
-        raise ValueError(
-            f"{name}: expected leading axes that broadcast with {arguments.shape(a.shape[:-1])}, "
-            f"got {arguments.shape(b.shape[:-1])}"
-        ) from None
+    batch = arguments.broadcast(name, a.shape[:-1], b.shape[:-1])
     return arguments.spread(a, (*batch, a.shape[-1])), arguments.spread(b, (*batch, b.shape[-1]))

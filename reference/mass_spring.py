@@ -20,9 +20,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .arguments import FloatArray, IndexArray, coordinates, frozen, indices, magnitudes, shape
+from .arguments import (
+    BoolArray,
+    FloatArray,
+    IndexArray,
+    array,
+    boolean,
+    coordinates,
+    flags,
+    frozen,
+    indices,
+    instance,
+)
 from .backend.compiled import TwoSpeeds
 from .backend.partition import LARGE, Regions, cut
 from .sparse.assembly import BlockSum
@@ -34,8 +45,6 @@ from .springs import (
     stiffness_blocks,
     sum_springs,
 )
-
-BoolArray = NDArray[np.bool_]
 
 
 class SystemArrays(NamedTuple):
@@ -109,9 +118,9 @@ class MassSpring:
                 _per_spring("rest_lengths", rest_lengths, len(ends)),
                 _per_spring("stiffnesses", stiffnesses, len(ends)),
                 _per_spring("dampings", dampings, len(ends)),
-                _flags("tension_only", tension_only, len(ends)),
+                flags("tension_only", tension_only, len(ends)),
                 np.unique(indices("pinned", pinned, "pinned", least=0, below=len(mass))),
-                magnitudes("gravity", gravity, 3).copy(),
+                array("gravity", gravity, 3).copy(),
             )
         )
         weightless = np.flatnonzero(self.free & (mass == 0))
@@ -217,7 +226,7 @@ class State:
             ValueError: if a shape is wrong, or a number not finite or beyond 1e75.
         """
         x = coordinates("positions", positions, "particle", 3)
-        v = magnitudes("velocities", velocities, len(x), 3)
+        v = array("velocities", velocities, len(x), 3)
         self._hold(x.copy(), v.copy())
 
     def _hold(self, positions: FloatArray, velocities: FloatArray) -> None:
@@ -259,7 +268,7 @@ def derivation(system: MassSpring) -> Derivation:
 
 def incidence(system: MassSpring) -> Any:
     """Return A alone, sparse CSC (particle, spring)."""
-    n, s = system.particle_count, len(system.springs)
+    n, s = _system(system).particle_count, len(system.springs)
     signs, starts = np.tile([1.0, -1.0], s), 2 * np.arange(s + 1)
     return scipy.sparse.csc_array((signs, system.springs.ravel(), starts), shape=(n, s))
 
@@ -347,11 +356,10 @@ def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None
     Raises:
         ValueError: if the external forces have another shape or are not finite.
     """
+    weights = _system(system).weights
     if external_forces is None:
-        return _system(system).weights.copy()
-    return system.weights + magnitudes(
-        "external_forces", external_forces, _system(system).particle_count, 3
-    )
+        return weights.copy()
+    return weights + array("external_forces", external_forces, system.particle_count, 3)
 
 
 def spring_forces(system: MassSpring, positions: ArrayLike) -> FloatArray:
@@ -416,7 +424,8 @@ def spring_blocks(
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    return _spring_blocks(system, _positions(system, positions), geometric=geometric)
+    x, geometric = _positions(system, positions), boolean("geometric", geometric)
+    return _spring_blocks(system, x, geometric=geometric)
 
 
 def _spring_blocks(system: MassSpring, x: FloatArray, *, geometric: bool = True) -> FloatArray:
@@ -431,8 +440,7 @@ def motion(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
         ValueError: if they are no MassSpring and State, or differ in their number of particles.
     """
     _system(system)
-    if not isinstance(state, State):
-        raise ValueError(f"state: expected a State, got {type(state).__name__}")
+    instance("state", state, State)
     if len(state.positions) != system.particle_count:
         expected, got = system.particle_count, len(state.positions)
         raise ValueError(f"state: expected {expected} particles, got {got}")
@@ -459,9 +467,7 @@ _rest_vectors = TwoSpeeds(spring_rest_vectors)
 
 
 def _system(system: MassSpring) -> MassSpring:
-    if not isinstance(system, MassSpring):
-        raise ValueError(f"system: expected a MassSpring, got {type(system).__name__}")
-    return system
+    return instance("system", system, MassSpring)
 
 
 def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
@@ -469,7 +475,7 @@ def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
 
 
 def _masses(masses: ArrayLike) -> FloatArray:
-    mass = magnitudes("masses", masses, "particle").copy()
+    mass = array("masses", masses, "particle").copy()
     if len(mass) == 0:
         raise ValueError("masses: expected at least one particle, got none")
     return _not_negative("masses", mass)
@@ -489,19 +495,10 @@ def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:
 
 
 def _per_spring(name: str, value: ArrayLike, count: int) -> FloatArray:
-    given = magnitudes(name, value, "...")
+    given = array(name, value, "...")
     if given.ndim == 0:
         return _not_negative(name, np.full(count, given))
-    return _not_negative(name, magnitudes(name, given, count).copy())
-
-
-def _flags(name: str, value: ArrayLike, count: int) -> BoolArray:
-    given = np.asarray(value)
-    if given.dtype != bool:
-        raise ValueError(f"{name}: expected booleans, got {given.dtype} values")
-    if given.shape not in {(), (count,)}:
-        raise ValueError(f"{name}: expected shape ({count},), got {shape(given.shape)}")
-    return np.array(np.broadcast_to(given, (count,)))
+    return _not_negative(name, array(name, given, count).copy())
 
 
 def _not_negative(name: str, values: FloatArray) -> FloatArray:

@@ -85,7 +85,7 @@ def track(
         ValueError: as `solve_ik` does, and if the curve is not of that shape or has no points, or a
             motion is to be closed but not coherent.
     """
-    if closed and not coherent:
+    if arguments.boolean("closed", closed) and not arguments.boolean("coherent", coherent):
         raise ValueError("closed: expected False where coherent is False, got True")
     model = checked_model(skeleton)
     wanted = _along(model, curve, effector)
@@ -93,7 +93,14 @@ def track(
         solver, _ = default_solver(model, curve)
         solver = "ccd" if solver == "fabrik" else solver
     settings = checked_settings(
-        solver, tolerance, tolerance_rotation, max_iterations, 0, 0, record, bool(warm)
+        solver,
+        tolerance,
+        tolerance_rotation,
+        max_iterations,
+        0,
+        0,
+        record,
+        arguments.boolean("warm", warm),
     )
     motion = _solved(model, _start(model, start), wanted, settings)
     if not coherent:
@@ -132,13 +139,15 @@ def _spread(one: Wanted, frames: int) -> Wanted:
 
 def _start(skeleton: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
     if isinstance(skeleton, Articulation):
-        given = skeleton.neutral() if start is None else start
-        given = arguments.floats("start", given, skeleton.coordinate_count)
+        if start is None:
+            return skeleton.neutral()
+        given = arguments.floats("start", start, skeleton.coordinate_count)
         skeleton.checked("start", given)
         return given
     count = skeleton.joint_count
-    given = rotation.identity(count) if start is None else start
-    given = arguments.floats("start", given, count, 4)
+    if start is None:
+        return rotation.identity(count)
+    given = arguments.floats("start", start, count, 4)
     rotation.unit("start", given)
     return given
 

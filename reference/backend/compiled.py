@@ -22,6 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from .. import arguments
+
 SPEEDS = ("compiled", "plain")
 # What a relaxed kernel's compiler may do; infinities and NaN keep their meaning.
 RELAXATIONS = {"reassoc", "contract", "nsz"}
@@ -41,9 +43,7 @@ def speed(name: str) -> Iterator[None]:
     Raises:
         ValueError: if the name is neither.
     """
-    if name not in SPEEDS:
-        raise ValueError(f"speed: expected one of {', '.join(SPEEDS)}, got {name!r}")
-    token = _speed.set(name)
+    token = _speed.set(arguments.choice("speed", name, SPEEDS))
     try:
         yield
     finally:

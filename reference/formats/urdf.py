@@ -78,6 +78,7 @@ def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robo
     joints = _distinct([_joint(element) for element in root.named("joint")])
     below = _joints_below(root, joints)
     base = _base(root, joints, below)
+    follows = arguments.boolean("mimic", mimic)
     links, at, carriers = [Link(base, -1)], {base: 0}, {}
     waiting = below[base][::-1]
     while waiting:
@@ -88,7 +89,7 @@ def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robo
     for joint in joints.values():
         if joint.child not in at:
             raise joint.element.error(f"expected a way to the root {base!r}, got a ring of links")
-    return assemble(origin, links, carriers, _mimics(joints, carriers) if mimic else {})
+    return assemble(origin, links, carriers, _mimics(joints, carriers) if follows else {})
 
 
 def _check_expanded(root: Element) -> None:

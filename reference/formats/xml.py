@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 from xml.parsers import expat
 
+from .. import arguments
 from ..arguments import LARGEST_COORDINATE
 from .source import read_text, warn
 
@@ -125,7 +126,7 @@ def parse(text: str, origin: str) -> Element:
         ValueError: if it is not well-formed, has a document type, more than MOST_ELEMENTS
             elements, or some nested deeper than MOST_DEPTH.
     """
-    builder = _Builder(origin)
+    builder, text = _Builder(origin), arguments.text("text", text)
     if found := MISPLACED_DECLARATION.match(text):
         warn(f"{origin}, line 1: expected <?xml ...?> first, got white space before it")
         text = found[1] + text[found.end() :]

@@ -29,8 +29,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, IndexArray, coordinates
-from ..mass_spring import BoolArray, lengths
+from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, floats, instance
+from ..mass_spring import lengths
 from ..sparse.linear_solver import Factor, NotPositiveDefiniteError, factorize
 from .objective import Objective
 
@@ -115,7 +115,14 @@ class Certificate:
 
         `apart` is the distance of the two answers [m]. None means that this is not proven either
         way, as where one of them has no bound.
+
+        Raises:
+            ValueError: if the other is no certificate, or the distance no number of at least 0.
         """
+        instance("other", other, Certificate)
+        apart = float(floats("apart", apart))
+        if not apart >= 0.0:
+            raise ValueError(f"apart: expected a distance of at least 0, got {apart}")
         if not (self.covered and other.covered):
             return None
         one, two = apart * SLACK + other.distance, apart * SLACK + self.distance
@@ -132,7 +139,7 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    system = objective.system
+    system = instance("objective", objective, Objective).system
     x = coordinates("positions", positions, system.particle_count, 3)
     with np.errstate(over="ignore", invalid="ignore"):
         here = objective._evaluate(x)

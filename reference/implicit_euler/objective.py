@@ -25,7 +25,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, choice, coordinates, number
+from ..arguments import FloatArray, boolean, choice, coordinates, instance, number
 from ..backend.compiled import TwoSpeeds
 from ..backend.threads import in_slices
 from ..mass_spring import (
@@ -202,8 +202,12 @@ class Objective:
         return _rounding(positions, y, external, h, *springs)
 
     def residual(self, iterate: Iterate) -> float:
-        """Return |grad g(x)| / max(|grad g(y)|, floor)."""
-        if iterate.gradient_norm == 0.0:
+        """Return |grad g(x)| / max(|grad g(y)|, floor).
+
+        Raises:
+            ValueError: if it is no iterate, such as the positions of one.
+        """
+        if instance("iterate", iterate, Iterate).gradient_norm == 0.0:
             return 0.0
         scale = self.inertial.gradient_norm
         if scale < iterate.most:
@@ -234,6 +238,7 @@ class Objective:
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
         """
+        geometric = boolean("geometric", geometric)
         return self._hessian(self._positions(positions), geometric=geometric)
 
     def _hessian(self, x: FloatArray, *, geometric: bool = True) -> Any:
@@ -253,6 +258,7 @@ class Objective:
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
         """
+        geometric = boolean("geometric", geometric)
         return self._pull_of_pins(self._positions(positions), geometric=geometric)
 
     def _pull_of_pins(self, x: FloatArray, *, geometric: bool) -> FloatArray:

@@ -207,7 +207,7 @@ def _settings(
         far,
         arguments.integer("restarts", restarts, least=0),
         arguments.integer("seed", seed, least=0),
-        record,
+        arguments.boolean("record", record),
         chained,
     )
 
@@ -320,7 +320,7 @@ def _solve_mechanisms(
     articulation = balls(model) if isinstance(model, Skeleton) else model
     if isinstance(model, Skeleton):
         rotations = arguments.floats("local_rotations", start, "...", model.joint_count, 4)
-        start = rotations.reshape(*rotations.shape[:-2], -1)
+        start = rotations.reshape(*rotations.shape[:-2], 4 * model.joint_count)
     name = coordinates_name(model)
     starts = arguments.floats(name, start, "...", articulation.coordinate_count)
     effectors = tuple([one.joint for one in wanted])
@@ -344,7 +344,7 @@ def _solve_mechanisms(
         wanted = check_numbers(wanted)
         again = articulation.checked(name, starts)
         if isinstance(model, Skeleton):
-            again = again.reshape(*again.shape[:-1], -1, 4)
+            again = again.reshape(*again.shape[:-1], model.joint_count, 4)
         return _solve_mechanisms(model, again, wanted, settings)
     if isinstance(model, Skeleton):
         local = answers.q.reshape(answers.local.shape)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, coordinates, frozen, magnitudes
+from ..arguments import FloatArray, array, coordinates, frozen
 from ..implicit_euler import ImplicitEuler
 from ..implicit_euler.certificate import Certificate
 from ..implicit_euler.objective import Objective
@@ -163,7 +163,7 @@ def _velocity_error(
 ) -> float | None:
     if velocities is None:
         return None
-    v = magnitudes("velocities", velocities, len(x), 3)
+    v = array("velocities", velocities, len(x), 3)
     return _largest(v - (x - objective.x_n) / objective.h)
 
 

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
-from ..arguments import FLOAT64, FloatArray, floats
+from ..arguments import FLOAT64, FloatArray, floats, instance, shape, shown
 from ..backend.compiled import TwoSpeeds
 from .analysis import analyse
 from .dissection import Graph
@@ -59,7 +60,7 @@ class CholeskyFactor:
             columns = columns.copy()
             columns.sum_duplicates()
         indptr, indices = columns.indptr.astype(np.int32), columns.indices.astype(np.int32)
-        if pattern is None or not pattern.fits(indptr, indices):
+        if pattern is None or not instance("pattern", pattern, Pattern).fits(indptr, indices):
             pattern = Pattern(indptr, indices)
         self.pattern = pattern
         self._values = np.empty(pattern.family.entries)
@@ -107,9 +108,7 @@ class CholeskyFactor:
             _solve(pattern.order, columns, starts, rows, self._values, b, y, x)
             self._spare.append(y)
             return x
-        if b.ndim not in (1, 2) or len(b) != n:
-            raise ValueError(f"b: expected shape ({n},) or ({n}, right-hand side), got {b.shape}")
-        given = b.reshape(n, -1)
+        given = right_sides(b, n).reshape(n, -1)
         x, some = np.empty(given.shape), np.zeros((n, SIDES))
         for first in range(0, given.shape[1], SIDES):
             sides = given[:, first : first + SIDES]
@@ -129,15 +128,30 @@ class CholeskyFactor:
 
 
 def square(matrix: Any) -> Any:
-    """Return a matrix that is sparse and square.
+    """Return a matrix that is sparse, square and real.
 
     Raises:
         ValueError: if it is not.
     """
-    if scipy.sparse.issparse(matrix) and matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]:
-        return matrix
-    got = f"{type(matrix).__name__} of shape {np.shape(matrix)}"
-    raise ValueError(f"matrix: expected a square sparse matrix, got {got}")
+    if not scipy.sparse.issparse(matrix):
+        raise ValueError(f"matrix: expected a square sparse matrix, got {shown(matrix)}")
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.dtype.kind not in "fiu":
+        got = f"one of {matrix.dtype} of shape {matrix.shape}"
+        raise ValueError(f"matrix: expected a square sparse matrix of numbers, got {got}")
+    return matrix
+
+
+def right_sides(b: ArrayLike, n: int) -> FloatArray:
+    """Return right-hand sides, (n,) or (n, right-hand side), whatever numbers they hold.
+
+    Raises:
+        ValueError: if they are no numbers or have another shape.
+    """
+    given = floats("b", b, "...")
+    if given.ndim not in (1, 2) or len(given) != n:
+        got = shape(given.shape)
+        raise ValueError(f"b: expected shape ({n},) or ({n}, right-hand side), got {got}")
+    return given
 
 
 _analyse = TwoSpeeds(analyse)

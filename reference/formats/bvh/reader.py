@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ... import arguments
 from ...arguments import LARGEST_COORDINATE, FloatArray, frozen
 from ...quaternion import IDENTITY, multiply
 from ...skeleton import Skeleton
@@ -41,7 +42,7 @@ def parse(text: str) -> Motion:
     Raises:
         ValueError: as for `read`.
     """
-    return _motion(text, "BVH")
+    return _motion(arguments.text("text", text), "BVH")
 
 
 @dataclass
