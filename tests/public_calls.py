@@ -69,6 +69,7 @@ INTERNAL = {
     "reference.implicit_euler.objective.Iterate": "made by an Objective alone",
     "reference.implicit_euler.objective.Iterate.within": "of a share in our own sources",
     "reference.judging.step.StepJudgement": "made by judge_step alone",
+    "reference.judging.pose.PoseJudgement": "made by judge_pose alone",
     "reference.implicit_euler.objective.Iterate.is_above": "compares what an Objective has made",
     "reference.implicit_euler.objective.global_matrix": "of a system that is checked already",
     "reference.implicit_euler.objective.effective_stiffnesses": "likewise",
@@ -210,8 +211,7 @@ def _rotations():
         "to_matrix": Call(rotation.to_matrix, {"q": q}, free="q"),
         "from_matrix": Call(rotation.from_matrix, {"matrix": rotation.to_matrix(q)}, free="matrix"),
     }  # fmt: skip
-    if hasattr(rotation, "normalise"):
-        table["normalise"] = Call(rotation.normalise, {"q": q}, free="q")
+    table["normalise"] = Call(rotation.normalise, {"quaternions": q}, free="quaternions")
     return {r + name: call for name, call in table.items()}
 
 
@@ -323,6 +323,7 @@ def _solves():
     settings = {"solver": "ccd", "effector": "f", **numbers}
     drawn = {"restarts": 1, "seed": 3, "record": True}
     i, t = "reference.inverse_kinematics.solve_ik", "reference.tracking.track"
+    j = "reference.judging.pose.judge_pose"
 
     def posed(position, rotation, effector, weight):
         goal = Target(position, rotation, effector, weight), Target([0.1, 0.2, 0.3], None, "c")
@@ -341,26 +342,39 @@ def _solves():
     table = {
         i: Call(reference.solve_ik,
                 {"skeleton": balls, "local_rotations": local, "target": points[0], **settings,
-                 "restarts": 0, "seed": 3, "record": False}, free="local_rotations target"),
+                 "restarts": 0, "seed": 3, "record": False},
+                free="local_rotations target", names="q effector"),
         i + ", batch": Call(reference.solve_ik,
                             {"skeleton": balls, "local_rotations": np.tile(local, (4, 1, 1)),
-                             "target": points, **settings, **drawn}, free="local_rotations target"),
+                             "target": points, **settings, **drawn},
+                            free="local_rotations target", names="q effector"),
         i + ", robot": Call(reference.solve_ik,
                             {"skeleton": model, "local_rotations": q, "target": points, **settings,
-                             **drawn}, free="local_rotations target"),
+                             **drawn},
+                            free="local_rotations target", names="q effector"),
         i + ", poses": Call(posed, goal, free="position rotation", names="target"),
         i + ", pose": Call(one_pose, goal, free="position rotation", names="target"),
         t: Call(reference.track,
                 {"skeleton": balls, "curve": points, "start": local, **settings, "warm": True,
-                 "coherent": True, "closed": True, "record": True}, free="curve"),
+                 "coherent": True, "closed": True, "record": True},
+                free="curve", names="q effector"),
         t + ", poses": Call(follow, goals, free="position rotation",
                             names="target curve"),
+    }  # fmt: skip
+    place = reference.forward_kinematics(balls, local).positions
+    judged = {"target": points[0], "effector": "f", "tolerance": 1e-4, "tolerance_rotation": 1e-4}
+    table |= {
+        j: Call(reference.judge_pose,
+                {"model": balls, "pose": local, "positions": place, **judged},
+                names="local_rotations q"),
+        j + ", robot": Call(reference.judge_pose, {"model": model, "pose": q, **judged},
+                             names="q local_rotations"),
     }  # fmt: skip
     for solver in inverse_kinematics.IK_SOLVERS:
         table[f"{i}, {solver}"] = Call(
             reference.solve_ik,
             {"skeleton": balls, "local_rotations": local, "target": points[0], "solver": solver,
-             "max_iterations": 4}, free="local_rotations target",
+             "max_iterations": 4}, free="local_rotations target", names="q effector",
         )  # fmt: skip
     return table
 
