@@ -17,6 +17,7 @@ PACKAGES = (
     "pin",
     "mujoco",
     "example-robot-data",
+    "gymnasium",
     "dm_control",
     "pytest-benchmark",
     "matplotlib",
