@@ -77,7 +77,12 @@ def test(name: str, python: Path, requirements: Path, options: list[str]) -> boo
         [*pip, "--no-deps", "-e", ROOT],
         [home / "bin" / "python", "-m", "pytest", *options],
     )
-    return all(subprocess.run(step, cwd=ROOT, check=False).returncode == 0 for step in steps)
+    # Compiled kernels of one version of numba would push those of another out of __pycache__.
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(home / "numba")}
+    return all(
+        subprocess.run(step, cwd=ROOT, check=False, env=environment).returncode == 0
+        for step in steps
+    )
 
 
 def lowest() -> Path:
