@@ -61,9 +61,7 @@ def normalise(quaternions: ArrayLike) -> tuple[FloatArray, FloatArray]:
         raise ValueError(f"quaternions: expected lengths above 0, got 0 at index {where}")
     scaled = given / largest  # no square overflows or vanishes
     lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
-    with np.errstate(over="ignore"):  # the length of the largest numbers is none itself
-        deviation = np.abs(lengths * largest - 1.0)[..., 0]
-    return scaled / lengths, deviation
+    return scaled / lengths, np.abs(lengths * largest - 1.0)[..., 0]
 
 
 def check_unit(name: str, lengths: FloatArray) -> None:

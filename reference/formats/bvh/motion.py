@@ -41,4 +41,4 @@ class Motion(NamedTuple):
         x = arguments.array("offsets", self.offsets, len(R), count, 3)
         here = Skeleton(skeleton.parents, np.zeros_like(skeleton.offsets))
         q = np.concatenate([x, rotation.unit("local_rotations", R)], axis=-1)
-        return forward_kinematics(Articulation(here, "free"), q.reshape(len(q), -1))
+        return forward_kinematics(Articulation(here, "free"), q.reshape(len(q), 7 * count))
