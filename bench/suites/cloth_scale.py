@@ -17,7 +17,8 @@ import numpy as np
 
 from reference import ImplicitEuler, MassSpring, State, scenes
 from reference.backend.compiled import TwoSpeeds
-from reference.implicit_euler.factor_cache import forget, prefactored
+from reference.implicit_euler.factor_cache import clear as clear_factor_cache
+from reference.implicit_euler.factor_cache import prefactored
 from reference.implicit_euler.objective import global_matrix
 from reference.sparse import CholeskyFactor
 from reference.sparse.linear_solver import factorize
@@ -198,5 +199,5 @@ def memory() -> int:
 
 if __name__ == "__main__":
     measure(min(SIZES), sys.argv[2])  # compiles
-    forget()
+    clear_factor_cache()
     print(json.dumps(measure(int(sys.argv[1]), sys.argv[2])))
