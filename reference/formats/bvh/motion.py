@@ -1,4 +1,4 @@
-"""Motion: how a skeleton moves, frame by frame."""
+"""A recorded motion: a skeleton with its local rotations and offsets in every frame."""
 
 from typing import NamedTuple
 
@@ -11,14 +11,14 @@ from ...skeleton import Pose, Skeleton
 
 
 class Motion(NamedTuple):
-    """A skeleton and its poses; `bvh.write(path, *motion)` writes it.
+    """A skeleton and its poses over time; `bvh.write(path, *motion)` writes it to a file.
 
     Attributes:
-        skeleton: its root is where it is in the first frame.
+        skeleton: the offset of its root is the root's position in the first frame.
         local_rotations: (frame, joint, 4).
-        frame_time: from a frame to the next [s].
-        offsets: each joint's position in its parent's frame, the root's global one, (frame, joint,
-            3): the skeleton's offsets but for joints that shift.
+        frame_time: time between frames [s].
+        offsets: each joint's position in its parent's frame, for the root in the world, (frame,
+            joint, 3); equal to the skeleton's offsets for joints without position channels.
     """
 
     skeleton: Skeleton
@@ -27,12 +27,13 @@ class Motion(NamedTuple):
     offsets: FloatArray
 
     def pose(self) -> Pose:
-        """Return the global poses of all joints, shifts included; the frames are a leading axis.
+        """Return the global poses of all joints, with frames as the leading axis.
 
-        Where only rotations change, `forward_kinematics(skeleton, local_rotations)` is the same.
+        Without position channels it equals `forward_kinematics(skeleton, local_rotations)`.
         """
-        here = Skeleton(self.skeleton.parents, np.zeros_like(self.skeleton.offsets))
+        without_offsets = Skeleton(self.skeleton.parents, np.zeros_like(self.skeleton.offsets))
         q = np.concatenate([self.offsets, self.local_rotations], axis=-1)
         return forward_kinematics(
-            Articulation(here, "free"), q.reshape(len(q), 7 * here.joint_count)
+            Articulation(without_offsets, "free"),
+            q.reshape(len(q), 7 * self.skeleton.joint_count),
         )
