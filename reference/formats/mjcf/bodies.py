@@ -9,7 +9,7 @@ from ...quaternion import exponential, rotate, scale, subtract
 from ..robot import INFINITY, ORIGIN, Link, Robot, Vector, assemble
 from ..source import warn
 from ..xml import Element
-from .settings import Pose, Settings, direction, one_of, settings
+from .settings import Settings, Transform, direction, one_of, settings
 
 KINDS = ("hinge", "slide", "ball", "free")
 GENERATORS = ("replicate", "attach", "composite", "flexcomp")
@@ -21,7 +21,7 @@ class _Part(NamedTuple):
     """An element of a body, its frame in the body, and its default class."""
 
     element: Element
-    frame: Pose
+    frame: Transform
     inherited: str
 
 
@@ -66,7 +66,7 @@ class _Tree:
 
     def add_world(self, world: Element) -> None:
         """Add all bodies of a <worldbody>."""
-        joints, bodies = self.parts(_Part(world, Pose(), "main"))
+        joints, bodies = self.parts(_Part(world, Transform(), "main"))
         if joints:
             raise joints[0].element.error("expected no joint in the world, which cannot move")
         waiting = [(body, 0) for body in reversed(bodies)]
@@ -82,9 +82,9 @@ class _Tree:
         if name in self.bodies:
             raise body.error(f"expected a body's name once, got {name!r:.80} twice")
         self.bodies.add(name)
-        pose = part.frame.then(self.settings.pose(body))
+        pose = part.frame.compose(self.settings.transform(body))
         inherited = self.settings.class_of(body, "childclass", part.inherited)
-        found, bodies = self.parts(_Part(body, Pose(), inherited))
+        found, bodies = self.parts(_Part(body, Transform(), inherited))
         joints = [self.joint(child, index) for index, child in enumerate(found)]
         _check_free(body, joints, parent)
         for number, (joint, child) in enumerate(zip(joints, found, strict=True), len(self.links)):
@@ -104,7 +104,7 @@ class _Tree:
             elif element.tag == "body":
                 bodies.append(part)
             elif element.tag == "frame":
-                frame = frame.then(self.settings.pose(element))
+                frame = frame.compose(self.settings.transform(element))
                 inherited = self.settings.class_of(element, "childclass", inherited)
                 inner = reversed(element.children)
                 waiting += [_Part(child, frame, inherited) for child in inner]
@@ -125,7 +125,7 @@ class _Tree:
         if kind == "free":
             self.check_aligned(element)
             return _Joint(label, kind)
-        anchor = frame.of(element.numbers("pos", ORIGIN))
+        anchor = frame.apply(element.numbers("pos", ORIGIN))
         angle = 1.0 if kind == "slide" else self.settings.angle
         lower, upper = (angle * limit for limit in self.limits(element, kind))
         if kind == "ball":
@@ -153,7 +153,9 @@ class _Tree:
         if align == "true" or (align == "auto" and self.settings.alignfree):
             raise joint.error("expected a free joint that is not aligned with the body's inertia")
 
-    def record(self, element: Element, joint: _Joint, path: str, number: int, pose: Pose) -> None:
+    def record(
+        self, element: Element, joint: _Joint, path: str, number: int, pose: Transform
+    ) -> None:
         """Store the index and home of a joint by its name, or by its path if it has none."""
         name = joint.label if "name" in element.attributes else path
         if name in self.joints:
@@ -170,7 +172,9 @@ def _check_free(body: Element, joints: list[_Joint], parent: int) -> None:
         raise body.error("expected a free joint alone, in a body that hangs on the world")
 
 
-def _chain(name: str, parent: int, number: int, pose: Pose, joints: list[_Joint]) -> list[Link]:
+def _chain(
+    name: str, parent: int, number: int, pose: Transform, joints: list[_Joint]
+) -> list[Link]:
     """Return the links of a body; the last one has the name and the pose of the body.
 
     The frames of the links are at the anchors of the joints. The file states the anchors in the
@@ -182,18 +186,18 @@ def _chain(name: str, parent: int, number: int, pose: Pose, joints: list[_Joint]
     anchor = ORIGIN
     for label, kind, next_anchor, axis, *limits, ref in joints:
         if kind != "slide":
-            pose = Pose(pose.of(subtract(next_anchor, anchor)), pose.R)
+            pose = Transform(pose.apply(subtract(next_anchor, anchor)), pose.R)
             anchor = next_anchor
-        x, R = pose.then(_displacement(kind, axis, -ref))
+        x, R = pose.compose(_displacement(kind, axis, -ref))
         links.append(Link(f"{name}/{label}", parent, x, R, kind, axis, *limits))
-        parent, pose = number + len(links) - 1, Pose()
+        parent, pose = number + len(links) - 1, Transform()
     if links and anchor == ORIGIN:
         return [*links[:-1], links[-1]._replace(name=name)]
-    return [*links, Link(name, parent, pose.of(scale(-1.0, anchor)), pose.R)]
+    return [*links, Link(name, parent, pose.apply(scale(-1.0, anchor)), pose.R)]
 
 
-def _displacement(kind: str, axis: Vector, q: float) -> Pose:
+def _displacement(kind: str, axis: Vector, q: float) -> Transform:
     """Return the pose of a hinge or a slide at q; of a ball the identity."""
     if kind == "hinge":
-        return Pose(ORIGIN, exponential(scale(q, axis)))
-    return Pose(scale(q, axis)) if kind == "slide" else Pose()
+        return Transform(ORIGIN, exponential(scale(q, axis)))
+    return Transform(scale(q, axis)) if kind == "slide" else Transform()

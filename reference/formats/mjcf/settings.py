@@ -28,19 +28,19 @@ OF_JOINTS = ("type", "pos", "axis", "range", "limited", "ref")
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
 
-class Pose(NamedTuple):
+class Transform(NamedTuple):
     """A position and a rotation."""
 
     x: Vector = ORIGIN
     R: Quaternion = IDENTITY
 
-    def of(self, x: Vector) -> Vector:
+    def apply(self, x: Vector) -> Vector:
         """Return the outer coordinates of a point x of this frame."""
         return add(self.x, rotate(self.R, x))
 
-    def then(self, inner: "Pose") -> "Pose":
-        """Return the product of this pose and an inner one."""
-        return Pose(self.of(inner.x), multiply(self.R, inner.R))
+    def compose(self, inner: "Transform") -> "Transform":
+        """Return the product of this transform and an inner one."""
+        return Transform(self.apply(inner.x), multiply(self.R, inner.R))
 
 
 class Settings(NamedTuple):
@@ -60,13 +60,13 @@ class Settings(NamedTuple):
     alignfree: bool
     classes: dict[str, dict[str, str]]
 
-    def pose(self, element: Element) -> Pose:
-        """Return the pose of a body or a frame in its parent.
+    def transform(self, element: Element) -> Transform:
+        """Return the transform of a body or a frame in its parent.
 
         Raises:
             ValueError: if a number is invalid, or there are several orientations.
         """
-        return Pose(element.numbers("pos", ORIGIN), self._orientation(element))
+        return Transform(element.numbers("pos", ORIGIN), self._orientation(element))
 
     def class_of(self, element: Element, attribute: str, inherited: str) -> str:
         """Return the default class that an element names, or the one it inherits.
