@@ -16,6 +16,7 @@ import numpy as np
 
 from reference import ImplicitEuler, MassSpring, State, scenes
 from reference.backend.compiled import TwoSpeeds
+from reference.implicit_euler.factor_cache import clear as clear_factor_cache
 from reference.implicit_euler.factor_cache import prefactored
 from reference.implicit_euler.objective import global_matrix
 from reference.sparse import CholeskyFactor
