@@ -203,6 +203,6 @@ def _local_many(parents, offsets, given, local):
     return True
 
 
-_forward = TwoSpeeds(_forward_one)
-_forward_batch = TwoSpeeds(_forward_many)
-_local_batch = TwoSpeeds(_local_many)
+_forward = TwoSpeeds(_forward_one, label="forward_kinematics")
+_forward_batch = TwoSpeeds(_forward_many, label="forward_kinematics of a batch")
+_local_batch = TwoSpeeds(_local_many, label="local_from_global")

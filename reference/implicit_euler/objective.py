@@ -301,7 +301,7 @@ def _side_by_side(
     return gradient, *joined
 
 
-_evaluate = TwoSpeeds(evaluate_objective)
+_evaluate = TwoSpeeds(evaluate_objective, label="the objective of implicit Euler")
 _regions = TwoSpeeds(evaluate_regions)
 _join = TwoSpeeds(join_regions)
 _rounding = TwoSpeeds(measure_rounding)

@@ -116,6 +116,6 @@ def _plain_layout(b: FloatArray) -> FloatArray:
     return np.array(b, dtype=np.float64, order="C")
 
 
-_analyse = TwoSpeeds(analyse)
-_factorize = TwoSpeeds(factorize, relaxed=True)
-_solve = TwoSpeeds(solve, relaxed=True)
+_analyse = TwoSpeeds(analyse, label="the analysis of sparse matrices")
+_factorize = TwoSpeeds(factorize, relaxed=True, label="sparse Cholesky factors")
+_solve = TwoSpeeds(solve, relaxed=True, label="sparse triangular solves")
