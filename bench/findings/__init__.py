@@ -10,6 +10,7 @@ from . import (
     cloth_peers,
     cloth_scale,
     energy,
+    first_call,
     kinematics,
     newton,
     published,
@@ -164,8 +165,9 @@ SECTIONS = (
             Entry("A step of the cloth", timing.cloth, ("timing_cloth",)),
             Entry("Iterations, up to a million particles", cloth_scale.iterations),
             Entry("Factors, up to a million particles", cloth_scale.factors),
+            Entry("What does the first call cost, which compiles?", first_call.first_calls),
         ),
-        ("timing", "cloth_scale"),
+        ("timing", "cloth_scale", "first_call"),
     ),
 )
 
