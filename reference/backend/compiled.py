@@ -91,7 +91,7 @@ def compile_kernel(kernel: Kernel, relaxed: bool = False, label: str | None = No
 
 
 def bind(kernel: Kernel, **callees: Kernel) -> Kernel:
-    """Return a kernel that calls other kernels under the given names: one loop, many solvers.
+    """Return a kernel that calls other kernels under these names, so that solvers share a loop.
 
     Raises:
         ValueError: if the kernel does not name one of them, or has a closure.
@@ -175,8 +175,8 @@ def _inlined_size(kernel: Kernel) -> int:
 def allocates(kernel: Kernel) -> bool:
     """Return whether a kernel, or one that it calls, may make arrays.
 
-    One that makes none is compiled without counting references to those it is given, which is
-    half of the work where arrays come many in a tuple. numba refuses to compile an error here.
+    One that makes none is compiled without counting references to its arguments, which is half of
+    the work where a tuple holds many arrays. numba would refuse to compile an error.
     """
     names = {name for code in code_objects(kernel.__code__) for name in code.co_names}
     return bool(ALLOCATING & names) or any(

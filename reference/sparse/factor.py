@@ -1,4 +1,4 @@
-"""The factor of a matrix as callers see it: made, solved with, and made again for new values."""
+"""Cholesky factors as callers see them: analyse, factorise, solve, factorise again."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from ..backend.compiled import TwoSpeeds
 from .analysis import analyse
 from .dissection import Graph
 from .multifrontal import factorize
-from .triangular import LANES, SIDES, solve
+from .triangular import REGISTER, RIGHT_HAND_SIDES, solve
 
 
 class NotPositiveDefiniteError(ValueError):
@@ -20,7 +20,7 @@ class Pattern:
     """The analysis of a symmetric pattern, shared by the factors of all matrices that have it."""
 
     def __init__(self, indptr: Any, indices: Any) -> None:
-        """Order the columns and find out which entries L has."""
+        """Order the columns and find the pattern of L."""
         self.graph = Graph(indptr, indices)
         n = len(indptr) - 1
         self.order, self.place, self.blocks, self.family = _analyse(
@@ -51,7 +51,7 @@ class CholeskyFactor:
             pattern = Pattern(indptr, indices)
         self.pattern = pattern
         self._values = np.empty(pattern.family.entries)
-        self._spare: list[FloatArray] = []  # room for the unknowns, one a call
+        self._spare: list[FloatArray] = []  # workspaces for the unknowns, one a thread
         data = np.array(columns.data, dtype=np.float64)
         failed = _factorize(
             pattern.graph, data, pattern.order, pattern.place, pattern.blocks, pattern.family,
@@ -79,22 +79,22 @@ class CholeskyFactor:
     def solve(self, b: FloatArray) -> FloatArray:
         """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side)."""
         n, pattern = len(self.pattern.order), self.pattern
-        if b.shape == (n, SIDES):
+        if b.shape == (n, RIGHT_HAND_SIDES):
             x = np.empty(b.shape)
             columns, starts, rows, _ = pattern.blocks
             try:
                 y = self._spare.pop()
-            except IndexError:  # none yet, or other threads have them all
-                y = np.empty((n, LANES))
+            except IndexError:  # none yet, or all are used by other threads
+                y = np.empty((n, REGISTER))
             _solve(pattern.order, columns, starts, rows, self._values, _plain_layout(b), y, x)
             self._spare.append(y)
             return x
-        given = b.reshape(n, -1)
-        x, some = np.empty(given.shape), np.zeros((n, SIDES))
-        for first in range(0, given.shape[1], SIDES):
-            sides = given[:, first : first + SIDES]
-            some[:, : sides.shape[1]] = sides
-            x[:, first : first + SIDES] = self.solve(some)[:, : sides.shape[1]]
+        columns = b.reshape(n, -1)
+        x, padded = np.empty(columns.shape), np.zeros((n, RIGHT_HAND_SIDES))
+        for first in range(0, columns.shape[1], RIGHT_HAND_SIDES):
+            part = slice(first, min(first + RIGHT_HAND_SIDES, columns.shape[1]))
+            padded[:, : part.stop - first] = columns[:, part]
+            x[:, part] = self.solve(padded)[:, : part.stop - first]
         return x.reshape(b.shape)
 
     def lower(self) -> Any:
