@@ -2,15 +2,24 @@
 # make test     the tests, a few minutes; `make test-all` adds the heavy sweeps
 # make lint     ruff and mypy
 # make bench    every benchmark at full length, then the report
-# make locks    renew the two lock files (needs uv)
+# make drawing  draw the pictures of docs/ anew, the architecture's from the imports
+# make locks    renew the two lock files after a change of pyproject.toml; UPGRADE=--upgrade
+#               takes the newest versions of everything
 # make clean    remove everything made here
 #
-# Each does all its own set-up in .venv; nothing but Python 3.11 or newer is needed.
+# make wheels        does the lock install from wheels alone on Python 3.11 to 3.14, x86 and ARM?
+# make test-pythons  the tests on every one of these Pythons that this machine has
+# make test-lowest   the tests with the lowest versions that pyproject.toml allows
+#
+# Each does all its own set-up in .venv and build; nothing but Python 3.11 to 3.14 is needed.
 
 PYTHON ?= python3
 BIN := .venv/bin
+# The pins are made and checked by uv, in an environment of its own; no Python is downloaded.
+UV ?= build/uv/bin/uv
+export UV_PYTHON_DOWNLOADS := never
 
-.PHONY: help report test test-all lint bench locks clean
+.PHONY: help report test test-all lint bench drawing locks wheels test-pythons test-lowest clean
 
 help:
 	@sed -n 's/^# \{0,1\}//p' $(MAKEFILE_LIST)
@@ -33,21 +42,39 @@ bench: .venv/installed
 	$(BIN)/plumbob bench
 	$(BIN)/plumbob report
 
+drawing: .venv/installed
+	$(BIN)/python docs/draw_architecture.py
+	$(BIN)/python docs/draw_lab.py
+
 .venv/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and \
 	    "Plumbob needs Python 3.11 or newer, this is " + sys.version.split()[0] + \
 	    ": try make PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	    --only-binary :all: --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	@touch $@
 
-COMPILE := uv pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes \
-    --no-header --no-emit-index-url --quiet
+COMPILE = $(UV) pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes \
+    --no-header --no-emit-index-url --quiet $(UPGRADE)
 
-locks:
-	$(COMPILE) --extra robots --extra fast --extra test -o requirements.lock
+locks: $(UV)
+	$(COMPILE) --only-binary :all: --extra robots --extra fast --extra test -o requirements.lock
 	$(COMPILE) --all-extras -c requirements.lock -o requirements-peers.lock
+
+wheels: $(UV)
+	UV=$(UV) $(PYTHON) .ci/pythons.py wheels
+
+test-pythons:
+	$(PYTHON) .ci/pythons.py tests $(PYTEST)
+
+test-lowest: $(UV)
+	UV=$(UV) $(PYTHON) .ci/pythons.py lowest $(PYTEST)
+
+build/uv/bin/uv:
+	$(PYTHON) -m venv build/uv
+	build/uv/bin/python -m pip install --quiet --disable-pip-version-check uv
 
 clean:
 	rm -rf .venv report build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,24 +1,28 @@
 """The command line. Engines, the reference and matplotlib are imported inside the commands."""
 
 import difflib
-import signal
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from . import compile_notice
-from .news import heard_by
-from .suites import SUITES
+from .experiments import SUITES
+from .harness.progress import heard_by
+from .presentation.text import visible
+
+if TYPE_CHECKING:
+    from .presentation.tables import Table
 
 # The width of the names of suites in the help.
 INDENT = 2 + max(map(len, SUITES))
 QUICK, FULL = "quick", "full"
 REPORT = Path("report")
-FINE, MISSED, MISUSED, INTERRUPTED = 0, 1, 2, 130
+FINE, MISSED, MISUSED, INTERRUPTED, UNREAD = 0, 1, 2, 130, 141
 _UsageError: Any = typer.BadParameter.__base__
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -38,15 +42,25 @@ Fresh = Annotated[bool, typer.Option("--fresh", help="Forget what is on record; 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code.
 
-    A reader that has seen enough, such as `head`, ends the program as it ends any other.
+    A reader that has seen enough, such as `head`, ends the program without a word. The signal for
+    it stays ignored: it would also strike where a worker has ended that we are writing to.
     """
-    if hasattr(signal, "SIGPIPE"):
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-    sys.exit(run_command(arguments))
+    try:
+        code = run_command(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        code = UNREAD
+    if code == UNREAD:  # what is not yet written has nowhere to go
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    sys.exit(code)
 
 
 def run_command(arguments: Sequence[str] | None = None) -> int:
-    """Return the exit code: 0 fine, 1 a check failed, 2 bad usage or input, 130 interrupted."""
+    """Return the exit code.
+
+    0 fine, 1 a check failed, 2 bad usage or input, 130 interrupted, 141 nobody reads the output.
+    """
     try:
         code = app(arguments, prog_name="plumbob", standalone_mode=False)
         if code == INTERRUPTED:  # typer's own answer to Ctrl-C
@@ -57,6 +71,12 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except _UsageError as error:
         return _complain(error.format_message())
+    except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):  # typer's own answer to that
+            return UNREAD
+        raise
+    except BrokenPipeError:
+        return UNREAD
     except OSError as error:
         return _complain(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "))
     except ValueError as error:
@@ -107,15 +127,22 @@ def plumbob(
         "Examples",
         "plumbob check",
         'plumbob check "spring forces" "Gauss-Newton step"',
+        "plumbob check --files robots/  your URDF, MJCF and BVH files: who reads them, who agrees",
     )
 )
 def check(
     claims: Annotated[
-        list[str] | None, typer.Argument(metavar="CLAIM", help="Only these; see --list.")
+        list[str] | None,
+        typer.Argument(metavar="CLAIM", help="Only these; see --list. With --files, paths."),
     ] = None,
     names: Annotated[bool, typer.Option("--list", help="List the claims and stop.")] = False,
+    files: Annotated[
+        bool, typer.Option("--files", help="Read files and folders of files with both engines.")
+    ] = False,
 ) -> int:
     """Hold the reference against Pinocchio and MuJoCo: a verdict table, exit 1 on a miss."""
+    if files:
+        return check_files(claims or [])
     from crosscheck.identities import CLAIMS, run_claims
     from crosscheck.robots.models import left_out
 
@@ -201,10 +228,12 @@ def show(
 
     The arm's motion can also be written as BVH, which animation programs open.
     """
+    from .harness.record import check_regular
     from .show import SCENES, write
 
     _known("scene", scene, SCENES)
     path = file or REPORT / f"{scene}.gif"
+    check_regular(path)
     writable(path.parent)
     with progress() as bar:
         task = bar.add_task(scene, total=None)
@@ -212,7 +241,7 @@ def show(
             scene, path, solver,
             lambda done, total: bar.update(task, completed=done, total=total), coherent,
         )  # fmt: skip
-    print(path)
+    print(visible(str(path)))
     return FINE
 
 
@@ -231,31 +260,36 @@ def main_job(output: Path, fresh: bool) -> int:
 
 def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> int:
     """Run suites with a progress bar; return 1 if a claim is missed or a block failed."""
-    from . import run
+    from .harness import run
+    from .harness.record import RecordFile
 
+    RecordFile(output).read()  # before anything is measured that could not be kept
     if fresh:
         run.forget(suites, output)
     done, failures = {run.KEPT: 0, run.MEASURED: 0, run.FAILED: 0}, []
     with progress() as bar:
         task = bar.add_task("starting", total=run.count(suites, scale))
-        with heard_by(lambda what: bar.update(task, description=what)):
+        with heard_by(lambda news: bar.update(task, description=visible(news.what))):
             for event in run.run(suites, scale, output):
-                bar.update(task, description=f"{event.suite}: {event.what}")
+                bar.update(task, description=visible(f"{event.suite}: {event.what}"))
                 if event.state in done:
                     done[event.state] += 1
                     bar.advance(task)
                 if event.state == run.FAILED:
                     failures.append(f"{event.suite}: {event.what}: {event.message}")
-    print(f"{done[run.MEASURED]} measured, {done[run.KEPT]} kept as on record, in {output}")
+    kept = visible(f"{done[run.KEPT]} kept as on record, in {output}")
+    print(f"{done[run.MEASURED]} measured, {kept}")
+    if warning := RecordFile(output).read().warning:
+        print(f"plumbob: {visible(warning)}", file=sys.stderr)
     for failure in [*failures, *run.missed_claims(suites, output)]:
-        print(f"plumbob: {failure}", file=sys.stderr)
+        print(f"plumbob: {visible(failure)}", file=sys.stderr)
         done[run.FAILED] += 1
     return MISSED if done[run.FAILED] else FINE
 
 
 def write_report(output: Path) -> int:
     """Write the report and say where it is, what it found and what is missing."""
-    from .report import write
+    from .presentation.report import write
 
     written = write(output)
     for table in written.tables:
@@ -265,31 +299,79 @@ def write_report(output: Path) -> int:
     print()
     for sentence in written.missing:
         print(f"Missing: {sentence}")
-    print(f"{written.page}: {len(written.tables)} tables, also as Markdown, LaTeX and CSV")
+    page = visible(str(written.page))
+    print(f"{page}: {len(written.tables)} tables, also as Markdown, LaTeX and CSV")
     return FINE
+
+
+def check_files(paths: Sequence[str]) -> int:
+    """Compare every URDF, MJCF and BVH file at some paths; return 1 if a reading disagrees."""
+    if not paths:
+        raise ValueError("--files: expected folders or files, got none")
+    from crosscheck.robots.files import check, find
+
+    from .experiments.check.files import report
+
+    found = find(paths)
+    checked = []
+    with progress() as bar:
+        task = bar.add_task("", total=len(found.files))
+        for one in check(found.files):
+            checked.append(one)
+            bar.update(task, description=one.file.path.name, advance=1)
+    files, summary, disagreements = report(found, checked)
+    for table in (files, summary):
+        print_table(table)
+    return MISSED if disagreements else FINE
+
+
+def print_table(table: "Table") -> None:
+    """Print a table with what it says: aligned on a terminal, as Markdown in a pipe."""
+    from .presentation.tables import markdown
+
+    if not sys.stdout.isatty():
+        print(markdown(table))
+        return
+    from rich.console import Console
+
+    print(f"\n{table.title}\n  {table.answer.sentence}".rstrip())
+    Console(highlight=False).print(_aligned(table), markup=False)
+    print("".join(f"    {point}\n" for point in table.answer.points), end="", flush=True)
 
 
 def print_tables(suites: Sequence[str], output: Path) -> None:
     """Print the tables that come from these suites, with what they say."""
     from rich.console import Console
-    from rich.table import Table
 
-    from .findings import Results, tables
-    from .record import RecordFile
-    from .tables import words
+    from .harness.record import RecordFile
+    from .presentation.sections import Results, plain, sift, tables
 
-    console = Console(width=None if sys.stdout.isatty() else 240, highlight=False)
-    for made in tables(Results(RecordFile(output).read().records), suites):
+    console = Console(
+        width=None if sys.stdout.isatty() else 240, highlight=False, markup=False, emoji=False
+    )
+    records = [plain(record) for record in RecordFile(output).read().records]
+    records, _ = sift(lambda results: tables(results, suites), records)
+    for made in tables(Results(records), suites):
         if not made.rows:
             continue
-        shown = Table(box=None, header_style="bold", pad_edge=False)
-        for column in made.columns:
-            shown.add_column(column.heading, justify="left" if column.words else "right")
-        for row in made.rows:
-            shown.add_row(*(words(cell) for cell in row))
         print(f"\n{made.title}\n  {made.answer.sentence}")
         print("".join(f"    {point}\n" for point in made.answer.points), end="", flush=True)
-        console.print(shown, markup=False)
+        console.print(_aligned(made))
+
+
+def _aligned(table: "Table") -> Any:
+    """Return a table as rich prints it."""
+    import rich.table
+    from rich.text import Text
+
+    from .presentation.tables import words
+
+    shown = rich.table.Table(box=None, header_style="bold", pad_edge=False)
+    for column in table.columns:
+        shown.add_column(column.heading, justify="left" if column.words else "right")
+    for row in table.rows:
+        shown.add_row(*(Text(words(cell)) for cell in row))
+    return shown
 
 
 def print_verdicts(verdicts: Iterable[Any]) -> None:
@@ -297,7 +379,7 @@ def print_verdicts(verdicts: Iterable[Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from .tables import words
+    from .presentation.tables import words
 
     table = Table(box=None, header_style="bold", pad_edge=False)
     for heading in ("claim", "cases", "largest difference", "tolerance", "verdict"):
@@ -313,7 +395,9 @@ def print_verdicts(verdicts: Iterable[Any]) -> None:
             "held" if verdict.held else f"MISSED: {verdict.missed}",
             style=None if verdict.held else "bold red",
         )
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+    console = Console(
+        width=None if sys.stdout.isatty() else 120, highlight=False, markup=False, emoji=False
+    )
     console.print(table)
     print(f"{held} of {table.row_count} claims held")
 
@@ -342,7 +426,7 @@ def progress() -> Any:
         BarColumn(24),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
     )
     return Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=2)
 
@@ -352,9 +436,13 @@ def writable(folder: Path) -> None:
 
     Raises:
         OSError: naming it, if nothing can be written there.
+        ValueError: if it is something else than a folder.
     """
     import tempfile
 
+    from .harness.record import check_folder
+
+    check_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
     try:
         with tempfile.TemporaryFile(dir=folder):
@@ -373,5 +461,5 @@ def _known(kind: str, name: str, valid: Iterable[str]) -> str:
 
 
 def _complain(message: str) -> int:
-    print(f"plumbob: {' '.join(message.split())}", file=sys.stderr)
+    print(f"plumbob: {visible(message)}", file=sys.stderr)
     return MISUSED

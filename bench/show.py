@@ -24,9 +24,9 @@ from reference import (
 from reference.arguments import FloatArray, choice
 from reference.formats import bvh
 
-from .figures import COLOURS, STYLE
-from .pictures import ARM_VIEW, CLOTH_VIEW, draw_arm, draw_cloth, seen
-from .problems.arm import CUSTOM, MAX_SPACING, MIN_SPACING
+from .experiments.arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING
+from .experiments.pictures.drawings import ARM_VIEW, CLOTH_VIEW, draw_arm, draw_cloth, seen
+from .presentation.figures import COLOURS, STYLE
 
 ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *curves)

@@ -4,10 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference import rotation
+from reference import arguments, rotation
 from reference.arguments import FloatArray
 from reference.mass_spring import MassSpring, State
-from reference.skeleton import Skeleton
+from reference.skeleton import Skeleton, checked_skeleton
 
 MOST_JOINTS = 50
 LEAST_PARTICLES, MOST_PARTICLES = 5, 500
@@ -19,7 +19,8 @@ RESOLVED = 0.04
 
 def generator(quantity: str, case: int) -> np.random.Generator:
     """Return the random numbers of one quantity of a case, independent of all others."""
-    return np.random.default_rng([20130, *quantity.encode(), case])
+    whole = arguments.integer("case", case, least=0)
+    return np.random.default_rng([20130, *quantity.encode(), whole])
 
 
 def skeleton(case: int) -> Skeleton:
@@ -39,7 +40,8 @@ def skeleton(case: int) -> Skeleton:
 
 def local_rotations(case: int, skeleton: Skeleton, *batch: int) -> FloatArray:
     """Return uniformly random local rotations, shape (*batch, joint, 4)."""
-    return rotation.random(generator("pose", case), *batch, skeleton.joint_count)
+    joints = checked_skeleton(skeleton).joint_count
+    return rotation.random(generator("pose", case), *batch, joints)
 
 
 class Reach(NamedTuple):
@@ -98,19 +100,19 @@ def smooth(case: int) -> Motion:
 
     At most `RESOLVED` is h omega, with omega a bound on the frequencies and decay rates.
     """
-    system, state, external, _ = _motion("smooth", case, particles(case % 2))
+    system, state, external, _ = _motion("smooth", case, _few(case))
     return Motion(system, state, external, RESOLVED / highest_rate(system))
 
 
 def unpinned(case: int) -> Motion:
     """Return a smooth motion of 5 to 23 particles, none of them pinned."""
-    system, state, external, _ = _motion("unpinned", case, particles(case % 2), pins=0)
+    system, state, external, _ = _motion("unpinned", case, _few(case), pins=0)
     return Motion(system, state, external, RESOLVED / highest_rate(system))
 
 
 def drifting(case: int) -> Motion:
     """Return a smooth motion without pins, gravity or external forces: nothing turns it."""
-    system, state, _, _ = _motion("drifting", case, particles(case % 2), pins=0, gravity=0.0)
+    system, state, _, _ = _motion("drifting", case, _few(case), pins=0, gravity=0.0)
     return Motion(system, state, np.zeros_like(state.positions), RESOLVED / highest_rate(system))
 
 
@@ -153,12 +155,18 @@ def line(case: int) -> Motion:
 
 def particles(case: int) -> int:
     """Return how many particles a case has: the sizes are spread evenly over their magnitudes."""
-    share = case * 3 % SIZES / (SIZES - 1)
+    share = arguments.integer("case", case, least=0) * 3 % SIZES / (SIZES - 1)
     return round(LEAST_PARTICLES * (MOST_PARTICLES / LEAST_PARTICLES) ** share)
+
+
+def _few(case: int) -> int:
+    """Return 5 or 23 particles."""
+    return particles(arguments.integer("case", case, least=0) % 2)
 
 
 def highest_rate(system: MassSpring) -> float:
     """Return a bound on the frequencies and decay rates of a system [1/s], by Gershgorin."""
+    arguments.instance("system", system, MassSpring)
 
     def busiest(per_spring: FloatArray) -> float:
         total = np.zeros(system.particle_count)
@@ -181,6 +189,7 @@ def _motion(
     gravity: float = 5.0,
 ) -> Motion:
     rng = generator(quantity, case)
+    damped = arguments.boolean("damped", damped)
     springs = _network(rng, n)
     x = rng.standard_normal((n, 3))
     if coincident:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from reference import arguments
 from reference.arguments import FloatArray
 
 from .tolerances import Tolerance
@@ -77,8 +78,14 @@ class Verdict:
 
 
 def judge(claim: Claim, cases: int | None = None) -> Verdict:
-    """Compare all cases of a claim, or the number given, and return the verdict."""
-    compared = list(claim.compare(claim.cases if cases is None else cases))
+    """Compare all cases of a claim, or the number given, and return the verdict.
+
+    Raises:
+        ValueError: if it is no claim, or the number not an integer of at least 0.
+    """
+    arguments.instance("claim", claim, Claim)
+    count = claim.cases if cases is None else arguments.integer("cases", cases, least=0)
+    compared = list(claim.compare(count))
     difference = np.max([_apart(c.ours, c.theirs, c.scale) for c in compared], initial=0.0)
     moved = np.min([_apart(c.ours, c.still, c.scale) for c in compared] or [0.0])
     missed = _missed(len(compared), difference, moved, claim.tolerance.value)

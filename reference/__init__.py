@@ -9,6 +9,7 @@ from .explicit import runge_kutta, symplectic_euler
 from .implicit_euler import STEP_SOLVERS, ImplicitEuler, StepResult
 from .implicit_euler.certificate import Certificate, Coverage
 from .inverse_kinematics import IK_SOLVERS, IKSolution, Target, solve_ik
+from .judging import PoseJudgement, StepJudgement, judge_pose, judge_step
 from .kinematics import forward_kinematics, local_from_global
 from .mass_spring import MassSpring, State
 from .outcome import Outcome
@@ -28,13 +29,17 @@ __all__ = [
     "Mimic",
     "Outcome",
     "Pose",
+    "PoseJudgement",
     "Skeleton",
     "State",
+    "StepJudgement",
     "StepResult",
     "Target",
     "cores",
     "curves",
     "forward_kinematics",
+    "judge_pose",
+    "judge_step",
     "local_from_global",
     "resample",
     "rotation",

@@ -1,18 +1,24 @@
 """What a caller passed, checked: the array asked for, or a ValueError that names the argument."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+Kind = TypeVar("Kind")
 
 FLOAT64 = np.dtype(np.float64)
 
-# The fourth power of a coordinate is still a finite number.
+# The one rule for magnitudes: no number given is beyond this, so that its fourth power is finite.
 LARGEST_COORDINATE = 1e75
+# Nor is a number that has to be positive below this.
+SMALLEST_POSITIVE = 1e-75
+# What arrays are counted in.
+LARGEST_INTEGER = 2**63 - 1
 
 
 def array(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
@@ -22,54 +28,51 @@ def array(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
     axes. The value itself is returned where it already fits, and must then not be written to.
 
     Raises:
-        ValueError: if it is not numeric, has another shape, or holds NaN or infinity.
+        ValueError: if it is not numeric, has another shape, or holds NaN, infinity or a number
+            beyond 1e75.
     """
-    result = floats(name, value, *trailing)
-    if not np.isfinite(result).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
-        raise ValueError(f"{name}: expected finite numbers, got {result[where]} at index {where}")
-    return result
+    return _bounded("numbers", name, value, *trailing)
 
 
 def coordinates(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
-    """Return the same as `array`, for lengths that will be squared and multiplied.
-
-    Raises:
-        ValueError: as `array` does, and if a coordinate is beyond 1e75.
-    """
-    result = floats(name, value, *trailing)
-    largest = np.abs(result).max(initial=0.0)
-    if not largest <= LARGEST_COORDINATE:
-        array(name, result, *trailing)
-        raise ValueError(
-            f"{name}: expected coordinates of at most {LARGEST_COORDINATE:g}, got {largest:g}"
-        )
-    return result
+    """Return the same as `array`; the error speaks of coordinates."""
+    return _bounded("coordinates", name, value, *trailing)
 
 
 def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
-    """Return the same as `array`, NaN and infinity let through, for kernels that look themselves.
+    """Return the same as `array`, any number let through, for kernels that look themselves.
 
     Raises:
         ValueError: if it is not numeric or has another shape.
     """
-    result = _floats(name, value)
-    if not _fits(result.shape, trailing):
-        raise ValueError(f"{name}: expected shape {shape(trailing)}, got {shape(result.shape)}")
-    return result
+    if type(value) is np.ndarray and value.dtype == FLOAT64 and value.flags.carray:
+        if not _fits(value.shape, trailing):
+            check_shape(name, value, *trailing)
+        return value
+    given = _converted(name, value)
+    if given.dtype.kind not in "fiu":
+        raise ValueError(f"{name}: expected an array of numbers, got {shown(value)}")
+    check_shape(name, given, *trailing)
+    return copied(name, given, np.float64)
 
 
-def number(name: str, value: Any, *, least: float = -np.inf, above: float = -np.inf) -> float:
-    """Return a finite float, at least `least` and greater than `above`.
+def number(
+    name: str, value: Any, *, least: float = -LARGEST_COORDINATE, above: float = -np.inf
+) -> float:
+    """Return a float, at least `least`, greater than `above`, and at most 1e75.
+
+    One that has to be greater than zero has to be at least 1e-75, so that one can divide by it.
 
     Raises:
         ValueError: if it is not a finite number in that range.
     """
-    if type(value) is float and least <= value < np.inf and value > above:
+    if above == 0.0:
+        least = max(least, SMALLEST_POSITIVE)
+    if type(value) is float and least <= value <= LARGEST_COORDINATE and value > above:
         return value
     if isinstance(value, str | bool):
-        raise ValueError(f"{name}: expected a number, got {value!r}")
-    result = _floats(name, value)
+        raise ValueError(f"{name}: expected a number, got {shown(value)}")
+    result = floats(name, value, "...")
     if result.shape != ():
         raise ValueError(f"{name}: expected one number, got shape {shape(result.shape)}")
     if not np.isfinite(result):
@@ -78,22 +81,27 @@ def number(name: str, value: Any, *, least: float = -np.inf, above: float = -np.
         raise ValueError(f"{name}: expected a number greater than {above:g}, got {value}")
     if result < least:
         raise ValueError(f"{name}: expected a number of at least {least:g}, got {value}")
+    if result > LARGEST_COORDINATE:
+        raise ValueError(
+            f"{name}: expected a number of at most {LARGEST_COORDINATE:g}, got {value}"
+        )
     return float(result)
 
 
-def integer(name: str, value: Any, *, least: int, below: int | None = None) -> int:
-    """Return an int, at least `least` and, if given, less than `below`.
+def integer(name: str, value: Any, *, least: int, below: int = LARGEST_INTEGER + 1) -> int:
+    """Return an int, at least `least` and less than `below`.
 
     Raises:
         ValueError: if it is not an integer (a boolean is none) in that range.
     """
-    if type(value) is int and value >= least and (below is None or value < below):
+    if type(value) is int and least <= value < below:
         return value
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
-        raise ValueError(f"{name}: expected an integer, got {value!r}")
-    if value < least or (below is not None and value >= below):
-        upper = "" if below is None else f" and at most {below - 1}"
-        raise ValueError(f"{name}: expected an integer of at least {least}{upper}, got {value}")
+        raise ValueError(f"{name}: expected an integer, got {shown(value)}")
+    if not least <= value < below:
+        upper = "" if below > LARGEST_INTEGER >= value else f" and at most {below - 1}"
+        got = shown(int(value))
+        raise ValueError(f"{name}: expected an integer of at least {least}{upper}, got {got}")
     return int(value)
 
 
@@ -105,19 +113,67 @@ def indices(
     Raises:
         ValueError: if they are not integers (booleans are none), out of range, or of another shape.
     """
-    given = np.asarray(value)
-    if given.size == 0:
-        given = given.astype(np.int64)
-    if given.dtype.kind not in "iu":
+    given = _converted(name, value)
+    if given.size > 0 and given.dtype.kind not in "iu":
         raise ValueError(f"{name}: expected integer indices, got {given.dtype} values")
-    if not _fits(given.shape, trailing):
-        raise ValueError(f"{name}: expected shape {shape(trailing)}, got {shape(given.shape)}")
-    outside = (given < least) | (given >= below)
+    check_shape(name, given, *trailing)
+    result = copied(name, given, np.int64)
+    outside = (result < least) | (result >= below)
     if outside.any():
         raise ValueError(
             f"{name}: expected indices from {least} to {below - 1}, got {given[outside][0]}"
         )
-    return np.array(given, dtype=np.int64, order="C")
+    return result
+
+
+def flags(name: str, value: ArrayLike, count: int) -> BoolArray:
+    """Return booleans, shape (count,), of which one may be given for all.
+
+    Raises:
+        ValueError: if they are not booleans, or of another shape.
+    """
+    given = _converted(name, value)
+    if given.dtype != bool:
+        raise ValueError(f"{name}: expected booleans, got {given.dtype} values")
+    if given.shape != ():
+        check_shape(name, given, count)
+    return np.array(np.broadcast_to(given, (count,)))
+
+
+def boolean(name: str, value: Any) -> bool:
+    """Return a boolean.
+
+    Raises:
+        ValueError: if it is none, such as a number.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name}: expected True or False, got {shown(value)}")
+    return bool(value)
+
+
+def text(name: str, value: Any) -> str:
+    """Return a string.
+
+    Raises:
+        ValueError: if it is none.
+    """
+    if not isinstance(value, str):
+        raise ValueError(f"{name}: expected text, got {shown(value)}")
+    return value
+
+
+def sequence(name: str, value: Any, count: int, each: str) -> tuple[Any, ...]:
+    """Return a sequence of so many items, one for `each`, as a tuple.
+
+    Raises:
+        ValueError: if it is none, or has another length.
+    """
+    listed = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+    if not (listed or (isinstance(value, np.ndarray) and value.ndim > 0)):
+        raise ValueError(f"{name}: expected {count} {name}, one {each}, got {shown(value)}")
+    if len(value) != count:
+        raise ValueError(f"{name}: expected {count} {name}, one {each}, got {len(value)}")
+    return tuple(value)
 
 
 def choice(name: str, value: Any, valid: Mapping[str, Any] | Sequence[str]) -> str:
@@ -127,8 +183,63 @@ def choice(name: str, value: Any, valid: Mapping[str, Any] | Sequence[str]) -> s
         ValueError: if not, with the valid names.
     """
     if not isinstance(value, str) or value not in valid:
-        raise ValueError(f"{name}: expected one of {', '.join(valid)}, got {value!r}")
+        raise ValueError(f"{name}: expected one of {', '.join(valid)}, got {shown(value)}")
     return value
+
+
+def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
+    """Return the value if it is of a kind.
+
+    Raises:
+        ValueError: if it is of another, such as the pair that a scene returns.
+    """
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
+        raise ValueError(f"{name}: expected {article} {kind.__name__}, got {type(value).__name__}")
+    return value
+
+
+def generator(name: str, value: Any) -> np.random.Generator:
+    """Return the value if it is a generator of random numbers.
+
+    Raises:
+        ValueError: if it is none; `numpy.random.default_rng(seed)` makes one.
+    """
+    return instance(name, value, np.random.Generator)
+
+
+def broadcast(name: str, one: tuple[int, ...], other: tuple[int, ...]) -> tuple[int, ...]:
+    """Return two batches' common leading axes; `name` is the second's argument.
+
+    Raises:
+        ValueError: if they do not broadcast with one another.
+    """
+    try:
+        return np.broadcast_shapes(one, other)
+    except ValueError:
+        raise ValueError(
+            f"{name}: expected leading axes that broadcast with {shape(one)}, got {shape(other)}"
+        ) from None
+
+
+def check_shape(name: str, given: np.ndarray, *trailing: int | str) -> None:
+    """Raise a ValueError that names the argument if its shape is not as for `array`."""
+    if not _fits(given.shape, trailing):
+        raise ValueError(f"{name}: expected shape {shape(trailing)}, got {shape(given.shape)}")
+
+
+def copied(name: str, given: np.ndarray, dtype: Any) -> Any:
+    """Return a C-contiguous copy of another type; what overflows becomes infinite.
+
+    Raises:
+        ValueError: if there is no memory for it.
+    """
+    try:
+        with np.errstate(over="ignore"):
+            return np.array(given, dtype=dtype, order="C")
+    except MemoryError:
+        got = shape(given.shape)
+        raise ValueError(f"{name}: expected an array that fits into memory, got {got}") from None
 
 
 def spread(values: FloatArray, lengths: Sequence[int]) -> FloatArray:
@@ -151,16 +262,34 @@ def shape(lengths: Sequence[int | str]) -> str:
     return f"({inner},)" if len(lengths) == 1 else f"({inner})"
 
 
-def _floats(name: str, value: Any) -> FloatArray:
-    if type(value) is np.ndarray and value.dtype == FLOAT64 and value.flags.carray:
-        return value
+def shown(value: Any) -> str:
+    """Write a value for an error message, in short; of what cannot be written, the type."""
+    try:
+        return f"{value!r:.80}"
+    except Exception:
+        return type(value).__name__
+
+
+def _bounded(kind: str, name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
+    result = floats(name, value, *trailing)
+    largest = np.abs(result).max(initial=0.0)
+    if largest <= LARGEST_COORDINATE:
+        return result
+    if not np.isfinite(result).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
+        raise ValueError(f"{name}: expected finite numbers, got {result[where]} at index {where}")
+    raise ValueError(f"{name}: expected {kind} of at most {LARGEST_COORDINATE:g}, got {largest:g}")
+
+
+def _converted(name: str, value: Any) -> np.ndarray:
+    """Return the value as an array of whatever type, a view where it is one already."""
     try:
         given = np.asarray(value)
-        if given.dtype.kind not in "fiu":
-            raise TypeError
-        return np.array(given, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: expected an array of numbers, got {value!r:.80}") from None
+    except Exception:  # anything may come from an object's own conversion
+        raise ValueError(f"{name}: expected an array of numbers, got {shown(value)}") from None
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise ValueError(f"{name}: expected an array of numbers, got one with masked values")
+    return given
 
 
 def _fits(actual: tuple[int, ...], trailing: tuple[int | str, ...]) -> bool:

@@ -159,7 +159,7 @@ class Articulation:
         count = checked_skeleton(skeleton).joint_count
         names = _checked_kinds(kinds, count)
         lower, upper = _checked_limits(lower, upper, count)
-        follows = _checked_mimics(mimics or {}, skeleton, names)
+        follows = _checked_mimics({} if mimics is None else mimics, skeleton, names)
         number = np.array([KINDS.index(kind) for kind in names])
         _check_twists(number, lower, upper)
         frames = _checked_frames(frames, count)
@@ -247,7 +247,12 @@ class Articulation:
 
         Without limits a hinge is drawn from a whole turn, a slide or a free joint from within a
         metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
+
+        Raises:
+            ValueError: if rng is no generator, or a length not an integer of at least 0.
         """
+        arguments.generator("rng", rng)
+        shape = tuple(arguments.integer("shape", length, least=0) for length in shape)
         q = np.empty((math.prod(shape), self.coordinate_count))
         for j in self._leading:
             where = self.coordinates_of(int(j))
@@ -270,12 +275,12 @@ class Articulation:
         """Return whether each q keeps all limits to a tolerance [rad or m], shape (...).
 
         Raises:
-            ValueError: as for `clamp`.
+            ValueError: as for `clamp`, or if the tolerance is no number of at least 0.
         """
         given = self.checked("q", q)
         excess = np.empty(given.shape[:-1])
         _excess(self.arrays, one_batch(given), excess.reshape(-1))
-        return excess <= tolerance
+        return excess <= arguments.number("tolerance", tolerance, least=0.0)
 
     def local_transforms(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return each joint's position [m] and rotation in its parent's frame.
@@ -500,9 +505,8 @@ _forward = TwoSpeeds(_forward_batch, label="forward_kinematics of articulations"
 
 
 def _checked_kinds(kinds: str | Sequence[str], count: int) -> tuple[str, ...]:
-    given = (kinds,) * count if isinstance(kinds, str) else tuple(kinds)
-    if len(given) != count:
-        raise ValueError(f"kinds: expected {count} kinds, one a joint, got {len(given)}")
+    one = isinstance(kinds, str)
+    given = (kinds,) * count if one else arguments.sequence("kinds", kinds, count, "a joint")
     return tuple(arguments.choice("kinds", kind, KINDS) for kind in given)
 
 
@@ -526,11 +530,7 @@ def _checked_limits(
 ) -> tuple[FloatArray, FloatArray]:
     bounds = []
     for name, value in (("lower", lower), ("upper", upper)):
-        given = arguments.floats(name, value, "...")
-        _one_a_joint(name, given.shape, count)
-        if np.isnan(given).any():
-            raise ValueError(f"{name}: expected numbers or infinity, got NaN")
-        bounds.append(arguments.spread(given, (count,)))
+        bounds.append(_checked_bound(name, value, count))
     crossed = np.flatnonzero(bounds[0] > bounds[1])
     if len(crossed):
         j = crossed[0]
@@ -539,6 +539,16 @@ def _checked_limits(
             f"for joint {j}"
         )
     return bounds[0], bounds[1]
+
+
+def _checked_bound(name: str, value: ArrayLike, count: int) -> FloatArray:
+    """Return numbers, one a joint, of which any may be infinite."""
+    given = arguments.floats(name, value, "...")
+    _one_a_joint(name, given.shape, count)
+    if np.isnan(given).any():
+        raise ValueError(f"{name}: expected numbers or infinity, got NaN")
+    arguments.array(name, given[np.isfinite(given)], "...")
+    return arguments.spread(given, (count,))
 
 
 def _check_twists(kinds: IndexArray, lower: FloatArray, upper: FloatArray) -> None:
@@ -553,11 +563,10 @@ def _check_twists(kinds: IndexArray, lower: FloatArray, upper: FloatArray) -> No
 
 
 def _checked_cones(cones: ArrayLike, count: int) -> FloatArray:
-    given = arguments.floats("cones", cones, "...")
-    _one_a_joint("cones", given.shape, count)
+    given = _checked_bound("cones", cones, count)
     if not (given >= 0.0).all():
         raise ValueError(f"cones: expected angles of at least 0, got {given.min():g}")
-    return arguments.spread(given, (count,))
+    return given
 
 
 def _one_a_joint(name: str, batch: tuple[int, ...], count: int) -> None:
@@ -569,7 +578,9 @@ def _checked_mimics(
     mimics: Mapping[int | str, Mimic], skeleton: Skeleton, kinds: tuple[str, ...]
 ) -> dict[int, Mimic]:
     """Return the mimics by index, each with a leader that is no mimic joint itself."""
-    named = {skeleton.index(joint, "mimics"): Mimic(*mimic) for joint, mimic in mimics.items()}
+    if not isinstance(mimics, Mapping):
+        raise ValueError(f"mimics: expected a mapping of joints, got {arguments.shown(mimics)}")
+    named = {skeleton.index(j, "mimics"): _checked_mimic(mimic) for j, mimic in mimics.items()}
     leaders = {joint: skeleton.index(mimic.leader, "mimics") for joint, mimic in named.items()}
     checked: dict[int, Mimic] = {}
     for joint in named:
@@ -577,13 +588,23 @@ def _checked_mimics(
             multiplier = arguments.number("mimics", named[j].multiplier)
             shift = arguments.number("mimics", named[j].shift)
             first, factor, further = checked.get(leaders[j], Mimic(leaders[j]))
-            checked[j] = Mimic(first, multiplier * factor, multiplier * further + shift)
+            checked[j] = Mimic(
+                first,
+                arguments.number("mimics", multiplier * factor),
+                arguments.number("mimics", multiplier * further + shift),
+            )
             for k in (j, leaders[j]):
                 if kinds[k] not in ("hinge", "slide"):
                     raise ValueError(
                         f"mimics: expected hinges or slides, got {kinds[k]!r} for joint {k}"
                     )
     return checked
+
+
+def _checked_mimic(mimic: Any) -> Mimic:
+    if not isinstance(mimic, tuple | list) or not 1 <= len(mimic) <= 3:
+        raise ValueError(f"mimics: expected a Mimic, got {arguments.shown(mimic)}")
+    return Mimic(*mimic)
 
 
 def _chain_to_leader(

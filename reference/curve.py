@@ -9,6 +9,9 @@ from . import arguments
 from .arguments import FloatArray
 from .backend.compiled import TwoSpeeds
 
+# A finer curve would not fit into memory.
+MOST_POINTS = 10_000_000
+
 # All named curves lie in the plane y = 0 [m]; the closed ones do not repeat their first point.
 
 
@@ -107,17 +110,20 @@ def resample(
         closed: whether the last point is a neighbour of the first.
 
     Raises:
-        ValueError: if there are no points, they are not finite, or the spacings are not positive or
-            too near to each other.
+        ValueError: if there are no points, they are not finite, or the spacings are not positive,
+            too near to each other, or so small that there would be more than ten million points.
     """
     points = arguments.array("curve", curve, "point", 3)
+    closed = arguments.boolean("closed", closed)
     min_spacing = arguments.number("min_spacing", min_spacing, above=0.0)
     max_spacing = arguments.number("max_spacing", max_spacing, least=2.0 * min_spacing)
     if len(points) == 0:
         raise ValueError("curve: expected at least one point, got none")
     if closed:
         points = np.concatenate([points, points[:1]])
-    spaced = _divide_gaps(_drop_close(points, min_spacing), max_spacing)
+    kept = _drop_close(points, min_spacing)
+    _check_count(kept, max_spacing)
+    spaced = _divide_gaps(kept, max_spacing)
     return spaced[:-1] if closed else spaced
 
 
@@ -163,6 +169,14 @@ def spacing(points, i, j):
 
 
 _keep = TwoSpeeds(keep_spaced)
+
+
+def _check_count(points: FloatArray, max_spacing: float) -> None:
+    count = (np.linalg.norm(np.diff(points, axis=0), axis=-1) / max_spacing).sum()
+    if count > MOST_POINTS:
+        raise ValueError(
+            f"max_spacing: expected one for at most {MOST_POINTS:,} points, got {max_spacing:g}"
+        )
 
 
 def _divide_gaps(points: FloatArray, max_spacing: float) -> FloatArray:

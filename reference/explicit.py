@@ -1,6 +1,7 @@
 """Explicit integrators: symplectic Euler, and the classical Runge-Kutta method as truth at tiny h.
 
-Dampers pull with -c ((v_i - v_j)·u) u at the velocities of the moment. A pin that is taken
+Dampers pull with -c ((v_i - v_j)·u) u at the velocities of the moment; those of implicit Euler's
+step have another law, which `reference.mass_spring.damper_forces` compares. A pin that is taken
 somewhere moves there in a straight line at constant speed, which is its velocity from the start of
 the step to its end; a pin that stays has none, whatever the state says.
 """
@@ -8,8 +9,8 @@ the step to its end; a pin that stays has none, whatever the state says.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import FloatArray, number
-from .mass_spring import MassSpring, State, constant_forces, motion, pin_goal, pulls
+from .arguments import LARGEST_COORDINATE, FloatArray, number
+from .mass_spring import MassSpring, State, _pulls, constant_forces, motion, pin_goal
 
 
 def symplectic_euler(
@@ -32,12 +33,12 @@ def symplectic_euler(
     Raises:
         ValueError: if h is not positive, the state has another number of particles, or the
             external forces or pin positions have another shape or are not finite.
-        FloatingPointError: if the step overflows, as it does after many unstable ones.
+        FloatingPointError: if the step goes beyond 1e75, as it does after many unstable ones.
     """
     h = number("h", h, above=0)
     with np.errstate(over="ignore", invalid="ignore"):
         x, v, goal = _start(system, state, h, pin_positions)
-        v = v + h * accelerations(system, x, v, constant_forces(system, external_forces))
+        v = v + h * _accelerations(system, x, v, constant_forces(system, external_forces))
         return _end("symplectic_euler", system, x + h * v, v, goal)
 
 
@@ -57,11 +58,11 @@ def runge_kutta(
 
     def rates(shift: float, dx: FloatArray, dv: FloatArray) -> tuple[FloatArray, FloatArray]:
         v_there = v + shift * dv
-        return v_there, accelerations(system, x + shift * dx, v_there, outer)
+        return v_there, _accelerations(system, x + shift * dx, v_there, outer)
 
     with np.errstate(over="ignore", invalid="ignore"):
         x, v, goal = _start(system, state, h, pin_positions)
-        k1 = v, accelerations(system, x, v, outer)
+        k1 = v, _accelerations(system, x, v, outer)
         k2 = rates(h / 2, *k1)
         k3 = rates(h / 2, *k2)
         k4 = rates(h, *k3)
@@ -69,14 +70,14 @@ def runge_kutta(
         return _end("runge_kutta", system, x + h / 6 * dx, v + h / 6 * dv, goal)
 
 
-def accelerations(
+def _accelerations(
     system: MassSpring, x: FloatArray, v: FloatArray, constant: FloatArray
 ) -> FloatArray:
     """Return M^-1 f, zero at the pins, shape (particle, 3) [m/s²], unchecked.
 
     `constant` are the forces besides those of springs and dampers [N], shape (particle, 3).
     """
-    total, free = constant + pulls(system, x, v), system.free
+    total, free = constant + _pulls(x, v, system.arrays), system.free
     result = np.zeros_like(total)
     result[free] = total[free] / system.masses[free, None]
     return result
@@ -102,6 +103,8 @@ def _end(
 ) -> State:
     """Return the state, the pins exactly where they were to go."""
     positions[system.pinned] = goal
-    if not (np.isfinite(positions).all() and np.isfinite(velocities).all()):
-        raise FloatingPointError(f"{name}: the step left the finite numbers; h is too large")
+    if not np.abs([positions, velocities]).max() <= LARGEST_COORDINATE:
+        raise FloatingPointError(
+            f"{name}: the step left the numbers up to {LARGEST_COORDINATE:g}; h is too large"
+        )
     return State.of(positions, velocities)

@@ -29,6 +29,7 @@ from .articulation import (
     one_batch,
 )
 from .backend.compiled import TwoSpeeds
+from .model import Model, checked_model, effector_of
 from .quaternion import (
     conjugate,
     cross,
@@ -41,32 +42,30 @@ from .quaternion import (
     subtract,
     vector_at,
 )
-from .skeleton import Skeleton, checked_skeleton
+from .skeleton import Skeleton
 
 
-def jacobian(
-    articulation: Skeleton | Articulation, q: ArrayLike, effector: int | str = -1
-) -> FloatArray:
+def jacobian(articulation: Model, q: ArrayLike, effector: int | str | None = None) -> FloatArray:
     """Return the derivative of a joint's motion by the velocity, (..., 6, freedom).
 
     Three rows of linear velocity [m], three of angular velocity [rad], both of the joint's frame,
     taken at its origin, along the axes of the world.
 
     Args:
-        articulation: the tree; a Skeleton is an articulation of balls.
+        articulation: the tree; a Skeleton is an articulation of balls, a Robot has its own.
         q: coordinates, (..., coordinate); of a Skeleton local rotations, (..., joint, 4).
-        effector: the joint, by name or index.
+        effector: the joint, by name or index; by default as for `solve_ik`.
 
     Raises:
         ValueError: if q has another shape, is not finite, or holds no unit quaternion where one
-            is expected, or if there is no such joint.
+            is expected, if there is no such joint, or none is named of several tips.
     """
     model, given = _coordinates("q", articulation, q)
-    one = np.array([model.index(effector, "effector")])
+    one = np.array([effector_of(checked_model(articulation), effector)])
     return _jacobians(model, one, given)[..., 0, :, :]
 
 
-def jacobians(articulation: Skeleton | Articulation, q: ArrayLike) -> FloatArray:
+def jacobians(articulation: Model, q: ArrayLike) -> FloatArray:
     """Return the Jacobians of all joints, (..., joint, 6, freedom), as `jacobian` does of one.
 
     Raises:
@@ -76,7 +75,7 @@ def jacobians(articulation: Skeleton | Articulation, q: ArrayLike) -> FloatArray
     return _jacobians(model, np.arange(model.joint_count), given)
 
 
-def integrate(articulation: Skeleton | Articulation, q: ArrayLike, v: ArrayLike) -> FloatArray:
+def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
     """Return the coordinates reached from q by moving with the velocity v for one second.
 
     Args:
@@ -95,10 +94,10 @@ def integrate(articulation: Skeleton | Articulation, q: ArrayLike, v: ArrayLike)
     start, step = _spread("v", start, step)
     moved = start.copy()
     _integrate(model.arrays, one_batch(step), one_batch(moved))
-    return moved if articulation is model else moved.reshape(*moved.shape[:-1], -1, 4)
+    return moved.reshape(*moved.shape[:-1], -1, 4) if isinstance(articulation, Skeleton) else moved
 
 
-def difference(articulation: Skeleton | Articulation, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
+def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
     """Return the velocity that leads from q0 to q1 in one second, (..., freedom).
 
     It is the inverse of `integrate`: rotations go the shorter way round, at most pi.
@@ -248,24 +247,17 @@ def _jacobians(model: Articulation, effectors: np.ndarray, q: FloatArray) -> Flo
     return J
 
 
-def _coordinates(
-    name: str, model: Skeleton | Articulation, q: ArrayLike
-) -> tuple[Articulation, FloatArray]:
+def _coordinates(name: str, given: Model, q: ArrayLike) -> tuple[Articulation, FloatArray]:
     """Return the articulation, and its coordinates checked, (..., coordinate)."""
+    model = checked_model(given, "articulation")
     if isinstance(model, Articulation):
         return model, model.checked(name, q)
-    balls = Articulation(checked_skeleton(model))
+    balls = Articulation(model)
     local = arguments.floats(name, q, "...", model.joint_count, 4)
     return balls, balls.checked(name, local.reshape(*local.shape[:-2], balls.coordinate_count))
 
 
 def _spread(name: str, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return both with the same leading axes; `name` is the second's, for the error."""
-    try:
-        batch = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
-    except ValueError:
-        raise ValueError(
-            f"{name}: expected leading axes that broadcast with {arguments.shape(a.shape[:-1])}, "
-            f"got {arguments.shape(b.shape[:-1])}"
-        ) from None
+    batch = arguments.broadcast(name, a.shape[:-1], b.shape[:-1])
     return arguments.spread(a, (*batch, a.shape[-1])), arguments.spread(b, (*batch, b.shape[-1]))

@@ -20,6 +20,7 @@ from .backend.simd.poses import (
     store_unit,
 )
 from .backend.threads import in_slices
+from .model import Model, checked_model
 from .quaternion import add, conjugate, made_unit, multiply, rotate, vector_at
 from .skeleton import Pose, Skeleton, SkeletonArrays, checked_skeleton
 
@@ -27,7 +28,7 @@ from .skeleton import Pose, Skeleton, SkeletonArrays, checked_skeleton
 THREAD_JOINTS = 100_000
 
 
-def forward_kinematics(skeleton: Skeleton | Articulation, local_rotations: ArrayLike) -> Pose:
+def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
     """Return the global pose of every joint.
 
     A joint with parent p has the rotation R = R_p Q and the position x = x_p + R_p offset. The
@@ -35,7 +36,7 @@ def forward_kinematics(skeleton: Skeleton | Articulation, local_rotations: Array
     descendants.
 
     Args:
-        skeleton: the tree.
+        skeleton: the tree, an Articulation, or a Robot read from a file.
         local_rotations: unit quaternions relative to the parent, w first, shape (..., joint, 4);
             leading axes are batch or frame. For an Articulation, its coordinates (...,
             coordinate).
@@ -50,7 +51,9 @@ def forward_kinematics(skeleton: Skeleton | Articulation, local_rotations: Array
     if isinstance(skeleton, Articulation):
         x, R = skeleton.forward(local_rotations)
         return Pose(frozen(x), frozen(R))
-    tree = checked_skeleton(skeleton).arrays
+    if not isinstance(skeleton, Skeleton):
+        return forward_kinematics(checked_model(skeleton), local_rotations)
+    tree = skeleton.arrays
     count = len(tree.parents)
     local = arguments.floats("local_rotations", local_rotations, "...", count, 4)
     positions, rotations = np.empty((*local.shape[:-1], 3)), np.empty(local.shape)

@@ -1,7 +1,8 @@
 """Particles joined by damped springs: the model, its state, energies, forces and their matrices.
 
 A spring from particle i to particle j has length l = |x_i - x_j| and direction
-u = (x_i - x_j) / l. It stores k/2 (l - r)² and pulls i with -(k (l - r) + c (v_i - v_j)·u) u.
+u = (x_i - x_j) / l. It stores k/2 (l - r)² and pulls i with -(k (l - r) + c (v_i - v_j)·u) u; the
+dampers of an implicit Euler step have another law, see `damper_forces`.
 
 A tension-only spring, such as a rope, stores nothing and does not pull while it is slack, l <= r;
 its damper acts all the same, as in MuJoCo. Its stiffness jumps where l passes r: exactly there it
@@ -19,9 +20,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .arguments import FloatArray, IndexArray, array, frozen, indices, shape
+from .arguments import (
+    BoolArray,
+    FloatArray,
+    IndexArray,
+    array,
+    boolean,
+    coordinates,
+    flags,
+    frozen,
+    indices,
+    instance,
+)
 from .backend.compiled import TwoSpeeds
 from .backend.partition import LARGE, Regions, cut
 from .sparse.assembly import BlockSum
@@ -33,8 +45,6 @@ from .springs import (
     stiffness_blocks,
     sum_springs,
 )
-
-BoolArray = NDArray[np.bool_]
 
 
 class SystemArrays(NamedTuple):
@@ -95,8 +105,9 @@ class MassSpring:
         """Check and copy the system; what belongs to springs may be one value for all of them.
 
         Raises:
-            ValueError: if a shape is wrong, a number is negative or not finite, an index is out of
-                range, a spring joins a particle to itself, or a free particle has no mass.
+            ValueError: if a shape is wrong, a number is negative, not finite or beyond 1e75, an
+                index is out of range, a spring joins a particle to itself, or a free particle has
+                no mass.
         """
         mass = _masses(masses)
         ends = _springs(springs, len(mass))
@@ -107,7 +118,7 @@ class MassSpring:
                 _per_spring("rest_lengths", rest_lengths, len(ends)),
                 _per_spring("stiffnesses", stiffnesses, len(ends)),
                 _per_spring("dampings", dampings, len(ends)),
-                _flags("tension_only", tension_only, len(ends)),
+                flags("tension_only", tension_only, len(ends)),
                 np.unique(indices("pinned", pinned, "pinned", least=0, below=len(mass))),
                 array("gravity", gravity, 3).copy(),
             )
@@ -212,9 +223,9 @@ class State:
         """Check and copy both.
 
         Raises:
-            ValueError: if a shape is wrong or a number is not finite.
+            ValueError: if a shape is wrong, or a number not finite or beyond 1e75.
         """
-        x = array("positions", positions, "particle", 3)
+        x = coordinates("positions", positions, "particle", 3)
         v = array("velocities", velocities, len(x), 3)
         self._hold(x.copy(), v.copy())
 
@@ -257,7 +268,7 @@ def derivation(system: MassSpring) -> Derivation:
 
 def incidence(system: MassSpring) -> Any:
     """Return A alone, sparse CSC (particle, spring)."""
-    n, s = system.particle_count, len(system.springs)
+    n, s = _system(system).particle_count, len(system.springs)
     signs, starts = np.tile([1.0, -1.0], s), 2 * np.arange(s + 1)
     return scipy.sparse.csc_array((signs, system.springs.ravel(), starts), shape=(n, s))
 
@@ -310,7 +321,8 @@ def spring_energy(system: MassSpring, positions: ArrayLike) -> float:
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    return float(np.sum(0.5 * system.stiffnesses * stretches(system, positions) ** 2))
+    stretch = stretches(system, positions)
+    return float(np.sum(0.5 * system.stiffnesses * stretch**2))
 
 
 def kinetic_energy(system: MassSpring, state: State) -> float:
@@ -335,7 +347,7 @@ def forces(
             a shape other than (particle, 3) or are not finite.
     """
     x, v = motion(system, state)
-    return constant_forces(system, external_forces) + pulls(system, x, v)
+    return constant_forces(system, external_forces) + _pulls(x, v, system.arrays)
 
 
 def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None) -> FloatArray:
@@ -344,9 +356,10 @@ def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None
     Raises:
         ValueError: if the external forces have another shape or are not finite.
     """
+    weights = _system(system).weights
     if external_forces is None:
-        return system.weights.copy()
-    return system.weights + array("external_forces", external_forces, system.particle_count, 3)
+        return weights.copy()
+    return weights + array("external_forces", external_forces, system.particle_count, 3)
 
 
 def spring_forces(system: MassSpring, positions: ArrayLike) -> FloatArray:
@@ -358,24 +371,22 @@ def spring_forces(system: MassSpring, positions: ArrayLike) -> FloatArray:
         ValueError: if the positions have a wrong shape or are not finite.
     """
     x = _positions(system, positions)
-    return pulls(system, x, np.zeros_like(x))
+    return _pulls(x, np.zeros_like(x), system.arrays)
 
 
 def damper_forces(system: MassSpring, state: State) -> FloatArray:
     """Return the dampers' forces -c ((v_i - v_j)·u) u at their first ends [N], (particle, 3).
 
-    Those of slack springs act as well.
+    Those of slack springs act as well. A step of implicit Euler has another law, in which the
+    dampers have an energy: -(c/h) (l - l_n) u, l_n being the length before the step. At the end of
+    a step the two differ by the rotation of a spring within it, about c h/2 |w across u|² / l with
+    w = v_i - v_j: in proportion to h.
 
     Raises:
         ValueError: if the state has another number of particles.
     """
     x, v = motion(system, state)
-    return pulls(system.replaced(stiffnesses=np.zeros(len(system.springs))), x, v)
-
-
-def pulls(system: MassSpring, x: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the forces of springs and dampers together [N], shape (particle, 3), unchecked."""
-    return _pulls(x, v, system.arrays)
+    return _pulls(x, v, system.arrays._replace(stiffnesses=np.zeros(len(system.springs))))
 
 
 def stiffness_matrix(system: MassSpring, positions: ArrayLike) -> Any:
@@ -387,7 +398,7 @@ def stiffness_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    blocks = spring_blocks(system, _positions(system, positions))
+    blocks = _blocks(_positions(system, positions), system.arrays, True)
     return BlockSum(incidence(system)).matrix(blocks)
 
 
@@ -399,28 +410,37 @@ def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    dampers = system.replaced(
-        stiffnesses=system.arrays.dampings, tension_only=np.zeros(len(system.springs), dtype=bool)
-    )
-    blocks = spring_blocks(dampers, _positions(system, positions), geometric=False)
+    x, never_slack = _positions(system, positions), np.zeros(len(system.springs), dtype=bool)
+    dampers = system.arrays._replace(stiffnesses=system.arrays.dampings, tension_only=never_slack)
+    blocks = _blocks(x, dampers, False)
     return BlockSum(incidence(system)).matrix(blocks)
 
 
 def spring_blocks(
-    system: MassSpring, positions: FloatArray, *, geometric: bool = True
+    system: MassSpring, positions: ArrayLike, *, geometric: bool = True
 ) -> FloatArray:
-    """Return each spring's 3 x 3 stiffness [N/m], with or without the geometric term, unchecked."""
-    return _blocks(positions, system.arrays, geometric)
+    """Return each spring's 3 x 3 stiffness [N/m], with or without the geometric term.
+
+    Raises:
+        ValueError: if the positions have a wrong shape or are not finite.
+    """
+    x, geometric = _positions(system, positions), boolean("geometric", geometric)
+    return _spring_blocks(system, x, geometric=geometric)
+
+
+def _spring_blocks(system: MassSpring, x: FloatArray, *, geometric: bool = True) -> FloatArray:
+    """Return what `spring_blocks` does; for steps, whose positions are their own."""
+    return _blocks(x, system.arrays, geometric)
 
 
 def motion(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
     """Return positions and velocities of a state of the system, those of the pins zero.
 
     Raises:
-        ValueError: if it is not a State, or has another number of particles.
+        ValueError: if they are no MassSpring and State, or differ in their number of particles.
     """
-    if not isinstance(state, State):
-        raise ValueError(f"state: expected a State, got {type(state).__name__}")
+    _system(system)
+    instance("state", state, State)
     if len(state.positions) != system.particle_count:
         expected, got = system.particle_count, len(state.positions)
         raise ValueError(f"state: expected {expected} particles, got {got}")
@@ -435,7 +455,7 @@ def pin_goal(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if they have another shape or are not finite.
     """
-    return array("pin_positions", pin_positions, len(system.pinned), 3)
+    return coordinates("pin_positions", pin_positions, len(system.pinned), 3)
 
 
 _pulls = TwoSpeeds(spring_pulls)
@@ -446,8 +466,12 @@ _stretches = TwoSpeeds(spring_stretches)
 _rest_vectors = TwoSpeeds(spring_rest_vectors)
 
 
+def _system(system: MassSpring) -> MassSpring:
+    return instance("system", system, MassSpring)
+
+
 def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
-    return array("positions", positions, system.particle_count, 3)
+    return coordinates("positions", positions, _system(system).particle_count, 3)
 
 
 def _masses(masses: ArrayLike) -> FloatArray:
@@ -475,15 +499,6 @@ def _per_spring(name: str, value: ArrayLike, count: int) -> FloatArray:
     if given.ndim == 0:
         return _not_negative(name, np.full(count, given))
     return _not_negative(name, array(name, given, count).copy())
-
-
-def _flags(name: str, value: ArrayLike, count: int) -> BoolArray:
-    given = np.asarray(value)
-    if given.dtype != bool:
-        raise ValueError(f"{name}: expected booleans, got {given.dtype} values")
-    if given.shape not in {(), (count,)}:
-        raise ValueError(f"{name}: expected shape ({count},), got {shape(given.shape)}")
-    return np.array(np.broadcast_to(given, (count,)))
 
 
 def _not_negative(name: str, values: FloatArray) -> FloatArray:

@@ -16,15 +16,23 @@ from .quaternion import logarithm as logarithm_of
 
 
 def identity(*shape: int) -> FloatArray:
-    """Return identity quaternions, (*shape, 4)."""
-    result = np.zeros((*shape, 4))
+    """Return identity quaternions, (*shape, 4).
+
+    Raises:
+        ValueError: if a length is not an integer of at least 0.
+    """
+    result = np.zeros((*_lengths(shape), 4))
     result[..., 0] = 1.0
     return result
 
 
 def random(rng: np.random.Generator, *shape: int) -> FloatArray:
-    """Return uniformly random rotations, (*shape, 4): normalised Gaussian 4-vectors."""
-    q = rng.standard_normal((*shape, 4))
+    """Return uniformly random rotations, (*shape, 4): normalised Gaussian 4-vectors.
+
+    Raises:
+        ValueError: if rng is no generator, or a length not an integer of at least 0.
+    """
+    q = arguments.generator("rng", rng).standard_normal((*_lengths(shape), 4))
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
@@ -38,6 +46,24 @@ def unit(name: str, q: ArrayLike) -> FloatArray:
     lengths = np.linalg.norm(values, axis=-1, keepdims=True)
     check_unit(name, lengths[..., 0])
     return values / lengths
+
+
+def normalise(quaternions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return quaternions made unit, (..., 4), and how far their lengths were from one, (...).
+
+    Raises:
+        ValueError: if they are not finite, or one has no length.
+    """
+    given = arguments.array("quaternions", quaternions, "...", 4)
+    largest = np.abs(given).max(axis=-1, keepdims=True)
+    if not largest.all():
+        where = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
+        raise ValueError(f"quaternions: expected lengths above 0, got 0 at index {where}")
+    scaled = given / largest  # no square overflows or vanishes
+    lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
+    with np.errstate(over="ignore"):  # the length of the largest numbers is none itself
+        deviation = np.abs(lengths * largest - 1.0)[..., 0]
+    return scaled / lengths, deviation
 
 
 def check_unit(name: str, lengths: FloatArray) -> None:
@@ -57,7 +83,8 @@ def multiply(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if an argument does not hold finite quaternions.
     """
-    return _joined(quaternion.multiply(_parts("a", a, 4), _parts("b", b, 4)))
+    a, b = _together(arguments.array("a", a, "...", 4), "b", arguments.array("b", b, "...", 4))
+    return _joined(quaternion.multiply(_parts(a), _parts(b)))
 
 
 def conjugate(q: ArrayLike) -> FloatArray:
@@ -66,7 +93,7 @@ def conjugate(q: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if q does not hold finite quaternions.
     """
-    return _joined(quaternion.conjugate(_parts("q", q, 4)))
+    return _joined(quaternion.conjugate(_parts(arguments.array("q", q, "...", 4))))
 
 
 def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
@@ -75,7 +102,8 @@ def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if an argument does not hold finite quaternions or vectors.
     """
-    return _joined(quaternion.rotate(_parts("q", q, 4), _parts("v", v, 3)))
+    q, v = _together(arguments.array("q", q, "...", 4), "v", arguments.array("v", v, "...", 3))
+    return _joined(quaternion.rotate(_parts(q), _parts(v)))
 
 
 def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
@@ -87,7 +115,8 @@ def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if an argument does not hold finite vectors.
     """
-    a, b = np.broadcast_arrays(arguments.array("a", a, "...", 3), arguments.array("b", b, "...", 3))
+    a, b = _together(arguments.array("a", a, "...", 3), "b", arguments.array("b", b, "...", 3))
+    a, b = _scaled(a), _scaled(b)
     result = np.empty((*a.shape[:-1], 4))
     _between(_rows(a), _rows(b), result.reshape(-1, 4))
     return result
@@ -123,7 +152,8 @@ def angle(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if an argument does not hold unit quaternions.
     """
-    return np.linalg.norm(logarithm(multiply(conjugate(unit("a", a)), unit("b", b))), axis=-1)
+    a, b = _together(unit("a", a), "b", unit("b", b))
+    return np.linalg.norm(logarithm(multiply(conjugate(a), b)), axis=-1)
 
 
 def to_matrix(q: ArrayLike) -> FloatArray:
@@ -168,8 +198,27 @@ def _quaternion_form(R: FloatArray) -> FloatArray:
     return K
 
 
-def _parts(name: str, value: ArrayLike, count: int) -> tuple[FloatArray, ...]:
-    return tuple(np.moveaxis(arguments.array(name, value, "...", count), -1, 0))
+def _lengths(shape: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(arguments.integer("shape", length, least=0) for length in shape)
+
+
+def _together(a: FloatArray, name: str, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return both with the same leading axes; `name` is the second's, for the error."""
+    batch = arguments.broadcast(name, a.shape[:-1], b.shape[:-1])
+    return (
+        np.broadcast_to(a, (*batch, a.shape[-1])),
+        np.broadcast_to(b, (*batch, b.shape[-1])),
+    )
+
+
+def _scaled(v: FloatArray) -> FloatArray:
+    """Return vectors times powers of two, so that the squares of none underflow."""
+    _, exponents = np.frexp(np.abs(v).max(axis=-1, keepdims=True))
+    return np.ldexp(v, -exponents)
+
+
+def _parts(values: FloatArray) -> tuple[FloatArray, ...]:
+    return tuple(np.moveaxis(values, -1, 0))
 
 
 def _joined(parts: tuple[FloatArray, ...]) -> FloatArray:

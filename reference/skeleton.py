@@ -76,6 +76,7 @@ class Skeleton:
         count = self.joint_count
         if type(joint) is int and -count <= joint < count:
             return joint % count
+        argument = arguments.text("argument", argument) or "joint"
         if isinstance(joint, str):
             return self._numbers[arguments.choice(argument, joint, self._numbers)]
         return arguments.integer(argument, joint, least=-count, below=count) % count
@@ -90,7 +91,7 @@ class Skeleton:
         Raises:
             ValueError: if there is no such joint.
         """
-        return frozen(self.path_array(self.index(effector)))
+        return frozen(self.path_array(self.index(effector, "effector")))
 
     def path_array(self, joint: int) -> IndexArray:
         """Return the path to a joint given by index, for kernels: not to be written to."""
@@ -113,15 +114,15 @@ class Skeleton:
         return f"Skeleton({self.joint_count} joints, reach {self.reach():g} m)"
 
 
-def checked_skeleton(skeleton: Skeleton) -> Skeleton:
-    """Return the argument if it is a Skeleton.
+def checked_skeleton(skeleton: Skeleton, name: str = "skeleton") -> Skeleton:
+    """Return the argument of that name if it is a Skeleton.
 
     Raises:
         ValueError: if it is anything else, such as the pair that a scene returns.
     """
-    if not isinstance(skeleton, Skeleton):
-        raise ValueError(f"skeleton: expected a Skeleton, got {type(skeleton).__name__}")
-    return skeleton
+    if type(skeleton) is Skeleton:
+        return skeleton
+    return arguments.instance(name, skeleton, Skeleton)
 
 
 class Pose(NamedTuple):
@@ -157,11 +158,11 @@ def _checked_tree(parents: ArrayLike, offsets: ArrayLike) -> tuple[IndexArray, F
 def _checked_names(names: Sequence[str] | None, count: int) -> tuple[str, ...]:
     if names is None:
         return tuple(f"joint{i}" for i in range(count))
-    if isinstance(names, str) or not all(isinstance(name, str) and name for name in names):
-        raise ValueError(f"names: expected {count} non-empty strings, got {names!r:.80}")
-    if len(names) != count:
-        raise ValueError(f"names: expected {count} names, one a joint, got {len(names)}")
-    if len(set(names)) != count:
-        twice = next(name for name in names if list(names).count(name) > 1)
+    given = arguments.sequence("names", names, count, "a joint")
+    for name in given:
+        if not arguments.text("names", name):
+            raise ValueError(f"names: expected {count} non-empty strings, got {names!r:.80}")
+    if len(set(given)) != count:
+        twice = next(name for name in given if given.count(name) > 1)
         raise ValueError(f"names: expected distinct names, got {twice!r} more than once")
-    return tuple(names)
+    return given

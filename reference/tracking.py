@@ -1,4 +1,4 @@
-"""Following a curve frame by frame, and coherently."""
+"""Following a curve: frame by frame, or by a smooth trajectory over all frames."""
 
 from collections.abc import Sequence
 from typing import Any, TypeGuard, cast
@@ -17,13 +17,15 @@ from .inverse_kinematics import (
     balls,
     batch_of,
     checked_settings,
+    default_solver,
     goals_of,
     solve_targets,
 )
 from .inverse_kinematics.mechanism import Mechanism, take_coordinates
 from .inverse_kinematics.problem import Wanted, check_numbers, checked_targets
 from .inverse_kinematics.reduce import prepare
-from .skeleton import Skeleton, checked_skeleton
+from .model import Model, checked_model
+from .skeleton import Skeleton
 
 # A frame that is nearer to its target than this, over the reach, or than this angle [rad], has met
 # it, whatever the tolerance.
@@ -31,46 +33,48 @@ MET = 1e-6
 
 
 def track(
-    skeleton: Skeleton | Articulation,
+    skeleton: Model,
     curve: ArrayLike | Target | Sequence[Target],
-    solver: str = "ccd",
+    solver: str | None = None,
     start: ArrayLike | None = None,
-    effector: int | str = -1,
+    effector: int | str | None = None,
     warm: bool = True,
     *,
     coherent: bool = False,
     closed: bool = False,
     tolerance: float = 1e-4,
     tolerance_rotation: float = 1e-4,
-    max_iterations: int = 100,
+    max_iterations: int | None = None,
     record: bool = False,
 ) -> IKSolution:
-    """Return the poses in which the effector follows a curve, a frame a point.
+    """Return the poses in which the effector follows a curve, one frame for each of its points.
 
-    A coherent motion is first solved frame by frame. Then all its frames are changed together until
-    the sum of the squared jumps between neighbours, over hinges [rad], rotation vectors of balls
-    [rad] and ways over the reach, cannot be lowered by a small change, with every effector on its
-    target and every joint within its limits: it is the nearest to the last frame that leaves no
-    frame worse off. Frames whose target is not reached are drawn to it as near as they come. The
-    first pose is as free as the others; `start` only says where the search begins. In the end every
-    frame that is not within the tolerance yet is solved once more from there.
+    A coherent motion is a smooth trajectory (`trajectory/`): solved frame by frame first, then in
+    all frames together, until no small change lowers the sum of the squared displacements between
+    neighbouring frames, over angles of hinges [rad], rotation vectors of balls [rad] and lengths
+    over the reach, with every effector on its target and every joint within its limits. Frames
+    whose target is not reached come as near to it as a penalty draws them. The first pose is as
+    free as the others; `start` is where the search begins. In the end every frame that is not
+    within the tolerance yet is solved once more from there.
 
     Args:
-        skeleton: the tree; an Articulation for joints of other kinds and for limits.
+        skeleton: the tree; an Articulation for joints of other kinds and for limits, or a Robot
+            read from a file.
         curve: the effector's global position in each frame [m], shape (frame, 3); or a Target whose
             position is that, and its rotation (frame, 4), or several for several effectors.
-        solver: a name in IK_SOLVERS.
+        solver: a name in IK_SOLVERS; by default CCD for one position on a Skeleton, and else
+            Levenberg-Marquardt. No frame is restarted from random poses, which would jump.
         start: the pose to start from: local rotations, shape (joint, 4), identities if None; of an
             Articulation coordinates, (coordinate,), neutral ones if None.
-        effector: the joint that follows, by index or name.
+        effector: the joint that follows, by index or name; by default as for `solve_ik`.
         warm: start each frame from the last one's solution, which keeps neighbouring frames alike;
             if False, each starts from `start`, and the joints may jump from frame to frame.
-        coherent: make the motion coherent.
-        closed: count the jump from the last frame to the first as well, so that the motion ends
-            where it began and can be repeated without drift; for coherent motions only.
+        coherent: make the motion a smooth trajectory.
+        closed: count the displacement from the last frame to the first as well, so that the motion
+            ends where it began and can be repeated without drift; needs coherent=True.
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that counts as reached [rad].
-        max_iterations: the most to make in a frame.
+        max_iterations: the most to make in a frame; by default as for `solve_ik`.
         record: keep the residuals of all iterations in `history`; not of those over all frames.
 
     Returns:
@@ -81,31 +85,40 @@ def track(
         ValueError: as `solve_ik` does, and if the curve is not of that shape or has no points, or a
             motion is to be closed but not coherent.
     """
-    if closed and not coherent:
+    if arguments.boolean("closed", closed) and not arguments.boolean("coherent", coherent):
         raise ValueError("closed: expected False where coherent is False, got True")
-    if not isinstance(skeleton, Articulation):
-        checked_skeleton(skeleton)
-    wanted = _along(skeleton, curve, effector)
+    model = checked_model(skeleton)
+    wanted = _along(model, curve, effector)
+    if solver is None:
+        solver, _ = default_solver(model, curve)
+        solver = "ccd" if solver == "fabrik" else solver
     settings = checked_settings(
-        solver, tolerance, tolerance_rotation, max_iterations, 0, 0, record, bool(warm)
+        solver,
+        tolerance,
+        tolerance_rotation,
+        max_iterations,
+        0,
+        0,
+        record,
+        arguments.boolean("warm", warm),
     )
-    motion = _solved(skeleton, _start(skeleton, start), wanted, settings)
+    motion = _solved(model, _start(model, start), wanted, settings)
     if not coherent:
         return motion
-    q, reached, steps = _smoothed(skeleton, motion, wanted, closed)
-    return _settled(skeleton, motion, wanted, q, reached, steps, settings)
+    q, reached, steps = _smoothed(model, motion, wanted, closed)
+    return _settled(model, motion, wanted, q, reached, steps, settings)
 
 
 def _along(
     skeleton: Skeleton | Articulation,
     curve: ArrayLike | Target | Sequence[Target],
-    effector: int | str,
+    effector: int | str | None,
 ) -> list[Wanted]:
     """Return what is wanted of each effector, in so many frames."""
     if not _has_targets(curve):
         curve = arguments.coordinates("curve", cast(ArrayLike, curve), "frame", 3)
     wanted = checked_targets(skeleton, curve, effector)
-    batch = batch_of((), wanted)
+    batch = batch_of((), wanted, "start")
     if len(batch) != 1:
         came = arguments.shape((*batch, 3))
         raise ValueError(f"curve: expected shape (frame, 3), got {came}")
@@ -126,10 +139,17 @@ def _spread(one: Wanted, frames: int) -> Wanted:
 
 def _start(skeleton: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
     if isinstance(skeleton, Articulation):
-        given = skeleton.neutral() if start is None else start
-        return arguments.floats("start", given, skeleton.coordinate_count)
+        if start is None:
+            return skeleton.neutral()
+        given = arguments.floats("start", start, skeleton.coordinate_count)
+        skeleton.checked("start", given)
+        return given
     count = skeleton.joint_count
-    return arguments.floats("start", rotation.identity(count) if start is None else start, count, 4)
+    if start is None:
+        return rotation.identity(count)
+    given = arguments.floats("start", start, count, 4)
+    rotation.unit("start", given)
+    return given
 
 
 def _solved(
@@ -139,13 +159,13 @@ def _solved(
     settings: Settings,
 ) -> IKSolution:
     targets = [Target(one.position, one.rotation, one.joint, one.weight) for one in wanted]
-    return solve_targets(skeleton, start, targets, -1, settings)
+    return solve_targets(skeleton, start, targets, None, settings)
 
 
 def _smoothed(
     skeleton: Skeleton | Articulation, motion: IKSolution, wanted: list[Wanted], closed: bool
 ) -> tuple[FloatArray, np.ndarray, int]:
-    """Return the coherent motion, which frames meet their targets, and the steps over all."""
+    """Return the smooth trajectory, which frames meet their targets, and its Newton steps."""
     articulation = skeleton if isinstance(skeleton, Articulation) else balls(skeleton)
     effectors = tuple(one.joint for one in wanted)
     oriented = tuple(one.rotation is not None for one in wanted)
@@ -179,7 +199,7 @@ def _settled(
 ) -> IKSolution:
     """Return the motion q with its residuals, those of its frames solved again that need it."""
     alone = settings._replace(chained=False, record=False)
-    still = alone._replace(max_iterations=0)
+    still = alone._replace(max_iterations=0, far_iterations=0)
     last = _solved(skeleton, q, wanted, still)
     off = np.flatnonzero(reached & (last.outcome != Outcome.CONVERGED))
     iterations = np.asarray(motion.iterations) + steps

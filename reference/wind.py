@@ -15,7 +15,7 @@ is not moved in return, and one triangle does not shelter another.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import FloatArray, array, indices, number
+from .arguments import FloatArray, array, indices, instance, number
 from .backend.compiled import TwoSpeeds
 from .mass_spring import State
 from .quaternion import add, cross, dot, norm, put_vector, scale, subtract, vector_at
@@ -49,8 +49,7 @@ def wind_forces(
             of range.
         FloatingPointError: if a force overflows.
     """
-    if not isinstance(state, State):
-        raise ValueError(f"state: expected a State, got {type(state).__name__}")
+    instance("state", state, State)
     n = len(state.positions)
     air = array("wind", wind, "...", 3)
     if air.shape != (3,):

@@ -1,13 +1,15 @@
 """The command line: what it prints, what it exits with, and what it never does."""
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bench import cli
-from bench.record import RecordFile
+from bench.harness.record import Record, RecordFile
 from crosscheck.identities import CLAIMS
 from crosscheck.verdict import Verdict
 
@@ -49,6 +51,9 @@ MISUSE = {
     "no records": (["report"], "no records in report"),
     "options before the command": (["--output", "x", "report"], "behind the command: report"),
     "too much": (["report", "now"], "now"),
+    "no files": (["check", "--files"], "--files: expected folders or files, got none"),
+    "no such folder": (["check", "--files", "here"], "here: there is no such file or folder"),
+    "nothing to read": (["check", "--files", "."], "expected URDF, MJCF or BVH files, got none"),
 }
 
 
@@ -86,6 +91,128 @@ def test_a_corrupt_result_file_exits_2_and_stays(capsys, empty_folder, arguments
     assert code == 2
     assert "line 1: not a record" in err
     assert path.read_text() == "no record\n"
+
+
+def a_record(solver="ccd", **more):
+    """A record that a report can be made of."""
+    return Record("timing", "kinematics/x/one pose a call", solver, {"operations": 1},
+                  arrays={"seconds": np.ones(5), "moved": np.array(0)}, **more)  # fmt: skip
+
+
+def in_the_way(path, kind):
+    """Put something at a path that is no file that can be read to its end."""
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        path.write_text("a file")
+
+
+COMMANDS = [[], ["bench", "check"], ["bench", "--fresh"], ["report"]]
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "file"])
+@pytest.mark.parametrize("arguments", COMMANDS, ids=" ".join)
+def test_an_output_that_is_no_folder_exits_2(capsys, empty_folder, arguments, kind):
+    in_the_way(empty_folder / "out", kind)
+    code, out, err = plumbob(capsys, *arguments, "-o", "out")
+    assert (code, err) == (2, f"plumbob: out: expected a folder, got a {kind}\n")
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
+@pytest.mark.parametrize("arguments", COMMANDS, ids=" ".join)
+def test_records_that_are_no_file_exit_2(capsys, empty_folder, arguments, kind):
+    (empty_folder / "out").mkdir()
+    in_the_way(empty_folder / "out" / "records.jsonl", kind)
+    code, out, err = plumbob(capsys, *arguments, "-o", "out")
+    assert (code, err) == (2, f"plumbob: out/records.jsonl: expected a file, got a {kind}\n")
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
+@pytest.mark.parametrize("path", ["index.html", "tables/check.md", "figures/timing_kinematics.svg"])
+def test_a_report_over_what_is_no_file_exits_2(capsys, empty_folder, path, kind):
+    RecordFile("out").append([a_record()])
+    (empty_folder / "out" / path).parent.mkdir(exist_ok=True)
+    in_the_way(empty_folder / "out" / path, kind)
+    code, _, err = plumbob(capsys, "report", "-o", "out")
+    assert (code, err) == (2, f"plumbob: out/{path}: expected a file, got a {kind}\n")
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
+@pytest.mark.parametrize("path", ["heart.svg", "heart.bvh", "heart.gif"])
+def test_a_picture_over_what_is_no_file_exits_2(capsys, empty_folder, path, kind):
+    in_the_way(empty_folder / path, kind)
+    code, _, err = plumbob(capsys, "show", "heart", "-o", path)
+    assert (code, err) == (2, f"plumbob: {path}: expected a file, got a {kind}\n")
+
+
+@pytest.mark.parametrize("command", ["report", "bench"])
+def test_a_folder_of_the_system_exits_2(capsys, command):
+    code, _, err = plumbob(capsys, command, "-o", "/proc/nothing-of-ours")
+    assert code == 2
+    assert "/proc/nothing-of-ours" in err
+    assert err.count("\n") == 1
+
+
+def test_damaged_lines_cost_a_sentence_and_nothing_else(capsys, empty_folder):
+    file = RecordFile("out")
+    file.append([a_record()])
+    file.path.write_bytes(b"rubbish\n" + file.path.read_bytes() + b"[" * 10**5 + b"\n")
+    code, out, err = plumbob(capsys, "report", "-o", "out")
+    assert (code, err) == (0, "")
+    assert "Missing: Left out of records.jsonl, for they are no records: line 1 (" in out
+    assert "; line 3 (" in out
+
+
+HOSTILE = ("[red]x", "[/]", ":smile:", "\x1b[2J", "\x00", "right\u202eleft", "$\\frac{$", "{0}")
+
+
+def test_hostile_names_are_data_on_the_terminal(capsys, empty_folder):
+    from bench.harness import run
+
+    records = [a_record(name) for name in HOSTILE]
+    RecordFile("out").append(records)
+    for command in (lambda: cli.print_tables(["timing"], empty_folder / "out"),
+                    lambda: cli.write_report(empty_folder / "out")):  # fmt: skip
+        command()
+        out = capsys.readouterr().out
+        assert all(line.isprintable() for line in out.splitlines())
+        for name in HOSTILE:
+            shown = name if name.isprintable() else name.encode("unicode_escape").decode()
+            assert shown in out
+    assert run.missed_claims(["check"], empty_folder / "out") == []
+
+
+@pytest.mark.parametrize("name", ["a\x1b[2Jb", "a\udcffb", "a\nb"])
+def test_a_path_of_hostile_letters_is_said_in_one_line(capsys, name):
+    code, _, err = plumbob(capsys, "report", "-o", name)
+    assert code == 2
+    assert err.count("\n") == 1
+    assert err.rstrip("\n").isprintable()
+
+
+READERS = {"help": ["--help"], "claims": ["check", "--list"], "complaint": ["chek"]}
+
+
+@pytest.mark.parametrize("arguments", READERS.values(), ids=READERS)
+@pytest.mark.parametrize("buffered", ["", "1"])
+def test_a_reader_that_leaves_ends_it_without_a_word(arguments, buffered):
+    """Nor is it taken for a claim that is missed, which is 1."""
+    read, write = os.pipe()
+    os.close(read)
+    script = f"from bench.cli import main; main({arguments})"
+    both = arguments == READERS["complaint"]
+    done = subprocess.run(
+        [sys.executable, "-c", script], stdout=write, stderr=write if both else subprocess.PIPE,
+        env={**os.environ, "PYTHONUNBUFFERED": buffered}, cwd=Path(cli.__file__).parent.parent,
+        check=False,
+    )  # fmt: skip
+    os.close(write)
+    assert done.returncode == 141
+    assert both or done.stderr == b""
 
 
 def test_alone_it_does_the_main_job(capsys, main_job):
@@ -143,6 +270,56 @@ def test_the_claims_can_be_listed(capsys):
     code, out, _ = plumbob(capsys, "check", "--list")
     assert code == 0
     assert len(out.splitlines()) == len(CLAIMS)
+
+
+BODY = '<body name="b"><geom size="0.1"/><joint name="j"/>{}</body>'.format
+CHARACTER = "<mujoco><worldbody>{}</worldbody></mujoco>".format
+
+
+@pytest.fixture
+def robots(empty_folder, monkeypatch):
+    """A folder of files, read without a process of their own."""
+    from crosscheck import child_process
+    from crosscheck.robots import files
+
+    monkeypatch.setattr(
+        child_process.ChildProcess, "call", lambda self, function, *given: function(*given)
+    )
+    monkeypatch.setattr(files, "departures", lambda path: [])
+    folder = empty_folder / "robots"
+    (folder / "arms").mkdir(parents=True)
+    (folder / "arms" / "arm|1.urdf").write_text('<robot name="r"><link name="a"/></robot>')
+    (folder / "b.xml").write_text(CHARACTER(BODY("")))
+    (folder / "c.xml").write_text(CHARACTER('<body name="a"><composite/></body>'))
+    (folder / "d.xml").write_text("<other/>")
+    (folder / "e.xml").write_text("<mujocoinclude/>")
+    return folder
+
+
+def test_files_are_checked_and_the_tables_are_markdown(capsys, robots):
+    code, out, err = plumbob(capsys, "check", "--files", "robots")
+    assert (code, err) == (0, "")
+    assert "| robots/arms/arm\\|1.urdf | URDF | agrees (0.0e+00) | agrees" in out
+    assert "- robots/c.xml: Pinocchio: not read by us: c.xml, line 1: \\<composite\\>: exp" in out
+    assert "Of 3 files nothing disagrees; 1 is a part that others include, 1 XML file is of" in out
+    assert "| MJCF | Pinocchio | 2 | 1 | 0 | 1 |" in out
+
+
+def test_files_that_differ_exit_1(capsys, robots):
+    (robots / "b.xml").write_text(CHARACTER(BODY("<frame><joint name='k'/></frame>")))
+    code, out, _ = plumbob(capsys, "check", "--files", "robots/b.xml", "robots/arms")
+    assert code == 1
+    assert "| robots/b.xml | MJCF | differs (" in out
+    assert "Of 2 files 1 reading disagrees; 0 are parts that others include, 0 XML files are" in out
+
+
+def test_a_terminal_shows_the_files_in_columns(capsys, robots, monkeypatch):
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    (robots / "[red]b.xml").write_text(CHARACTER(BODY("")))
+    code, out, _ = plumbob(capsys, "check", "--files", "robots")
+    assert code == 0
+    assert "robots/[red]b.xml" in out
+    assert "|" not in out.replace("arm|1", "")
 
 
 @pytest.mark.parametrize("command", [(), ("check",), ("bench",), ("report",), ("show",)])
@@ -203,7 +380,7 @@ def test_a_picture_of_a_scene_is_written_and_named(capsys, empty_folder):
 @pytest.mark.parametrize("coherent", [False, True])
 def test_a_motion_is_written_for_animation_programs(capsys, empty_folder, coherent):
     """Six decimals leave joint n of the arm off by (n + 1) 9e-7 + n 2.6 m 2.7e-8 at the most."""
-    from bench.problems.arm import MAX_SPACING, MIN_SPACING
+    from bench.experiments.arm.problem import MAX_SPACING, MIN_SPACING
     from reference import curves, resample, scenes, track
     from reference.formats import bvh
 

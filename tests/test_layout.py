@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ["reference", "crosscheck", "bench"]  # each may import those before it
+ROOMS = ["reference", "crosscheck", "bench", "plumbob"]  # each may import those before it
 LIBRARIES = {"numpy", "scipy", "numba", "llvmlite", "cholespy"}  # llvmlite is numba's own
 RUBBISH = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = {"pathlib", "os", "io", "shutil", "tempfile", "open", "fromfile", "tofile", "loadtxt"}
@@ -76,6 +76,13 @@ def prints_in_reference(path, tree):
     return PRINTS & used(tree) if room(path) == "reference" else set()
 
 
+def definitions_at_the_front_door(path, tree):
+    defined = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
+    return {
+        node for node in ast.walk(tree) if isinstance(node, defined) and room(path) == "plumbob"
+    }
+
+
 RULES = [
     arrows_against_the_direction,
     names_that_say_nothing,
@@ -83,6 +90,7 @@ RULES = [
     files_in_reference,
     clocks_in_reference,
     prints_in_reference,
+    definitions_at_the_front_door,
 ]
 
 SLIPS = [
@@ -90,8 +98,12 @@ SLIPS = [
     (arrows_against_the_direction, "reference/a.py", "from crosscheck.verdict import judge"),
     (arrows_against_the_direction, "reference/formats/a.py", "from bench import cli"),
     (arrows_against_the_direction, "crosscheck/a.py", "def f():\n    import bench.run"),
-    (arrows_against_the_direction, "crosscheck/a.py", "import_module('bench.run')"),
+    (arrows_against_the_direction, "crosscheck/a.py", "import_module('bench.harness.run')"),
     (arrows_against_the_direction, "bench/a.py", "from tests import conftest"),
+    (arrows_against_the_direction, "bench/a.py", "from plumbob import solve_ik"),
+    (arrows_against_the_direction, "reference/a.py", "import plumbob"),
+    (definitions_at_the_front_door, "plumbob/a.py", "def f():\n    return 1"),
+    (definitions_at_the_front_door, "plumbob/__init__.py", "class A:\n    pass"),
     (names_that_say_nothing, "reference/utils.py", ""),
     (names_that_say_nothing, "bench/helpers/a.py", ""),
     (names_that_say_nothing, "crosscheck/common.py", ""),
@@ -114,6 +126,7 @@ FINE = [
     ("reference/a.py", "import math\nimport numpy as np\nfrom .compiled import TwoSpeeds"),
     ("reference/formats/a.py", "from pathlib import Path\nopen(Path('a'))"),
     ("crosscheck/a.py", "import mujoco\nfrom reference import Skeleton\nfrom . import samples"),
+    ("plumbob/__init__.py", "from reference import *\nfrom bench.cli import main"),
     ("bench/a.py", "import time\nfrom crosscheck.verdict import judge\nprint(time.time())"),
 ]
 

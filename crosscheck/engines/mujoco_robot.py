@@ -11,10 +11,17 @@ import numpy as np
 
 from reference.arguments import FloatArray
 
+from .file_kind import URDF, file_kind, xml_root
 from .robot_engine import Placement, UnreadableError, columns
 
 # What MuJoCo would refuse or lose in a URDF, and kinematics does not read.
 LEFT_OUT = ("visual", "collision", "inertial")
+# What is left out of an MJCF file that MuJoCo refuses as it is: what uses others comes first.
+SHAPES = (
+    "keys", "sensors", "actuators", "tendons", "equalities", "pairs", "excludes", "skins",
+    "flexes", "sites", "geoms", "meshes", "hfields", "materials", "textures",
+)  # fmt: skip
+KINDS = ("free", "ball", "slide", "hinge")  # by MuJoCo's number
 
 
 class Follower(NamedTuple):
@@ -29,32 +36,32 @@ class Follower(NamedTuple):
 class MujocoRobot:
     """A file as MuJoCo reads it, without anything but kinematics.
 
-    Its links are MuJoCo's bodies; one without a name is called after its number, body#3. MuJoCo
-    orders bodies and joints depth-first: all are found by name. A URDF's mimic joints become
-    equality constraints, which kinematics does not enforce: the followers are placed, and their
-    columns added to their leaders', as the constraints say.
+    Its links are MuJoCo's bodies; one without a name is called after its number, body#3, and a
+    joint without one after its body, its type and its place there, body#3/hinge1. MuJoCo orders
+    bodies and joints depth-first: all are found by name. A URDF's mimic joints become equality
+    constraints, which kinematics does not enforce: the followers are placed, and their columns
+    added to their leaders', as the constraints say.
 
     Attributes:
         model: the mujoco.MjModel.
         data: its mujoco.MjData.
         links: MuJoCo's index of each body.
-        joints: MuJoCo's index of each joint that has a name.
-        followers: the joints that are held to others.
+        joints: MuJoCo's index of each joint.
+        followers: the joints that are held to others, each behind its leader.
     """
 
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
-        is_urdf = path.suffix == ".urdf"
         try:
+            is_urdf = file_kind(path) == URDF
             with silent():
                 self.model = (mujoco_urdf if is_urdf else mujoco_mjcf)(path)
-        except ValueError as error:
+            self.followers = _followers(self.model) if is_urdf and mimic else []
+        except (ValueError, OSError, RecursionError) as error:
             raise UnreadableError(" ".join(str(error).split())) from None
         self.data = mujoco.MjData(self.model)
         bodies = [self.model.body(i).name or f"body#{i}" for i in range(self.model.nbody)]
         self.links = {name: i for i, name in enumerate(bodies)}
-        joints = [self.model.joint(i).name for i in range(self.model.njnt)]
-        self.joints = {name: i for i, name in enumerate(joints) if name}
-        self.followers = _followers(self.model) if is_urdf and mimic else []
+        self.joints = {_joint_name(self.model, bodies, i): i for i in range(self.model.njnt)}
         at = self.model.jnt_dofadr
         self._at = {name: int(at[joint]) for name, joint in self.joints.items()}
 
@@ -83,7 +90,7 @@ class MujocoRobot:
         for part, link in zip(J, links, strict=True):
             mujoco.mj_jacBody(self.model, self.data, part[:3], part[3:], self.links[link])
         at = self.model.jnt_dofadr
-        for joint, leader, _, multiplier in self.followers:
+        for joint, leader, _, multiplier in reversed(self.followers):
             J[..., at[leader]] += multiplier * J[..., at[joint]]
         return columns(J, self._at, freedoms)
 
@@ -98,10 +105,7 @@ def mujoco_urdf(path: Path) -> mujoco.MjModel:
     Raises:
         ValueError: if MuJoCo does not read it.
     """
-    try:
-        root = ElementTree.parse(path).getroot()
-    except ElementTree.ParseError as error:
-        raise ValueError(str(error)) from None
+    root = xml_root(path)
     for link in root.findall("link"):
         for child in [child for child in link if child.tag in LEFT_OUT]:
             link.remove(child)
@@ -118,12 +122,31 @@ def mujoco_urdf(path: Path) -> mujoco.MjModel:
 
 
 def mujoco_mjcf(path: Path) -> mujoco.MjModel:
-    """Return the model of an MJCF file, read as it is.
+    """Return the model of an MJCF file, read as it is, or else without shapes and masses.
+
+    Files of shapes may not be there, and some masses MuJoCo refuses.
 
     Raises:
         ValueError: if MuJoCo does not read it.
     """
-    return mujoco.MjModel.from_xml_path(str(path))
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        with contextlib.suppress(ValueError):
+            return _without_shapes(path)
+        raise error
+
+
+def _without_shapes(path: Path) -> mujoco.MjModel:
+    """Return the model of an MJCF file of which only bodies and joints are left, all as heavy."""
+    spec = mujoco.MjSpec.from_file(str(path))
+    for kind in SHAPES:
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
+    for body in spec.bodies:
+        body.explicitinertial, body.mass, body.inertia = True, 1.0, np.ones(3)
+        body.fullinertia = np.full(6, np.nan)
+    return spec.compile()
 
 
 @contextlib.contextmanager
@@ -145,11 +168,31 @@ def _unit_inertia() -> ElementTree.Element:
     return inertial
 
 
+def _joint_name(model: mujoco.MjModel, bodies: list[str], joint: int) -> str:
+    """Return a joint's name, or that of its body, its type and its place there."""
+    body = model.jnt_bodyid[joint]
+    place = joint - model.body_jntadr[body] + 1
+    return model.joint(joint).name or f"{bodies[body]}/{KINDS[model.jnt_type[joint]]}{place}"
+
+
 def _followers(model: mujoco.MjModel) -> list[Follower]:
-    held = np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT)
-    return [
-        Follower(
+    """Return the joints that are held to others, each behind its leader.
+
+    Raises:
+        ValueError: if some are held to each other in a ring.
+    """
+    waiting = {
+        int(model.eq_obj1id[i]): Follower(
             int(model.eq_obj1id[i]), int(model.eq_obj2id[i]), *map(float, model.eq_data[i, :2])
         )
-        for i in held
-    ]
+        for i in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT)
+    }
+    ordered: list[Follower] = []
+    while waiting:
+        ready = [follower for follower in waiting.values() if follower.leader not in waiting]
+        if not ready:
+            raise ValueError("its mimic joints follow each other in a ring")
+        ordered += ready
+        for follower in ready:
+            del waiting[follower.joint]
+    return ordered

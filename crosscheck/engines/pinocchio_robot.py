@@ -1,6 +1,6 @@
 """Robots and characters in Pinocchio, which reads URDF and MJCF files itself."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -11,9 +11,12 @@ import pinocchio
 from reference import rotation
 from reference.arguments import FloatArray
 
+from .file_kind import URDF, file_kind, xml_root
 from .robot_engine import Placement, UnreadableError, columns
 
-COMPOSITE = "Composite_"
+COMPOSITE = "JointModelComposite"
+# Its own name of the world: a joint of that name ends the process.
+WORLD = "universe"
 
 
 class Place(NamedTuple):
@@ -30,8 +33,9 @@ class PinocchioRobot:
 
     Its links are Pinocchio's body frames. Of the coordinates, a hinge without limits in a URDF
     takes cosine and sine, quaternions are (x, y, z, w), and the linear velocity of a free joint is
-    in its own, moved frame. Several joints of one body in an MJCF file are one composite joint,
-    named after the first: the file says which follow it.
+    in its own, moved frame. Several joints of one body in an MJCF file are one composite joint:
+    the file says which they are. One without a name is called after its body, its type and its
+    place there, trunk/hinge1.
 
     Attributes:
         model: the pinocchio.Model.
@@ -42,17 +46,18 @@ class PinocchioRobot:
 
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
         try:
-            root = ElementTree.parse(path).getroot()
-            self.model = (
-                pinocchio_urdf(path, root, mimic) if path.suffix == ".urdf" else _mjcf(path)
-            )
-        except (ValueError, RuntimeError, ElementTree.ParseError) as error:
+            root = xml_root(path)
+            is_urdf = file_kind(path) == URDF
+            self.model = pinocchio_urdf(path, root, mimic) if is_urdf else _mjcf(path, root)
+        except (ValueError, RuntimeError, LookupError, OSError) as error:
             said = str(error).rpartition("message:")[2]  # before it comes where in Pinocchio
+            if isinstance(error, LookupError):
+                said = f"it ends in an {type(error).__name__}: {said}"
             raise UnreadableError(" ".join(said.split())) from None
         self.data = self.model.createData()
         frames = enumerate(self.model.frames)
         self.links = {f.name: i for i, f in frames if f.type == pinocchio.FrameType.BODY}
-        self.joints = dict(_places(self.model, _siblings(root)))
+        self.joints = dict(_places(self.model) if is_urdf else _places_by_body(self.model, root))
         self._at = {name: place.freedom for name, place in self.joints.items()}
         self._turns: dict[str, FloatArray] = {}
 
@@ -111,7 +116,18 @@ def pinocchio_urdf(path: Path, root: ElementTree.Element, mimic: bool) -> pinocc
     return pinocchio.buildModelFromUrdf(str(path), mimic=mimic)
 
 
-def _mjcf(path: Path) -> pinocchio.Model:
+def _mjcf(path: Path, root: ElementTree.Element) -> pinocchio.Model:
+    """Return the model of an MJCF file.
+
+    Raises:
+        ValueError: if it would read something twice, or end the process.
+        RuntimeError: if Pinocchio refuses it.
+        LookupError: if Pinocchio looks for what it has not read, such as a class.
+    """
+    if len(root.findall("worldbody")) > 1:
+        raise ValueError("it reads the first of several <worldbody> again for each")
+    if any(joint.get("name") == WORLD for joint in (*root.iter("joint"), *root.iter("freejoint"))):
+        raise ValueError(f"{WORLD} is its own name of the world, and here that of a joint")
     return pinocchio.buildModelFromMJCF(str(path))
 
 
@@ -124,21 +140,33 @@ def _theirs(value: FloatArray, place: Place) -> FloatArray:
     return value
 
 
-def _places(model: pinocchio.Model, siblings: Mapping[str, list[str]]):
-    """Yield each joint's name and place, those inside composite joints too."""
+def _places(model: pinocchio.Model) -> Iterator[tuple[str, Place]]:
+    """Yield each joint's name and place."""
     for name, joint in zip(model.names[1:], list(model.joints)[1:], strict=True):
-        if not name.startswith(COMPOSITE):
-            yield name, Place(joint.idx_q, joint.nq, joint.idx_v, joint.nv)
-            continue
-        parts = joint.extract().joints
-        for part, named in zip(parts, siblings[name.removeprefix(COMPOSITE)], strict=True):
-            yield named, Place(part.idx_q, part.nq, part.idx_v, part.nv)
+        yield name, _place(joint)
 
 
-def _siblings(root: ElementTree.Element) -> dict[str, list[str]]:
-    """Return the names of all joints of each MJCF body, by that of the first."""
-    joints = [
-        [child.get("name", "") for child in body if child.tag in ("joint", "freejoint")]
-        for body in root.iter("body")
-    ]
-    return {names[0]: names for names in joints if names}
+def _places_by_body(
+    model: pinocchio.Model, root: ElementTree.Element
+) -> Iterator[tuple[str, Place]]:
+    """Yield the name and place of each joint of an MJCF file that stands in a body itself."""
+    movers = {f.name: f.parentJoint for f in model.frames if f.type == pinocchio.FrameType.BODY}
+    for body in root.iter("body"):
+        name = body.get("name", "")
+        elements = [child for child in body if child.tag in ("joint", "freejoint")]
+        if elements and movers.get(name):
+            joint = model.joints[movers[name]]
+            parts = joint.extract().joints if joint.shortname() == COMPOSITE else [joint]
+            for i, (element, part) in enumerate(zip(elements, parts, strict=True), 1):
+                yield element.get("name") or f"{name}/{_kind(part)}{i}", _place(part)
+
+
+def _place(joint: pinocchio.JointModel) -> Place:
+    return Place(joint.idx_q, joint.nq, joint.idx_v, joint.nv)
+
+
+def _kind(joint: pinocchio.JointModel) -> str:
+    """Return the type of a joint as MJCF calls it."""
+    if joint.nq in (4, 7):
+        return "ball" if joint.nq == 4 else "free"
+    return "slide" if joint.shortname().startswith("JointModelP") else "hinge"

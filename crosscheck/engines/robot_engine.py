@@ -28,6 +28,8 @@ class Placement(NamedTuple):
 class RobotEngine(Protocol):
     """A robot or character as an engine reads it from its file.
 
+    Joints without a name go by that of their body, their type and their place there, arm/hinge1.
+
     Coordinates go in, by the name of the file's joint, as our conventions have them: a number for
     a hinge [rad] or slide [m], (w, x, y, z) for a ball, a position [m] and (w, x, y, z) for a free
     joint, both in the frame where it is unmoved. Velocities come out likewise: of a ball the

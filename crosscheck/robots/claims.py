@@ -9,7 +9,7 @@ from . import comparisons
 from .models import CHARACTERS, PACKAGES, ROBOTS, comparable, models
 
 READS = {ROBOTS: "formats.urdf.read", CHARACTERS: "formats.mjcf.read"}
-FILES = {ROBOTS: "the URDFs of example-robot-data", CHARACTERS: "dm_control's characters in MJCF"}
+FILES = {ROBOTS: "the URDFs of example-robot-data", CHARACTERS: "characters in MJCF"}
 
 
 def robot_claims(family: str, engine: str) -> list[Claim]:

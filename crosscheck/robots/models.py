@@ -1,8 +1,7 @@
-"""The files: every URDF of example-robot-data, and dm_control's characters in MJCF."""
+"""The files: every URDF of example-robot-data, characters in MJCF of gymnasium and dm_control."""
 
 import functools
 import importlib.metadata
-import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,12 +12,24 @@ from reference.articulation import Articulation
 from reference.formats import mjcf, urdf
 from reference.formats.robot import Robot
 
+from ..engines.file_kind import URDF, file_kind
+from .departures import CLASS_ANCHOR, OUTER_ROOT, TURNED_ROOT
+
 ROBOTS, CHARACTERS = "robots", "characters"
-PACKAGES = {ROBOTS: "example-robot-data", CHARACTERS: "dm_control"}
+# dm_control needs labmaze, of which there are no wheels from Python 3.13 on.
+PACKAGES = {ROBOTS: ("example-robot-data",), CHARACTERS: ("gymnasium", "dm_control")}
 EXTRA = "robots"
 
-# Models of dm_control with several bodies; those that only vary another are left out.
+# Models with several bodies; those that only vary another are left out.
 _CHARACTERS = (
+    "envs/mujoco/assets/ant.xml",
+    "envs/mujoco/assets/half_cheetah.xml",
+    "envs/mujoco/assets/hopper.xml",
+    "envs/mujoco/assets/humanoid.xml",
+    "envs/mujoco/assets/pusher.xml",
+    "envs/mujoco/assets/reacher.xml",
+    "envs/mujoco/assets/swimmer.xml",
+    "envs/mujoco/assets/walker2d.xml",
     "suite/humanoid.xml",
     "suite/dog.xml",
     "suite/humanoid_CMU.xml",
@@ -41,9 +52,6 @@ _CHARACTERS = (
     "mujoco/testing/assets/model_with_ball_joints.xml",
 )
 # What an engine is known to place elsewhere, and why; each cause is a test of its own.
-OUTER_ROOT = "a first body without a joint is put at the world's origin"
-TURNED_ROOT = "a free body that the file shows at x, turned by R, is shifted by x - R x"
-CLASS_ANCHOR = "the anchor (pos) that a joint has from its default class is not read"
 CAUSES = {
     ("Pinocchio", "suite/dog.xml"): CLASS_ANCHOR,
     ("Pinocchio", "suite/humanoid_CMU.xml"): TURNED_ROOT,
@@ -71,12 +79,14 @@ class Model:
     """A file.
 
     Attributes:
-        name: its path below the folder of its family.
+        name: its path below the folder of its package.
         path: of the file.
+        root: the folder that files which it includes must be in; its own if None.
     """
 
     name: str
     path: Path
+    root: Path | None = None
 
     def read(self, *, mimic: bool = True) -> Robot:
         """Return what the reference makes of it.
@@ -84,22 +94,22 @@ class Model:
         Raises:
             ValueError: if the file is wrong.
         """
-        if self.path.suffix == ".urdf":
+        if file_kind(self.path) == URDF:
             return urdf.read(self.path, mimic=mimic)
-        return mjcf.read(self.path)
+        return mjcf.read(self.path, root=self.root)
 
 
 @functools.cache
 def models(family: str) -> tuple[Model, ...]:
-    """Return all models of a family, none where its package is not installed."""
-    root = folder(family)
-    if root is None:
-        return ()
+    """Return all models of a family, those of packages that are not installed left out."""
+    roots = [root for package in PACKAGES[family] if (root := folder(package))]
+    return tuple(Model(name, root / name) for root in roots for name in _names(family, root))
+
+
+def _names(family: str, root: Path) -> list[str]:
     if family == CHARACTERS:
-        names = [name for name in _CHARACTERS if (root / name).exists()]
-    else:
-        names = sorted(path.relative_to(root).as_posix() for path in root.rglob("*.urdf"))
-    return tuple(Model(name, root / name) for name in names)
+        return [name for name in _CHARACTERS if (root / name).exists()]
+    return sorted(path.relative_to(root).as_posix() for path in root.rglob("*.urdf"))
 
 
 def comparable(family: str, engine: str, *, moving: bool = False) -> list[Model]:
@@ -112,27 +122,25 @@ def comparable(family: str, engine: str, *, moving: bool = False) -> list[Model]
     return [model for model in models(family) if model.name not in left_out]
 
 
-@functools.cache
-def folder(family: str) -> Path | None:
-    """Return where a family's files are, None if its package is not installed."""
-    if family == CHARACTERS:
-        found = importlib.util.find_spec(PACKAGES[family])
-        return Path(found.origin).parent if found and found.origin else None
+def folder(package: str) -> Path | None:
+    """Return where a package has its files, None if it is not installed."""
     try:
-        package = importlib.metadata.distribution(PACKAGES[family])
+        found = importlib.metadata.distribution(package)
     except importlib.metadata.PackageNotFoundError:
         return None
-    return Path(str(package.locate_file("cmeel.prefix/share/example-robot-data/robots")))
+    inside = {"example-robot-data": "cmeel.prefix/share/example-robot-data/robots"}
+    return Path(str(found.locate_file(inside.get(package, package))))
 
 
 def left_out() -> str:
-    """Return a sentence on the families whose files are not installed, "" if all are."""
-    missing = {family: package for family, package in PACKAGES.items() if not models(family)}
+    """Return a sentence on the packages with files that are not installed, "" if all are."""
+    packages = [package for family in PACKAGES.values() for package in family]
+    missing = [package for package in packages if folder(package) is None]
     if not missing:
         return ""
     return (
-        f"Left out: the claims about {' and '.join(missing)}, whose files are not installed "
-        f"({', '.join(missing.values())}; pip install -e '.[{EXTRA}]' brings them)"
+        f"Left out: the claims about the files of {' and '.join(missing)}, not installed here "
+        f"(pip install -e '.[{EXTRA}]' brings what there are wheels of for this Python)"
     )
 
 

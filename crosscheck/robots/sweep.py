@@ -50,9 +50,8 @@ class Sweep(NamedTuple):
     free_mimics: str
 
 
-@functools.cache
-def sweep(engine: str, model: Model) -> Sweep:
-    """Return a model as an engine sees it.
+def sweep_anew(engine: str, model: Model) -> Sweep:
+    """Return a model as an engine sees it, read from its file.
 
     Where one of both does not take the file's mimic joints, they move by themselves for both.
 
@@ -64,6 +63,10 @@ def sweep(engine: str, model: Model) -> Sweep:
         return _sweep(engine, model, "")
     except (UnreadableError, ValueError) as error:
         return _sweep(engine, model, str(error).replace(str(model.path), model.path.name))
+
+
+# The same, kept: several claims are made of every model.
+sweep = functools.cache(sweep_anew)
 
 
 def ours(robot: Robot, q: FloatArray, links: np.ndarray) -> Motion:

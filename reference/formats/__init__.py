@@ -2,5 +2,6 @@
 
 from . import bvh, mjcf, urdf
 from .obj import Mesh, parse_obj, read_obj
+from .source import FormatWarning
 
-__all__ = ["Mesh", "bvh", "mjcf", "parse_obj", "read_obj", "urdf"]
+__all__ = ["FormatWarning", "Mesh", "bvh", "mjcf", "parse_obj", "read_obj", "urdf"]

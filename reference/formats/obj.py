@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import arguments
 from ..arguments import FloatArray, IndexArray, frozen
 from .source import read_text
 
@@ -63,6 +64,8 @@ def parse_obj(text: str, *, name: str = "text") -> Mesh:
             coordinate is no finite number, a face has fewer than three corners, names a vertex
             twice or one that does not exist, or there is no face at all.
     """
+    arguments.text("text", text)
+    arguments.text("name", name)
     vertices: list[float] = []
     triangles: list[int] = []
     furthest = -1, 0  # the highest vertex that a face names, and the line that does

@@ -1,9 +1,21 @@
 """Text from files that nobody has vouched for."""
 
 import os
+import warnings
 from pathlib import Path
 
+from ..arguments import shown
+
 LARGEST = 256 * 2**20  # bytes
+
+
+class FormatWarning(UserWarning):
+    """A file departs from its format in what can be read all the same; the message says how."""
+
+
+def warn(problem: str) -> None:
+    """Warn of what a file says, by a sentence that names the file and the line."""
+    warnings.warn(problem, FormatWarning, stacklevel=3)
 
 
 def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST) -> str:
@@ -27,9 +39,20 @@ def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def checked_path(path: str | os.PathLike[str]) -> str:
+    """Return the path of a file as a string.
+
+    Raises:
+        ValueError: if it is none, is empty or holds a NUL.
+    """
+    given = os.fspath(path) if isinstance(path, str | os.PathLike) else None
+    if not isinstance(given, str) or not given or "\0" in given:
+        raise ValueError(f"path: expected a path, got {shown(path)}")
+    return given
+
+
 def _bytes(path: str | os.PathLike[str], largest: int) -> bytes:
-    if not isinstance(path, str | os.PathLike):
-        raise ValueError(f"path: expected a path, got {type(path).__name__}")
+    path = checked_path(path)
     try:
         if not Path(path).exists():
             raise ValueError(f"{path}: there is no such file")

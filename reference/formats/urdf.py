@@ -11,10 +11,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from .. import arguments
+from ..arguments import LARGEST_COORDINATE
 from ..articulation import Mimic
 from ..quaternion import exponential, multiply, rotate
 from . import xml
 from .robot import INFINITY, ORIGIN, Link, Robot, Vector, assemble, upright
+from .source import warn
 from .xml import Element
 
 KINDS = {
@@ -25,6 +28,9 @@ KINDS = {
     "floating": "free",
     "planar": "hinge",
 }
+# What becomes of limits whose lower one is above the upper one. MuJoCo reads none; Pinocchio keeps
+# both as they are, so that no coordinate is within them.
+CROSSED_LIMITS = ("unlimited", "ordered", "refused")
 MOVED_BY_ONE_NUMBER = ("revolute", "continuous", "prismatic")
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
@@ -37,46 +43,63 @@ class _Joint(NamedTuple):
     element: Element
 
 
-def read(path: str | Path, *, mimic: bool = True) -> Robot:
+def read(path: str | Path, *, mimic: bool = True, crossed_limits: str = "unlimited") -> Robot:
     """Return the robot that a file describes, at home where its coordinates are zero.
 
     Args:
         path: of the file.
         mimic: whether mimic joints move with their leaders; if False, by themselves.
+        crossed_limits: what becomes of limits whose lower one is above the upper one:
+            "unlimited" reads none, as MuJoCo does, "ordered" exchanges them, both with a
+            FormatWarning; "refused" raises. (Pinocchio keeps them: nothing is within them then.)
 
     Raises:
         ValueError: naming file, line and element, if it cannot be read or is not a URDF file of one
-            tree of links.
+            tree of links; naming the argument, if `crossed_limits` is none of these.
     """
-    return _robot(xml.read(path), str(path), mimic)
+    arguments.choice("crossed_limits", crossed_limits, CROSSED_LIMITS)
+    return _robot(xml.read(path), str(path), mimic, crossed_limits)
 
 
-def parse(text: str, *, mimic: bool = True) -> Robot:
+def parse(text: str, *, mimic: bool = True, crossed_limits: str = "unlimited") -> Robot:
     """Return the robot that a text describes; see `read`.
 
     Raises:
         ValueError: as for `read`.
     """
-    return _robot(xml.parse(text, "URDF"), "URDF", mimic)
+    arguments.choice("crossed_limits", crossed_limits, CROSSED_LIMITS)
+    return _robot(xml.parse(text, "URDF"), "URDF", mimic, crossed_limits)
 
 
-def _robot(root: Element, origin: str, mimic: bool) -> Robot:
+def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robot:
     if root.tag != "robot":
         raise root.error("expected a <robot>")
+    _check_expanded(root)
     joints = _distinct([_joint(element) for element in root.named("joint")])
     below = _joints_below(root, joints)
     base = _base(root, joints, below)
+    follows = arguments.boolean("mimic", mimic)
     links, at, carriers = [Link(base, -1)], {base: 0}, {}
     waiting = below[base][::-1]
     while waiting:
         joint = waiting.pop()
-        links += _links(joint, at[joint.parent], len(links))
+        links += _links(joint, at[joint.parent], len(links), crossed_limits)
         at[joint.child] = carriers[joint.name] = len(links) - 1
         waiting += below[joint.child][::-1]
     for joint in joints.values():
         if joint.child not in at:
             raise joint.element.error(f"expected a way to the root {base!r}, got a ring of links")
-    return assemble(origin, links, carriers, _mimics(joints, carriers) if mimic else {})
+    return assemble(origin, links, carriers, _mimics(joints, carriers) if follows else {})
+
+
+def _check_expanded(root: Element) -> None:
+    """Refuse what is left of xacro's macros, wherever it stands."""
+    waiting = [root]
+    while waiting:
+        element = waiting.pop()
+        if any(name.startswith("xacro:") for name in (element.tag, *element.attributes)):
+            raise element.error("expected a URDF file, got xacro: run xacro first")
+        waiting += reversed(element.children)
 
 
 def _joint(element: Element) -> _Joint:
@@ -137,7 +160,7 @@ def _base(root: Element, joints: Mapping[str, _Joint], links: Mapping[str, list[
     return bases[0]
 
 
-def _links(joint: _Joint, parent: int, number: int) -> list[Link]:
+def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list[Link]:
     """Return what a joint becomes, in a list that begins with that number."""
     origin = joint.element.single("origin")
     offset = origin.numbers("xyz", ORIGIN) if origin else ORIGIN
@@ -154,7 +177,8 @@ def _links(joint: _Joint, parent: int, number: int) -> list[Link]:
             Link(f"{joint.name} y", number, kind="slide", axis=rotate(plane, Y)),
             Link(joint.child, number + 1, kind="hinge", axis=axis),
         ]
-    return [Link(joint.child, parent, offset, frame, KINDS[joint.type], axis, *_limits(joint))]
+    limits = _limits(joint, crossed_limits)
+    return [Link(joint.child, parent, offset, frame, KINDS[joint.type], axis, *limits)]
 
 
 def _axis(element: Element) -> Vector:
@@ -165,7 +189,7 @@ def _axis(element: Element) -> Vector:
     return axis
 
 
-def _limits(joint: _Joint) -> tuple[float, float]:
+def _limits(joint: _Joint, crossed: str) -> tuple[float, float]:
     """Return the least and the greatest coordinate."""
     if joint.type == "continuous":
         return -INFINITY, INFINITY
@@ -173,9 +197,13 @@ def _limits(joint: _Joint) -> tuple[float, float]:
     if limit is None:
         raise joint.element.error(f"expected a <limit> of a {joint.type} joint, got none")
     (lower,), (upper,) = limit.limits("lower", (0.0,)), limit.limits("upper", (0.0,))
-    if lower > upper:
-        raise joint.element.error(f"expected lower <= upper, got lower {lower:g}, upper {upper:g}")
-    return lower, upper
+    if lower <= upper:
+        return lower, upper
+    problem = f"expected lower <= upper, got lower {lower:g}, upper {upper:g}"
+    if crossed == "refused" or max(abs(lower), abs(upper)) > LARGEST_COORDINATE:
+        raise joint.element.error(problem)
+    warn(str(joint.element.error(f"{problem}; read as {crossed}")))
+    return (upper, lower) if crossed == "ordered" else (-INFINITY, INFINITY)
 
 
 def _mimics(joints: Mapping[str, _Joint], carriers: Mapping[str, int]) -> dict[int | str, Mimic]:

@@ -5,18 +5,21 @@ file could define: those that grow without bound and those that read other files
 """
 
 import math
+import re
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 from xml.parsers import expat
 
+from .. import arguments
 from ..arguments import LARGEST_COORDINATE
-from .source import read_text
+from .source import read_text, warn
 
 MOST_ELEMENTS = 100_000
 # As deep as TinyXML2, which MuJoCo and ROS read with.
 MOST_DEPTH = 500
 # In an attribute that is read: one that goes into every joint must not be a file of its own.
 MOST_CHARACTERS = 2000
+MISPLACED_DECLARATION = re.compile(r"(\s+)<\?xml\s[^<>]{0,200}\?>")
 
 Numbers = TypeVar("Numbers", bound=tuple[float, ...])
 
@@ -97,6 +100,8 @@ class Element(NamedTuple):
         value = self.attributes.get(name, "")
         if len(value) > MOST_CHARACTERS:
             raise self.error(f"expected at most {MOST_CHARACTERS:,} characters in {name!r}")
+        if "${" in value or "$(" in value:
+            raise self.error(f"expected a value, got the xacro {value!r:.80}: run xacro first")
         return value
 
     def _no_numbers(self, name: str, count: int, kind: str) -> ValueError:
@@ -115,11 +120,16 @@ def read(path: str | Path) -> Element:
 def parse(text: str, origin: str) -> Element:
     """Return the root element of a text; origin names it in errors.
 
+    White space before <?xml ...?> gets a warning.
+
     Raises:
         ValueError: if it is not well-formed, has a document type, more than MOST_ELEMENTS
             elements, or some nested deeper than MOST_DEPTH.
     """
-    builder = _Builder(origin)
+    builder, text = _Builder(origin), arguments.text("text", text)
+    if found := MISPLACED_DECLARATION.match(text):
+        warn(f"{origin}, line 1: expected <?xml ...?> first, got white space before it")
+        text = found[1] + text[found.end() :]
     try:
         builder.parser.Parse(text.encode(errors="replace"), True)
     except expat.ExpatError as error:

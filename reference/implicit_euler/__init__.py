@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, choice, frozen, integer, number
+from ..arguments import LARGEST_COORDINATE, FloatArray, choice, frozen, instance, integer, number
 from ..mass_spring import MassSpring, State
 from ..outcome import Outcome
 from .certificate import Certificate, certify
@@ -17,7 +17,7 @@ from .lbfgs import LBFGS
 from .local_global import LocalGlobal
 from .newton import Newton
 from .newton_cg import NewtonCG
-from .objective import Iterate, Objective, effective_stiffnesses
+from .objective import STARTS, Iterate, Objective
 
 
 class StepSolver(Protocol):
@@ -45,7 +45,9 @@ STEP_SOLVERS: dict[str, type[StepSolver]] = {
     "gauss_newton": GaussNewton,
 }
 
-LEAP = 0.1  # the share of the residual that an iteration has to leave to be one
+# Progress has ended once the least residual is so many iterations old, and this share of them all:
+# an accelerated solver's residual rises and falls, the longer the slower it converges.
+PATIENCE, PATIENT_SHARE = 3, 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,7 @@ class StepResult:
     Attributes:
         state: positions x and velocities (x - x_n) / h after the step.
         residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles; infinity if the
-            very start overflowed, and then the state is the one before the step.
+            very start overflowed or all went beyond 1e75, and then the state is the one before.
         iterations: how many were run.
         outcome: how the solve ended.
         at_floor: whether |grad g(x)| is within what rounding can leave of it.
@@ -82,6 +84,8 @@ class ImplicitEuler:
         solver: one of `STEP_SOLVERS`.
         tolerance: the residual at which a step is solved; at 0 all iterations are run.
         max_iterations: the most iterations in a step; None means the solver's own number.
+        start: where the iterations begin, "y" or "x_n"; None means y for all but gauss_newton,
+            which begins at x_n by definition. Residuals are measured by y all the same.
     """
 
     system: MassSpring
@@ -90,6 +94,7 @@ class ImplicitEuler:
     solver: str = "newton"
     tolerance: float = 1e-10
     max_iterations: int | None = None
+    start: str | None = None
     _solver: StepSolver = field(init=False, repr=False)
     _limit: int = field(init=False, repr=False)
 
@@ -99,16 +104,13 @@ class ImplicitEuler:
         Raises:
             ValueError: naming the setting, if one is out of range or unknown.
         """
-        if not isinstance(self.system, MassSpring):
-            raise ValueError(f"system: expected a MassSpring, got {type(self.system).__name__}")
+        instance("system", self.system, MassSpring)
         object.__setattr__(self, "h", number("h", self.h, above=0))
         object.__setattr__(self, "tolerance", number("tolerance", self.tolerance, least=0))
         method = STEP_SOLVERS[choice("solver", self.solver, STEP_SOLVERS)]
         limit = method.default_iterations if self.max_iterations is None else self.max_iterations
         object.__setattr__(self, "_limit", integer("max_iterations", limit, least=0))
-        with np.errstate(over="ignore"):
-            if not np.isfinite(self.h * self.h * effective_stiffnesses(self.system, self.h)).all():
-                raise ValueError(f"h: expected h² k + h c to be finite, got h = {self.h}")
+        object.__setattr__(self, "start", _start(self.solver, self.start))
         object.__setattr__(self, "_solver", method(self.system, self.h))
 
     def step(
@@ -146,27 +148,30 @@ class ImplicitEuler:
         Raises:
             ValueError: as for `step`.
         """
-        return Objective(self.system, state, self.h, external_forces, pin_positions)
+        start = self.start or STARTS[0]
+        return Objective(self.system, state, self.h, external_forces, pin_positions, start)
 
     def certify(
         self,
         state: State,
-        result: StepResult,
+        result: StepResult | ArrayLike,
         external_forces: ArrayLike | None = None,
         pin_positions: ArrayLike | None = None,
     ) -> Certificate:
-        """Return what is known for sure about the result of `step`, given what `step` was given.
+        """Return what is known for sure about the end of a step, given what `step` was given.
 
-        It costs about as much as three iterations of Newton's method; `certificate` says how it is
-        proven. A result keeps nothing of the step that it solves, so that motions stay small: this
-        is why the state and the forces are asked for again.
+        `result` is what `step` returned, or anyone's positions, shape (particle, 3) [m]. It costs
+        about as much as three iterations of Newton's method; `certificate` says how it is proven. A
+        result keeps nothing of the step that it solves, so that motions stay small: this is why the
+        state and the forces are asked for again.
 
         Raises:
-            ValueError: as for `step`.
+            ValueError: as for `step`, or if the positions have a wrong shape or are not finite.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             objective = self.objective(state, external_forces, pin_positions)
-        return certify(objective, result.state.positions)
+        x = result.state.positions if isinstance(result, StepResult) else result
+        return certify(objective, x)
 
     def iterates(
         self,
@@ -190,7 +195,8 @@ class ImplicitEuler:
         last: Iterate | None = None
         residuals: list[float] = []
         values: list[float] = []
-        if not objective.start.finite:
+        best = 0
+        if not objective.inertial.finite:
             return last, Outcome.DIVERGED, residuals, values
         for iterate in self._solver.iterates(objective):
             if not iterate.finite:
@@ -198,25 +204,44 @@ class ImplicitEuler:
             residuals.append(objective.residual(iterate))
             values.append(iterate.value)
             stuck, last = iterate is last, iterate
-            outcome = self._outcome(iterate, residuals, stuck)
+            if residuals[-1] < residuals[best]:
+                best = len(residuals) - 1
+            outcome = self._outcome(iterate, residuals, best, stuck)
             if outcome is not None:
                 return last, outcome, residuals, values
         return last, Outcome.DIVERGED, residuals, values
 
-    def _outcome(self, iterate: Iterate, residuals: list[float], stuck: bool) -> Outcome | None:
+    def _outcome(
+        self, iterate: Iterate, residuals: list[float], best: int, stuck: bool
+    ) -> Outcome | None:
         """Return how the solve ends with this iterate, or None if it goes on.
 
-        The floor is a bound, often a thousand times what rounding really leaves: a solver that
-        falls below it with a leap is let go on.
+        The floor is a bound, often a thousand times what rounding really leaves: to be within it
+        ends a solve only where the least residual, the one at `best`, is no longer improved upon.
+        A start at rest, though, is not iterated.
         """
-        final = len(residuals) > self._limit
-        leaping = len(residuals) > 1 and residuals[-1] < LEAP * residuals[-2]
+        count = len(residuals) - 1
+        final = count >= self._limit
         if self.tolerance > 0 or final:
-            if residuals[-1] <= self.tolerance or (iterate.at_floor and (final or not leaping)):
+            if residuals[-1] <= self.tolerance:
                 return Outcome.CONVERGED
+            since = count - best
+            ended = stuck or (since >= PATIENCE and since >= PATIENT_SHARE * count)
+            if (ended and iterate.at_floor) or (count == 0 and iterate.at_rest):
+                return Outcome.AT_ROUNDING
             if stuck:
                 return Outcome.STALLED
         return Outcome.ITERATION_LIMIT if final else None
+
+
+def _start(solver: str, start: str | None) -> str:
+    """Return where a solver begins.
+
+    Raises:
+        ValueError: if the start is unknown, or Gauss-Newton is to begin at y.
+    """
+    valid = STARTS[1:] if solver == "gauss_newton" else STARTS
+    return valid[0] if start is None else choice("start", start, valid)
 
 
 def _result(
@@ -230,7 +255,7 @@ def _result(
     if last is not None:
         velocities = last.positions - objective.x_n
         velocities /= objective.h
-        if np.isfinite(velocities).all():
+        if np.abs([last.positions, velocities]).max() <= LARGEST_COORDINATE:
             return StepResult(
                 state=State.of(last.positions, velocities),
                 residual=residuals[-1],

@@ -29,8 +29,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, IndexArray, array
-from ..mass_spring import BoolArray, lengths
+from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, floats, instance
+from ..mass_spring import lengths
 from ..sparse.linear_solver import Factor, NotPositiveDefiniteError, factorize
 from .objective import Objective
 
@@ -43,6 +43,8 @@ HESSIAN_ROUNDING = 128
 SLACK = 1.0 + 1e-8
 # The norm of the third derivative of the length |p| is this over |p|².
 THIRD_DERIVATIVE = 2.0 / math.sqrt(3.0)
+# Lengths are no shorter than this [m] where one divides by them.
+TINY = 1e-150
 # Where the shift that proves the smallest eigenvalue begins, and how close its estimate is.
 SHARE, ESTIMATE = 0.98, 1e-2
 
@@ -113,7 +115,14 @@ class Certificate:
 
         `apart` is the distance of the two answers [m]. None means that this is not proven either
         way, as where one of them has no bound.
+
+        Raises:
+            ValueError: if the other is no certificate, or the distance no number of at least 0.
         """
+        instance("other", other, Certificate)
+        apart = float(floats("apart", apart))
+        if not apart >= 0.0:
+            raise ValueError(f"apart: expected a distance of at least 0, got {apart}")
         if not (self.covered and other.covered):
             return None
         one, two = apart * SLACK + other.distance, apart * SLACK + self.distance
@@ -130,11 +139,11 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    system = objective.system
-    x = array("positions", positions, system.particle_count, 3)
+    system = instance("objective", objective, Objective).system
+    x = coordinates("positions", positions, system.particle_count, 3)
     with np.errstate(over="ignore", invalid="ignore"):
-        here = objective.evaluate(x)
-        if not (here.finite and objective.start.finite):
+        here = objective._evaluate(x)
+        if not (here.finite and objective.inertial.finite):
             return Certificate(math.inf, Coverage.OVERFLOWN)
     residual = objective.residual(here)
     if not np.array_equal(x[system.pinned], objective.y[system.pinned]):
@@ -152,7 +161,7 @@ def _near(
 ) -> Certificate:
     """Return the certificate of finite positions where g has a Hessian and something is free."""
     free, doubts = np.repeat(objective.system.free, 3), rounding(objective, x)
-    H = objective.hessian(x)[free][:, free].tocsc()
+    H = objective._hessian(x)[free][:, free].tocsc()
     mu, factor = least_curvature(H, doubts.hessian)
     if factor is None:
         return Certificate(residual, Coverage.NOT_CONVEX)
@@ -262,7 +271,10 @@ def rounding(objective: Objective, x: FloatArray) -> Rounding:
     places = _norms(x) + _norms(objective.y) + _norms(objective.x_n)
     given = _norms(objective.external) + m * np.linalg.norm(system.gravity)
     pulls = k * (length + made)
-    bent = np.divide(made, length, out=np.zeros_like(length), where=made > 0)
+    acts = (k > 0) & (made > 0) & free[springs].any(axis=1)
+    acts &= ~(objective.effective.tension_only & (length < objective.effective.rest_lengths))
+    bent = np.zeros_like(length)
+    bent[acts] = made[acts] / np.maximum(length[acts], TINY)
     blocks = 2.0 * k * (1.0 + bent)
     gradient = m * places + h * h * given + _gathered(len(m), springs, pulls, pulls)
     hessian = m + _gathered(len(m), springs, blocks, blocks)

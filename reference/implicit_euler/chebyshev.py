@@ -37,7 +37,7 @@ FARTHEST = 300.0  # exponent of what steps may be hoped to shrink by: no number 
 
 
 class Chebyshev:
-    """Accelerated local/global iterations from y; M + h² L is factorised here, for all steps."""
+    """Accelerated local/global iterations; M + h² L is factorised here, for all steps."""
 
     default_iterations = 1000
 
@@ -50,7 +50,7 @@ class Chebyshev:
         self._factor = global_factor(system, h)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield the start y and then one iterate after the other, without end."""
+        """Yield the objective's start and then one iterate after the other, without end."""
         before = iterate = objective.start
         pace = Pace()
         while True:
@@ -58,9 +58,9 @@ class Chebyshev:
             x, step = iterate.positions, -self._factor.solve(iterate.gradient)
             weight, relaxation = pace.next(math.sqrt(abs(np.sum(step * iterate.gradient))))
             way = (weight - 1) * (x - before.positions) + (weight * relaxation) * step
-            after = objective.evaluate(x + way)
+            after = objective._evaluate(x + way)
             if after.is_above(iterate):
-                after = objective.evaluate(x + step)
+                after = objective._evaluate(x + step)
                 pace.restart()
             before, iterate = iterate, after
 

@@ -16,6 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..mass_spring import MassSpring
+from ..sparse.linear_solver import NotPositiveDefiniteError
 from .factor_cache import hessian_factor
 from .objective import Iterate, Objective
 
@@ -30,15 +31,21 @@ class GaussNewton:
         self._analysed = hessian_factor(system)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield x_n, but for the pins, and then one iterate after the other, without end."""
+        """Yield x_n, but for the pins, and then one iterate after the other, without end.
+
+        It is the last one again where the matrix is singular to rounding.
+        """
         x = objective.x_n
-        iterate = objective.evaluate(x)
-        gradient = iterate.gradient + objective.pull_of_pins(x, geometric=False)
+        iterate = objective._evaluate(x)
+        gradient = iterate.gradient + objective._pull_of_pins(x, geometric=False)
         if np.any(objective.y[objective.system.pinned] != x[objective.system.pinned]):
-            iterate = objective.evaluate(np.where(objective.system.free[:, None], x, objective.y))
+            iterate = objective._evaluate(np.where(objective.system.free[:, None], x, objective.y))
         while True:
             yield iterate
-            factor = self._analysed.refactorize(objective.hessian(x, geometric=False))
+            try:
+                factor = self._analysed.refactorize(objective._hessian(x, geometric=False))
+            except NotPositiveDefiniteError:  # to rounding the masses are nothing beside h² k
+                continue
             correction = factor.solve(gradient.ravel()).reshape(-1, 3)
-            iterate = objective.evaluate(iterate.positions - correction)
+            iterate = objective._evaluate(iterate.positions - correction)
             x, gradient = iterate.positions, iterate.gradient

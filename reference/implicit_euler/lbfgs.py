@@ -23,7 +23,7 @@ Pair = tuple[FloatArray, FloatArray]
 
 
 class LBFGS:
-    """L-BFGS iterations from y; M + h² L is factorised here, once for all steps."""
+    """L-BFGS iterations; M + h² L is factorised here, once for all steps."""
 
     default_iterations = 300
 
@@ -36,7 +36,7 @@ class LBFGS:
         self._factor = global_factor(system, h)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield the start y and then one iterate after the other; the last again once stuck."""
+        """Yield the objective's start, then iterate after iterate; once stuck the last again."""
         iterate, pairs = objective.start, deque[Pair](maxlen=WINDOW)
         while True:
             yield iterate

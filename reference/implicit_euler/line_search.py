@@ -19,7 +19,7 @@ def line_search(objective: Objective, start: Iterate, step: FloatArray) -> Itera
     slope = float(np.sum(start.gradient * step))
     length = 1.0
     for _ in range(HALVINGS):
-        end = objective.evaluate(start.positions + length * step)
+        end = objective._evaluate(start.positions + length * step)
         if accepts(start, end, step, slope, length):
             return end
         length /= 2

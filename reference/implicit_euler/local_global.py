@@ -23,7 +23,7 @@ from .objective import Iterate, Objective
 
 
 class LocalGlobal:
-    """Local/global iterations from y; M + h² L is factorised here, once for all steps."""
+    """Local/global iterations; M + h² L is factorised here, once for all steps."""
 
     default_iterations = 1000
 
@@ -36,9 +36,9 @@ class LocalGlobal:
         self._factor = global_factor(system, h)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield the start y and then one iterate after the other, without end."""
+        """Yield the objective's start and then one iterate after the other, without end."""
         iterate = objective.start
         while True:
             yield iterate
             x = self._factor.solve(iterate.gradient)
-            iterate = objective.evaluate(np.subtract(iterate.positions, x, out=x))
+            iterate = objective._evaluate(np.subtract(iterate.positions, x, out=x))

@@ -21,7 +21,7 @@ SHIFT_GROWTH, SHIFT_DECAY = 4.0, 2.0
 
 
 class Newton:
-    """Newton iterations from y; the Hessian's pattern is analysed here, once for all steps."""
+    """Newton iterations; the Hessian's pattern is analysed here, once for all steps."""
 
     default_iterations = 100
 
@@ -32,11 +32,11 @@ class Newton:
         self._diagonal = system.dampers_apart.free_blocks.diagonal
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield the start y and then one iterate after the other; the last again once stuck."""
+        """Yield the objective's start, then iterate after iterate; once stuck the last again."""
         iterate, shift = objective.start, 0.0
         while True:
             yield iterate
-            factor, shift = self._factor(objective.hessian(iterate.positions), shift)
+            factor, shift = self._factor(objective._hessian(iterate.positions), shift)
             step = -factor.solve(iterate.gradient.ravel()).reshape(-1, 3)
             iterate = line_search(objective, iterate, step)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arguments import FloatArray
 from ..backend.compiled import TwoSpeeds
-from ..mass_spring import MassSpring, spring_blocks
+from ..mass_spring import MassSpring, _spring_blocks
 from ..quaternion import add, put_vector, scale, subtract, vector_at
 from .factor_cache import global_factor
 from .line_search import line_search
@@ -28,7 +28,7 @@ LIMIT = 500  # conjugate gradients in one step
 
 
 class NewtonCG:
-    """Truncated Newton iterations from y; M + h² L is factorised here, once for all steps."""
+    """Truncated Newton iterations; M + h² L is factorised here, once for all steps."""
 
     default_iterations = 100
 
@@ -41,17 +41,17 @@ class NewtonCG:
         self._factor = global_factor(system, h)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield the start y and then one iterate after the other; the last again once stuck."""
+        """Yield the objective's start, then iterate after iterate; once stuck the last again."""
         iterate = objective.start
         while True:
             yield iterate
-            left = iterate.gradient_norm / (objective.start.gradient_norm or 1.0)
+            left = iterate.gradient_norm / (objective.inertial.gradient_norm or 1.0)
             share = min(LOOSEST, TIGHTENING * np.sqrt(left))
             iterate = line_search(objective, iterate, self._step(objective, iterate, share))
 
     def _step(self, objective: Objective, iterate: Iterate, share: float) -> FloatArray:
         """Return s with H s = -grad g but for a share, or s before H lacks positive curvature."""
-        blocks = objective.h**2 * spring_blocks(objective.effective, iterate.positions)
+        blocks = objective.h**2 * _spring_blocks(objective.effective, iterate.positions)
         arrays, r = objective.effective.arrays, -iterate.gradient
         p = self._factor.solve(r)
         s, size = np.zeros_like(r), float(np.sum(r * p))

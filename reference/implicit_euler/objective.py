@@ -9,6 +9,9 @@ where f_ext is gravity and what else is given. A damper adds c/(2h) (l(x) - l_n)
 a damped spring acts through the step as a spring of stiffness k + c/h and of rest length
 (k r + c l_n/h) / (k + c/h). A tension-only spring stores nothing where it is slack, but its damper
 acts all the same: the damper becomes a spring of its own, of stiffness c/h and rest length l_n.
+So a step's damper pulls with -(c/h) (l - l_n) u, a law with an energy, and not with the rate at the
+end of the step, -c ((v_i - v_j)·u) u, as `mass_spring.damper_forces` and explicit integrators do;
+the two differ in proportion to h, by how far the spring rotates within the step.
 Pinned particles are no variables: y has them at the end of their path, at x_n if they stay, and
 their rows of the gradient are zero.
 """
@@ -22,20 +25,21 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, array
+from ..arguments import FloatArray, boolean, choice, coordinates, instance, number
 from ..backend.compiled import TwoSpeeds
 from ..backend.threads import in_slices
 from ..mass_spring import (
     MassSpring,
     State,
+    _spring_blocks,
     constant_forces,
     derivation,
     motion,
     pin_goal,
     rest_vectors,
-    spring_blocks,
 )
 from .terms import (
+    EPS,
     ROUNDING,
     blend_dampers,
     evaluate_objective,
@@ -44,6 +48,8 @@ from .terms import (
     measure_rounding,
     most_rounding,
 )
+
+STARTS = ("y", "x_n")
 
 
 class Iterate:
@@ -97,7 +103,16 @@ class Iterate:
     @property
     def at_floor(self) -> bool:
         """Whether rounding alone may have left this gradient."""
-        return self.gradient_norm <= self.most and self.gradient_norm <= self.floor
+        return self.within(1.0)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the floats nearest to a minimiser may have this gradient: an EPS of its terms."""
+        return self.within(EPS / ROUNDING)
+
+    def within(self, share: float) -> bool:
+        """Return whether the gradient is within a share of the floor."""
+        return self.gradient_norm <= share * self.most and self.gradient_norm <= share * self.floor
 
     def is_above(self, other: "Iterate") -> bool:
         """Return whether g is greater than at the other, or no number, beyond rounding."""
@@ -115,6 +130,7 @@ class Objective:
         external: gravity and other given forces [N], shape (particle, 3); never to be written to.
         effective: the system with its dampers made into springs, as above; those that belong to
             tension-only springs come after all others.
+        inertial: the iterate at y, by which residuals are measured.
     """
 
     def __init__(
@@ -124,16 +140,17 @@ class Objective:
         h: float,
         external_forces: ArrayLike | None = None,
         pin_positions: ArrayLike | None = None,
+        start: str = "y",
     ) -> None:
-        """Set up the step of length h from a state.
+        """Set up the step of length h from a state; solvers begin at `start`, "y" or "x_n".
 
         Raises:
-            ValueError: if the state has another number of particles, or the external forces [N],
-                shape (particle, 3), or the pins' positions at the end of the step [m], shape
-                (pinned, 3), have another shape or are not finite.
+            ValueError: if h is not positive, the state has another number of particles, or the
+                external forces [N], shape (particle, 3), or the pins' positions at the end of the
+                step [m], shape (pinned, 3), have another shape or are not finite.
         """
         self.system = system
-        self.h = h
+        self.h = h = number("h", h, above=0)
         self.x_n, v_n = motion(system, state)
         self.y = np.multiply(v_n, h, out=v_n)
         self.y += self.x_n
@@ -151,10 +168,26 @@ class Objective:
         self._most = _most_rounding(
             self.y, self.external, h, arrays.masses, self.effective.spring_sums, system.free
         )
-        self.start = self.evaluate(self.y)
+        self._start = choice("start", start, STARTS)
+        self.inertial = self._evaluate(self.y)
 
-    def evaluate(self, positions: FloatArray) -> Iterate:
-        """Return g and its gradient at unchecked positions."""
+    @functools.cached_property
+    def start(self) -> Iterate:
+        """The iterate at which solvers begin: y, or x_n with the pins at their places in y."""
+        if self._start == "y":
+            return self.inertial
+        return self._evaluate(np.where(self.system.free[:, None], self.x_n, self.y))
+
+    def evaluate(self, positions: ArrayLike) -> Iterate:
+        """Return g and its gradient at positions of shape (particle, 3) [m].
+
+        Raises:
+            ValueError: if the positions have a wrong shape or are not finite.
+        """
+        return self._evaluate(self._positions(positions))
+
+    def _evaluate(self, positions: FloatArray) -> Iterate:
+        """Return what `evaluate` does; the solvers' own, whose positions it keeps and trusts."""
         regions = self.system.dampers_apart.regions
         if regions is None:
             gradient, value, norm, reach = _evaluate(positions, *self._arguments)
@@ -169,10 +202,14 @@ class Objective:
         return _rounding(positions, y, external, h, *springs)
 
     def residual(self, iterate: Iterate) -> float:
-        """Return |grad g(x)| / max(|grad g(y)|, floor)."""
-        if iterate.gradient_norm == 0.0:
+        """Return |grad g(x)| / max(|grad g(y)|, floor).
+
+        Raises:
+            ValueError: if it is no iterate, such as the positions of one.
+        """
+        if instance("iterate", iterate, Iterate).gradient_norm == 0.0:
             return 0.0
-        scale = self.start.gradient_norm
+        scale = self.inertial.gradient_norm
         if scale < iterate.most:
             scale = max(scale, iterate.floor)
         return float(iterate.gradient_norm / scale)
@@ -183,7 +220,7 @@ class Objective:
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
         """
-        return self.evaluate(self._positions(positions)).value
+        return self.evaluate(positions).value
 
     def gradient(self, positions: ArrayLike) -> FloatArray:
         """Return grad g(x) = M (x - y) - h² f(x) [kg m], shape (particle, 3), zero at the pins.
@@ -191,7 +228,7 @@ class Objective:
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
         """
-        return self.evaluate(self._positions(positions)).gradient
+        return self.evaluate(positions).gradient
 
     def hessian(self, positions: ArrayLike, *, geometric: bool = True) -> Any:
         """Return M + h² K [kg], sparse (3 particle, 3 particle); an identity at the pins.
@@ -201,8 +238,12 @@ class Objective:
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
         """
-        x = self._positions(positions)
-        blocks = spring_blocks(self.effective, x, geometric=geometric)
+        geometric = boolean("geometric", geometric)
+        return self._hessian(self._positions(positions), geometric=geometric)
+
+    def _hessian(self, x: FloatArray, *, geometric: bool = True) -> Any:
+        """Return what `hessian` does, of the solvers' own positions."""
+        blocks = _spring_blocks(self.effective, x, geometric=geometric)
         springs = self.system.dampers_apart.free_blocks
         hessian = springs.matrix(self.h * self.h * blocks)
         hessian.data[springs.diagonal] += np.repeat(self.system.free_masses, 3)
@@ -217,11 +258,16 @@ class Objective:
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
         """
+        geometric = boolean("geometric", geometric)
+        return self._pull_of_pins(self._positions(positions), geometric=geometric)
+
+    def _pull_of_pins(self, x: FloatArray, *, geometric: bool) -> FloatArray:
+        """Return what `pull_of_pins` does, of the solvers' own positions."""
         way = np.where(self.system.free[:, None], 0.0, self.y - self.x_n)
         if not way.any():
             return way
         i, j = self.effective.springs.T
-        blocks = spring_blocks(self.effective, self._positions(positions), geometric=geometric)
+        blocks = _spring_blocks(self.effective, x, geometric=geometric)
         pulls = np.einsum("sab,sb->sa", self.h * self.h * blocks, way[i] - way[j])
         return self.system.dampers_apart.free_incidence @ pulls
 
@@ -236,7 +282,7 @@ class Objective:
             ValueError: if the positions or d have a wrong shape or are not finite.
         """
         x, y, hh = self._positions(positions), self.y, self.h * self.h
-        d = array("d", d, len(self.effective.springs), 3)
+        d = coordinates("d", d, len(self.effective.springs), 3)
         M = scipy.sparse.diags_array(self.system.masses)
         _, _, L, J = derivation(self.effective)
         stored = 0.5 * np.sum(self.effective.stiffnesses[:, None] * d**2) + self._constant
@@ -253,7 +299,7 @@ class Objective:
         return rest_vectors(self.effective, positions)
 
     def _positions(self, positions: ArrayLike) -> FloatArray:
-        return array("positions", positions, self.system.particle_count, 3)
+        return coordinates("positions", positions, self.system.particle_count, 3)
 
 
 def global_matrix(system: MassSpring, h: float) -> Any:

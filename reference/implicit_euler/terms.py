@@ -12,7 +12,8 @@ from ..quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
 from ..springs import spring_frame, spring_stretch
 
 # Rounding errors in the gradient are a few units in the last place of the terms that it sums.
-ROUNDING = 64 * np.finfo(float).eps
+EPS = float(np.finfo(float).eps)
+ROUNDING = 64 * EPS
 # What is said to be no less than the floor is rounded itself.
 MARGIN = 1.000001
 

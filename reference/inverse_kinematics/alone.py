@@ -12,14 +12,17 @@ import numpy as np
 
 from ..arguments import FLOAT64, FloatArray, frozen
 from ..articulation import Articulation
+from ..model import effector_of
 from ..outcome import Outcome
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
+from .batch import FIGURES
 from .mechanism import ROTATION, WEIGHT
 from .problem import IKSolution, Target
 from .reduce import prepare
 
-OUTCOMES = tuple(Outcome)
+OUTCOMES = {outcome.value: outcome for outcome in Outcome}
+NAMES = (int, str, type(None))
 NO_HISTORY = frozen(np.empty(0))
 UNWANTED = np.empty((1, 1))  # where the kernels may write a history that nobody reads
 
@@ -36,14 +39,14 @@ def solve_alone(
     if type(target) is list and len(target) == 1:
         target = target[0]
     if type(target) is Target:
-        if type(effector) is not int or effector != -1:
+        if effector is not None:
             return None
         position, turn, effector, weight = target
     if type(weight) is not float or not 0.0 < weight < math.inf:  # alone, it counts for nothing
         return None
     if type(model) is Skeleton and turn is None:
         return solve_chain(model, start, position, effector, settings)
-    if not (type(effector) in (int, str) and is_plain(position, (3,))):
+    if not (type(effector) in NAMES and is_plain(position, (3,))):
         return None
     if type(model) is Articulation and (turn is None or is_plain(turn, (4,))):
         goal = new_goal(position, turn)
@@ -70,7 +73,7 @@ def solve_mechanism(
     model: Articulation,
     start: FloatArray,
     goal: FloatArray,
-    effector: int | str,
+    effector: int | str | None,
     oriented: bool,
     settings: Any,
 ) -> IKSolution | None:
@@ -80,15 +83,15 @@ def solve_mechanism(
     count, asked = model.joint_count, (effector, oriented, settings.restarts, settings.seed)
     prepared = model.mechanisms.get(asked)
     if prepared is None:
-        joint = model.index(effector, "effector")
+        joint = effector_of(model, effector)
         prepared = prepare(model, (joint,), (oriented,), settings.restarts, settings.seed)
         model.mechanisms[asked] = prepared
     q, local = np.empty((1, model.coordinate_count)), np.empty((1, count, 4))
-    positions, figures = np.empty((1, count, 3)), np.empty((1, 4))
+    positions, figures = np.empty((1, count, 3)), np.empty((1, len(FIGURES)))
     fine = settings.solver.mechanism(
         *prepared.flat, writable(start)[None], goal, settings.tolerance,
-        settings.tolerance_rotation, settings.max_iterations, prepared.restarts, prepared.tips,
-        False, q, local, positions, figures, UNWANTED,
+        settings.tolerance_rotation, settings.max_iterations, settings.far_iterations,
+        prepared.restarts, prepared.tips, False, q, local, positions, figures, UNWANTED,
     )  # fmt: skip
     return finished(local, positions, figures, NO_HISTORY, q) if fine else None
 
@@ -100,15 +103,15 @@ def solve_chain(
     count = model.joint_count
     if not (is_plain(start, (count, 4)) and is_plain(position, (3,))):
         return None
-    if settings.restarts or type(effector) not in (int, str):
+    if settings.restarts or type(effector) not in NAMES:
         return None
-    joint = count - 1 if effector == -1 else model.index(effector, "effector")
+    joint = count - 1 if effector is None else model.index(effector, "effector")
     local, positions = np.empty((1, count, 4)), np.empty((1, count, 3))
-    figures = np.empty((1, 4))
+    figures = np.empty((1, len(FIGURES)))
     fine = settings.solver.chain(
         *model.arrays, model.path_array(joint), writable(start)[None],
-        writable(position)[None], settings.tolerance, settings.max_iterations, False,
-        local, positions, figures, UNWANTED,
+        writable(position)[None], settings.tolerance, settings.max_iterations,
+        settings.far_iterations, 1, False, local, positions, figures, UNWANTED,
     )  # fmt: skip
     return finished(local, positions, figures, NO_HISTORY, local) if fine else None
 
@@ -129,8 +132,8 @@ def finished(
     shown = local[0]
     for rows in (shown, positions) if coordinates is local else (shown, positions, coordinates):
         rows.setflags(False)  # type: ignore[call-arg]  # by its name it takes twice as long
-    residual, angle, iterations, outcome = figures.tolist()[0]
+    residual, angle, iterations, outcome, merit, excess = figures.tolist()[0]
     return IKSolution(
         shown, positions[0], residual, int(iterations), OUTCOMES[int(outcome)], history, angle,
-        shown if coordinates is local else coordinates[0],
+        shown if coordinates is local else coordinates[0], merit, excess,
     )  # fmt: skip

@@ -12,6 +12,7 @@ from ..skeleton import SkeletonArrays
 from .ccd import ccd_sweep as sweep  # the one that is bound to each solver's
 from .chain import (
     bend,
+    copy_pose,
     least_distance,
     new_chain,
     on_one_line,
@@ -24,9 +25,26 @@ from .chain import (
     turn_links,
 )
 
-# Columns of figures, (target, 4): the distance from effector to target [m], the angle between them
-# [rad], the number of iterations and the value of the outcome.
-RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME = range(4)
+# Columns of figures, (target, 6): the distance from effector to target [m], the angle between them
+# [rad], the number of iterations, the value of the outcome, the merit [m], and the distance above
+# what geometry proves to be the least [m].
+RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME, MERIT, EXCESS = FIGURES = range(6)
+
+
+class Limits(NamedTuple):
+    """When a solve on a chain ends.
+
+    Attributes:
+        tolerance: distance that counts as reached [m].
+        max_iterations: of each period.
+        far_iterations: the same where geometry proves the target out of reach.
+        periods: how many; the best end of one is the answer.
+    """
+
+    tolerance: float
+    max_iterations: int
+    far_iterations: int
+    periods: int
 
 
 class Solved(NamedTuple):
@@ -35,9 +53,9 @@ class Solved(NamedTuple):
     Attributes:
         local: local rotations, (target, joint, 4).
         positions: global positions [m], (target, joint, 3).
-        figures: (target, 4), see above.
+        figures: (target, 6), see above.
         history: residuals before and after each iteration [m], (target, iteration), or (1, 1) when
-            they are not wanted. After the last iteration the last residual is repeated.
+            they are not wanted. What follows the last iteration is not filled.
     """
 
     local: FloatArray
@@ -47,15 +65,16 @@ class Solved(NamedTuple):
 
 
 def solve_given(
-    parents, offsets, path, starts, targets, tolerance, max_iterations, chained, local, positions,
-    figures, history,
+    parents, offsets, path, starts, targets, tolerance, max_iterations, far_iterations, periods,
+    chained, local, positions, figures, history,
 ):  # fmt: skip
     """Do what `solve_batch` does, called from Python: single arrays come in faster than tuples."""
     tree, solved = SkeletonArrays(parents, offsets), Solved(local, positions, figures, history)
-    return solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained, solved)
+    limits = Limits(tolerance, max_iterations, far_iterations, periods)
+    return solve_batch(tree, path, starts, targets, limits, chained, solved)
 
 
-def solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained, solved):
+def solve_batch(tree, path, starts, targets, limits, chained, solved):
     """Solve target after target; return whether all starts and targets were fit to compute with.
 
     Args:
@@ -63,12 +82,12 @@ def solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained,
         path: joints from the root to the effector.
         starts: local rotations, (start, joint, 4), used in turn.
         targets: global positions [m], (target, 3).
-        tolerance: distance that counts as reached [m].
-        max_iterations: of each solve.
+        limits: Limits.
         chained: whether each solve but the first starts from the solution before it.
         solved: Solved, filled.
     """
     chain = new_chain(tree.offsets, path)
+    kept = new_chain(tree.offsets, path) if limits.periods > 1 else chain
     rotations = np.empty((len(tree.parents), 4))
     for i in range(len(targets)):
         local, target, figures = solved.local[i], vector_at(targets, i), solved.figures[i]
@@ -77,15 +96,18 @@ def solve_batch(tree, path, starts, targets, tolerance, max_iterations, chained,
             return False
         history = solved.history[i % len(solved.history)]
         pose_chain(chain, path, local)
-        iterations, stalled = iterate(chain, target, tolerance, max_iterations, history)
+        d = root_distance(chain, target)
+        iterations, settled = iterate_periods(chain, kept, target, d, limits, history)
         if iterations > 0:
             turn_links(chain)
             put_local(chain, path, local)
         forward_pose(tree.parents, tree.offsets, local, solved.positions[i], rotations)
         residual = norm(subtract(vector_at(solved.positions[i], path[-1]), target))
+        least = least_distance(chain, d)
         figures[RESIDUAL], figures[RESIDUAL_ROTATION] = residual, 0.0
         figures[ITERATIONS] = iterations
-        figures[OUTCOME] = judge(chain, target, residual, tolerance, stalled).value
+        figures[OUTCOME] = judge(chain, d, least, residual, limits.tolerance, settled).value
+        figures[MERIT], figures[EXCESS] = residual, max(0.0, residual - least)
     return True
 
 
@@ -95,42 +117,71 @@ def largest(v):
     return x + y + z if x + y + z != x + y + z else max(x, y, z)
 
 
-def iterate(chain, target, tolerance, max_iterations, history):
-    """Sweep until the effector is on the target, or as near as geometry allows.
+def iterate_periods(chain, kept, target, d, limits, history):
+    """Iterate for some periods of so many iterations each; leave the best end of a period.
+
+    The target is at distance d from the root [m].
+
+    Returns:
+        The number of iterations, and whether the best settled.
+    """
+    residual, least, margin = tip_error(chain, target), least_distance(chain, d), rounding(chain, d)
+    put_if_room(history, 0, residual)
+    # The residual is recomputed from the rotations in the end: leave that rounding some room.
+    tolerance = least + limits.tolerance - min(8.0 * margin, 0.5 * limits.tolerance)
+    count = limits.far_iterations if least > limits.tolerance else limits.max_iterations
+    if residual > tolerance and not out_of_reach(chain, d) and on_one_line(chain, target):
+        bend(chain)
+    done, settled = iterate(chain, target, tolerance, margin, count, history, 0)
+    if settled or limits.periods == 1:
+        return done, settled
+    best = tip_error(chain, target)
+    copy_pose(chain, kept)
+    best_settled = False
+    for _ in range(limits.periods - 1):
+        made, settled = iterate(chain, target, tolerance, margin, count, history, done)
+        done += made
+        residual = tip_error(chain, target)
+        if residual < best:
+            best, best_settled = residual, settled
+            copy_pose(chain, kept)
+        if settled:
+            break
+    copy_pose(kept, chain)
+    return done, best_settled
+
+
+def iterate(chain, target, tolerance, margin, max_iterations, history, done):
+    """Sweep until the effector is within the tolerance of the target, or makes no more progress.
+
+    Distances are known to a margin [m].
 
     Returns:
         The number of iterations, and whether they ended because no more would be of use.
     """
-    d = root_distance(chain, target)
-    # The residual is recomputed from the rotations in the end: leave that rounding some room.
-    goal = least_distance(chain, d) + tolerance - min(8.0 * rounding(chain, d), 0.5 * tolerance)
     residual = tip_error(chain, target)
-    fill_from(history, 0, residual)
-    if residual > goal and not out_of_reach(chain, d) and on_one_line(chain, target):
-        bend(chain)
     for i in range(max_iterations):
-        if residual <= goal:
+        if residual <= tolerance:
             return i, True
         before = residual
         sweep(chain, target)
         residual = tip_error(chain, target)
-        fill_from(history, i + 1, residual)
-        if abs(before - residual) <= rounding(chain, d):
+        put_if_room(history, done + i + 1, residual)
+        if abs(before - residual) <= margin:
             return i + 1, True
-    return max_iterations, False
+    return max_iterations, residual <= tolerance
 
 
-def fill_from(row, first, value):
-    """Write a value into a row from an entry to its end."""
-    for k in range(first, len(row)):
-        row[k] = value
+def put_if_room(row, i, value):
+    """Write an entry of a row if it has that many."""
+    if i < len(row):
+        row[i] = value
 
 
-def judge(chain, target, residual, tolerance, stalled):
+def judge(chain, d, least, residual, tolerance, settled):
     """Return the outcome, by the residual recomputed and by geometry."""
-    d = root_distance(chain, target)
     if residual <= tolerance:
         return Outcome.CONVERGED
-    if least_distance(chain, d) > tolerance + rounding(chain, d):
-        return Outcome.UNREACHABLE
-    return Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT
+    if least > tolerance + rounding(chain, d):
+        return Outcome.UNREACHABLE if settled else Outcome.UNREACHABLE_UNSETTLED
+    return Outcome.STALLED if settled else Outcome.ITERATION_LIMIT

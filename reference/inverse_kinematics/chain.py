@@ -110,6 +110,13 @@ def put_local(chain, path, local):
         put_quaternion(local, path[k], renormalised(q))
 
 
+def copy_pose(chain, other):
+    """Give another chain of the same links the pose of this one."""
+    for k in range(len(chain.positions)):
+        put_vector(other.positions, k, vector_at(chain.positions, k))
+        put_quaternion(other.rotations, k, quaternion_at(chain.rotations, k))
+
+
 def tip_error(chain, target):
     """Return the distance from the effector to the target [m]."""
     return norm(subtract(vector_at(chain.positions, len(chain.lengths)), target))
@@ -142,6 +149,21 @@ def out_of_reach(chain, d):
 def in_hole(chain, d):
     """Return whether a target at distance d lies on the rim of the hole, to rounding, or inside."""
     return d <= 2.0 * chain.longest - chain.reach + rounding(chain, d)
+
+
+def drawn_near(chain, target, beyond):
+    """Return the target, drawn to within a distance of what the effector can reach [m]."""
+    root = vector_at(chain.positions, 0)
+    way = subtract(target, root)
+    d = norm(way)
+    least = least_distance(chain, d) - beyond
+    if least <= 0.0:
+        return target
+    if d <= rounding(chain, d):  # all directions are as near: the effector keeps its own
+        way = subtract(vector_at(chain.positions, len(chain.lengths)), root)
+        d = norm(way)
+        return add(root, scale(least / d, way)) if d > 0.0 else target
+    return add(root, scale((d - least if d > chain.reach else d + least) / d, way))
 
 
 def on_one_line(chain, target):

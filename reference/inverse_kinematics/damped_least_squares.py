@@ -1,6 +1,7 @@
 """Damped least squares with one fixed damping (Wampler 1986; Nakamura & Hanafusa 1986).
 
-Steps towards a target beyond reach do not die down: it may swing about the straight chain.
+Steps towards a target beyond reach die down on unlimited chains only, where they lead to the
+nearest point within reach; elsewhere they may swing about it.
 """
 
 from .jacobian import linearise, solve_damped, turn_joints
@@ -8,11 +9,14 @@ from .stacked import damped_step, linearise_all, take_step
 
 # The square of the damping factor, over the reach squared: a tenth of the reach.
 DAMPING = 0.01
+# A target on an unlimited chain is drawn to within so much of its reach, over the reach. From
+# further off steps would swing; at reach itself they would take the longer the nearer they are.
+BEYOND = 0.02
 
 
 def damped_least_squares_sweep(chain, target):
     """Turn all joints by J^T (J J^T + (0.1 reach)^2 1)^-1 e."""
-    e, A = linearise(chain, target)
+    e, A = linearise(chain, target, BEYOND * chain.reach)
     turn_joints(chain, solve_damped(A, DAMPING * chain.reach * chain.reach, e))
 
 

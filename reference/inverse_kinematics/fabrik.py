@@ -2,7 +2,8 @@
 
 On mechanisms the way forward turns joints instead of moving points, each to bring its children
 nearest to where they were wished backward: a hinge about its axis, a ball within its limits, one
-rotation for all children of a branch. What cannot be had remains as the residual.
+rotation for all children of a branch, a free joint as one body. What cannot be had remains as the
+residual.
 """
 
 from ..articulation import BALL, FREE, HINGE, KIND, LEADER, PARENT, SLIDE, joint_transform
@@ -175,11 +176,10 @@ def move_towards_wishes(mechanism, goal, posture, room, j):
     """Move one joint, its parent in place, to bring its children nearest to their wishes."""
     joints, q, kind = mechanism.joints, posture.q, mechanism.joints.integers[j, KIND]
     R, x = quaternion_at(posture.rotations, j), vector_at(posture.positions, j)
-    if kind == FREE:
-        way = subtract(vector_at(room.wishes, j), x)
-        shift_free(joints, q, j, rotate(conjugate(frame_of(joints, j, posture)), way))
-        x = add(x, way)
-    elif kind == SLIDE and joints.integers[j, LEADER] == j:
+    if kind == FREE and room.wishes[j, WISHED] > 0.0:
+        fit_free(mechanism, goal, posture, room, j)
+        return
+    if kind == SLIDE and joints.integers[j, LEADER] == j:
         axis = axis_of(joints, j, R)
         way = dot(axis, mean_wish(mechanism, goal, posture, room, j))
         x = add(x, scale(move_by(joints, q, j, way), axis))
@@ -188,10 +188,49 @@ def move_towards_wishes(mechanism, goal, posture, room, j):
         axis = axis_of(joints, j, R)
         angle = best_angle(arms_to_wishes(mechanism, goal, posture, room, j), axis)
         R = multiply(turn_about(axis, move_by(joints, q, j, angle)), R)
-    elif kind in (BALL, FREE) and room.wishes[j, WISHED] > 0.0:
+    elif kind == BALL and room.wishes[j, WISHED] > 0.0:
         turn = turn_to_wishes(mechanism, goal, posture, room, j)
         R = turn_ball(joints, q, j, frame_of(joints, j, posture), multiply(turn, R))
     put_quaternion(posture.rotations, j, normalised(R))
+
+
+def fit_free(mechanism, goal, posture, room, j):
+    """Move a free joint as one body to bring what is below nearest to its wishes (Horn 1987).
+
+    The centre of the arms goes to the centre of their wishes, the rotation is the best about it: a
+    joint that first went to its own wish and then turned about that would overshoot and oscillate.
+    """
+    joints, x = mechanism.joints, vector_at(posture.positions, j)
+    total, arm, way = mean_arm_and_wish(mechanism, goal, posture, room, j)
+    M = arms_to_wishes(mechanism, goal, posture, room, j)
+    M = add_outer(M, -total, way, arm)
+    turn = best_rotation(M, room.eigen[0], room.eigen[1])
+    shift, frame = subtract(way, rotate(turn, arm)), frame_of(joints, j, posture)
+    R = multiply(turn, quaternion_at(posture.rotations, j))
+    R = turn_ball(joints, posture.q, j, frame, R)
+    shift_free(joints, posture.q, j, rotate(conjugate(frame), shift))
+    put_vector(posture.positions, j, add(x, shift))
+    put_quaternion(posture.rotations, j, normalised(R))
+
+
+def mean_arm_and_wish(mechanism, goal, posture, room, j):
+    """Return the weight of what `arms_to_wishes` counts, and the mean of arms and of wishes."""
+    total, arms, ways = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for e in range(len(mechanism.effectors)):
+        if moves(mechanism, j, e):
+            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
+            arms, ways = (
+                add(arms, scale(goal[e, WEIGHT], arm)),
+                add(ways, scale(goal[e, WEIGHT], way)),
+            )
+            total += goal[e, WEIGHT]
+    for c in range(j + 1, len(room.wishes)):
+        if sees(mechanism, j, c):
+            arm, way = joint_and_wish(mechanism, posture, room, c, j)
+            weight = room.wishes[c, WISHED]
+            arms, ways = add(arms, scale(weight, arm)), add(ways, scale(weight, way))
+            total += weight
+    return total, scale(1.0 / total, arms), scale(1.0 / total, ways)
 
 
 def turn_to_wishes(mechanism, goal, posture, room, j):

@@ -17,7 +17,7 @@ from ..quaternion import (
     subtract,
     vector_at,
 )
-from .chain import LINE_TOLERANCE, bend, place_joints
+from .chain import LINE_TOLERANCE, bend, drawn_near, place_joints
 
 # Where J J^T is singular, a damping of so much of its trace keeps its factors above rounding.
 ROUNDING = 1e-14
@@ -39,15 +39,19 @@ def task_matrix(chain):
     return xx, yy, zz, xy, xz, yz
 
 
-def linearise(chain, target):
+def linearise(chain, target, beyond):
     """Return e, from the effector to the target [m], and J J^T, the chain bent first if need be.
 
-    Where every arm lies along e no turn brings the effector nearer at first order.
+    Where every arm lies along e no turn brings the effector nearer at first order. A target
+    further than so much beyond reach [m] is drawn that near, which leaves the nearest pose what it
+    is: else steps swing about it, or are damped ever more the further off the target is.
     """
+    wanted = drawn_near(chain, target, beyond)
     for _ in range(2):
-        e = subtract(target, vector_at(chain.positions, len(chain.lengths)))
+        e = subtract(wanted, vector_at(chain.positions, len(chain.lengths)))
         A = task_matrix(chain)
-        if norm(times(A, e)) > LINE_TOLERANCE * chain.reach * chain.reach * norm(e):
+        near = norm(e) <= LINE_TOLERANCE * chain.reach
+        if near or norm(times(A, e)) > LINE_TOLERANCE * chain.reach * chain.reach * norm(e):
             break
         bend(chain)
     return e, A

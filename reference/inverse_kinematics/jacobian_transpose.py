@@ -1,11 +1,16 @@
 """The transposed Jacobian (Wolovich & Elliott 1984; Balestrino et al. 1984).
 
-Steps towards a target beyond reach do not die down: it may swing about the straight chain.
+Steps towards a target beyond reach die down on unlimited chains only, where they lead to the
+nearest point within reach; elsewhere they may swing about it.
 """
 
 from ..quaternion import dot, scale
 from .jacobian import linearise, times, turn_joints
 from .stacked import linearise_all, take_step, transposed_step
+
+# A target on an unlimited chain is drawn to within so much of its reach, over the reach. From
+# further off steps would swing; at reach itself they would take the longer the nearer they are.
+BEYOND = 0.2
 
 
 def jacobian_transpose_sweep(chain, target):
@@ -14,7 +19,7 @@ def jacobian_transpose_sweep(chain, target):
     The step length is the one that brings the effector nearest if it moved by a J J^T e in a
     straight line (Buss 2004).
     """
-    e, A = linearise(chain, target)
+    e, A = linearise(chain, target, BEYOND * chain.reach)
     move = times(A, e)
     if dot(move, move) > 0.0:
         turn_joints(chain, scale(dot(e, move) / dot(move, move), e))

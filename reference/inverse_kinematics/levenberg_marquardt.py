@@ -19,7 +19,7 @@ BIAS = 1e-24
 
 def levenberg_marquardt_sweep(chain, target):
     """Turn all joints by J^T (J J^T + mu 1)^-1 e, mu = 1/2 |e|^2 + bias."""
-    e, A = linearise(chain, target)
+    e, A = linearise(chain, target, 0.0)
     damping = DAMPING * dot(e, e) + BIAS * chain.reach * chain.reach
     damping += ROUNDING * (A[0] + A[1] + A[2])
     turn_joints(chain, solve_damped(A, damping, e))

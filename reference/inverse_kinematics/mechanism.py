@@ -5,6 +5,7 @@ is a mechanism: joints of all kinds with limits, several effectors, positions an
 joints are merged into the ones below them. See `reduce.py` for how one is made.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -233,18 +234,40 @@ def residuals(mechanism, goal, posture):
     return distance, angle, total
 
 
-def too_far(mechanism, goal, margin):
-    """Return whether a target is further than its effector can ever be, by a margin [m].
+def merit_of(mechanism, goal, posture):
+    """Return the root of the sum of weighted squares of distances and of lever times angles [m]."""
+    total = 0.0
+    for e in range(len(mechanism.effectors)):
+        way, angle = position_error(mechanism, goal, posture, e), 0.0
+        if mechanism.effectors[e, ORIENTED]:
+            angle = norm(logarithm(wrong_turn(mechanism, goal, posture, e)))
+        total += weighted_square(mechanism, goal[e, WEIGHT], norm(way), angle)
+    return math.sqrt(total)
 
-    Distances and sums of lengths are known to a few roundings for each joint.
+
+def weighted_square(mechanism, weight, distance, angle):
+    """Return what one effector adds to the square of the merit [m²]."""
+    lever = LEVER * mechanism.reach
+    return weight * (distance * distance + lever * lever * angle * angle)
+
+
+def too_far(mechanism, goal, margin):
+    """Return whether a target is further than its effector can ever be, by a margin [m]."""
+    return least_residual(mechanism, goal) > margin
+
+
+def least_residual(mechanism, goal):
+    """Return what the largest distance from effector to target is at least, in any pose [m].
+
+    Links and the travel of slides reach no further than their sum. Distances and sums of lengths
+    are known to a few roundings for each joint.
     """
-    share = ROUNDING * (1 + len(mechanism.joints.integers))
+    share, least = ROUNDING * (1 + len(mechanism.joints.integers)), 0.0
     for e in range(len(mechanism.effectors)):
         start, top = vector_at(mechanism.tips, e, ARM), mechanism.effectors[e, TOP]
         if top >= 0:
             start = vector_at(mechanism.joints.numbers, top, OFFSET)
         target, reach = vector_at(goal, e, POSITION), mechanism.tips[e, REACH]
         rounding = share * (reach + norm(start) + norm(target))
-        if norm(subtract(target, start)) > reach + margin + rounding:
-            return True
-    return False
+        least = max(least, norm(subtract(target, start)) - reach - rounding)
+    return least

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from .. import arguments, rotation
 from ..arguments import FloatArray, IndexArray
 from ..articulation import Articulation
+from ..model import effector_of
 from ..outcome import Outcome
 from ..skeleton import Skeleton
 
@@ -18,13 +19,13 @@ class Target(NamedTuple):
     Attributes:
         position: global position [m], shape (3,), or (..., 3) for a batch.
         rotation: global rotation, shape (4,) or (..., 4); None if any will do.
-        effector: the joint, by index or name.
+        effector: the joint, by index or name; None for the default of `solve_ik`.
         weight: how much its squared error counts beside those of other targets.
     """
 
     position: ArrayLike
     rotation: ArrayLike | None = None
-    effector: int | str = -1
+    effector: int | str | None = None
     weight: float = 1.0
 
 
@@ -44,6 +45,12 @@ class IKSolution(NamedTuple):
             rotation is asked for.
         coordinates: the pose found as what was given for a start: the coordinates of an
             Articulation, (..., coordinate), or the local rotations of a Skeleton.
+        merit: what says which of several attempts is best [m], the root of the sum over targets of
+            weight (distance² + (lever angle)²), the heaviest weight taken as 1, the angle only
+            where a rotation is asked for, the lever half the reach.
+        excess: how far `residual` is above the least that geometry proves possible [m]: the
+            distance beyond all links and slides, and on a Skeleton with one position also that to
+            the rim of the hole which the longest link leaves; above 0 where nothing is proven.
     """
 
     local_rotations: FloatArray
@@ -54,6 +61,8 @@ class IKSolution(NamedTuple):
     history: FloatArray
     residual_rotation: float | FloatArray
     coordinates: FloatArray
+    merit: float | FloatArray
+    excess: float | FloatArray
 
 
 class Wanted(NamedTuple):
@@ -75,7 +84,7 @@ class Wanted(NamedTuple):
 def checked_targets(
     model: Skeleton | Articulation,
     target: ArrayLike | Target | Sequence[Target],
-    effector: int | str,
+    effector: int | str | None,
 ) -> list[Wanted]:
     """Return what is wanted of each effector.
 
@@ -85,8 +94,8 @@ def checked_targets(
     """
     if isinstance(target, Target):
         return [_checked(model, target, effector)]
-    if not _are_targets(target):
-        joint = model.index(effector, "effector")
+    if not are_targets(target):
+        joint = effector_of(model, effector)
         return [Wanted(joint, _position(target), None, 1.0)]
     wanted = [_checked(model, one, effector) for one in target]
     joints = [one.joint for one in wanted]
@@ -96,15 +105,16 @@ def checked_targets(
     return wanted
 
 
-def _are_targets(target: Any) -> TypeGuard[Sequence[Target]]:
+def are_targets(target: Any) -> TypeGuard[Sequence[Target]]:
+    """Return whether it is a sequence that holds a Target."""
     return isinstance(target, list | tuple) and any(isinstance(one, Target) for one in target)
 
 
-def _checked(model: Skeleton | Articulation, target: Any, effector: int | str) -> Wanted:
+def _checked(model: Skeleton | Articulation, target: Any, effector: int | str | None) -> Wanted:
     if not isinstance(target, Target):
         raise ValueError(f"target: expected only Targets beside others, got {target!r:.80}")
-    joint = model.index(target.effector, "effector")
-    if effector != -1 and joint != model.index(effector, "effector"):
+    joint = effector_of(model, effector if target.effector is None else target.effector)
+    if effector is not None and joint != model.index(effector, "effector"):
         raise ValueError(
             f"effector: expected that of the target, {target.effector!r}, got {effector!r}"
         )

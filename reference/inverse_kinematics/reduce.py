@@ -34,6 +34,8 @@ from .mechanism import Mechanism
 
 # Points are in one spot if they are no further apart than this, over the reach.
 SPOT = 1e-9
+# Random poses are drawn so many at a time.
+BLOCK = 16
 
 
 class Prepared(NamedTuple):
@@ -63,7 +65,7 @@ def prepare(
     key = effectors, oriented, restarts, seed
     if key not in articulation.mechanisms:
         mechanism, columns = _prepared(articulation, effectors, oriented)
-        poses = articulation.random(np.random.default_rng(seed), restarts)
+        poses = _random_poses(articulation, restarts, seed)
         tips = np.empty((0, len(effectors), 7))
         if restarts:  # without, forward kinematics need not be compiled
             x, R = articulation.forward(poses)
@@ -73,6 +75,13 @@ def prepare(
             (*articulation.arrays, *mechanism.joints, *mechanism[1:]),
         )  # fmt: skip
     return articulation.mechanisms[key]
+
+
+def _random_poses(articulation: Articulation, count: int, seed: int) -> FloatArray:
+    """Return random coordinates, (count, coordinate): the first of those of any larger count."""
+    rng, blocks = np.random.default_rng(seed), -(-count // BLOCK)
+    drawn = [articulation.random(rng, BLOCK) for _ in range(blocks)]
+    return np.concatenate([*drawn, np.empty((0, articulation.coordinate_count))])[:count]
 
 
 def _prepared(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, IndexArray, integer, number
+from ..arguments import FloatArray, IndexArray, boolean, integer, number, sequence
 from ..mass_spring import MassSpring, State
 from .rest import at_rest
 
@@ -115,7 +115,7 @@ def grid_cloth(
         damping=damping,
         pinned=[0, columns - 1] if pinned is None else pinned,
         gravity=gravity,
-        tension_only=tension_only,
+        tension_only=boolean("tension_only", tension_only),
     )
 
 
@@ -195,9 +195,8 @@ def lattice(
         ValueError: if there are not three counts of 1 or more, spacing or mass is not positive, or
             a number is negative or not finite.
     """
-    if len(counts) != 3:
-        raise ValueError(f"counts: expected three numbers of particles, got {len(counts)}")
-    nx, ny, nz = (integer("counts", count, least=1) for count in counts)
+    along = sequence("counts", counts, 3, "an axis")
+    nx, ny, nz = (integer("counts", count, least=1) for count in along)
     places = np.indices((nx, ny, nz)).reshape(3, -1).T.astype(np.float64)
     return at_rest(
         number("spacing", spacing, above=0) * places,
@@ -249,7 +248,7 @@ def hanging_rope(
         damping=damping,
         pinned=[0],
         gravity=gravity,
-        tension_only=tension_only,
+        tension_only=boolean("tension_only", tension_only),
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, IndexArray, array, indices, number
+from ..arguments import FloatArray, IndexArray, array, boolean, indices, number
 from ..mass_spring import MassSpring, State
 from .rest import at_rest
 
@@ -52,6 +52,7 @@ def cloth_from_mesh(
     bending = number("bending_stiffness", bending_stiffness, least=0)
     edges, across = mesh_springs(corners, len(x), bending > 0)
     stiffnesses = [number("stiffness", stiffness, least=0), bending]
+    slack = boolean("tension_only", tension_only)
     return at_rest(
         x,
         np.concatenate([edges, across]),
@@ -60,7 +61,7 @@ def cloth_from_mesh(
         damping=damping,
         pinned=pinned,
         gravity=gravity,
-        tension_only=np.repeat([tension_only, False], [len(edges), len(across)]),
+        tension_only=np.repeat([slack, False], [len(edges), len(across)]),
     )
 
 

@@ -3,8 +3,10 @@
 from typing import Any
 
 import numpy as np
+import scipy
+from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray
+from ..arguments import FLOAT64, FloatArray, floats, instance, shape, shown
 from ..backend.compiled import TwoSpeeds
 from .analysis import analyse
 from .dissection import Graph
@@ -20,9 +22,16 @@ class Pattern:
     """The analysis of a symmetric pattern, shared by the factors of all matrices that have it."""
 
     def __init__(self, indptr: Any, indices: Any) -> None:
-        """Order the columns and find the pattern of L."""
-        self.graph = Graph(indptr, indices)
+        """Order the columns and find the pattern of L.
+
+        Raises:
+            ValueError: if the pattern is not symmetric.
+        """
         n = len(indptr) - 1
+        ones = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
+        if (ones != ones.T).nnz:
+            raise ValueError("matrix: expected both triangles with the same pattern")
+        self.graph = Graph(indptr, indices)
         self.order, self.place, self.blocks, self.family = _analyse(
             self.graph, np.arange(n, dtype=np.int32)
         )
@@ -44,10 +53,14 @@ class CholeskyFactor:
 
         Raises:
             NotPositiveDefiniteError: if a pivot is not positive, or not finite.
+            ValueError: if the matrix is not sparse or square, or its pattern not symmetric.
         """
-        columns = matrix.tocsc()
+        columns = square(matrix).tocsc()
+        if not columns.has_canonical_format:
+            columns = columns.copy()
+            columns.sum_duplicates()
         indptr, indices = columns.indptr.astype(np.int32), columns.indices.astype(np.int32)
-        if pattern is None or not pattern.fits(indptr, indices):
+        if pattern is None or not instance("pattern", pattern, Pattern).fits(indptr, indices):
             pattern = Pattern(indptr, indices)
         self.pattern = pattern
         self._values = np.empty(pattern.family.entries)
@@ -77,8 +90,14 @@ class CholeskyFactor:
         return CholeskyFactor(matrix, self.pattern)
 
     def solve(self, b: FloatArray) -> FloatArray:
-        """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side)."""
+        """Return x of A x = b, C-contiguous; `b` has shape (n,) or (n, right-hand side).
+
+        Raises:
+            ValueError: if b has another shape or is not numeric.
+        """
         n, pattern = len(self.pattern.order), self.pattern
+        if type(b) is not np.ndarray or b.dtype != FLOAT64 or not b.flags.carray:
+            b = floats("b", b, "...")
         if b.shape == (n, RIGHT_HAND_SIDES):
             x = np.empty(b.shape)
             columns, starts, rows, _ = pattern.blocks
@@ -86,10 +105,10 @@ class CholeskyFactor:
                 y = self._spare.pop()
             except IndexError:  # none yet, or all are used by other threads
                 y = np.empty((n, REGISTER))
-            _solve(pattern.order, columns, starts, rows, self._values, _plain_layout(b), y, x)
+            _solve(pattern.order, columns, starts, rows, self._values, b, y, x)
             self._spare.append(y)
             return x
-        columns = b.reshape(n, -1)
+        columns = right_sides(b, n).reshape(n, -1)
         x, padded = np.empty(columns.shape), np.zeros((n, RIGHT_HAND_SIDES))
         for first in range(0, columns.shape[1], RIGHT_HAND_SIDES):
             part = slice(first, min(first + RIGHT_HAND_SIDES, columns.shape[1]))
@@ -99,8 +118,6 @@ class CholeskyFactor:
 
     def lower(self) -> Any:
         """Return L, sparse (n, n), with the explicit zeros of its blocks."""
-        import scipy
-
         columns, starts, rows, _ = self.pattern.blocks
         lists = []
         for s in range(len(columns) - 1):
@@ -110,10 +127,31 @@ class CholeskyFactor:
         return scipy.sparse.csc_array((self._values, np.concatenate(lists), indptr))
 
 
-def _plain_layout(b: FloatArray) -> FloatArray:
-    if b.dtype == np.float64 and b.flags.carray:
-        return b
-    return np.array(b, dtype=np.float64, order="C")
+def square(matrix: Any) -> Any:
+    """Return a matrix that is sparse, square and real.
+
+    Raises:
+        ValueError: if it is not.
+    """
+    if not scipy.sparse.issparse(matrix):
+        raise ValueError(f"matrix: expected a square sparse matrix, got {shown(matrix)}")
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or matrix.dtype.kind not in "fiu":
+        got = f"one of {matrix.dtype} of shape {matrix.shape}"
+        raise ValueError(f"matrix: expected a square sparse matrix of numbers, got {got}")
+    return matrix
+
+
+def right_sides(b: ArrayLike, n: int) -> FloatArray:
+    """Return right-hand sides, (n,) or (n, right-hand side), whatever numbers they hold.
+
+    Raises:
+        ValueError: if they are no numbers or have another shape.
+    """
+    given = floats("b", b, "...")
+    if given.ndim not in (1, 2) or len(given) != n:
+        got = shape(given.shape)
+        raise ValueError(f"b: expected shape ({n},) or ({n}, right-hand side), got {got}")
+    return given
 
 
 _analyse = TwoSpeeds(analyse, label="the analysis of sparse matrices")

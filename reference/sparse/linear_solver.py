@@ -1,6 +1,6 @@
 """Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
 
-Three libraries stand behind one interface: our own, the default, CHOLMOD through cholespy
+Three ways stand behind one interface: our own `cholesky`, the default, CHOLMOD through cholespy
 where that is installed, and SciPy's SuperLU. cholespy prints a warning at an indefinite matrix.
 """
 
@@ -12,6 +12,7 @@ import scipy
 
 from ..arguments import FloatArray, choice
 from . import CholeskyFactor, NotPositiveDefiniteError
+from .factor import right_sides, square
 
 
 class Factor(Protocol):
@@ -35,10 +36,10 @@ def factorize(matrix: Any, library: str = "supernodal") -> Factor:
 
     Raises:
         NotPositiveDefiniteError: if the matrix is not positive definite.
-        ValueError: if the library is unknown.
+        ValueError: if the library is unknown, or the matrix not sparse, real and square.
     """
     factor = LIBRARIES[choice("library", library, LIBRARIES)]
-    if not np.isfinite(matrix.data).all():
+    if not np.isfinite(square(matrix).data).all():
         raise NotPositiveDefiniteError("matrix: expected finite entries, got NaN or infinity")
     return factor(matrix)
 
@@ -49,7 +50,7 @@ class SuperLUFactor:
     def __init__(self, matrix: Any):
         try:
             self._lu = scipy.sparse.linalg.splu(
-                matrix.tocsc(),
+                square(matrix).tocsc(),
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.0,
                 options={"SymmetricMode": True},
@@ -67,7 +68,7 @@ class SuperLUFactor:
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Return x of A x = b."""
-        return np.ascontiguousarray(self._lu.solve(b))
+        return np.ascontiguousarray(self._lu.solve(right_sides(b, self._lu.shape[0])))
 
     def refactorize(self, matrix: Any) -> Factor:
         """Return the factor of another matrix."""
@@ -80,7 +81,8 @@ class CholespyFactor:
     def __init__(self, matrix: Any):
         import cholespy
 
-        entries = matrix.tocoo()
+        entries = square(matrix).astype(np.float64).tocoo()
+        self._size = matrix.shape[0]
         rows, columns = entries.row.astype(np.int32), entries.col.astype(np.int32)
         layout = cholespy.MatrixType.COO
         try:
@@ -92,8 +94,9 @@ class CholespyFactor:
 
     def solve(self, b: FloatArray) -> FloatArray:
         """Return x of A x = b."""
+        b = right_sides(b, self._size)
         x = np.empty_like(b, order="C")
-        self._solver.solve(np.ascontiguousarray(b), x)
+        self._solver.solve(b, x)
         return x
 
     def refactorize(self, matrix: Any) -> Factor:

@@ -25,7 +25,8 @@ def factorize(matrix, data, order, place, blocks, family, values):
         size = width + starts[s + 1] - starts[s]
         front = work[: size * size].reshape((size, size))
         for j in range(size):
-            for i in range(j, size):
+            # Four rows are eliminated from together, which also touches three before the diagonal.
+            for i in range(max(j - 3, 0), size):
                 front[at(j), at(i)] = 0.0
         for j in range(width):
             local[first + j] = j

@@ -1,86 +1,93 @@
-"""Coherent motions: of all that follow a curve, one whose poses change least from frame to frame.
+"""Smooth trajectories: of all motions that follow a curve, one that changes least between frames.
 
-Over all frames q_f together, half the sum of the squared jumps |q_{f+1} - q_f|^2 is made least,
-subject to every effector being on its goal and every joint within its limits. The differences are
-velocities: angles of hinges, rotation vectors of balls, ways over the reach. A closed motion also
-counts the jump from the last frame to the first. Where it comes to rest no small change of the
-motion lowers the sum; another motion far away may still be calmer. Steps are Newton's, within the
-null spaces of all frames (`descent.py`), and limits are kept by the method of multipliers
-(`limits.py`).
+Minimise 1/2 sum_f |d_f|^2 over the poses q_f of all frames together, d_f the displacement from
+frame f to the next, subject to every effector being on its target and every joint within its
+limits. A displacement holds angles of hinges [rad], rotation vectors of balls [rad], and lengths
+over the reach; a closed trajectory also counts the one from the last frame to the first.
 
-Long motions are first found in a few frames, and then in twice as many again and again.
+The targets are kept exactly, by a Riemannian Newton method on the poses that meet them
+(`riemannian_newton.py`), and the limits by an augmented Lagrangian (`augmented_lagrangian.py`). The
+result is a local minimum. Long trajectories are solved on a coarse grid of frames first, and the
+grid is then refined by halves.
 """
 
 import numpy as np
 
 from ..arguments import FloatArray, IndexArray
 from ..inverse_kinematics.mechanism import Mechanism
-from .problem import Course, jumps, moved, restored, stuck, worth_of
-from .riemannian_newton import cost, descend
+from .problem import (
+    TrajectoryProblem,
+    displacements,
+    integrate,
+    near_singular,
+    new_problem,
+    project,
+)
+from .riemannian_newton import cost, minimise, zero_multipliers
 
 __all__ = ["smooth"]
 
-# The fewest frames that a motion is thinned out to.
-FEWEST = 64
+# The fewest frames of the coarsest grid.
+COARSEST_GRID = 64
 
 
 def smooth(
-    mechanism: Mechanism, goals: FloatArray, q: FloatArray, reached: np.ndarray, closed: bool
+    mechanism: Mechanism, targets: FloatArray, q: FloatArray, reached: np.ndarray, closed: bool
 ) -> tuple[FloatArray, int]:
-    """Return the coherent motion nearest to one that follows a curve, and the steps to it.
+    """Return a smooth trajectory near one that follows the targets, and the Newton steps taken.
 
     Limits are kept to about 1e-10 rad.
 
     Args:
-        mechanism: what moves.
-        goals: of each frame, (frame, effector, 8), see `inverse_kinematics/mechanism.py`.
-        q: the mechanism's coordinates in each frame, (frame, coordinate).
-        reached: in which frames the goal is reached; the others are drawn to theirs as near as they
-            come, (frame,).
+        mechanism: the joints.
+        targets: of each frame, (frame, effector, 8), see `inverse_kinematics/mechanism.py`.
+        q: the mechanism's coordinates to start from, (frame, coordinate).
+        reached: in which frames q meets the targets: these keep to them, the others only approach
+            theirs as far as a penalty draws them, (frame,).
         closed: whether the last frame leads back to the first.
     """
-    course = Course(mechanism, worth_of(mechanism), goals, reached, closed and len(q) > 2)
-    back, on = restored(course, q)
-    q = np.where(on[:, None], back, q)
-    course = course._replace(strict=reached & on & ~stuck(course, q))
-    found, steps = refined(course, q)
-    free = np.zeros((len(q), len(mechanism.joints.integers), 3))
-    if cost(course, found, free) > cost(course, q, free):
-        found, more = descend(course, q)
+    problem = new_problem(mechanism, targets, reached, closed and len(q) > 2)
+    projected, valid = project(problem, q)
+    q = np.where(valid[:, None], projected, q)
+    problem = problem._replace(constrained=reached & valid & ~near_singular(problem, q))
+    result, steps = minimise_from_coarse(problem, q)
+    multipliers = zero_multipliers(problem, q)
+    if cost(problem, result, multipliers) > cost(problem, q, multipliers):
+        result, more = minimise(problem, q)
         steps += more
-    return found, steps
+    return result, steps
 
 
-def refined(course: Course, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return the coherent motion near q, found in ever more frames, and all steps to it."""
+def minimise_from_coarse(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, int]:
+    """Return a smooth trajectory near q, solved on finer and finer grids, and the steps taken."""
     stride = 1
-    while len(q) >= 2 * stride * FEWEST:
+    while len(q) >= 2 * stride * COARSEST_GRID:
         stride *= 2
-    at = thinned(len(q), stride, course.closed)
-    found, steps = descend(course.at(at), q[at])
+    grid = every(stride, len(q), problem.closed)
+    result, steps = minimise(problem.at(grid), q[grid])
     while stride > 1:
         stride //= 2
-        finer = thinned(len(q), stride, course.closed)
-        start, on = restored(course.at(finer), filled_in(course.at(at), found, at, finer, len(q)))
-        if not on[course.strict[finer]].all():
-            start = q[finer]
-        at = finer
-        found, more = descend(course.at(at), start)
+        coarse, grid = grid, every(stride, len(q), problem.closed)
+        guess = interpolate(problem.at(coarse), result, coarse, grid, len(q))
+        start, valid = project(problem.at(grid), guess)
+        if not valid[problem.constrained[grid]].all():
+            start = q[grid]
+        result, more = minimise(problem.at(grid), start)
         steps += more
-    return found, steps
+    return result, steps
 
 
-def thinned(frames: int, stride: int, closed: bool) -> IndexArray:
-    """Return every so many frames, of an open motion the last one too."""
-    at = np.arange(0, frames, stride)
-    return at if closed or at[-1] == frames - 1 else np.append(at, frames - 1)
+def every(stride: int, frames: int, closed: bool) -> IndexArray:
+    """Return the indices of every stride-th frame; of an open trajectory the last one too."""
+    grid = np.arange(0, frames, stride)
+    return grid if closed or grid[-1] == frames - 1 else np.append(grid, frames - 1)
 
 
-def filled_in(
-    course: Course, q: FloatArray, at: IndexArray, finer: IndexArray, frames: int
+def interpolate(
+    problem: TrajectoryProblem, q: FloatArray, coarse: IndexArray, fine: IndexArray, frames: int
 ) -> FloatArray:
-    """Return the frames `finer` between the frames `at`, on the way from each to the next."""
-    d, ends = jumps(course, q), np.append(at, frames)
-    before = np.searchsorted(at, finer, side="right") - 1
-    share = (finer - at[before]) / (ends[before + 1] - at[before])
-    return moved(course, q[before], share[:, None] * d[np.minimum(before, len(d) - 1)])
+    """Return the poses at the frames `fine`, along the displacements between those at `coarse`."""
+    d, ends = displacements(problem, q), np.append(coarse, frames)
+    before = np.searchsorted(coarse, fine, side="right") - 1
+    fraction = (fine - coarse[before]) / (ends[before + 1] - coarse[before])
+    return integrate(problem, q[before], fraction[:, None] * d[np.minimum(before, len(d) - 1)])

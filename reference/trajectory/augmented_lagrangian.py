@@ -1,156 +1,154 @@
-"""Joints within their limits: what it costs to leave them, by Newton.
+"""Joint limits as terms of an augmented Lagrangian, with the derivatives that Newton needs.
 
-A multiplier z and a penalty r keep h <= 0, h by how much a limit is overstepped: (max(0, z + r h)^2
-- z^2) / 2 r (Rockafellar 1973). Its gradient is max(0, z + r h) times that of h. For a ball with
-the twist axis u, with Q = w + v and s = v . u: the twist is 2 atan(s/w), whose gradient in the
-ball's own frame is (w (w u + u x v) + s v)/(w^2 + s^2); the tilt is the angle from u to Q u, whose
-gradient is the unit vector along Q* u x u.
+Each limit h(q) <= 0 adds psi = (max(0, z + r h)^2 - z^2) / 2 r, z its multiplier and r the penalty
+(Rockafellar 1973; Nocedal & Wright 2006, chapter 17); after a step z becomes max(0, z + r h). The
+gradient is max(0, z + r h) grad h, and where a limit is active the Gauss-Newton Hessian is
+r grad h grad h'.
+
+A ball with the twist axis u turns by Q = w + v; with s = v . u its twist is 2 atan(s/w), of
+gradient (w (w u + u x v) + s v)/(w^2 + s^2) in the ball's own frame. Its swing is the angle from u
+to Q u, of gradient along Q* u x u.
 """
 
 import math
 
+import numpy as np
+
+from ..arguments import IndexArray
 from ..articulation import (
     AT,
     AXIS,
     BALL,
     CONE,
     FREEDOM,
+    FREEDOMS,
     HINGE,
     KIND,
     LEADER,
     LOWER,
     SLIDE,
     UPPER,
+    JointArrays,
     swing_twist,
 )
 from ..quaternion import add, conjugate, cross, dot, norm, rotate, scale, vector_at
 
-# The limits of a joint, in the order of their multipliers: columns of JointArrays.numbers.
-SIDES = (LOWER, UPPER, CONE)
-# A ball tilted by less, or by all but this much from half a turn, is tilted in no direction.
-STRAIGHT = 1e-9
+# r: the penalty of exceeding a limit by 1 rad.
+PENALTY = 100.0
+# The swing has no gradient where its sine, the twist where w^2 + s^2 is below this (squared).
+DEGENERATE = 1e-9
 
 
-def is_limit(joints, j, side):
-    """Return whether a joint has this limit."""
-    kind, own = joints.integers[j, KIND], joints.integers[j, LEADER] == j
-    fits = kind == BALL if side == CONE else kind in (HINGE, SLIDE, BALL)
-    return own and fits and abs(joints.numbers[j, side]) < math.inf
+def joint_limits(joints: JointArrays) -> IndexArray:
+    """Return the joint and the bound, LOWER, UPPER or CONE, of every finite limit, (limit, 2)."""
+    kinds = {LOWER: (HINGE, SLIDE, BALL), UPPER: (HINGE, SLIDE, BALL), CONE: (BALL,)}
+    found = [
+        (j, bound)
+        for j, row in enumerate(joints.integers)
+        for bound in kinds
+        if row[LEADER] == j and row[KIND] in kinds[bound] and np.isfinite(joints.numbers[j, bound])
+    ]
+    return np.array(found, dtype=np.int64).reshape(-1, 2)
 
 
-def overstep(joints, worth, q, j, side):
-    """Return by how much a joint oversteps a limit, ways over the reach, and the gradient."""
+def excess(problem, q, limit):
+    """Return by how much a limit is exceeded, h [rad, or m over the reach], and its gradient."""
+    joints, j, bound = problem.mechanism.joints, problem.limits[limit, 0], problem.limits[limit, 1]
+    value, sign = joints.numbers[j, bound], -1.0 if bound == LOWER else 1.0
     at = joints.integers[j, AT]
-    bound, sign = joints.numbers[j, side], -1.0 if side == LOWER else 1.0
     if joints.integers[j, KIND] != BALL:
-        unit = worth[joints.integers[j, FREEDOM]]
-        return sign * (q[at] - bound) / unit, (sign, 0.0, 0.0)
+        unit = problem.units[joints.integers[j, FREEDOM]]
+        return sign * (q[at] - value) / unit, (sign, 0.0, 0.0)
     Q, u = (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints.numbers, j, AXIS)
-    if side == CONE:
-        tilt, gradient = tilt_of(Q, u)
-        return tilt - bound, gradient
+    if bound == CONE:
+        swing, gradient = swing_and_gradient(Q, u)
+        return swing - value, gradient
     _, twist = swing_twist(Q, u)
-    return sign * (twist - bound), scale(sign, twist_gradient(Q, u))
+    return sign * (twist - value), scale(sign, twist_gradient(Q, u))
 
 
-def tilt_of(Q, u):
+def swing_and_gradient(Q, u):
     """Return the angle [rad] from u to Q u, and its gradient, zero where it has none."""
-    seen = rotate(conjugate(Q), u)
-    across = cross(seen, u)
-    sine = norm(across)
-    tilt = math.atan2(sine, dot(seen, u))
-    return tilt, scale(1.0 / sine if sine > STRAIGHT else 0.0, across)
+    rotated = rotate(conjugate(Q), u)
+    normal = cross(rotated, u)
+    sine = norm(normal)
+    swing = math.atan2(sine, dot(rotated, u))
+    return swing, scale(1.0 / sine if sine > DEGENERATE else 0.0, normal)
 
 
 def twist_gradient(Q, u):
-    """Return the gradient of the twist about u, zero where there is no twist."""
+    """Return the gradient of the twist about u, zero where it has none."""
     w, v = Q[0], (Q[1], Q[2], Q[3])
     s = dot(v, u)
     square = w * w + s * s
-    if square <= STRAIGHT * STRAIGHT:
+    if square <= DEGENERATE * DEGENERATE:
         return 0.0, 0.0, 0.0
     gradient = add(scale(w, add(scale(w, u), cross(u, v))), scale(s, v))
     return scale(1.0 / square, gradient)
 
 
-def limits_cost(joints, worth, q, z, penalty):
-    """Return what the limits cost in all frames; z are the multipliers, (frame, joint, 3)."""
+def limit_cost(problem, q, z):
+    """Return the sum of psi over all frames and limits; z holds multipliers, (frame, limit)."""
     total = 0.0
     for f in range(len(q)):
-        for j in range(len(joints.integers)):
-            for i in range(3):
-                if is_limit(joints, j, SIDES[i]):
-                    h, _ = overstep(joints, worth, q[f], j, SIDES[i])
-                    push = max(0.0, z[f, j, i] + penalty * h)
-                    total += 0.5 * (push * push - z[f, j, i] * z[f, j, i]) / penalty
+        for i in range(len(problem.limits)):
+            h, _ = excess(problem, q[f], i)
+            force = max(0.0, z[f, i] + PENALTY * h)
+            total += 0.5 * (force * force - z[f, i] * z[f, i]) / PENALTY
     return total
 
 
-def add_limits(joints, worth, q, z, penalty, step, gradient, within, touched):
-    """Add the derivatives of the pieces of that in which a step ends, see `descent.Model`.
+def add_active_limits(problem, q, z, step, gradient, diagonal, active):
+    """Add the derivatives of the limits that are active where a step ends.
 
-    The cost has a kink where a limit begins to push: to second order it is one parabola on the far
-    side and nothing on the near one. Marks the limits `touched`, (frame, joint, 3), by 1.
+    psi has a kink where a limit becomes active: to second order it is a parabola on one side and
+    zero on the other, and the step decides which. `active`, (frame, limit), is set to whether it
+    is the parabola.
 
     Returns:
-        By how much those parabolas are above the cost where the step begins, and whether they are
-        the ones that were marked before.
+        By how much the parabolas exceed psi where the step begins, to be taken off the decrease
+        that they predict; and whether `active` has changed.
     """
-    surplus, same = 0.0, True
+    joints, surplus, changed = problem.mechanism.joints, 0.0, False
     for f in range(len(q)):
-        for j in range(len(joints.integers)):
-            for i in range(3):
-                before, touched[f, j, i] = touched[f, j, i], 0
-                if is_limit(joints, j, SIDES[i]):
-                    h, normal = overstep(joints, worth, q[f], j, SIDES[i])
-                    push = z[f, j, i] + penalty * h
-                    if push + penalty * along(joints, j, normal, step[f]) > 0.0:
-                        touched[f, j, i] = 1
-                        add_limit(joints, j, push, penalty, normal, gradient[f], within[f])
-                        if push < 0.0:
-                            surplus += 0.5 * push * push / penalty
-                same &= before == touched[f, j, i]
-    return surplus, same
+        for i in range(len(problem.limits)):
+            j = problem.limits[i, 0]
+            h, normal = excess(problem, q[f], i)
+            force = z[f, i] + PENALTY * h
+            at_end = force + PENALTY * directional_derivative(joints, j, normal, step[f])
+            if at_end > 0.0:
+                add_parabola(joints, j, force, normal, gradient[f], diagonal[f])
+                if force < 0.0:
+                    surplus += 0.5 * force * force / PENALTY
+            changed |= active[f, i] != (at_end > 0.0)
+            active[f, i] = at_end > 0.0
+    return surplus, changed
 
 
-def push_limits(joints, worth, q, z, penalty, gradient):
-    """Add the gradient of the limits' cost, (frame, freedom)."""
-    for f in range(len(q)):
-        for j in range(len(joints.integers)):
-            for i in range(3):
-                if is_limit(joints, j, SIDES[i]):
-                    h, normal = overstep(joints, worth, q[f], j, SIDES[i])
-                    k, push = joints.integers[j, FREEDOM], max(0.0, z[f, j, i] + penalty * h)
-                    for a in range(3 if joints.integers[j, KIND] == BALL else 1):
-                        gradient[f, k + a] += push * normal[a]
-
-
-def along(joints, j, normal, step):
-    """Return by how much a step oversteps a limit of joint j further."""
+def directional_derivative(joints, j, normal, step):
+    """Return the change of h along a step, to first order."""
     k, total = joints.integers[j, FREEDOM], 0.0
-    for a in range(3 if joints.integers[j, KIND] == BALL else 1):
+    for a in range(FREEDOMS[joints.integers[j, KIND]]):
         total += normal[a] * step[k + a]
     return total
 
 
-def add_limit(joints, j, push, penalty, normal, gradient, within):
-    """Add the derivatives of one limit's parabola."""
-    k = joints.integers[j, FREEDOM]
-    for a in range(3 if joints.integers[j, KIND] == BALL else 1):
-        gradient[k + a] += push * normal[a]
-        for b in range(3 if joints.integers[j, KIND] == BALL else 1):
-            within[k + a, k + b] += penalty * normal[a] * normal[b]
+def add_parabola(joints, j, force, normal, gradient, diagonal):
+    """Add the derivatives of one active limit."""
+    k, n = joints.integers[j, FREEDOM], FREEDOMS[joints.integers[j, KIND]]
+    for a in range(n):
+        gradient[k + a] += force * normal[a]
+        for b in range(n):
+            diagonal[k + a, k + b] += PENALTY * normal[a] * normal[b]
 
 
-def raise_multipliers(joints, worth, q, z, penalty):
+def update_multipliers(problem, q, z):
     """Set z to max(0, z + r h); return the largest change over r."""
     change = 0.0
     for f in range(len(q)):
-        for j in range(len(joints.integers)):
-            for i in range(3):
-                if is_limit(joints, j, SIDES[i]):
-                    h, _ = overstep(joints, worth, q[f], j, SIDES[i])
-                    raised = max(0.0, z[f, j, i] + penalty * h)
-                    change = max(change, abs(raised - z[f, j, i]) / penalty)
-                    z[f, j, i] = raised
+        for i in range(len(problem.limits)):
+            h, _ = excess(problem, q[f], i)
+            force = max(0.0, z[f, i] + PENALTY * h)
+            change = max(change, abs(force - z[f, i]) / PENALTY)
+            z[f, i] = force
     return change

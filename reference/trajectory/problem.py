@@ -1,4 +1,9 @@
-"""What a motion is to follow, and what arrays of frames are asked about it."""
+"""The problem that a smooth trajectory solves: its displacements, its constraints, its retraction.
+
+The poses that meet their targets form a manifold. A step along it is integrated joint by joint and
+then projected back onto it by Gauss-Newton steps of least norm; the two together are the retraction
+of Absil, Mahony & Sepulchre 2008 (section 4.1).
+"""
 
 from typing import NamedTuple
 
@@ -8,105 +13,122 @@ from ..arguments import FloatArray, IndexArray
 from ..articulation import FREE, FREEDOM, KIND, LEADER, SLIDE
 from ..backend.compiled import TwoSpeeds
 from ..inverse_kinematics.mechanism import Mechanism
-from .smoothness import fill_jumps, move_frames
-from .task_derivatives import fill_path
+from .augmented_lagrangian import joint_limits
+from .smoothness import fill_displacements, integrate_frames
+from .task_derivatives import fill_errors_and_jacobians
 
-# Errors count as none below this, over the reach.
-ON_PATH = 1e-12
-MOST_CORRECTIONS = 12
-# Added to J J' over the reach squared: a direction that moves no effector does not stop the others.
+# A target is met when its errors, over the reach, are below this.
+CONSTRAINT_TOLERANCE = 1e-12
+MAX_PROJECTIONS = 12
+# The longest step of a projection [rad]; longer ones come from singular poses and lead anywhere.
+LONGEST_PROJECTION = 1.0
+# Added to J J' over the reach squared, so that it can be inverted where J lacks rank.
 RIDGE = 1e-14
-# A pose is stuck where a singular value of J is below this share of what it is elsewhere, if it is
-# not always zero; elsewhere is where every freedom has moved by up to this [rad].
-STUCK, NEVER, ELSEWHERE = 1e-3, 1e-9, 0.3
+# A pose is near singular if a singular value of its J is below this ratio to that of a pose nearby,
+# every freedom of which has moved by up to PROBE [rad]; values below the last are always zero.
+SINGULAR_RATIO, PROBE, ALWAYS_ZERO = 1e-3, 0.3, 1e-9
 
-_jumps, _move, _path = (TwoSpeeds(kernel) for kernel in (fill_jumps, move_frames, fill_path))
+_displacements = TwoSpeeds(fill_displacements)
+_integrate = TwoSpeeds(integrate_frames)
+_errors_and_jacobians = TwoSpeeds(fill_errors_and_jacobians)
 
 
-class Course(NamedTuple):
-    """What a motion is to follow.
+class TrajectoryProblem(NamedTuple):
+    """What a trajectory has to keep.
 
     Attributes:
-        mechanism: what moves.
-        worth: what a unit of each freedom is: 1 rad, or for ways the reach [m], (freedom,).
-        goals: of each frame, (frame, effector, 8), see `inverse_kinematics/mechanism.py`.
-        strict: which frames are to meet their goal; the others are only drawn to it, (frame,).
+        mechanism: the joints.
+        units: the displacement that counts as 1: 1 rad, or the reach [m], (freedom,).
+        limits: the joint and the bound of every finite limit, see `joint_limits`, (limit, 2).
+        targets: of each frame, (frame, effector, 8), see `inverse_kinematics/mechanism.py`.
+        constrained: which frames have to meet their targets; a penalty draws the others, (frame,).
         closed: whether the first frame follows the last.
     """
 
     mechanism: Mechanism
-    worth: FloatArray
-    goals: FloatArray
-    strict: np.ndarray
+    units: FloatArray
+    limits: IndexArray
+    targets: FloatArray
+    constrained: np.ndarray
     closed: bool
 
-    def at(self, frames: IndexArray) -> "Course":
-        """Return the course of some of the frames."""
-        return self._replace(goals=self.goals[frames], strict=self.strict[frames])
+    def at(self, frames: IndexArray) -> "TrajectoryProblem":
+        """Return the problem of some of the frames."""
+        return self._replace(targets=self.targets[frames], constrained=self.constrained[frames])
 
 
-def worth_of(mechanism: Mechanism) -> FloatArray:
-    """Return what a unit of each freedom is: 1 rad, or for ways the reach [m]."""
-    worth = np.ones(mechanism.freedoms)
+def new_problem(
+    mechanism: Mechanism, targets: FloatArray, constrained: np.ndarray, closed: bool
+) -> TrajectoryProblem:
+    """Return the problem of a mechanism whose limits are those of its joints."""
+    units, limits = displacement_units(mechanism), joint_limits(mechanism.joints)
+    return TrajectoryProblem(mechanism, units, limits, targets, constrained, closed)
+
+
+def displacement_units(mechanism: Mechanism) -> FloatArray:
+    """Return the displacement of each freedom that counts as 1: 1 rad, or the reach [m]."""
+    units = np.ones(mechanism.freedoms)
     for j, row in enumerate(mechanism.joints.integers):
         if row[LEADER] == j and row[KIND] in (SLIDE, FREE):
-            worth[row[FREEDOM] : row[FREEDOM] + (1 if row[KIND] == SLIDE else 3)] = mechanism.reach
-    return worth
+            units[row[FREEDOM] : row[FREEDOM] + (1 if row[KIND] == SLIDE else 3)] = mechanism.reach
+    return units
 
 
-def jumps(course: Course, q: FloatArray) -> FloatArray:
-    """Return the jumps, (jump, freedom): as many as frames if closed, else one less."""
-    d = np.empty((len(q) - (not course.closed), course.mechanism.freedoms))
-    _jumps(course.mechanism.joints, course.worth, q, d)
+def displacements(problem: TrajectoryProblem, q: FloatArray) -> FloatArray:
+    """Return those from each frame to the next: as many as frames if closed, else one less."""
+    d = np.empty((len(q) - (not problem.closed), problem.mechanism.freedoms))
+    _displacements(problem, q, d)
     return d
 
 
-def moved(course: Course, q: FloatArray, step: FloatArray) -> FloatArray:
-    """Return the frames moved by a step, (frame, freedom)."""
+def integrate(problem: TrajectoryProblem, q: FloatArray, step: FloatArray) -> FloatArray:
+    """Return the frames displaced by a step, (frame, freedom)."""
     q = q.copy()
-    _move(course.mechanism.joints, course.worth, step, q)
+    _integrate(problem, step, q)
     return q
 
 
-def path(course: Course, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return errors, (frame, equation), and their derivatives' negatives, over the reach."""
-    mechanism = course.mechanism
+def errors_and_jacobians(
+    problem: TrajectoryProblem, q: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return e, target less effector over the reach, (frame, equation), and J = -de/dq."""
+    mechanism = problem.mechanism
     e = np.empty((len(q), mechanism.equations))
     J = np.empty((*e.shape, mechanism.freedoms))
-    _path(mechanism, course.worth, course.goals, q, e, J)
+    _errors_and_jacobians(problem, q, e, J)
     return e / mechanism.reach, J / mechanism.reach
 
 
-def pseudoinverse(J: FloatArray) -> FloatArray:
-    """Return the transposed pseudoinverses (J J')^-1 J, (frame, equation, freedom)."""
+def transposed_pseudoinverse(J: FloatArray) -> FloatArray:
+    """Return (J J')^-1 J of each frame, (frame, equation, freedom)."""
     A = J @ J.swapaxes(-1, -2) + RIDGE * np.eye(J.shape[-2])
     return np.asarray(np.linalg.solve(A, J), dtype=np.float64)
 
 
-def restored(course: Course, q: FloatArray) -> tuple[FloatArray, np.ndarray]:
-    """Return the strict frames brought onto the path by the shortest way, and which are there."""
-    for _ in range(MOST_CORRECTIONS):
-        e, J = path(course, q)
-        off = np.abs(e).max(axis=-1) > ON_PATH
-        if not (off & course.strict).any():
+def project(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, np.ndarray]:
+    """Return the constrained frames brought onto their targets, and which frames meet theirs."""
+    for _ in range(MAX_PROJECTIONS):
+        e, J = errors_and_jacobians(problem, q)
+        off = np.abs(e).max(axis=-1) > CONSTRAINT_TOLERANCE
+        if not (off & problem.constrained).any():
             break
-        step = np.einsum("fe,fek->fk", e, pseudoinverse(J))
-        step[~course.strict] = 0.0
-        # A longer step comes from a pose that is stuck, and would lead anywhere.
-        step[np.abs(step).max(axis=-1) > 1.0] = 0.0
-        q = moved(course, q, step)
+        step = np.einsum("fe,fek->fk", e, transposed_pseudoinverse(J))
+        step[~problem.constrained] = 0.0
+        step[np.abs(step).max(axis=-1) > LONGEST_PROJECTION] = 0.0
+        q = integrate(problem, q, step)
     return q, ~off
 
 
-def stuck(course: Course, q: FloatArray) -> np.ndarray:
-    """Return which frames have poses that cannot move their effectors in some direction others can.
+def near_singular(problem: TrajectoryProblem, q: FloatArray) -> np.ndarray:
+    """Return which frames cannot move their effectors in a direction in which poses nearby can.
 
-    Such is a straight arm: from there the path can only be kept to first order.
+    From such a pose, a straight arm say, the targets can only be kept to first order.
     """
-    frames, n = len(q), course.mechanism.freedoms
-    elsewhere = moved(course, q, ELSEWHERE * np.cos(np.arange(frames * n)).reshape(frames, n))
+    frames, n = len(q), problem.mechanism.freedoms
+    nearby = integrate(problem, q, PROBE * np.cos(np.arange(frames * n)).reshape(frames, n))
     here, there = (
-        np.linalg.svd(path(course, some)[1], compute_uv=False) for some in (q, elsewhere)
+        np.linalg.svd(errors_and_jacobians(problem, some)[1], compute_uv=False)
+        for some in (q, nearby)
     )
     usual = there.max(axis=0)
-    return ((here < STUCK * usual) & (usual > NEVER)).any(axis=-1)
+    return ((here < SINGULAR_RATIO * usual) & (usual > ALWAYS_ZERO)).any(axis=-1)

@@ -1,11 +1,10 @@
-"""Newton's method over all frames of a motion at once, on the poses that meet their goals.
+"""Newton's method over all frames at once, on the manifold of poses that meet their targets.
 
-Steps lie in the null spaces of the frames' Jacobians and are led back onto the path, so that the
-cost itself is what must go down. Its second derivatives within the null spaces are those of the
-cost less the multipliers of the path times those of the effectors, the multipliers the least
-squares fit to the gradient (Absil, Mahony & Sepulchre 2008, Riemannian Newton on a submanifold).
-What is not positive definite is shifted until it is, and so is a step that does not go down
-(Levenberg-Marquardt).
+A step lies in the null spaces of the frames' Jacobians and is then projected back onto the targets,
+so that the cost alone decides whether it is taken. Within the null spaces the Hessian is that of
+the cost less sum_i m_i times that of constraint i, m the least-squares multipliers of the gradient
+(Absil, Mahony & Sepulchre 2008, Riemannian Newton on a submanifold). It is shifted by a multiple of
+the identity until it is positive definite and the step lowers the cost (Levenberg-Marquardt).
 """
 
 from typing import NamedTuple
@@ -14,170 +13,207 @@ import numpy as np
 
 from ..arguments import FloatArray
 from ..backend.compiled import TwoSpeeds
-from .augmented_lagrangian import add_limits, limits_cost, push_limits, raise_multipliers
-from .cyclic_banded import Ring
-from .problem import Course, jumps, moved, path, pseudoinverse, restored
-from .smoothness import add_jumps
-from .task_derivatives import subtract_second
+from .augmented_lagrangian import add_active_limits, limit_cost, update_multipliers
+from .cyclic_banded import CyclicBandedSystem
+from .problem import (
+    TrajectoryProblem,
+    displacements,
+    errors_and_jacobians,
+    integrate,
+    project,
+    transposed_pseudoinverse,
+)
+from .smoothness import add_smoothness
+from .task_derivatives import subtract_second_derivatives
 
-# The penalty of overstepping a limit by 1 rad, and that of a goal that a frame is only drawn to, by
-# the reach.
-LIMIT, DRAWN = 100.0, 100.0
-# A motion is at rest when a step promises no more than this share of the cost, or of this cost.
-REST, NOTHING = 1e-14, 1e-20
-# Limits are kept when no multiplier changes by more than this, over the penalty [rad].
-KEPT = 1e-10
-# Multipliers follow the motion once steps are no longer than this [rad].
-CALM = 0.1
-MOST_STEPS = 100
-# How often the limits that a step touches are found anew.
-MOST_TOUCHES = 10
-# The second derivatives are about 1.
-FIRST_SHIFT, LEAST_SHIFT, SOME_SHIFT, MOST_SHIFT = 1e-6, 1e-12, 1e-7, 1e4
-# Of what a step promises: it is accepted above the first share, and trusted above the second.
+# The weight of half the squared errors, over the reach, of a frame that need not meet its targets.
+TARGET_PENALTY = 100.0
+# Converged when a step predicts a decrease below this ratio to the cost, or below this cost.
+RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-14, 1e-20
+# And when no multiplier changes by more than this, over the penalty [rad].
+MULTIPLIER_TOLERANCE = 1e-10
+# Multipliers are updated after steps no longer than this [rad].
+LONGEST_STEP_TO_UPDATE = 0.1
+MAX_STEPS = 100
+# How often a step is solved for, until the limits that it makes active are those assumed.
+MAX_ACTIVE_SETS = 10
+# Shifts of the Hessian, whose entries are about 1.
+FIRST_SHIFT, LEAST_SHIFT, LEAST_RAISED_SHIFT, MAX_SHIFT = 1e-6, 1e-12, 1e-7, 1e4
+# Least ratios of the actual to the predicted decrease: to take a step, and to lower the shift.
 ACCEPTED, TRUSTED = 1e-4, 0.75
 
-_add_jumps, _add_limits = TwoSpeeds(add_jumps), TwoSpeeds(add_limits)
-_limits_cost, _raise = TwoSpeeds(limits_cost), TwoSpeeds(raise_multipliers)
-_push, _subtract_second = TwoSpeeds(push_limits), TwoSpeeds(subtract_second)
+_add_smoothness = TwoSpeeds(add_smoothness)
+_add_active_limits = TwoSpeeds(add_active_limits)
+_limit_cost = TwoSpeeds(limit_cost)
+_update_multipliers = TwoSpeeds(update_multipliers)
+_subtract_second_derivatives = TwoSpeeds(subtract_second_derivatives)
 
 
-class Model(NamedTuple):
-    """The cost about a motion to second order, limits left out.
+class QuadraticModel(NamedTuple):
+    """The cost about a trajectory to second order, without the terms of the limits but for `cost`.
 
     Attributes:
-        cost: of the motion, limits included.
+        cost: of the trajectory, limits included.
         gradient: (frame, freedom).
-        within: second derivatives by each frame, (frame, freedom, freedom).
-        between: those within the null spaces by the frame after each jump and the one before it,
-            (jump, freedom, freedom).
+        diagonal: the Hessian's block of each frame, (frame, freedom, freedom).
+        coupling: its blocks with the frame after a displacement as rows and the one before it as
+            columns, within the null spaces, (displacement, freedom, freedom).
         P: projections onto the null spaces, (frame, freedom, freedom).
     """
 
     cost: float
     gradient: FloatArray
-    within: FloatArray
-    between: FloatArray
+    diagonal: FloatArray
+    coupling: FloatArray
     P: FloatArray
 
 
-class Taken(NamedTuple):
-    """A step that was accepted: where it leads, how long it was, what it promised, the shift."""
+class AcceptedStep(NamedTuple):
+    """The trajectory after a step, its largest entry [rad], its predicted decrease, the shift."""
 
     q: FloatArray
     length: float
-    promise: float
+    predicted: float
     shift: float
 
 
-def descend(course: Course, q: FloatArray) -> tuple[FloatArray, int]:
-    """Return the motion of least cost near one that is on its path, and the steps to it."""
-    ring = Ring(len(q), course.mechanism.freedoms, course.closed)
-    z, shift = np.zeros((len(q), len(course.mechanism.joints.integers), 3)), FIRST_SHIFT
-    steps, done = 0, False
-    while steps < MOST_STEPS and not done:
+def minimise(problem: TrajectoryProblem, q: FloatArray) -> tuple[FloatArray, int]:
+    """Return the trajectory of least cost near one that meets its targets, and the steps taken."""
+    system = CyclicBandedSystem(len(q), problem.mechanism.freedoms, problem.closed)
+    z, shift = zero_multipliers(problem, q), FIRST_SHIFT
+    steps, converged = 0, False
+    while steps < MAX_STEPS and not converged:
         steps += 1
-        model = expanded(course, q, z)
-        taken = lower(course, q, z, model, ring, shift)
-        if taken is None:
+        model = quadratic_model(problem, q, z)
+        accepted = accepted_step(problem, q, z, model, system, shift)
+        if accepted is None:
             break
-        q, shift, change = taken.q, taken.shift, np.inf
-        if taken.length <= CALM:
-            change = _raise(course.mechanism.joints, course.worth, q, z, LIMIT)
-        done = abs(taken.promise) <= REST * model.cost + NOTHING and change <= KEPT
+        q, shift, change = accepted.q, accepted.shift, np.inf
+        if accepted.length <= LONGEST_STEP_TO_UPDATE:
+            change = _update_multipliers(problem, q, z)
+        converged = is_negligible(accepted.predicted, model) and change <= MULTIPLIER_TOLERANCE
     return q, steps
 
 
-def cost(course: Course, q: FloatArray, z: FloatArray) -> float:
-    """Return half the squared jumps, and what limits and goals not met cost."""
-    d, (e, _) = jumps(course, q), path(course, q)
-    limits = _limits_cost(course.mechanism.joints, course.worth, q, z, LIMIT)
-    return 0.5 * float((d * d).sum() + DRAWN * (e[~course.strict] ** 2).sum()) + limits
+def zero_multipliers(problem: TrajectoryProblem, q: FloatArray) -> FloatArray:
+    """Return the first multipliers of the limits, (frame, limit)."""
+    return np.zeros((len(q), len(problem.limits)))
 
 
-def expanded(course: Course, q: FloatArray, z: FloatArray) -> Model:
-    """Return the cost about a motion to second order."""
-    mechanism, (frames, n) = course.mechanism, (len(q), course.mechanism.freedoms)
-    d, (e, J) = jumps(course, q), path(course, q)
-    gradient, within = np.zeros((frames, n)), np.zeros((frames, n, n))
-    between = np.zeros((len(d), n, n))
-    _add_jumps(mechanism.joints, d, gradient, within, between)
-    K, drawn = pseudoinverse(J), ~course.strict
-    pushed = gradient.copy()
-    _push(mechanism.joints, course.worth, q, z, LIMIT, pushed)
-    m = np.einsum("fek,fk->fe", K, pushed)
+def is_negligible(predicted: float, model: QuadraticModel) -> bool:
+    """Return whether a predicted decrease is no more than rounding."""
+    return abs(predicted) <= RELATIVE_TOLERANCE * model.cost + ABSOLUTE_TOLERANCE
+
+
+def cost(problem: TrajectoryProblem, q: FloatArray, z: FloatArray) -> float:
+    """Return half the squared displacements, plus the terms of limits and of targets not met."""
+    d, (e, _) = displacements(problem, q), errors_and_jacobians(problem, q)
+    return sum_of_costs(problem, d, e) + _limit_cost(problem, q, z)
+
+
+def sum_of_costs(problem: TrajectoryProblem, d: FloatArray, e: FloatArray) -> float:
+    """Return half the squared displacements, plus the penalties of errors where these may stay."""
+    errors = e[~problem.constrained]
+    return 0.5 * float((d * d).sum() + TARGET_PENALTY * (errors**2).sum())
+
+
+def quadratic_model(problem: TrajectoryProblem, q: FloatArray, z: FloatArray) -> QuadraticModel:
+    """Return the cost about a trajectory to second order."""
+    mechanism, (frames, n) = problem.mechanism, (len(q), problem.mechanism.freedoms)
+    d, (e, J) = displacements(problem, q), errors_and_jacobians(problem, q)
+    gradient, diagonal = np.zeros((frames, n)), np.zeros((frames, n, n))
+    coupling = np.zeros((len(d), n, n))
+    _add_smoothness(mechanism.joints, d, gradient, diagonal, coupling)
+    K, drawn = transposed_pseudoinverse(J), ~problem.constrained
+    with_limits, _, _, _ = add_limits(problem, q, z, gradient, diagonal, np.zeros_like(gradient))
+    m = np.einsum("fek,fk->fe", K, with_limits)
     P = np.eye(n) - J.swapaxes(-1, -2) @ K
-    P[drawn], m[drawn] = np.eye(n), DRAWN * e[drawn]
+    P[drawn], m[drawn] = np.eye(n), TARGET_PENALTY * e[drawn]
     gradient[drawn] -= np.einsum("fek,fe->fk", J[drawn], m[drawn])
-    within[drawn] += DRAWN * J[drawn].swapaxes(-1, -2) @ J[drawn]
-    _subtract_second(mechanism, course.worth, course.goals, q, m / mechanism.reach, within)
+    diagonal[drawn] += TARGET_PENALTY * J[drawn].swapaxes(-1, -2) @ J[drawn]
+    _subtract_second_derivatives(problem, q, m / mechanism.reach, diagonal)
     after = np.roll(P, -1, axis=0)[: len(d)]
-    return Model(cost(course, q, z), gradient, within, after @ between @ P[: len(d)], P)
+    projected = after @ coupling @ P[: len(d)]
+    total = sum_of_costs(problem, d, e) + _limit_cost(problem, q, z)
+    return QuadraticModel(total, gradient, diagonal, projected, P)
 
 
-def lower(
-    course: Course, q: FloatArray, z: FloatArray, model: Model, ring: Ring, shift: float
-) -> Taken | None:
-    """Return a step that lowers the cost, with as small a shift as need be, or None."""
-    while shift <= MOST_SHIFT:
-        step, promise = newton_step(course, q, z, model, ring, shift)
+def accepted_step(
+    problem: TrajectoryProblem,
+    q: FloatArray,
+    z: FloatArray,
+    model: QuadraticModel,
+    system: CyclicBandedSystem,
+    shift: float,
+) -> AcceptedStep | None:
+    """Return the first step that lowers the cost enough as the shift is raised, or None."""
+    while shift <= MAX_SHIFT:
+        step, predicted = newton_step(problem, q, z, model, system, shift)
         if step is not None:
-            rounding = abs(promise) <= REST * model.cost + NOTHING
-            there, on = restored(course, moved(course, q, step))
-            if on[course.strict].all():
-                gain = model.cost - cost(course, there, z)
-                if rounding or gain >= ACCEPTED * abs(promise):
-                    trusted = rounding or gain >= TRUSTED * promise
+            trial, valid = project(problem, integrate(problem, q, step))
+            if valid[problem.constrained].all():
+                decrease = model.cost - cost(problem, trial, z)
+                negligible = is_negligible(predicted, model)
+                if negligible or decrease >= ACCEPTED * abs(predicted):
+                    trusted = negligible or decrease >= TRUSTED * predicted
                     after = max(shift / 16.0, LEAST_SHIFT) if trusted else shift
-                    return Taken(there, float(np.abs(step).max()), promise, after)
-        shift = max(4.0 * shift, SOME_SHIFT)
+                    return AcceptedStep(trial, float(np.abs(step).max()), predicted, after)
+        shift = max(4.0 * shift, LEAST_RAISED_SHIFT)
     return None
 
 
 def newton_step(
-    course: Course, q: FloatArray, z: FloatArray, model: Model, ring: Ring, shift: float
-) -> tuple[FloatArray | None, float]:
-    """Return the step to the least value of the shifted model, and what it promises.
-
-    Limits that it comes to touch or to leave are taken into account until they are the same.
-    """
-    step, promise = np.zeros_like(model.gradient), 0.0
-    touched = np.full((len(q), len(course.mechanism.joints.integers), 3), -1)
-    for _ in range(MOST_TOUCHES):
-        gradient, within, surplus, same = limited(course, q, z, model, step, touched)
-        if same:
-            break
-        gradient, within = projected(model.P, gradient, within)
-        ring.fill(within, model.between)
-        found = ring.solve(-gradient, shift)
-        if found is None:
-            return None, 0.0
-        step = found
-        promise = 0.5 * float((step * (shift * step - gradient)).sum()) - surplus
-    return step, promise
-
-
-def limited(
-    course: Course,
+    problem: TrajectoryProblem,
     q: FloatArray,
     z: FloatArray,
-    model: Model,
-    step: FloatArray,
-    touched: np.ndarray,
-) -> tuple[FloatArray, FloatArray, float, bool]:
-    """Return gradient and second derivatives by each frame, with the limits that a step touches.
+    model: QuadraticModel,
+    system: CyclicBandedSystem,
+    shift: float,
+) -> tuple[FloatArray | None, float]:
+    """Return the minimiser of the shifted model, and the decrease that it predicts.
 
-    See `limits.add_limits` for the rest.
+    It is solved for again until the limits active at its end are those that it was solved with.
+    Returns None if the shifted Hessian is not positive definite.
     """
-    gradient, within = model.gradient.copy(), model.within.copy()
-    surplus, same = _add_limits(
-        course.mechanism.joints, course.worth, q, z, LIMIT, step, gradient, within, touched
-    )
-    return gradient, within, surplus, same
+    step, predicted = np.zeros_like(model.gradient), 0.0
+    active = np.zeros(z.shape, dtype=bool)
+    for i in range(MAX_ACTIVE_SETS):
+        gradient, diagonal, surplus, changed = add_limits(
+            problem, q, z, model.gradient, model.diagonal, step, active
+        )
+        if i > 0 and not changed:
+            break
+        gradient, diagonal = project_derivatives(model.P, gradient, diagonal)
+        system.fill(diagonal, model.coupling)
+        solved = system.solve(-gradient, shift)
+        if solved is None:
+            return None, 0.0
+        step = solved
+        predicted = 0.5 * float((step * (shift * step - gradient)).sum()) - surplus
+    return step, predicted
 
 
-def projected(
-    P: FloatArray, gradient: FloatArray, within: FloatArray
+def add_limits(
+    problem: TrajectoryProblem,
+    q: FloatArray,
+    z: FloatArray,
+    gradient: FloatArray,
+    diagonal: FloatArray,
+    step: FloatArray,
+    active: np.ndarray | None = None,
+) -> tuple[FloatArray, FloatArray, float, bool]:
+    """Return gradient and Hessian blocks with the limits active at the end of a step added.
+
+    See `augmented_lagrangian.add_active_limits` for the other results.
+    """
+    gradient, diagonal = gradient.copy(), diagonal.copy()
+    flags = np.zeros(z.shape, dtype=bool) if active is None else active
+    surplus, changed = _add_active_limits(problem, q, z, step, gradient, diagonal, flags)
+    return gradient, diagonal, surplus, changed
+
+
+def project_derivatives(
+    P: FloatArray, gradient: FloatArray, diagonal: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return both within the null spaces; across them the second derivatives are 1."""
-    return np.einsum("fkl,fl->fk", P, gradient), P @ within @ P + np.eye(P.shape[-1]) - P
+    """Return both within the null spaces; across them the Hessian is the identity."""
+    return np.einsum("fkl,fl->fk", P, gradient), P @ diagonal @ P + np.eye(P.shape[-1]) - P

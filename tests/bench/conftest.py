@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.record import FINISHED, Record
-from bench.suites import SUITES
+from bench.experiments import SUITES
+from bench.harness.record import FINISHED, Record
 
 STAMP = {
     "machine": {"processor": "a <b>slide</b> rule", "cores": 1, "memory_gib": 0.5, "system": "x"},
@@ -124,6 +124,13 @@ def few(iterations):
     settings = {"h": 0.02, "first": 5, "steps": 2, "iterations": iterations}
     arrays = {"error": [0.5, 0.5], "distance": [0.1, 0.1], "drift": [0.1, 0.2], "path": [1, 2]}
     return record("cloth", "cloth/x1/few iterations", "local_global", settings, arrays)
+
+
+def two_dampers(apart=(0.04, 0.02)):
+    """How far the two laws of dampers are apart in two steps."""
+    settings = {"first": 5, "longest": 0.02, "halvings": len(apart) - 1, "damping": 0.2}
+    h = 0.02 / 2.0 ** np.arange(len(apart))
+    return record("cloth", "cloth/x1/dampers", "newton", settings, {"h": h, "apart": apart})
 
 
 def swung(solver, problem="swing/undamped", left=(1.0, 0.5)):
@@ -267,6 +274,8 @@ def make():
         timed=timed,
         stepped=stepped,
         swung=swung,
+        two_dampers=two_dampers,
+        stepping=stepping,
         certified=certified,
         raced=raced,
         lacking=lacking,
@@ -296,6 +305,7 @@ def records():
         *(stepped(solver) for solver in ("local_global", "newton")),
         *(few(iterations) for iterations in (1, 10)),
         stepping(),
+        two_dampers(),
         certified(),
         *(swung(s, f"swing/{c}") for c in ("undamped", "damped") for s in ("RK4", "discrete")),
         *(

@@ -6,14 +6,11 @@ import sys
 import numpy as np
 import pytest
 
-from bench import figures, metrics
-from bench.cloth_job import ClothJob
-from bench.cloth_solvers import CLOTH_PEERS, EXPLICIT, LINEARISED, ClothPeer, Rung
-from bench.cloth_truth import cloth_truth, implicit_motion, true_motion
-from bench.findings import Results
-from bench.findings import cloth_peers as findings
-from bench.isolation import Outcome, Workshop
-from bench.problems.cloth_peers import (
+from bench.experiments import Scale
+from bench.experiments.cloth_peers import measurement as peers_cloth
+from bench.experiments.cloth_peers import tables as findings
+from bench.experiments.cloth_peers.job import ClothJob
+from bench.experiments.cloth_peers.problem import (
     FRAME,
     MASS,
     FallingCloth,
@@ -23,8 +20,13 @@ from bench.problems.cloth_peers import (
     highest_frequency,
     highest_mode,
 )
-from bench.suites import Scale, peers_cloth
-from bench.worker import Done, Ready, Solved, Unfit
+from bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, true_motion
+from bench.harness import metrics
+from bench.harness.isolation import Outcome, Workshop
+from bench.harness.worker import Done, Ready, Solved, Unfit
+from bench.peers.cloth import CLOTH_PEERS, EXPLICIT, LINEARISED, ClothPeer, Rung
+from bench.presentation import figures
+from bench.presentation.sections import Results
 from reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
 from reference.mass_spring import stiffness_matrix
 
@@ -132,7 +134,7 @@ def test_converged_implicit_euler_is_the_same_by_another_solver(cloth):
 
 
 def test_newton_that_does_not_converge_is_no_answer(cloth, monkeypatch):
-    monkeypatch.setattr("bench.cloth_truth.MOST_ITERATIONS", 1)
+    monkeypatch.setattr("bench.experiments.cloth_peers.truth.MOST_ITERATIONS", 1)
     with pytest.raises(ArithmeticError, match="frame 0 as ITERATION_LIMIT"):
         implicit_motion(cloth, 1)
 
@@ -251,7 +253,7 @@ def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
 
 
 def test_colours_are_proper_and_few(cloth):
-    newton_model = pytest.importorskip("bench.cloth_solvers.newton_model", exc_type=ImportError)
+    newton_model = pytest.importorskip("bench.peers.cloth.newton_model", exc_type=ImportError)
     groups = newton_model.colours(cloth.system.springs, cloth.system.particle_count)
     colour = np.full(cloth.system.particle_count, -1)
     for number, group in enumerate(groups):
@@ -263,7 +265,7 @@ def test_colours_are_proper_and_few(cloth):
 
 
 def test_by_itself_newton_gives_springs_one_colour(cloth):
-    newton_model = pytest.importorskip("bench.cloth_solvers.newton_model", exc_type=ImportError)
+    newton_model = pytest.importorskip("bench.peers.cloth.newton_model", exc_type=ImportError)
     model = newton_model.model(cloth.system, own_colours=True)
     assert len(model.particle_color_groups) == 1
 
@@ -612,7 +614,8 @@ def test_a_work_precision_diagram_has_a_panel_for_each_cloth_and_a_curve_for_eac
         for solver in ("Plumbob Newton", "MuJoCo Euler")
         for k in (1e2, 1e4)
     ]
-    drawn = {drawing.name: drawing.svg for drawing in figures.figures(Results(records))}
+    made = [draw(Results(records)) for draw in figures.FIGURES]
+    drawn = {drawing.name: drawing.svg for drawing in made if drawing}
     for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", "Plumbob Newton", "MuJoCo Euler"):
         assert text in drawn[name]
 

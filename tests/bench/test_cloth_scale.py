@@ -7,10 +7,11 @@ import subprocess
 import numpy as np
 import pytest
 
-from bench.findings import Results, cloth_scale
-from bench.news import heard_by
-from bench.suites import SCALES, blocks
-from bench.suites import cloth_scale as suite
+from bench.experiments import SCALES, blocks
+from bench.experiments.cloth_scale import measurement as suite
+from bench.experiments.cloth_scale import tables as cloth_scale
+from bench.harness.progress import heard_by
+from bench.presentation.sections import Results
 from reference.implicit_euler.objective import Objective
 
 SMALL = min(suite.SIZES)
@@ -50,7 +51,7 @@ def test_what_is_measured_is_the_work_it_says(ours):
 
 def test_what_it_is_doing_is_told_on_the_way():
     heard = []
-    with heard_by(heard.append):
+    with heard_by(lambda news: heard.append(news.what)):
         suite.in_its_own_process(SMALL, suite.OURS)
     assert heard[0] == f"cloth/{SMALL}x{SMALL}, supernodal: cloth"
     assert heard[-1].endswith("factor, once more")
@@ -65,7 +66,7 @@ def test_an_interrupt_ends_its_process(monkeypatch):
             super().__init__(*arguments, **settings)
             children.append(self)
 
-    def interrupt(what):
+    def interrupt(news):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(subprocess, "Popen", Watched)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from bench import figures
-from bench.findings import Results
-from bench.findings import energy as findings
-from bench.suites import Scale, blocks
-from bench.suites import energy as suite
+from bench.experiments import Scale, blocks
+from bench.experiments.energy import measurement as suite
+from bench.experiments.energy import tables as findings
+from bench.presentation import figures
+from bench.presentation.sections import Results
 
 STEPS = 100
 

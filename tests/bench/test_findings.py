@@ -6,19 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.findings import (
-    SECTIONS,
-    Results,
-    check,
-    cloth,
-    kinematics,
-    published,
-    robots,
-    tables,
-    timing,
-    tracking,
-)
-from bench.suites import SUITES
+from bench.experiments import SUITES
+from bench.experiments.chain import tables as kinematics
+from bench.experiments.check import tables as check
+from bench.experiments.closed_curves import tables as tracking
+from bench.experiments.cloth import tables as cloth
+from bench.experiments.published import tables as published
+from bench.experiments.robots import tables as robots
+from bench.experiments.timing import tables as timing
+from bench.presentation.sections import SECTIONS, Results, tables
 
 
 def column(table, heading):
@@ -254,3 +250,17 @@ def test_published_numbers_stand_beside_those_measured_here(make):
     assert column(published.toolbox(results), "here, by its own word [%]") == [50.0]
     (row,) = published.fabrik(results).rows
     assert row == ("FABRIK", 15.5, 5.0, 6, 67.6, 5.0, 6)
+
+
+def test_the_two_laws_of_dampers_are_listed_with_their_order(make):
+    table = cloth.dampers(Results([make.two_dampers((0.04, 0.02, 0.01))]))
+    assert column(table, "h [ms]") == [20.0, 10.0, 5.0]
+    assert column(table, "observed order") == [None, 1.0, 1.0]
+    assert table.answer.points == ("stiffness × 1: 0.0400 at 20.0 ms, 0.0100 at 5.00 ms",)
+    assert cloth.dampers(Results([])).answer.sentence == ""
+
+
+def test_steps_at_rounding_count_as_solved(make):
+    made = make.stepping()
+    ended = replace(made, arrays=made.arrays | {"outcome": np.array([0, 5, 3])})
+    assert cloth.newton_steps(Results([ended])).rows[0][2].hits == 2

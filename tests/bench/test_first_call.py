@@ -5,9 +5,10 @@ import sys
 
 import pytest
 
-from bench.findings import Results, first_call
-from bench.suites import SCALES, blocks
-from bench.suites import first_call as suite
+from bench.experiments import SCALES, blocks
+from bench.experiments.first_call import measurement as suite
+from bench.experiments.first_call import tables as first_call
+from bench.presentation.results import Results
 from reference import IK_SOLVERS, STEP_SOLVERS
 
 
@@ -60,7 +61,7 @@ def test_a_call_that_fails_says_why(tmp_path):
 
 def test_importing_the_suite_does_not_import_the_compiler():
     """Its import is part of what a first call costs."""
-    code = "import sys, bench.suites.first_call; sys.exit('numba' in sys.modules)"
+    code = "import sys, bench.experiments.first_call.measurement; sys.exit('numba' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

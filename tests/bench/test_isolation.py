@@ -2,20 +2,24 @@
 
 import importlib
 import sys
+import threading
+from multiprocessing import Pipe
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from bench import stopwatch
-from bench.isolation import Workshop, raised
-from bench.judge import Targets, Tolerance, judge
-from bench.problems.robots import robot
-from bench.solvers import ONE_START, Entry, Peer
-from bench.solvers.protocol import Answer
-from bench.solvers.restarts import restarted
-from bench.suites import Scale, robots
-from bench.worker import AGAIN, Done, Job, Ready, Solved, Unfit, perform, serve
+from bench.experiments import Scale
+from bench.experiments.robots import measurement as robots
+from bench.experiments.robots.evaluate import Targets, Tolerance, judge
+from bench.experiments.robots.job import AGAIN, Job, perform
+from bench.experiments.robots.problem import robot
+from bench.harness import stopwatch
+from bench.harness.isolation import Workshop, raised
+from bench.harness.worker import Begun, Done, Ready, Solved, Unfit, serve
+from bench.peers.ik import ONE_START, Entry, Peer
+from bench.peers.ik.protocol import Answer
+from bench.peers.ik.restarts import restarted
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4
@@ -25,7 +29,7 @@ COUNT = 4
 FAKES = """
 import os, sys, time
 import numpy as np
-from bench.solvers.protocol import Answer, UnableError
+from bench.peers.ik.protocol import Answer, UnableError
 
 def prepare(robot, tolerance, manner="perfect", at=2):
     if manner == "unable":
@@ -131,7 +135,7 @@ def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(shop, target
 
 def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monkeypatch):
     """What is timed is timed as in a loop of solves and nothing else."""
-    monkeypatch.setattr("bench.worker.QUICK", 0.1)
+    monkeypatch.setattr("bench.experiments.robots.job.QUICK", 0.1)
     counts, called = [], 0
 
     def timed(call):
@@ -140,7 +144,7 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
         called = 0
         return stopwatch.timed(call)
 
-    monkeypatch.setattr("bench.worker.timed", timed)
+    monkeypatch.setattr("bench.experiments.robots.job.timed", timed)
     fake = importlib.import_module("fake_solvers")
     prepare = fake.prepare
 
@@ -252,17 +256,19 @@ def test_restarts_that_all_fail_claim_nothing():
 
 
 def test_a_worker_serves_job_after_job(targets):
-    import io
-    import pickle
-
-    jobs, results = io.BytesIO(), io.BytesIO()
-    for manner in ("perfect", "unable"):
-        pickle.dump(job(targets, manner), jobs)
-    jobs.seek(0)
-    serve(jobs, results)
-    results.seek(0)
-    kinds = [type(pickle.load(results)) for _ in range(COUNT + 3)]
-    assert kinds == [Ready, *[Solved] * COUNT, Done, Unfit]
+    ours, theirs = Pipe()
+    with ours, theirs:
+        serving = threading.Thread(target=serve, args=(theirs,))
+        serving.start()
+        kinds = []
+        for manner in ("perfect", "unable"):
+            ours.send(job(targets, manner))
+            kinds.append(type(ours.recv()))
+            while kinds[-1] not in (Done, Unfit):
+                kinds.append(type(ours.recv()))
+        ours.close()
+        serving.join()
+    assert kinds == [Begun, Ready, *[Solved] * COUNT, Done, Begun, Unfit]
 
 
 @pytest.fixture

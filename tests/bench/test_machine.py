@@ -1,30 +1,131 @@
 """The stamp: it changes with whatever can change a number, and names no one."""
 
+import ast
+import shutil
 import socket
+from pathlib import Path
 
-from bench import machine
+import pytest
+
+from bench.harness import machine
+
+PACKAGES = ("reference", "crosscheck", "bench")
+ROOT = Path(machine.__file__).parents[2]
 
 
-def test_the_digest_changes_with_a_source_and_with_nothing_else(tmp_path, monkeypatch):
+@pytest.fixture
+def copy(tmp_path, monkeypatch):
+    """A copy of all sources, which is what is digested."""
+    for name in PACKAGES:
+        ignored = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=ignored)
     monkeypatch.setattr(machine, "_ROOT", tmp_path)
-    monkeypatch.setattr(machine, "_SOURCES", ("reference", "bench/run.py"))
-    (tmp_path / "reference" / "deep").mkdir(parents=True)
-    (tmp_path / "bench").mkdir()
-    source = tmp_path / "reference" / "deep" / "a.py"
-    source.write_text("x = 1")
-    (tmp_path / "bench" / "run.py").write_text("")
+    return tmp_path
+
+
+def every_file(root):
+    found = [path for name in PACKAGES for path in sorted((root / name).rglob("*"))]
+    return [path for path in found if path.is_file() and "__pycache__" not in path.parts]
+
+
+def only_shows(path):
+    in_experiment = path.is_relative_to("bench/experiments")
+    return any(path.is_relative_to(name) for name in machine.PRESENTATION) or (
+        in_experiment and path.name in machine.PRESENTATION_FILES
+    )
+
+
+def test_an_edit_of_any_file_changes_the_digest_unless_it_only_shows_numbers(copy):
     before = machine.source_digest()
-    (tmp_path / "reference" / "notes.txt").write_text("new")
+    for path in every_file(copy):
+        whole = path.read_bytes()
+        path.write_bytes(whole + b"\n")
+        changed = machine.source_digest() != before
+        path.write_bytes(whole)
+        assert changed != only_shows(path.relative_to(copy)), path
     assert machine.source_digest() == before
-    source.write_text("x = 2")
-    changed = machine.source_digest()
-    assert changed != before
-    source.rename(source.with_name("b.py"))
-    assert machine.source_digest() not in (before, changed)
 
 
-def test_every_source_that_is_named_exists():
-    assert all((machine._ROOT / name).exists() for name in machine._SOURCES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "bench/peers/cloth/explicit.py",
+        "bench/experiments/cloth_peers/job.py",
+        "bench/experiments/cloth_peers/truth.py",
+    ],
+)
+def test_the_files_that_were_once_left_out_count(name):
+    assert ROOT / name in machine.source_files()
+
+
+def test_a_new_file_and_a_new_name_change_the_digest_and_a_compiled_cache_does_not(copy):
+    digests = {machine.source_digest()}
+    new = copy / "bench" / "peers" / "new.py"
+    new.write_text("")
+    digests.add(machine.source_digest())
+    new.rename(new.with_name("newer.py"))
+    digests.add(machine.source_digest())
+    assert len(digests) == 3
+    cache = copy / "reference" / "__pycache__"
+    cache.mkdir()
+    (cache / "kernel.nbi").write_text("")
+    assert machine.source_digest() in digests
+
+
+def test_what_only_shows_numbers_is_there_and_in_the_bench():
+    for name in machine.PRESENTATION:
+        assert name.startswith("bench/")
+        assert (ROOT / name).exists()
+
+
+def imported(path, root):
+    """The files that a source may import, in a function or at its head, by any form of import."""
+    package = path.relative_to(root).parent.parts
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names = [alias.name.split(".") for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = list(package[: len(package) + 1 - node.level]) if node.level else []
+            base += node.module.split(".") if node.module else []
+            names = [base, *([*base, alias.name] for alias in node.names)]
+        elif isinstance(node, ast.Constant) and str(node.value).startswith("bench."):
+            names = [node.value.split(".")]  # a module by its name, as adapters are
+        else:
+            continue
+        for name in names:
+            yield Path(*name).with_suffix(".py")
+            yield Path(*name) / "__init__.py"
+
+
+def measuring_files_that_import_what_shows(root):
+    """Each file reaches only what its imports do, so to look at single imports suffices."""
+    sources = [path for path in every_file(root) if path.suffix == ".py"]
+    return [
+        (str(path.relative_to(root)), str(name))
+        for path in sources if not only_shows(path.relative_to(root))
+        for name in imported(path, root) if only_shows(name) and (root / name).is_file()
+    ]  # fmt: skip
+
+
+def test_what_measures_never_imports_what_only_shows():
+    assert measuring_files_that_import_what_shows(ROOT) == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "import bench.presentation.report",
+        "from ..presentation import tables",
+        "from ..presentation import results",
+        "from bench.presentation import figures",
+        "def f():\n    from ..presentation.results import label",
+        'importlib.import_module("bench.presentation.text")',
+    ],
+)
+def test_an_import_of_what_only_shows_is_found(copy, line):
+    path = copy / "bench" / "harness" / "metrics.py"
+    path.write_text(f"{path.read_text()}\n{line}\n")
+    assert measuring_files_that_import_what_shows(copy)
 
 
 def test_the_stamp_names_machine_and_versions_but_no_host():

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench import metrics
+from bench.harness import metrics
 from reference import rotation
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bench.findings import Results
-from bench.findings import newton as findings
-from bench.suites import SCALES, Scale, blocks
-from bench.suites import newton as suite
+from bench.experiments import SCALES, Scale, blocks
+from bench.experiments.newton import measurement as suite
+from bench.experiments.newton import tables as findings
+from bench.presentation.sections import Results
 from reference import STEP_SOLVERS
 
 SIZE = 6

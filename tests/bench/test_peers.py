@@ -6,12 +6,13 @@ import importlib.metadata
 import numpy as np
 import pytest
 
-from bench.judge import Targets, Tolerance, judge
-from bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
-from bench.problems.robots import CHARACTER, is_installed, robot
-from bench.solvers import ONE_START, OURS, PEERS, RESTARTS
-from bench.solvers.protocol import UnableError
-from bench.worker import Job, Solved, perform
+from bench.experiments.robots.evaluate import Targets, Tolerance, judge
+from bench.experiments.robots.job import Job, perform
+from bench.experiments.robots.problem import CHARACTER, is_installed, robot
+from bench.experiments.robots.targets import robot_targets, uniform_targets, unreachable_targets
+from bench.harness.worker import Solved
+from bench.peers.ik import ONE_START, OURS, PEERS, RESTARTS
+from bench.peers.ik.protocol import UnableError
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several tips.
@@ -103,12 +104,12 @@ def test_ours_finds_every_target_of_every_stratum():
 
 def test_the_registry_says_what_the_packages_say(peer):
     metadata = importlib.metadata.metadata(peer.package)
+    expression = metadata.get("License-Expression", "")
     said = " ".join(
-        [metadata["License-Expression"] or "", metadata["License"] or ""]
-        + (metadata.get_all("Classifier") or [])
+        [expression, metadata.get("License", ""), *(metadata.get_all("Classifier") or [])]
     )
     words = {"Apache-2.0": "Apache", "BSD-3-Clause": "BSD", "MIT": "MIT"}
-    if "icense" in said or metadata["License-Expression"]:
+    if "icense" in said or expression:
         assert words[peer.license] in said
 
 

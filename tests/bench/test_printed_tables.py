@@ -1,7 +1,7 @@
 """What `plumbob bench SUITE` prints: the tables that its records make, and no others."""
 
 from bench import cli
-from bench.record import RecordFile
+from bench.harness.record import RecordFile
 
 
 def test_the_tables_of_the_suites_asked_for_are_printed(capsys, tmp_path, records):

@@ -1,14 +1,17 @@
 """The report: one page that needs nothing else, from the records alone."""
 
+import csv
 import html.parser
 import re
+import unicodedata
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 
 import pytest
 
-from bench import report
-from bench.findings import SECTIONS
-from bench.record import RecordFile
+from bench.harness.record import RecordFile
+from bench.presentation import report
+from bench.presentation.sections import SECTIONS
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -148,6 +151,131 @@ def test_the_same_records_give_the_same_files(whole):
     before = [p.read_bytes() for p in files]
     report.write(result.page.parent)
     assert [p.read_bytes() for p in files] == before
+
+
+HOSTILE = (
+    r"$\frac{$", "$x$ and $y$", "<script>alert(1)</script>", "[red]x", "a|b`c`*d*", "\x1b[2J",
+    "100 %", "_hidden_", "a & b", "two\nlines", "right\u202eleft", "x" * 10_000, "", "\x00\x07",
+    "id=\"x\" xlink:href='#22272e'", "-->]]>&lt;", "../../x/", "\ufffe\U000f0000", "[/]", "{0}",
+    r"\input{/etc/passwd}", "*", "手腕", "${day}", ":smile:", " ",
+)  # fmt: skip
+KEPT = (r"$\frac{$", "[red]x", "<script>alert(1)</script>", r"\x1b[2J", r"right\u202eleft", "手腕")
+
+
+def spoilt(record, field, name):
+    """A record with a name of an enemy's choice in all strings of a field."""
+    if field in ("problem", "solver"):
+        was = getattr(record, field)
+        return replace(record, **{field: f"{was}/{name}" if field == "problem" else name})
+    values = dict(getattr(record, field))
+    if field == "stamp":
+        machine = values["machine"] | {"processor": name, "system": name}
+        return replace(record, stamp={"machine": machine, "versions": {name: name}, "source": name})
+    changed = {key: name if isinstance(value, str) else value for key, value in values.items()}
+    return replace(record, **{field: changed})
+
+
+def look_into_everything(folder):
+    """Check that no name is an instruction in any file of a report."""
+    for path in sorted(p for p in folder.rglob("*.*") if p.name != "records.jsonl"):
+        text = path.read_text(encoding="utf-8")
+        bad = {unicodedata.category(c) for c in text if c != "\n"} & {"Cc", "Cf", "Cs", "Cn", "Co"}
+        assert not bad, (path, bad)
+        if path.suffix == ".svg":
+            ET.fromstring(text)
+        if path.suffix == ".html":
+            page = Page(text)
+            assert (page.wrong, page.open) == ([], [])
+            assert len(page.ids) == len(set(page.ids))
+            assert not page.tags & {"script", "link", "img", "iframe", "object"}
+        if path.suffix == ".md":
+            rows = [line for line in text.splitlines() if line.startswith("|")]
+            assert len({len(re.findall(r"(?<!\\)\|", row)) for row in rows}) <= 1
+            body = "\n".join(rows[2:])
+            assert not re.search(r"(?<!\\)(\\\\)*[`*_\[\]<>$]", body)
+        if path.suffix == ".tex":
+            assert not re.search(r"\\(frac|input)|\\\\\s*[\[*]", text)
+            bare = re.sub(r"%.*|\\\\[{}%]", "", re.sub(r"\\[{}$&#%_]", "", text))
+            assert bare.count("{") == bare.count("}")
+        if path.suffix == ".csv":
+            assert len({len(row) for row in csv.reader(text.splitlines())}) <= 1
+
+
+def hostile_report(folder, records, field, names):
+    """A report of good records, and of spoilt ones beside them."""
+    bad = [spoilt(r, field, names[i % len(names)]) for i, r in enumerate(records)]
+    return written(folder, [*records, *bad])
+
+
+@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp"])
+def test_hostile_names_are_data_in_every_file(tmp_path, records, field):
+    few = [r for i, r in enumerate(records) if field == "solver" or i % 3 == 0]
+    result, page = hostile_report(tmp_path, few, field, HOSTILE)
+    look_into_everything(tmp_path)
+    if field in ("solver", "stamp"):  # others tell tables what to do: "3 joints", "robots/..."
+        assert not [sentence for sentence in result.missing if sentence.startswith("The record")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp"])
+@pytest.mark.parametrize("name", HOSTILE, ids=[ascii(name)[:20] for name in HOSTILE])
+def test_each_hostile_name_is_data_everywhere(tmp_path, records, field, name):
+    hostile_report(tmp_path, records, field, [name])
+    look_into_everything(tmp_path)
+
+
+def test_a_name_stands_letter_by_letter_in_figures_and_tables(tmp_path, make):
+    cases = [make.timed(name, 1e-6) for name in (*HOSTILE, "Pinocchio")]
+    result, page = written(tmp_path, cases)
+    drawn = ET.parse(tmp_path / "figures" / "timing_kinematics.svg").getroot()
+    inline = "".join(page.text)
+    for name in KEPT:
+        shown = name.encode("unicode_escape").decode() if not name.isprintable() else name
+        assert any(shown == "".join(element.itertext()) for element in drawn.iter()), name
+        assert inline.count(shown) >= 2
+
+
+SPOILT = {
+    "no arrays": lambda r: replace(r, arrays={}),
+    "no notes": lambda r: replace(r, notes={}),
+    "no settings": lambda r: replace(r, settings={}),
+    "settings of other kinds": lambda r: replace(r, settings=dict.fromkeys(r.settings, "x")),
+    "arrays of other shapes": lambda r: replace(
+        r, arrays={name: values[..., None, None] for name, values in r.arrays.items()}
+    ),
+    "empty arrays": lambda r: replace(
+        r, arrays={name: values.ravel()[:0] for name, values in r.arrays.items()}
+    ),
+    "shorter arrays": lambda r: replace(
+        r, arrays={name: values.ravel()[:1] for name, values in r.arrays.items()}
+    ),
+    "no stamp": lambda r: replace(r, stamp={}),
+}
+
+
+@pytest.fixture(params=["tables", pytest.param("figures too", marks=pytest.mark.slow)])
+def drawn(request, monkeypatch):
+    """Without and with figures, which take long to draw."""
+    if request.param == "tables":
+        monkeypatch.setattr(report, "DRAWINGS", ())
+
+
+@pytest.mark.parametrize("how", SPOILT)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.usefixtures("drawn")
+def test_what_a_record_lacks_costs_that_record_alone(tmp_path, records, how):
+    """Every kind of record is spoilt, once: the tables of the others are as they were."""
+    kinds = {(r.suite, r.problem.split("/")[0], tuple(r.arrays)): r for r in records if r.arrays}
+    bad = [replace(SPOILT[how](r), solver="the spoilt one") for r in kinds.values()]
+    result, page = written(tmp_path, [*records, *bad])
+    look_into_everything(tmp_path)
+    spared = [s for s in result.missing if s.startswith("The record of")]
+    assert all("the spoilt one" in sentence for sentence in spared)
+    assert len(spared) <= len(bad)
+    assert all(table.rows for table in result.tables)
+    if how == "no arrays":
+        assert len(spared) > 5
 
 
 def test_without_records_there_is_no_report(tmp_path):

@@ -2,9 +2,9 @@
 
 import pytest
 
-from bench.findings import Results
-from bench.findings.robot_models import agreement
-from bench.suites.robot_models import compare
+from bench.experiments.robot_models.measurement import compare
+from bench.experiments.robot_models.tables import agreement
+from bench.presentation.sections import Results
 from crosscheck.engines import ROBOT_ENGINES
 from crosscheck.robots.models import Model
 

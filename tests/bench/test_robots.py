@@ -4,8 +4,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from bench.judge import LIMIT_TOLERANCE, Targets, Tolerance, angle_between, judge
-from bench.problems.robot_targets import (
+from bench.experiments.robots.evaluate import (
+    LIMIT_TOLERANCE,
+    Targets,
+    Tolerance,
+    angle_between,
+    judge,
+)
+from bench.experiments.robots.problem import ALL, CHARACTER, AbsentError, is_installed, links, robot
+from bench.experiments.robots.targets import (
     STRATA,
     farthest,
     least_singular_values,
@@ -16,7 +23,6 @@ from bench.problems.robot_targets import (
     uniform_targets,
     unreachable_targets,
 )
-from bench.problems.robots import ALL, CHARACTER, AbsentError, is_installed, links, robot
 from reference import rotation
 
 COUNT = 8

@@ -2,10 +2,10 @@
 
 import pytest
 
-from bench import run
-from bench.machine import stamp
-from bench.record import RecordFile
-from bench.suites import Block, Measured
+from bench.experiments import Block, Measured
+from bench.harness import run
+from bench.harness.machine import stamp
+from bench.harness.record import RecordFile
 
 
 class Suite:

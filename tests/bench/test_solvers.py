@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bench.problems.chain import chain_targets
-from bench.solvers.levenberg_marquardt import levenberg_marquardt
-from bench.solvers.reference_kinematics import ReferenceKinematics
+from bench.experiments.chain.problem import chain_targets
+from bench.peers.ik.levenberg_marquardt import levenberg_marquardt
+from bench.peers.ik.reference_kinematics import ReferenceKinematics
 from crosscheck.engines import SKELETON_ENGINES
 from crosscheck.engines.skeleton_engine import coordinates
 from reference import Skeleton, forward_kinematics, rotation, solve_ik

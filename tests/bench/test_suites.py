@@ -3,9 +3,13 @@
 import numpy as np
 import pytest
 
-from bench.record import key
-from bench.suites import SUITES, Scale, blocks
-from bench.timing import cases
+from bench.experiments import SUITES, Scale, blocks
+from bench.experiments.cloth import measurement as cloth
+from bench.experiments.cloth.problem import cloth_swing
+from bench.experiments.timing import cases
+from bench.harness.machine import stamp
+from bench.harness.record import Record, decode, encode, key
+from bench.harness.run import now
 
 TINY = Scale(targets=3, seconds=0.001)
 MEASURED = [suite for suite in SUITES if suite != "timing"]
@@ -27,6 +31,15 @@ def test_no_two_blocks_have_the_same_key(suite):
     keys = [key(b.suite, b.problem, b.solver, b.settings) for b in blocks(suite, TINY)]
     assert len(keys) == len(set(keys)) > 0
     assert {name for name, *_ in keys} == {suite}
+
+
+@pytest.mark.parametrize("suite", MEASURED)
+def test_the_settings_of_every_block_can_be_read_again(suite):
+    for b in blocks(suite, TINY):
+        made = Record(b.suite, b.problem, b.solver, b.settings, b.size, stamp=stamp(), when=now())
+        back = decode(encode(made))
+        assert back.key == made.key
+        assert back.stamp == made.stamp
 
 
 def test_no_two_cases_of_the_timing_have_the_same_key():
@@ -101,3 +114,24 @@ def test_one_step_of_the_cloth_starts_at_one_and_converges():
         arrays = found("cloth", "cloth/x1/one step", solver).measure().arrays
         assert arrays["residual"][0] == arrays["error"][0] == 1.0
         assert arrays["error"][last] < 1e-10
+
+
+def test_the_two_laws_of_dampers_come_together_with_h_to_first_order():
+    swing = cloth_swing(1, size=5, damping=0.2)
+    found = cloth.two_dampers(swing, first=30).arrays
+    apart = np.array(found["apart"])
+    assert np.log2(found["h"][0] / found["h"][-1]) == len(apart) - 1
+    orders = np.log2(apart[:-1] / apart[1:])
+    assert orders[-1] == pytest.approx(1.0, abs=0.05)
+    assert 1e-4 < apart[-1] < apart[0] < 1
+
+
+def test_a_law_of_dampers_with_the_wrong_factor_does_not_come_together(monkeypatch):
+    """Twice the damper, or half of it, is as far off however short the step."""
+    right = cloth.damper_forces
+    for slip in (0.5, 2.0, -1.0):
+        monkeypatch.setattr(
+            cloth, "damper_forces", lambda system, state, slip=slip: slip * right(system, state)
+        )
+        apart = cloth.two_dampers(cloth_swing(1, size=5, damping=0.2), first=30).arrays["apart"]
+        assert apart[-1] > 0.4

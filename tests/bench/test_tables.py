@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench import tables
-from bench.metrics import Share, share
-from bench.tables import Answer, Column, Table, words
+from bench.harness.metrics import Share, share
+from bench.presentation import tables
+from bench.presentation.tables import Answer, Column, Table, words
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
 
@@ -76,9 +76,23 @@ def test_latex_specials_are_escaped():
     lines = tables.latex(table((HOSTILE, 1.0))).splitlines()
     row = lines[lines.index(r"    \midrule") + 1].removesuffix(r" & 1.00 \\")
     commands = r"\\(textbackslash|textasciicircum|textasciitilde|textbar)\{\}|\\ensuremath\{[<>]\}"
+    commands += r"|\{[\[\]*]\}"
     rest = re.sub(rf"{commands}|\\[{{}}$&#%_]", "", row)
     assert not set(rest) & set("\\{}$&#%_^~<>|")
     assert "50" in rest
+
+
+@pytest.mark.parametrize("name", ["[red]x", "*", "*[2cm]"])
+def test_a_latex_row_is_no_option_of_the_row_before(name):
+    text = tables.latex(table(("a", 1), ("a", 2), (name, 1.0)))
+    assert not re.search(r"(\\\\|\\midrule|\\addlinespace)\s*[\[*]", text)
+
+
+@pytest.mark.parametrize("name", ["- x", "+ x", "1. x", "1) x", "= x", "$x$"])
+def test_a_point_in_markdown_begins_no_list_or_formula(name):
+    answered = Table("t", "T", (Column("a"),), ((1,),), answer=Answer(name, (name,)))
+    lines = tables.markdown(answered).splitlines()
+    assert not any(re.match(r"(- )?([-+=$]|\d[.)]) ?x", line) for line in lines)
 
 
 def test_latex_braces_and_environments_close_in_turn():

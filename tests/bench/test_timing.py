@@ -1,33 +1,27 @@
 """Timing, for real but in a blink: pytest-benchmark, in a process of its own."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
-from bench import run
-from bench.machine import stamp
-from bench.record import RecordFile
-from bench.timing import case as timing_case
-from bench.timing import kinematics
-from bench.timing.case import LIMIT, copying, stream, streaming
+from bench.experiments.timing import case as timing_case
+from bench.experiments.timing import kinematics
+from bench.experiments.timing.case import LIMIT, copying, stream, streaming
+from bench.harness import run
+from bench.harness.machine import stamp
+from bench.harness.record import RecordFile
 from reference import cores, forward_kinematics
 
 
 @pytest.fixture(scope="module")
 def timed(tmp_path_factory):
-    """The folder of records and the output of timing a few cases for a millisecond."""
+    """The folder of records and the events of timing a few cases for a millisecond."""
     folder = tmp_path_factory.mktemp("timed")
     arguments = run.timing_arguments(folder, 0.001, str(folder / "storage"))
-    command = [sys.executable, "-m", "pytest", *arguments, "-k", "kinematics and 10 and compiled"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
-    return folder, done
+    return folder, list(run._relay([*arguments, "-k", "kinematics and 10 and compiled"]))
 
 
 def test_every_case_is_kept_with_rounds_of_one_operation_each(timed):
-    folder, done = timed
-    assert done.returncode == 0, done.stdout + done.stderr
+    folder, _ = timed
     records = RecordFile(folder).read().records
     assert {record.settings["operations"] for record in records} >= {1, 10_000}
     for record in records:
@@ -40,11 +34,11 @@ def test_every_case_is_kept_with_rounds_of_one_operation_each(timed):
         assert record.stamp["machine"] == stamp()["machine"]
 
 
-def test_what_happens_is_announced_line_by_line(timed):
-    _, done = timed
-    lines = [line for line in done.stdout.splitlines() if line.startswith(run.MARK)]
-    states = {line.split("\t")[1] for line in lines}
-    assert states == {run.MEASURING, run.MEASURED}
+def test_what_happens_is_told_case_by_case(timed):
+    folder, events = timed
+    assert {event.state for event in events} == {run.MEASURING, run.MEASURED}
+    measured = [event.what for event in events if event.state == run.MEASURED]
+    assert measured == [f"{r.problem}, {r.solver}" for r in RecordFile(folder).read().records]
 
 
 def test_pytest_that_fails_is_an_event_with_its_reason():

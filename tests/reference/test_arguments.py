@@ -1,3 +1,5 @@
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -93,6 +95,35 @@ def test_only_an_integer_in_range_is_one(given):
 def test_misfit_indices_are_named(given, message):
     with pytest.raises(ValueError, match=message):
         arguments.indices("pinned", given, "pin", least=0, below=3)
+
+
+@pytest.mark.parametrize("given", [1e-75, 1e75, 1, np.float32(2.0)])
+def test_a_positive_number_is_within_75_orders_of_one(given):
+    assert arguments.number("h", given, above=0.0) == given
+
+
+@pytest.mark.parametrize(
+    ("border", "given", "message"),
+    [
+        (partial(arguments.number, above=0.0), 1e-76, "a number of at least 1e-75, got 1e-76"),
+        (partial(arguments.number, above=0.0), 2e75, "a number of at most 1e.75, got 2e.75"),
+        (arguments.number, -2e75, "a number of at least -1e.75, got -2e.75"),
+        (partial(arguments.integer, least=0), 2**63, "an integer of at least 0 and at most 92233"),
+        (arguments.array, -2e75, "numbers of at most 1e.75, got 2e.75"),
+        (arguments.array, np.ma.array([1.0], mask=[True]), "numbers, got one with masked values"),
+        (partial(arguments.flags, count=2), [True], r"shape \(2,\), got \(1,\)"),
+        (partial(arguments.flags, count=2), [1, 0], "booleans, got int64 values"),
+        (arguments.boolean, 1, "True or False, got 1"),
+        (arguments.text, b"a", "text, got b'a'"),
+        (partial(arguments.sequence, count=2, each="a joint"), "ab", "2 x, one a joint, got 'ab'"),
+        (partial(arguments.sequence, count=2, each="a joint"), [1], "2 x, one a joint, got 1"),
+        (partial(arguments.instance, kind=int), "a", "an int, got str"),
+        (arguments.generator, 3, "a Generator, got int"),
+    ],
+)
+def test_a_misfit_of_any_kind_is_named(border, given, message):
+    with pytest.raises(ValueError, match=f"x: expected (an array of )?{message}"):
+        border("x", given)
 
 
 def test_no_indices_are_fine():

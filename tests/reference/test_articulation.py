@@ -382,7 +382,7 @@ def test_bad_coordinates_are_named(use, change, message, arm, q, speed):
         ({"lower": 3.2}, "lower: expected limits of a ball's twist .* got 3.2 to inf for joint 2"),
         ({"upper": -3.2}, "lower: expected limits of a ball's twist .* got -inf to -3.2"),
         ({"cones": -1.0}, "cones: expected angles of at least 0, got -1"),
-        ({"cones": np.nan}, "cones: expected angles of at least 0, got nan"),
+        ({"cones": np.nan}, "cones: expected numbers or infinity, got NaN"),
         ({"cones": [1.0, 2.0]}, "cones: expected one, or one for each of 3 joints"),
         ({"mimics": {7: Mimic(0)}}, "mimics: expected an integer .* got 7"),
         ({"mimics": {1: Mimic("hip")}}, "mimics: expected one of .* got 'hip'"),

@@ -131,3 +131,11 @@ class TestEveryIntegrator:
         system, state = oscillator()
         with pytest.raises(ValueError, match=f"^{name}: .*{message}"):
             integrator(**({"system": system, "state": state, "h": 0.1} | change))
+
+
+@pytest.mark.parametrize("integrate", [symplectic_euler, runge_kutta])
+def test_a_step_beyond_the_largest_magnitude_is_an_error(integrate):
+    """No state holds what `State` would refuse."""
+    system = MassSpring([1.0], [], 1.0, 1.0, gravity=(0, -1e70, 0))
+    with pytest.raises(FloatingPointError, match=r"numbers up to 1e\+75"):
+        integrate(system, State([[0, 0, 0]], [[0, 0, 0]]), 1e6)

@@ -12,7 +12,7 @@ from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
 from reference.implicit_euler.chebyshev import PLAIN
 from reference.implicit_euler.line_search import line_search
 from reference.implicit_euler.newton_cg import _product
-from reference.implicit_euler.objective import global_matrix
+from reference.implicit_euler.objective import Objective, global_matrix
 from reference.mass_spring import (
     MassSpring,
     State,
@@ -196,10 +196,41 @@ class TestObjective:
         with pytest.raises(ValueError, match=r"^d: expected shape"):
             problem[0].quadratic_form(problem[1], np.zeros((2, 3)))
 
-    @pytest.mark.parametrize("method", ["value", "gradient", "hessian", "rest_vectors"])
-    def test_wrong_positions_are_named(self, problem, method):
+    METHODS = ("evaluate", "value", "gradient", "hessian", "pull_of_pins", "rest_vectors")
+
+    @pytest.mark.parametrize("method", METHODS)
+    @pytest.mark.parametrize("shape", [(6, 3), (8, 3), (7, 2), (3, 7), (21,), (7, 3, 1), (0, 3)])
+    def test_wrong_positions_are_named(self, problem, method, shape):
         with pytest.raises(ValueError, match=r"^positions: expected shape \(7, 3\)"):
-            getattr(problem[0], method)(np.zeros((6, 3)))
+            getattr(problem[0], method)(np.zeros(shape))
+
+    @pytest.mark.parametrize("method", METHODS)
+    def test_positions_that_are_no_numbers_are_named(self, problem, method):
+        for wrong, message in (
+            (np.full((7, 3), np.nan), "finite numbers, got nan"),
+            (np.full((7, 3), 1e200), "coordinates of at most"),
+            ("cloth", "an array of numbers"),
+        ):
+            with pytest.raises(ValueError, match=f"^positions: expected {message}"):
+                getattr(problem[0], method)(wrong)
+
+    def test_lists_and_single_precision_are_evaluated_as_they_are(self, problem):
+        objective, x = problem
+        x = x.astype(np.float32)
+        expected = objective.evaluate(x.astype(float))
+        for same in (x, x.tolist(), np.asfortranarray(x)):
+            found = objective.evaluate(same)
+            assert (found.value, found.gradient_norm) == (expected.value, expected.gradient_norm)
+            np.testing.assert_array_equal(found.gradient, expected.gradient)
+
+    def test_a_wrong_step_is_named(self, network):
+        for wrong in (0.0, -1.0, np.nan, "fast"):
+            with pytest.raises(ValueError, match=r"^h: expected a"):
+                Objective(*network, wrong)
+        with pytest.raises(ValueError, match=r"^system: expected a MassSpring"):
+            Objective(None, network[1], h)
+        with pytest.raises(ValueError, match=r"^start: expected one of y, x_n, got 'z'"):
+            Objective(*network, h, start="z")
 
 
 class TestStep:
@@ -388,12 +419,70 @@ class TestStep:
 
     @pytest.mark.parametrize("gap", [1e-149, 1e-151, 1e-160])
     def test_the_hessian_is_finite_wherever_the_gradient_is(self, gap):
-        """Ends so close that k r / l would overflow count as coincident."""
-        system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 1e153, pinned=[0], gravity=(0, 0, 0))
+        """The stiffest and longest spring there may be, its ends as near as not to coincide."""
+        system = MassSpring([1.0, 1.0], [[0, 1]], 1e75, 1e75, pinned=[0], gravity=(0, 0, 0))
         state = State([[0.0, 0.0, 0.0], [gap, 0.0, 0.0]], np.zeros((2, 3)))
         objective = ImplicitEuler(system, h=h).objective(state)
         assert objective.start.finite
         assert np.isfinite(objective.hessian(state.positions).data).all()
+
+    @pytest.mark.parametrize("name", ["local_global", "chebyshev"])
+    def test_an_iteration_from_x_n_is_that_of_liu_et_al(self, network, rng, speed, name):
+        """(M + h² L) x = h² J d + M y + h² f_ext with d from x_n, the pins eliminated."""
+        system, state = network
+        given = outer(rng)
+        x = stepped(system, state, name, given, start="x_n", tolerance=0, max_iterations=1).state
+        expected = published_iteration(system, state, given)
+        # Two solves of seven unknowns, whose matrices have condition numbers of about 3.
+        np.testing.assert_allclose(x.positions, expected, rtol=0, atol=2e-15)
+        from_y = stepped(system, state, name, given, tolerance=0, max_iterations=1).state
+        assert np.abs(from_y.positions - expected).max() > 1e-4
+
+    @pytest.mark.parametrize("name", CONVERGING)
+    def test_from_x_n_every_solver_comes_to_the_same_minimiser(self, cloth, name):
+        pins = cloth[1].positions[cloth[0].pinned] + [0.0, 0.02, 0.01]
+        integrators = [ImplicitEuler(cloth[0], h=h, solver=name, start=at) for at in ("y", "x_n")]
+        results = [integrator.step(cloth[1], pin_positions=pins) for integrator in integrators]
+        starts = [next(one.iterates(cloth[1], pin_positions=pins)) for one in integrators]
+        assert np.abs(starts[0].positions - starts[1].positions).max() > 0.01
+        np.testing.assert_array_equal(starts[1].positions[cloth[0].pinned], pins)
+        assert all(result.outcome == Outcome.CONVERGED for result in results)
+        ends = [result.state.positions for result in results]
+        np.testing.assert_allclose(*ends, rtol=0, atol=1e-9)  # both residuals are below 1e-10
+
+    def test_gauss_newton_starts_at_x_n_alone(self, cloth):
+        assert ImplicitEuler(cloth[0], solver="gauss_newton").start == "x_n"
+        with pytest.raises(ValueError, match="start: expected one of x_n, got 'y'"):
+            ImplicitEuler(cloth[0], solver="gauss_newton", start="y")
+
+    @pytest.mark.parametrize("stiffness", [1e15, 1e16, 1e17, 1e19])
+    def test_gauss_newton_answers_where_its_matrix_is_singular_to_rounding(self, stiffness, speed):
+        """Nothing holds the two masses but each other: h² k / m is up to 1e17."""
+        system = MassSpring([1.0, 1.0, 1.0], [[0, 1], [1, 2]], 1.0, stiffness)
+        state = State(np.arange(9.0).reshape(3, 3), np.ones((3, 3)))
+        result = stepped(system, state, "gauss_newton", h=0.1)
+        assert np.isfinite(result.state.positions).all()
+        assert np.isfinite(result.residual)
+        assert result.outcome in (Outcome.STALLED, Outcome.ITERATION_LIMIT)
+        assert stiffness < 1e19 or result.outcome == Outcome.STALLED
+
+
+def published_iteration(system, state, given):
+    """Return one iteration of Liu et al. 2013 from x_n, dense, springs and dampers apart."""
+    ends, k, r, rope = beside(system, state.positions)
+    x_n, free, A = state.positions, system.free, np.zeros((len(system.masses), len(ends)))
+    A[ends[:, 0], range(len(ends))], A[ends[:, 1], range(len(ends))] = 1.0, -1.0
+    p = A.T @ x_n
+    length = np.linalg.norm(p, axis=1)
+    d = np.where(rope & (length < r), length, r)[:, None] * p / length[:, None]
+    M, L, J = np.diag(system.masses), A @ np.diag(k) @ A.T, A @ np.diag(k)
+    y = x_n + h * state.velocities
+    right = h * h * (J @ d) + M @ y + h * h * (M @ np.tile(system.gravity, (len(M), 1)) + given)
+    left, x = M + h * h * L, x_n.copy()
+    x[free] = np.linalg.solve(
+        left[np.ix_(free, free)], right[free] - left[np.ix_(free, ~free)] @ x_n[~free]
+    )
+    return x
 
 
 class TestResidual:
@@ -474,21 +563,75 @@ class TestOutcome:
         assert result.residual == 0
         np.testing.assert_array_equal(result.state.positions, state.positions)
 
-    def test_a_start_at_equilibrium_is_converged_after_no_iteration(self, solver, speed):
+    def test_a_start_at_equilibrium_is_at_rounding_after_no_iteration(self, solver, speed):
         """Rounding leaves a gradient there, which is all the gradient there is."""
         system, state = hanging(6)
         result = stepped(system, state, solver)
-        assert (result.outcome, result.iterations) == (Outcome.CONVERGED, 0)
+        assert (result.outcome, result.iterations) == (Outcome.AT_ROUNDING, 0)
         assert result.at_floor
         assert result.residual <= 1
 
     @pytest.mark.parametrize("name", CONVERGING)
     def test_converged_means_within_the_tolerance(self, cloth, name):
-        for tolerance in (1e-2, 1e-5, 1e-8):
+        for tolerance in (1e-2, 1e-5, 1e-8, 1e-12):
             result = stepped(*cloth, name, tolerance=tolerance)
             assert result.outcome == Outcome.CONVERGED
             assert result.residual <= tolerance
             assert (result.history[:-1] > tolerance).all()
+
+    @pytest.mark.parametrize("place", [0.0, 1e4])
+    @pytest.mark.parametrize("name", CONVERGING)
+    def test_at_rounding_means_as_near_as_newton_comes(self, cloth, name, place):
+        """10 km from the origin the floor is far above the tolerance, and what is attained is."""
+        system, state = cloth
+        moved = State(state.positions + place, state.velocities)
+        best, result = (
+            stepped(system, moved, solver, tolerance=1e-300, max_iterations=2000)
+            for solver in ("newton", name)
+        )
+        assert best.outcome == result.outcome == Outcome.AT_ROUNDING
+        # What rounding leaves differs from solver to solver; an accelerated one amplifies it.
+        assert result.residual <= 30 * best.residual
+        assert result.residual > 0
+
+    @pytest.mark.parametrize("name", ["local_global", "chebyshev"])
+    def test_a_slow_solver_goes_on_below_the_floor(self, name):
+        system, state = scenes.lab_cloth(size=5, stiffness=1e3, gravity=9.81)
+        state = ImplicitEuler(system, h=h).step(state).state
+        result = stepped(system, state, name, tolerance=1e-12, max_iterations=5000)
+        objective = ImplicitEuler(system, h=h).objective(state)
+        floor = objective.evaluate(result.state.positions).floor
+        assert floor > 10 * 1e-12 * objective.inertial.gradient_norm
+        assert result.outcome == Outcome.CONVERGED
+        assert result.residual <= 1e-12
+
+    @pytest.mark.parametrize("name", CONVERGING)
+    def test_a_start_within_the_floor_is_iterated(self, cloth, name):
+        """Newton's answer, its particles off by a thousandth of what the floor allows."""
+        system, state = hanging(6)
+        noise = np.random.default_rng(5).standard_normal((6, 3))
+        beside = State(state.positions + 3e-15 * noise, np.zeros((6, 3)))
+        objective = ImplicitEuler(system, h=h).objective(beside)
+        assert objective.start.at_floor
+        assert not objective.start.at_rest
+        result = stepped(system, beside, name)
+        assert result.outcome == Outcome.AT_ROUNDING
+        assert result.iterations > 2
+        assert result.residual < 0.2 * result.history[0]
+
+    @pytest.mark.parametrize("slip", ["at the floor", "two steps back"])
+    def test_the_laws_of_rounding_see_a_solve_that_ends_early(self, cloth, slip, monkeypatch):
+        """The rule as it was, and one that takes a rise of an accelerated residual for the end."""
+
+        def outcome(self, iterate, residuals, best, stuck):
+            early = slip == "at the floor" or len(residuals) - 1 > best
+            if residuals[-1] <= self.tolerance or (iterate.at_floor and early):
+                return Outcome.AT_ROUNDING
+            return None
+
+        monkeypatch.setattr(ImplicitEuler, "_outcome", outcome)
+        with pytest.raises(AssertionError):
+            self.test_a_slow_solver_goes_on_below_the_floor("chebyshev")
 
     @pytest.mark.parametrize("count", [0, 1, 7])
     def test_without_tolerance_all_iterations_are_run(self, network, solver, count):
@@ -535,7 +678,7 @@ class TestOutcome:
             def iterates(self, objective):
                 yield objective.start
                 yield objective.evaluate(objective.y + 0.01)
-                yield objective.evaluate(np.full_like(objective.y, bad))
+                yield objective._evaluate(np.full_like(objective.y, bad))
 
         monkeypatch.setitem(STEP_SOLVERS, "bursting", Bursting)
         result = stepped(*cloth, "bursting")
@@ -545,12 +688,12 @@ class TestOutcome:
         assert np.isfinite(result.history).all()
 
     @pytest.mark.parametrize(
-        ("positions", "velocities"), [(1e200, 1.0), (1.0, 1e308)], ids=["positions", "velocities"]
+        ("positions", "velocities"), [(1e75, 1.0), (1.0, 1e75)], ids=["positions", "velocities"]
     )
     def test_a_start_that_overflows_is_returned_unmoved(self, solver, speed, positions, velocities):
-        system = MassSpring([1.0, 2.0], [[0, 1]], 1.0, 100.0)
+        system = MassSpring([1e75, 2e74], [[0, 1]], 1.0, 1e75)
         state = State(positions * np.eye(3)[:2], velocities * np.ones((2, 3)))
-        result = stepped(system, state, solver, h=1e3)
+        result = stepped(system, state, solver, h=1e5)
         assert (result.outcome, result.iterations) == (Outcome.DIVERGED, 0)
         assert result.residual == np.inf
         np.testing.assert_array_equal(result.state.positions, state.positions)
@@ -757,7 +900,7 @@ class TestInputs:
             ("h", 0.0, "greater than 0"),
             ("h", -1.0, "greater than 0"),
             ("h", np.nan, "finite"),
-            ("h", 1e200, "h² k . h c to be finite"),
+            ("h", 1e200, "expected a number of at most 1e.75"),
             ("h", "fast", "a number, got 'fast'"),
             (
                 "solver",
@@ -769,6 +912,8 @@ class TestInputs:
             ("max_iterations", -1, "at least 0"),
             ("max_iterations", 2.5, "integer"),
             ("max_iterations", True, "integer"),
+            ("start", "z", "one of y, x_n, got 'z'"),
+            ("start", 1, "one of y, x_n, got 1"),
         ],
     )
     def test_wrong_settings_are_named(self, cloth, name, value, message):

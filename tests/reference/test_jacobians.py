@@ -113,7 +113,7 @@ def test_the_jacobian_of_a_joint_is_its_row_of_all(arm, q, speed):
     for j, name in enumerate(arm.names):
         assert (jacobian(arm, q, name) == everything[j]).all()
         assert (jacobian(arm, q, j) == everything[j]).all()
-    assert (jacobian(arm, q) == everything[-1]).all()
+    assert (jacobian(arm, q, -1) == everything[-1]).all()
 
 
 def test_joints_off_the_path_have_columns_of_zero(arm, q, speed):
@@ -158,8 +158,9 @@ def test_leading_axes_broadcast(arm, q, rng, speed):
     J = jacobians(arm, moved)
     assert J.shape == (2, 3, arm.joint_count, 6, arm.freedom_count)
     assert (J[1, 2] == jacobians(arm, moved[1, 2])).all()
-    assert (jacobian(arm, moved) == J[..., -1, :, :]).all()
-    assert jacobian(arm, np.empty((0, arm.coordinate_count))).shape == (0, 6, arm.freedom_count)
+    assert (jacobian(arm, moved, -1) == J[..., -1, :, :]).all()
+    none = np.empty((0, arm.coordinate_count))
+    assert jacobian(arm, none, -1).shape == (0, 6, arm.freedom_count)
 
 
 def test_inputs_stay_as_they_were(arm, q, speed):
@@ -174,7 +175,7 @@ def test_inputs_stay_as_they_were(arm, q, speed):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda m, q: jacobian("arm", q), "skeleton: expected a Skeleton, got str"),
+        (lambda m, q: jacobian("arm", q), "articulation: expected a Skeleton, an Articulation or"),
         (lambda m, q: jacobian(m, q[:-1]), "q: expected shape"),
         (lambda m, q: jacobians(m, 2.0 * q), "q: expected unit quaternions"),
         (lambda m, q: jacobian(m, q, 7), "effector: expected an integer"),

@@ -18,6 +18,7 @@ from reference.mass_spring import (
     lengths,
     potential_energy,
     rest_vectors,
+    spring_blocks,
     spring_energy,
     spring_forces,
     stiffness_matrix,
@@ -397,6 +398,11 @@ class TestInputs:
             ("pinned", 0, "shape"),
             ("gravity", -9.81, r"shape \(3,\), got \(\)"),
             ("gravity", (0, np.inf, 0), "finite"),
+            ("gravity", (0, 1e76, 0), r"of at most 1e\+75, got 1e\+76"),
+            ("masses", [1.0, 1e76], "of at most"),
+            ("rest_lengths", 1e76, "of at most"),
+            ("stiffnesses", 1e76, "of at most"),
+            ("dampings", 1e76, "of at most"),
         ],
     )
     def test_a_wrong_model_is_named(self, name, value, message):
@@ -410,6 +416,8 @@ class TestInputs:
             ("positions", np.full((2, 3), np.nan), "finite"),
             ("velocities", np.zeros((3, 3)), r"shape \(2, 3\), got \(3, 3\)"),
             ("velocities", np.full((2, 3), np.inf), "finite"),
+            ("positions", np.full((2, 3), 1e155), r"of at most 1e\+75, got 1e\+155"),
+            ("velocities", np.full((2, 3), 1e155), "of at most"),
         ],
     )
     def test_a_wrong_state_is_named(self, name, value, message):
@@ -434,12 +442,40 @@ class TestInputs:
             rest_vectors,
             stiffness_matrix,
             damping_matrix,
+            spring_blocks,
         ],
     )
     def test_positions_of_another_system_are_refused(self, function):
-        with pytest.raises(ValueError, match=r"^positions: expected shape \(2, 3\)"):
-            function(pair(), np.zeros((3, 3)))
+        for wrong in (np.zeros((3, 3)), np.zeros((1, 3)), np.zeros((2, 2)), np.zeros((3, 2))):
+            with pytest.raises(ValueError, match=r"^positions: expected shape \(2, 3\)"):
+                function(pair(), wrong)
+        with pytest.raises(ValueError, match=r"^positions: expected coordinates of at most"):
+            function(pair(), np.full((2, 3), 1e76))
+        with pytest.raises(ValueError, match=r"^system: expected a MassSpring, got ndarray"):
+            function(PAIR, PAIR)
+
+    @pytest.mark.parametrize("gap", [0.0, 1e-151, 1e-149, 1e-75, 1.0, 1e75])
+    @pytest.mark.parametrize("tension_only", [False, True])
+    def test_nothing_overflows_up_to_the_largest_magnitude(self, gap, tension_only, speed):
+        """One law for all that is given: no NaN and no infinity, without a word or with one."""
+        largest = {"rest_lengths": 1e75, "stiffnesses": 1e75, "dampings": 1e75}
+        for rest_length in (0.0, 1e75):
+            system = pair(
+                **(largest | {"rest_lengths": rest_length}), masses=[1e75, 1e75],
+                gravity=(1e75, 0, 0), tension_only=tension_only,
+            )  # fmt: skip
+            state = State([[0, 0, 0], [gap, 0, 0]], [[1e75, 0, 0], [-1e75, 1e75, 0]])
+            x = state.positions
+            found = [
+                forces(system, state, np.full((2, 3), 1e75)), damper_forces(system, state),
+                kinetic_energy(system, state), potential_energy(system, x), lengths(system, x),
+                stiffness_matrix(system, x).data, damping_matrix(system, x).data,
+                rest_vectors(system, x), spring_energy(system, x), spring_forces(system, x),
+            ]  # fmt: skip
+            assert all(np.isfinite(values).all() for values in found)
 
     def test_wrong_external_forces_are_named(self):
         with pytest.raises(ValueError, match=r"^external_forces: expected shape \(2, 3\)"):
             forces(pair(), State(PAIR, PAIR), np.zeros(3))
+        with pytest.raises(ValueError, match=r"^external_forces: expected numbers of at most"):
+            forces(pair(), State(PAIR, PAIR), np.full((2, 3), 1e155))

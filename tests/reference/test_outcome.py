@@ -5,8 +5,9 @@ import pytest
 from reference.outcome import Outcome
 
 
-def test_the_outcomes_are_the_five_of_the_interface():
-    names = ["CONVERGED", "UNREACHABLE", "STALLED", "ITERATION_LIMIT", "DIVERGED"]
+def test_the_outcomes_are_those_of_the_interface():
+    names = ["CONVERGED", "UNREACHABLE", "STALLED", "ITERATION_LIMIT", "DIVERGED", "AT_ROUNDING"]
+    names.append("UNREACHABLE_UNSETTLED")
     assert [outcome.name for outcome in Outcome] == names
 
 
@@ -14,3 +15,8 @@ def test_the_outcomes_are_the_five_of_the_interface():
 def test_each_has_a_sentence_of_its_own(outcome):
     assert outcome.sentence.endswith(".")
     assert sum(outcome.sentence == other.sentence for other in Outcome) == 1
+
+
+def test_solved_are_those_that_got_as_far_as_asked_for_or_as_rounding_lets():
+    solved = [outcome for outcome in Outcome if outcome.solved]
+    assert solved == [Outcome.CONVERGED, Outcome.AT_ROUNDING]

@@ -139,6 +139,12 @@ def test_between_is_accurate_near_zero_and_near_opposite(angle, speed):
     assert_close(rotation.rotate(q, [1.0, 0.0, 0.0]), end, 2e-9)
 
 
+@pytest.mark.parametrize(("short", "long"), [(1e-200, 1.0), (1e-300, 1e74), (1e-308, 1e-308)])
+def test_between_needs_directions_of_any_length(short, long, rng, speed):
+    a, b = rng.standard_normal((2, 20, 3))
+    assert_close(rotation.between(short * a, long * b), rotation.between(a, b), 1e-14)
+
+
 def test_between_without_a_direction_is_the_identity(speed):
     zero, x = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]
     assert_close(rotation.between([zero, x, zero], [x, zero, zero]), rotation.identity(3))

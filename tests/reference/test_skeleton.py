@@ -25,7 +25,7 @@ FORK = {"parents": [-1, 0, 1, 1, 0], "offsets": np.arange(15.0).reshape(5, 3)}
         ([-1, 0], np.zeros((2, 3)), ["a"], "names: expected 2 names, one a joint, got 1"),
         ([-1, 0], np.zeros((2, 3)), ["a", "a"], "names: expected distinct names, got 'a'"),
         ([-1, 0], np.zeros((2, 3)), ["a", ""], "names: expected 2 non-empty strings"),
-        ([-1, 0], np.zeros((2, 3)), "ab", "names: expected 2 non-empty strings"),
+        ([-1, 0], np.zeros((2, 3)), "ab", "names: expected 2 names, one a joint, got 'ab'"),
     ],
 )
 def test_what_is_no_tree_is_refused_and_named(parents, offsets, names, message):

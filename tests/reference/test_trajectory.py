@@ -1,4 +1,4 @@
-"""Coherent motions: on the path, within the limits, and of the least squared jumps nearby."""
+"""Smooth trajectories: on the path, within limits, of the least squared displacements nearby."""
 
 import functools
 import itertools
@@ -21,14 +21,28 @@ from reference import (
     track,
     trajectory,
 )
+from reference.articulation import BALL, CONE, KIND, LOWER
 from reference.inverse_kinematics import balls, goals_of
 from reference.inverse_kinematics.problem import checked_targets
 from reference.inverse_kinematics.reduce import prepare
 from reference.jacobians import difference, integrate, jacobian
 from reference.trajectory import riemannian_newton
-from reference.trajectory.cyclic_banded import Ring
-from reference.trajectory.problem import Course, moved, path, restored, stuck, worth_of
-from reference.trajectory.riemannian_newton import cost, expanded, limited, projected
+from reference.trajectory.augmented_lagrangian import joint_limits
+from reference.trajectory.cyclic_banded import CyclicBandedSystem
+from reference.trajectory.problem import (
+    errors_and_jacobians,
+    near_singular,
+    new_problem,
+    project,
+)
+from reference.trajectory.problem import integrate as integrate_step
+from reference.trajectory.riemannian_newton import (
+    add_limits,
+    cost,
+    project_derivatives,
+    quadratic_model,
+    zero_multipliers,
+)
 
 ARM = scenes.lab_arm()[0]
 FRAMES = 60
@@ -44,18 +58,18 @@ def drawn(name="heart", solver=LM, coherent=True, closed=False, rounds=1):
     return track(ARM, curve, solver, max_iterations=1000, **options)
 
 
-def jumps(model, q, closed=False):
-    """How the pose changes from frame to frame, (jump, freedom)."""
+def displacements(model, q, closed=False):
+    """The change from frame to frame, (displacement, freedom)."""
     found = difference(model, np.roll(q, -1, axis=0), q)
     return found if closed else found[:-1]
 
 
 def squares(model, q, closed=False):
-    return 0.5 * (jumps(model, q, closed) ** 2).sum()
+    return 0.5 * (displacements(model, q, closed) ** 2).sum()
 
 
 def largest(model, q, closed=False):
-    return np.linalg.norm(jumps(model, q, closed), axis=-1).max()
+    return np.linalg.norm(displacements(model, q, closed), axis=-1).max()
 
 
 def slides(count=2, **limits):
@@ -81,7 +95,7 @@ def line(start, end, frames=FRAMES):
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("solver", IK_SOLVERS)
 @pytest.mark.parametrize("name", ["heart", "triangle"])
-def test_a_coherent_motion_is_on_its_path_and_its_jumps_are_smaller(name, solver, closed):
+def test_a_smooth_trajectory_is_on_its_path_and_its_displacements_are_smaller(name, solver, closed):
     warm, motion = drawn(name, solver, coherent=False), drawn(name, solver, closed=closed)
     assert (motion.outcome == Outcome.CONVERGED).all()
     off = np.linalg.norm(motion.positions[:, -1] - curves[name](FRAMES), axis=-1)
@@ -92,15 +106,15 @@ def test_a_coherent_motion_is_on_its_path_and_its_jumps_are_smaller(name, solver
 
 
 @pytest.mark.parametrize("name", ["circle", "heart", "star"])
-def test_a_closed_motion_returns_as_calmly_as_it_goes(name):
+def test_a_closed_trajectory_is_as_smooth_at_its_seam_as_elsewhere(name):
     """Solved frame by frame the arm comes back to another pose; the seam is where that shows."""
     for coherent in (False, True):
         motion = drawn(name, "ccd", coherent, closed=coherent)
-        steps = np.linalg.norm(jumps(ARM, motion.local_rotations, closed=True), axis=-1)
+        steps = np.linalg.norm(displacements(ARM, motion.local_rotations, closed=True), axis=-1)
         assert (steps[-1] <= 1.5 * np.median(steps)) == coherent
 
 
-def test_a_closed_motion_does_not_drift():
+def test_a_closed_trajectory_does_not_drift():
     """After a round the arm is in the same pose; solved frame by frame it has wandered off."""
     for coherent, least, most in ((False, 1e-2, np.inf), (True, 0.0, 1e-5)):
         q = drawn("heart", "ccd", coherent, closed=coherent, rounds=3).local_rotations
@@ -119,7 +133,7 @@ def tangents(q, rng, count):
 
 
 @pytest.mark.parametrize("closed", [False, True])
-def test_no_small_change_makes_a_coherent_motion_calmer(closed, rng):
+def test_no_small_change_makes_a_trajectory_smoother(closed, rng):
     """To first order the sum stays; a warm motion's does not. Further on it only grows."""
     slopes = {}
     for coherent in (False, True):
@@ -159,19 +173,19 @@ def test_two_rounds_at_once_are_one_round_twice():
     np.testing.assert_allclose(two.positions[FRAMES:], one.positions, rtol=0, atol=1e-5)
 
 
-def test_a_turned_world_gives_the_turned_motion(rng):
-    turn = rotation.random(rng)
+def test_a_rotated_world_gives_the_rotated_trajectory(rng):
+    R = rotation.random(rng)
     offsets = ARM.offsets.copy()
-    offsets[0] = rotation.rotate(turn, offsets[0])
+    offsets[0] = rotation.rotate(R, offsets[0])
     start = rotation.identity(5)
-    start[0] = turn
-    curve = rotation.rotate(turn, curves["heart"](FRAMES))
+    start[0] = R
+    curve = rotation.rotate(R, curves["heart"](FRAMES))
     motion = track(
         Skeleton(ARM.parents, offsets), curve, LM, start, coherent=True,
         tolerance=TOLERANCE,
     )  # fmt: skip
     upright = drawn("heart").positions
-    np.testing.assert_allclose(motion.positions, rotation.rotate(turn, upright), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(motion.positions, rotation.rotate(R, upright), rtol=0, atol=1e-6)
 
 
 def test_a_finer_drawing_gives_the_same_motion():
@@ -196,7 +210,7 @@ def test_two_hinges_follow_a_line_as_trigonometry_says(elbow, speed):
     np.testing.assert_allclose(motion.coordinates, expected, rtol=0, atol=1e-8)
 
 
-def test_slides_share_a_way_evenly(speed):
+def test_slides_share_a_distance_evenly(speed):
     motion = track(slides(), line([0, 0, 1], [3, 0, 1], 7), LM, coherent=True)
     steps = np.diff(motion.coordinates, axis=0)
     np.testing.assert_allclose(steps, 0.25, rtol=0, atol=1e-9)
@@ -211,8 +225,8 @@ def test_a_slide_with_limits_goes_as_far_as_they_let_it(speed):
     assert (motion.outcome == Outcome.CONVERGED).all()
 
 
-def test_an_endless_hinge_goes_on_where_a_turn_ends():
-    """Round its own axis an arm need only turn, on and on; at the seam it is back all the same."""
+def test_a_continuous_hinge_goes_on_past_half_a_revolution():
+    """About its own axis an arm goes round and round; at the seam it is back all the same."""
     circle = 2.0 * curves["circle"](FRAMES)[:, [0, 2, 1]]
     q = track(hinges(3), circle, LM, [0.0, 1.0, 1.0], coherent=True, closed=True).coordinates
     np.testing.assert_allclose(np.diff(q[:, 0]), 2 * np.pi / FRAMES, rtol=0, atol=1e-6)
@@ -220,7 +234,7 @@ def test_an_endless_hinge_goes_on_where_a_turn_ends():
 
 
 @pytest.mark.parametrize("solver", ["ccd", "fabrik", LM])
-def test_points_out_of_reach_are_said_so_and_the_motion_stays_calm(solver):
+def test_points_beyond_reach_are_reported_and_the_trajectory_stays_smooth(solver):
     curve = 2.2 * curves["heart"](FRAMES)
     far = np.linalg.norm(curve - ARM.offsets[0], axis=-1) > ARM.reach()
     motion = track(ARM, curve, solver, coherent=True, closed=True)
@@ -228,9 +242,9 @@ def test_points_out_of_reach_are_said_so_and_the_motion_stays_calm(solver):
     assert (motion.outcome[far] == Outcome.UNREACHABLE).all()
     excess = motion.residual - np.linalg.norm(curve - ARM.offsets[0], axis=-1) + ARM.reach()
     assert excess[far].max() < 0.02
-    steps = np.linalg.norm(jumps(ARM, motion.local_rotations, True), axis=-1)
-    way = np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=-1)
-    assert (steps < 2.0 * way + 0.02).all()
+    steps = np.linalg.norm(displacements(ARM, motion.local_rotations, True), axis=-1)
+    spacing = np.linalg.norm(np.roll(curve, -1, axis=0) - curve, axis=-1)
+    assert (steps < 2.0 * spacing + 0.02).all()
 
 
 def test_a_frame_that_limits_keep_from_its_point_says_what_its_solver_said():
@@ -250,22 +264,22 @@ def test_a_straight_arm_closes_its_round_too():
     curve = curves["circle"](FRAMES) * np.sqrt(ARM.reach() ** 2 - 1.7**2) / 0.6
     motion = track(ARM, curve, "fabrik", coherent=True, closed=True)
     assert (motion.outcome == Outcome.CONVERGED).all()
-    steps = np.linalg.norm(jumps(ARM, motion.local_rotations, True), axis=-1)
+    steps = np.linalg.norm(displacements(ARM, motion.local_rotations, True), axis=-1)
     assert steps[-1] < 1.5 * np.median(steps)
 
 
 def test_a_rotation_is_followed_as_well():
-    turns = rotation.exponential(line([0, 0, 0], [0.3, 0.8, -0.2]))
-    target = Target(curves["circle"](FRAMES), turns)
+    rotations = rotation.exponential(line([0, 0, 0], [0.3, 0.8, -0.2]))
+    target = Target(curves["circle"](FRAMES), rotations)
     motion = track(ARM, target, LM, coherent=True, tolerance_rotation=1e-6)
     assert motion.residual_rotation.max() <= 1e-6
     pose = forward_kinematics(ARM, motion.local_rotations)
-    assert rotation.angle(pose.rotations[:, -1], turns).max() <= 1e-6
+    assert rotation.angle(pose.rotations[:, -1], rotations).max() <= 1e-6
     warm = track(ARM, target, LM, tolerance_rotation=1e-6)
     assert squares(ARM, motion.local_rotations) < squares(ARM, warm.local_rotations)
 
 
-def test_two_hands_are_led_at_once():
+def test_two_effectors_follow_their_curves_at_once():
     offsets = [[0, 0, 0], [0, 0.5, 0], [0.5, 0, 0], [0.5, 0, 0], [-0.5, 0, 0], [-0.5, 0, 0]]
     tree = Skeleton([-1, 0, 1, 2, 1, 4], offsets)
     circle = 0.3 * curves["circle"](FRAMES)[:, [0, 2, 1]] + [0, 0.4, 0]
@@ -274,7 +288,7 @@ def test_two_hands_are_led_at_once():
     start = rotation.exponential(np.full((6, 3), 0.2))
     motion = track(tree, targets, LM, start, coherent=True, closed=True, tolerance=1e-8)
     assert motion.residual.max() <= 1e-8
-    steps = np.linalg.norm(jumps(tree, motion.local_rotations, True), axis=-1)
+    steps = np.linalg.norm(displacements(tree, motion.local_rotations, True), axis=-1)
     assert steps[-1] < 1.5 * np.median(steps)
 
 
@@ -286,25 +300,25 @@ def test_joints_that_do_not_move_the_effector_stay_as_they_are(rng):
     np.testing.assert_allclose(motion.local_rotations[:, 2:], [start[2:]] * 12, atol=1e-15)
 
 
-def test_a_long_motion_is_the_same_whether_it_is_first_found_in_few_frames_or_not(monkeypatch):
+def test_a_long_trajectory_does_not_depend_on_the_coarsest_grid(monkeypatch):
     curve, found = curves["heart"](300), []
-    for fewest in (32, 10_000):
-        monkeypatch.setattr(trajectory, "FEWEST", fewest)
+    for frames in (32, 10_000):
+        monkeypatch.setattr(trajectory, "COARSEST_GRID", frames)
         found.append(track(ARM, curve, LM, coherent=True, tolerance=TOLERANCE).positions)
     np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-6)
 
 
-def test_a_motion_is_never_less_calm_than_the_one_it_is_made_from(monkeypatch):
-    """Were another motion found in few frames that is less calm, the search begins again."""
+def test_a_trajectory_is_never_less_smooth_than_the_one_it_is_made_from(monkeypatch):
+    """A result of the coarse grids that is less smooth than the start is discarded."""
 
-    def shaken(course, q):
+    def shaken(problem, q):
         step = 0.1 * np.cos(np.arange(q.shape[0] * 12.0)).reshape(-1, 12)
-        return restored(course, moved(course, q, step))[0], 1
+        return project(problem, integrate_step(problem, q, step))[0], 1
 
-    monkeypatch.setattr(trajectory, "refined", shaken)
+    monkeypatch.setattr(trajectory, "minimise_from_coarse", shaken)
     motion = track(ARM, curves["heart"](FRAMES), LM, coherent=True, tolerance=TOLERANCE)
-    calm = squares(ARM, drawn("heart").local_rotations)
-    assert squares(ARM, motion.local_rotations) == pytest.approx(calm, rel=1e-9)
+    smooth = squares(ARM, drawn("heart").local_rotations)
+    assert squares(ARM, motion.local_rotations) == pytest.approx(smooth, rel=1e-9)
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])
@@ -337,7 +351,7 @@ def test_iterations_are_counted_and_residuals_are_those_before():
     np.testing.assert_array_equal(motion.history, warm.history)
 
 
-def test_only_a_coherent_motion_can_be_closed():
+def test_only_a_smooth_trajectory_can_be_closed():
     with pytest.raises(ValueError, match="closed: expected False where coherent is False"):
         track(ARM, curves["circle"](3), closed=True)
 
@@ -352,7 +366,7 @@ MODELS = {
 }  # fmt: skip
 
 
-def course_of(name, closed, rng, drawn_to=()):
+def problem_of(name, closed, rng, drawn_to=()):
     """A random tree of joints, on a path that its poses are on, and these poses."""
     kinds, mimics, effectors, oriented = MODELS[name]
     parents = [-1, 0, 1, 1, 3] if len(effectors) > 1 else np.arange(-1, 4)
@@ -367,15 +381,15 @@ def course_of(name, closed, rng, drawn_to=()):
         Target(pose.positions[:, e], pose.rotations[:, e] if oriented else None, e, 1.0 + k)
         for k, e in enumerate(effectors)
     ]
-    goals = goals_of(checked_targets(model, targets, -1), (4,))
-    strict = ~np.isin(np.arange(4), drawn_to)
-    goals[~strict, :, :3] += 0.1
+    goals = goals_of(checked_targets(model, targets, None), (4,))
+    constrained = ~np.isin(np.arange(4), drawn_to)
+    goals[~constrained, :, :3] += 0.1
     mechanism = prepared.mechanism
     columns = np.concatenate([
         np.arange(model.coordinate_count)[model.coordinates_of(j)] for j in range(5)
         if j not in mimics and j in joints_of(mechanism, model)
     ])  # fmt: skip
-    return Course(mechanism, worth_of(mechanism), goals, strict, closed), q[:, columns].copy()
+    return new_problem(mechanism, goals, constrained, closed), q[:, columns].copy()
 
 
 def joints_of(mechanism, model):
@@ -387,40 +401,40 @@ def joints_of(mechanism, model):
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("name", MODELS)
 def test_the_second_order_model_is_that_of_the_cost_along_the_path(name, closed, rng, speed):
-    """Balls have no limits that are felt here: the curvature of those is left out of the model."""
-    course, q = course_of(name, closed, rng, drawn_to=[2])
-    z = rng.uniform(0.0, 0.1, (4, len(course.mechanism.joints.integers), 3))
-    felt = course.mechanism.joints.integers[:, 1] != 3
-    course.mechanism.joints.numbers[~felt, 10:13] = [-np.inf, np.inf, np.inf]
-    model = expanded(course, q, z)
-    gradient, within = slopes(course, q, z, model)
-    assert model.cost == pytest.approx(cost(course, q, z))
+    """Balls are without limits here: the model leaves the curvature of those out."""
+    problem, q = problem_of(name, closed, rng, drawn_to=[2])
+    joints = problem.mechanism.joints
+    joints.numbers[joints.integers[:, KIND] == BALL, LOWER : CONE + 1] = [-np.inf, np.inf, np.inf]
+    problem = problem._replace(limits=joint_limits(joints))
+    z = rng.uniform(0.0, 0.1, (4, len(problem.limits)))
+    model = quadratic_model(problem, q, z)
+    gradient, diagonal = derivatives(problem, q, z, model)
+    assert model.cost == pytest.approx(cost(problem, q, z))
     v = rng.standard_normal(gradient.shape)
-    v = np.einsum("fkl,fl->fk", null_spaces(course, q), v)
+    v = np.einsum("fkl,fl->fk", null_spaces(problem, q), v)
 
     def along(h):
-        there, on = restored(course, moved(course, q, h * v))
-        assert on[course.strict].all()
-        return cost(course, there, z)
+        there, on = project(problem, integrate_step(problem, q, h * v))
+        assert on[problem.constrained].all()
+        return cost(problem, there, z)
 
     h = 1e-4
     first = (along(h) - along(-h)) / (2 * h)
     assert first == pytest.approx((gradient * v).sum(), rel=1e-5, abs=1e-6)
-    after = np.roll(v, -1, axis=0)[: len(model.between)]
-    second = np.einsum("fk,fkl,fl", v, within, v)
-    second += 2.0 * np.einsum("fk,fkl,fl", after, model.between, v[: len(after)])
+    after = np.roll(v, -1, axis=0)[: len(model.coupling)]
+    second = np.einsum("fk,fkl,fl", v, diagonal, v)
+    second += 2.0 * np.einsum("fk,fkl,fl", after, model.coupling, v[: len(after)])
     coarse, fine = ((along(h) - 2.0 * model.cost + along(-h)) / h**2 for h in (1e-3, 5e-4))
     assert (4.0 * fine - coarse) / 3.0 == pytest.approx(second, rel=1e-5)
 
 
-def slopes(course, q, z, model):
-    """The gradient and the second derivatives by each frame, with the limits where it is."""
-    touched = np.full(z.shape, -1)
-    gradient, within, surplus, same = limited(
-        course, q, z, model, np.zeros_like(model.gradient), touched
+def derivatives(problem, q, z, model):
+    """The gradient and the Hessian's blocks of the frames, with the limits active before a step."""
+    gradient, diagonal, surplus, changed = add_limits(
+        problem, q, z, model.gradient, model.diagonal, np.zeros_like(model.gradient)
     )
-    assert (surplus, same) == (0.0, False)
-    return projected(model.P, gradient, within)
+    assert (surplus, changed) == (0.0, len(problem.limits) > 0)
+    return project_derivatives(model.P, gradient, diagonal)
 
 
 @pytest.mark.parametrize("seed", [2, 9, 11])
@@ -429,72 +443,76 @@ def test_no_step_raises_the_cost(monkeypatch, seed):
     curve, frames = curves["heart"](5), 5
     mechanism = prepare(balls(ARM), (4,), (False,)).mechanism
     goals = goals_of(checked_targets(ARM, curve, -1), (frames,))
-    course = Course(mechanism, worth_of(mechanism), goals, np.ones(frames, dtype=bool), True)
+    problem = new_problem(mechanism, goals, np.ones(frames, dtype=bool), True)
     start = rotation.random(np.random.default_rng(seed), frames, 5)
     q = solve_ik(ARM, start, curve, LM).local_rotations
-    q, on = restored(course, q[:, :4].reshape(frames, -1))
+    q, on = project(problem, q[:, :4].reshape(frames, -1))
     assert on.all()
-    free = np.zeros((frames, 4, 3))
-    costs = [cost(course, q, free)]
+    z = zero_multipliers(problem, q)
+    costs = [cost(problem, q, z)]
     for steps in range(1, 14):
-        monkeypatch.setattr(riemannian_newton, "MOST_STEPS", steps)
-        costs.append(cost(course, riemannian_newton.descend(course, q)[0], free))
+        monkeypatch.setattr(riemannian_newton, "MAX_STEPS", steps)
+        costs.append(cost(problem, riemannian_newton.minimise(problem, q)[0], z))
     assert (np.diff(costs) <= 1e-12).all()
     assert costs[-1] < 0.5 * costs[0]
 
 
-def null_spaces(course, q):
-    """Projections onto the changes that keep the strict frames on the path, by differences."""
-    n, h = course.mechanism.freedoms, 1e-6
+def null_spaces(problem, q):
+    """Projections onto the changes that keep constrained frames on the path, by differences."""
+    n, h = problem.mechanism.freedoms, 1e-6
+
+    def errors(step):
+        return errors_and_jacobians(problem, integrate_step(problem, q, step))[0]
+
     columns = [
-        (path(course, moved(course, q, h * e))[0] - path(course, moved(course, q, -h * e))[0])
-        / (2 * h)
+        (errors(h * e) - errors(-h * e)) / (2 * h)
         for e in np.eye(n)[:, None, :] * np.ones((1, len(q), 1))
     ]
     J = np.stack(columns, axis=-1)
     P = np.eye(n) - np.linalg.pinv(J, rcond=1e-6) @ J
-    P[~course.strict] = np.eye(n)
+    P[~problem.constrained] = np.eye(n)
     return P
 
 
 def test_the_limits_of_balls_push_as_the_cost_says(rng, speed):
-    course, q = course_of("balls", False, rng)
-    course = course._replace(strict=np.zeros(4, dtype=bool))
-    course.mechanism.joints.numbers[:, 12] = 0.2
-    z = rng.uniform(0.0, 0.1, (4, len(course.mechanism.joints.integers), 3))
-    gradient, _ = slopes(course, q, z, expanded(course, q, z))
+    problem, q = problem_of("balls", False, rng)
+    problem = problem._replace(constrained=np.zeros(4, dtype=bool))
+    problem.mechanism.joints.numbers[:, CONE] = 0.2
+    problem = problem._replace(limits=joint_limits(problem.mechanism.joints))
+    z = rng.uniform(0.0, 0.1, (4, len(problem.limits)))
+    gradient, _ = derivatives(problem, q, z, quadratic_model(problem, q, z))
     v, h = rng.standard_normal(gradient.shape), 1e-6
-    found = cost(course, moved(course, q, h * v), z) - cost(course, moved(course, q, -h * v), z)
-    assert found / (2 * h) == pytest.approx((gradient * v).sum(), rel=1e-6)
+    after, before = (cost(problem, integrate_step(problem, q, s * h * v), z) for s in (1, -1))
+    assert (after - before) / (2 * h) == pytest.approx((gradient * v).sum(), rel=1e-6)
 
 
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("frames", [3, 4, 7, 8])
-def test_a_ring_is_solved_like_a_dense_system(frames, closed, rng, speed):
+def test_a_cycle_of_frames_is_solved_like_a_dense_system(frames, closed, rng, speed):
     n = 2
-    within = np.eye(n) * 8.0 + np.ones((frames, n, n))
-    between = rng.standard_normal((frames if closed else frames - 1, n, n))
+    diagonal = np.eye(n) * 8.0 + np.ones((frames, n, n))
+    coupling = rng.standard_normal((frames if closed else frames - 1, n, n))
     A = np.zeros((frames, n, frames, n))
     for f in range(frames):
-        A[f, :, f] = within[f] + 0.5 * np.eye(n)
-    for f, block in enumerate(between):
+        A[f, :, f] = diagonal[f] + 0.5 * np.eye(n)
+    for f, block in enumerate(coupling):
         g = (f + 1) % frames
         A[g, :, f] += block
         A[f, :, g] += block.T
     b = rng.standard_normal((frames, n))
-    ring = Ring(frames, n, closed)
-    ring.fill(within, between)
+    system = CyclicBandedSystem(frames, n, closed)
+    system.fill(diagonal, coupling)
     dense = np.linalg.solve(A.reshape(frames * n, -1), b.ravel()).reshape(b.shape)
-    np.testing.assert_allclose(ring.solve(b, 0.5), dense, rtol=0, atol=1e-13)
-    assert ring.solve(b, -100.0) is None
+    np.testing.assert_allclose(system.solve(b, 0.5), dense, rtol=0, atol=1e-13)
+    assert system.solve(b, -100.0) is None
 
 
-def test_a_straight_arm_is_stuck():
-    """Hinges in a plane can never leave it: they are not stuck for that."""
+def test_a_straight_arm_is_near_singular():
+    """Hinges in a plane can never leave it: that alone is not singular."""
     q = np.array([[0.3, 0.0, 0.0], [0.3, 0.0, 0.5]])
     arm = hinges(3)
     mechanism = prepare(arm, (3,), (False,)).mechanism
     goals = np.zeros((2, 1, 8))
     goals[..., 7] = 1.0
-    course = Course(mechanism, worth_of(mechanism), goals, np.ones(2, dtype=bool), False)
-    assert stuck(course, q).tolist() == [True, False]
+    problem = new_problem(mechanism, goals, np.ones(2, dtype=bool), False)
+    assert near_singular(problem, q).tolist() == [True, False]

@@ -182,5 +182,7 @@ def test_wrong_arguments_are_named(change, message):
 
 
 def test_a_force_that_overflows_is_an_error(speed):
+    state, triangles = plate()
+    vast = State(1e74 * state.positions, state.velocities)
     with np.errstate(over="ignore"), pytest.raises(FloatingPointError, match=r"^wind_forces: "):
-        wind_forces(*plate(), [0, 1e200, 0])
+        wind_forces(vast, triangles, [0, 1e75, 0], density=1e75)

@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ... import arguments, rotation
 from ...arguments import FloatArray
 from ...articulation import Articulation
 from ...kinematics import forward_kinematics
-from ...skeleton import Pose, Skeleton
+from ...skeleton import Pose, Skeleton, checked_skeleton
 
 
 class Motion(NamedTuple):
@@ -30,7 +31,14 @@ class Motion(NamedTuple):
         """Return the global poses of all joints, shifts included; the frames are a leading axis.
 
         Where only rotations change, `forward_kinematics(skeleton, local_rotations)` is the same.
+
+        Raises:
+            ValueError: if the skeleton is none, or the rotations or offsets are not its own.
         """
-        here = Skeleton(self.skeleton.parents, np.zeros_like(self.skeleton.offsets))
-        q = np.concatenate([self.offsets, self.local_rotations], axis=-1)
+        skeleton = checked_skeleton(self.skeleton)
+        count = skeleton.joint_count
+        R = arguments.array("local_rotations", self.local_rotations, "frame", count, 4)
+        x = arguments.array("offsets", self.offsets, len(R), count, 3)
+        here = Skeleton(skeleton.parents, np.zeros_like(skeleton.offsets))
+        q = np.concatenate([x, rotation.unit("local_rotations", R)], axis=-1)
         return forward_kinematics(Articulation(here, "free"), q.reshape(len(q), -1))

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from ... import arguments
 from ...arguments import LARGEST_COORDINATE, FloatArray, frozen
 from ...quaternion import IDENTITY, multiply
 from ...skeleton import Skeleton
 from ..robot import MOST_JOINTS, ORIGIN
-from ..source import read_text
+from ..source import read_text, warn
 from .motion import Motion
 
 # Frames times joints: a motion then fits in about a gigabyte.
@@ -27,6 +28,8 @@ BRACES = re.compile(r"([{}])")
 def read(path: str | Path) -> Motion:
     """Return the motion in a file.
 
+    One frame more than the file counts, as some programs write, is left out with a warning.
+
     Raises:
         ValueError: naming file and line, if it cannot be read or is not a BVH file.
     """
@@ -39,7 +42,7 @@ def parse(text: str) -> Motion:
     Raises:
         ValueError: as for `read`.
     """
-    return _motion(text, "BVH")
+    return _motion(arguments.text("text", text), "BVH")
 
 
 @dataclass
@@ -56,8 +59,12 @@ def _motion(text: str, origin: str) -> Motion:
     try:
         joints = _hierarchy(lines)
         frame_time, values = _frames(lines, joints, len(text))
+        extra = _frame_too_many(lines, values)
     except ValueError as error:
         raise ValueError(f"{origin}, line {lines.number}: {error}") from None
+    if extra:
+        said = f"expected the end after {len(values):,} frames, got one more, which is left out"
+        warn(f"{origin}, line {extra}: {said}")
     offsets, rotations = _poses(joints, values)
     rest = np.array([joint.offset for joint in joints])
     if len(offsets):
@@ -219,9 +226,29 @@ def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, Floa
     values = np.empty((count, width))
     for i in range(count):
         values[i] = _numbers(lines.next(f"{count:,} frames"), width)
-    for line in lines:
-        raise ValueError(f"expected the end after {count:,} frames, got {line!r:.40}")
     return frame_time, values
+
+
+def _frame_too_many(lines: _Lines, values: FloatArray) -> int:
+    """Return the line of the one frame that follows the last one, 0 if the text ends there.
+
+    Raises:
+        ValueError: if anything else follows.
+    """
+    count, width = values.shape
+    line = next(iter(lines), "")
+    number = lines.number
+    follows = next(iter(lines), "") if line and _is_frame(line, width) else line
+    if follows:
+        raise ValueError(f"expected the end after {count:,} frames, got {follows!r:.40}")
+    return number if line else 0
+
+
+def _is_frame(line: str, width: int) -> bool:
+    try:
+        return len(_numbers(line, width)) == width > 0
+    except ValueError:
+        return False
 
 
 def _after(title: str, lines: _Lines) -> str:

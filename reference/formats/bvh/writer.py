@@ -9,6 +9,7 @@ from ... import arguments, rotation
 from ...arguments import FloatArray
 from ...articulation import Articulation
 from ...skeleton import Skeleton, checked_skeleton
+from ..source import checked_path
 
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 EVEN = ("XYZ", "YZX", "ZXY")
@@ -50,7 +51,7 @@ def write(
         OSError: if the file cannot be written.
     """
     text = format(skeleton, local_rotations, frame_time, offsets, order=order)
-    Path(path).write_text(text, encoding="utf-8", newline="\n")
+    Path(checked_path(path)).write_text(text, encoding="utf-8", newline="\n")
 
 
 def format(
@@ -133,10 +134,11 @@ def _rotated(
     x = np.tile(skeleton.offsets, (len(R), 1, 1))
     if offsets is None:
         return x, R
-    if np.ndim(offsets) == 2:
-        x[:, 0] = arguments.coordinates("offsets", offsets, len(R), 3)
+    shifts = arguments.coordinates("offsets", offsets, "...", 3)
+    if shifts.ndim == 2:
+        x[:, 0] = arguments.coordinates("offsets", shifts, len(R), 3)
         return x, R
-    return arguments.coordinates("offsets", offsets, len(R), count, 3), R
+    return arguments.coordinates("offsets", shifts, len(R), count, 3), R
 
 
 def _framed(name: str, values: FloatArray, axes: int) -> FloatArray:

@@ -10,9 +10,10 @@ its type and its place among the body's.
 `ref` is folded into the frames: `home` is where the file shows the robot, with each joint at its
 `ref`. A free joint moves in the world's frame. The limit of a ball, which MuJoCo sets on its whole
 angle, becomes one of the same size on its tilt and one on its twist about z: this allows all that
-MuJoCo does, and more. Frames, nested defaults, and includes from the file's own folder are
-followed. Sites, keyframes, equality constraints and all else that forward kinematics has no use for
-is passed over. What makes bodies by a rule (replicate, attach, composite, flexcomp) is refused.
+MuJoCo does, and more. Frames, nested defaults, and includes from within one folder are followed.
+Sites, keyframes, equality constraints and all else that forward kinematics has no use for is passed
+over. What makes bodies by a rule (replicate, attach, composite, flexcomp) is refused, but for a
+replicate without bodies, which is passed over with a warning.
 """
 
 from pathlib import Path
@@ -25,16 +26,20 @@ from .include import include_files, refuse_includes
 __all__ = ["parse", "read"]
 
 
-def read(path: str | Path) -> Robot:
+def read(path: str | Path, *, root: str | Path | None = None) -> Robot:
     """Return the robot or character that a file describes.
+
+    Args:
+        path: of the file.
+        root: the folder that included files must be in, links followed; the file's own if None.
 
     Raises:
         ValueError: naming file, line and element, if it cannot be read, is not an MJCF file,
-            includes one from elsewhere, or makes bodies by a rule.
+            includes one from outside the root, or makes bodies by a rule.
     """
-    root = xml.read(path)
-    include_files(root, Path(path))
-    return robot(root, str(path))
+    element = xml.read(path)
+    include_files(element, Path(path), root)
+    return robot(element, str(path))
 
 
 def parse(text: str) -> Robot:

@@ -1,5 +1,6 @@
 """The tree of bodies of an MJCF file."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -7,11 +8,13 @@ import numpy as np
 from ...arguments import frozen
 from ...quaternion import exponential, rotate, scale, subtract
 from ..robot import INFINITY, ORIGIN, Link, Robot, Vector, assemble
+from ..source import warn
 from ..xml import Element
 from .settings import Pose, Settings, direction, one_of, settings
 
 KINDS = ("hinge", "slide", "ball", "free")
 BODIES_BY_RULE = ("replicate", "attach", "composite", "flexcomp")
+MOVING = ("body", "joint", "freejoint", *BODIES_BY_RULE[1:])
 Z = (0.0, 0.0, 1.0)
 
 
@@ -106,6 +109,8 @@ class _Tree:
                 inherited = self.settings.class_of(element, "childclass", inherited)
                 inner = reversed(element.children)
                 waiting += [_Part(child, frame, inherited) for child in inner]
+            elif element.tag == "replicate" and not _holds(element, MOVING):
+                warn(str(element.error("expected bodies or joints, got none: passed over")))
             elif element.tag in BODIES_BY_RULE:
                 raise element.error("expected every body to be written out, got a rule for some")
         return joints, bodies
@@ -159,6 +164,17 @@ class _Tree:
             self.homes[number] = (*pose.x, *pose.R)
         elif joint.kind != "ball":
             self.homes[number] = (joint.ref,)
+
+
+def _holds(element: Element, tags: Sequence[str]) -> bool:
+    """Return whether an element of one of these names is anywhere in another."""
+    waiting = [element]
+    while waiting:
+        inner = waiting.pop().children
+        if any(child.tag in tags for child in inner):
+            return True
+        waiting += inner
+    return False
 
 
 def _check_free(body: Element, joints: list[_Joint], parent: int) -> None:

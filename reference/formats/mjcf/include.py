@@ -1,18 +1,34 @@
 """Files that an MJCF file includes: their content takes the place of the <include>."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 from .. import xml
 from ..xml import Element
 
 
-def include_files(root: Element, path: Path) -> None:
+class _Folders(NamedTuple):
+    """Where included files may be: beside the main one, and nowhere outside the top."""
+
+    main: Path
+    top: Path
+
+
+def include_files(root: Element, path: Path, top: str | Path | None) -> None:
     """Put the content of included files in its place, each file once.
 
+    Args:
+        root: the main file's root element.
+        path: of the main file.
+        top: the folder that no file may be outside of, links followed; that of the main file if
+            None.
+
     Raises:
-        ValueError: if a file is included twice or is not in the folder of the main file.
+        ValueError: if a file is included twice, is not there or outside of that folder, or if that
+            is no folder that holds the main file.
     """
     main = path.resolve()
+    folders = _Folders(main.parent, main.parent if top is None else _holding(main, top))
     seen = {main}
     waiting = [(root, main)]
     while waiting:
@@ -22,7 +38,7 @@ def include_files(root: Element, path: Path) -> None:
         while found:
             child, file = found.pop()
             if child.tag == "include":
-                included = _included(child, file, main)
+                included = _included(child, file, folders)
                 if included in seen:
                     raise child.error("expected every file to be included once, got it again")
                 seen.add(included)
@@ -42,11 +58,33 @@ def refuse_includes(root: Element) -> None:
         waiting += element.children
 
 
-def _included(include: Element, file: Path, main: Path) -> Path:
-    """Return the file meant: beside the one that includes it, or else beside the main one."""
+def _holding(main: Path, top: str | Path) -> Path:
+    found = _resolved(Path(top)) if isinstance(top, str | Path) else None
+    if found is None or not (found.is_dir() and main.is_relative_to(found)):
+        raise ValueError(f"root: expected a folder that holds {main.name!r:.80}, got {top!r:.80}")
+    return found
+
+
+def _included(include: Element, file: Path, folders: _Folders) -> Path:
+    """Return the file meant: beside the main one, or else beside the one that includes it."""
     name = include.word("file")
-    for folder in (file.parent, main.parent):
-        candidate = (folder / name).resolve()
-        if candidate.is_relative_to(main.parent) and candidate.is_file():
-            return candidate
-    raise include.error(f"expected a file in the folder of {main.name!r:.80}, got {name!r:.80}")
+    found = [_resolved(folder / name) for folder in (folders.main, file.parent)]
+    possible = [path for path in found if path is not None]
+    inside = [path for path in possible if path.is_relative_to(folders.top)]
+    for path in inside:
+        if path.is_file():
+            return path
+    outside = possible and not inside
+    fault = "outside; root= names a wider folder" if outside else "not there"
+    raise include.error(
+        f"expected a file in {folders.top.name!r:.60}, got {name!r:.80}, which is {fault}"
+    )
+
+
+def _resolved(path: Path) -> Path | None:
+    """Return where a path leads, links followed; None if no file can have it."""
+    try:
+        path.exists()  # which says so of names too long and of rings of links
+        return path.resolve()
+    except (OSError, RuntimeError):
+        return None

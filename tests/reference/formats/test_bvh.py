@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from crosscheck.robots.second_bvh import placements
 from reference import (
     Articulation,
     Skeleton,
@@ -14,7 +15,7 @@ from reference import (
     solve_ik,
     track,
 )
-from reference.formats import bvh
+from reference.formats import FormatWarning, bvh
 from reference.formats.bvh.writer import ORDERS, euler_angles
 
 ONE_JOINT = """HIERARCHY
@@ -68,45 +69,8 @@ def turn(axis, degrees):
 
 
 def positions_by_a_second_reader(text):
-    """The joints' global positions by name, frame by frame, read another way.
-
-    A list of words, one recursion, matrices, end sites of any length; nothing is checked.
-    """
-    words = text.split()
-    frames = int(words[words.index("Frames:") + 1])
-    rows = np.array(words[words.index("Time:") + 2 :], dtype=float).reshape(frames, -1)
-    words = words[1 : words.index("MOTION")]
-
-    def joint(columns, x, R, found, above=""):
-        kind = words.pop(0)
-        name = words.pop(0)
-        while words[0] != "{":
-            name += " " + words.pop(0)
-        name = f"{above} end" if kind == "End" else name
-        del words[:2]  # { OFFSET
-        offset = np.array([float(words.pop(0)) for _ in range(3)])
-        channels = []
-        if words[0] == "CHANNELS":
-            channels = words[2 : 2 + int(words[1])]
-            del words[: 2 + int(words[1])]
-        local = np.eye(3)
-        for channel in channels:
-            if channel.endswith("position"):
-                offset["XYZ".index(channel[0])] = columns.pop(0)
-            else:
-                local = local @ turn(channel[0], columns.pop(0))
-        found[name] = x + R @ offset
-        while words[0] != "}":
-            joint(columns, found[name], R @ local, found, name)
-        del words[0]
-
-    poses = []
-    hierarchy = list(words)
-    for row in rows:
-        words[:] = hierarchy
-        poses.append({})
-        joint(list(row), np.zeros(3), np.eye(3), poses[-1])
-    return {name: np.array([pose[name] for pose in poses]) for name in poses[0]}
+    """The joints' global positions by name, frame by frame, read another way."""
+    return {name: positions for name, positions, _ in placements(text)}
 
 
 def bound(skeleton):
@@ -260,10 +224,19 @@ def test_a_file_of_many_manners_is_read():
     np.testing.assert_allclose(legs["left leg"][0], [1, 2, 3] + R @ [0.5, -1, 0], atol=1e-14)
 
 
+def test_a_frame_too_many_is_left_out_with_a_warning():
+    said = "line 25: expected the end after 1 frames, got one more, which is left out"
+    with pytest.warns(FormatWarning, match=said):
+        motion = bvh.parse(WALK.replace("Frames: 2", "Frames: 1"))
+    assert motion.offsets.shape[0] == 1
+    assert motion.offsets[:, 0].tolist() == [[1, 2, 3]]
+
+
 def test_no_frames_are_a_skeleton():
     text = WALK[: WALK.index("Frames")] + "Frames: 0\nFrame Time: 0.04\n"
     motion = bvh.parse(text)
     assert motion.local_rotations.shape == (0, 4, 4)
+    assert motion.pose().positions.shape == (0, 4, 3)
     assert motion.skeleton.offsets[1].tolist() == [0.5, -1, 0]
     assert "Frames: 0\n" in bvh.format(*motion)
 
@@ -374,7 +347,11 @@ WRONG = {
     "no whole count": (WALK.replace("Frames: 2", "Frames: 2.5"), "a count of frames, got '2.5'"),
     "a negative count": (WALK.replace("Frames: 2", "Frames: -2"), "a count of frames, got '-2'"),
     "frames not there": (WALK.replace("Frames: 2", "Frames: 3"), "expected 3 frames, got the end"),
-    "a frame too many": (WALK.replace("Frames: 2", "Frames: 1"), "expected the end after 1 fr"),
+    "two frames too many": (
+        WALK.replace("Frames: 2", "Frames: 0"), "line 25: expected the end after 0 frames"
+    ),
+    "words too many": (WALK + "the end", "expected the end after 2 frames, got 'the end'"),
+    "a short frame too many": (WALK + "1 2 3", "expected the end after 2 frames, got '1 2 3'"),
     "a million frames": (WALK.replace("Frames: 2", "Frames: 1000000"), "got a shorter file"),
     "a billion frames": (WALK.replace("Frames: 2", "Frames: 999999999"), "at most 20,000,000"),
     "many digits": (WALK.replace("Frames: 2", "Frames: " + "9" * 5000), "a count of frames"),

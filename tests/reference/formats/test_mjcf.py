@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from reference import forward_kinematics, rotation
-from reference.formats import mjcf
+from reference.formats import FormatWarning, mjcf
 
 SOLID = '<geom size="1"/>'
 
@@ -230,19 +230,110 @@ def test_a_file_includes_nothing_twice_nor_from_elsewhere(tmp_path, refusal):
     )
     (folder / "part.xml").write_text("<mujoco/>")
     (folder / "link.xml").symlink_to(tmp_path / "secret.xml")
+    (folder / "link").symlink_to(tmp_path)
     for name, message in [
         ("ring.xml", "ring.xml, line 1: <include>: expected every file to be included once"),
         ("twice.xml", "twice.xml, line 1: <include>: expected every file to be included once"),
-        ("../secret.xml", "expected a file in the folder of 'main.xml', got '../secret.xml'"),
-        (str(tmp_path / "secret.xml"), "expected a file in the folder"),
-        ("link.xml", "expected a file in the folder"),
-        ("missing.xml", "expected a file in the folder"),
+        ("../secret.xml", "got '../secret.xml', which is outside; root= names a wider folder"),
+        (str(tmp_path / "secret.xml"), "which is outside"),
+        ("link.xml", "which is outside"),
+        ("link/secret.xml", "which is outside"),
+        ("../nowhere.xml", "which is outside"),
+        ("missing.xml", "expected a file in 'model', got 'missing.xml', which is not there"),
         ("", "expected an attribute 'file', got an empty one"),
     ]:
         (folder / "main.xml").write_text(f'<mujoco><include file="{name}"/></mujoco>')
         assert message in refusal(mjcf.read, folder / "main.xml")
     text = '<mujoco><include file="ring.xml"/></mujoco>'
     assert "expected a text without includes" in refusal(mjcf.parse, text)
+
+
+@pytest.fixture
+def shared(tmp_path):
+    """A model whose arm stands in a folder beside its own."""
+    for folder in ("robots/arm", "robots/parts", "elsewhere"):
+        (tmp_path / folder).mkdir(parents=True)
+    main = tmp_path / "robots" / "arm" / "main.xml"
+    main.write_text(
+        '<mujoco><worldbody><body name="a"><include file="../parts/arm.xml"/></body></worldbody>'
+        "</mujoco>"
+    )
+    (tmp_path / "robots" / "parts" / "arm.xml").write_text('<x><body name="b" pos="1 0 0"/></x>')
+    (tmp_path / "elsewhere" / "hand.xml").write_text("<x><body/></x>")
+    return main
+
+
+@pytest.mark.parametrize("up", [1, 2])
+def test_a_wider_root_admits_files_of_other_folders(shared, up, refusal):
+    found = mjcf.read(shared, root=shared.parents[up])
+    assert found.articulation.names == ("world", "a", "b")
+    message = refusal(mjcf.read, shared)
+    assert "got '../parts/arm.xml', which is outside; root= names a wider folder" in message
+
+
+def test_nothing_leaves_the_root_by_dots_or_links(shared, refusal):
+    root = shared.parents[1]
+    (root / "parts" / "link.xml").symlink_to(root.parent / "elsewhere" / "hand.xml")
+    (root / "parts" / "inner.xml").symlink_to(root / "parts" / "arm.xml")
+    for name, fate in [
+        ("../../elsewhere/hand.xml", "outside"),
+        ("../parts/link.xml", "outside"),
+        ("../parts/none.xml", "not there"),
+        ("../parts/inner.xml", None),
+    ]:
+        shared.write_text(f'<mujoco><worldbody><include file="{name}"/></worldbody></mujoco>')
+        if fate is None:
+            assert mjcf.read(shared, root=root).articulation.names == ("world", "b")
+        else:
+            assert f"got {name!r}, which is {fate}" in refusal(mjcf.read, shared, root=root)
+
+
+@pytest.mark.parametrize("name", ["a" * 1000, "loop", "loop/a.xml", "main.xml/a", "/" * 999])
+def test_a_name_that_no_file_can_have_is_not_there(name, shared, refusal):
+    (shared.parent / "loop").symlink_to(shared.parent / "loop")
+    shared.write_text(f'<mujoco><include file="{name}"/></mujoco>')
+    message = refusal(mjcf.read, shared)
+    assert "which is outside" in message if name[0] == "/" else "which is not there" in message
+    message = refusal(mjcf.read, shared, root=shared.parent / name / "a")
+    assert message.startswith("root: expected a folder that holds 'main.xml', got ")
+
+
+def test_a_root_is_a_folder_that_holds_the_file(shared, refusal):
+    for root in (shared.parents[1] / "parts", shared, "no such folder", 3):
+        message = refusal(mjcf.read, shared, root=root)
+        assert message.startswith("root: expected a folder that holds 'main.xml', got ")
+
+
+def test_a_file_is_sought_beside_the_main_one_first_as_mujoco_does(tmp_path):
+    (tmp_path / "parts").mkdir()
+    main = tmp_path / "main.xml"
+    main.write_text('<mujoco><worldbody><include file="parts/p.xml"/></worldbody></mujoco>')
+    (tmp_path / "parts" / "p.xml").write_text('<mujoco><include file="q.xml"/></mujoco>')
+    for folder in ("parts", "."):  # the second takes the place of the first
+        name = "inner" if folder == "parts" else "outer"
+        (tmp_path / folder / "q.xml").write_text(f'<mujoco><body name="{name}"/></mujoco>')
+        assert mujoco.MjModel.from_xml_path(str(main)).body(1).name == name
+        assert mjcf.read(main).articulation.names == ("world", name)
+
+
+COPIES = [
+    '<replicate count="9"><geom size="1"/><site/></replicate>',
+    '<replicate count="2"><replicate count="2"><frame><light/></frame></replicate></replicate>',
+    "<replicate/>",
+]
+
+
+@pytest.mark.parametrize("copies", COPIES)
+def test_copies_of_what_has_no_body_are_passed_over_with_a_warning(copies):
+    with pytest.warns(FormatWarning, match="line 1: <replicate>: expected bodies .* passed over"):
+        found = character(f'<body name="a" pos="1 2 3">{copies}<joint/></body>')
+    assert found.articulation.names == ("world", "a")
+
+
+@pytest.mark.parametrize("inside", ["<body/>", "<joint/>", "<freejoint/>", "<attach/>"])
+def test_copies_of_bodies_and_joints_are_refused(inside, refusal):
+    text = f"<body><replicate><frame>{inside}</frame></replicate></body>"
+    assert "expected every body to be written out" in refusal(character, text)
 
 
 DEEP = 400
@@ -283,7 +374,7 @@ WRONG = {
         '<body><joint type="ball" range="1 2"/></body>', "expected a range from 0 up, got 1 to 2"
     ),
     "perhaps a limit": ('<body><joint limited="1"/></body>', "one of true, false, auto"),
-    "copies": ('<body><replicate count="9"/></body>', "got a rule for some"),
+    "copies": ('<body><replicate count="9"><body/></replicate></body>', "got a rule for some"),
     "an attachment": ('<attach model="m"/>', "<attach>: expected every body to be written out"),
     "a composite": ('<body><composite type="cable"/></body>', "got a rule for some"),
     "a flexible body": ('<frame><flexcomp name="f"/></frame>', "got a rule for some"),

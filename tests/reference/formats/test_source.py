@@ -61,11 +61,11 @@ def test_what_is_no_file_is_refused(tmp_path):
         read_text(tmp_path / "nothing")
     with pytest.raises(ValueError, match="expected a regular file"):
         read_text(tmp_path)
-    with pytest.raises(ValueError, match=r"^path: expected a path, got int"):
+    with pytest.raises(ValueError, match=r"^path: expected a path, got 3"):
         read_text(3)
     with pytest.raises(ValueError, match="name too long"):
         read_text("a" * 5000)
-    with pytest.raises(ValueError, match="there is no such file"):
+    with pytest.raises(ValueError, match="path: expected a path"):
         read_text("a\0b")
 
 

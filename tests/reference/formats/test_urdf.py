@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference import forward_kinematics, rotation
-from reference.formats import urdf
+from reference.formats import FormatWarning, urdf
 
-PI = np.pi
+PI, inf = np.pi, np.inf
 
 
 def link(*names):
@@ -126,6 +126,30 @@ def test_limits_are_those_of_the_type():
     assert found.upper.tolist() == [inf, 2, inf, 2, 0, inf, inf]
 
 
+CROSSED = {"unlimited": (-inf, inf), "ordered": (-2.0, 1.0)}
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("choice", [*CROSSED, None])
+def test_crossed_limits_are_read_with_a_warning_by_a_named_choice(kind, choice):
+    limit = '<limit lower="1" upper="-2"/>'
+    text = f"<robot>{link('a', 'b')}{joint('j', 'a', 'b', kind, limit=limit)}</robot>"
+    chosen = {"crossed_limits": choice} if choice else {}
+    said = r"line 1: <joint name='j'>: expected lower <= upper, got lower 1, upper -2; read as "
+    with pytest.warns(FormatWarning, match=said + (choice or "unlimited")):
+        found = urdf.parse(text, **chosen).articulation
+    assert (found.lower[1], found.upper[1]) == CROSSED[choice or "unlimited"]
+
+
+def test_crossed_limits_are_refused_on_demand(refusal):
+    text = joint("j", "a", "b", limit='<limit lower="2" upper="1"/>')
+    text = f"<robot>{link('a', 'b')}{text}</robot>"
+    message = refusal(urdf.parse, text, crossed_limits="refused")
+    assert "expected lower <= upper, got lower 2, upper 1" in message
+    message = refusal(urdf.parse, text, crossed_limits="swapped")
+    assert message == ("crossed_limits: expected one of unlimited, ordered, refused, got 'swapped'")
+
+
 def test_mimic_joints_follow_through_chains():
     follow = '<mimic joint="{}" multiplier="{}" offset="{}"/>'.format
     found = robot(
@@ -210,10 +234,6 @@ WRONG = {
     "no type": (link("a") + '<joint name="j"/>', "expected an attribute 'type'"),
     "no axis": (link("a", "b") + joint("j", "a", "b", inside='<axis xyz="0 0 0"/>'), "not zero"),
     "no limit": (link("a", "b") + joint("j", "a", "b", limit=""), "<limit> of a revolute joint"),
-    "crossed limits": (
-        link("a", "b") + joint("j", "a", "b", limit='<limit lower="2" upper="1"/>'),
-        "expected lower <= upper, got lower 2, upper 1",
-    ),
     "two numbers": (
         link("a", "b") + joint("j", "a", "b", inside='<origin xyz="1 2"/>'),
         "expected 3 numbers in 'xyz', got '1 2'",
@@ -243,8 +263,16 @@ WRONG = {
     ),
     "unexpanded macros": (
         link("a", "b") + joint("j", "a", "b", inside='<origin xyz="${x} 0 0"/>'),
-        "expected 3 numbers in 'xyz', got '${x} 0 0'",
+        "expected a value, got the xacro '${x} 0 0': run xacro first",
     ),
+    "a macro": (
+        '<xacro:macro name="m"/>' + link("a"),
+        "<xacro:macro name='m'>: expected a URDF file, got xacro: run xacro first",
+    ),
+    "a macro inside": (link("a") + '<link name="b"><xacro:box/></link>', "run xacro first"),
+    "a macro's attribute": ('<link name="a" xacro:if="1"/>', "got xacro: run xacro first"),
+    "a name of a macro": ('<link name="${prefix}base"/>', "${prefix}base': run xacro first"),
+    "an argument of a macro": ('<link name="$(arg prefix)"/>', "run xacro first"),
 }  # fmt: skip
 
 

@@ -533,7 +533,10 @@ def test_a_target_names_its_effector(skeleton, local, target, solver, speed):
         ({"target": np.zeros((2, 3))}, "target: expected leading axes that broadcast"),
         ({"effector": "hand"}, "effector: expected one of joint0"),
         ({"effector": 6}, "effector: expected an integer of at least -6 and at most 5, got 6"),
-        ({"skeleton": scenes.lab_arm()}, "skeleton: expected a Skeleton or an Articulation, got t"),
+        (
+            {"skeleton": scenes.lab_arm()},
+            "skeleton: expected a Skeleton, an Articulation or a Robot, got t",
+        ),
         ({"tolerance": -1.0}, "tolerance: expected a number of at least 0"),
         ({"tolerance": np.nan}, "tolerance: expected a finite number"),
         ({"max_iterations": 1.5}, "max_iterations: expected an integer, got 1.5"),

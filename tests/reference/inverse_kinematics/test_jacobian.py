@@ -110,7 +110,7 @@ def test_a_chain_that_had_to_be_bent_is_linearised_where_it_then_is():
     chain = new_chain(arm.offsets, arm.path())
     pose_chain(chain, arm.path(), rest)
     target = (0.0, 0.3, 0.0)
-    e, A = linearise(chain, target)
+    e, A = linearise(chain, target, 0.0)
     assert np.ptp(chain.positions[:, [0, 2]]) > 0.1
     np.testing.assert_array_equal(e, target - chain.positions[-1])
     assert task_matrix(chain) == A

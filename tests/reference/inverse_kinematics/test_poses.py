@@ -73,7 +73,7 @@ def test_a_skeleton_s_effector_turns_where_its_rotation_is_asked_for(
 def test_the_sign_of_the_target_s_quaternion_does_not_matter(solver, speed, articulated, rng):
     model = articulated(["ball", "hinge", "ball", "slide", "hinge", "ball"], 5)
     goal, q = forward_kinematics(model, model.random(rng)), model.random(rng)
-    target = Target(goal.positions[-1], goal.rotations[-1])
+    target = Target(goal.positions[-1], goal.rotations[-1], -1)
     here = solve_ik(model, q, target, solver, max_iterations=5)
     there = solve_ik(model, q, target._replace(rotation=-target.rotation), solver, max_iterations=5)
     assert (there.coordinates == here.coordinates).all()
@@ -155,7 +155,7 @@ def test_a_solve_alone_takes_the_short_way_wherever_its_arrays_come_from(change,
     target = Target(change(pose.positions[-1]), change(pose.rotations[-1]), arm.names[-1])
     settings = checked_settings("levenberg_marquardt", 1e-6, 1e-6, 100, 3, 0, False)
     for one in (target, [target], target._replace(effector=5)):
-        alone = solve_alone(arm, change(arm.neutral()), one, -1, settings)
-        usual = solve_targets(arm, arm.neutral(), target, -1, settings)
+        alone = solve_alone(arm, change(arm.neutral()), one, None, settings)
+        usual = solve_targets(arm, arm.neutral(), target, None, settings)
         assert alone is not None
         np.testing.assert_array_equal(alone.coordinates, usual.coordinates)

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from reference import Outcome, Target, forward_kinematics, rotation, solve_ik
-from reference.backend.compiled import bind
 from reference.inverse_kinematics.mechanism import LEVER
 from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.restarts import STUCK, attempts, rank_restarts, take_nearest
+from reference.inverse_kinematics.restarts import RANK, rank_restarts, take_nearest
 
 
 @pytest.fixture
@@ -75,41 +74,18 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
     ]
     goal = machine(arm, arm.neutral(), targets).goal
     request = SimpleNamespace(restarts=prepared.restarts, tips=prepared.tips)
-    room = SimpleNamespace(ranks=np.empty(9))
+    room = SimpleNamespace(progress=np.empty((11, 6)))
     rank_restarts(prepared.mechanism, goal, request, room)
     full = np.hstack([prepared.restarts, np.zeros((9, arm.coordinate_count))])[:, :8]
     pose = forward_kinematics(arm, full)
     ways = [np.linalg.norm(pose.positions[:, t.effector] - t.position, axis=1) for t in targets]
     angles = rotation.angle(pose.rotations[:, 7], targets[0].rotation)
     expected = np.max(ways, axis=0) + LEVER * prepared.mechanism.reach * 4.0 * np.sin(angles / 4.0)
-    np.testing.assert_allclose(room.ranks, expected, rtol=1e-12, atol=0)
+    np.testing.assert_allclose(room.progress[1:10, RANK], expected, rtol=1e-12, atol=0)
     taken = np.empty((9, prepared.mechanism.coordinates))
     for q in taken:
         take_nearest(request, room, q)
     assert (taken == prepared.restarts[np.argsort(expected)]).all()
-
-
-@pytest.mark.parametrize(
-    ("restarts", "hasty"),
-    [(0, [0]), (1, [1, 0]), (4, [1, 1, 1, 0, 0]), (9, [1] * 7 + [0] * 3)],
-)
-def test_all_but_the_last_quarter_of_the_attempts_are_in_haste(
-    arm, poses, machine, restarts, hasty
-):
-    found = []
-
-    def attempt(mechanism, goal, posture, room, request, history, done, in_haste):
-        found.append(in_haste)
-        return done + STUCK, True, 1.0
-
-    target = Target(poses.position[0], poses.rotation[0], 7)
-    mechanism, goal, posture, _ = machine(arm, arm.neutral(), [target])
-    prepared = prepare(arm, (7,), (True,), restarts, 5)
-    request = SimpleNamespace(restarts=prepared.restarts, tips=prepared.tips)
-    room, best = SimpleNamespace(ranks=np.empty(restarts)), np.empty(mechanism.coordinates)
-    trial = bind(attempts, attempt=attempt)
-    trial(mechanism, goal, posture, room, request, best, np.empty(1))
-    assert found == hasty
 
 
 def test_the_best_of_all_attempts_is_returned(arm, poses, rng, solver, speed):
@@ -162,8 +138,8 @@ def test_the_iterations_of_all_attempts_are_counted_and_recorded(arm, rng, solve
     far = Target([100.0, 0.0, 0.0])
     q = arm.random(rng)
     solution = solve_ik(arm, q, far, solver, restarts=2, max_iterations=4, record=True)
-    assert solution.outcome is Outcome.UNREACHABLE
-    assert 3 <= solution.iterations <= 16
+    assert solution.outcome.unreachable
+    assert 3 <= solution.iterations <= 20
     assert solution.history.shape == (solution.iterations + 1,)
     assert np.isfinite(solution.history).all()
     assert (solution.history >= 90.0).all()

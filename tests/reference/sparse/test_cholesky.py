@@ -1,6 +1,7 @@
 """Laws of the sparse Cholesky factor and of each step towards it."""
 
 from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ EPS = np.finfo(float).eps
 
 def definite(pattern, seed=0):
     """Return a matrix with the given pattern of neighbours, diagonally dominant by a little."""
-    entries = scipy.sparse.coo_array(scipy.sparse.triu(pattern, 1))
+    entries = scipy.sparse.triu(scipy.sparse.coo_array(pattern), 1)
     values = np.random.default_rng(seed).uniform(-1, 1, entries.nnz)
     upper = scipy.sparse.coo_array((values, (entries.row, entries.col)), pattern.shape).tocsc()
     both = upper + upper.T
@@ -166,6 +167,20 @@ def test_any_number_of_right_hand_sides_gives_what_each_gives_alone(rng, sides):
     expected = scipy.sparse.linalg.spsolve(matrix, b)
     # Dominance keeps the condition number below 200.
     np.testing.assert_allclose(x, expected.reshape(b.shape), rtol=0, atol=1e-12)
+
+
+def test_nothing_is_computed_from_memory_that_was_never_written(matrix, monkeypatch):
+    """Fresh memory holds signalling NaNs: arithmetic on one is an invalid operation."""
+    signal = np.uint64(0x7FF0000000000001)
+
+    def unwritten(count, dtype=float):
+        return np.full(count, signal).view(float) if dtype is float else np.empty(count, dtype)
+
+    fresh = SimpleNamespace(empty=unwritten, int32=np.int32)
+    monkeypatch.setattr("reference.sparse.multifrontal.np", fresh)
+    with compiled.speed("plain"), np.errstate(all="raise"):
+        factor = CholeskyFactor(matrix)
+    assert np.isfinite(factor._values).all()
 
 
 def test_both_speeds_agree(matrix, rng):

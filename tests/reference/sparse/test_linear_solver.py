@@ -102,3 +102,47 @@ def test_an_unknown_library_is_named_with_the_known_ones(matrix):
         ValueError, match=r"^library: expected one of supernodal, cholespy, scipy, got 'eigen'"
     ):
         factorize(matrix, "eigen")
+
+
+@pytest.mark.parametrize("shape", [(29,), (31,), (29, 3), (60,), (3, 30), (90,), (30, 3, 1), ()])
+def test_a_right_hand_side_of_another_size_is_named(matrix, shape):
+    with pytest.raises(ValueError, match=r"^b: expected shape \(30,\) or \(30, right-hand side\)"):
+        factorize(matrix).solve(np.ones(shape))
+
+
+def test_a_right_hand_side_of_another_kind_is_converted_or_named(matrix, rng):
+    factor, b = factorize(matrix), rng.standard_normal((30, 3)).astype(np.float32)
+    expected = factor.solve(b.astype(float))
+    for same in (b, b.tolist(), np.asfortranarray(b)):
+        np.testing.assert_array_equal(factor.solve(same), expected)
+    with pytest.raises(ValueError, match=r"^b: expected an array of numbers"):
+        factor.solve("right")
+
+
+def test_a_matrix_that_is_not_square_or_not_sparse_is_named(library):
+    for wrong in (np.eye(3), scipy.sparse.csc_array(np.ones((3, 2))), None):
+        with pytest.raises(ValueError, match=r"^matrix: expected a square sparse matrix"):
+            factorize(wrong, library)
+
+
+def test_one_triangle_is_no_symmetric_pattern(matrix):
+    with pytest.raises(ValueError, match=r"^matrix: expected both triangles"):
+        factorize(scipy.sparse.tril(matrix, format="csc"))
+
+
+def test_entries_given_twice_are_summed(matrix, rng):
+    entries = matrix.tocoo()
+    doubled = scipy.sparse.coo_array(
+        (np.tile(entries.data / 2, 2), (np.tile(entries.row, 2), np.tile(entries.col, 2)))
+    )
+    twice = scipy.sparse.csc_array((30, 30))
+    twice.data, twice.indices, twice.indptr = raw_columns(doubled)
+    x = rng.standard_normal(30)
+    np.testing.assert_allclose(factorize(twice).solve(matrix @ x), x, rtol=0, atol=1e-12)
+
+
+def raw_columns(entries):
+    """Return data, rows and starts of columns in which entries stay apart."""
+    order = np.argsort(entries.col, kind="stable")
+    starts = np.r_[0, np.cumsum(np.bincount(entries.col, minlength=entries.shape[1]))]
+    return entries.data[order], entries.row[order], starts

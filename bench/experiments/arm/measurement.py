@@ -1,0 +1,45 @@
+"""The lab's arm: accuracy, iterations and jitter on every curve, and targets beyond its reach."""
+
+from collections.abc import Iterator
+from functools import partial
+
+from reference import IK_SOLVERS, track
+
+from ...harness import metrics
+from ...harness.block import Block, Measured, Scale
+from ..chain.measurement import BEYOND_TOLERANCE, Limits, residuals, solve_targets
+from .problem import CurveForArm, arm_beyond, arm_curves
+
+LIMITS = Limits(tolerance=1e-4, max_iterations=100)
+BEYOND_LIMITS = Limits(BEYOND_TOLERANCE, max_iterations=1000)
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield every curve for every solver, from rest and from the last solution (warm), then Q1."""
+    for curve in arm_curves():
+        for solver in IK_SOLVERS:
+            for warm in (False, True):
+                settings = {**LIMITS._asdict(), "warm": warm}
+                yield Block("arm", curve.name, solver, partial(draw, curve, solver, warm), settings)
+    far = arm_beyond(scale.targets)
+    for solver in IK_SOLVERS:
+        measure = partial(solve_targets, far, solver, BEYOND_LIMITS)
+        yield Block("arm", far.name, solver, measure, BEYOND_LIMITS._asdict(), scale.targets)
+
+
+def draw(problem: CurveForArm, solver: str, warm: bool) -> Measured:
+    """Follow the curve; residuals are recomputed by forward kinematics of the answers."""
+    motion = track(
+        problem.skeleton, problem.curve, solver, problem.rest, warm=warm, **LIMITS._asdict()
+    )
+    # The tip keeps its rotation and would only dilute the mean.
+    turns = metrics.turns(motion.local_rotations[:, :-1])
+    return Measured(
+        {
+            "residual": residuals(problem.skeleton, motion.local_rotations, problem.curve),
+            "iterations": motion.iterations,
+            "outcome": motion.outcome,
+            "largest_turn": turns.max(axis=-1),
+            "mean_turn": turns.mean(axis=-1),
+        }
+    )

@@ -1,0 +1,108 @@
+"""Inverse kinematics: a ten-ball chain by us and both engines, robots, published tables."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from crosscheck.engines import SKELETON_ENGINES
+from crosscheck.engines.skeleton_engine import coordinates
+from reference import IK_SOLVERS, Skeleton, forward_kinematics, solve_ik
+from reference.arguments import FloatArray
+
+from ...harness import metrics
+from ...harness.block import Block, Measured, Scale
+from ...peers.ik.levenberg_marquardt import levenberg_marquardt
+from ..published import measurement as published
+from ..robots import measurement as robots
+from .problem import STRATA, TargetsForSkeleton, chain_targets
+
+TOLERANCE = 1e-4
+# Beyond reach it is the distance from the best answer there is; small, to see how straight it is.
+BEYOND_TOLERANCE = 1e-6
+MAX_ITERATIONS = 1000
+# An engine's loop in the interpreter would spend minutes on what it cannot reach.
+ENGINE_ITERATIONS = 200
+# The residuals of so many iterations are kept for the figure.
+HISTORY = 200
+ENGINE_SOLVER = "lm/{}"
+
+
+class Limits(NamedTuple):
+    """When a solver stops: the distance that counts as reached [m], and the most iterations."""
+
+    tolerance: float
+    max_iterations: int
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield the chain, every stratum for every solver; then robots and published tables."""
+    yield from _chain_blocks(scale)
+    yield from robots.blocks(scale)
+    yield from published.blocks(scale)
+
+
+def _chain_blocks(scale: Scale) -> Iterator[Block]:
+    for stratum in STRATA:
+        problem = chain_targets(stratum, scale.targets)
+        tolerance = BEYOND_TOLERANCE if stratum == "beyond" else TOLERANCE
+        ours = Limits(tolerance, MAX_ITERATIONS)
+        for solver in IK_SOLVERS:
+            measure = partial(solve_targets, problem, solver, ours, record=True)
+            yield Block("ik", problem.name, solver, measure, ours._asdict(), scale.targets)
+        theirs = Limits(tolerance, ENGINE_ITERATIONS)
+        for name in SKELETON_ENGINES:
+            measure = partial(solve_with_engine, problem, name, theirs)
+            solver = ENGINE_SOLVER.format(name)
+            yield Block("ik", problem.name, solver, measure, theirs._asdict(), scale.targets)
+
+
+def solve_targets(
+    problem: TargetsForSkeleton, solver: str, limits: Limits, record: bool = False
+) -> Measured:
+    """Solve all targets with a solver of ours; residuals are recomputed from the answers."""
+    solution = solve_ik(
+        problem.skeleton, problem.starts, problem.targets, solver,
+        **limits._asdict(), record=record,
+    )  # fmt: skip
+    arrays = _answers(problem, solution.local_rotations, solution.iterations)
+    arrays["outcome"] = np.asarray(solution.outcome)
+    if record:
+        kept = metrics.convergence(solution.history[:, : HISTORY + 1])
+        arrays |= {f"history_{name}": values for name, values in kept._asdict().items()}
+    return Measured(arrays)
+
+
+def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) -> Measured:
+    """Solve all targets by Levenberg-Marquardt on an engine's kinematics."""
+    engine = SKELETON_ENGINES[name](problem.skeleton)
+    effector = problem.skeleton.joint_count - 1
+    answers = [
+        levenberg_marquardt(engine, q, target, effector, **limits._asdict())
+        for q, target in zip(coordinates(engine, problem.starts), problem.targets, strict=True)
+    ]
+    found = np.array([answer.q[engine.columns] for answer in answers])
+    return Measured(_answers(problem, found, [answer.iterations for answer in answers]))
+
+
+def residuals(skeleton: Skeleton, local_rotations: FloatArray, targets: FloatArray) -> FloatArray:
+    """Return the effector's distances from the targets by forward kinematics [m], (target,)."""
+    tips = forward_kinematics(skeleton, local_rotations).positions[..., -1, :]
+    return np.linalg.norm(tips - targets, axis=-1)
+
+
+def _answers(
+    problem: TargetsForSkeleton, found: FloatArray, iterations: Any
+) -> dict[str, np.ndarray]:
+    positions = forward_kinematics(problem.skeleton, found).positions
+    distance = np.linalg.norm(problem.targets - problem.skeleton.offsets[0], axis=-1)
+    residual = residuals(problem.skeleton, found, problem.targets)
+    return {
+        "residual": residual,
+        "iterations": np.asarray(iterations),
+        "distance": distance,
+        "bend": metrics.bend(positions, problem.targets),
+        "excess": metrics.excess(residual, distance, problem.skeleton.reach()),
+        "reach": np.array(problem.skeleton.reach()),
+    }

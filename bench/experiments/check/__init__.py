@@ -1,0 +1,1 @@
+"""The reference against both engines: verdicts, and any files of the user's."""

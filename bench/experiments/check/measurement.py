@@ -1,0 +1,30 @@
+"""The cross-check's claims, a block each."""
+
+from collections.abc import Iterator
+from functools import partial
+
+from crosscheck.identities import CLAIMS, run_claims
+
+from ...harness.block import Block, Measured, Scale
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield every claim; its number of cases is its own at every scale."""
+    for claim in CLAIMS.values():
+        yield Block("check", claim.name, claim.theirs, partial(verdict, claim.name))
+
+
+def verdict(name: str) -> Measured:
+    """Judge a claim; keep its numbers and its words."""
+    (verdict,) = run_claims([name])
+    claim = verdict.claim
+    return Measured(
+        {
+            "cases": verdict.cases,
+            "difference": verdict.difference,
+            "tolerance": claim.tolerance.value,
+            "moved": verdict.moved,
+            "held": verdict.held,
+        },
+        {"ours": claim.ours, "reason": claim.tolerance.reason, "missed": verdict.missed},
+    )

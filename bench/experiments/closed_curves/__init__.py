@@ -1,0 +1,1 @@
+"""Closed curves tracked round after round: largest joint steps and drift."""

@@ -1,0 +1,208 @@
+"""The lab's third question: motions without jitter, and what they cost."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ...harness import metrics
+from ...harness.record import Record
+from ...presentation.results import Results, label, settings
+from ...presentation.tables import Answer, Cell, Column, Table, words
+
+COLD, WARM, COHERENT = "cold", "warm", "coherent"
+WAYS = (COLD, WARM, COHERENT)
+SUITE, DRIFT = "tracking", "drift/"
+# The way that closes a round is no larger than others if it is so but for this share.
+SAME = 0.01
+
+
+class Case(NamedTuple):
+    """One curve followed by one solver in all ways."""
+
+    cold: Record
+    warm: Record
+    coherent: Record
+
+
+def _cases(results: Results) -> list[Case]:
+    """Return the curves that were followed in all ways."""
+    found = []
+    for cold in results.all(SUITE, way=COLD):
+        others = [
+            results.one(SUITE, cold.problem, cold.solver, way=way) for way in (WARM, COHERENT)
+        ]
+        if others[0] is not None and others[1] is not None:
+            found.append(Case(cold, others[0], others[1]))
+    return found
+
+
+def jitter(results: Results) -> Table:
+    """Return Q3: how far joints turn from frame to frame."""
+    cases = _cases(results)
+    return Table(
+        "q3_jitter",
+        "How far joints turn from frame to frame",
+        (
+            Column("curve", words=True),
+            Column("solver", words=True),
+            Column("frames"),
+            *(Column(f"{way}, {what}", "°") for what in ("largest", "mean") for way in WAYS),
+            *(Column(f"{way}, last to first", "°") for way in (WARM, COHERENT)),
+        ),
+        tuple(_jitter_row(case) for case in cases),
+        shows="By how much a joint turns between neighbouring frames: a ball by a geodesic angle, "
+        "a hinge by its coordinate. The largest is over all frames and joints, the mean over both; "
+        "the way from the last frame back to the first stands apart.",
+        measured="Each curve is closed and followed once. Cold: every frame solved from the start "
+        "pose; warm: every frame from the solution before it; coherent: all frames changed "
+        "together from there until the sum of all squared turns, the one that closes the round "
+        "among them, is least.",
+        answer=_jitter_answer(cases),
+    )
+
+
+def _jitter_row(case: Case) -> tuple[Cell, ...]:
+    return (
+        label(case.cold.problem), label(case.cold.solver), int(case.cold.arrays["residual"].size),
+        *(_largest(record) for record in case), *(_mean(record) for record in case),
+        *(_seam(record) for record in case[1:]),
+    )  # fmt: skip
+
+
+def _largest(record: Record) -> float:
+    return metrics.degrees(metrics.spread(record.arrays["largest_turn"][:-1]).largest)
+
+
+def _mean(record: Record) -> float:
+    return metrics.degrees(metrics.mean(record.arrays["mean_turn"][:-1]))
+
+
+def _seam(record: Record) -> float:
+    return metrics.degrees(float(record.arrays["largest_turn"][-1]))
+
+
+def _jitter_answer(cases: Sequence[Case]) -> Answer:
+    if not cases:
+        return Answer()
+    calmer = sum(_largest(case.coherent) < _largest(case.warm) for case in cases)
+    limit = 1.0 + SAME
+    closed = sum(_seam(case.coherent) <= limit * _largest(case.coherent) for case in cases)
+    worst = [max((case[i] for case in cases), key=_largest) for i in range(len(WAYS))]
+    return Answer(
+        "Of the many solutions take, for all frames together, those that change least from each to "
+        f"the next. The largest turn of a joint is then smaller than with warm starts in {calmer} "
+        f"of {len(cases)} cases, and in {closed} the way from the last frame back to the first is "
+        "no larger than others. The largest of all:",
+        tuple(
+            f"{way}: {words(_largest(record))}° ({label(record.problem)}, {label(record.solver)})"
+            for way, record in zip(WAYS, worst, strict=True)
+        ),
+    )
+
+
+def price(results: Results) -> Table:
+    """Return how closely the curves are followed, and in how many iterations."""
+    cases = _cases(results)
+    return Table(
+        "q3_price",
+        "What a calm motion costs",
+        (
+            Column("curve", words=True),
+            Column("solver", words=True),
+            *(Column(f"{way}, within tolerance") for way in WAYS),
+            *(Column(f"{way}, largest path error", "m") for way in WAYS),
+            *(Column(f"{way}, mean iterations") for way in WAYS),
+            Column("of these over all frames at once"),
+        ),
+        tuple(_price_row(case) for case in cases),
+        shows="The path error is the distance from the effector to its point on the curve. An "
+        "iteration over all frames at once counts as one of each frame.",
+        measured="Residuals recomputed by forward kinematics of the answers, whatever the solver "
+        f"says. Frames are solved to {settings([c.cold for c in cases], 'tolerance')} m in at most "
+        f"{settings([c.cold for c in cases], 'max_iterations')} iterations, a coherent motion is "
+        "then on its path to rounding; a frame that is not reached is drawn to its point.",
+        answer=_price_answer(cases),
+    )
+
+
+def _price_row(case: Case) -> tuple[Cell, ...]:
+    return (
+        label(case.cold.problem), label(case.cold.solver),
+        *(_within(record) for record in case),
+        *(metrics.spread(record.arrays["residual"]).largest for record in case),
+        *(metrics.mean(record.arrays["iterations"]) for record in case),
+        _together(case),
+    )  # fmt: skip
+
+
+def _within(record: Record) -> metrics.Share:
+    return metrics.share(record.arrays["residual"] <= record.settings["tolerance"])
+
+
+def _together(case: Case) -> int:
+    """Return the iterations over all frames: what even the frame with the fewest more has more."""
+    more = case.coherent.arrays["iterations"] - case.warm.arrays["iterations"]
+    return int(metrics.extent(more)[0])
+
+
+def _price_answer(cases: Sequence[Case]) -> Answer:
+    if not cases:
+        return Answer()
+    steps = [_together(case) for case in cases]
+    shares = [[_within(record) for record in case] for case in cases]
+    hits = [sum(share[i].hits for share in shares) for i in range(len(WAYS))]
+    total = sum(share[0].total for share in shares)
+    return Answer(
+        f"All frames are changed together {words(min(steps))} to {words(max(steps))} times. Of "
+        f"{words(total)} frames are within tolerance:",
+        tuple(f"{way}: {words(count)}" for way, count in zip(WAYS, hits, strict=True)),
+    )
+
+
+def drift(results: Results) -> Table:
+    """Return how far the pose drifts away from round to round."""
+    pairs = []
+    for warm in results.all(SUITE, DRIFT, way=WARM):
+        coherent = results.one(SUITE, warm.problem, warm.solver, way=COHERENT)
+        if coherent is not None:
+            pairs.append((warm, coherent))
+    return Table(
+        "q3_drift",
+        "How far the arm is from its first pose after each round",
+        (
+            Column("solver", words=True),
+            *(
+                Column(f"{way}, after {counted}", "°")
+                for way in (WARM, COHERENT)
+                for counted in ("one round", "two", "three")
+            ),
+        ),
+        tuple(
+            (
+                label(warm.solver),
+                *(metrics.degrees(turn) for record in (warm, coherent) for turn in _drift(record)),
+            )
+            for warm, coherent in pairs
+        ),
+        shows="The largest angle between a joint’s first rotation and the one it has when the tip "
+        "is back at the first point.",
+        measured="The lab’s arm draws the heart three times without a break. The coherent motion "
+        "is closed: its last frame leads back to its first, so that after the third round it has "
+        "returned by construction.",
+        answer=_drift_answer(pairs),
+    )
+
+
+def _drift(record: Record) -> list[float]:
+    return [float(turn) for turn in record.arrays["drift"]]
+
+
+def _drift_answer(pairs: Sequence[tuple[Record, Record]]) -> Answer:
+    if not pairs:
+        return Answer()
+    warm = [metrics.degrees(_drift(record)[-1]) for record, _ in pairs]
+    closed = max(metrics.degrees(max(_drift(record))) for _, record in pairs)
+    return Answer(
+        f"With warm starts the arm is {words(min(warm))} to {words(max(warm))}° from its first "
+        f"pose after three rounds; the closed coherent motion at no time more than "
+        f"{words(closed)}°.",
+    )

@@ -1,0 +1,1 @@
+"""The lab's cloth at three stiffnesses: convergence of every step solver."""

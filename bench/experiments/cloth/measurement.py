@@ -1,0 +1,174 @@
+"""The lab's cloth: how implicit Euler's solvers converge, and what one iteration leaves behind."""
+
+import functools
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from reference import ImplicitEuler, State
+from reference.arguments import FloatArray
+from reference.mass_spring import MassSpring, damper_forces, lengths, spring_forces
+
+from ...harness import metrics
+from ...harness.block import Block, Measured, Scale
+from ..cloth_peers import measurement as peers_cloth
+from .problem import DAMPING, FACTORS, ClothSwing, H, cloth_swing
+
+# The cloth falls for three seconds; the steps of the next second are looked at.
+FALLING = 180
+STEPS = 60
+TOLERANCE = 1e-10
+# The step whose convergence is followed iteration by iteration.
+MIDDLE = FALLING + STEPS // 2
+CONVERGENCE = {
+    "local_global": 1000, "chebyshev": 1000, "lbfgs": 200, "newton_cg": 12, "newton": 12,
+}  # fmt: skip
+FEW = (1, 10, 100)
+# Steps in which the two laws of dampers are compared [s], each half the one before.
+HALVED = tuple(H / 2**i for i in range(-1, 6))
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield, for each stiffness: consecutive Newton steps, one step's iterations, few iterations.
+
+    The cloth is the same at every scale. Then one cloth for every solver that is installed.
+    """
+    yield from _lab_blocks()
+    yield from peers_cloth.blocks(scale)
+
+
+def _lab_blocks() -> Iterator[Block]:
+    for factor in FACTORS:
+        problem = cloth_swing(factor)
+        swinging = {"h": H, "first": FALLING, "steps": STEPS}
+        yield Block(
+            "cloth", problem.name, "newton", partial(newton_steps, problem),
+            {**swinging, "tolerance": TOLERANCE},
+        )  # fmt: skip
+        for solver, iterations in CONVERGENCE.items():
+            yield Block(
+                "cloth", f"{problem.name}/one step", solver,
+                partial(one_step, problem, solver, iterations),
+                {"h": H, "step": MIDDLE, "iterations": iterations},
+            )  # fmt: skip
+        for iterations in FEW:
+            yield Block(
+                "cloth", f"{problem.name}/few iterations", "local_global",
+                partial(few_iterations, problem, iterations),
+                {**swinging, "iterations": iterations},
+            )  # fmt: skip
+        damped = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
+        halved = {"longest": HALVED[0], "halvings": len(HALVED) - 1}
+        yield Block(
+            "cloth", f"{problem.name}/dampers", "newton", damped,
+            {"first": MIDDLE, "damping": DAMPING, **halved},
+        )  # fmt: skip
+
+
+def newton_steps(problem: ClothSwing) -> Measured:
+    """Take consecutive swinging steps by Newton; keep iterations and residual of each."""
+    integrator = converging(problem)
+    states = converged_motion(problem)[FALLING:-1]
+    results = [integrator.step(state) for state in states]
+    return Measured(
+        {
+            "iterations": [result.iterations for result in results],
+            "residual": [result.residual for result in results],
+            "outcome": [result.outcome for result in results],
+            "at_floor": [result.at_floor for result in results],
+        }
+    )
+
+
+def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:
+    """Iterate one step from mid-swing; keep residual and error after each iteration."""
+    integrator = converging(problem)
+    state = converged_motion(problem)[MIDDLE]
+    exact = converging(problem, tolerance=0.0, max_iterations=50).step(state).state.positions
+    objective = integrator.objective(state)
+    iterates = ImplicitEuler(problem.system, h=problem.h, solver=solver).iterates(state)
+    residual, error = [], []
+    for _, iterate in zip(range(iterations + 1), iterates, strict=False):
+        residual.append(objective.residual(iterate))
+        error.append(metrics.relative_error(iterate.positions, exact, objective.y))
+    return Measured({"residual": residual, "error": error})
+
+
+def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
+    """Compare steps of a few local/global iterations with converged ones.
+
+    A step's error is that of one such step from each state of the converged motion. The drift is
+    the distance between the converged motion and one that takes all its steps so; the path, that
+    of the converged motion from where both began.
+    """
+    converged = converging(problem)
+    hasty = ImplicitEuler(
+        problem.system, h=problem.h, solver="local_global", tolerance=0.0,
+        max_iterations=iterations,
+    )  # fmt: skip
+    true = converged_motion(problem)[FALLING:]
+    own = motion(true[0], STEPS, hasty)
+    after = [hasty.step(state).state for state in true[:-1]]
+    inertial = [converged.objective(state).y for state in true[:-1]]
+    positions = [state.positions for state in true[1:]]
+    errors = [
+        metrics.relative_error(state.positions, exact, y)
+        for state, exact, y in zip(after, positions, inertial, strict=True)
+    ]
+    distances = [
+        metrics.rms_distance(state.positions, exact)
+        for state, exact in zip(after, positions, strict=True)
+    ]
+    drift = [
+        metrics.rms_distance(state.positions, exact)
+        for state, exact in zip(own[1:], positions, strict=True)
+    ]
+    path = [metrics.rms_distance(exact, true[0].positions) for exact in positions]
+    return Measured({"error": errors, "distance": distances, "drift": drift, "path": path})
+
+
+def two_dampers(problem: ClothSwing, first: int = MIDDLE) -> Measured:
+    """Take one step of each length after the first ones; compare the two laws at its end."""
+    state, apart = motion(problem.start, first, converging(problem))[-1], []
+    for h in HALVED:
+        end = ImplicitEuler(problem.system, h=h).step(state).state
+        rates = damper_forces(problem.system, end)
+        differences = step_damper_forces(problem.system, state, end, h)
+        apart.append(np.linalg.norm(differences - rates) / np.linalg.norm(rates))
+    return Measured({"h": HALVED, "apart": apart})
+
+
+def step_damper_forces(system: MassSpring, before: State, after: State, h: float) -> FloatArray:
+    """Return the forces -(c/h) (l - l_n) u of a step's dampers at its end [N], (particle, 3)."""
+    count = len(system.springs)
+    dampers = system.replaced(
+        stiffnesses=system.dampings / h,
+        rest_lengths=lengths(system, before.positions),
+        tension_only=np.zeros(count, dtype=bool),
+    )
+    return spring_forces(dampers, after.positions)
+
+
+def converging(
+    problem: ClothSwing, tolerance: float = TOLERANCE, max_iterations: int = 100
+) -> ImplicitEuler:
+    """Return the integrator that solves every step to the end."""
+    return ImplicitEuler(
+        problem.system, h=problem.h, solver="newton", tolerance=tolerance,
+        max_iterations=max_iterations,
+    )  # fmt: skip
+
+
+@functools.cache
+def converged_motion(problem: ClothSwing) -> tuple[State, ...]:
+    """Return the states of the four seconds by converged steps, the start first."""
+    return tuple(motion(problem.start, FALLING + STEPS, converging(problem)))
+
+
+def motion(start: State, steps: int, integrator: ImplicitEuler) -> list[State]:
+    """Return the states of consecutive steps, the start first."""
+    states = [start]
+    for _ in range(steps):
+        states.append(integrator.step(states[-1]).state)
+    return states

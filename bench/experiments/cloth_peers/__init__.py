@@ -1,0 +1,1 @@
+"""One cloth for every engine: work against precision, stability."""

@@ -1,0 +1,358 @@
+"""One cloth for every solver that is installed: work and precision, limits of stability.
+
+Each solver works in a process of its own. What it returns is held against converged implicit Euler
+and against the motion itself.
+"""
+
+import functools
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference import STEP_SOLVERS, ImplicitEuler, MassSpring, State
+
+from ...harness import metrics
+from ...harness.block import Block, Measured, Scale
+from ...harness.isolation import Outcome, Workshop
+from ...peers.cloth import CLOTH_PEERS, EXPLICIT, ClothPeer, Rung
+from ..published import problem as published
+from .job import ClothJob
+from .problem import (
+    FRAME,
+    SIDE,
+    STIFFNESSES,
+    FallingCloth,
+    falling_cloth,
+    hanging_cloth,
+    highest_mode,
+)
+from .truth import ClothTruth, cloth_truth, implicit_motion
+
+SUITE = "cloth"
+ONE_STEP, MOTION, NEEDED = "peers/one step", "peers/motion", "peers/iterations"
+STABILITY, LIU = "peers/stability", "peers/liu2013"
+EVERY_CLOTH = "peers/all"
+# Between the rungs' names in a record's notes.
+LIST = "; "
+# One step is timed so often, but for no more than a twentieth of its ladder's time.
+_REPEATS, _REPEATING = 5, 0.05
+# A ladder ends with the first rung this near to the answer.
+NEAR_ENOUGH = 1e-9
+# A silent frame of a large cloth is given up after so long [s], and so is one being set up.
+_PATIENCE, _START_PATIENCE = 60.0, 300.0
+
+# Errors whose iterations are counted, on a cloth of so many particles a side.
+DECADES = 10.0 ** -np.arange(1, 9)
+NEEDED_SIZE, NEEDED_LIMIT = 20, {"newton": 60, "newton_cg": 60, "gauss_newton": 20}
+MANY_ITERATIONS = 2000
+
+# A mode is unstable if, begun with this amplitude [m], it grows so much in so many steps.
+STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
+STABILITY_DIGITS = 2e-4
+_DOUBLINGS = 30
+
+# Numbers, and a label in the end.
+Row = tuple[Any, ...]
+
+
+class Level(NamedTuple):
+    """A size of the cloth: particles a side, frames of a motion, seconds for a solver's ladder."""
+
+    size: int
+    frames: int
+    budget: float
+
+
+QUICK = (Level(20, 3, 0.2),)
+FULL = (Level(20, 30, 2.0), Level(40, 10, 3.0), Level(100, 2, 30.0))
+QUICK_STIFFNESS = STIFFNESSES[1:2]
+# The benchmarks of a scale that is full take so long [s].
+_FULL = 1.0
+
+
+def levels(scale: Scale) -> tuple[Level, ...]:
+    """Return the sizes of the cloth at a scale."""
+    return FULL if scale.seconds >= _FULL else QUICK
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield one step, a motion and the limit of every solver; what is missing makes one block.
+
+    Larger cloths, the published one among them, are for the full scale.
+    """
+    sizes = levels(scale)
+    for package in dict.fromkeys(peer.package for peer in CLOTH_PEERS if not peer.version):
+        yield Block(SUITE, EVERY_CLOTH, package, partial(not_installed, package))
+    for stiffness in STIFFNESSES:
+        for solver in STEP_SOLVERS:
+            yield Block(
+                SUITE, f"{NEEDED}/k{stiffness:g}", solver,
+                partial(iterations_needed, solver, stiffness),
+                {"size": NEEDED_SIZE, "stiffness": stiffness, "frame": FRAME},
+            )  # fmt: skip
+    for peer in (peer for peer in CLOTH_PEERS if peer.version):
+        yield from _peer_blocks(peer, sizes)
+    for solver in published.LIU_2013 if sizes == FULL else ():
+        yield Block(
+            SUITE, LIU, solver, partial(liu_2013, solver),
+            {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME},
+        )  # fmt: skip
+
+
+def _peer_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
+    most = sum(level.size for level in sizes)
+    for stiffness in STIFFNESSES:
+        for problem, measure in ((ONE_STEP, one_step), (MOTION, motion)):
+            yield Block(
+                SUITE, f"{problem}/k{stiffness:g}", peer.title,
+                partial(measure, peer, stiffness, sizes),
+                {"stiffness": stiffness, "frame": FRAME, "version": peer.version}, most,
+            )  # fmt: skip
+    if peer.kind == EXPLICIT and not peer.settings.get("iterations"):
+        hung = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
+        yield Block(
+            SUITE, STABILITY, peer.title, partial(stability, peer, hung),
+            {"size": STABILITY_SIZE, "version": peer.version}, len(hung),
+        )  # fmt: skip
+
+
+def not_installed(package: str) -> Measured:
+    """Return a block without numbers that says what is missing."""
+    return Measured({}, {"remark": f"{package} is not installed"})
+
+
+def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measured:
+    """Take the same step with ever more work; keep time and what is left of the error.
+
+    A ladder that has used its time, or has arrived, is climbed no further.
+    """
+    rows: list[Row] = []
+    remarks: list[str] = []
+    for level in sizes:
+        cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
+        spent = 0.0
+        for rung in peer.step_rungs(cloth.frequency):
+            outcome = _tried(
+                job(
+                    peer.module, cloth, rung, frames=1, repeats=_REPEATS,
+                    budget=_REPEATING * level.budget,
+                )
+            )  # fmt: skip
+            remarks += _remarks(level, rung, outcome)
+            if not outcome.solved:
+                break
+            seconds = np.array([one.seconds for one in outcome.solved])
+            error = step_error(outcome.solved[-1].q, truth)
+            rows.append((level.size, metrics.spread(seconds).median, error, rung.label))
+            spent += float(seconds.sum())
+            if error <= NEAR_ENOUGH or spent > level.budget:
+                break
+    return _columns(("particles", "seconds", "error"), rows, remarks)
+
+
+def _tried(job: ClothJob) -> Outcome:
+    """Return what came of a job; one that could not be set up in time is not set up again."""
+    what = job.module, len(job.positions)
+    if what in _given_up:
+        return Outcome(0.0, [], _given_up[what])
+    outcome = workshop().perform(job)
+    if outcome.trouble.endswith("silence") and not outcome.lost:
+        _given_up[what] = outcome.trouble
+    return outcome
+
+
+_given_up: dict[tuple[str, int], str] = {}
+
+
+def _remarks(level: Level, rung: Rung, outcome: Outcome) -> list[str]:
+    said = f"{level.size} × {level.size}, {rung.label}: {outcome.trouble}"
+    return [said] if outcome.trouble else []
+
+
+def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
+    """Return what a step leaves of the way from y to converged implicit Euler; inf if it blew up.
+
+    Beyond what can be squared there is nothing left to compare.
+    """
+    if not np.isfinite(positions).all() or np.abs(positions).max() > 1e100:
+        return np.inf
+    return metrics.relative_error(positions, truth.implicit[0], truth.inertial)
+
+
+def motion(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measured:
+    """Move on frame after frame; keep the distances from implicit Euler and from the truth."""
+    rows: list[Row] = []
+    remarks: list[str] = []
+    for level in sizes:
+        cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
+        for rung in peer.motion_rungs(cloth.frequency):
+            outcome = _tried(
+                job(
+                    peer.module, cloth, rung, frames=level.frames, repeats=1, budget=level.budget,
+                )
+            )  # fmt: skip
+            remarks += _remarks(level, rung, outcome)
+            rows.append((*_moved(outcome, level, truth), rung.label))
+            if not outcome.solved:
+                break
+    names = ("particles", "frames", "wanted", "seconds", "setup", "implicit", "true", "diverged")
+    measured = _columns(names, rows, remarks)
+    truths = [_truth(level, stiffness) for level in sizes]
+    known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
+    return Measured({**measured.arrays, **known}, measured.notes)
+
+
+def _moved(outcome: Outcome, level: Level, truth: ClothTruth) -> tuple[float, ...]:
+    """Return a row: distances are those in the end, or as far as the motion got."""
+    frames = len(outcome.solved)
+    seconds = metrics.spread(np.array([one.seconds for one in outcome.solved])).median
+    positions = np.array([one.q for one in outcome.solved]).reshape(frames, *truth.start.shape)
+    lost = diverged(positions, truth.true[:frames])
+    apart = [np.nan, np.nan]
+    if frames and not lost:
+        answers = truth.implicit[frames - 1], truth.true[frames - 1]
+        apart = [metrics.rms_distance(positions[-1], answer) for answer in answers]
+    return (level.size, frames, level.frames, seconds, outcome.setup, *apart, lost)
+
+
+def diverged(positions: np.ndarray, true: np.ndarray) -> bool:
+    """Return whether a particle ever is farther from where it belongs than the cloth is wide."""
+    if not np.isfinite(positions).all():
+        return True
+    return bool((np.abs(positions - true) > SIDE).any())
+
+
+def iterations_needed(solver: str, stiffness: float) -> Measured:
+    """Count the iterations of one step to errors of a tenth, a hundredth and so on."""
+    cloth = falling_cloth(NEEDED_SIZE, stiffness)
+    truth = cloth_truth(NEEDED_SIZE, stiffness, 1)
+    iterates = ImplicitEuler(cloth.system, h=FRAME, solver=solver).iterates(cloth.start)
+    errors = []
+    limit = NEEDED_LIMIT.get(solver, MANY_ITERATIONS)
+    for _, iterate in zip(range(limit + 1), iterates, strict=False):
+        errors.append(step_error(iterate.positions, truth))
+        if errors[-1] <= NEAR_ENOUGH:
+            break
+    needed = [metrics.first_below(np.array(errors), decade) for decade in DECADES]
+    return Measured(
+        {
+            "needed": [np.nan if count is None else count for count in needed],
+            "tried": len(errors) - 1,
+            "least": min(errors),
+        }
+    )
+
+
+def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
+    """Find the longest stable step of an explicit solver, on hanging cloths."""
+    limits, frequencies, remarks = [], [], []
+    for stiffness in stiffnesses:
+        system, rest = hanging_cloth(STABILITY_SIZE, stiffness)
+        largest, mode = highest_mode(system, rest)
+        frequencies.append(np.sqrt(largest))
+        start = State(rest + AMPLITUDE * mode, np.zeros_like(rest))
+        stable = partial(is_stable, peer, system, start, rest)
+        try:
+            limits.append(stability_limit(stable, FRAME))
+        except ArithmeticError as error:
+            limits.append(np.nan)
+            remarks.append(str(error))
+    return Measured(
+        {"stiffness": stiffnesses, "limit": limits, "frequency": frequencies},
+        {"remark": LIST.join(remarks)},
+    )
+
+
+def is_stable(
+    peer: ClothPeer, system: MassSpring, start: State, rest: np.ndarray, h: float
+) -> bool:
+    """Return whether the particles stay near their rest for many steps of length h.
+
+    Raises:
+        ArithmeticError: if the solver does not get through.
+    """
+    shape = ClothJob(
+        peer.module, system.arrays, start.positions, start.velocities,
+        h * STABILITY_STEPS, 1, 1, {**peer.settings, "substeps": STABILITY_STEPS}, np.inf,
+    )  # fmt: skip
+    outcome = workshop().perform(shape)
+    if not outcome.solved:
+        raise ArithmeticError(outcome.trouble)
+    away = np.abs(outcome.solved[-1].q - rest)
+    return bool(np.isfinite(away).all() and away.max() <= GROWTH * AMPLITUDE)
+
+
+def stability_limit(stable: Callable[[float], bool], h: float) -> float:
+    """Return the longest stable step, by doubling, halving and bisection from a first guess h.
+
+    Raises:
+        ArithmeticError: if no step is stable, or every one is.
+    """
+    low, high = (h, 2.0 * h) if stable(h) else (h / 2.0, h)
+    for _ in range(_DOUBLINGS):
+        if not stable(low):
+            low, high = low / 2.0, low
+        elif stable(high):
+            low, high = high, 2.0 * high
+        else:
+            break
+    else:
+        raise ArithmeticError(f"no limit of stability between {low:g} and {high:g} s")
+    while high - low > STABILITY_DIGITS * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stable(middle) else (low, middle)
+    return 0.5 * (low + high)
+
+
+def liu_2013(solver: str) -> Measured:
+    """Take steps of the cloth of the paper's size, by the paper's ten iterations or by Newton."""
+    cloth = falling_cloth(published.LIU_2013_SIZE, published.LIU_2013_STIFFNESS)
+    exact = implicit_motion(cloth, 1, published.LIU_2013_FRAME)[0]
+    x, v = cloth.start.positions, cloth.start.velocities
+    settings = published.LIU_2013[solver].settings
+    outcome = workshop().perform(
+        job(
+            "bench.peers.cloth.step_solvers", cloth, Rung("", {"solver": solver, **settings}),
+            frames=1, repeats=_REPEATS, budget=5.0, frame=published.LIU_2013_FRAME,
+        )
+    )  # fmt: skip
+    if not outcome.solved:
+        raise ArithmeticError(outcome.trouble)
+    inertial = x + published.LIU_2013_FRAME * np.where(cloth.system.free[:, None], v, 0.0)
+    return Measured(
+        {
+            "seconds": [one.seconds for one in outcome.solved],
+            "error": metrics.relative_error(outcome.solved[-1].q, exact, inertial),
+            "vertices": cloth.system.particle_count,
+        }
+    )
+
+
+def job(
+    module: str, cloth: FallingCloth, rung: Rung, *, frames: int, repeats: int, budget: float,
+    frame: float = FRAME,
+) -> ClothJob:  # fmt: skip
+    """Return the job of moving a cloth from its start."""
+    return ClothJob(
+        module, cloth.system.arrays, cloth.start.positions, cloth.start.velocities, frame, frames,
+        repeats, rung.settings, budget,
+    )  # fmt: skip
+
+
+def _truth(level: Level, stiffness: float) -> ClothTruth:
+    return cloth_truth(level.size, stiffness, level.frames)
+
+
+def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[str]) -> Measured:
+    """Return rows, their labels last, as arrays and notes."""
+    arrays = {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
+    labels = LIST.join(row[-1] for row in rows)
+    return Measured(arrays, {"rungs": labels, "remark": LIST.join(remarks)})
+
+
+@functools.cache
+def workshop() -> Workshop:
+    """Return the one process in which all solvers work, one after the other."""
+    return Workshop(_START_PATIENCE, _PATIENCE)

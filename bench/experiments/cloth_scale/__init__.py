@@ -1,0 +1,1 @@
+"""Cloths of a thousand particles and more: factorisations, solves, memory."""

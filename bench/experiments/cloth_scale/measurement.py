@@ -1,0 +1,196 @@
+"""Cloths from a thousand particles to a million: factors, solves, iterations, memory.
+
+Each cloth is measured in a process of its own, since only a process can say how much memory it ever
+had.
+"""
+
+import contextlib
+import importlib.util
+import resource
+import sys
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference import ImplicitEuler, MassSpring, State, scenes
+from reference.backend.compiled import TwoSpeeds
+from reference.implicit_euler.factor_cache import forget, prefactored
+from reference.implicit_euler.objective import global_matrix
+from reference.sparse import CholeskyFactor
+from reference.sparse.linear_solver import factorize
+
+from ...harness.block import Block, Measured, Scale
+from ...harness.isolation import Workshop
+from ...harness.progress import tell
+from ...harness.stopwatch import timed
+from ...harness.worker import Done, Found, Message, Unfit, said
+
+H = 1 / 60
+STIFFNESS = 1e4
+ITERATIONS = 10
+# Particles along a side, and how long a benchmark may take [s] where the cloth is to be measured.
+SIZES = {32: 0.0, 100: 0.0, 316: 1.0, 1000: 1.0}
+OURS = "supernodal"
+LIBRARIES = (OURS, "cholespy")
+# Rounds in which everything is timed in turn: so many particles in all, within limits.
+ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
+# What the limit of memory reads again and again: more than any cache holds [bytes].
+STRETCH = 2**28
+# So long [s] a part may take, such as the factor of a million particles, compilation included.
+PATIENCE = 1800.0
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield every size by our own factorisation and by CHOLMOD."""
+    for size, seconds in SIZES.items():
+        if scale.seconds < seconds:
+            continue
+        cloth = {"particles": size * size, "h": H, "stiffness": STIFFNESS}
+        for library in LIBRARIES:
+            yield Block(
+                "cloth_scale", f"cloth/{size}x{size}", library,
+                partial(in_its_own_process, size, library), {**cloth, "iterations": ITERATIONS},
+            )  # fmt: skip
+
+
+def in_its_own_process(size: int, library: str) -> Measured:
+    """Measure one cloth in a process that does nothing else; say so if there is no such library."""
+    if library != OURS and importlib.util.find_spec(library) is None:
+        return Measured({}, {"missing": f"{library} is not installed"})
+    with contextlib.closing(Workshop(PATIENCE)) as shop:
+        outcome = shop.perform(LargeCloth(size, library))
+    if outcome.found is None:
+        raise RuntimeError(outcome.trouble)
+    return Measured(dict(outcome.found))
+
+
+class LargeCloth(NamedTuple):
+    """A cloth to be measured in a worker's process, by particles along a side and library."""
+
+    size: int
+    library: str
+
+    def perform(self) -> Iterator[Message]:
+        """Yield what is measured, after a small cloth for which everything is compiled."""
+        try:
+            measure(min(SIZES), self.library)
+            forget()
+            yield Found(measure(self.size, self.library))
+            yield Done()
+        except Exception as error:
+            yield Unfit(said(error))
+
+
+def _say(size: int, library: str, what: str) -> None:
+    """Say what is being done now."""
+    tell(f"cloth/{size}x{size}, {library}: {what}")
+
+
+def billowing_cloth(size: int) -> tuple[MassSpring, State]:
+    """Return the lab's cloth, a hundred times as stiff, with two waves across it that rise."""
+    system, flat = scenes.lab_cloth(size=size, stiffness=STIFFNESS)
+    x = flat.positions.copy()
+    wave = np.sin(np.pi * x[:, 0]) * np.cos(np.pi * x[:, 2])
+    x[:, 1] += 0.1 * wave
+    v = np.zeros_like(x)
+    v[:, 1] = wave
+    return system, State(x, v)
+
+
+def measure(size: int, library: str) -> dict[str, Any]:
+    """Return the times [s] and the memory [bytes] of one cloth."""
+    before, say = memory(), partial(_say, size, library)
+    say("cloth")
+    system, state = billowing_cloth(size)
+    rounds = int(np.clip(ROUNDS_PARTICLES // size**2, *ROUNDS))
+    if library != OURS:
+        matrix = global_matrix(system, H)
+        say("factor")
+        factor, seconds = timed(lambda: factorize(matrix, library))
+        sides = np.array(state.positions)
+        times = in_turn({"solve": lambda: factor.solve(sides)}, rounds, say)
+        return {"factor": seconds, **times, "memory": memory(), "before": before}
+    return {"before": before, **steps(system, state, rounds, say)}
+
+
+def steps(
+    system: MassSpring, state: State, rounds: int, say: Callable[[str], None]
+) -> dict[str, Any]:
+    """Return what iterations cost and all their parts, in turn; and what they reach."""
+    say("matrix")
+    matrix, assembly = timed(lambda: global_matrix(system, H))
+    say("factor")
+    factor, seconds = timed(lambda: prefactored(matrix))
+    assert isinstance(factor, CholeskyFactor)
+    integrator = ImplicitEuler(
+        system, h=H, solver="local_global", tolerance=0.0, max_iterations=ITERATIONS
+    )
+    objective = integrator.objective(state)
+    gradient = objective.start.gradient
+    limit = reading(2 * 8 * factor.entries + local_bytes(system))
+    work = {
+        "solve": lambda: factor.solve(gradient),
+        "local": lambda: objective.evaluate(objective.y),
+        "step": lambda: integrator.step(state),
+        "limit": limit,
+    }
+    times = in_turn(work, rounds, say)
+    say("factor, once more")
+    used, result = memory(), integrator.step(state)
+    twice = global_matrix(system, 2 * H)
+    _, again = timed(lambda: factor.refactorize(twice))
+    return {
+        "assembly": assembly, "factor": seconds, "refactor": again, **times,
+        "entries": factor.entries, "matrix_entries": matrix.nnz, "residual": result.residual,
+        "history": result.history.tolist(), "memory": used,
+    }  # fmt: skip
+
+
+def in_turn(
+    work: dict[str, Callable[[], Any]], rounds: int, say: Callable[[str], None]
+) -> dict[str, list[float]]:
+    """Return how long each took in each round; a first, uncounted round warms up."""
+    times: dict[str, list[float]] = {name: [] for name in work}
+    for done in range(rounds + 1):
+        say(f"round {done} of {rounds}")
+        for name, call in work.items():
+            times[name].append(timed(call)[1])
+    return {name: seconds[1:] for name, seconds in times.items()}
+
+
+def local_bytes(system: MassSpring) -> int:
+    """Return what a local step has to read: the springs, and six numbers of each particle's."""
+    arrays = system.arrays
+    springs = (arrays.springs, arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only)
+    return sum(array.nbytes for array in springs) + 6 * 3 * 8 * system.particle_count
+
+
+def reading(size: int) -> Callable[[], float]:
+    """Return a call that reads so many bytes, as fast as memory or the caches give them."""
+    numbers = np.ones(min(size // 2, STRETCH) // 8)
+    passes, rest = divmod(size // 8, len(numbers))
+
+    def run() -> float:
+        whole = sum(_total(numbers) for _ in range(passes))
+        return whole + _total(numbers[:rest])
+
+    return run
+
+
+def total(numbers):
+    """Return the sum, in whatever order is fastest."""
+    result = 0.0
+    for i in range(len(numbers)):
+        result += numbers[i]
+    return result
+
+
+_total = TwoSpeeds(total, relaxed=True)
+
+
+def memory() -> int:
+    """Return the most memory that this process ever had [bytes]."""
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else 1024 * most

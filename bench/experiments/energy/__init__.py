@@ -1,0 +1,1 @@
+"""The energy of a swinging cloth under six integrators."""

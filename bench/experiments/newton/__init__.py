@@ -1,0 +1,1 @@
+"""One step of a heavy cloth by every solver, and what is proven of it."""

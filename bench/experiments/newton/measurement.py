@@ -1,0 +1,126 @@
+"""Every solver's answer to one step of a swinging cloth, held against Newton's and certified."""
+
+import copy
+import functools
+from collections.abc import Iterator
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from crosscheck.mass_spring import balance_residual
+from reference import STEP_SOLVERS, ImplicitEuler
+from reference.arguments import FloatArray
+from reference.implicit_euler.certificate import Certificate, certify
+from reference.implicit_euler.objective import Objective
+
+from ...harness import metrics
+from ...harness.block import Block, Measured, Scale
+from .problem import STIFFNESSES, H, MidSwing, mid_swing
+
+SUITE = "newton"
+TOLERANCE = 1e-10
+# The most iterations of solvers that need many, and what is usual where steps have to be quick.
+MANY, USUAL = 3000, 10
+LIMITS = {"newton": 100, "gauss_newton": 1}
+# From this stiffness on [N/m] the slow solvers also start beside Newton's answer, every coordinate
+# off by about so much [m].
+STIFF, BESIDE = 1e5, 1e-6
+FROM_Y, FROM_BESIDE = "y", "beside Newton’s answer"
+# Particles a side; a scale of so many random targets is full.
+QUICK, FULL, _FULL = 10, 30, 2000
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield, for each stiffness, every solver's limit and ten local/global iterations."""
+    size = FULL if scale.targets >= _FULL else QUICK
+    for stiffness in STIFFNESSES:
+        for solver in STEP_SOLVERS:
+            limit = LIMITS.get(solver, MANY)
+            yield _block(size, stiffness, solver, FROM_Y, limit)
+            if stiffness >= STIFF and limit == MANY:
+                yield _block(size, stiffness, solver, FROM_BESIDE, limit)
+        yield _block(size, stiffness, "local_global", FROM_Y, USUAL)
+
+
+def _block(size: int, stiffness: float, solver: str, start: str, limit: int) -> Block:
+    settings = {"h": H, "start": start, "iterations": limit, "tolerance": TOLERANCE}
+    measure = partial(certified_step, size, stiffness, solver, start, limit)
+    return Block(SUITE, f"swing/k{stiffness:g}", solver, measure, settings, size)
+
+
+def certified_step(size: int, stiffness: float, solver: str, start: str, limit: int) -> Measured:
+    """Solve the step; keep what is known of the answer, and how far it is from Newton's."""
+    problem = mid_swing(stiffness, size)
+    newton, objective = newtons_answer(problem), _objective(problem)
+    x, iterations = (
+        _solved(problem, solver, limit)
+        if start == FROM_Y
+        else _solved_from_beside(problem, solver, limit)
+    )
+    known, here, apart = certify(objective, x), objective.evaluate(x), np.linalg.norm(x - newton.x)
+    same = known.shares_minimiser(newton.certificate, float(apart))
+    return Measured(
+        {
+            "size": size,
+            "iterations": iterations,
+            "residual": known.residual,
+            "at_floor": here.at_floor,
+            "balance": balance_residual(problem.system, problem.state, x, problem.h),
+            "distance": known.distance,
+            "curvature": known.curvature,
+            "lipschitz": known.lipschitz,
+            "newton_step": known.newton_step,
+            "apart": apart,
+            "error": metrics.relative_error(x, newton.x, objective.y),
+            "above": here.value - newton.value,
+            "covered": known.covered,
+            "same": same is True,
+            "different": same is False,
+        },
+        {"coverage": known.coverage.name, "why": known.coverage.sentence},
+    )
+
+
+class Answer(NamedTuple):
+    """Newton's answer x, its certificate, and g there."""
+
+    x: FloatArray
+    certificate: Certificate
+    value: float
+
+
+@functools.cache
+def newtons_answer(problem: MidSwing) -> Answer:
+    """Return what Newton's method comes to, iterated far beyond the rounding floor."""
+    integrator = ImplicitEuler(problem.system, h=problem.h, tolerance=0.0, max_iterations=50)
+    x, objective = integrator.step(problem.state).state.positions, _objective(problem)
+    return Answer(x, certify(objective, x), objective.value(x))
+
+
+def _objective(problem: MidSwing) -> Objective:
+    return Objective(problem.system, problem.state, problem.h)
+
+
+def _solved(problem: MidSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
+    result = ImplicitEuler(
+        problem.system, h=problem.h, solver=solver, tolerance=TOLERANCE, max_iterations=limit
+    ).step(problem.state)
+    return result.state.positions, result.iterations
+
+
+def _solved_from_beside(problem: MidSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
+    """Return what the solver comes to, and after how many iterations, from beside the answer.
+
+    Solvers start where the objective starts; the residual stays that of the step from y.
+    """
+    objective = _objective(problem)
+    moved = copy.copy(objective)
+    noise = np.random.default_rng(20130).standard_normal(objective.y.shape)
+    noise[problem.system.pinned] = 0.0
+    moved.start = objective.evaluate(newtons_answer(problem).x + BESIDE * noise)
+    iterates = STEP_SOLVERS[solver](problem.system, problem.h).iterates(moved)
+    for k, iterate in enumerate(iterates):
+        if k == limit or iterate.at_floor or objective.residual(iterate) <= TOLERANCE:
+            break
+    return iterate.positions, k

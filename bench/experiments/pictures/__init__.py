@@ -1,0 +1,1 @@
+"""The poses and cloths that the report draws."""

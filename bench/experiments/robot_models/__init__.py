@@ -1,0 +1,1 @@
+"""Robots and characters from files of others, read by both engines."""

@@ -1,0 +1,48 @@
+"""Robots and characters from files of others, each beside both engines, a block each."""
+
+from collections.abc import Iterator
+from functools import partial
+
+from crosscheck.engines import ROBOT_ENGINES
+from crosscheck.engines.robot_engine import UnreadableError
+from crosscheck.robots.comparisons import differences
+from crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
+from crosscheck.robots.sweep import CONFIGURATIONS, sweep
+
+from ...harness.block import Block, Measured, Scale
+
+SUITE = "robot_models"
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield every file for every engine, none where the files are not installed."""
+    settings = {"configurations": CONFIGURATIONS}
+    for family in PACKAGES:
+        for model in models(family):
+            for engine in ROBOT_ENGINES:
+                measure = partial(compare, engine, model)
+                yield Block(SUITE, f"{family}/{model.name}", engine, measure, settings)
+
+
+def compare(engine: str, model: Model) -> Measured:
+    """Compare one file in random configurations; keep why the engine does not read it."""
+    try:
+        swept = sweep(engine, model)
+    except UnreadableError as error:
+        return _unread(f"{engine} does not read it: {error}", model)
+    except ValueError as error:
+        return _unread(f"{engine} reads it, the reference does not: {error}", model)
+    articulation = swept.robot.articulation
+    return Measured(
+        {
+            "links": len(swept.links),
+            "joints": len(slots(swept.robot)) + len(articulation.mimics),
+            "freedoms": articulation.freedom_count,
+            **differences(swept)._asdict(),
+        },
+        {"cause": CAUSES.get((engine, model.name), ""), "free mimics": swept.free_mimics},
+    )
+
+
+def _unread(why: str, model: Model) -> Measured:
+    return Measured({}, {"unread": why.replace(str(model.path), model.path.name)})

@@ -1,0 +1,1 @@
+"""Robots and characters: every installed inverse-kinematics solver on the same targets."""

@@ -1,0 +1,137 @@
+"""The judge: what an answer comes to, by MuJoCo's kinematics of the robot's own text.
+
+It shares no code with the reference, and says the same of every solver: how far the tips are from
+where they are wanted, how far they are turned away, and by how much a joint is beyond its limits.
+"""
+
+import functools
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from reference.arguments import FloatArray
+
+from .problem import Robot, robot
+
+# A limit counts as kept to this [rad]; some peers keep limits in single precision.
+LIMIT_TOLERANCE = 1e-6
+
+
+class Tolerance(NamedTuple):
+    """When a tip has reached its target."""
+
+    position: float
+    rotation: float
+
+
+class Targets(NamedTuple):
+    """Where tips are wanted.
+
+    Attributes:
+        positions: [m], (target, tip, 3).
+        rotations: matrices, (target, tip, 3, 3).
+        starts: coordinates to start from, (target, coordinate).
+        strata: the number of each target's stratum, (target,).
+    """
+
+    positions: FloatArray
+    rotations: FloatArray
+    starts: FloatArray
+    strata: np.ndarray
+
+
+class Judgement(NamedTuple):
+    """What the answers come to, one entry a target.
+
+    Attributes:
+        position: the farthest tip's distance from its target [m]; NaN if there is no answer.
+        rotation: the most turned tip's angle from its target [rad]; zero where none is wanted.
+        beyond: by how much the worst joint is beyond its limit [rad].
+        solved: whether all three are within tolerance.
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+    beyond: FloatArray
+    solved: np.ndarray
+
+
+def mujoco_model(robot: Robot) -> Any:
+    """Return the robot in MuJoCo, all of its links kept."""
+    text = robot.text
+    if text.startswith("<robot"):
+        head, _, rest = text.partition(">")
+        text = f'{head}><mujoco><compiler fusestatic="false"/></mujoco>{rest}'
+    return mujoco.MjModel.from_xml_string(text)
+
+
+class Judge:
+    """The kinematics of one robot."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.model = mujoco_model(robot)
+        self._data = mujoco.MjData(self.model)
+        self._tips = [self.model.body(tip).id for tip in robot.tips]
+
+    def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the tips' positions (..., tip, 3) [m] and rotations (..., tip, 3, 3)."""
+        rows = q.reshape(-1, q.shape[-1])
+        positions = np.empty((len(rows), len(self._tips), 3))
+        rotations = np.empty((len(rows), len(self._tips), 9))
+        for i, row in enumerate(rows):
+            self._place(row)
+            positions[i] = self._data.xpos[self._tips]
+            rotations[i] = self._data.xmat[self._tips]
+        batch = q.shape[:-1]
+        return (
+            positions.reshape(*batch, -1, 3),
+            rotations.reshape(*batch, len(self._tips), 3, 3),
+        )
+
+    def jacobians(self, q: FloatArray) -> FloatArray:
+        """Return what moves and turns the tips, (row, 6 tip, freedom)."""
+        J = np.empty((len(q), 6 * len(self._tips), self.model.nv))
+        for i, row in enumerate(q):
+            self._place(row)
+            mujoco.mj_comPos(self.model, self._data)
+            for k, tip in enumerate(self._tips):
+                moves, turns = J[i, 6 * k : 6 * k + 3], J[i, 6 * k + 3 : 6 * k + 6]
+                mujoco.mj_jacBody(self.model, self._data, moves, turns, tip)
+        return J
+
+    def judge(self, targets: Targets, q: FloatArray, tolerance: Tolerance) -> Judgement:
+        """Return what answers (target, coordinate) to the first targets come to; NaN is none."""
+        given = np.asarray(np.isfinite(q).all(axis=-1))
+        positions, rotations = self.forward(np.where(given[:, None], q, targets.starts[: len(q)]))
+        aside = np.linalg.norm(positions - targets.positions[: len(q)], axis=-1).max(axis=-1)
+        turned = angle_between(rotations, targets.rotations[: len(q)]).max(axis=-1)
+        turned = turned if self.robot.posed else np.zeros_like(turned)
+        over = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
+        aside, turned, over = (np.where(given, x, np.nan) for x in (aside, turned, over))
+        solved = (
+            (aside <= tolerance.position)
+            & (turned <= tolerance.rotation)
+            & (over <= LIMIT_TOLERANCE)
+        )
+        return Judgement(aside, turned, over, solved)
+
+    def _place(self, q: FloatArray) -> None:
+        self._data.qpos[:] = q
+        mujoco.mj_kinematics(self.model, self._data)
+
+
+def angle_between(A: FloatArray, B: FloatArray) -> FloatArray:
+    """Return the angle of the rotation from A to B [rad], exact also where it is tiny, (...).
+
+    |A - B| in the norm of Frobenius is 2 sqrt 2 sin(angle / 2).
+    """
+    distance = np.linalg.norm(A - B, axis=(-2, -1))
+    return 2.0 * np.arcsin(np.minimum(distance / np.sqrt(8.0), 1.0))
+
+
+@functools.cache
+def judge(name: str) -> Judge:
+    """Return the judge of a robot by name."""
+    return Judge(robot(name))

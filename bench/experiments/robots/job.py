@@ -1,0 +1,102 @@
+"""Targets to be solved one by one in a worker's process, by one solver with its settings."""
+
+import contextlib
+import importlib
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...harness.stopwatch import Budget, timed
+from ...harness.worker import Done, Message, Ready, Solved, Unfit, said
+from ...peers.ik.protocol import Answer, Ask, Solve, UnableError
+from ...peers.ik.restarts import restarted
+from .evaluate import Targets, Tolerance
+from .problem import Robot
+
+# A solve that took less [s] is made again so often, uncounted, right before the next.
+QUICK, AGAIN = 1e-3, 4
+
+
+class Job(NamedTuple):
+    """What is to be solved, and by what.
+
+    Attributes:
+        module: the adapter's module, by its full name.
+        robot: the robot.
+        targets: solved in order.
+        tolerance: when a target counts as reached.
+        settings: what the adapter is prepared with.
+        restarts: further attempts from random poses, made here for solvers that make one.
+        budget: no further target is begun after so long [s].
+    """
+
+    module: str
+    robot: Robot
+    targets: Targets
+    tolerance: Tolerance
+    settings: Mapping[str, Any]
+    restarts: int
+    budget: float
+
+    def perform(self) -> Iterator[Message]:
+        """Yield what comes of it, each part as soon as it is there."""
+        return perform(self)
+
+
+def perform(job: Job) -> Iterator[Message]:
+    """Yield what comes of a job, each part as soon as it is there."""
+    try:
+        adapter = importlib.import_module(job.module)
+        ask, setup = timed(lambda: _prepared(adapter, job))
+        _solve(_asked(ask, job, 0), job)  # may compile
+    except UnableError as error:
+        yield Unfit(str(error))
+        return
+    except Exception as error:  # whatever an engine raises is its result
+        yield Unfit(said(error))
+        return
+    yield Ready(setup)
+    budget, before = Budget(job.budget), None
+    for i in range(len(job.targets.starts)):
+        if budget.is_spent:
+            break
+        solve = _asked(ask, job, i)
+        if before is not None:  # so that caches are as in a loop of solves and nothing else
+            with contextlib.suppress(Exception):
+                for _ in range(AGAIN):
+                    before()
+        solved = _solve(solve, job)
+        before = solve if solved.seconds < QUICK else None
+        yield solved
+    yield Done()
+
+
+def _prepared(adapter: Any, job: Job) -> Ask:
+    ask = adapter.prepare(job.robot, job.tolerance, **job.settings)
+    return restarted(ask, job.robot, job.restarts) if job.restarts else ask
+
+
+def _asked(ask: Ask, job: Job, i: int) -> Solve:
+    positions, rotations, starts, _ = job.targets
+    return ask(positions[i], rotations[i], starts[i].copy())
+
+
+def _solve(solve: Solve, job: Job) -> Solved:
+    trouble, starts = "", job.targets.starts
+
+    def attempt() -> Answer:
+        nonlocal trouble
+        try:
+            return solve()
+        except Exception as error:  # one target lost, not the rest
+            trouble = said(error)
+            return Answer(None, False)
+
+    answer, seconds = timed(attempt)
+    nothing = np.full(starts.shape[-1], np.nan)
+    q = nothing if answer.q is None else np.array(answer.q, dtype=float)
+    if q.shape != nothing.shape:
+        q, trouble = nothing, f"returned {q.shape} numbers, not {nothing.shape}"
+    claimed = -1 if answer.claimed is None else int(answer.claimed)
+    return Solved(q, claimed, seconds, trouble)

@@ -1,0 +1,154 @@
+"""Robots: every solver that is installed on every arm and on the character, in all strata.
+
+Each solver works in a process of its own. Its answers are judged here, by MuJoCo's kinematics.
+"""
+
+import functools
+from collections.abc import Iterator
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...harness.block import Block, Measured, Scale
+from ...harness.isolation import Workshop
+from ...harness.worker import Solved
+from ...peers.ik import PEERS, Entry, Peer
+from .evaluate import Targets, Tolerance, judge
+from .job import Job
+from .problem import PACKAGE, ROBOTS, is_installed, title
+from .targets import STRATA, robot_targets, unreachable_targets
+
+SUITE = "ik"
+TOLERANCE = Tolerance(1e-3, 1e-3)
+# Targets in a stratum, and seconds that a solver has for a robot, for those of a scale.
+_TARGETS = 0.1
+_BUDGET = 3.0
+# Those out of reach are fewer: the slowest solvers take the longest over them.
+_OUT_OF_REACH = 0.25
+EVERY_ROBOT, EVERY_SOLVER = "robots/all", "all solvers"
+# Between the names of the strata in a record's notes.
+LIST = ", "
+# Digits kept of times and residuals: more would fill the disk with noise.
+_DIGITS = 5
+
+
+class Run(NamedTuple):
+    """One solver with its settings, on one robot."""
+
+    robot: str
+    peer: Peer
+    entry: Entry
+    tolerance: Tolerance
+    budget: float
+
+
+def blocks(scale: Scale) -> Iterator[Block]:
+    """Yield each solver on each robot; one block for a solver or a robot that is not installed."""
+    count = max(1, round(_TARGETS * scale.targets))
+    here = [name for name in ROBOTS if is_installed(name)]
+    for name in ROBOTS:
+        if name not in here:
+            absent = partial(not_installed, PACKAGE, title(name))
+            yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"})
+    for peer in PEERS:
+        for entry in peer.entries:
+            yield from _entry_blocks(peer, entry, here, count, _BUDGET * scale.seconds)
+
+
+def _entry_blocks(
+    peer: Peer, entry: Entry, robots: list[str], count: int, budget: float
+) -> Iterator[Block]:
+    solver = peer.called(entry)
+    settings = settings_of(peer, entry, TOLERANCE)
+    if not peer.version:
+        yield Block(SUITE, EVERY_ROBOT, solver, partial(not_installed, peer.package), settings)
+        return
+    few = max(1, round(_OUT_OF_REACH * count))
+    for name in robots:
+        run = Run(name, peer, entry, TOLERANCE, budget)
+        measure = partial(_solve_strata, run, count)
+        yield Block(SUITE, f"robots/{name}", solver, measure, settings, count * len(STRATA))
+        run = run._replace(budget=_OUT_OF_REACH * budget)
+        measure = partial(_solve_unreachable, run, few)
+        yield Block(SUITE, f"unreachable/{name}", solver, measure, settings, few)
+
+
+def settings_of(peer: Peer, entry: Entry, tolerance: Tolerance) -> dict[str, Any]:
+    """Return all that changes the answers of an entry, the version included."""
+    return {
+        **entry.settings,
+        "kind": entry.kind,
+        "attempts": entry.restarts + 1,
+        "version": peer.version,
+        "tolerance": tolerance.position,
+        "tolerance_rotation": tolerance.rotation,
+    }
+
+
+def not_installed(package: str, robot: str = "every robot") -> Measured:
+    """Return a block without numbers that says what is missing."""
+    return Measured({}, {"remark": f"{package} is not installed", "robot": robot})
+
+
+def _solve_strata(run: Run, count: int) -> Measured:
+    return solve(run, robot_targets(run.robot, count))
+
+
+def _solve_unreachable(run: Run, count: int) -> Measured:
+    return solve(run, unreachable_targets(run.robot, count))
+
+
+def solve(run: Run, targets: Targets) -> Measured:
+    """Let a solver loose on the targets, and judge what came of it, finished or not.
+
+    A target over which the solver's process was lost counts as one that it did not solve, with the
+    time until it was given up; targets never begun do not count.
+    """
+    robot = judge(run.robot).robot
+    job = Job(
+        run.peer.module, robot, targets, run.tolerance, run.entry.settings,
+        run.entry.restarts, run.budget,
+    )  # fmt: skip
+    outcome = workshop().perform(job)
+    done = outcome.solved
+    if outcome.lost and len(done) < len(targets.starts):
+        nothing = np.full(targets.starts.shape[-1], np.nan)
+        done = [*done, Solved(nothing, 0, workshop().patience, outcome.trouble)]
+    arrays = _judged(run, targets, done) if done else {}
+    return Measured(
+        {**arrays, "setup": np.array(outcome.setup)},
+        {
+            "remark": outcome.trouble,
+            "strata": LIST.join(STRATA),
+            "robot": robot.title,
+            "tips": LIST.join(robot.tips),
+            "joints": str(len(robot.joints)),
+            "freedom": str(judge(run.robot).model.nv),
+            "wanted": "pose" if robot.posed else "position",
+        },
+    )
+
+
+def _judged(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.ndarray]:
+    answers = np.array([one.q for one in done])
+    judgement = judge(run.robot).judge(targets, answers, run.tolerance)
+    return {
+        "solved": judgement.solved,
+        "claimed": np.array([one.claimed for one in done]),
+        "seconds": _short(np.array([one.seconds for one in done])),
+        "position": _short(judgement.position),
+        "rotation": _short(judgement.rotation),
+        "beyond": _short(judgement.beyond),
+        "stratum": targets.strata[: len(done)],
+    }
+
+
+@functools.cache
+def workshop() -> Workshop:
+    """Return the one process in which all solvers work, one after the other."""
+    return Workshop()
+
+
+def _short(values: np.ndarray) -> np.ndarray:
+    return np.array([float(f"{value:.{_DIGITS - 1}e}") for value in values])

@@ -1,0 +1,170 @@
+"""Where the tips of robots are wanted: strata, all from seeded poses, so that they can be reached.
+
+Targets come from a pool of random poses within the limits. Those of a stratum are drawn from the
+poses of the pool that belong to it. Unreachable ones are made up: they lie farther from the first
+joint than all links in a row are long.
+"""
+
+import functools
+
+import numpy as np
+
+from reference.arguments import FloatArray
+
+from ..chain.problem import random_rotations, unit
+from .evaluate import Judge, Targets, judge
+from .problem import ALL, links
+
+STRATA = {
+    "joint space": "uniform in joint space",
+    "space": "the tip uniform in the space that it reaches",
+    "outer shell": "the twentieth of the poses that reach farthest from the root",
+    "near the root": "the twentieth that stay nearest to it",
+    "near singular": "the twentieth with the smallest least singular value of the Jacobian",
+    "at a limit": "uniform in joint space, then one joint put at one of its limits",
+}
+# Poses in the pool for each target of a stratum, and the share that makes an extreme stratum.
+_POOL = 40
+_EXTREME = 0.05
+# Cells a side of the grid by which tips are spread evenly over space.
+_CELLS = 12
+_SEED = 1986
+
+
+@functools.lru_cache(maxsize=16)
+def robot_targets(name: str, count: int) -> Targets:
+    """Return `count` targets in each stratum, the strata taking turns, and random starts.
+
+    Raises:
+        ValueError: if there is no such robot.
+        AbsentError: if its file is not installed.
+    """
+    mind = judge(name)
+    rng = np.random.default_rng([_SEED, ALL.index(name)])
+    poses = stratum_poses(mind, rng, count).values()
+    positions, rotations = (
+        np.stack(parts, axis=1).reshape(count * len(STRATA), *parts[0].shape[1:])
+        for parts in zip(*(mind.forward(q) for q in poses), strict=True)
+    )
+    strata = np.tile(np.arange(len(STRATA)), count)
+    return Targets(positions, rotations, mind.robot.draw(rng, len(strata)), strata)
+
+
+def stratum_poses(mind: Judge, rng: np.random.Generator, count: int) -> dict[str, FloatArray]:
+    """Return the poses whose tips are the targets, (count, coordinate) for each stratum."""
+    pool = mind.robot.draw(rng, _POOL * count)
+    tips, _ = mind.forward(pool)
+    distance = np.linalg.norm(tips - root(mind), axis=-1).max(axis=-1)
+    chosen = [
+        pool[:count],
+        pool[spread(rng, tips, count)],
+        pool[_extreme(rng, -distance, count)],
+        pool[_extreme(rng, distance, count)],
+        pool[_extreme(rng, least_singular_values(mind, pool), count)],
+        _at_a_limit(rng, mind, count),
+    ]
+    return dict(zip(STRATA, chosen, strict=True))
+
+
+@functools.lru_cache(maxsize=16)
+def unreachable_targets(name: str, count: int) -> Targets:
+    """Return targets 1.05 to 1.5 times as far from the first joint as all links in a row reach.
+
+    Raises:
+        ValueError: if there is no such robot.
+        AbsentError: if its file is not installed.
+    """
+    mind = judge(name)
+    rng = np.random.default_rng([_SEED, ALL.index(name), 1])
+    positions, rotations = _unreachable(rng, mind, count)
+    return Targets(positions, rotations, mind.robot.draw(rng, count), np.zeros(count, dtype=int))
+
+
+@functools.lru_cache(maxsize=16)
+def uniform_targets(name: str, count: int, middle: bool) -> Targets:
+    """Return targets uniform in joint space, from random starts or from the middle of the limits.
+
+    Raises:
+        ValueError: if there is no such robot.
+        AbsentError: if its file is not installed.
+    """
+    mind = judge(name)
+    rng = np.random.default_rng([_SEED, ALL.index(name), count])
+    positions, rotations = mind.forward(mind.robot.draw(rng, count))
+    starts = mind.robot.draw(rng, count)
+    if middle:
+        starts[:] = (mind.robot.lower + mind.robot.upper) / 2
+    return Targets(positions, rotations, starts, np.zeros(count, dtype=int))
+
+
+def least_singular_values(mind: Judge, q: FloatArray) -> FloatArray:
+    """Return the least singular value of each pose's Jacobian, lengths in units of the reach."""
+    J = mind.jacobians(q).reshape(len(q), len(mind.robot.tips), 2, 3, -1)
+    J[:, :, 0] /= farthest(mind)
+    if not mind.robot.posed:  # the tips' rotations do not count
+        J = J[:, :, :1]
+    values = np.linalg.svd(J.reshape(len(q), -1, J.shape[-1]), compute_uv=False)
+    return np.asarray(values[:, -1], dtype=float)
+
+
+def _extreme(rng: np.random.Generator, measure: FloatArray, count: int) -> FloatArray:
+    least = np.argsort(measure, kind="stable")[: max(count, int(_EXTREME * len(measure)))]
+    return rng.choice(least, count, replace=False)
+
+
+def spread(rng: np.random.Generator, tips: FloatArray, count: int) -> FloatArray:
+    """Return the numbers of poses whose first tip is spread over all cells that any tip is in.
+
+    A cell is drawn first, then one of the poses within.
+    """
+    points = tips[:, 0]
+    edge = np.ptp(points, axis=0).max() / _CELLS
+    cells = np.unique((points // edge).astype(int), axis=0, return_inverse=True)[1].ravel()
+    order = rng.permutation(len(points))
+    members = [order[cells[order] == cell] for cell in range(cells.max() + 1)]
+    drawn = rng.integers(len(members), size=count)
+    return np.array([rng.choice(members[cell]) for cell in drawn])
+
+
+def _at_a_limit(rng: np.random.Generator, mind: Judge, count: int) -> FloatArray:
+    q = mind.robot.draw(rng, count)
+    limited = np.flatnonzero(np.isfinite(mind.robot.lower))
+    joint = rng.choice(limited, count)
+    ends = np.where(rng.random(count) < 0.5, mind.robot.lower[joint], mind.robot.upper[joint])
+    q[np.arange(count), joint] = ends
+    return q
+
+
+def _unreachable(
+    rng: np.random.Generator, mind: Judge, count: int
+) -> tuple[FloatArray, FloatArray]:
+    tips = len(mind.robot.tips)
+    distance = farthest(mind) * rng.uniform(1.05, 1.5, (count, tips, 1))
+    positions = root(mind) + distance * unit(rng.standard_normal((count, tips, 3)))
+    w, x, y, z = np.moveaxis(random_rotations(rng, count, tips), -1, 0)
+    rotations = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return positions, np.moveaxis(np.array(rotations), (0, 1), (-2, -1))
+
+
+def root(mind: Judge) -> FloatArray:
+    """Return where the first joint is: nothing before it moves [m], (3,)."""
+    if mind.robot.is_chain:
+        return links(mind.robot)[0].transform[:3, 3]
+    return np.array(mind.model.body(mind.model.jnt_bodyid[0]).pos)
+
+
+def farthest(mind: Judge) -> float:
+    """Return a distance from the first joint that no tip exceeds [m]: all its links in a row."""
+    lengths = []
+    for tip in mind.robot.tips:
+        body, length = mind.model.body(tip).id, 0.0
+        first = mind.model.jnt_bodyid[0]
+        while body not in (first, 0):
+            length += float(np.linalg.norm(mind.model.body_pos[body]))
+            body = int(mind.model.body_parentid[body])
+        lengths.append(length)
+    return max(lengths)

@@ -1,0 +1,112 @@
+"""A case for the stopwatch: some work, done by us or by an engine, or the least it could cost."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from reference.backend.compiled import TwoSpeeds
+from reference.backend.threads import in_slices
+
+from ...harness.record import Key, key
+
+TIMING = "timing"
+# The same names in every subject, so that the tables find their columns.
+COMPILED = "Plumbob, compiled"
+PLAIN = "Plumbob, plain Python"
+OURS = "Plumbob's kinematics"
+LIMIT = "limit: copying as many bytes"
+
+
+@dataclass(frozen=True)
+class Case:
+    """Work to be timed.
+
+    Attributes:
+        problem: what is done, such as "forward kinematics/10 balls".
+        solver: by what.
+        prepare: sets everything up and returns the call to be timed.
+        operations: how many poses, solves or steps one call makes; times are for one.
+        moved: bytes that one call reads and writes, where it is a limit of memory.
+        speed: at which of the reference's speeds it runs.
+        cores: on how many of them; None is all that there are.
+    """
+
+    problem: str
+    solver: str
+    prepare: Callable[[], Callable[[], Any]]
+    operations: int = 1
+    moved: int = 0
+    speed: str = "compiled"
+    cores: int | None = 1
+
+    @property
+    def name(self) -> str:
+        """Problem and solver in one."""
+        return f"{self.problem}, {self.solver}"
+
+    @property
+    def key(self) -> Key:
+        """The key of its record."""
+        return key(TIMING, self.problem, self.solver, self.settings)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What distinguishes it from another case of the same problem and solver."""
+        return {"operations": self.operations}
+
+
+def copying(problem: str, size: int, *, passes: int = 1, operations: int = 1) -> Case:
+    """Return the limit of memory: copies that read and write as many bytes, half and half.
+
+    `size` bytes are moved in each pass, so that they come from as near a cache as the work's do.
+    """
+    prepare = partial(_copies, size // 16, passes)
+    return Case(problem, LIMIT, prepare, operations, moved=size * passes)
+
+
+def streaming(
+    problem: str, read: int, written: int, *, operations: int = 1,
+    cores: int | None = 1, least: int = 0,
+) -> Case:  # fmt: skip
+    """Return the limit of memory: a compiled loop that reads and writes so many bytes.
+
+    A processor reads what it is about to write (write-allocate), which counts as moved. On several
+    cores the loop is cut into slices that read at least `least` bytes each.
+    """
+    prepare = partial(_streams, read // 8, written // 8, least // 8)
+    return Case(problem, LIMIT, prepare, operations, read + 2 * written, cores=cores)
+
+
+def stream(source, sink):
+    """Fill a sink, longer than the source, by adding one to each number and going on with ones."""
+    for i in range(len(source)):
+        sink[i] = source[i] + 1.0
+    for i in range(len(source), len(sink)):
+        sink[i] = 1.0
+
+
+_stream = TwoSpeeds(stream)
+
+
+def _streams(read: int, written: int, least: int) -> Callable[[], Any]:
+    source, sink = np.ones(read), np.zeros(written)
+
+    def share(part: slice) -> tuple[np.ndarray, np.ndarray]:
+        return source[part], sink[part.start * written // read : part.stop * written // read]
+
+    if least == 0:
+        return partial(_stream, source, sink)
+    return partial(in_slices, _stream, read, share, least=least)
+
+
+def _copies(numbers: int, passes: int) -> Callable[[], None]:
+    source, sink = np.ones(numbers), np.zeros(numbers)
+
+    def run() -> None:
+        for _ in range(passes):
+            np.copyto(sink, source)
+
+    return run

@@ -1,0 +1,124 @@
+"""Steps of the lab's cloth from mid-swing: the same work by us and by MuJoCo."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import mujoco
+
+from crosscheck.engines import MujocoMassSpring
+from reference import ImplicitEuler, State, symplectic_euler
+from reference.implicit_euler.factor_cache import global_factor
+from reference.sparse import CholeskyFactor
+
+from ..cloth.measurement import MIDDLE, converged_motion, motion
+from ..cloth.problem import ClothSwing, cloth_swing
+from .case import COMPILED, PLAIN, Case, copying
+
+FACTORS = (1, 100)
+SUBSTEPS = 10
+ITERATIONS = 10
+# A larger cloth, whose factor no longer fits into the nearest caches.
+LARGE = 50
+# Newton's motion of more particles than this would take longer than all the timing.
+MANY = 1000
+MUJOCO = "MuJoCo"
+
+
+def cases() -> Iterator[Case]:
+    """Yield one frame of 1/60 s in four ways, at two stiffnesses, and of a larger cloth."""
+    for factor in FACTORS:
+        problem = cloth_swing(factor)
+        for work, (ours, theirs) in WORKS.items():
+            name = f"cloth/x{factor:g}/{work}"
+            yield Case(name, COMPILED, partial(ours, problem))
+            yield Case(name, PLAIN, partial(ours, problem), speed="plain")
+            if theirs:
+                yield Case(name, MUJOCO, partial(theirs, problem))
+        yield solving(f"cloth/x{factor:g}/{LOCAL_GLOBAL}", problem)
+    large = cloth_swing(1, LARGE)
+    name = f"cloth/{LARGE} × {LARGE} particles/{LOCAL_GLOBAL}"
+    yield Case(name, COMPILED, partial(local_global, large))
+    yield solving(name, large)
+
+
+def local_global(problem: ClothSwing) -> Callable[[], Any]:
+    """Return one step of a fixed number of local/global iterations, factorised beforehand."""
+    integrator = ImplicitEuler(
+        problem.system, h=problem.h, solver="local_global", tolerance=0.0,
+        max_iterations=ITERATIONS,
+    )  # fmt: skip
+    return partial(integrator.step, moving(problem))
+
+
+def newton(problem: ClothSwing) -> Callable[[], Any]:
+    """Return one step converged by Newton."""
+    return partial(ImplicitEuler(problem.system, h=problem.h).step, moving(problem))
+
+
+def gauss_newton(problem: ClothSwing) -> Callable[[], Any]:
+    """Return one linearised step."""
+    integrator = ImplicitEuler(problem.system, h=problem.h, solver="gauss_newton")
+    return partial(integrator.step, moving(problem))
+
+
+def mujoco_discrete(problem: ClothSwing) -> Callable[[], Any]:
+    """Return the same linearised step by MuJoCo, by conjugate gradients."""
+    engine = MujocoMassSpring(problem.system, h=problem.h, integrator="discrete")
+    return partial(engine.step, moving(problem))
+
+
+def substeps(problem: ClothSwing) -> Callable[[], Any]:
+    """Return one frame of explicit substeps."""
+    step = partial(symplectic_euler, problem.system, h=problem.h / SUBSTEPS)
+    return partial(_repeat, lambda state: step(state=state), moving(problem))
+
+
+def mujoco_substeps(problem: ClothSwing) -> Callable[[], Any]:
+    """Return one frame of the same explicit substeps by MuJoCo, its state read in the end."""
+    engine = MujocoMassSpring(problem.system, h=problem.h / SUBSTEPS, integrator="Euler")
+    start = moving(problem)
+
+    def run() -> State:
+        engine.write(start)
+        mujoco.mj_step(engine.model, engine.data, nstep=SUBSTEPS)
+        return engine.read()
+
+    return run
+
+
+def moving(problem: ClothSwing) -> State:
+    """Return a state in mid-swing; a large cloth gets there by a few iterations a step."""
+    if problem.system.particle_count > MANY:
+        integrator = ImplicitEuler(
+            problem.system, h=problem.h, solver="local_global", max_iterations=ITERATIONS
+        )
+        return motion(problem.start, MIDDLE, integrator)[-1]
+    return converged_motion(problem)[MIDDLE]
+
+
+def solving(name: str, problem: ClothSwing) -> Case:
+    """Return the limit of the triangular solves, two an iteration, which each read all of L."""
+    return copying(name, factor_bytes(problem), passes=2 * ITERATIONS)
+
+
+def factor_bytes(problem: ClothSwing) -> int:
+    """Return the bytes of L of M + h² L: its nonzeros; a block of them shares its indices."""
+    factor = global_factor(problem.system, problem.h)
+    assert isinstance(factor, CholeskyFactor)
+    return 8 * factor.entries
+
+
+def _repeat(step: Callable[[State], State], state: State) -> State:
+    for _ in range(SUBSTEPS):
+        state = step(state)
+    return state
+
+
+LOCAL_GLOBAL = f"implicit Euler, {ITERATIONS} local-global iterations"
+WORKS = {
+    LOCAL_GLOBAL: (local_global, None),
+    "implicit Euler, Newton to 1e-10": (newton, None),
+    "implicit Euler, linearised once": (gauss_newton, mujoco_discrete),
+    f"symplectic Euler, {SUBSTEPS} substeps": (substeps, mujoco_substeps),
+}

@@ -1,0 +1,1 @@
+"""How the bench runs: records, runs, worker processes, timing, the machine."""

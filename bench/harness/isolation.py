@@ -1,0 +1,207 @@
+"""Solvers in a process of their own, which is ended when it falls silent; what it sent counts."""
+
+import atexit
+import contextlib
+import os
+import queue
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections import Counter
+from collections.abc import Generator, Iterator, Mapping
+from multiprocessing import Pipe
+from multiprocessing.reduction import ForkingPickler
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from .progress import News, tell
+from .worker import LAST, Begun, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
+
+# A worker that says nothing for so long [s] is ended: before it is ready it may compile.
+START_PATIENCE = 180.0
+TARGET_PATIENCE = 10.0
+# A process whose connection has ended is given so long [s] to end by itself.
+_LEAVE = 1.0
+# In safe-path mode (-P) nothing is imported from where one works; the bench comes from where ours
+# is, before any other that the path may lead to.
+_ROOT = Path(__file__).resolve().parents[2]
+_START = "import sys; sys.path.insert(0, sys.argv[1]); import bench.harness.worker as w; w.main({})"
+
+
+class Outcome(NamedTuple):
+    """What came of a job.
+
+    Attributes:
+        setup: how long the solver took to be set up [s].
+        solved: the targets that were done, in order.
+        trouble: why there are no more, or what was raised and how often; else "".
+        lost: whether the worker was lost over the next target.
+        found: what was measured, if that was the job.
+    """
+
+    setup: float
+    solved: list[Solved]
+    trouble: str
+    lost: bool = False
+    found: Mapping[str, Any] | None = None
+
+
+class Workshop:
+    """One worker, started when the first job comes, and anew after one that was lost."""
+
+    def __init__(
+        self, start_patience: float = START_PATIENCE, target_patience: float = TARGET_PATIENCE
+    ) -> None:
+        # While it is being set up, and once it is ready.
+        self._patience = start_patience, target_patience
+        self._worker: _Worker | None = None
+        atexit.register(self.close)
+
+    @property
+    def patience(self) -> float:
+        """How long a worker may be silent over a target [s]."""
+        return self._patience[True]
+
+    def perform(self, job: Work) -> Outcome:
+        """Return what came of a job, however it ended."""
+        outcome, ready = Outcome(0.0, [], ""), False
+        with contextlib.closing(self.stream(job)) as messages:
+            for message in messages:
+                match message:
+                    case Ready():
+                        outcome, ready = outcome._replace(setup=message.setup), True
+                    case News():
+                        tell(*message)
+                    case Solved():
+                        outcome.solved.append(message)
+                    case Found():
+                        outcome = outcome._replace(found=message.values)
+                    case Unfit() | Lost():
+                        lost = ready and isinstance(message, Lost)
+                        outcome = outcome._replace(trouble=message.why, lost=lost)
+                    case Done():
+                        outcome = outcome._replace(trouble=raised(outcome.solved))
+        return outcome
+
+    def stream(self, job: Work) -> Generator[Message, None, None]:
+        """Yield what a worker says of a job as it comes; the last is Done, Unfit or Lost.
+
+        A worker that was lost since its last job costs nothing: a new one takes the job.
+        """
+        used = self._worker is not None
+        messages = self._once(job)
+        first = next(messages)
+        if used and isinstance(first, Lost):
+            messages = self._once(job)
+            first = next(messages)
+        if not isinstance(first, Begun):
+            yield first
+        yield from messages
+
+    def _once(self, job: Work) -> Iterator[Message]:
+        ready = False
+        try:
+            worker = self._worker = self._worker or _Worker()
+            worker.send(job)
+            message: Message | None = None
+            while not isinstance(message, LAST):
+                message = worker.receive(self._patience[ready])
+                ready = ready or isinstance(message, Ready)
+                if isinstance(message, Lost):
+                    self.close()
+                yield message
+        except BaseException:  # what is still under way must not answer the next job
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """End the worker, if there is one, and whatever it has started."""
+        worker, self._worker = self._worker, None
+        if worker is not None:
+            worker.end()
+
+
+class _Worker:
+    """A process that performs jobs, and a thread that talks with it, so that we never wait."""
+
+    def __init__(self) -> None:
+        self._jobs: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._messages: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._connection, theirs = Pipe()
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-c", _START.format(theirs.fileno()), str(_ROOT)],
+                pass_fds=[theirs.fileno()], env=one_thread(), process_group=0,
+                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+        self._thread = threading.Thread(target=self._talk, daemon=True)
+        self._thread.start()
+
+    def send(self, job: Work) -> None:
+        """Send a job; if the process is gone, the next message says so."""
+        self._jobs.put(bytes(ForkingPickler.dumps(job)))
+
+    def receive(self, patience: float) -> Message:
+        """Return the next message, Lost if there will be none or none came in time [s]."""
+        try:
+            message = self._messages.get(timeout=patience)
+        except queue.Empty:
+            return Lost(f"ended after {patience:g} s of silence")
+        if isinstance(message, Message):
+            return message
+        return Lost(self._end_of_process())
+
+    def end(self) -> None:
+        """End the process and those that it has started."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.kill()
+        self._process.wait()
+        self._jobs.put(None)
+        with (
+            socket.socket(fileno=os.dup(self._connection.fileno())) as ours,
+            contextlib.suppress(OSError),
+        ):
+            ours.shutdown(socket.SHUT_RDWR)  # whoever else may hold the other end
+        self._thread.join()
+        self._connection.close()
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+
+    def _talk(self) -> None:
+        """Pass on jobs and messages; None is the end, by whatever the process does or sends."""
+        with contextlib.suppress(Exception):
+            while (job := self._jobs.get()) is not None:
+                self._connection.send_bytes(job)
+                message = None
+                while not isinstance(message, LAST):
+                    message = self._connection.recv()
+                    self._messages.put(message)
+        self._messages.put(None)
+
+    def _end_of_process(self) -> str:
+        try:
+            code = self._process.wait(timeout=_LEAVE)
+        except subprocess.TimeoutExpired:
+            return "its process broke off the connection, or sent what is no message"
+        if code >= 0:
+            return f"its process ended with code {code}"
+        names = {int(known): known.name for known in signal.Signals}
+        return f"its process was ended by {names.get(-code, f'signal {-code}')}"
+
+
+def raised(solved: list[Solved]) -> str:
+    """Return what a solver raised most often, and how often; "" if it raised nothing."""
+    counts = Counter(one.trouble for one in solved if one.trouble)
+    if not counts:
+        return ""
+    what, times = counts.most_common(1)[0]
+    return f"{what}, on {times} of {len(solved)} targets"
+
+
+def one_thread() -> dict[str, str]:
+    """Return an environment in which the linear algebra of NumPy and SciPy keeps to one core."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    return {**os.environ, **dict.fromkeys(names, "1")}

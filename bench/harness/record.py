@@ -1,0 +1,316 @@
+"""Result files: one record a line of JSON, appended as it is produced, the later of a key counts.
+
+This is the only file of the bench that opens a result file. A record is one block: what was
+solved, by what, with which settings, the arrays that came out, and where it was measured.
+"""
+
+import json
+import os
+import stat
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, TypedDict
+
+import msgspec
+import numpy as np
+
+FORMAT = 1
+FILE_NAME = "records.jsonl"
+# The suite of the records that say of each other suite that it was gone through to its end.
+FINISHED = "finished"
+
+# So many lines that are no records are named; of the others only how many there are.
+NAMED = 5
+# What a number that JSON has no sign for is written as.
+_WORDS = {"nan", "inf", "-inf"}
+
+Key = tuple[str, str, str, str]
+
+
+_Moment = Annotated[
+    str, msgspec.Meta(pattern=r"^(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(Z|[+-]\d\d:\d\d))?$")
+]
+
+
+class _Machine(TypedDict, total=False):
+    processor: str
+    cores: int | None
+    memory_gib: float | None
+    system: str
+
+
+class _Stamp(TypedDict, total=False):
+    machine: _Machine
+    versions: dict[str, str]
+    source: str
+
+
+class _Line(msgspec.Struct):
+    """What a line has to hold."""
+
+    format: Literal[1]
+    suite: str
+    problem: str
+    solver: str
+    settings: dict[str, str | int | float | bool | None]
+    size: float
+    arrays: dict[str, Any]
+    notes: dict[str, str]
+    stamp: _Stamp
+    when: _Moment
+    seconds: float
+
+
+_FIELDS = tuple(name for name in _Line.__struct_fields__ if name != "format")
+_DECODER = msgspec.json.Decoder(_Line)
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One block of results.
+
+    Attributes:
+        suite: which family of problems, such as "arm".
+        problem: the name of the problem.
+        solver: what solved it.
+        settings: numbers, words and truth values that change the answer.
+        size: how much was measured, such as the number of random targets.
+        arrays: what came out, each an array of numbers with one entry a target, frame or step.
+        notes: words that belong to it; "failed" says why there are no arrays.
+        stamp: machine, versions and digest of the sources, see `bench.harness.machine`.
+        when: the moment it was produced, ISO 8601 with time zone.
+        seconds: how long it took to produce.
+    """
+
+    suite: str
+    problem: str
+    solver: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    size: float = 0.0
+    arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
+    stamp: Mapping[str, Any] = field(default_factory=dict)
+    when: str = ""
+    seconds: float = 0.0
+
+    @property
+    def key(self) -> Key:
+        """What makes two records the same measurement."""
+        return key(self.suite, self.problem, self.solver, self.settings)
+
+    @property
+    def failed(self) -> str:
+        """Why it could not be measured, "" if it was."""
+        return self.notes.get("failed", "")
+
+
+class Reading(NamedTuple):
+    """What a result file holds: its records, and a sentence on the lines that are none, else ""."""
+
+    records: list[Record]
+    warning: str
+
+
+def key(suite: str, problem: str, solver: str, settings: Mapping[str, Any]) -> Key:
+    """Return the key of a record; the order of the settings does not matter."""
+    return suite, problem, solver, json.dumps(dict(settings), sort_keys=True)
+
+
+class RecordFile:
+    """The result file of one report folder."""
+
+    def __init__(self, folder: str | os.PathLike[str]):
+        self.path = Path(folder) / FILE_NAME
+
+    def read(self) -> Reading:
+        """Return the records, the later of two with the same key; none if there is no file.
+
+        A line that is no record costs itself and a part of the sentence.
+
+        Raises:
+            ValueError: naming the file, if it is no regular file, or no line of it is a record.
+        """
+        lines, unfinished = self._lines()
+        records = {line.record.key: line.record for line in lines if line.record}
+        sentences = [_cut_off(self.path)] if unfinished else []
+        if damaged := [line for line in lines if not line.record]:
+            sentences.append(_no_records(self.path, damaged))
+        return Reading(list(records.values()), " ".join(sentences))
+
+    def append(self, records: Iterable[Record]) -> None:
+        """Write the records to the end of the file and to the disk, in one piece.
+
+        An unfinished record, left by a run that was killed, is cut off first; whatever else is in
+        the file stays.
+        """
+        text = "".join(encode(record) + "\n" for record in records).encode()
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        self._mend()
+        with self.path.open("ab") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+
+    def drop(self, unwanted: Callable[[Record], bool]) -> None:
+        """Remove records; the old file stays whole until the new one is, and all else stays in it.
+
+        Raises:
+            ValueError: as `read` does.
+        """
+        lines, _ = self._lines()
+        latest = {line.record.key: line.record for line in lines if line.record}
+        if any(unwanted(record) for record in latest.values()):
+            kept = {id(record) for record in latest.values() if not unwanted(record)}
+            stays = [line.text for line in lines if not line.record or id(line.record) in kept]
+            self._replace(b"".join(text + b"\n" for text in stays))
+
+    def _bytes(self) -> bytes:
+        check_regular(self.path)
+        return self.path.read_bytes() if self.path.exists() else b""
+
+    def _lines(self) -> tuple[list["_Decoded"], bytes]:
+        """Return all lines with text, and the last one if it is a record that was cut off."""
+        *texts, last = self._bytes().split(b"\n")
+        unfinished = last if _is_begun(last) else b""
+        texts += [] if unfinished else [last]
+        lines = [_decoded(text, number) for number, text in enumerate(texts, 1) if text.strip()]
+        if lines and not any(line.record for line in lines):
+            raise ValueError(f"{self.path}, line {lines[0].number}: not a record ({lines[0].why})")
+        return lines, unfinished
+
+    def _mend(self) -> None:
+        content = self._bytes()
+        end = content.rfind(b"\n") + 1
+        if _is_begun(content[end:]):
+            self._replace(content[:end])
+        elif content[end:]:
+            self._replace(content + b"\n")
+
+    def _replace(self, content: bytes) -> None:
+        beside = self.path.with_suffix(".new")
+        check_regular(beside)
+        beside.write_bytes(content)
+        beside.replace(self.path)
+
+
+class _Decoded(NamedTuple):
+    """A line of a result file: its record, or why it is none."""
+
+    number: int
+    text: bytes
+    record: Record | None
+    why: str
+
+
+def check_regular(path: Path) -> None:
+    """Make sure that a file is one that can be read to its end, or is not there.
+
+    Raises:
+        ValueError: if it is a folder, a pipe or a device.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    if not stat.S_ISREG(mode):
+        raise ValueError(f"{path}: expected a file, got a {_kind(mode)}")
+
+
+def check_folder(path: Path) -> None:
+    """Make sure that a folder is one, or is not there.
+
+    Raises:
+        ValueError: if it is a file, a pipe or a device.
+    """
+    if path.exists() and not path.is_dir():
+        raise ValueError(f"{path}: expected a folder, got a {_kind(path.stat().st_mode)}")
+
+
+def _kind(mode: int) -> str:
+    kinds = {
+        stat.S_IFDIR: "folder", stat.S_IFIFO: "pipe", stat.S_IFCHR: "device",
+        stat.S_IFBLK: "device", stat.S_IFSOCK: "socket", stat.S_IFREG: "file",
+    }  # fmt: skip
+    return kinds.get(stat.S_IFMT(mode), "special file")
+
+
+def _is_begun(line: bytes) -> bool:
+    """Return whether a line is the beginning of a record, and not a whole one."""
+    begin = f'{{"format": {FORMAT}, "suite": '.encode()
+    if not line or not (line.startswith(begin) or begin.startswith(line)):
+        return False
+    return _decoded(line, 0).record is None
+
+
+def _decoded(text: bytes, number: int) -> _Decoded:
+    try:
+        return _Decoded(number, text, decode(text), "")
+    except ValueError as error:
+        return _Decoded(number, text, None, str(error)[:100])
+
+
+def _cut_off(path: Path) -> str:
+    return (
+        f"The last line of {path.name} was cut off and is left out; "
+        "its block is measured again by the next bench."
+    )
+
+
+def _no_records(path: Path, damaged: Sequence[_Decoded]) -> str:
+    """Return a sentence that names lines that are no records, and why the first few are none."""
+    numbers = [f"line {line.number} ({line.why})" for line in damaged[:NAMED]]
+    if more := len(damaged) - NAMED:
+        numbers += [f"{more} more"] if more > 0 else []
+    return f"Left out of {path.name}, for they are no records: {'; '.join(numbers)}."
+
+
+def encode(record: Record) -> str:
+    """Return the record as one line of standard JSON; NaN and infinities become words."""
+    content: dict[str, Any] = {"format": FORMAT}
+    content |= {name: getattr(record, name) for name in _FIELDS}
+    content["arrays"] = {name: _words(np.asarray(a)) for name, a in record.arrays.items()}
+    content["notes"] = {name: _in_unicode(text) for name, text in record.notes.items()}
+    return json.dumps(content, allow_nan=False)
+
+
+def decode(line: bytes | str) -> Record:
+    """Return the record of a line that `encode` wrote.
+
+    Raises:
+        ValueError: if the line is not JSON, of another format, lacks a field, or has one of
+            another kind.
+    """
+    try:
+        content = _DECODER.decode(line)
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    fields = {name: getattr(content, name) for name in _FIELDS}
+    fields["arrays"] = {name: _numbers(name, values) for name, values in content.arrays.items()}
+    return Record(**fields)
+
+
+def _in_unicode(text: str) -> str:
+    """Return text without halves of surrogate pairs, which names of files may bring along."""
+    return text.encode(errors="replace").decode()
+
+
+def _words(values: np.ndarray) -> Any:
+    if values.dtype.kind not in "biuf":
+        raise ValueError(f"arrays: expected numbers, got {values.dtype} values")
+    if np.isfinite(values).all():
+        return values.tolist()
+    words = [repr(float(x)) if not np.isfinite(x) else float(x) for x in values.ravel()]
+    return np.array(words, dtype=object).reshape(values.shape).tolist()
+
+
+def _numbers(name: str, values: Any) -> np.ndarray:
+    """Return nested lists as an array: of truth values, of integers, or of floating point."""
+    leaves = np.array(values, dtype=object).ravel().tolist()
+    kinds = set(map(type, leaves))
+    words = {leaf for leaf in leaves if isinstance(leaf, str)}
+    if (kinds <= {int, float, str} or kinds == {bool}) and words <= _WORDS:
+        array = np.array(values, dtype=np.float64 if words else None)
+        if array.dtype.kind in "biuf":  # and no integers of more than 64 bits
+            return array
+    raise ValueError(f"arrays: expected numbers in {name[:40]!r}")

@@ -1,0 +1,234 @@
+"""Run suites: measure the blocks that are not yet on record, and store each as it is done."""
+
+import contextlib
+import io
+import os
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..experiments import SCALES, Block, blocks
+from ..experiments.timing import cases as timing_cases
+from ..experiments.timing.case import TIMING
+from .isolation import Workshop
+from .machine import stamp
+from .progress import News
+from .record import FINISHED, Key, Record, RecordFile, key
+from .worker import Done, Lost, Message, Unfit
+
+# At most so many rounds of a benchmark are kept.
+ROUNDS = 200
+# So long [s] a case may take; and the lines of pytest's that say why it failed.
+_CASE_PATIENCE, _LAST_LINES = 1800.0, 20
+KEPT, MEASURING, MEASURED, FAILED = "kept", "measuring", "measured", "failed"
+
+
+class Event(NamedTuple):
+    """A step of a run.
+
+    Attributes:
+        state: "kept" if a record of it was there, "measuring", "measured" or "failed".
+        suite: the suite.
+        what: problem and solver.
+        message: why it failed, else "".
+    """
+
+    state: str
+    suite: str
+    what: str
+    message: str = ""
+
+
+def run(suites: Sequence[str], scale: str, folder: Path) -> Iterator[Event]:
+    """Measure suites in order, yielding what happens; records already there are kept.
+
+    A block is measured again where its record is from other sources, versions or another machine,
+    smaller than asked for, or failed.
+
+    Raises:
+        ValueError: if the result file cannot be read.
+    """
+    file = RecordFile(folder)
+    present = {record.key: record for record in file.read().records}
+    for suite in suites:
+        begin = time.perf_counter()
+        yield from _run_suite(suite, scale, file, present)
+        wanted = keys(suite, scale)
+        if wanted <= {record.key for record in file.read().records}:
+            file.append([_finished(suite, scale, len(wanted), time.perf_counter() - begin)])
+        file.drop(partial(_is_left_over, suite, wanted))
+
+
+def _run_suite(
+    suite: str, scale: str, file: RecordFile, present: dict[Key, Record]
+) -> Iterator[Event]:
+    if suite == TIMING:
+        yield from _run_timing(scale, file.path.parent, present)
+        return
+    for block in blocks(suite, SCALES[scale]):
+        yield from _run_block(block, file, present)
+
+
+def _finished(suite: str, scale: str, count: int, seconds: float) -> Record:
+    """Return the record that says that a suite was gone through to its end."""
+    return Record(
+        FINISHED, suite, "", size=count, notes={"scale": scale},
+        stamp=stamp(), when=now(), seconds=seconds,
+    )  # fmt: skip
+
+
+def _is_left_over(suite: str, known: set[Key], record: Record) -> bool:
+    """Return whether a record belongs to the suite as it was once, but no longer is."""
+    return record.suite == suite and record.key not in known
+
+
+def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
+    """Return a sentence for each claim on record, of the suites given, that does not hold."""
+    if "check" not in suites:
+        return []
+    checks = [r for r in RecordFile(folder).read().records if r.suite == "check"]
+    return [
+        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}"
+        for record in checks if not np.all(record.arrays.get("held", True))
+    ]  # fmt: skip
+
+
+def forget(suites: Sequence[str], folder: Path) -> None:
+    """Remove the records of some suites.
+
+    Raises:
+        ValueError: if the result file cannot be read.
+    """
+    RecordFile(folder).drop(
+        lambda record: (record.problem if record.suite == FINISHED else record.suite) in suites
+    )
+
+
+def count(suites: Sequence[str], scale: str) -> int:
+    """Return how many blocks there are, measured or not."""
+    return sum(len(keys(suite, scale)) for suite in suites)
+
+
+def keys(suite: str, scale: str) -> set[Key]:
+    """Return the keys of all records of a suite that was gone through."""
+    if suite == TIMING:
+        return {case.key for case in timing_cases()}
+    return {block_key(block) for block in blocks(suite, SCALES[scale])}
+
+
+def block_key(block: Block) -> Key:
+    """Return the key of a block's record."""
+    return key(block.suite, block.problem, block.solver, block.settings)
+
+
+def is_done(record: Record | None, size: float) -> bool:
+    """Return whether a record of the wanted size was made by these sources on this machine."""
+    return (
+        record is not None
+        and not record.failed
+        and record.size >= size
+        and dict(record.stamp) == stamp()
+    )
+
+
+def now() -> str:
+    """Return the moment, ISO 8601, in UTC."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def _run_block(block: Block, file: RecordFile, present: dict[Key, Record]) -> Iterator[Event]:
+    what = f"{block.problem}, {block.solver}"
+    if is_done(present.get(block_key(block)), block.size):
+        yield Event(KEPT, block.suite, what)
+        return
+    yield Event(MEASURING, block.suite, what)
+    record = measure(block)
+    file.append([record])
+    yield Event(FAILED if record.failed else MEASURED, block.suite, what, record.failed)
+
+
+def measure(block: Block) -> Record:
+    """Measure a block; one that raises becomes a record that says why, and costs no other."""
+    begin = time.perf_counter()
+    try:
+        arrays, notes = block.measure()
+    except Exception as error:  # whatever a solver raises is a result of that solver
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
+            raise KeyboardInterrupt from None
+        arrays, notes = {}, {"failed": f"{type(error).__name__}: {error}"}
+    return Record(
+        block.suite,
+        block.problem,
+        block.solver,
+        block.settings,
+        block.size,
+        {name: np.asarray(values) for name, values in arrays.items()},
+        notes,
+        stamp(),
+        now(),
+        time.perf_counter() - begin,
+    )
+
+
+def _run_timing(scale: str, folder: Path, present: dict[Key, Record]) -> Iterator[Event]:
+    """Time the cases in a process of its own, which keeps the records, and relay what it says."""
+    length = SCALES[scale].seconds
+    cases = list(timing_cases())
+    kept = [case for case in cases if is_done(present.get(case.key), length)]
+    yield from (Event(KEPT, TIMING, case.name) for case in kept)
+    if len(kept) == len(cases):
+        return
+    with tempfile.TemporaryDirectory() as storage:
+        yield from _relay(timing_arguments(folder, length, storage))
+
+
+def _relay(arguments: Sequence[str]) -> Iterator[Event]:
+    """Run pytest in a worker's process and yield what it tells, and why it fails if it does."""
+    with contextlib.closing(Workshop(_CASE_PATIENCE)) as shop:
+        for message in shop.stream(TimingJob(tuple(arguments))):
+            match message:
+                case News():
+                    yield Event(message.state, TIMING, message.what, message.message)
+                case Unfit() | Lost():
+                    yield Event(FAILED, TIMING, "pytest-benchmark", message.why)
+
+
+class TimingJob(NamedTuple):
+    """All cases to be timed by pytest in a worker's process, given its arguments."""
+
+    arguments: tuple[str, ...]
+
+    def perform(self) -> Iterator[Message]:
+        """Yield the end; what happens until then is told as news."""
+        import pytest
+
+        os.environ["PYTEST_ADDOPTS"] = ""  # what pytest is told to do elsewhere is not meant here
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            code = pytest.main(list(self.arguments))
+        last = "".join(said.getvalue().splitlines(keepends=True)[-_LAST_LINES:]).strip()
+        yield Unfit(last) if code else Done()
+
+
+def timing_arguments(folder: Path, length: float, storage: str) -> list[str]:
+    """Return pytest's arguments: no configuration but ours, about `length` seconds a case.
+
+    pytest-benchmark makes a folder for results of its own, which `storage` keeps out of the way.
+    """
+    here = Path(__file__).parents[1] / "experiments" / "timing"
+    return [
+        str(here / "time_cases.py"),
+        *("-c", os.devnull, "--rootdir", str(here), "--import-mode=importlib"),
+        *("-p", "no:cacheprovider", "-p", "bench.experiments.timing.plugin", "-s", "-q"),
+        f"--records={folder}",
+        f"--benchmark-storage=file://{storage}",
+        f"--benchmark-max-time={length}",
+        f"--benchmark-min-time={length / ROUNDS}",
+        *("--benchmark-min-rounds=5", "--benchmark-disable-gc", "--benchmark-warmup=off"),
+    ]

@@ -1,0 +1,109 @@
+"""What a worker says, and its side of the connection: jobs in, messages out, as they come.
+
+A solver may print, crash or hang; whatever it does, it does it in a worker's process, which
+`isolation` starts. Nothing else than messages goes through the connection.
+"""
+
+import os
+import threading
+from collections.abc import Iterator, Mapping
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from .progress import News, heard_by
+
+
+class Begun(NamedTuple):
+    """The job was read and is begun."""
+
+
+class Ready(NamedTuple):
+    """The solver is set up, in so long [s] without imports, and did one target, not counted."""
+
+    setup: float
+
+
+class Solved(NamedTuple):
+    """One target is done.
+
+    Attributes:
+        q: the coordinates, NaN if there are none.
+        claimed: 1 if the solver says that it is solved, 0 if not, -1 if it does not say.
+        seconds: how long it took.
+        trouble: what the solver raised, else "".
+    """
+
+    q: np.ndarray
+    claimed: int
+    seconds: float
+    trouble: str
+
+
+class Unfit(NamedTuple):
+    """The solver cannot do this job; `why` says what came of trying."""
+
+    why: str
+
+
+class Done(NamedTuple):
+    """There is nothing more to come."""
+
+
+class Found(NamedTuple):
+    """What was measured, by name."""
+
+    values: Mapping[str, Any]
+
+
+class Lost(NamedTuple):
+    """The process is gone, or was ended since it was silent; `why` says which."""
+
+    why: str
+
+
+Message = Begun | Ready | News | Solved | Found | Unfit | Done | Lost
+# After one of these there is no more to come.
+LAST = (Unfit, Done, Lost)
+
+
+class Work(Protocol):
+    """What a worker can be sent: it knows how it is done."""
+
+    def perform(self) -> Iterator[Message]:
+        """Yield what comes of it, each part as soon as it is there."""
+
+
+def said(error: Exception) -> str:
+    """Return what an exception says, on one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())[:200]
+
+
+def serve(connection: Connection) -> None:
+    """Perform jobs until the other end is closed."""
+    with heard_by(connection.send):
+        while True:
+            try:
+                job = connection.recv()
+            except EOFError:
+                return
+            except Exception as error:  # a class that cannot be imported here, or is another
+                connection.send(Unfit(said(error)))
+                continue
+            connection.send(Begun())
+            for message in job.perform():
+                connection.send(message)
+
+
+def main(descriptor: int) -> None:
+    """Serve at a connection that this process was born with, for as long as its parent lives."""
+    os.set_inheritable(descriptor, False)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    serve(Connection(descriptor))
+
+
+def _end_with_parent() -> None:
+    """Wait for the end of the input, which only the parent holds open, and leave."""
+    os.read(0, 1)
+    os._exit(1)

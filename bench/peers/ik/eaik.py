@@ -1,0 +1,73 @@
+"""EAIK: all solutions at once by subproblems, for arms whose axes allow it.
+
+Some of what it returns are least-squares answers to what cannot be solved, marked `is_LS`; those
+are left out, and so are solutions beyond the limits, after whole turns are tried. It needs no
+start.
+"""
+
+import numpy as np
+from eaik.pybindings import EAIK
+
+from reference.arguments import FloatArray
+
+from ...experiments.robots.evaluate import LIMIT_TOLERANCE, Tolerance
+from ...experiments.robots.problem import Robot, links
+from .protocol import Answer, Ask, Solve, UnableError, needs_a_chain
+
+TURN = 2.0 * np.pi
+MOST = 6
+
+
+def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
+    """Return the solver, set up for a robot; it has no tolerance to be told.
+
+    Raises:
+        UnableError: if it knows no decomposition of this robot.
+    """
+    needs_a_chain(robot)
+    axes, offsets, turned = axes_at_zero(robot)
+    if len(axes) > MOST:
+        raise UnableError(f"takes {MOST} hinges at the most")
+    engine = EAIK.Robot(axes.T, offsets.T, turned, [], True)
+    if not engine.has_known_decomposition():
+        raise UnableError("knows no decomposition of this arm")
+
+    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
+        goal = np.eye(4)
+        goal[:3, :3], goal[:3, 3] = rotations[0], positions[0]
+
+        def solve() -> Answer:
+            found = engine.calculate_IK(goal)
+            exact = [q for q, nearest in zip(found.Q, found.is_LS, strict=True) if not nearest]
+            for q in exact:
+                q = within(robot, np.asarray(q))
+                if ((q >= robot.lower) & (q <= robot.upper)).all():
+                    return Answer(q, True)
+            return Answer(None, False)
+
+        return solve
+
+    return ask
+
+
+def within(robot: Robot, q: FloatArray) -> FloatArray:
+    """Return angles brought within the limits by whole turns where that can be done."""
+    q = q + TURN * np.ceil((robot.lower - LIMIT_TOLERANCE - q) / TURN).clip(0.0)
+    q = q - TURN * np.ceil((q - robot.upper - LIMIT_TOLERANCE) / TURN).clip(0.0)
+    nearest = np.clip(q, robot.lower, robot.upper)
+    return np.where(np.abs(q - nearest) <= LIMIT_TOLERANCE, nearest, q)
+
+
+def axes_at_zero(robot: Robot) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return axes (joint, 3), offsets between them (joint + 1, 3), and the tip's rotation.
+
+    All are in the frame of the root, with every joint at zero.
+    """
+    T, axes, places = np.eye(4), [], [np.zeros(3)]
+    for transform, axis in links(robot):
+        T = T @ transform
+        if axis is not None:
+            axes.append(T[:3, :3] @ axis)
+            places.append(T[:3, 3])
+    places.append(T[:3, 3])
+    return np.array(axes), np.diff(places, axis=0), T[:3, :3]

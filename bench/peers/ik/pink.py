@@ -1,0 +1,55 @@
+"""pink: differential inverse kinematics by quadratic programs, iterated to a target.
+
+Each step asks for all of the error at once (gain 1 over 1 s) within the joint limits. A tip whose
+rotation is not wanted has no cost for it. Velocity limits are left out: there is no motion here.
+"""
+
+import numpy as np
+import pink
+
+from reference.arguments import FloatArray
+
+from ...experiments.robots.evaluate import Tolerance
+from ...experiments.robots.problem import Robot
+from .pinocchio_model import from_pinocchio, pinocchio_model, to_pinocchio
+from .protocol import Answer, Ask, Solve
+
+
+def prepare(
+    robot: Robot, tolerance: Tolerance, iterations: int = 200, damping: float = 1e-12
+) -> Ask:
+    """Return the solver, set up for a robot."""
+    model = pinocchio_model(robot)
+    data = model.createData()
+    limits = [pink.limits.ConfigurationLimit(model)]
+    tasks = [pink.FrameTask(tip, 1.0, 1.0 if robot.posed else 0.0) for tip in robot.tips]
+
+    def solved(configuration: pink.Configuration) -> bool:
+        errors = np.array([task.compute_error(configuration) for task in tasks])
+        sizes = np.linalg.norm(errors.reshape(len(tasks), 2, 3), axis=-1)
+        limit = (tolerance.position, tolerance.rotation if robot.posed else np.inf)
+        return bool((sizes <= limit).all())
+
+    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
+        goals = [
+            pink.configuration.pin.SE3(R, x) for R, x in zip(rotations, positions, strict=True)
+        ]
+        q0 = to_pinocchio(robot, start)
+
+        def solve() -> Answer:
+            for task, goal in zip(tasks, goals, strict=True):
+                task.set_target(goal)
+            configuration = pink.Configuration(model, data, q0)
+            for _ in range(iterations):
+                if solved(configuration):
+                    break
+                velocity = pink.solve_ik(
+                    configuration, tasks, 1.0, solver="daqp", damping=damping, limits=limits,
+                    safety_break=False,
+                )  # fmt: skip
+                configuration.integrate_inplace(velocity, 1.0)
+            return Answer(from_pinocchio(robot, configuration.q), solved(configuration))
+
+        return solve
+
+    return ask

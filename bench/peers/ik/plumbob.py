@@ -1,0 +1,42 @@
+"""Plumbob's own solvers, through their public interface, on what its readers make of the text."""
+
+from typing import Any
+
+from reference import Outcome, Target, rotation, solve_ik
+from reference.arguments import FloatArray
+from reference.formats import mjcf, urdf
+
+from ...experiments.robots.evaluate import Tolerance
+from ...experiments.robots.problem import Robot
+from .protocol import Answer, Ask, Solve
+
+
+def prepare(
+    robot: Robot,
+    tolerance: Tolerance,
+    solver: str = "levenberg_marquardt",
+    restarts: int = 0,
+    iterations: int = 200,
+) -> Ask:
+    """Return the solver, set up for a robot."""
+    read = urdf.parse if robot.is_chain else mjcf.parse
+    articulation = read(robot.text).articulation
+    settings: dict[str, Any] = {
+        "solver": solver, "restarts": restarts, "max_iterations": iterations,
+        "tolerance": tolerance.position, "tolerance_rotation": tolerance.rotation,
+    }  # fmt: skip
+
+    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
+        turns = rotation.from_matrix(rotations) if robot.posed else [None] * len(robot.tips)
+        targets = [
+            Target(position, turn, tip)
+            for position, turn, tip in zip(positions, turns, robot.tips, strict=True)
+        ]
+
+        def solve() -> Answer:
+            solution = solve_ik(articulation, start, targets, **settings)
+            return Answer(solution.coordinates, solution.outcome == Outcome.CONVERGED)
+
+        return solve
+
+    return ask

@@ -1,0 +1,68 @@
+"""What the bench asks of a solver for robots.
+
+An adapter is a module with one function, `prepare(robot, tolerance, **settings)`: it sets the
+engine up once for a robot and returns a function `ask(positions, rotations, start)`. That puts one
+target in the engine's own words and returns the call to be timed, which returns an `Answer`. So
+conversions cost no solver anything, and set-up is timed apart.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from reference.arguments import FloatArray
+
+from ...experiments.robots.evaluate import Tolerance
+from ...experiments.robots.problem import Robot
+
+
+class Answer(NamedTuple):
+    """What a solver found.
+
+    Attributes:
+        q: the coordinates, in the robot's order; None if it returns none.
+        claimed: whether it says that they solve the target; None if it does not say.
+    """
+
+    q: FloatArray | None
+    claimed: bool | None
+
+
+Solve = Callable[[], Answer]
+
+
+class Ask(Protocol):
+    """A solver that is set up for a robot."""
+
+    def __call__(self, positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
+        """Return the call that solves one target.
+
+        Args:
+            positions: of the tips [m], (tip, 3).
+            rotations: of the tips, (tip, 3, 3).
+            start: coordinates, (coordinate,).
+        """
+
+
+class Prepare(Protocol):
+    """Sets a solver up."""
+
+    def __call__(self, robot: Robot, tolerance: Tolerance, **settings: float | str) -> Ask:
+        """Return the solver, set up for a robot.
+
+        Raises:
+            ValueError: if it cannot solve this robot; the message says why.
+        """
+
+
+class UnableError(ValueError):
+    """What a solver cannot do by its making; the message says what."""
+
+
+def needs_a_chain(robot: Robot) -> None:
+    """Raise unless the robot is a chain of hinges with one tip.
+
+    Raises:
+        UnableError: if it is not.
+    """
+    if not robot.is_chain:
+        raise UnableError("takes one chain of hinges only")

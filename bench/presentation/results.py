@@ -1,0 +1,123 @@
+"""The records of a report, and how problems and solvers are written."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from ..harness.record import Record
+from .tables import words
+from .text import all_visible, shortened, visible
+
+LABELS = {
+    "ccd": "CCD",
+    "fabrik": "FABRIK",
+    "lm": "LM",
+    "local_global": "local/global",
+    "lbfgs": "L-BFGS",
+    "chebyshev": "Chebyshev",
+    "gauss_newton": "Gauss-Newton",
+    "newton_cg": "Newton-CG",
+    "newton": "Newton",
+    "levenberg_marquardt": "Levenberg-Marquardt",
+    "jacobian_transpose": "Jacobian transpose",
+    "x1": "stiffness × 1",
+    "x10": "stiffness × 10",
+    "x100": "stiffness × 100",
+}
+
+
+class Results:
+    """The records that hold numbers, in the order of the file, to be asked for by what they are."""
+
+    def __init__(self, records: Iterable[Record]) -> None:
+        """Leave out those that say why there are none."""
+        self.records = [record for record in records if not record.failed]
+
+    def all(self, suite: str, problem: str = "", **wanted: Any) -> list[Record]:
+        """Return the records of a suite whose problem begins so and whose settings are these."""
+        return [
+            record
+            for record in self.records
+            if record.suite == suite
+            and record.problem.startswith(problem)
+            and all(record.settings.get(name) == value for name, value in wanted.items())
+        ]
+
+    def one(self, suite: str, problem: str, solver: str, **wanted: Any) -> Record | None:
+        """Return the record of exactly this problem and solver, or None."""
+        for record in self.all(suite, problem, **wanted):
+            if record.problem == problem and record.solver == solver:
+                return record
+        return None
+
+
+def plain(record: Record) -> Record:
+    """Return a record whose names and notes can be shown anywhere."""
+    names = ("suite", "problem", "solver", "settings", "notes", "stamp")
+    return replace(record, **{name: all_visible(getattr(record, name)) for name in names})
+
+
+def sift(
+    make: Callable[[Results], Any], records: Sequence[Record]
+) -> tuple[list[Record], list[str]]:
+    """Return the records without those over which `make` raises, and a sentence on each of these.
+
+    Raises:
+        Exception: whatever `make` raises without any record.
+    """
+    make(Results([]))
+    return _joined(make, [], list(records))
+
+
+def _joined(
+    make: Callable[[Results], Any], fit: list[Record], more: list[Record]
+) -> tuple[list[Record], list[str]]:
+    """Return what of more records fits to those that fit already, by halves, and what is said."""
+    try:
+        make(Results([*fit, *more]))
+        return [*fit, *more], []
+    except Exception as error:  # a record may hold anything
+        if len(more) == 1:
+            return fit, [_does_not_fit(more[0], error)]
+    half, said = len(more) // 2, []
+    for part in (more[:half], more[half:]):
+        fit, sentences = _joined(make, fit, part)
+        said += sentences
+    return fit, said
+
+
+def _does_not_fit(record: Record, error: Exception) -> str:
+    names = ", ".join(shortened(name, 40) for name in (record.problem, record.solver))
+    why = shortened(visible(f"{type(error).__name__}: {error}"), 100)
+    return f"The record of {names} is left out, for no table can be made of what it holds ({why})."
+
+
+def label(name: str) -> str:
+    """Return how a problem or solver is written: "arm/plumb_bob" as "arm, plumb bob"."""
+    return ", ".join(LABELS.get(part, part.replace("_", " ")) for part in name.split("/"))
+
+
+def problems(records: Iterable[Record]) -> list[str]:
+    """Return the names of the problems, each once, in the order of the records."""
+    return list(dict.fromkeys(record.problem for record in records))
+
+
+def solvers(records: Iterable[Record]) -> list[str]:
+    """Return the names of the solvers, each once, in the order of the records."""
+    return list(dict.fromkeys(record.solver for record in records))
+
+
+def settings(records: Iterable[Record], name: str) -> str:
+    """Return the values of a setting as words, smallest first: "100 or 1,000"."""
+    values = sorted({r.settings[name] for r in records if name in r.settings})
+    return listed([words(value) for value in values], "or")
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Return names as a list in a sentence: "a, b and c"."""
+    return f" {last} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+
+
+def counted(count: int, name: str) -> str:
+    """Return a count of things: "1 iteration", "2 iterations"."""
+    return f"{words(count)} {name}{'' if count == 1 else 's'}"

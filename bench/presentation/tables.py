@@ -1,0 +1,238 @@
+"""A table as a value, and its three forms for others: Markdown, LaTeX (booktabs), CSV.
+
+Tables compute nothing: the cells arrive as numbers and leave as text.
+"""
+
+import csv
+import io
+import math
+import re
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from ..harness.metrics import Share
+
+Cell = str | int | float | bool | Share | None
+
+
+class Answer(NamedTuple):
+    """What a table says: a sentence, and points below it; empty where it says nothing."""
+
+    sentence: str = ""
+    points: tuple[str, ...] = ()
+
+
+NO_ANSWER = Answer()
+
+
+@dataclass(frozen=True)
+class Column:
+    """A heading with its unit, such as `Column("median", "µs")`; words are set to the left."""
+
+    title: str
+    unit: str = ""
+    words: bool = False
+
+    @property
+    def heading(self) -> str:
+        """Title and unit in one."""
+        return f"{self.title} [{self.unit}]" if self.unit else self.title
+
+
+@dataclass(frozen=True)
+class Table:
+    """A named table.
+
+    Attributes:
+        name: the stem of its files.
+        title: what it is called.
+        columns: one heading a column; the first names the row.
+        rows: the cells; None where nothing was measured.
+        shows: one sentence on what can be read off.
+        measured: one sentence on how the numbers came about.
+        answer: what the numbers say, generated from them.
+    """
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    shows: str = ""
+    measured: str = ""
+    answer: Answer = NO_ANSWER
+
+    def __post_init__(self) -> None:
+        """Refuse ragged rows and headings that stand twice."""
+        if len({column.heading for column in self.columns}) < len(self.columns):
+            raise ValueError(f"columns: expected distinct headings in table {self.name}")
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(
+                    f"rows: expected {len(self.columns)} cells in table {self.name}, got {len(row)}"
+                )
+
+
+def words(cell: Cell) -> str:
+    """Return a cell as plain text: three significant digits, powers of ten as 1.2e-5."""
+    if cell is None:
+        return "–"
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    if isinstance(cell, Share):
+        return _share(cell)
+    if isinstance(cell, str):
+        return " ".join(cell.split())
+    return f"{cell:,}" if isinstance(cell, int) else _number(float(cell))
+
+
+def markdown(table: Table) -> str:
+    """Return the table in GitHub's Markdown, titled and explained."""
+    head = [_markdown(column.heading) for column in table.columns]
+    rule = ["---" if column.words else "---:" for column in table.columns]
+    body = [[_markdown(words(cell)) for cell in row] for row in table.rows]
+    lines = ["| " + " | ".join(row) + " |" for row in (head, rule, *body)]
+    points = "\n".join(f"- {_markdown(point)}" for point in table.answer.points)
+    about = [_markdown(text) for text in (table.shows, table.measured)]
+    parts = [f"# {_markdown(table.title)}", _markdown(table.answer.sentence), points, *about]
+    return "\n\n".join([*filter(None, parts), "\n".join(lines)]) + "\n"
+
+
+def latex(table: Table) -> str:
+    """Return the table as LaTeX for the packages booktabs and graphicx.
+
+    A table that is wider than the line is shrunk to it.
+    """
+    align = "".join("l" if column.words else "r" for column in table.columns)
+    head = " & ".join(_latex(column.heading) for column in table.columns)
+    caption = " ".join(_latex(text) for text in (table.title + ".", table.shows) if text)
+    return "\n".join(
+        [
+            r"% needs \usepackage{booktabs,graphicx}",
+            r"\begin{table}",
+            r"  \centering",
+            rf"  \caption{{{caption}}}",
+            rf"  \label{{tab:{table.name}}}",
+            r"  \resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
+            rf"  \begin{{tabular}}{{{align}}}",
+            r"    \toprule",
+            rf"    {head} \\",
+            r"    \midrule",
+            *(f"    {line}" for line in _latex_rows(table)),
+            r"    \bottomrule",
+            r"  \end{tabular}}",
+            r"\end{table}",
+            "",
+        ]
+    )
+
+
+def comma_separated(table: Table) -> str:
+    """Return the table as CSV, all digits kept; a share becomes hits, total and interval."""
+    spread_out = [
+        any(isinstance(row[i], Share) for row in table.rows) for i in range(len(table.columns))
+    ]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(_csv_head(table, spread_out))
+    for row in table.rows:
+        writer.writerow([part for i, cell in enumerate(row) for part in _csv(cell, spread_out[i])])
+    return text.getvalue()
+
+
+def _number(value: float) -> str:
+    if not math.isfinite(value):
+        return "not a number" if math.isnan(value) else ("infinite" if value > 0 else "-infinite")
+    if value == 0:
+        return "0"
+    power = int(f"{value:.2e}".split("e")[1])
+    if power < -3 or power > 6:
+        mantissa, exponent = f"{value:.1e}".split("e")
+        return f"{mantissa}e{int(exponent)}"
+    return f"{float(f'{value:.3g}'):,.{max(0, 2 - power)}f}"
+
+
+def _share(share: Share) -> str:
+    if share.total == 0:
+        return "–"
+    rates = (share.hits / share.total, share.low, share.high)
+    digits = max(1, len(str(share.total - 1)) - 2)  # one missed of all is seen
+    percent, low, high = (_trimmed(f"{100 * rate:.{digits}f}") for rate in rates)
+    return f"{share.hits}/{share.total} = {percent} % ({low}–{high})"
+
+
+def _trimmed(digits: str) -> str:
+    return digits.rstrip("0").rstrip(".")
+
+
+_MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=]|(?<=^\d)[.)])")
+
+
+def _markdown(text: str) -> str:
+    return _MARKDOWN.sub(r"\\\1", " ".join(text.split()))
+
+
+_LATEX = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "[": "{[}",  # else an option of the end of the row before
+    "]": "{]}",
+    "*": "{*}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "%": r"\%",
+    "_": r"\_",
+    "^": r"\textasciicircum{}",
+    "~": r"\textasciitilde{}",
+    "<": r"\ensuremath{<}",
+    ">": r"\ensuremath{>}",
+    "|": r"\textbar{}",
+    "–": "--",
+    "−": r"\ensuremath{-}",
+    "µ": r"\textmu{}",
+    "°": r"\textdegree{}",
+    "²": r"\textsuperscript{2}",
+    "×": r"\ensuremath{\times}",
+    "·": r"\ensuremath{\cdot}",
+    "≤": r"\ensuremath{\leq}",
+    "≥": r"\ensuremath{\geq}",
+    "→": r"\ensuremath{\to}",
+}
+POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?!\w)")
+
+
+def _latex(text: str) -> str:
+    escaped = "".join(_LATEX.get(letter, letter) for letter in " ".join(text.split()))
+    return POWER.sub(r"$\1 \\cdot 10^{\2}$", escaped)
+
+
+def _latex_rows(table: Table) -> list[str]:
+    lines: list[str] = []
+    previous = None
+    grouped = len({row[0] for row in table.rows}) < len(table.rows)
+    for row in table.rows:
+        if grouped and lines and row[0] != previous:
+            lines.append(r"\addlinespace")
+        first = "" if row[0] == previous else _latex(words(row[0]))
+        lines.append(" & ".join([first, *(_latex(words(cell)) for cell in row[1:])]) + r" \\")
+        previous = row[0]
+    return lines
+
+
+def _csv_head(table: Table, spread_out: list[bool]) -> list[str]:
+    parts = ("hits", "total", "95 % low", "95 % high")
+    head: list[str] = []
+    for column, several in zip(table.columns, spread_out, strict=True):
+        # What stands in brackets, "(95 % interval)", belongs to the form that the parts replace.
+        title = column.title.partition(" (")[0]
+        head += [f"{title}, {part}" for part in parts] if several else [column.heading]
+    return head
+
+
+def _csv(cell: Cell, spread_out: bool) -> list[Any]:
+    if spread_out:
+        return list(cell) if isinstance(cell, Share) else ["", "", "", ""]
+    if cell is None:
+        return [""]
+    return [words(cell)] if isinstance(cell, bool | str) else [repr(cell)]

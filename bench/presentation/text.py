@@ -1,0 +1,29 @@
+"""Names from elsewhere as text that no terminal, browser or parser takes for an instruction."""
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def visible(text: str) -> str:
+    """Return one line in which whatever does not print is written as an escape, as in Python."""
+    spaced = " ".join(text.split())
+    if spaced.isprintable():
+        return spaced
+    return "".join(
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+        for letter in spaced
+    )
+
+
+def all_visible(value: Any) -> Any:
+    """Return a value with every text in it, keys of mappings included, made visible."""
+    if isinstance(value, str):
+        return visible(value)
+    if isinstance(value, Mapping):
+        return {all_visible(key): all_visible(inner) for key, inner in value.items()}
+    return value
+
+
+def shortened(text: str, length: int) -> str:
+    """Return the text, its end cut off if it is longer."""
+    return text if len(text) <= length else f"{text[: length - 1]}…"

@@ -1,1 +1,0 @@
-"""Named problems: the same name and size give the same numbers on every machine."""

@@ -1,0 +1,91 @@
+"""What Pinocchio 4.1 is known to read otherwise than MuJoCo in an MJCF file, told from the file.
+
+Each is a test of its own, on a file that holds little else.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from ..engines.file_kind import MJCF, file_kind, xml_root
+
+JOINTS = ("joint", "freejoint")
+ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+
+OUTER_ROOT = "a first body without a joint is put at the world's origin"
+TURNED_ROOT = "a free body that the file shows at x, turned by R, is shifted by x - R x"
+CLASS_ANCHOR = "the anchor (pos) that a joint has from its default class is not read"
+SHARED_REF = "the ref of one of several joints of a body is not read"
+FRAME = "a <frame> is passed over with the joints and bodies in it"
+INCLUDE = "included files are not read"
+NAMELESS = "bodies without a name are passed over, or taken for each other"
+
+
+def departures(path: Path) -> list[str]:
+    """Return what in a file Pinocchio is known to read otherwise, in sentences; none in a URDF."""
+    try:
+        root = xml_root(path) if file_kind(path) == MJCF else Element("robot")
+    except (ValueError, OSError):
+        return []
+    return [said for said, holds in DEPARTURES.items() if holds(root)]
+
+
+def _outer_root(root: Element) -> bool:
+    body = root.find("worldbody/body")
+    return body is not None and not _joints(body) and _has(body, "pos", *ORIENTATIONS)
+
+
+def _turned_root(root: Element) -> bool:
+    return any(
+        _has(body, *ORIENTATIONS)
+        and any(joint.tag == "freejoint" or joint.get("type") == "free" for joint in _joints(body))
+        for body in root.iter("body")
+    )
+
+
+def _class_anchor(root: Element) -> bool:
+    return any(_has(joint, "pos") for joint in _defaults(root))
+
+
+def _shared_ref(root: Element) -> bool:
+    by_class = any(_has(joint, "ref") for joint in _defaults(root))
+    return any(
+        len(joints) > 1 and (by_class or any(_has(joint, "ref") for joint in joints))
+        for joints in map(_joints, root.iter("body"))
+    )
+
+
+def _frame(root: Element) -> bool:
+    inner = (element for frame in root.iter("frame") for element in frame.iter())
+    return any(element.tag in ("body", *JOINTS) for element in inner)
+
+
+def _include(root: Element) -> bool:
+    return root.find(".//include") is not None
+
+
+def _nameless(root: Element) -> bool:
+    return any(not body.get("name") for body in root.iter("body"))
+
+
+def _joints(body: Element) -> list[Element]:
+    return [child for child in body if child.tag in JOINTS]
+
+
+def _defaults(root: Element) -> list[Element]:
+    return [joint for grade in root.iter("default") for joint in grade.findall("joint")]
+
+
+def _has(element: Element, *attributes: str) -> bool:
+    return any(name in element.attrib for name in attributes)
+
+
+DEPARTURES: dict[str, Callable[[Element], bool]] = {
+    OUTER_ROOT: _outer_root,
+    TURNED_ROOT: _turned_root,
+    CLASS_ANCHOR: _class_anchor,
+    SHARED_REF: _shared_ref,
+    FRAME: _frame,
+    INCLUDE: _include,
+    NAMELESS: _nameless,
+}

@@ -1,0 +1,189 @@
+"""Anyone's answer to an inverse-kinematics problem, held against forward kinematics.
+
+Answers in single precision hold quaternions that are off unit length by 1e-5 after some hundred
+products. They are normalised, and how far they were off is told beside the distances, not instead.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import arguments, rotation
+from ..arguments import FloatArray, frozen
+from ..articulation import Articulation, joint_excess
+from ..inverse_kinematics.problem import Target, Wanted, check_numbers, checked_targets
+from ..kinematics import forward_kinematics
+from ..model import Model, checked_model, coordinates_name
+from ..skeleton import Skeleton
+
+
+@dataclass(frozen=True, eq=False)
+class PoseJudgement:
+    """What is known of a pose that is said to bring effectors to targets.
+
+    Attributes:
+        distance: from effector to target [m], the largest of several.
+        angle: from the effector's to the target's rotation [rad], the largest of several; 0 where
+            no rotation is asked for.
+        distances: from each effector to its target [m], (target,).
+        angles: likewise [rad], (target,).
+        norm_deviation: the largest difference of a quaternion's length from one, as given.
+        limit_excess: how far each joint is beyond its limits [rad, of slides m], (joint,).
+        position_error: the largest distance between a joint's position as given and where the
+            rotations put it [m]; None if no positions were given.
+        length_error: the largest difference between a link's length by the positions given and as
+            the model has it [m]; None if none were given. Links that slide are left out.
+        positions: of all joints by forward kinematics of the normalised pose [m], (joint, 3).
+        names: of the joints.
+        tolerance: distance that counts as reached [m].
+        tolerance_rotation: angle that does [rad].
+    """
+
+    distance: float
+    angle: float
+    distances: FloatArray
+    angles: FloatArray
+    norm_deviation: float
+    limit_excess: FloatArray
+    position_error: float | None
+    length_error: float | None
+    positions: FloatArray
+    names: tuple[str, ...]
+    tolerance: float
+    tolerance_rotation: float
+
+    @property
+    def reached(self) -> bool:
+        """Whether every effector is on its target, within the tolerances."""
+        return self.distance <= self.tolerance and self.angle <= self.tolerance_rotation
+
+    @property
+    def summary(self) -> str:
+        """What was found, in a few sentences."""
+        return " ".join([self._targets(), *self._limits(), *self._given(), self._norms()])
+
+    def _targets(self) -> str:
+        verb = "is" if self.reached else "is not"
+        angle = f" and {self.angle:.2g} rad" if self.angle else ""
+        return f"The target {verb} reached: the effector is {self.distance:.2g} m{angle} off."
+
+    def _limits(self) -> list[str]:
+        beyond = np.flatnonzero(self.limit_excess > 0.0)
+        if not len(beyond):
+            return []
+        worst = int(self.limit_excess.argmax())
+        return [
+            f"{len(beyond)} joints are beyond their limits, {self.names[worst]} by "
+            f"{self.limit_excess[worst]:.2g}."
+        ]
+
+    def _given(self) -> list[str]:
+        if self.position_error is None:
+            return []
+        return [
+            f"The positions given are up to {self.position_error:.2g} m from where the rotations "
+            f"put the joints, and change a link's length by up to {self.length_error:.2g} m."
+        ]
+
+    def _norms(self) -> str:
+        return f"Quaternions are up to {self.norm_deviation:.2g} off unit length."
+
+
+def judge_pose(
+    model: Model,
+    pose: ArrayLike,
+    target: ArrayLike | Target | Sequence[Target],
+    effector: int | str | None = None,
+    *,
+    positions: ArrayLike | None = None,
+    tolerance: float = 1e-4,
+    tolerance_rotation: float = 1e-4,
+) -> PoseJudgement:
+    """Return how far a pose is from its targets, its limits, and the positions said to be its own.
+
+    Args:
+        model: a Skeleton, an Articulation, or a Robot read from a file.
+        pose: local rotations of a Skeleton, (joint, 4), w first, or coordinates q of an
+            Articulation, (coordinate,); quaternions of any length but zero.
+        target: as for `solve_ik`, of one pose.
+        effector: as for `solve_ik`.
+        positions: global positions of all joints that came with the pose [m], (joint, 3).
+        tolerance: distance that counts as reached [m].
+        tolerance_rotation: angle that counts as reached [rad].
+
+    Raises:
+        ValueError: if an argument has another shape or is not finite, a quaternion has no length,
+            or there is no such effector.
+    """
+    model = checked_model(model, "model")
+    unit, deviation = _normalised(model, pose)
+    wanted = check_numbers(checked_targets(model, target, effector))
+    found = forward_kinematics(model, unit)
+    distances = [_distance(one, found.positions[one.joint]) for one in wanted]
+    angles = [_angle(one, found.rotations[one.joint]) for one in wanted]
+    tree = model if isinstance(model, Skeleton) else model.skeleton
+    moved, stretched = _compared(model, tree, found.positions, positions)
+    return PoseJudgement(
+        max(distances), max(angles), frozen(np.array(distances)), frozen(np.array(angles)),
+        deviation, frozen(_limit_excess(model, unit)), moved, stretched, found.positions,
+        tree.names, arguments.number("tolerance", tolerance, least=0.0),
+        arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
+    )  # fmt: skip
+
+
+def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatArray, float]:
+    """Return the pose with unit quaternions, and how far one was off at most."""
+    name = coordinates_name(model)
+    if isinstance(model, Skeleton):
+        given = arguments.array(name, pose, model.joint_count, 4)
+        unit, deviation = rotation.normalise(given)
+        return unit, float(deviation.max())
+    unit = arguments.coordinates(name, pose, model.coordinate_count).copy()
+    worst = 0.0
+    for joint, kind in enumerate(model.kinds):
+        if kind in ("ball", "free"):
+            end = model.coordinates_of(joint).stop
+            unit[end - 4 : end], deviation = rotation.normalise(unit[end - 4 : end])
+            worst = max(worst, float(deviation))
+    return unit, worst
+
+
+def _distance(wanted: Wanted, position: FloatArray) -> float:
+    if wanted.position.ndim != 1:
+        raise ValueError(
+            f"target: expected shape (3,), got {arguments.shape(wanted.position.shape)}"
+        )
+    return float(np.linalg.norm(position - wanted.position))
+
+
+def _angle(wanted: Wanted, turn: FloatArray) -> float:
+    if wanted.rotation is None:
+        return 0.0
+    if wanted.rotation.ndim != 1:
+        raise ValueError(
+            f"rotation: expected shape (4,), got {arguments.shape(wanted.rotation.shape)}"
+        )
+    return float(rotation.angle(turn, wanted.rotation))
+
+
+def _limit_excess(model: Skeleton | Articulation, q: FloatArray) -> FloatArray:
+    if isinstance(model, Skeleton):
+        return np.zeros(model.joint_count)
+    return np.array([joint_excess(model.arrays, j, q) for j in range(model.joint_count)])
+
+
+def _compared(
+    model: Skeleton | Articulation, tree: Skeleton, expected: FloatArray, given: Any
+) -> tuple[float | None, float | None]:
+    """Return how far positions given are off, and how much they change the links' lengths."""
+    if given is None:
+        return None, None
+    x = arguments.coordinates("positions", given, tree.joint_count, 3)
+    moved = np.linalg.norm(x - expected, axis=-1).max()
+    kinds = ("ball",) * tree.joint_count if isinstance(model, Skeleton) else model.kinds
+    rigid = [j for j in range(1, tree.joint_count) if kinds[j] not in ("slide", "free")]
+    lengths = np.linalg.norm(x[rigid] - x[tree.parents[rigid]], axis=-1)
+    return float(moved), float(np.abs(lengths - tree.link_lengths[rigid]).max(initial=0.0))

@@ -1,0 +1,171 @@
+"""Anyone's answer to a step of implicit Euler, held against the minimiser of g.
+
+The residual |grad g(x)| / |grad g(y)| is no measure of the distance to the minimiser where springs
+are stiff, and it does not see pins at all, which are no variables of g. So positions are held
+against x*, what Newton's method comes to from y when it goes on as long as rounding lets it, by
+
+    |x - x*| / |y - x*|,
+
+over all particles and pins: 0 at x*, 1 at the inertial start y.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import FloatArray, array, coordinates, frozen
+from ..implicit_euler import ImplicitEuler
+from ..implicit_euler.certificate import Certificate
+from ..implicit_euler.objective import Objective
+from ..mass_spring import MassSpring, State
+from ..outcome import Outcome
+
+# No residual but 0 is so small: Newton's method goes on until rounding stops it.
+TOLERANCE = 1e-300
+MOST_ITERATIONS = 500
+
+
+@dataclass(frozen=True, eq=False)
+class StepJudgement:
+    """What is known of positions x that are said to be the end of a step.
+
+    Attributes:
+        error: |x - x*| / |y - x*|; 0 where both are 0, infinite where only |y - x*| is, or where
+            there is no x*.
+        distance: |x - x*| over all coordinates [m].
+        displacement: |y - x*| over all coordinates [m].
+        pin_displacement: the largest distance of a pinned particle from where the step takes it
+            [m].
+        velocity_error: the largest difference of a velocity from (x - x_n) / h [m/s]; None if no
+            velocities were given.
+        residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles.
+        certificate: what is proven about the free particles, the pins put where the step takes
+            them.
+        reference_certificate: what is proven about x*, which might be a saddle point.
+        same_minimiser: whether the minimiser near x is proven to be x* (True) or another one
+            (False); None if neither is proven.
+        minimiser: x*, shape (particle, 3) [m]; x_n if there is none.
+        iterations: how many Newton's method took to x*.
+        outcome: how it ended; unless it is `solved` there is no x*.
+    """
+
+    error: float
+    distance: float
+    displacement: float
+    pin_displacement: float
+    velocity_error: float | None
+    residual: float
+    certificate: Certificate
+    reference_certificate: Certificate
+    same_minimiser: bool | None
+    minimiser: FloatArray
+    iterations: int
+    outcome: Outcome
+
+    @property
+    def summary(self) -> str:
+        """What was found, in a few sentences, worst first."""
+        return " ".join([*self._pins(), self._distance(), self._proof(), *self._velocities()])
+
+    def _pins(self) -> list[str]:
+        if self.pin_displacement == 0.0:
+            return []
+        return [f"A pin is {self.pin_displacement:.2g} m from where the step takes it."]
+
+    def _distance(self) -> str:
+        if not self.outcome.solved:
+            return f"Newton's method found no minimiser to compare with ({self.outcome.name})."
+        doubt = "" if self.reference_certificate.covered else ", not proven to be a minimiser"
+        return (
+            f"The positions are {self.distance:.2g} m from x*, what Newton's method comes to from y"
+            f"{doubt}: {self.error:.2g} times as far as y."
+        )
+
+    def _proof(self) -> str:
+        if not self.certificate.covered:
+            return self.certificate.coverage.sentence
+        which = {
+            True: "the minimiser near x* lies",
+            False: "another minimiser, as right as that one, lies",
+            None: "a minimiser lies",
+        }[self.same_minimiser]
+        pins = " of them with the pins in place" if self.pin_displacement else ""
+        return f"Proven: {which} within {self.certificate.distance:.2g} m{pins}."
+
+    def _velocities(self) -> list[str]:
+        if self.velocity_error is None:
+            return []
+        return [f"Velocities differ from (x - x_n) / h by up to {self.velocity_error:.2g} m/s."]
+
+
+def judge_step(
+    system: MassSpring,
+    state: State,
+    h: float,
+    positions: ArrayLike,
+    velocities: ArrayLike | None = None,
+    external_forces: ArrayLike | None = None,
+    pin_positions: ArrayLike | None = None,
+) -> StepJudgement:
+    """Return how far positions are from the end of a step, and what is proven about them.
+
+    Args:
+        system: the system that steps.
+        state: where the step starts.
+        h: the step [s].
+        positions: the answer to be judged [m], shape (particle, 3).
+        velocities: its velocities [m/s], shape (particle, 3), if they are to be judged too.
+        external_forces: [N], shape (particle, 3), besides gravity; they stay through the step.
+        pin_positions: where the pinned particles, in ascending order, are at the end of the step
+            [m], shape (pinned, 3); by default they stay.
+
+    Raises:
+        ValueError: if an argument has a wrong shape or is not finite.
+    """
+    integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE, max_iterations=MOST_ITERATIONS)
+    given = external_forces, pin_positions
+    objective = integrator.objective(state, *given)
+    x = coordinates("positions", positions, system.particle_count, 3)
+    found = integrator.step(state, *given)
+    best, placed = found.state.positions, np.where(system.free[:, None], x, objective.y)
+    known, true = (integrator.certify(state, at, *given) for at in (placed, best))
+    return StepJudgement(
+        **_distances(x, best, objective.y, found.outcome.solved),
+        pin_displacement=_largest((x - objective.y)[system.pinned]),
+        velocity_error=_velocity_error(x, velocities, objective),
+        residual=integrator.certify(state, x, *given).residual,
+        certificate=known,
+        reference_certificate=true,
+        same_minimiser=known.shares_minimiser(true, float(np.linalg.norm(placed - best))),
+        minimiser=frozen(best),
+        iterations=found.iterations,
+        outcome=found.outcome,
+    )
+
+
+def _distances(x: FloatArray, best: FloatArray, y: FloatArray, solved: bool) -> dict[str, float]:
+    """Return the error, the distance |x - x*| and the displacement |y - x*|."""
+    if not solved:
+        return dict.fromkeys(("error", "distance", "displacement"), math.inf)
+    distance, displacement = float(np.linalg.norm(x - best)), float(np.linalg.norm(y - best))
+    ratio = distance / displacement if displacement > 0.0 else math.inf
+    return {
+        "error": ratio if distance > 0.0 else 0.0,
+        "distance": distance,
+        "displacement": displacement,
+    }
+
+
+def _velocity_error(
+    x: FloatArray, velocities: ArrayLike | None, objective: Objective
+) -> float | None:
+    if velocities is None:
+        return None
+    v = array("velocities", velocities, len(x), 3)
+    return _largest(v - (x - objective.x_n) / objective.h)
+
+
+def _largest(vectors: FloatArray) -> float:
+    return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))

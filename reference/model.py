@@ -1,0 +1,57 @@
+"""What takes the place of a model at the borders: a Skeleton, an Articulation, or a Robot."""
+
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from .articulation import Articulation
+from .skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from .formats.robot import Robot
+
+Model: TypeAlias = "Skeleton | Articulation | Robot"
+
+
+def checked_model(model: Any, argument: str = "skeleton") -> Skeleton | Articulation:
+    """Return the model, of a Robot its articulation.
+
+    Raises:
+        ValueError: if it is anything else; it speaks of the argument named.
+    """
+    if isinstance(model, Skeleton | Articulation):
+        return model
+    from .formats.robot import Robot  # the readers are loaded by whoever has read a robot
+
+    if isinstance(model, Robot):
+        return model.articulation
+    raise ValueError(
+        f"{argument}: expected a Skeleton, an Articulation or a Robot, got {type(model).__name__}"
+    )
+
+
+def coordinates_name(model: Skeleton | Articulation) -> str:
+    """Return what the coordinates of a model are called: q, or local_rotations of a Skeleton."""
+    return "local_rotations" if isinstance(model, Skeleton) else "q"
+
+
+def tips(model: Skeleton | Articulation) -> list[int]:
+    """Return the joints that have no children."""
+    tree = model if isinstance(model, Skeleton) else model.skeleton
+    parents = set(tree.parents.tolist())
+    return [j for j in range(tree.joint_count) if j not in parents]
+
+
+def effector_of(model: Skeleton | Articulation, effector: int | str | None) -> int:
+    """Return the index of the effector named; None is a Skeleton's last joint, else the only tip.
+
+    Raises:
+        ValueError: if there is no such joint, or it is None where there are several tips.
+    """
+    if effector is not None:
+        return model.index(effector, "effector")
+    if isinstance(model, Skeleton):
+        return model.joint_count - 1
+    ends = tips(model)
+    if len(ends) > 1:
+        names = ", ".join(model.names[j] for j in ends)
+        raise ValueError(f"effector: expected one of the tips {names}, got none")
+    return ends[0]

@@ -1,0 +1,344 @@
+"""Files of anyone beside the engines: what is found, what is said of each, what a crash costs."""
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from crosscheck.child_process import ChildProcess, LostError
+from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
+from crosscheck.robots import files, second_bvh
+from crosscheck.robots.departures import INCLUDE
+from crosscheck.robots.files import (
+    AGREES,
+    DEPARTS,
+    DIFFERS,
+    LOST,
+    NEITHER,
+    REFUSED,
+    SECOND_READER,
+    UNREAD,
+    File,
+    check,
+    compare,
+    find,
+)
+from crosscheck.tolerances import POSITION
+from reference import Skeleton, rotation
+from reference.formats import bvh, mjcf
+
+ARM = """<robot name="arm"><link name="base"/><link name="arm"/>
+<joint name="j" type="revolute"><parent link="base"/><child link="arm"/>
+<origin xyz="0.1 0.2 0.3"/><axis xyz="0 1 0"/><limit lower="{}" upper="2" effort="1" velocity="1"/>
+</joint></robot>""".format
+BODY = '<body name="{}" pos="{} 0 0"><geom size="0.1"/><joint range="-60 60"/>{}</body>'.format
+TRUNK = BODY("trunk", 0, BODY("head", 1, ""))
+PART = f"<mujocoinclude>{TRUNK}</mujocoinclude>"
+BY_CLASS = BODY("hand", 0, "").replace("<joint", '<joint class="c"')
+
+
+def character(inside):
+    return f"<mujoco><worldbody>{inside}</worldbody></mujoco>"
+
+
+def motion(count=3, joints=4):
+    skeleton = Skeleton(np.arange(-1, joints - 1), np.ones((joints, 3)))
+    return bvh.format(skeleton, rotation.random(np.random.default_rng(1), count, joints))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Return the function that writes files and returns their folder."""
+
+    def write(**texts):
+        for name, text in texts.items():
+            path = tmp_path / name.replace("__", "/").replace("_", ".")
+            path.parent.mkdir(exist_ok=True, parents=True)
+            path.write_text(text)
+        return tmp_path
+
+    return write
+
+
+class Here:
+    """Stands for a process of its own, which takes seconds to start."""
+
+    def __init__(self, prepare, patience):
+        pass
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        pass
+
+    def call(self, function, *arguments):
+        return function(*arguments)
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Let files be read in this process."""
+    monkeypatch.setattr(files, "ChildProcess", Here)
+
+
+def outcomes(folder, **options):
+    """What came of each file in a folder beside each engine, by name."""
+    return {
+        one.file.path.relative_to(folder).as_posix(): {r.engine: r for r in one.readings}
+        for one in check(find([folder]).files, **options)
+    }
+
+
+KINDS = {
+    "a.urdf": ("anything", URDF),
+    "a.URDF": ("", URDF),
+    "a.bvh": ("", BVH),
+    "a.xml": ('<?xml version="1.0"?>\n<!-- <mujoco> --><robot><link/></robot>', URDF),
+    "robot.xml": ("<!DOCTYPE robot><robot><devices/></robot>", ""),
+    "b.xml": ("\ufeff<mujoco><worldbody/></mujoco>", MJCF),
+    "c.xml": ("\n <?xml version='1.0'?>\n<mujoco>\n<include file='a'/></mujoco>", MJCF),
+    "cut.xml": ("<mujoco><worldbody><body", MJCF),
+    "d.mjcf": ("<mujoco model='a'><worldbody/></mujoco>", MJCF),
+    "e.xml": ("<mujoco><asset/></mujoco>", FRAGMENT),
+    "f.xml": (PART, FRAGMENT),
+    "g.xml": ("<!DOCTYPE html><html><mujoco/></html>", ""),
+    "h.xml": ("not XML", ""),
+    "i.xml": ("", ""),
+    "j.txt": ("<mujoco><worldbody/></mujoco>", ""),
+    "k.xml": ("<!-- " * 10**5 + "<mujoco>", ""),
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_kind_of_a_file_is_told_by_its_name_and_first_element(name, tmp_path):
+    (tmp_path / name).write_text(KINDS[name][0])
+    assert file_kind(tmp_path / name) == KINDS[name][1]
+
+
+def test_files_are_found_below_folders_in_order_and_once(folder):
+    root = folder(
+        b__b_urdf=ARM(-1), a_xml=character(TRUNK), b__a_bvh=motion(), c_xml="<other/>", d_txt="",
+        b__part_xml=PART,
+    )  # fmt: skip
+    os.mkfifo(root / "endless.xml")
+    (root / "gone.urdf").symlink_to(root / "nowhere")
+    found = find([root, root / "b", root / "a.xml"])
+    assert [(file.path.relative_to(root).as_posix(), file.kind) for file in found.files] == [
+        ("a.xml", MJCF), ("b/a.bvh", BVH), ("b/b.urdf", URDF), ("b/part.xml", FRAGMENT)
+    ]  # fmt: skip
+    assert found.others == 1
+    assert {file.root for file in found.files} == {root}
+    assert find([root / "a.xml"]).files == (File(root / "a.xml", MJCF, root),)
+
+
+def test_nothing_to_read_is_said(folder):
+    root = folder(a_txt="")
+    with pytest.raises(ValueError, match="expected URDF, MJCF or BVH files, got none"):
+        find([root])
+    with pytest.raises(ValueError, match="there is no such file or folder"):
+        find([root / "nowhere"])
+
+
+def test_everyone_agrees_on_what_all_read(folder, here):
+    root = folder(a_urdf=ARM(-1), b_xml=character(TRUNK), c_bvh=motion())
+    said = outcomes(root)
+    assert [list(readings) for readings in said.values()] == [
+        ["Pinocchio", "MuJoCo"], ["Pinocchio", "MuJoCo"], [SECOND_READER]
+    ]  # fmt: skip
+    for readings in said.values():
+        for reading in readings.values():
+            assert reading.outcome == AGREES, reading
+            assert reading.difference < 1e-14
+            assert (reading.why, reading.notes) == ("", ())
+
+
+def test_who_does_not_read_a_file_is_said_and_why(folder, here):
+    root = folder(
+        a_urdf="<robot", b_xml=character('<body name="b"><composite/></body>'),
+        c_xml=character(TRUNK + "<geom type='hfield'/>"), d_bvh="HIERARCHY", e_urdf=ARM(3),
+    )  # fmt: skip
+    said = outcomes(root)
+    assert said["a.urdf"]["Pinocchio"].outcome == NEITHER
+    assert "; the reference: a.urdf, line 1: expected well-formed" in said["a.urdf"]["MuJoCo"].why
+    assert said["b.xml"]["Pinocchio"].outcome == REFUSED
+    assert said["b.xml"]["Pinocchio"].why.startswith("b.xml, line 1: <composite>: expected every")
+    assert said["d.bvh"][SECOND_READER].outcome == REFUSED
+    assert said["e.urdf"]["MuJoCo"].outcome == AGREES
+    assert "lower 3, upper 2; read as unlimited" in said["e.urdf"]["MuJoCo"].notes[0]
+    assert all("\n" not in r.why + "".join(r.notes) for rs in said.values() for r in rs.values())
+
+
+def test_parts_that_others_include_are_told_from_models(folder, here):
+    """One that a model includes and nobody reads by itself is a part, whatever its root says."""
+    main = '<mujoco><default><default class="c"/></default><include file="hand.xml"/></mujoco>'
+    root = folder(main_xml=main, hand_xml=character(BY_CLASS), part_xml=PART)
+    checked = {one.file.path.name: one for one in check(find([root]).files)}
+    assert {name: one.file.kind for name, one in checked.items()} == {
+        "hand.xml": FRAGMENT, "main.xml": MJCF, "part.xml": FRAGMENT
+    }  # fmt: skip
+    assert checked["hand.xml"].readings == ()
+    assert checked["main.xml"].readings[1].outcome == AGREES
+    (root / "main.xml").unlink()
+    checked = {one.file.path.name: one for one in check(find([root]).files)}
+    assert checked["hand.xml"].file.kind == MJCF
+    assert checked["hand.xml"].readings[1].outcome == NEITHER
+
+
+def test_includes_are_read_from_the_whole_folder(folder, here):
+    root = folder(
+        robots__a_xml=character('<include file="../parts/trunk.xml"/>'), parts__trunk_xml=PART
+    )
+    assert outcomes(root)["robots/a.xml"]["MuJoCo"].outcome == AGREES
+    reading = outcomes(root / "robots")["a.xml"]["MuJoCo"]
+    assert reading.outcome == REFUSED
+    assert "which is outside" in reading.why
+
+
+def test_shapes_in_files_that_are_not_there_do_not_matter(folder, here):
+    mesh = '<mujoco><asset><mesh name="m" file="m.stl"/></asset><worldbody>{}</worldbody></mujoco>'
+    shape = '<geom type="mesh" mesh="m"/>'
+    root = folder(a_xml=mesh.format(TRUNK.replace("<joint", f"{shape}<joint")))
+    assert outcomes(root)["a.xml"]["MuJoCo"].outcome == AGREES
+
+
+def test_a_difference_is_excused_only_by_a_known_cause_where_mujoco_agrees(
+    folder, here, monkeypatch
+):
+    inner = '<include file="part.xml"/>'
+    root = folder(
+        a_xml=character(BODY("b", 0, inner)),
+        part_xml='<x><joint name="k" type="slide" axis="1 0 0" range="0 1"/></x>',
+    )
+    reading = outcomes(root)["a.xml"]["Pinocchio"]
+    assert (reading.outcome, reading.why) == (DEPARTS, INCLUDE)
+    assert reading.difference > 0.01
+    monkeypatch.setattr(files, "departures", lambda path: [])
+    assert outcomes(root)["a.xml"]["Pinocchio"].outcome == DIFFERS
+    file = find([root]).files[0]
+    theirs = files.Reading("Pinocchio", DIFFERS, 0.5), files.Reading("MuJoCo", UNREAD)
+    monkeypatch.undo()
+    assert files._with_causes(file, list(theirs)) == theirs
+
+
+BLIND = {
+    "a body of a character elsewhere": ("a.xml", character(TRUNK), 'pos="1', 'pos="1.000001'),
+    "an axis": ("a.urdf", ARM(-1), "0 1 0", "0 1 1e-9"),
+    "an offset": ("a.bvh", motion(), "OFFSET 1.000000", "OFFSET 1.000001"),
+    "a rotation": ("a.bvh", motion(), "Zrotation X", "Xrotation Z"),
+}
+
+
+@pytest.mark.parametrize("name", BLIND)
+def test_what_is_read_otherwise_differs(name, tmp_path, monkeypatch):
+    """The reference is made to read another file than the engines."""
+    path, text, pattern, instead = BLIND[name]
+    assert pattern in text
+    (tmp_path / path).write_text(text)
+    other = tmp_path / "other" / path
+    other.parent.mkdir()
+    other.write_text(text.replace(pattern, instead))
+    file = find([tmp_path / path]).files[0]
+    for engine in files.ENGINES[file.kind]:
+        assert compare(engine, file).outcome == AGREES
+    for reader in (bvh, mjcf, files.Model):
+        read = reader.read
+        monkeypatch.setattr(
+            reader, "read",
+            (lambda self, read=read, **options: read(files.Model("", other), **options))
+            if reader is files.Model
+            else (lambda _, read=read, **options: read(other)),
+        )  # fmt: skip
+    for engine in files.ENGINES[file.kind]:
+        reading = compare(engine, file)
+        assert reading.outcome == DIFFERS, reading
+        assert reading.difference > 1e3 * POSITION.value
+
+
+def test_white_space_before_the_declaration_keeps_no_engine_from_reading(folder, here):
+    root = folder(a_urdf='\n<?xml version="1.0"?>' + ARM(-1))
+    for reading in outcomes(root)["a.urdf"].values():
+        assert reading.outcome == AGREES
+        assert "white space before" in reading.notes[0]
+
+
+@pytest.mark.parametrize("difference", [np.nan, np.inf, 2 * POSITION.value])
+def test_what_is_no_number_differs(difference, folder, monkeypatch):
+    monkeypatch.setattr(files, "_robots", lambda *_: difference)
+    file = find([folder(a_urdf=ARM(-1))]).files[0]
+    assert compare("MuJoCo", file).outcome == DIFFERS
+
+
+def test_a_joint_that_the_second_reader_misses_differs(folder, monkeypatch):
+    file = find([folder(a_bvh=motion())]).files[0]
+    monkeypatch.setattr(files, "placements", lambda text: list(second_bvh.placements(text))[:-2])
+    assert compare(SECOND_READER, file).outcome == DIFFERS
+
+
+def test_whatever_is_raised_is_said_of_that_file(folder, monkeypatch):
+    def broken(*_):
+        raise KeyError("a")
+
+    monkeypatch.setattr(files, "_robots", broken)
+    reading = compare("MuJoCo", find([folder(a_urdf=ARM(-1))]).files[0])
+    assert (reading.outcome, reading.why) == (LOST, "it ends in KeyError: 'a'")
+
+
+def test_a_file_that_ends_an_engine_costs_that_reading_alone(folder):
+    """So many bodies in each other are more than the stack that Pinocchio 4.1 reads on holds."""
+    deep = '<body name="a">' * 60_000 + "</body>" * 60_000
+    root = folder(a_urdf=ARM(-1), c_urdf=ARM(-2), b_xml=character(deep))
+    said = outcomes(root)
+    assert said["b.xml"]["Pinocchio"].outcome == LOST
+    assert said["b.xml"]["Pinocchio"].why == "the process ends by SIGSEGV"
+    assert said["b.xml"]["MuJoCo"].outcome == NEITHER
+    assert "at most 500 elements in each other" in said["b.xml"]["MuJoCo"].why
+    for name in ("a.urdf", "c.urdf"):
+        assert {r.outcome for r in said[name].values()} == {AGREES}
+
+
+def nothing():
+    pass
+
+
+def crash(code):
+    os.kill(os.getpid(), code) if code == signal.SIGSEGV else os._exit(code)
+
+
+def loud():
+    os.write(1, b"loud")
+    os.write(2, b"loud")
+    return os.getpid()
+
+
+def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
+    with ChildProcess(nothing, patience=0.5) as child:
+        first = child.call(loud)
+        assert child.call(loud) == first != os.getpid()
+        with pytest.raises(LostError, match="ends by SIGSEGV"):
+            child.call(crash, signal.SIGSEGV)
+        with pytest.raises(LostError, match="ends with code 3"):
+            child.call(crash, 3)
+        with pytest.raises(LostError, match=r"takes longer than 0\.5 s"):
+            child.call(time.sleep, 60)
+        assert child.call(loud) not in (first, os.getpid())
+        process = child._process
+    assert not process.is_alive()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_the_second_reader_reads_what_the_first_wrote(rng):
+    skeleton = Skeleton([-1, 0, 1, 0], rng.uniform(-1, 1, (4, 3)), ["a", "b c", "b c end", "d"])
+    local = rotation.random(rng, 5, 4)
+    local[:, 2] = [1, 0, 0, 0]
+    text = bvh.format(skeleton, local)
+    pose = bvh.parse(text).pose()
+    found = {name: (x, R) for name, x, R in second_bvh.placements(text.lower().upper())}
+    assert set(found) >= {"A", "B C", "D"}
+    for name, j in (("A", 0), ("B C", 1), ("D", 3)):
+        np.testing.assert_allclose(found[name][0], pose.positions[:, j], atol=1e-14)
+        np.testing.assert_allclose(
+            found[name][1], rotation.to_matrix(pose.rotations[:, j]), atol=1e-14
+        )

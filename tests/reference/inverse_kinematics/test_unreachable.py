@@ -1,0 +1,134 @@
+"""Out of reach: what is proven, whether the iterations settled, and how much is left to gain."""
+
+import numpy as np
+import pytest
+
+from reference import (
+    Articulation,
+    Outcome,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    rotation,
+    scenes,
+    solve_ik,
+    track,
+)
+
+CLAW = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [0.5, 0, 0], [0, 3.0, 0], [0, 0, 0.5]])
+
+
+def nearest(chain, target):
+    """Return the least distance from the last joint of a chain to a target."""
+    lengths, d = chain.link_lengths, np.linalg.norm(np.asarray(target) - chain.offsets[0])
+    return max(0.0, d - lengths.sum(), 2.0 * lengths.max() - lengths.sum() - d)
+
+
+PLACES = [[3.0, 0.0, 4.0], [0.0, 5.0, 0.0], [2.9, 0.3, 0.2], [50.0, 0.0, 0.0], [0.0, -300.0, 40.0]]
+
+
+@pytest.mark.parametrize("target", PLACES)
+def test_by_default_a_chain_settles_at_the_nearest_point(target, solver):
+    """Levenberg-Marquardt left the arm 0.1 m from it; steps of two others swung by metres."""
+    arm, rest = scenes.lab_arm()
+    solution = solve_ik(arm, rest, target, solver)
+    assert solution.outcome is Outcome.UNREACHABLE
+    assert solution.residual <= nearest(arm, target) + 1e-4
+    assert solution.excess == pytest.approx(solution.residual - nearest(arm, target), abs=1e-12)
+
+
+@pytest.mark.parametrize("depth", [0.1, 0.9, 1.0])
+def test_by_default_a_chain_settles_at_the_rim_of_its_hole(depth, solver):
+    solution = solve_ik(CLAW, rotation.identity(4), [0.0, 0.0, 2.0 * (1.0 - depth)], solver)
+    assert solution.outcome is Outcome.UNREACHABLE
+    assert solution.excess == pytest.approx(solution.residual - 2.0 * depth, abs=1e-12)
+    assert solution.excess <= 1e-4
+
+
+@pytest.mark.parametrize("restarts", [0, 1])
+@pytest.mark.parametrize("articulated", [False, True])
+def test_iterations_given_are_kept_and_an_unfinished_solve_says_so(articulated, restarts, solver):
+    arm, rest = scenes.lab_arm()
+    model, q = (Articulation(arm), rest.ravel()) if articulated else (arm, rest)
+    options = {"max_iterations": 1, "restarts": restarts}
+    solution = solve_ik(model, q, [3.0, 0.5, 4.0], solver, **options)
+    assert solution.iterations <= 2 + 3 * restarts
+    assert solution.outcome.unreachable
+    assert solution.excess == pytest.approx(solution.residual - nearest(arm, [3.0, 0.5, 4.0]))
+    settled = solution.outcome is Outcome.UNREACHABLE
+    assert settled == (solution.excess <= 1e-4)
+
+
+@pytest.mark.parametrize("solver", ["levenberg_marquardt", "ccd", "fabrik"], indirect=True)
+def test_by_default_a_robot_settles(solver, chain_of_joints, rng):
+    """Where more iterations change nothing; what they have not reached is above the bound."""
+    model = chain_of_joints("hinge", rng, links=5, lower=-1.8, upper=1.8)
+    for _ in range(5):
+        way = rotation.rotate(rotation.random(rng), [0.0, 0.0, 1.0])
+        target = model.skeleton.offsets[0] + 1.5 * model.skeleton.reach() * way
+        q = model.random(rng)
+        solution = solve_ik(model, q, target, solver)
+        assert solution.outcome is Outcome.UNREACHABLE
+        more = solve_ik(model, q, target, solver, max_iterations=20000)
+        assert more.residual == pytest.approx(solution.residual, abs=1e-9)
+        assert 0.0 < solution.excess <= solution.residual
+        assert solution.excess == pytest.approx(
+            solution.residual - 0.5 * model.skeleton.reach(), abs=1e-12
+        )
+
+
+def test_where_nothing_is_proven_the_excess_is_the_residual(solver, chain_of_joints, rng):
+    model = chain_of_joints("hinge", rng, lower=-0.5, upper=0.5)
+    targets = forward_kinematics(model, rng.uniform(-3, 3, (10, 5)) * 0.1).positions[:, -1]
+    solution = solve_ik(model, model.neutral(), targets, solver, max_iterations=3)
+    assert (solution.excess == solution.residual).all()
+
+
+def test_reachable_solves_keep_the_usual_limit(solver, rng):
+    arm, rest = scenes.lab_arm()
+    solution = solve_ik(arm, rest, [0.3, 0.2, 0.4], solver, tolerance=0.0)
+    assert solution.iterations <= 100
+
+
+def test_the_history_of_a_long_solve_is_whole(rng):
+    arm, rest = scenes.lab_arm()
+    targets = np.array([[3.0, 0.0, 4.0], [0.3, 0.2, 0.4]])
+    solution = solve_ik(arm, rest, targets, "jacobian_transpose", record=True)
+    most = solution.iterations.max()
+    assert most > 100
+    assert solution.history.shape == (2, most + 1)
+    last = solution.history[np.arange(2), solution.iterations]
+    np.testing.assert_allclose(last, solution.residual, rtol=0, atol=1e-12)
+    assert (solution.history[1, solution.iterations[1] :] == last[1]).all()
+
+
+def test_the_history_of_a_skeleton_s_restarts_is_one_row(rng):
+    arm, rest = scenes.lab_arm()
+    targets = [[2.55, 0.1, 0.0], [0.3, 0.2, 0.4]]
+    options = {"max_iterations": 2, "restarts": 1, "record": True, "tolerance": 1e-12}
+    batch = solve_ik(arm, rest, targets, "ccd", **options)
+    assert batch.history.shape == (2, batch.iterations.max() + 1)
+    for i in range(2):
+        one = solve_ik(arm, rest, targets[i], "ccd", **options)
+        assert one.iterations == batch.iterations[i]
+        assert (batch.history[i, : one.iterations + 1] == one.history).all()
+        assert one.residual == batch.residual[i]
+        assert type(one.outcome) is Outcome
+    start = forward_kinematics(arm, rest).positions[-1]
+    assert batch.history[0, 0] == pytest.approx(np.linalg.norm(start - targets[0]))
+
+
+def test_tracking_out_of_reach_settles_too():
+    arm, _ = scenes.lab_arm()
+    motion = track(arm, [[3.0, 0.0, 1.0], [3.0, 0.1, 1.0]], "levenberg_marquardt")
+    assert (motion.outcome == Outcome.UNREACHABLE).all()
+    assert (motion.excess <= 1e-4).all()
+
+
+def test_two_positions_out_of_reach_have_the_greater_bound():
+    fork = Articulation(Skeleton([-1, 0, 0], [[0, 0, 0], [1, 0, 0], [0, 1, 0]]), "ball")
+    targets = [Target([3.0, 0, 0], effector=1), Target([0, 5.0, 0], effector=2)]
+    solution = solve_ik(fork, fork.neutral(), targets)
+    assert solution.outcome is Outcome.UNREACHABLE
+    assert solution.residual == pytest.approx(4.0, abs=1e-9)
+    assert solution.excess <= 1e-9

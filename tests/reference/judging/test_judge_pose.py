@@ -1,0 +1,123 @@
+"""Answers of others are judged by distances, whatever their precision."""
+
+import numpy as np
+import pytest
+
+from reference import (
+    Articulation,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    judge_pose,
+    rotation,
+    scenes,
+    solve_ik,
+)
+
+# A few roundings of float32, over arms of 2.6 m.
+SINGLE = 1e-6
+
+
+@pytest.fixture
+def arm():
+    return scenes.lab_arm()[0]
+
+
+def drifted(rng):
+    """Return rotations of the arm in float32, as off unit length as after a thousand products."""
+    return (rotation.random(rng, 5) * rng.uniform(1 - 2e-5, 1 + 2e-5, (5, 1))).astype(np.float32)
+
+
+def test_answers_in_single_precision_are_judged_where_inputs_are_refused(arm, rng):
+    for _ in range(20):
+        given = drifted(rng)
+        with pytest.raises(ValueError, match="unit quaternions"):
+            forward_kinematics(arm, given)
+        exact = given / np.linalg.norm(given.astype(float), axis=1, keepdims=True)
+        tip = forward_kinematics(arm, exact).positions[-1]
+        judged = judge_pose(arm, given, tip)
+        assert judged.reached
+        assert judged.distance <= 1e-14
+        off = np.abs(np.linalg.norm(given.astype(float), axis=1) - 1.0).max()
+        assert judged.norm_deviation == pytest.approx(off, rel=1e-9)
+
+
+def test_the_distance_and_angle_are_those_by_forward_kinematics(arm, rng):
+    local = rotation.random(rng, 5)
+    targets = [Target([0.3, 0.1, 0.2], rotation.random(rng), 3), Target([1.0, 0.2, 0.0], None, 4)]
+    pose, judged = forward_kinematics(arm, local), judge_pose(arm, local, targets)
+    expected = [np.linalg.norm(pose.positions[t.effector] - t.position) for t in targets]
+    np.testing.assert_allclose(judged.distances, expected, rtol=1e-14)
+    angle = rotation.angle(pose.rotations[3], targets[0].rotation)
+    np.testing.assert_allclose(judged.angles, [angle, 0.0], rtol=1e-14)
+    assert (judged.distance, judged.angle) == (max(expected), angle)
+    assert not judged.reached
+    assert "is not reached" in judged.summary
+
+
+def test_broken_limits_are_told_by_how_much():
+    links = Skeleton([-1, 0, 1, 2], np.eye(4, 3))
+    model = Articulation(links, ["hinge", "slide", "ball", "fixed"], lower=-0.5, upper=0.5)
+    q = np.concatenate([[0.7], [-1.5], rotation.exponential([0.0, 0.0, 0.75])])
+    judged = judge_pose(model, q, [0.0, 0.0, 0.0])
+    np.testing.assert_allclose(judged.limit_excess, [0.2, 1.0, 0.25, 0.0], atol=1e-15)
+    assert "3 joints are beyond their limits, joint1 by 1" in judged.summary
+    assert (judge_pose(model, model.neutral(), [0, 0, 0]).limit_excess == 0.0).all()
+
+
+def test_positions_that_are_not_the_pose_s_are_told(arm, rng):
+    local = rotation.random(rng, 5)
+    x = forward_kinematics(arm, local).positions.copy()
+    same = judge_pose(arm, local, x[-1], positions=x.astype(np.float32))
+    assert same.position_error <= SINGLE
+    assert same.length_error <= SINGLE
+    x[4] += 0.25 * (x[4] - x[3]) / np.linalg.norm(x[4] - x[3])
+    longer = judge_pose(arm, local, x[-1], positions=x)
+    assert longer.position_error == pytest.approx(0.25)
+    assert longer.length_error == pytest.approx(0.25)
+    assert not longer.reached  # a tip that the rotations do not lead to reaches nothing
+
+
+def test_our_own_answers_are_judged_as_they_say(arm, rng):
+    solution = solve_ik(arm, rotation.random(rng, 5), [0.3, 0.1, 0.4])
+    judged = judge_pose(arm, solution.local_rotations, [0.3, 0.1, 0.4])
+    assert judged.distance == pytest.approx(solution.residual, abs=1e-15)
+    assert judged.reached
+    assert "is reached" in judged.summary
+
+
+def test_what_is_given_stays_as_it_is(arm, rng):
+    given = 3.0 * rotation.random(rng, 5)
+    before = given.copy()
+    judged = judge_pose(arm, given, [0.0, 0.0, 0.0])
+    assert (given == before).all()
+    assert judged.norm_deviation == pytest.approx(2.0)
+    with pytest.raises(ValueError, match="read-only"):
+        judged.distances[0] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"model": 3}, "model: expected a Skeleton"),
+        ({"pose": np.zeros((5, 4))}, r"quaternions: expected lengths above 0, got 0 at index \(0,"),
+        ({"pose": np.ones((4, 4))}, r"local_rotations: expected shape \(5, 4\)"),
+        ({"pose": np.full((5, 4), np.nan)}, "local_rotations: expected finite"),
+        ({"target": np.zeros((2, 3))}, r"target: expected shape \(3,\)"),
+        ({"positions": np.zeros((4, 3))}, r"positions: expected shape \(5, 3\)"),
+        ({"effector": "hand"}, "effector: expected one of"),
+    ],
+)
+def test_bad_input_is_named(arm, change, message):
+    good = {"model": arm, "pose": rotation.identity(5), "target": np.zeros(3)}
+    with pytest.raises(ValueError, match=message):
+        judge_pose(**(good | change))
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-5, 1.0, 1e200])
+def test_normalise_makes_unit_and_tells_how_far_off_it_was(size, rng):
+    q = rotation.random(rng, 3, 5)
+    unit, deviation = rotation.normalise(size * q)
+    np.testing.assert_allclose(unit, q, rtol=1e-14)
+    np.testing.assert_allclose(deviation, np.abs(size - 1.0), rtol=1e-14, atol=4e-16)
+    assert deviation.shape == (3, 5)

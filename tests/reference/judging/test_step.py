@@ -1,0 +1,213 @@
+"""Laws of judging anyone's step: what residuals do not see is seen, and nothing more is claimed."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from reference import STEP_SOLVERS, ImplicitEuler, Outcome, State, judge_step, scenes
+from reference.mass_spring import MassSpring
+
+h = 1 / 30
+FLOAT32 = float(np.finfo(np.float32).eps)
+
+
+def swing(stiffness):
+    """A 5 x 5 cloth after three steps from rest under full gravity."""
+    system, state = scenes.lab_cloth(size=5, stiffness=stiffness, damping=0.2, gravity=9.81)
+    integrator = ImplicitEuler(system, h=h)
+    for _ in range(3):
+        state = integrator.step(state).state
+    return system, state
+
+
+@pytest.fixture(scope="module")
+def soft():
+    return swing(1e3)
+
+
+@pytest.fixture(scope="module")
+def stiff():
+    return swing(1e6)
+
+
+def local_global(system, state, iterations):
+    return ImplicitEuler(
+        system, h=h, solver="local_global", tolerance=0, max_iterations=iterations
+    ).step(state)
+
+
+def test_the_converged_step_is_the_minimiser_to_rounding_and_proven_so(soft, stiff):
+    for system, state in (soft, stiff):
+        end = ImplicitEuler(system, h=h).step(state).state
+        found = judge_step(system, state, h, end.positions, end.velocities)
+        assert found.error < 1e-9  # the tolerance is 1e-10
+        assert (found.pin_displacement, found.velocity_error) == (0.0, 0.0)
+        assert found.certificate.covered
+        assert found.same_minimiser is True
+        assert found.outcome is Outcome.AT_ROUNDING
+        assert found.distance == pytest.approx(found.error * found.displacement)
+
+
+def test_pins_half_a_metre_off_are_seen_where_the_residual_is_nothing(soft, stiff):
+    for system, state in (soft, stiff):
+        moved = state.positions[system.pinned] + [0.0, 0.5, 0.0]
+        astray = ImplicitEuler(system, h=h, tolerance=1e-11).step(state, pin_positions=moved)
+        found = judge_step(system, state, h, astray.state.positions)
+        assert found.residual < 1e-9  # below 1e-11 of |grad g(y)| as it is with these pins
+        assert found.pin_displacement == pytest.approx(0.5, abs=1e-15)
+        assert found.error > 1
+        assert found.summary.startswith("A pin is 0.5 m from where the step takes it.")
+        taken = judge_step(system, state, h, astray.state.positions, pin_positions=moved)
+        assert taken.pin_displacement == 0
+        assert taken.error < 1e-9
+
+
+def test_doing_nothing_on_a_stiff_cloth_is_no_answer_whatever_the_residual_says(stiff):
+    system, state = stiff
+    nothing = judge_step(system, state, h, state.positions)
+    assert nothing.residual < 0.05
+    assert nothing.error > 1
+    slow = judge_step(system, state, h, local_global(system, state, 20_000).state.positions)
+    assert 0.01 < slow.error < 0.1
+    assert slow.residual < 1e-3
+
+
+def test_of_a_cloth_at_rest_doing_nothing_scores_one(stiff):
+    """y is x_n there."""
+    system, state = stiff
+    state = State(state.positions, np.zeros_like(state.positions))
+    found = judge_step(system, state, h, state.positions)
+    assert found.error == 1
+    assert found.residual == 1
+
+
+def test_the_step_rounded_to_single_precision_scores_at_its_rounding(soft, stiff):
+    for system, state in (soft, stiff):
+        x = ImplicitEuler(system, h=h).step(state).state.positions
+        found = judge_step(system, state, h, x.astype(np.float32))
+        rounded = np.linalg.norm(x - x.astype(np.float32))
+        assert 0 < rounded < FLOAT32 * np.linalg.norm(x)
+        assert found.distance == pytest.approx(rounded, rel=1e-4)
+        assert found.certificate.covered
+        assert found.certificate.distance < 1.1 * rounded
+        assert found.same_minimiser is True
+
+
+def test_velocities_are_judged_by_the_positions_they_come_with(soft):
+    system, state = soft
+    end = ImplicitEuler(system, h=h).step(state).state
+    old = judge_step(system, state, h, end.positions, state.velocities)
+    expected = np.linalg.norm(state.velocities - end.velocities, axis=1).max()
+    assert old.velocity_error == pytest.approx(expected, rel=1e-12)
+    assert old.velocity_error > 0.1
+    assert judge_step(system, state, h, end.positions).velocity_error is None
+
+
+@pytest.fixture
+def buckled():
+    """A mass between two pins that are too near, held to them across; it leaves up or down."""
+    pins = [[-0.5, 0, 0], [0.5, 0, 0], [0, 0, -2], [0, 0, 2]]
+    system = MassSpring(
+        np.ones(5), [[0, 1], [0, 2], [0, 3], [0, 4]], [1, 1, 0.5, 0.5], [100, 100, 60, 60],
+        pinned=[1, 2, 3, 4], gravity=(0, 0, 0),
+    )  # fmt: skip
+    return lambda height: (system, State([[0, height, 0], *pins], np.zeros((5, 3))))
+
+
+def newton_from(system, state, x):
+    """What Newton's method comes to when it begins at x instead of y."""
+    objective = ImplicitEuler(system, h=1.0).objective(state)
+    objective.start = objective.evaluate(x)
+    iterates = STEP_SOLVERS["newton"](system, 1.0).iterates(objective)
+    return next(itertools.islice(iterates, 50, None)).positions
+
+
+def test_another_minimiser_is_said_to_be_as_right(buckled):
+    system, state = buckled(0.1)
+    other = newton_from(system, state, state.positions * [1, -4, 1])
+    found = judge_step(system, state, 1.0, other)
+    assert found.minimiser[0, 1] > 0.1 > -0.1 > other[0, 1]
+    assert found.error > 1
+    assert found.certificate.covered
+    assert found.certificate.distance < 1e-9
+    assert found.same_minimiser is False
+    assert "another minimiser, as right as that one" in found.summary
+
+
+def test_a_saddle_that_newton_comes_to_is_not_called_a_minimiser(buckled):
+    """y is one, and its gradient is zero."""
+    system, state = buckled(0.0)
+    found = judge_step(system, state, 1.0, newton_from(system, state, buckled(0.1)[1].positions))
+    assert not found.reference_certificate.covered
+    assert found.certificate.covered
+    assert found.same_minimiser is None
+    assert "not proven to be a minimiser" in found.summary
+    assert "Proven: a minimiser lies within" in found.summary
+
+
+def test_the_summary_claims_no_more_than_is_proven(soft):
+    system, state = soft
+    found = judge_step(system, state, h, state.positions)
+    assert not found.certificate.covered
+    assert found.certificate.coverage.sentence in found.summary
+    assert "Proven" not in found.summary
+    assert found.same_minimiser is None
+
+
+def test_where_there_is_no_minimiser_to_compare_with_it_is_said():
+    system = MassSpring([1e75, 2e74], [[0, 1]], 1.0, 1e75)
+    state = State(1e75 * np.eye(3)[:2], np.ones((2, 3)))
+    found = judge_step(system, state, 1e5, state.positions)
+    assert found.outcome is Outcome.DIVERGED
+    assert found.error == found.distance == math.inf
+    assert "found no minimiser" in found.summary
+
+
+def test_at_rest_only_the_rest_itself_is_without_error():
+    system, state = scenes.hanging_rope(particles=4, gravity=0.0)
+    assert judge_step(system, state, h, state.positions).error == 0
+    assert judge_step(system, state, h, state.positions + 1e-6).error == math.inf
+
+
+def test_pins_alone_are_judged_too():
+    system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
+    state = State(np.eye(3)[:2], np.zeros((2, 3)))
+    found = judge_step(system, state, h, state.positions)
+    assert (found.error, found.pin_displacement) == (0, 0)
+    assert found.certificate.covered
+
+
+def test_external_forces_are_part_of_the_step(soft):
+    system, state = soft
+    push = np.full_like(state.positions, 0.3)
+    x = ImplicitEuler(system, h=h).step(state, push).state.positions
+    assert judge_step(system, state, h, x, external_forces=push).error < 1e-9
+    assert judge_step(system, state, h, x).error > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"positions": np.zeros((24, 3))}, r"positions: expected shape \(25, 3\)"),
+        ({"positions": np.zeros((3, 25))}, r"positions: expected shape \(25, 3\)"),
+        ({"positions": np.full((25, 3), np.nan)}, "positions: expected finite numbers, got nan"),
+        ({"positions": "cloth"}, "positions: expected an array of numbers"),
+        ({"velocities": np.zeros((24, 3))}, r"velocities: expected shape \(25, 3\)"),
+        ({"h": 0.0}, "h: expected a number greater than 0"),
+        ({"system": None}, "system: expected a MassSpring"),
+        ({"state": None}, "state: expected a State"),
+        ({"pin_positions": [0.0]}, r"pin_positions: expected shape \(2, 3\)"),
+    ],
+)
+def test_a_wrong_argument_is_named(soft, change, message):
+    given = {"system": soft[0], "state": soft[1], "h": h, "positions": soft[1].positions}
+    with pytest.raises(ValueError, match=message):
+        judge_step(**(given | change))
+
+
+def test_lists_and_single_precision_are_converted(soft):
+    system, state = soft
+    x = state.positions.astype(np.float32)
+    assert judge_step(system, state, h, x).error == judge_step(system, state, h, x.tolist()).error

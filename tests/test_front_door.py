@@ -1,0 +1,74 @@
+"""The front door and the examples, which use nothing else."""
+
+import ast
+import importlib.metadata
+import os
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import plumbob
+import reference
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+# What each prints if it does what it says.
+SAYS = {
+    "arm_to_target": ["CONVERGED    tip [", "UNREACHABLE"],
+    "compare_step_solvers": ["local_global   CONVERGED", "gauss_newton"],
+    "draw_a_heart": ["frame by frame: 150 frames", "coherent: 150 frames"],
+    "falling_cloth": ["frame 9: CONVERGED", "lowest 1.4954 m"],
+    "robot_with_limits": ["CONVERGED after", "coordinates ["],
+}
+
+
+def test_every_public_name_of_the_reference_is_at_the_front_door():
+    assert set(reference.__all__) <= set(plumbob.__all__)
+    assert len(set(plumbob.__all__)) == len(plumbob.__all__)
+    for name in reference.__all__:
+        assert getattr(plumbob, name) is getattr(reference, name)
+    for name in plumbob.__all__:
+        assert hasattr(plumbob, name)
+    assert plumbob.__version__ == importlib.metadata.version("plumbob")
+
+
+def test_the_module_runs_the_command_line(tmp_path):
+    command = [sys.executable, "-m", "plumbob", "--version"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert run.stdout == f"plumbob {plumbob.__version__}\n"
+    command[-1] = "--fersh"
+    run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert run.returncode == 2
+    assert run.stderr.startswith("plumbob: ")
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_example_runs_and_says_what_it_should(path, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(path), run_name="__main__")
+    printed = capsys.readouterr().out
+    for words in SAYS[path.stem]:
+        assert words in printed
+    if path.stem == "draw_a_heart":
+        assert (tmp_path / "heart.bvh").stat().st_size > 0
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_example_fits_a_screen_and_uses_the_front_door(path):
+    source = path.read_text(encoding="utf-8")
+    assert len(source.splitlines()) <= 30
+    nodes = list(ast.walk(ast.parse(source)))
+    names = {alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names}
+    names |= {n.module for n in nodes if isinstance(n, ast.ImportFrom)}
+    assert "plumbob" in names
+    assert names <= {"plumbob", "numpy"}
+    assert ast.get_docstring(ast.parse(source))
+
+
+def test_there_are_five_examples_and_each_is_checked():
+    assert {path.stem for path in EXAMPLES} == set(SAYS)
+    assert len(EXAMPLES) == 5

@@ -1,0 +1,146 @@
+"""The locks and the script that holds them against every Python; the network is never asked."""
+
+import importlib.util
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+ROOT = Path(__file__).parents[1]
+LOCKS = [ROOT / "requirements.lock", ROOT / "requirements-peers.lock"]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+LINUX, ARM, MAC = ("linux", "x86_64"), ("linux", "aarch64"), ("darwin", "arm64")
+
+
+@pytest.fixture(scope="session")
+def pythons():
+    """The script, as a module."""
+    spec = importlib.util.spec_from_file_location("pythons", ROOT / ".ci" / "pythons.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def blocks(text):
+    """Each requirement of a lock with its hashes and comments."""
+    return re.split(r"\n(?=\S)", text.strip())
+
+
+def pins(text):
+    return [Requirement(block.partition("\\")[0].strip()) for block in blocks(text)]
+
+
+def needed(text, python, machine):
+    """The names of what a lock installs there."""
+    where = {
+        "python_version": python,
+        "python_full_version": f"{python}.0",
+        "sys_platform": machine[0],
+        "platform_machine": machine[1],
+    }
+    return {pin.name for pin in pins(text) if not pin.marker or pin.marker.evaluate(where)}
+
+
+def has_no_wheel(python, machine):
+    """What is known to have no wheel there; `make wheels` asks about everything."""
+    late = {"labmaze", "dm-control"} if python in ("3.13", "3.14") else set()
+    return late | ({"cholespy"} if machine == ARM else set())
+
+
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda path: path.name)
+def test_everything_is_pinned_with_hashes_and_no_host_is_named(lock):
+    text = lock.read_text(encoding="utf-8")
+    assert "://" not in text
+    assert "--index" not in text
+    for block, pin in zip(blocks(text), pins(text), strict=True):
+        assert "--hash=sha256:" in block, pin
+        assert [part.operator for part in pin.specifier] == ["=="]
+
+
+@pytest.mark.parametrize("machine", [LINUX, ARM, MAC], ids="-".join)
+def test_what_has_no_wheel_is_left_out_by_its_marker(pythons, machine):
+    text = LOCKS[0].read_text(encoding="utf-8")
+    for python in pythons.PYTHONS:
+        assert not needed(text, python, machine) & has_no_wheel(python, machine)
+        assert {"numpy", "numba", "pin", "mujoco", "gymnasium"} <= needed(text, python, machine)
+        unmarked = re.sub(r" ; .*? \\\n", " \\\n", text)
+        assert needed(unmarked, python, machine) >= has_no_wheel(python, machine)
+
+
+def test_the_locks_hold_what_the_project_asks_for(pythons):
+    extras = [PROJECT["optional-dependencies"][extra] for extra in pythons.EXTRAS]
+    text = LOCKS[0].read_text(encoding="utf-8")
+    pinned = {pin.name: pin.specifier for pin in pins(text)}
+    for wanted in map(Requirement, sum(extras, PROJECT["dependencies"])):
+        (pin,) = {str(part.version) for part in pinned[wanted.name.replace("_", "-")]}
+        assert pin in wanted.specifier, wanted
+
+
+def test_the_same_pythons_are_named_everywhere(pythons):
+    first, last = pythons.PYTHONS[0], pythons.PYTHONS[-1]
+    assert f"Python {first} to {last}" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"Python {first} to {last}" in (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert set(SpecifierSet(PROJECT["requires-python"]).filter(pythons.PYTHONS)) == set(
+        pythons.PYTHONS
+    )
+
+
+@pytest.fixture
+def stand_in(tmp_path):
+    """Write a program that stands in for another one."""
+
+    def write(name, source):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"#!{sys.executable}\nimport sys\n{source}\n")
+        path.chmod(0o755)
+        return path
+
+    return write
+
+
+REFUSES = "sys.exit('no\\n wheel' if '3.13' in sys.argv else 0)"
+
+
+def test_a_python_without_wheels_is_said_and_fails(pythons, stand_in, monkeypatch, capsys):
+    monkeypatch.setenv("UV", str(stand_in("uv", REFUSES)))
+    assert pythons.without_wheels(LOCKS[0], ["3.12", "3.13"], ["arm"]) == [
+        "Python 3.13 on arm: no wheel"
+    ]
+    assert pythons.main("wheels") == 1
+    assert capsys.readouterr().out.count("\n") == len(pythons.PLATFORMS)
+    monkeypatch.setenv("UV", str(stand_in("uv", "")))
+    assert pythons.main("wheels") == 0
+
+
+def test_only_wheels_are_asked_for_and_hashes_are_checked(pythons, stand_in, monkeypatch):
+    asks = "sys.exit(' '.join(sys.argv[1:]))"
+    monkeypatch.setenv("UV", str(stand_in("uv", asks)))
+    (asked,) = pythons.without_wheels(LOCKS[0], ["3.14"], ["arm"])
+    assert "--python-version 3.14 --python-platform arm" in asked
+    assert "--only-binary :all: --require-hashes" in asked
+
+
+def test_pythons_are_found_by_what_they_say_they_are(pythons, stand_in, monkeypatch, tmp_path):
+    for folder, says in (("3.12.7", "3.12"), ("3.13.1", "3.9"), ("3.14.0", "")):
+        stand_in(f"versions/{folder}/bin/python", f"print({says!r})")
+    monkeypatch.setenv("PYENV_ROOT", str(tmp_path))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert dict(pythons.installed()) == {"3.12": tmp_path / "versions/3.12.7/bin/python"}
+
+
+@pytest.mark.parametrize("failing", ["venv", "-r", "-e", "pytest", None])
+def test_a_step_that_fails_is_a_failure(pythons, stand_in, monkeypatch, tmp_path, failing):
+    """The stand-in's environments hold the stand-in itself."""
+    python = stand_in("x/bin/python", f"sys.exit({failing!r} in sys.argv)")
+    monkeypatch.setattr(pythons, "VENVS", tmp_path)
+    assert pythons.test("x", python, LOCKS[0], ["-q"]) == (failing is None)
+
+
+def test_no_such_check_is_said(pythons, capsys):
+    assert pythons.main("nothing") == 2
+    assert "wheels" in capsys.readouterr().out
