@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from . import compile_notice
 from .experiments import SUITES
 from .harness.progress import heard_by
 from .presentation.text import visible
@@ -112,6 +113,8 @@ def plumbob(
 
         print(f"plumbob {importlib.metadata.version('plumbob')}")
         raise typer.Exit
+    if sys.stderr.isatty():
+        compile_notice.install()
     if context.invoked_subcommand is not None:
         if output or fresh:
             raise ValueError(f"write options behind the command: {context.invoked_subcommand}")

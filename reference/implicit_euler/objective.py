@@ -343,7 +343,7 @@ def _evaluate_in_parallel(
     return gradient, *_join(x, h, constant, *elastic, pinned, regions, gradient, sums)
 
 
-_evaluate = TwoSpeeds(evaluate_objective)
+_evaluate = TwoSpeeds(evaluate_objective, label="the objective of implicit Euler")
 _regions = TwoSpeeds(evaluate_regions)
 _join = TwoSpeeds(join_regions)
 _rounding_bounds = TwoSpeeds(rounding_bounds)
