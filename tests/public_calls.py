@@ -91,8 +91,6 @@ INTERNAL = {
     "reference.backend.compiled.compile_kernel": "for kernels",
     "reference.backend.compiled.bind": "for kernels",
     "reference.backend.compiled.compiled_in": "for kernels",
-    "reference.backend.compiled.digest": "for kernels",
-    "reference.backend.compiled.allocates": "for kernels",
     "reference.backend.threads.in_slices": "for kernels",
     "crosscheck.verdict.Verdict": "made by check_claim alone",
     "crosscheck.verdict.Claim": "made by claims",
