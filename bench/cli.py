@@ -341,7 +341,8 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
     from rich.console import Console
 
     from .harness.record import RecordFile
-    from .presentation.sections import Results, plain, sift, tables
+    from .presentation.results import Results, plain, sift
+    from .presentation.sections import tables
 
     console = Console(
         width=None if sys.stdout.isatty() else 240, highlight=False, markup=False, emoji=False

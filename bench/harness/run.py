@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..experiments import SCALES, Block, blocks
-from ..experiments.timing import cases as timing_cases
 from ..experiments.timing.case import TIMING
+from ..experiments.timing.cases import cases as timing_cases
 from .isolation import Workshop
 from .machine import stamp
 from .progress import News

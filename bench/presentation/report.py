@@ -11,15 +11,15 @@ from string import Template
 from typing import Any, NamedTuple
 
 from ..experiments import SUITES
-from ..experiments.pictures.drawings import PICTURES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
 from . import tables
-from .figures import COLOURS, FIGURES, Drawing
-from .sections import SECTIONS, Entry, Results, Section, plain, sift
+from .entry import Entry, Figure
+from .figures import COLOURS, Drawing
+from .results import Results, plain, sift
+from .sections import SECTIONS, Section
 from .tables import Cell, Column, Table
 
 _HERE = Path(__file__).parent
-DRAWINGS = (*FIGURES, *PICTURES)
 FORMATS = {
     "md": (tables.markdown, "Markdown", "text/markdown"),
     "tex": (tables.latex, "LaTeX", "application/x-tex"),
@@ -59,7 +59,7 @@ class Shown(NamedTuple):
 
     records: Sequence[Record]
     tables: dict[Entry, Table]
-    drawings: dict[str, Drawing]
+    drawings: dict[Figure, Drawing]
 
 
 def sound(records: Sequence[Record]) -> tuple[Shown, list[str]]:
@@ -76,15 +76,20 @@ def sound(records: Sequence[Record]) -> tuple[Shown, list[str]]:
 def _shown(records: Sequence[Record]) -> Shown:
     results = Results(records)
     made = {entry: _checked(entry, results) for section in SECTIONS for entry in section.entries}
-    drawn = [draw(results) for draw in DRAWINGS]
-    return Shown(records, made, {drawing.name: drawing for drawing in drawn if drawing})
+    drawn = {draw: draw(results) for draw in all_figures()}
+    return Shown(records, made, {draw: drawing for draw, drawing in drawn.items() if drawing})
+
+
+def all_figures() -> list[Figure]:
+    """Return the figures of all sections, in order."""
+    return [draw for section in SECTIONS for entry in section.entries for draw in entry.figures]
 
 
 def _makers() -> Iterator[Callable[[Results], Any]]:
     """Yield all that makes something of records, one by one."""
     for section in SECTIONS:
         yield from (partial(_checked, entry) for entry in section.entries)
-    yield from DRAWINGS
+    yield from all_figures()
 
 
 def _checked(entry: Entry, results: Results) -> Table:
@@ -217,7 +222,7 @@ def _brief(made: dict[Entry, Table]) -> str:
     return "\n".join(items)
 
 
-def _section(section: Section, made: dict[Entry, Table], drawings: dict[str, Drawing]) -> str:
+def _section(section: Section, made: dict[Entry, Table], drawings: dict[Figure, Drawing]) -> str:
     entries = "\n".join(
         _entry(f"{section.name}-{i}", entry, made[entry], drawings)
         for i, entry in enumerate(section.entries, 1)
@@ -228,9 +233,9 @@ def _section(section: Section, made: dict[Entry, Table], drawings: dict[str, Dra
     )
 
 
-def _entry(anchor: str, entry: Entry, table: Table, drawings: dict[str, Drawing]) -> str:
+def _entry(anchor: str, entry: Entry, table: Table, drawings: dict[Figure, Drawing]) -> str:
     answer = f'<div class="answer">{_answer(table)}</div>' if table.rows else ""
-    shown = "\n".join(_drawing(drawings[name]) for name in entry.drawings if name in drawings)
+    shown = "\n".join(_drawing(drawings[draw]) for draw in entry.figures if draw in drawings)
     body = _table(table) if table.rows else '<p class="none">Not measured yet.</p>'
     return (
         f'<article id="{anchor}">\n<h3>{_text(entry.question)}</h3>\n{answer}\n{shown}\n{body}\n'

@@ -25,8 +25,8 @@ from bench.harness import metrics
 from bench.harness.isolation import Outcome, Workshop
 from bench.harness.worker import Done, Ready, Solved, Unfit
 from bench.peers.cloth import CLOTH_PEERS, EXPLICIT, LINEARISED, ClothPeer, Rung
-from bench.presentation import figures
-from bench.presentation.sections import Results
+from bench.presentation.report import all_figures
+from bench.presentation.results import Results
 from reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
 from reference.mass_spring import stiffness_matrix
 
@@ -614,7 +614,7 @@ def test_a_work_precision_diagram_has_a_panel_for_each_cloth_and_a_curve_for_eac
         for solver in ("Plumbob Newton", "MuJoCo Euler")
         for k in (1e2, 1e4)
     ]
-    made = [draw(Results(records)) for draw in figures.FIGURES]
+    made = [draw(Results(records)) for draw in all_figures()]
     drawn = {drawing.name: drawing.svg for drawing in made if drawing}
     for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", "Plumbob Newton", "MuJoCo Euler"):
         assert text in drawn[name]

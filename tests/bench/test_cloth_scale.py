@@ -11,7 +11,7 @@ from bench.experiments import SCALES, blocks
 from bench.experiments.cloth_scale import measurement as suite
 from bench.experiments.cloth_scale import tables as cloth_scale
 from bench.harness.progress import heard_by
-from bench.presentation.sections import Results
+from bench.presentation.results import Results
 from reference.implicit_euler.objective import Objective
 
 SMALL = min(suite.SIZES)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from bench.experiments import Scale, blocks
+from bench.experiments.energy import figures
 from bench.experiments.energy import measurement as suite
 from bench.experiments.energy import tables as findings
-from bench.presentation import figures
-from bench.presentation.sections import Results
+from bench.presentation.results import Results
 
 STEPS = 100
 

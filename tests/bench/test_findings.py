@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bench.experiments import SUITES
+from bench.experiments.arm import tables as arm
 from bench.experiments.chain import tables as kinematics
 from bench.experiments.check import tables as check
 from bench.experiments.closed_curves import tables as tracking
@@ -14,7 +15,8 @@ from bench.experiments.cloth import tables as cloth
 from bench.experiments.published import tables as published
 from bench.experiments.robots import tables as robots
 from bench.experiments.timing import tables as timing
-from bench.presentation.sections import SECTIONS, Results, tables
+from bench.presentation.results import Results
+from bench.presentation.sections import SECTIONS, tables
 
 
 def column(table, heading):
@@ -93,7 +95,7 @@ def test_drift_is_shown_after_each_round(make):
 
 
 def test_success_is_counted_by_the_residual_not_by_the_solver(records):
-    table = kinematics.accuracy(Results(records))
+    table = arm.accuracy(Results(records))
     shares = column(table, "within tolerance (95 % interval)")
     assert [(share.hits, share.total) for share in shares] == [(2, 3)] * 4 + [(2, 2)] * 2
     assert max(column(table, "residual, largest [m]")) == 3e-4

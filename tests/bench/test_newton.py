@@ -6,7 +6,7 @@ import pytest
 from bench.experiments import SCALES, Scale, blocks
 from bench.experiments.newton import measurement as suite
 from bench.experiments.newton import tables as findings
-from bench.presentation.sections import Results
+from bench.presentation.results import Results
 from reference import STEP_SOLVERS
 
 SIZE = 6

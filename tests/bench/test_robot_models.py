@@ -4,7 +4,7 @@ import pytest
 
 from bench.experiments.robot_models.measurement import compare
 from bench.experiments.robot_models.tables import agreement
-from bench.presentation.sections import Results
+from bench.presentation.results import Results
 from crosscheck.engines import ROBOT_ENGINES
 from crosscheck.robots.models import Model
 

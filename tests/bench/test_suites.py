@@ -6,7 +6,7 @@ import pytest
 from bench.experiments import SUITES, Scale, blocks
 from bench.experiments.cloth import measurement as cloth
 from bench.experiments.cloth.problem import cloth_swing
-from bench.experiments.timing import cases
+from bench.experiments.timing.cases import cases
 from bench.harness.machine import stamp
 from bench.harness.record import Record, decode, encode, key
 from bench.harness.run import now

@@ -1,1 +1,8 @@
 """The lab's arm: curves drawn by its effector, and targets out of reach."""
+
+from ...harness.experiment import Experiment
+
+EXPERIMENT = Experiment(
+    __package__, "arm",
+    "the lab's arm on every curve, and reaching for what is too far",
+)  # fmt: skip

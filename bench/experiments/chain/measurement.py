@@ -1,4 +1,4 @@
-"""Inverse kinematics: a ten-ball chain by us and both engines, robots, published tables."""
+"""Inverse kinematics of a ten-ball chain, by us and on the kinematics of both engines."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -14,8 +14,6 @@ from reference.arguments import FloatArray
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt
-from ..published import measurement as published
-from ..robots import measurement as robots
 from .problem import STRATA, TargetsForSkeleton, chain_targets
 
 TOLERANCE = 1e-4
@@ -37,13 +35,7 @@ class Limits(NamedTuple):
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield the chain, every stratum for every solver; then robots and published tables."""
-    yield from _chain_blocks(scale)
-    yield from robots.blocks(scale)
-    yield from published.blocks(scale)
-
-
-def _chain_blocks(scale: Scale) -> Iterator[Block]:
+    """Yield every stratum for every solver of ours, and for one loop on each engine."""
     for stratum in STRATA:
         problem = chain_targets(stratum, scale.targets)
         tolerance = BEYOND_TOLERANCE if stratum == "beyond" else TOLERANCE

@@ -12,7 +12,6 @@ from reference.mass_spring import MassSpring, damper_forces, lengths, spring_for
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ..cloth_peers import measurement as peers_cloth
 from .problem import DAMPING, FACTORS, ClothSwing, H, cloth_swing
 
 # The cloth falls for three seconds; the steps of the next second are looked at.
@@ -32,13 +31,8 @@ HALVED = tuple(H / 2**i for i in range(-1, 6))
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield, for each stiffness: consecutive Newton steps, one step's iterations, few iterations.
 
-    The cloth is the same at every scale. Then one cloth for every solver that is installed.
+    The cloth is the same at every scale.
     """
-    yield from _lab_blocks()
-    yield from peers_cloth.blocks(scale)
-
-
-def _lab_blocks() -> Iterator[Block]:
     for factor in FACTORS:
         problem = cloth_swing(factor)
         swinging = {"h": H, "first": FALLING, "steps": STEPS}

@@ -10,8 +10,8 @@ from bench.harness.machine import stamp
 from bench.harness.record import Record, RecordFile
 from bench.harness.run import TIMING, is_done, now
 
-from . import cases
 from .case import Case
+from .cases import cases
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

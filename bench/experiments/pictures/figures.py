@@ -127,6 +127,3 @@ def _ghosts(ax: Axes, ghosts: Floats) -> None:
 def _bare(ax: Axes) -> None:
     ax.set_aspect("equal")
     ax.axis("off")
-
-
-PICTURES = (arm_draws, falling_cloth)
