@@ -62,19 +62,6 @@ STYLE: dict[Any, Any] = {
     "savefig.facecolor": "none",
     "mathtext.default": "regular",
 }
-SERIES: dict[str, tuple[str, Any, str]] = {
-    "ccd": ("orange", "-", "o"),
-    "fabrik": ("blue", "--", "s"),
-    "local_global": ("orange", "-", "o"),
-    "newton": ("blue", "--", "s"),
-    "chebyshev": ("green", "-.", "^"),
-    "lbfgs": ("purple", (0, (1, 1)), "v"),
-    "newton_cg": ("brass", (0, (4, 1, 1, 1, 1, 1)), "D"),
-    "levenberg_marquardt": ("green", "-.", "^"),
-    "damped_least_squares": ("purple", (0, (1, 1)), "v"),
-    "jacobian_transpose": ("brass", (0, (4, 1, 1, 1, 1, 1)), "D"),
-}
-OTHER_SERIES = ("faint", ":", "P")
 WIDTH = 7.4
 # Letters of a name in a figure.
 LONGEST = 60

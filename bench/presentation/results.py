@@ -5,25 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 from ..harness.record import Record
+from ..peers import registry
 from .tables import words
 from .text import all_visible, shortened, visible
 
-LABELS = {
-    "ccd": "CCD",
-    "fabrik": "FABRIK",
-    "lm": "LM",
-    "local_global": "local/global",
-    "lbfgs": "L-BFGS",
-    "chebyshev": "Chebyshev",
-    "gauss_newton": "Gauss-Newton",
-    "newton_cg": "Newton-CG",
-    "newton": "Newton",
-    "levenberg_marquardt": "Levenberg-Marquardt",
-    "jacobian_transpose": "Jacobian transpose",
-    "x1": "stiffness × 1",
-    "x10": "stiffness × 10",
-    "x100": "stiffness × 100",
-}
+STIFFNESSES = {"x1": "stiffness × 1", "x10": "stiffness × 10", "x100": "stiffness × 100"}
 
 
 class Results:
@@ -94,7 +80,9 @@ def _does_not_fit(record: Record, error: Exception) -> str:
 
 def label(name: str) -> str:
     """Return how a problem or solver is written: "arm/plumb_bob" as "arm, plumb bob"."""
-    return ", ".join(LABELS.get(part, part.replace("_", " ")) for part in name.split("/"))
+    if name in {loop.name for loop in registry.LOOPS}:
+        return registry.find(name).label
+    return ", ".join(STIFFNESSES.get(part, registry.find(part).label) for part in name.split("/"))
 
 
 def problems(records: Iterable[Record]) -> list[str]:

@@ -24,7 +24,9 @@ from bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, tr
 from bench.harness import metrics
 from bench.harness.isolation import Outcome, Workshop
 from bench.harness.worker import Done, Ready, Solved, Unfit
-from bench.peers.cloth import CLOTH_PEERS, EXPLICIT, LINEARISED, ClothPeer, Rung
+from bench.peers import registry
+from bench.peers.cloth.ladder import Rung, motion_rungs, step_rungs
+from bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from bench.presentation.report import all_figures
 from bench.presentation.results import Results
 from reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
@@ -43,7 +45,7 @@ def slow_if_long_to_compile(peer):
     return pytest.param(peer, marks=marks, id=peer.title)
 
 
-@pytest.fixture(params=map(slow_if_long_to_compile, CLOTH_PEERS))
+@pytest.fixture(params=map(slow_if_long_to_compile, registry.cloth_peers()))
 def peer(request):
     """Every solver that is installed."""
     if not request.param.version:
@@ -231,7 +233,7 @@ def test_a_model_kept_by_mujoco_takes_on_the_stiffness_asked_for(stiffness):
     cloth = falling_cloth(SIZE, stiffness)
     level = falling_cloth(SIZE, STIFFNESS).system
     assert not np.array_equal(cloth.system.stiffnesses, level.stiffnesses)
-    for peer in (p for p in CLOTH_PEERS if p.engine == "MuJoCo" and p.kind == EXPLICIT):
+    for peer in (p for p in registry.cloth_peers() if p.engine == "MuJoCo" and p.kind == EXPLICIT):
         moved(peer, falling_cloth(SIZE, STIFFNESS), substeps=8)
         state = cloth.start
         for _ in range(8):
@@ -271,11 +273,11 @@ def test_by_itself_newton_gives_springs_one_colour(cloth):
 
 
 def test_every_entry_has_a_name_and_every_rung_a_label_of_its_own():
-    titles = [peer.title for peer in CLOTH_PEERS]
+    titles = [peer.title for peer in registry.cloth_peers()]
     assert len(set(titles)) == len(titles)
-    for peer in CLOTH_PEERS:
+    for peer in registry.cloth_peers():
         assert peer.title.startswith(peer.engine)
-        for rungs in (peer.step_rungs(1000.0), peer.motion_rungs(1000.0)):
+        for rungs in (step_rungs(peer, 1000.0), motion_rungs(peer, 1000.0)):
             labels = [rung.label for rung in rungs]
             assert len(set(labels)) == len(labels) > 0
 
@@ -386,13 +388,9 @@ def fake_peer(manner, package="numpy"):
     )  # fmt: skip
 
 
-class OneRung(ClothPeer):
-    """A solver that knows no substeps."""
-
-    def motion_rungs(self, frequency):
-        return [Rung("as it is", self.settings)]
-
-    step_rungs = motion_rungs
+def as_it_is(peer, frequency):
+    """The one rung of a solver that knows no substeps."""
+    return [Rung("as it is", peer.settings)]
 
 
 LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
@@ -409,7 +407,8 @@ LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
 )
 def test_every_manner_becomes_one_point(shop, monkeypatch, manner, frames, lost, why):
     monkeypatch.setattr(peers_cloth, "workshop", lambda: shop)
-    arrays, notes = peers_cloth.motion(OneRung(*fake_peer(manner)), STIFFNESS, (LEVEL,))
+    monkeypatch.setattr(peers_cloth, "motion_rungs", as_it_is)
+    arrays, notes = peers_cloth.motion(fake_peer(manner), STIFFNESS, (LEVEL,))
     assert arrays["frames"].tolist() == [frames]
     assert arrays["diverged"].tolist() == [lost]
     assert np.isfinite(arrays["true"]).all() == (not lost)
@@ -450,7 +449,7 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
 
 def test_a_ladder_ends_where_it_arrives(here):
     """Two iterations of Newton and three are asked for, and no more once 1e-9 is reached."""
-    newton = next(peer for peer in CLOTH_PEERS if peer.title == "Plumbob Newton")
+    newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
     arrays, notes = peers_cloth.one_step(newton, STIFFNESS, (LEVEL,))
     assert arrays["error"][0] > arrays["error"][-1] <= peers_cloth.NEAR_ENOUGH
     assert (arrays["error"][:-1] > peers_cloth.NEAR_ENOUGH).all()
@@ -458,14 +457,14 @@ def test_a_ladder_ends_where_it_arrives(here):
 
 
 def test_a_ladder_whose_time_is_used_is_climbed_no_further(here):
-    newton = next(peer for peer in CLOTH_PEERS if peer.title == "Plumbob Newton")
+    newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
     arrays, _ = peers_cloth.one_step(newton, STIFFNESS, (LEVEL._replace(budget=1e-9),))
     assert len(arrays["error"]) == 1
 
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
     gone = [fake_peer(name, "a-package-that-nobody-has") for name in ("one", "two")]
-    monkeypatch.setattr(peers_cloth, "CLOTH_PEERS", gone)
+    monkeypatch.setattr(registry, "cloth_peers", lambda: gone)
     missing = [b for b in peers_cloth.blocks(Scale(1, 0.1)) if b.problem == "peers/all"]
     (block,) = missing
     arrays, notes = block.measure()
@@ -515,7 +514,7 @@ def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
     """A growth of a hundredfold shows a little beyond it: (h omega)² - 4 is 7e-5, or for
     Runge-Kutta, of which |R(ih omega)| climbs with a slope of 2.5, h omega is 0.005 too large.
     """
-    peer = next(peer for peer in CLOTH_PEERS if peer.title == title)
+    peer = next(peer for peer in registry.cloth_peers() if peer.title == title)
     arrays = longest_step(peer, one_spring(), monkeypatch)
     assert arrays["frequency"] == pytest.approx([np.sqrt(7.0 / 2.0)])
     reached = np.array(arrays["limit"]) * np.array(arrays["frequency"])

@@ -17,9 +17,10 @@ from bench.experiments.robots.problem import robot
 from bench.harness import stopwatch
 from bench.harness.isolation import Workshop, raised
 from bench.harness.worker import Begun, Done, Ready, Solved, Unfit, serve
-from bench.peers.ik import ONE_START, Entry, Peer
+from bench.peers import registry
 from bench.peers.ik.protocol import Answer
 from bench.peers.ik.restarts import restarted
+from bench.peers.registry import ONE_START, Entry, Peer
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4
@@ -284,7 +285,7 @@ def suite(monkeypatch, shop):
         peer("gone", package="a-package-that-nobody-has"),
         peer("unable", manner="unable"),
     ]
-    monkeypatch.setattr(robots, "PEERS", peers)
+    monkeypatch.setattr(registry, "PEERS", peers)
     monkeypatch.setattr(robots, "ROBOTS", ("iiwa14",))
     monkeypatch.setattr(robots, "workshop", lambda: shop)
     blocks = {(b.solver, b.problem): b for b in robots.blocks(Scale(targets=3, seconds=10.0))}

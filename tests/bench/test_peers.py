@@ -11,8 +11,8 @@ from bench.experiments.robots.job import Job, perform
 from bench.experiments.robots.problem import CHARACTER, is_installed, robot
 from bench.experiments.robots.targets import robot_targets, uniform_targets, unreachable_targets
 from bench.harness.worker import Solved
-from bench.peers.ik import ONE_START, OURS, PEERS, RESTARTS
 from bench.peers.ik.protocol import UnableError
+from bench.peers.registry import ONE_START, OURS, PEERS, RESTARTS
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several tips.

@@ -4,10 +4,9 @@ from matplotlib.axes import Axes
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import registry
 from ...presentation.figures import (
     COLOURS,
-    OTHER_SERIES,
-    SERIES,
     Drawing,
     canvas,
     finished,
@@ -28,7 +27,7 @@ def jitter(results: Results) -> Drawing | None:
     height = 0.32 * len(curves) + 1.1 + legend_height(names, 1)
     with canvas(height, 1) as (figure, axes):
         for record in records:
-            colour, _, marker = SERIES.get(record.solver, OTHER_SERIES)
+            colour, _, marker = registry.find(record.solver).style
             y = curves.index(record.problem) + _aside(record.solver, names)
             warm = results.one("arm", record.problem, record.solver, warm=True)
             ends = [_largest_turn(r) for r in (record, warm) if r is not None]

@@ -4,10 +4,9 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import registry
 from ...presentation.figures import (
     COLOURS,
-    OTHER_SERIES,
-    SERIES,
     Drawing,
     canvas,
     finished,
@@ -26,7 +25,7 @@ def iterations(results: Results) -> Drawing | None:
     with canvas(2.5, len(panels)) as (figure, axes):
         for ax, (problem, records) in zip(axes, panels.items(), strict=True):
             for record in records:
-                colour, line, _ = SERIES.get(record.solver, OTHER_SERIES)
+                colour, line, _ = registry.find(record.solver).style
                 ax.stairs(
                     metrics.counts(record.arrays["iterations"], edges), edges,
                     color=COLOURS[colour], linestyle=line, fill=False, linewidth=1.6,
@@ -51,7 +50,7 @@ def ik_residuals(results: Results) -> Drawing | None:
     with canvas(2.7, len(panels), sharey=True) as (figure, axes):
         for ax, (problem, records) in zip(axes, panels.items(), strict=True):
             for record in records:
-                colour, line, _ = SERIES.get(record.solver, OTHER_SERIES)
+                colour, line, _ = registry.find(record.solver).style
                 low, median, high = (
                     record.arrays[f"history_{name}"] for name in ("low", "median", "high")
                 )

@@ -13,6 +13,7 @@ from reference.arguments import FloatArray
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
+from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt
 from .problem import STRATA, TargetsForSkeleton, chain_targets
 
@@ -24,7 +25,6 @@ MAX_ITERATIONS = 1000
 ENGINE_ITERATIONS = 200
 # The residuals of so many iterations are kept for the figure.
 HISTORY = 200
-ENGINE_SOLVER = "lm/{}"
 
 
 class Limits(NamedTuple):
@@ -44,10 +44,9 @@ def blocks(scale: Scale) -> Iterator[Block]:
             measure = partial(solve_targets, problem, solver, ours, record=True)
             yield Block("ik", problem.name, solver, measure, ours._asdict(), scale.targets)
         theirs = Limits(tolerance, ENGINE_ITERATIONS)
-        for name in SKELETON_ENGINES:
-            measure = partial(solve_with_engine, problem, name, theirs)
-            solver = ENGINE_SOLVER.format(name)
-            yield Block("ik", problem.name, solver, measure, theirs._asdict(), scale.targets)
+        for loop in registry.LOOPS:
+            measure = partial(solve_with_engine, problem, loop.engine, theirs)
+            yield Block("ik", problem.name, loop.name, measure, theirs._asdict(), scale.targets)
 
 
 def solve_targets(

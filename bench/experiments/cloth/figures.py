@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from ...peers import registry
 from ...presentation.figures import (
     COLOURS,
-    OTHER_SERIES,
-    SERIES,
     Drawing,
     canvas,
     finished,
@@ -28,7 +27,7 @@ def cloth_convergence(results: Results) -> Drawing | None:
             for j, problem in enumerate(names):
                 ax = axes[i * len(names) + j]
                 for record in (r for r in records if r.problem == problem):
-                    colour, line, _ = SERIES.get(record.solver, OTHER_SERIES)
+                    colour, line, _ = registry.find(record.solver).style
                     values = record.arrays[quantity]
                     shown = {"linestyle": line, "color": COLOURS[colour]}
                     k = np.arange(1, len(values))

@@ -12,6 +12,7 @@ from reference.mass_spring import MassSpring, damper_forces, lengths, spring_for
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
+from ...peers import registry
 from .problem import DAMPING, FACTORS, ClothSwing, H, cloth_swing
 
 # The cloth falls for three seconds; the steps of the next second are looked at.
@@ -20,9 +21,6 @@ STEPS = 60
 TOLERANCE = 1e-10
 # The step whose convergence is followed iteration by iteration.
 MIDDLE = FALLING + STEPS // 2
-CONVERGENCE = {
-    "local_global": 1000, "chebyshev": 1000, "lbfgs": 200, "newton_cg": 12, "newton": 12,
-}  # fmt: skip
 FEW = (1, 10, 100)
 # Steps in which the two laws of dampers are compared [s], each half the one before.
 HALVED = tuple(H / 2**i for i in range(-1, 6))
@@ -40,11 +38,11 @@ def blocks(scale: Scale) -> Iterator[Block]:
             "cloth", problem.name, "newton", partial(newton_steps, problem),
             {**swinging, "tolerance": TOLERANCE},
         )  # fmt: skip
-        for solver, iterations in CONVERGENCE.items():
+        for solver in registry.followed_step_solvers():
             yield Block(
-                "cloth", f"{problem.name}/one step", solver,
-                partial(one_step, problem, solver, iterations),
-                {"h": H, "step": MIDDLE, "iterations": iterations},
+                "cloth", f"{problem.name}/one step", solver.name,
+                partial(one_step, problem, solver.name, solver.followed),
+                {"h": H, "step": MIDDLE, "iterations": solver.followed},
             )  # fmt: skip
         for iterations in FEW:
             yield Block(

@@ -8,11 +8,11 @@ from reference import Outcome
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import registry
 from ...presentation.results import Results, counted, label, settings
 from ...presentation.tables import Answer, Cell, Column, Table, words
 
 LISTED = (1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000)
-RIVALS = ("local_global", "chebyshev", "lbfgs", "newton_cg", "newton")
 # Those whose residual is listed beside the error.
 CHECKED = ("local_global", "newton")
 ONE_STEP = "/one step"
@@ -82,16 +82,17 @@ def _solved(record: Record) -> np.ndarray:
 
 def convergence(results: Results) -> Table:
     """Return residual and error after each of some iterations of one step."""
+    rivals = [solver.name for solver in registry.followed_step_solvers()]
     problems = [r.problem for r in results.all("cloth") if r.problem.endswith(ONE_STEP)]
     solved = {
-        problem: {rival: results.one("cloth", problem, rival) for rival in RIVALS}
+        problem: {rival: results.one("cloth", problem, rival) for rival in rivals}
         for problem in dict.fromkeys(problems)
     }
     rows = [
         (
             _cloth(problem),
             k,
-            *(_after(by[rival], "error", k) for rival in RIVALS),
+            *(_after(by[rival], "error", k) for rival in rivals),
             *(_after(by[rival], "residual", k) for rival in CHECKED),
         )
         for problem, by in solved.items()
@@ -105,7 +106,7 @@ def convergence(results: Results) -> Table:
         (
             Column("cloth", words=True),
             Column("iterations"),
-            *(Column(f"{label(rival)}: error") for rival in RIVALS),
+            *(Column(f"{label(rival)}: error") for rival in rivals),
             *(Column(f"{label(rival)}: residual") for rival in CHECKED),
         ),
         tuple(rows),

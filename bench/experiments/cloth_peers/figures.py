@@ -2,9 +2,9 @@
 
 from matplotlib.axes import Axes
 
+from ...peers import registry
 from ...presentation.entry import Figure
 from ...presentation.figures import (
-    OTHER_SERIES,
     Drawing,
     canvas,
     every_handle,
@@ -15,8 +15,6 @@ from ...presentation.figures import (
 from ...presentation.results import Results
 from . import tables as cloth_peers
 
-# The markers of solvers for cloths, whose names begin with the engine's.
-ENGINES = {"Plumbob": "o", "MuJoCo": "s", "Newton": "^"}
 # Errors beyond this are left out: of a motion that blew up.
 MOST_DRAWN = 10.0
 
@@ -64,9 +62,14 @@ def _work_precision_curves(
         mine = [p for p in found if p.solver == solver]
         ax.plot(
             [1e3 * p.values["seconds"] for p in mine], [p.values[error] for p in mine],
-            marker=ENGINES.get(solver.partition(" ")[0], OTHER_SERIES[2]), markersize=3.5,
+            marker=_marker(solver), markersize=3.5,
             label=written(solver), **nth_style(names.index(solver)),
         )  # fmt: skip
+
+
+def _marker(solver: str) -> str:
+    """Return the marker of whose a solver is."""
+    return registry.ENGINE_MARKERS.get(registry.find(solver).engine, registry.OTHER.marker)
 
 
 def _can_be_drawn(point: cloth_peers.Point, error: str) -> bool:

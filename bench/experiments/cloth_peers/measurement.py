@@ -11,12 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference import STEP_SOLVERS, ImplicitEuler, MassSpring, State
+from reference import ImplicitEuler, MassSpring, State
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, Workshop
-from ...peers.cloth import CLOTH_PEERS, EXPLICIT, ClothPeer, Rung
+from ...peers import registry
+from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
+from ...peers.registry import EXPLICIT, ClothPeer
 from ..published import problem as published
 from .job import ClothJob
 from .problem import (
@@ -45,8 +47,7 @@ _PATIENCE, _START_PATIENCE = 60.0, 300.0
 
 # Errors whose iterations are counted, on a cloth of so many particles a side.
 DECADES = 10.0 ** -np.arange(1, 9)
-NEEDED_SIZE, NEEDED_LIMIT = 20, {"newton": 60, "newton_cg": 60, "gauss_newton": 20}
-MANY_ITERATIONS = 2000
+NEEDED_SIZE = 20
 
 # A mode is unstable if, begun with this amplitude [m], it grows so much in so many steps.
 STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
@@ -83,16 +84,17 @@ def blocks(scale: Scale) -> Iterator[Block]:
     Larger cloths, the published one among them, are for the full scale.
     """
     sizes = levels(scale)
-    for package in dict.fromkeys(peer.package for peer in CLOTH_PEERS if not peer.version):
+    peers = registry.cloth_peers()
+    for package in dict.fromkeys(peer.package for peer in peers if not peer.version):
         yield Block(SUITE, EVERY_CLOTH, package, partial(not_installed, package))
     for stiffness in STIFFNESSES:
-        for solver in STEP_SOLVERS:
+        for solver in registry.step_solvers():
             yield Block(
                 SUITE, f"{NEEDED}/k{stiffness:g}", solver,
                 partial(iterations_needed, solver, stiffness),
                 {"size": NEEDED_SIZE, "stiffness": stiffness, "frame": FRAME},
             )  # fmt: skip
-    for peer in (peer for peer in CLOTH_PEERS if peer.version):
+    for peer in (peer for peer in peers if peer.version):
         yield from _peer_blocks(peer, sizes)
     for solver in published.LIU_2013 if sizes == FULL else ():
         yield Block(
@@ -133,7 +135,7 @@ def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Mea
     for level in sizes:
         cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
         spent = 0.0
-        for rung in peer.step_rungs(cloth.frequency):
+        for rung in step_rungs(peer, cloth.frequency):
             outcome = _tried(
                 job(
                     peer.module, cloth, rung, frames=1, repeats=_REPEATS,
@@ -187,7 +189,7 @@ def motion(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measu
     remarks: list[str] = []
     for level in sizes:
         cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
-        for rung in peer.motion_rungs(cloth.frequency):
+        for rung in motion_rungs(peer, cloth.frequency):
             outcome = _tried(
                 job(
                     peer.module, cloth, rung, frames=level.frames, repeats=1, budget=level.budget,
@@ -230,7 +232,7 @@ def iterations_needed(solver: str, stiffness: float) -> Measured:
     truth = cloth_truth(NEEDED_SIZE, stiffness, 1)
     iterates = ImplicitEuler(cloth.system, h=FRAME, solver=solver).iterates(cloth.start)
     errors = []
-    limit = NEEDED_LIMIT.get(solver, MANY_ITERATIONS)
+    limit = registry.step_solvers()[solver].counted
     for _, iterate in zip(range(limit + 1), iterates, strict=False):
         errors.append(step_error(iterate.positions, truth))
         if errors[-1] <= NEAR_ENOUGH:

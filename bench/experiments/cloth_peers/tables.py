@@ -7,6 +7,7 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import registry
 from ...presentation.results import Results, label, listed
 from ...presentation.tables import Answer, Cell, Column, Table, words
 from ..published import problem as published
@@ -157,7 +158,7 @@ def _step_answer(found: Sequence[Point]) -> Answer:
 
 
 def _engine(point: Point) -> str:
-    return point.solver.partition(" ")[0]
+    return registry.find(point.solver).engine
 
 
 def _fastest(groups: Sequence[Sequence[Point]], target: float) -> str:

@@ -26,14 +26,15 @@ from ...harness.isolation import Workshop
 from ...harness.progress import tell
 from ...harness.stopwatch import timed
 from ...harness.worker import Done, Found, Message, Unfit, said
+from ...peers import registry
 
 H = 1 / 60
 STIFFNESS = 1e4
 ITERATIONS = 10
 # Particles along a side, and how long a benchmark may take [s] where the cloth is to be measured.
 SIZES = {32: 0.0, 100: 0.0, 316: 1.0, 1000: 1.0}
-OURS = "supernodal"
-LIBRARIES = (OURS, "cholespy")
+OURS = registry.SUPERNODAL.name
+LIBRARIES = tuple(library.name for library in registry.FACTORS)
 # Rounds in which everything is timed in turn: so many particles in all, within limits.
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
 # What the limit of memory reads again and again: more than any cache holds [bytes].

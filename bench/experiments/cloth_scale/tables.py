@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import registry
 from ...presentation.results import Results, settings
 from ...presentation.tables import Answer, Cell, Column, Table, words
 
-OURS = "supernodal"
-PEERS = {OURS: "ours", "cholespy": "CHOLMOD (cholespy)"}
+OURS = registry.SUPERNODAL.name
+PEERS = {library.name: library.label for library in registry.FACTORS}
 GIB = 2.0**30
 
 

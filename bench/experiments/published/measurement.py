@@ -9,7 +9,7 @@ import numpy as np
 from reference import scenes, solve_ik
 
 from ...harness.block import Block, Measured, Scale
-from ...peers.ik import ONE_START, OURS, PEERS, RESTARTS, Entry, Peer
+from ...peers.registry import ONE_START, OURS, RESTARTS, TOOLBOX, TRAC_IK, Entry, Peer
 from ..chain.problem import unit
 from ..robots.evaluate import Tolerance
 from ..robots.measurement import SUITE, Run, settings_of, solve
@@ -22,45 +22,43 @@ _TARGETS = 5
 _BUDGET = 15.0
 _SEED = 2011
 _ITERATIONS = 10_000
-TRAC_IK, TOOLBOX, FABRIK = "published/trac_ik", "published/toolbox", "published/fabrik"
 # The solvers fast enough for 10,000 targets, with restarts as TRAC-IK has them.
-_FAST = ("plumbob", "toolbox", "trac_ik")
+_FAST = (OURS, TOOLBOX, TRAC_IK)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield TRAC-IK's table, the toolbox's, FABRIK's; a solver that is missing is left out."""
-    peers = {peer.module.rpartition(".")[2]: peer for peer in PEERS if peer.version}
     count, budget = _TARGETS * scale.targets, _BUDGET * scale.seconds
     norm = math.sqrt(3.0) * published.TRAC_IK_TOLERANCE
     tolerance = Tolerance(norm, norm)
-    for peer in (peers[name] for name in _FAST if name in peers):
+    for peer in (peer for peer in _FAST if peer.version):
         entry = next(entry for entry in peer.entries if entry.kind == RESTARTS)
         for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK):
             if is_installed(robot):
                 run = Run(robot, peer, entry, tolerance, budget)
-                yield _block(f"{TRAC_IK}/{robot}", run, count, middle=True)
+                yield _block(f"published/trac_ik/{robot}", run, count, middle=True)
     if is_installed("ur5"):
-        for peer, entry in _toolbox(peers.get("toolbox")):
+        for peer, entry in _toolbox():
             near = math.sqrt(2.0 * published.TOOLBOX_HALF_SQUARE)
             run = Run("ur5", peer, entry, Tolerance(near, near), budget)
-            yield _block(f"{TOOLBOX}/ur5", run, count, middle=False)
+            yield _block("published/toolbox/ur5", run, count, middle=False)
     for stratum, distance in published.FABRIK_DISTANCES.items():
         for solver in published.FABRIK:
             yield Block(
-                SUITE, f"{FABRIK}/{stratum}", solver, partial(iterations, solver, distance),
+                SUITE, f"published/fabrik/{stratum}", solver, partial(iterations, solver, distance),
                 {"tolerance": published.FABRIK_TOLERANCE, "max_iterations": _ITERATIONS},
             )  # fmt: skip
 
 
-def _toolbox(toolbox: Peer | None) -> Iterator[tuple[Peer, Entry]]:
+def _toolbox() -> Iterator[tuple[Peer, Entry]]:
     once = next(entry for entry in OURS.entries if entry.kind == ONE_START)
     iterations = {"iterations": published.TOOLBOX_ITERATIONS}
     yield OURS, once._replace(settings={**once.settings, **iterations})
-    if toolbox is None:
+    if not TOOLBOX.version:
         return
     for method in published.TOOLBOX:
         settings = {"method": method, "searches": 1, "limits": False, **iterations}
-        yield toolbox, Entry(ONE_START, settings, note=method)
+        yield TOOLBOX, Entry(ONE_START, settings, note=method)
 
 
 def _block(problem: str, run: Run, count: int, middle: bool) -> Block:

@@ -13,7 +13,8 @@ import numpy as np
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Workshop
 from ...harness.worker import Solved
-from ...peers.ik import PEERS, Entry, Peer
+from ...peers import registry
+from ...peers.registry import Entry, Peer
 from .evaluate import Targets, Tolerance, judge
 from .job import Job
 from .problem import PACKAGE, ROBOTS, is_installed, title
@@ -51,7 +52,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
         if name not in here:
             absent = partial(not_installed, PACKAGE, title(name))
             yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"})
-    for peer in PEERS:
+    for peer in registry.PEERS:
         for entry in peer.entries:
             yield from _entry_blocks(peer, entry, here, count, _BUDGET * scale.seconds)
 

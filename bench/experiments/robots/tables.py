@@ -11,7 +11,8 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...peers.ik import ONE_START, PEERS, RESTARTS
+from ...peers import registry
+from ...peers.registry import ONE_START, RESTARTS
 from ...presentation.results import Results, listed, settings
 from ...presentation.tables import Answer, Cell, Column, Table, words
 
@@ -90,7 +91,7 @@ def who(results: Results) -> Table:
     """Return the solvers that take part."""
     present = {r.solver: r for r in results.all("ik", "robots/")}
     rows: list[tuple[Cell, ...]] = []
-    for peer in PEERS if present else ():
+    for peer in registry.PEERS if present else ():
         versions = [
             present[peer.called(entry)].settings.get("version", "")
             for entry in peer.entries if peer.called(entry) in present
@@ -111,7 +112,7 @@ def who(results: Results) -> Table:
         shows="A solver that makes one attempt is also started again by the bench, from seeded "
         "random poses until it claims an answer within the limits.",
         measured="Settings are the packages’ own but for those in brackets and what their adapters "
-        "in bench/solvers say.",
+        "in bench/peers say.",
         answer=Answer(f"{sum(row[2] != 'not installed' for row in rows)} of {len(rows)} installed.")
         if rows
         else Answer(),

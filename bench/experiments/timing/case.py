@@ -11,13 +11,11 @@ from reference.backend.compiled import TwoSpeeds
 from reference.backend.threads import in_slices
 
 from ...harness.record import Key, key
+from ...peers import registry
 
 TIMING = "timing"
-# The same names in every subject, so that the tables find their columns.
-COMPILED = "Plumbob, compiled"
-PLAIN = "Plumbob, plain Python"
-OURS = "Plumbob's kinematics"
-LIMIT = "limit: copying as many bytes"
+COMPILED, PLAIN, LIMIT = registry.COMPILED.name, registry.PLAIN.name, registry.LIMIT.name
+OURS = registry.OUR_KINEMATICS.name
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from matplotlib.axes import Axes
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import registry
 from ...presentation.entry import Figure
 from ...presentation.figures import (
     COLOURS,
@@ -16,17 +17,6 @@ from ...presentation.figures import (
     written,
 )
 from ...presentation.results import Results, problems, solvers
-from .case import COMPILED, LIMIT, OURS, PLAIN
-
-DOERS = {
-    COMPILED: ("blue", "o"),
-    PLAIN: ("orange", "D"),
-    OURS: ("brass", "v"),
-    "Pinocchio": ("green", "s"),
-    "MuJoCo": ("purple", "^"),
-    LIMIT: ("ink", "|"),
-}
-OTHER_DOER = ("faint", "P")
 
 
 def timing(subject: str, unit: str, scale: float, title: str) -> Figure:
@@ -55,15 +45,17 @@ def timing(subject: str, unit: str, scale: float, title: str) -> Figure:
 
 
 def _timing_marks(ax: Axes, records: list[Record], works: list[str], scale: float) -> None:
-    known = [solver for solver in DOERS if solver in solvers(records)]
-    for solver in [*known, *(name for name in solvers(records) if name not in DOERS)]:
-        colour, marker = DOERS.get(solver, OTHER_DOER)
+    timed = [solver.name for solver in registry.TIMED]
+    known = [solver for solver in timed if solver in solvers(records)]
+    for solver in [*known, *(name for name in solvers(records) if name not in timed)]:
+        colour, _, marker = registry.find(solver).style
+        filled = "none" if solver == registry.PLAIN.name else None
         mine = [record for record in records if record.solver == solver]
         ax.plot(
             [scale * metrics.timing(record.arrays["seconds"]).median for record in mine],
             [works.index(record.problem) for record in mine],
-            marker, markersize=11 if solver == LIMIT else 5.5, markeredgewidth=1.4,
-            color=COLOURS[colour], markerfacecolor="none" if solver == PLAIN else None,
+            marker, markersize=11 if solver == registry.LIMIT.name else 5.5, markeredgewidth=1.4,
+            color=COLOURS[colour], markerfacecolor=filled,
             linestyle="none", label=written(solver),
         )  # fmt: skip
 
