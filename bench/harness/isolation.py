@@ -39,6 +39,7 @@ class Outcome(NamedTuple):
         trouble: why there are no more, or what was raised and how often; else "".
         lost: whether the worker was lost over the next target.
         found: what was measured, if that was the job.
+        silent: whether the worker was ended since it was silent.
     """
 
     setup: float
@@ -46,6 +47,7 @@ class Outcome(NamedTuple):
     trouble: str
     lost: bool = False
     found: Mapping[str, Any] | None = None
+    silent: bool = False
 
 
 class Workshop:
@@ -78,9 +80,10 @@ class Workshop:
                         outcome.solved.append(message)
                     case Found():
                         outcome = outcome._replace(found=message.values)
-                    case Unfit() | Lost():
-                        lost = ready and isinstance(message, Lost)
-                        outcome = outcome._replace(trouble=message.why, lost=lost)
+                    case Unfit():
+                        outcome = outcome._replace(trouble=message.why)
+                    case Lost(why, silent):
+                        outcome = outcome._replace(trouble=why, lost=ready, silent=silent)
                     case Done():
                         outcome = outcome._replace(trouble=raised(outcome.solved))
         return outcome
@@ -148,7 +151,7 @@ class _Worker:
         try:
             message = self._messages.get(timeout=patience)
         except queue.Empty:
-            return Lost(f"ended after {patience:g} s of silence")
+            return Lost(f"ended after {patience:g} s of silence", silent=True)
         if isinstance(message, Message):
             return message
         return Lost(self._end_of_process())

@@ -157,11 +157,11 @@ def measure(block: Block) -> Record:
     """Measure a block; one that raises becomes a record that says why, and costs no other."""
     begin = time.perf_counter()
     try:
-        arrays, notes = block.measure()
+        arrays, notes, facts = block.measure()
     except Exception as error:  # whatever a solver raises is a result of that solver
         if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
             raise KeyboardInterrupt from None
-        arrays, notes = {}, {"failed": f"{type(error).__name__}: {error}"}
+        arrays, notes, facts = {}, {"failed": f"{type(error).__name__}: {error}"}, {}
     return Record(
         block.suite,
         block.problem,
@@ -173,6 +173,7 @@ def measure(block: Block) -> Record:
         stamp(),
         now(),
         time.perf_counter() - begin,
+        {**block.facts, **facts},
     )
 
 

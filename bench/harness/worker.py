@@ -58,9 +58,10 @@ class Found(NamedTuple):
 
 
 class Lost(NamedTuple):
-    """The process is gone, or was ended since it was silent; `why` says which."""
+    """The process is gone; `why` says how, `silent` whether it was ended since it was silent."""
 
     why: str
+    silent: bool = False
 
 
 Message = Begun | Ready | News | Solved | Found | Unfit | Done | Lost

@@ -14,7 +14,6 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .results import label
 from .text import shortened
 
 COLOURS = {
@@ -123,11 +122,6 @@ def nth_style(i: int) -> dict[str, Any]:
 def legend_height(names: list[str], columns: int) -> float:
     """Return how much higher [inch] a figure is for a legend of more than two rows."""
     return 0.2 * max(0, -(-len(names) // columns) - 2)
-
-
-def ticks(works: list[str]) -> list[str]:
-    """Return how works are written along an axis, without their subject."""
-    return [written(label(work.partition("/")[2])) for work in works]
 
 
 def plain_powers(ax: Axes) -> None:

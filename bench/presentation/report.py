@@ -194,21 +194,13 @@ def _contents() -> str:
     lines = []
     for section in SECTIONS:
         inner = "".join(
-            f'<li><a href="#{section.name}-{i}">{_text(_short(entry.question))}</a></li>'
+            f'<li><a href="#{section.name}-{i}">{_text(entry.question)}</a></li>'
             for i, entry in enumerate(section.entries, 1)
         )
         lines.append(
             f'<li><a href="#{section.name}">{_text(section.title)}</a><ol>{inner}</ol></li>'
         )
     return "\n".join(lines)
-
-
-def _short(question: str) -> str:
-    """Return the last sentence of a question, its number kept."""
-    number, _, rest = question.partition(". ")
-    if not re.fullmatch(r"Q\d", number):
-        return question
-    return f"{number}. {rest.rpartition('. ')[2] or rest}"
 
 
 def _brief(made: dict[Entry, Table]) -> str:

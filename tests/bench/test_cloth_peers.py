@@ -408,11 +408,11 @@ LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
 def test_every_manner_becomes_one_point(shop, monkeypatch, manner, frames, lost, why):
     monkeypatch.setattr(peers_cloth, "workshop", lambda: shop)
     monkeypatch.setattr(peers_cloth, "motion_rungs", as_it_is)
-    arrays, notes = peers_cloth.motion(fake_peer(manner), STIFFNESS, (LEVEL,))
+    arrays, _, facts = peers_cloth.motion(fake_peer(manner), STIFFNESS, (LEVEL,))
     assert arrays["frames"].tolist() == [frames]
     assert arrays["diverged"].tolist() == [lost]
     assert np.isfinite(arrays["true"]).all() == (not lost)
-    assert notes == {"rungs": "as it is", "remark": why}
+    assert facts == {"rungs": ["as it is"], "remarks": [why] if why else []}
 
 
 class InThisProcess:
@@ -436,29 +436,29 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
     class Silent:
         def perform(self, job):
             tried.append(job)
-            return Outcome(0.0, [], "ended after 300 s of silence")
+            return Outcome(0.0, [], "ended after 300 s of silence", silent=True)
 
     monkeypatch.setattr(peers_cloth, "workshop", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})
-    arrays, notes = peers_cloth.motion(fake_peer("fine"), STIFFNESS, (LEVEL, LEVEL))
+    arrays, _, facts = peers_cloth.motion(fake_peer("fine"), STIFFNESS, (LEVEL, LEVEL))
     assert len(tried) == 1
     assert arrays["frames"].tolist() == [0, 0]
     assert np.isnan(arrays["true"]).all()
-    assert "silence" in notes["remark"]
+    assert "silence" in facts["remarks"][0]
 
 
 def test_a_ladder_ends_where_it_arrives(here):
     """Two iterations of Newton and three are asked for, and no more once 1e-9 is reached."""
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
-    arrays, notes = peers_cloth.one_step(newton, STIFFNESS, (LEVEL,))
+    arrays, _, facts = peers_cloth.one_step(newton, STIFFNESS, (LEVEL,))
     assert arrays["error"][0] > arrays["error"][-1] <= peers_cloth.NEAR_ENOUGH
     assert (arrays["error"][:-1] > peers_cloth.NEAR_ENOUGH).all()
-    assert len(notes["rungs"].split("; ")) == len(arrays["error"])
+    assert len(facts["rungs"]) == len(arrays["error"])
 
 
 def test_a_ladder_whose_time_is_used_is_climbed_no_further(here):
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
-    arrays, _ = peers_cloth.one_step(newton, STIFFNESS, (LEVEL._replace(budget=1e-9),))
+    arrays, _, _ = peers_cloth.one_step(newton, STIFFNESS, (LEVEL._replace(budget=1e-9),))
     assert len(arrays["error"]) == 1
 
 
@@ -467,13 +467,13 @@ def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
     monkeypatch.setattr(registry, "cloth_peers", lambda: gone)
     missing = [b for b in peers_cloth.blocks(Scale(1, 0.1)) if b.problem == "peers/all"]
     (block,) = missing
-    arrays, notes = block.measure()
+    arrays, notes, _ = block.measure()
     assert not arrays
     assert notes["remark"] == "a-package-that-nobody-has is not installed"
 
 
 def test_iterations_are_counted_to_each_power_of_ten():
-    arrays, _ = peers_cloth.iterations_needed("newton", 100.0)
+    arrays, *_ = peers_cloth.iterations_needed("newton", 100.0)
     counts = np.array(arrays["needed"])
     assert (np.diff(counts) >= 0).all()
     assert 1 <= counts[0] <= counts[-1] <= arrays["tried"] < 20
@@ -523,7 +523,7 @@ def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
 
 def test_a_solver_that_does_not_get_through_has_no_limit(monkeypatch, here):
     peer = fake_peer("unable")
-    arrays, notes = peers_cloth.stability(peer, (STIFFNESS,))
+    arrays, notes, _ = peers_cloth.stability(peer, (STIFFNESS,))
     assert np.isnan(arrays["limit"]).all()
     assert "TypeError" in notes["remark"] or "takes no cloths" in notes["remark"]
 
@@ -572,7 +572,8 @@ def test_the_table_of_motions_says_what_diverged_and_what_was_cut_short(make):
 
 
 def test_a_missing_engine_has_a_row_in_both_tables(make):
-    missing = make.record("cloth", "peers/all", "newton", notes={"remark": "not installed"})
+    notes, facts = {"remark": "not installed"}, {"task": "missing"}
+    missing = make.record("cloth", "peers/all", "newton", notes=notes, facts=facts)
     for table in (findings.one_step(Results([missing])), findings.motion(Results([missing]))):
         (row,) = table.rows
         assert row[:2] == ("every cloth", "newton")

@@ -48,7 +48,7 @@ def test_blocks_are_listed_without_measuring():
 
 def test_table_and_sentence_follow_the_records(make):
     left = np.linspace(1.0, 0.5, 11)
-    records = [make.swung("RK4", left=left), make.swung("discrete", "swing/damped", left)]
+    records = [make.swung("RK4", left=left), make.swung("discrete", "damped", left)]
     table = findings.energy(Results(records))
     assert [row[:2] for row in table.rows] == [("undamped", "RK4"), ("damped", "discrete")]
     assert table.rows[0][2:5] == (50.0, None, None)
@@ -57,12 +57,12 @@ def test_table_and_sentence_follow_the_records(make):
 
 
 def test_without_a_swing_undamped_nothing_is_said(make):
-    assert findings.energy(Results([make.swung("RK4", "swing/damped")])).answer.sentence == ""
+    assert findings.energy(Results([make.swung("RK4", "damped")])).answer.sentence == ""
 
 
 def test_figure_has_a_panel_for_each_cloth_and_a_line_for_each_integrator(make):
     records = [
-        make.swung(solver, f"swing/{cloth}")
+        make.swung(solver, cloth)
         for cloth in ("undamped", "damped")
         for solver in ("RK4", "discrete")
     ]

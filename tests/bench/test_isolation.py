@@ -295,23 +295,23 @@ def suite(monkeypatch, shop):
 def test_a_missing_peer_costs_one_block_that_says_so(suite):
     assert ("gone", "robots/all") in suite.blocks
     assert sum(solver == "gone" for solver, _ in suite.blocks) == 1
-    arrays, notes = suite.blocks["gone", "robots/all"].measure()
+    arrays, notes, _ = suite.blocks["gone", "robots/all"].measure()
     assert not arrays
     assert notes["remark"] == "a-package-that-nobody-has is not installed"
 
 
 def test_every_manner_becomes_one_record(suite):
-    arrays, notes = suite.blocks["liar", "robots/iiwa14"].measure()
+    arrays, notes, _ = suite.blocks["liar", "robots/iiwa14"].measure()
     assert arrays["claimed"].tolist() == [1] * 6
     assert not arrays["solved"].any()
     assert notes["remark"] == ""
-    arrays, notes = suite.blocks["unable", "robots/iiwa14"].measure()
+    arrays, notes, _ = suite.blocks["unable", "robots/iiwa14"].measure()
     assert "solved" not in arrays
     assert notes["remark"] == "takes no iiwas"
 
 
 def test_the_target_that_a_solver_hangs_on_counts_as_failed_with_the_time_it_took(suite):
-    arrays, notes = suite.blocks["hangs", "robots/iiwa14"].measure()
+    arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
     assert len(arrays["solved"]) == 2
     assert not arrays["solved"][1]
     assert arrays["seconds"][1] == 0.5

@@ -207,7 +207,7 @@ def hostile_report(folder, records, field, names):
     return written(folder, [*records, *bad])
 
 
-@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp"])
+@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp", "facts"])
 def test_hostile_names_are_data_in_every_file(tmp_path, records, field):
     few = [r for i, r in enumerate(records) if field == "solver" or i % 3 == 0]
     result, page = hostile_report(tmp_path, few, field, HOSTILE)
@@ -217,7 +217,7 @@ def test_hostile_names_are_data_in_every_file(tmp_path, records, field):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp"])
+@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp", "facts"])
 @pytest.mark.parametrize("name", HOSTILE, ids=[ascii(name)[:20] for name in HOSTILE])
 def test_each_hostile_name_is_data_everywhere(tmp_path, records, field, name):
     hostile_report(tmp_path, records, field, [name])
@@ -239,6 +239,9 @@ SPOILT = {
     "no arrays": lambda r: replace(r, arrays={}),
     "no notes": lambda r: replace(r, notes={}),
     "no settings": lambda r: replace(r, settings={}),
+    "no facts": lambda r: replace(r, facts={}),
+    "facts of other kinds": lambda r: replace(r, facts=dict.fromkeys(r.facts, ["x"])),
+    "titles of other kinds": lambda r: replace(r, facts={**r.facts, "title": None}),
     "settings of other kinds": lambda r: replace(r, settings=dict.fromkeys(r.settings, "x")),
     "arrays of other shapes": lambda r: replace(
         r, arrays={name: values[..., None, None] for name, values in r.arrays.items()}

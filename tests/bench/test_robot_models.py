@@ -28,7 +28,7 @@ def compared(make, tmp_path):
         return [
             make.record(
                 "robot_models", f"robots/{name}", engine, {"configurations": 5},
-                measured.arrays, notes=dict(measured.notes),
+                measured.arrays, notes=dict(measured.notes), facts={"title": name},
             )
             for engine in ROBOT_ENGINES
             for measured in [compare(engine, Model(name, path))]

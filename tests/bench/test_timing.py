@@ -5,11 +5,13 @@ import pytest
 
 from bench.experiments.timing import case as timing_case
 from bench.experiments.timing import kinematics
-from bench.experiments.timing.case import LIMIT, copying, stream, streaming
+from bench.experiments.timing.case import LIMIT, Work, copying, stream, streaming
 from bench.harness import run
 from bench.harness.machine import stamp
 from bench.harness.record import RecordFile
 from reference import cores, forward_kinematics
+
+WORK = Work("p", "s", "g", "t")
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +54,7 @@ def test_the_limit_moves_as_many_bytes_as_it_says(monkeypatch):
     monkeypatch.setattr(
         np, "copyto", lambda sink, source: moved.append(sink.nbytes + source.nbytes)
     )
-    case = copying("p", 1600, passes=3, operations=10)
+    case = copying(WORK, 1600, passes=3, operations=10)
     case.prepare()()
     assert moved == [1600] * 3
     assert case.moved == 4800
@@ -70,7 +72,7 @@ def test_the_limit_of_batches_reads_and_writes_all_that_it_says(many, monkeypatc
         assert (sink[len(source) :] == 1.0).all()
 
     monkeypatch.setattr(timing_case, "_stream", watched)
-    case = streaming("p", 320, 560, cores=many, least=0 if many == 1 else 8)
+    case = streaming(WORK, 320, 560, cores=many, least=0 if many == 1 else 8)
     with cores(many):
         case.prepare()()
     assert len(moved) == (1 if many == 1 else 3 * 4)
@@ -85,18 +87,16 @@ def test_a_batch_moves_what_its_limit_moves():
         given[..., 0] = 1.0
         pose = forward_kinematics(skeleton, given)
         written = pose.positions.nbytes + pose.rotations.nbytes
-        (limit,) = [
-            case
-            for case in kinematics.cases()
-            if case.solver == LIMIT and case.problem == f"kinematics/{name}/{batch:,} poses a call"
-        ]
+        limits = [case for case in kinematics.cases() if case.solver == LIMIT]
+        calls = name, f"{batch:,} poses a call"
+        (limit,) = [case for case in limits if (case.work.group, case.work.title) == calls]
         assert limit.moved == given.nbytes + 2 * written
 
 
 def test_every_forward_kinematics_stands_beside_its_limit_on_as_many_cores():
     cases = list(kinematics.cases())
-    limits = {case.problem: case for case in cases if case.solver == LIMIT}
+    limits = {case.work.problem: case for case in cases if case.solver == LIMIT}
     for case in cases:
-        assert limits[case.problem].cores == case.cores
-        assert limits[case.problem].operations == case.operations
+        assert limits[case.work.problem].cores == case.cores
+        assert limits[case.work.problem].operations == case.operations
     assert {case.cores for case in cases} == {1, None}

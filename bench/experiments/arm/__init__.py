@@ -2,6 +2,9 @@
 
 from ...harness.experiment import Experiment
 
+# What a record is about.
+CURVE, BEYOND = "curve", "beyond"
+
 EXPERIMENT = Experiment(
     __package__, "arm",
     "the lab's arm on every curve, and reaching for what is too far",

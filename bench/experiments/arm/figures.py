@@ -12,18 +12,19 @@ from ...presentation.figures import (
     finished,
     legend_height,
     plain_powers,
-    ticks,
     written,
 )
-from ...presentation.results import Results, label, problems, solvers
+from ...presentation.results import Results, by_problem, label, solvers
+from . import CURVE
 
 
 def jitter(results: Results) -> Drawing | None:
     """Draw the largest turn of a joint on each curve, from rest and from the last solution."""
-    records = results.all("arm", warm=False)
+    records = results.all("arm", task=CURVE, warm=False)
     if not records:
         return None
-    curves, names = problems(records), solvers(records)
+    rows = by_problem(records)
+    curves, names = list(rows), solvers(records)
     height = 0.32 * len(curves) + 1.1 + legend_height(names, 1)
     with canvas(height, 1) as (figure, axes):
         for record in records:
@@ -37,7 +38,8 @@ def jitter(results: Results) -> Drawing | None:
                     x, y, marker, color=COLOURS[colour], markerfacecolor=filled, markersize=5.5,
                     linestyle="none", label=_once(axes[0], written(label(record.solver)), filled),
                 )  # fmt: skip
-        axes[0].set_yticks(range(len(curves)), ticks(curves))
+        labels = [written(of[0].facts["curve"]) for of in rows.values()]
+        axes[0].set_yticks(range(len(curves)), labels)
         axes[0].set(xscale="log", xlabel="largest turn of a joint between frames [°], log scale")
         axes[0].invert_yaxis()
         plain_powers(axes[0])

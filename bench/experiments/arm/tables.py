@@ -6,12 +6,15 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, problems, settings, solvers
 from ...presentation.tables import Answer, Cell, Column, Table, words
+from ..chain import BEYOND, CHAIN
+from . import CURVE
 
 
 def accuracy(results: Results) -> Table:
     """Return success and residuals of every solver on every problem within reach."""
-    records = results.all("arm", warm=False) + results.all("arm", warm=True)
-    records += [r for r in results.all("ik", "chain/") if r.problem != "chain/beyond"]
+    records = results.all("arm", task=CURVE, warm=False)
+    records += results.all("arm", task=CURVE, warm=True)
+    records += [r for r in results.all("ik", task=CHAIN) if r.facts["stratum"] != BEYOND]
     order = problems(records)
     records.sort(key=lambda record: order.index(record.problem))
     return Table(
@@ -42,7 +45,7 @@ def accuracy(results: Results) -> Table:
 def _accuracy_row(record: Record) -> tuple[Cell, ...]:
     starts = {None: "random", False: "rest", True: "last solution"}
     return (
-        label(record.problem),
+        record.title,
         label(record.solver),
         starts[record.settings.get("warm")],
         _success(record),

@@ -2,6 +2,9 @@
 
 from ...harness.experiment import Experiment
 
+# What a record is about, and the stratum of targets out of reach.
+CHAIN, BEYOND = "chain", "beyond"
+
 EXPERIMENT = Experiment(
     __package__, "ik",
     "a chain of ten ball joints, robots and a character, beside every solver installed",

@@ -13,7 +13,8 @@ from ...presentation.figures import (
     plain_powers,
     written,
 )
-from ...presentation.results import Results, label, problems
+from ...presentation.results import Results, by_problem, label
+from . import BEYOND, CHAIN
 
 
 def iterations(results: Results) -> Drawing | None:
@@ -23,7 +24,7 @@ def iterations(results: Results) -> Drawing | None:
         return None
     edges = np.array([0.5, 1.5, 2.5, 4.5, 8.5, 16.5, 32.5, 64.5, 128.5, 256.5, 512.5, 1000.5])
     with canvas(2.5, len(panels)) as (figure, axes):
-        for ax, (problem, records) in zip(axes, panels.items(), strict=True):
+        for ax, records in zip(axes, panels, strict=True):
             for record in records:
                 colour, line, _ = registry.find(record.solver).style
                 ax.stairs(
@@ -31,7 +32,7 @@ def iterations(results: Results) -> Drawing | None:
                     color=COLOURS[colour], linestyle=line, fill=False, linewidth=1.6,
                     label=written(label(record.solver)),
                 )  # fmt: skip
-            ax.set(title=written(label(problem)), xscale="log", xlabel="iterations, log scale")
+            ax.set(title=written(records[0].title), xscale="log", xlabel="iterations, log scale")
             plain_powers(ax)
         axes[0].set_ylabel("targets")
         axes[0].legend(loc="upper right")
@@ -48,7 +49,7 @@ def ik_residuals(results: Results) -> Drawing | None:
     if not panels:
         return None
     with canvas(2.7, len(panels), sharey=True) as (figure, axes):
-        for ax, (problem, records) in zip(axes, panels.items(), strict=True):
+        for ax, records in zip(axes, panels, strict=True):
             for record in records:
                 colour, line, _ = registry.find(record.solver).style
                 low, median, high = (
@@ -64,7 +65,9 @@ def ik_residuals(results: Results) -> Drawing | None:
                     linewidth=0.8,
                     dashes=(2, 2),
                 )
-            ax.set(title=written(label(problem)), yscale="log", xlabel="iteration", xlim=(0, None))
+            ax.set(
+                title=written(records[0].title), yscale="log", xlabel="iteration", xlim=(0, None)
+            )
             ax.minorticks_off()
         axes[0].set_ylabel("residual [m]")
         axes[0].legend(loc="upper right")
@@ -75,10 +78,10 @@ def ik_residuals(results: Results) -> Drawing | None:
         )  # fmt: skip
 
 
-def _ik_panels(results: Results) -> dict[str, list[Record]]:
+def _ik_panels(results: Results) -> list[list[Record]]:
+    """Return the records with a history of each stratum within reach."""
     records = [
-        r
-        for r in results.all("ik", "chain/")
-        if "history_median" in r.arrays and "beyond" not in r.problem
-    ]
-    return {problem: [r for r in records if r.problem == problem] for problem in problems(records)}
+        record for record in results.all("ik", task=CHAIN)
+        if "history_median" in record.arrays and record.facts["stratum"] != BEYOND
+    ]  # fmt: skip
+    return list(by_problem(records).values())

@@ -15,6 +15,7 @@ from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt
+from . import BEYOND, CHAIN
 from .problem import STRATA, TargetsForSkeleton, chain_targets
 
 TOLERANCE = 1e-4
@@ -38,15 +39,18 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every stratum for every solver of ours, and for one loop on each engine."""
     for stratum in STRATA:
         problem = chain_targets(stratum, scale.targets)
-        tolerance = BEYOND_TOLERANCE if stratum == "beyond" else TOLERANCE
+        facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
+        tolerance = BEYOND_TOLERANCE if stratum == BEYOND else TOLERANCE
         ours = Limits(tolerance, MAX_ITERATIONS)
         for solver in IK_SOLVERS:
             measure = partial(solve_targets, problem, solver, ours, record=True)
-            yield Block("ik", problem.name, solver, measure, ours._asdict(), scale.targets)
+            settings = ours._asdict()
+            yield Block("ik", problem.name, solver, measure, settings, scale.targets, facts)
         theirs = Limits(tolerance, ENGINE_ITERATIONS)
         for loop in registry.LOOPS:
             measure = partial(solve_with_engine, problem, loop.engine, theirs)
-            yield Block("ik", problem.name, loop.name, measure, theirs._asdict(), scale.targets)
+            settings = theirs._asdict()
+            yield Block("ik", problem.name, loop.name, measure, settings, scale.targets, facts)
 
 
 def solve_targets(

@@ -6,8 +6,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, counted, label, problems, settings, solvers
+from ...presentation.results import Results, by_problem, counted, label, settings, solvers
 from ...presentation.tables import Answer, Cell, Column, Table, words
+from .. import arm
+from . import BEYOND, CHAIN
 
 # A chain counts as straight if no joint is off the line by more than this share of the reach.
 STRAIGHT = 0.01
@@ -16,7 +18,8 @@ RIVALS = ("ccd", "fabrik")
 
 def beyond_reach(results: Results) -> Table:
     """Return Q1: what becomes of a target that is too far away."""
-    records = results.all("arm", "arm/beyond") + results.all("ik", "chain/beyond")
+    records = results.all("arm", task=arm.BEYOND)
+    records += results.all("ik", task=CHAIN, stratum=BEYOND)
     return Table(
         "q1_beyond_reach",
         "Targets beyond reach",
@@ -45,7 +48,7 @@ def _beyond_row(record: Record) -> tuple[Cell, ...]:
     bend, excess = (metrics.spread(record.arrays[name]) for name in ("bend", "excess"))
     median, _, largest = metrics.whole(record.arrays["iterations"])
     return (
-        label(record.problem), label(record.solver), int(record.size), bend.median, bend.largest,
+        record.title, label(record.solver), int(record.size), bend.median, bend.largest,
         excess.median, excess.largest, median, largest,
     )  # fmt: skip
 
@@ -82,14 +85,13 @@ def iterations(results: Results) -> Table:
     """Return Q2: the iterations of CCD against FABRIK."""
     records = [
         record
-        for record in results.all("arm", warm=True)
-        + results.all("arm", "arm/beyond")
-        + results.all("ik", "chain/")
+        for record in results.all("arm", task=arm.CURVE, warm=True)
+        + results.all("arm", task=arm.BEYOND)
+        + results.all("ik", task=CHAIN)
         if record.solver in RIVALS
     ]
     pairs = []
-    for problem in problems(records):
-        both = [r for r in records if r.problem == problem]
+    for both in by_problem(records).values():
         pair = [next((r for r in both if r.solver == rival), None) for rival in RIVALS]
         if pair[0] is not None and pair[1] is not None:
             pairs.append((pair[0], pair[1]))
@@ -119,7 +121,7 @@ def iterations(results: Results) -> Table:
 def _rival_row(ccd: Record, fabrik: Record) -> tuple[Cell, ...]:
     spreads = [metrics.whole(record.arrays["iterations"]) for record in (ccd, fabrik)]
     return (
-        label(ccd.problem),
+        ccd.title,
         int(ccd.arrays["iterations"].size),
         *(value for spread in spreads for value in spread),
         _fewer(ccd, fabrik),

@@ -1,6 +1,7 @@
 """Following closed curves: each frame from rest, each from the last solution, and coherently."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,11 +10,11 @@ from reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rota
 from reference.arguments import FloatArray
 
 from ...harness.block import SCALES, Block, Measured, Scale
+from . import COHERENT, COLD, CURVE, DRIFT, WARM
 from .problem import DRIFT_FRAMES, Round, arm_rounds, robot_rounds, three_rounds
 
 SUITE = "tracking"
 TOLERANCE, ITERATIONS = 1e-4, 100
-COLD, WARM, COHERENT = "cold", "warm", "coherent"
 OPTIONS = {
     COLD: {"warm": False},
     WARM: {},
@@ -33,14 +34,16 @@ def blocks(scale: Scale) -> Iterator[Block]:
     for solver in IK_SOLVERS:
         for way in (WARM, COHERENT):
             measure = partial(drift, three_rounds(), solver, way)
-            yield Block(SUITE, three_rounds().name, solver, measure, _settings(way))
+            facts = {"task": DRIFT, "title": three_rounds().title}
+            yield Block(SUITE, three_rounds().name, solver, measure, _settings(way), facts=facts)
 
 
 def _ways(problem: Round, solvers: list[str]) -> Iterator[Block]:
     for solver in solvers:
         for way in OPTIONS:
             measure = partial(follow, problem, solver, way)
-            yield Block(SUITE, problem.name, solver, measure, _settings(way))
+            facts = {"task": CURVE, "title": problem.title}
+            yield Block(SUITE, problem.name, solver, measure, _settings(way), facts=facts)
 
 
 def _settings(way: str) -> dict[str, str | float]:
@@ -74,7 +77,7 @@ def drift(problem: Round, solver: str, way: str) -> Measured:
     again = (
         problem.curve if way == COHERENT else np.append(problem.curve, problem.curve[:1], axis=0)
     )
-    motion = _tracked(Round(problem.name, problem.model, problem.start, again), solver, way)
+    motion = _tracked(replace(problem, curve=again), solver, way)
     later = (DRIFT_FRAMES * np.arange(1, 4)) % len(again)
     turned = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[later])
     return Measured({"drift": turned.max(axis=-1), "residual": motion.residual})

@@ -8,7 +8,7 @@ from reference import Articulation, Skeleton, curves, resample, scenes
 from reference.arguments import FloatArray
 from reference.formats import urdf
 
-from ..arm.problem import CUSTOM, FRAMES, MAX_SPACING, MIN_SPACING, custom_curve
+from ..arm.problem import CUSTOM, FRAMES, MAX_SPACING, MIN_SPACING, custom_curve, spaced
 from ..robots.problem import robot
 
 ARM_CURVES = ("circle", "heart", "triangle", "star")
@@ -27,12 +27,14 @@ class Round:
 
     Attributes:
         name: of the problem.
+        title: how it is written.
         model: what follows.
         start: its pose at the start: local rotations of a Skeleton, else coordinates.
         curve: where the effector is wanted in each frame [m], (frame, 3).
     """
 
     name: str
+    title: str
     model: Skeleton | Articulation
     start: FloatArray
     curve: FloatArray
@@ -44,7 +46,10 @@ def arm_rounds() -> list[Round]:
     drawn = {name: curves[name](FRAMES[name]) for name in ARM_CURVES}
     spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
     drawn[CUSTOM] = resample(custom_curve(), closed=True, **spacing)
-    return [Round(f"arm/{name}", skeleton, rest, curve) for name, curve in drawn.items()]
+    return [
+        Round(f"arm/{name}", f"arm, {spaced(name)}", skeleton, rest, curve)
+        for name, curve in drawn.items()
+    ]
 
 
 def robot_rounds() -> list[Round]:
@@ -52,7 +57,7 @@ def robot_rounds() -> list[Round]:
     arm = urdf.parse(robot(ROBOT).text).articulation
     return [
         Round(
-            f"{ROBOT}/{name}", arm, np.radians(_START),
+            f"{ROBOT}/{name}", f"{ROBOT}, {name}", arm, np.radians(_START),
             _SCALE * curves[name](FRAMES[name])[:, [0, 2, 1]] + _CENTRE,
         )
         for name in ROBOT_CURVES
@@ -62,4 +67,7 @@ def robot_rounds() -> list[Round]:
 def three_rounds() -> Round:
     """Return the lab's arm on the heart, three times over."""
     skeleton, rest = scenes.lab_arm()
-    return Round("drift/heart", skeleton, rest, np.tile(curves["heart"](DRIFT_FRAMES), (3, 1)))
+    return Round(
+        "drift/heart", "drift, heart", skeleton, rest,
+        np.tile(curves["heart"](DRIFT_FRAMES), (3, 1)),
+    )  # fmt: skip

@@ -7,10 +7,10 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, settings
 from ...presentation.tables import Answer, Cell, Column, Table, words
+from . import COHERENT, COLD, CURVE, DRIFT, WARM
 
-COLD, WARM, COHERENT = "cold", "warm", "coherent"
 WAYS = (COLD, WARM, COHERENT)
-SUITE, DRIFT = "tracking", "drift/"
+SUITE = "tracking"
 # The way that closes a round is no larger than others if it is so but for this share.
 SAME = 0.01
 
@@ -26,7 +26,7 @@ class Case(NamedTuple):
 def _cases(results: Results) -> list[Case]:
     """Return the curves that were followed in all ways."""
     found = []
-    for cold in results.all(SUITE, way=COLD):
+    for cold in results.all(SUITE, task=CURVE, way=COLD):
         others = [
             results.one(SUITE, cold.problem, cold.solver, way=way) for way in (WARM, COHERENT)
         ]
@@ -62,7 +62,7 @@ def jitter(results: Results) -> Table:
 
 def _jitter_row(case: Case) -> tuple[Cell, ...]:
     return (
-        label(case.cold.problem), label(case.cold.solver), int(case.cold.arrays["residual"].size),
+        case.cold.title, label(case.cold.solver), int(case.cold.arrays["residual"].size),
         *(_largest(record) for record in case), *(_mean(record) for record in case),
         *(_seam(record) for record in case[1:]),
     )  # fmt: skip
@@ -93,7 +93,7 @@ def _jitter_answer(cases: Sequence[Case]) -> Answer:
         f"of {len(cases)} cases, and in {closed} the way from the last frame back to the first is "
         "no larger than others. The largest of all:",
         tuple(
-            f"{way}: {words(_largest(record))}° ({label(record.problem)}, {label(record.solver)})"
+            f"{way}: {words(_largest(record))}° ({record.title}, {label(record.solver)})"
             for way, record in zip(WAYS, worst, strict=True)
         ),
     )
@@ -126,7 +126,7 @@ def price(results: Results) -> Table:
 
 def _price_row(case: Case) -> tuple[Cell, ...]:
     return (
-        label(case.cold.problem), label(case.cold.solver),
+        case.cold.title, label(case.cold.solver),
         *(_within(record) for record in case),
         *(metrics.spread(record.arrays["residual"]).largest for record in case),
         *(metrics.mean(record.arrays["iterations"]) for record in case),
@@ -161,7 +161,7 @@ def _price_answer(cases: Sequence[Case]) -> Answer:
 def drift(results: Results) -> Table:
     """Return how far the pose drifts away from round to round."""
     pairs = []
-    for warm in results.all(SUITE, DRIFT, way=WARM):
+    for warm in results.all(SUITE, task=DRIFT, way=WARM):
         coherent = results.one(SUITE, warm.problem, warm.solver, way=COHERENT)
         if coherent is not None:
             pairs.append((warm, coherent))

@@ -11,22 +11,21 @@ from ...presentation.figures import (
     plain_powers,
     written,
 )
-from ...presentation.results import Results, label, problems
-from .tables import ONE_STEP
+from ...presentation.results import Results, by_problem, label
+from . import ONE_STEP
 
 
 def cloth_convergence(results: Results) -> Drawing | None:
     """Draw residual and error against the iteration of one step, a column for each stiffness."""
-    records = [r for r in results.all("cloth") if r.problem.endswith(ONE_STEP)]
-    if not records:
+    cloths = list(by_problem(results.all("cloth", task=ONE_STEP)).values())
+    if not cloths:
         return None
-    names = problems(records)
     rows = {"residual": "residual", "error": "error |x − x*| / |y − x*|"}
-    with canvas(4.6, len(names), rows=2, sharex=True, sharey=True) as (figure, axes):
+    with canvas(4.6, len(cloths), rows=2, sharex=True, sharey=True) as (figure, axes):
         for i, (quantity, ylabel) in enumerate(rows.items()):
-            for j, problem in enumerate(names):
-                ax = axes[i * len(names) + j]
-                for record in (r for r in records if r.problem == problem):
+            for j, records in enumerate(cloths):
+                ax = axes[i * len(cloths) + j]
+                for record in records:
                     colour, line, _ = registry.find(record.solver).style
                     values = record.arrays[quantity]
                     shown = {"linestyle": line, "color": COLOURS[colour]}
@@ -34,10 +33,10 @@ def cloth_convergence(results: Results) -> Drawing | None:
                     ax.plot(k, values[1:], **shown, label=written(label(record.solver)))
                 ax.set(xscale="log", yscale="log", ylim=(1e-14, 2))
                 plain_powers(ax)
-            axes[i * len(names)].set_ylabel(ylabel)
-        for ax, problem in zip(axes, names, strict=False):
-            ax.set_title(written(label(problem.removesuffix(ONE_STEP))))
-        for ax in axes[len(names) :]:
+            axes[i * len(cloths)].set_ylabel(ylabel)
+        for ax, records in zip(axes, cloths, strict=False):
+            ax.set_title(written(f"cloth, {records[0].title}"))
+        for ax in axes[len(cloths) :]:
             ax.set_xlabel("iteration, log scale")
         axes[0].legend(loc="upper right")
         return finished(

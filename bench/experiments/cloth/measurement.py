@@ -13,6 +13,7 @@ from reference.mass_spring import MassSpring, damper_forces, lengths, spring_for
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
+from . import DAMPERS, FEW, ONE_STEP, SWING
 from .problem import DAMPING, FACTORS, ClothSwing, H, cloth_swing
 
 # The cloth falls for three seconds; the steps of the next second are looked at.
@@ -21,7 +22,7 @@ STEPS = 60
 TOLERANCE = 1e-10
 # The step whose convergence is followed iteration by iteration.
 MIDDLE = FALLING + STEPS // 2
-FEW = (1, 10, 100)
+FEW_ITERATIONS = (1, 10, 100)
 # Steps in which the two laws of dampers are compared [s], each half the one before.
 HALVED = tuple(H / 2**i for i in range(-1, 6))
 
@@ -33,28 +34,30 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """
     for factor in FACTORS:
         problem = cloth_swing(factor)
+        facts = {"title": f"stiffness × {factor:g}"}
         swinging = {"h": H, "first": FALLING, "steps": STEPS}
         yield Block(
             "cloth", problem.name, "newton", partial(newton_steps, problem),
-            {**swinging, "tolerance": TOLERANCE},
+            {**swinging, "tolerance": TOLERANCE}, facts={**facts, "task": SWING},
         )  # fmt: skip
         for solver in registry.followed_step_solvers():
             yield Block(
                 "cloth", f"{problem.name}/one step", solver.name,
                 partial(one_step, problem, solver.name, solver.followed),
                 {"h": H, "step": MIDDLE, "iterations": solver.followed},
+                facts={**facts, "task": ONE_STEP},
             )  # fmt: skip
-        for iterations in FEW:
+        for iterations in FEW_ITERATIONS:
             yield Block(
                 "cloth", f"{problem.name}/few iterations", "local_global",
                 partial(few_iterations, problem, iterations),
-                {**swinging, "iterations": iterations},
+                {**swinging, "iterations": iterations}, facts={**facts, "task": FEW},
             )  # fmt: skip
         damped = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
         halved = {"longest": HALVED[0], "halvings": len(HALVED) - 1}
         yield Block(
             "cloth", f"{problem.name}/dampers", "newton", damped,
-            {"first": MIDDLE, "damping": DAMPING, **halved},
+            {"first": MIDDLE, "damping": DAMPING, **halved}, facts={**facts, "task": DAMPERS},
         )  # fmt: skip
 
 

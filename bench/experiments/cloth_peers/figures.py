@@ -19,7 +19,7 @@ from . import tables as cloth_peers
 MOST_DRAWN = 10.0
 
 
-def work_precision(name: str, family: str, error: str, titles: tuple[str, str, str]) -> Figure:
+def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str]) -> Figure:
     """Return what draws an error against the time for a frame: a curve for each solver.
 
     A column for each stiffness, a row for each size. The titles are those of the figure, of the
@@ -27,7 +27,7 @@ def work_precision(name: str, family: str, error: str, titles: tuple[str, str, s
     """
 
     def draw(results: Results) -> Drawing | None:
-        found = [p for p in cloth_peers.points(results, family) if _can_be_drawn(p, error)]
+        found = [p for p in cloth_peers.points(results, task) if _can_be_drawn(p, error)]
         if not found:
             return None
         stiffnesses, sizes = (

@@ -11,9 +11,8 @@ from ...peers import registry
 from ...presentation.results import Results, label, listed
 from ...presentation.tables import Answer, Cell, Column, Table, words
 from ..published import problem as published
+from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 
-ONE_STEP, MOTION, NEEDED = "peers/one step/", "peers/motion/", "peers/iterations/"
-STABILITY, LIU, MISSING = "peers/stability", "peers/liu2013", "peers/all"
 TARGETS = {"1e-3": 1e-3, "1e-6": 1e-6}
 DECADES = tuple(f"1e-{p}" for p in range(1, 9))
 EVERY = "every cloth"
@@ -53,22 +52,22 @@ class Point(NamedTuple):
     record: Record
 
 
-def points(results: Results, family: str) -> list[Point]:
-    """Return all points of a family, cloth by cloth: stiffness first, then particles."""
-    found = [p for record in results.all("cloth", family) for p in _points_of(record)]
+def points(results: Results, task: str) -> list[Point]:
+    """Return all points of a task, cloth by cloth: stiffness first, then particles."""
+    found = [p for record in results.all("cloth", task=task) for p in _points_of(record)]
     return sorted(found, key=lambda point: (point.stiffness, point.particles))
 
 
 def _points_of(record: Record) -> Iterator[Point]:
     if "particles" not in record.arrays:
         return
-    rungs = record.notes["rungs"].split("; ")
     count = record.arrays["particles"].size
     whole = {name: values for name, values in record.arrays.items() if values.size == count}
     for i in range(count):
         values = {name: float(array[i]) for name, array in whole.items()}
         yield Point(
-            record.settings["stiffness"], int(values["particles"]), record.solver, rungs[i], values,
+            record.settings["stiffness"], int(values["particles"]), record.solver,
+            record.facts["rungs"][i], values,
             record,
         )  # fmt: skip
 
@@ -80,7 +79,7 @@ def _cloth_of(point: Point) -> str:
 def _missing_rows(results: Results, cells: int) -> list[tuple[Cell, ...]]:
     return [
         (EVERY, record.solver, *[None] * (cells - 3), record.notes["remark"])
-        for record in results.all("cloth", MISSING)
+        for record in results.all("cloth", task=MISSING)
     ]
 
 
@@ -139,9 +138,9 @@ def _step_row(group: Sequence[Point]) -> tuple[Cell, ...]:
 
 def _remark(group: Sequence[Point]) -> str:
     """Return what a record says of this cloth."""
-    size = f"{group[0].particles} × {group[0].particles}"
-    remarks = group[0].record.notes.get("remark", "").split("; ")
-    return "; ".join(remark for remark in remarks if remark.startswith(size))
+    record = group[0].record
+    remarks = zip(record.arrays["remark_particles"], record.facts["remarks"], strict=True)
+    return "; ".join(sentence for particles, sentence in remarks if particles == group[0].particles)
 
 
 def _milliseconds(point: Point) -> float:
@@ -262,7 +261,7 @@ def _nearest(whole: Sequence[Point]) -> str:
 
 def iterations(results: Results) -> Table:
     """Return the iterations of our solvers to each power of ten."""
-    records = results.all("cloth", NEEDED)
+    records = results.all("cloth", task=NEEDED)
     size = records[0].settings["size"] if records else 0
     return Table(
         "cloth_iterations",
@@ -309,7 +308,7 @@ def _count_to(record: Record, i: int) -> str:
 def stability(results: Results) -> Table:
     """Return the longest stable steps, beside what theory has for them."""
     rows: list[tuple[Cell, ...]] = []
-    for record in results.all("cloth", STABILITY):
+    for record in results.all("cloth", task=STABILITY):
         arrays = record.arrays
         for k, limit, frequency in zip(
             arrays["stiffness"], arrays["limit"], arrays["frequency"], strict=True
@@ -347,7 +346,7 @@ def _stability_answer(rows: Sequence[tuple[Cell, ...]]) -> Answer:
 
 def liu_2013(results: Results) -> Table:
     """Return the published times of Liu et al. 2013, and ours for as many vertices."""
-    wanted = [r for r in results.all("cloth", LIU) if r.solver in published.LIU_2013]
+    wanted = [r for r in results.all("cloth", task=LIU) if r.solver in published.LIU_2013]
     records = [r for r in wanted if "seconds" in r.arrays]
     rows = []
     for record in records:

@@ -9,7 +9,7 @@ from ...presentation.figures import (
     nth_style,
     written,
 )
-from ...presentation.results import Results, label, problems, solvers
+from ...presentation.results import Results, by_problem, label, solvers
 
 
 def energy(results: Results) -> Drawing | None:
@@ -17,17 +17,17 @@ def energy(results: Results) -> Drawing | None:
     records = results.all("energy")
     if not records:
         return None
-    names, shown = problems(records), solvers(records)
-    with canvas(3.2 + legend_height(shown, 3), len(names), sharey=True) as (figure, axes):
-        for ax, problem in zip(axes, names, strict=True):
-            for record in (r for r in records if r.problem == problem):
+    groups, shown = list(by_problem(records).values()), solvers(records)
+    with canvas(3.2 + legend_height(shown, 3), len(groups), sharey=True) as (figure, axes):
+        for ax, group in zip(axes, groups, strict=True):
+            for record in group:
                 style = nth_style(shown.index(record.solver))
                 ax.plot(
                     record.arrays["time"], record.arrays["left"],
                     label=written(label(record.solver)), **style,
                 )  # fmt: skip
             ax.set(
-                title=written(label(problem.removeprefix("swing/"))),
+                title=written(group[0].title),
                 xlabel="time [s]",
                 xlim=(0, None),
             )

@@ -7,7 +7,6 @@ from ...harness.record import Record
 from ...presentation.results import Results, label, settings
 from ...presentation.tables import Answer, Cell, Column, Table, words
 
-UNDAMPED = "swing/undamped"
 LISTED = (100, 1_000, 10_000)
 
 
@@ -40,7 +39,7 @@ def energy(results: Results) -> Table:
 def _row(record: Record) -> tuple[Cell, ...]:
     low, high = metrics.extent(record.arrays["left"])
     return (
-        label(record.problem.removeprefix("swing/")),
+        record.title,
         label(record.solver),
         *(_left(record, k) for k in LISTED),
         metrics.percent(high, 1.0),
@@ -55,7 +54,7 @@ def _left(record: Record, steps: int) -> float | None:
 
 
 def _answer(records: Sequence[Record]) -> Answer:
-    undamped = [record for record in records if record.problem == UNDAMPED]
+    undamped = [record for record in records if record.facts["damping"] == 0.0]
     if not undamped:
         return Answer()
     return Answer(

@@ -46,7 +46,8 @@ def blocks(scale: Scale) -> Iterator[Block]:
 def _block(size: int, stiffness: float, solver: str, start: str, limit: int) -> Block:
     settings = {"h": H, "start": start, "iterations": limit, "tolerance": TOLERANCE}
     measure = partial(certified_step, size, stiffness, solver, start, limit)
-    return Block(SUITE, f"swing/k{stiffness:g}", solver, measure, settings, size)
+    facts = {"stiffness": stiffness}
+    return Block(SUITE, f"swing/k{stiffness:g}", solver, measure, settings, size, facts)
 
 
 def certified_step(size: int, stiffness: float, solver: str, start: str, limit: int) -> Measured:

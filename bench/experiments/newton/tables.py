@@ -80,7 +80,7 @@ def _is_solved(record: Record) -> bool:
 
 
 def _stiffness(record: Record) -> float:
-    return float(record.problem.rpartition("/k")[2])
+    return float(record.facts["stiffness"])
 
 
 def _sizes(records: Sequence[Record]) -> str:

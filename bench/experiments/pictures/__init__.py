@@ -2,4 +2,7 @@
 
 from ...harness.experiment import Experiment
 
+# What a record is about.
+ARM, CLOTH = "arm", "cloth"
+
 EXPERIMENT = Experiment(__package__, "pictures", "the poses and cloths that the report draws")

@@ -12,6 +12,7 @@ from ...harness.block import Block, Measured, Scale
 from ..arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
 from ..cloth.measurement import converged_motion
 from ..cloth.problem import H, cloth_swing
+from . import ARM, CLOTH
 
 GHOSTS = 9
 FRAMES = 6
@@ -24,10 +25,11 @@ def blocks(scale: Scale) -> Iterator[Block]:
         yield Block(
             "pictures", f"arm/{CUSTOM}", solver, partial(drawing, solver, evened),
             {"evened": evened, "min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING},
+            facts={"task": ARM},
         )  # fmt: skip
     yield Block(
         "pictures", "cloth/x1", "newton", falling_cloth,
-        {"h": H, "frames": FRAMES},
+        {"h": H, "frames": FRAMES}, facts={"task": CLOTH},
     )  # fmt: skip
 
 

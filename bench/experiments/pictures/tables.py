@@ -6,11 +6,12 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, listed, settings, solvers
 from ...presentation.tables import Answer, Cell, Column, Table, words
+from . import ARM
 
 
 def resampling(results: Results) -> Table:
     """Return what resampling makes of the custom curve."""
-    records = results.all("pictures", "arm/")
+    records = results.all("pictures", task=ARM)
     return Table(
         "resampling",
         "The custom curve before and after resampling",

@@ -6,6 +6,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, settings
 from ...presentation.tables import Answer, Cell, Column, Table, words
+from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
 
 HERE = "here"
@@ -13,10 +14,10 @@ HERE = "here"
 
 def trac_ik(results: Results) -> Table:
     """Return TRAC-IK's table, and what the solvers do here."""
-    records = results.all("ik", "published/trac_ik/")
+    records = results.all("ik", task=TRAC_IK)
     rows: list[tuple[Cell, ...]] = []
     for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK):
-        here = [r for r in records if r.problem.endswith(f"/{robot}")]
+        here = [r for r in records if r.facts["robot"] == robot]
         rows += [
             (robot, rate.solver, rate.source, None, rate.percent, None, rate.milliseconds)
             for rate in published.TRAC_IK if here and rate.robot == robot
@@ -56,7 +57,7 @@ def _trac_ik_answer(records: Sequence[Record]) -> Answer:
     points = []
     for record in records:
         if "solved" in record.arrays:
-            robot = record.problem.rpartition("/")[2]
+            robot = record.facts["robot"]
             row = _trac_ik_row(robot, record)
             points.append(f"{robot}, {record.solver}: {words(row[3])}, mean {words(row[6])} ms")
     return Answer("Here:", tuple(points)) if points else Answer()
@@ -64,7 +65,7 @@ def _trac_ik_answer(records: Sequence[Record]) -> Answer:
 
 def toolbox(results: Results) -> Table:
     """Return the Robotics Toolbox's table of one search, and what the solvers do here."""
-    records = [r for r in results.all("ik", "published/toolbox/") if "solved" in r.arrays]
+    records = [r for r in results.all("ik", task=TOOLBOX) if "solved" in r.arrays]
     return Table(
         "published_toolbox",
         "The Robotics Toolbox tutorial’s table of one search, and here",
@@ -87,11 +88,10 @@ def toolbox(results: Results) -> Table:
 
 
 def _toolbox_row(record: Record) -> tuple[Cell, ...]:
-    method = record.settings.get("method", "")
     failed = metrics.share(~record.arrays["solved"])
     own = metrics.share(record.arrays["claimed"] != 1)
     return (
-        record.solver, published.TOOLBOX.get(method), metrics.percent(own.hits, own.total), failed,
+        record.solver, record.facts.get("infeasible"), metrics.percent(own.hits, own.total), failed,
         metrics.microseconds(metrics.effort(record.arrays["seconds"]).median),
     )  # fmt: skip
 
@@ -109,7 +109,7 @@ def _toolbox_answer(records: Sequence[Record]) -> Answer:
 
 def fabrik(results: Results) -> Table:
     """Return table 1 of the paper on FABRIK, and our iterations."""
-    records = results.all("ik", "published/fabrik/")
+    records = results.all("ik", task=FABRIK)
     solvers = list(dict.fromkeys(record.solver for record in records))
     columns = [
         Column(f"{stratum}, {what}")
@@ -135,7 +135,8 @@ def fabrik(results: Results) -> Table:
 def _fabrik_row(results: Results, solver: str) -> tuple[Cell, ...]:
     cells: list[Cell] = [label(solver)]
     for i, stratum in enumerate(published.FABRIK_DISTANCES):
-        record = results.one("ik", f"published/fabrik/{stratum}", solver)
+        found = results.all("ik", task=FABRIK, stratum=stratum)
+        record = next((r for r in found if r.solver == solver), None)
         cells.append(published.FABRIK[solver][i] if solver in published.FABRIK else None)
         counts = None if record is None else record.arrays["iterations"]
         cells.append(None if counts is None else metrics.mean(counts))

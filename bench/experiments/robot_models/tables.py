@@ -46,7 +46,7 @@ def _row(records: Sequence[Record]) -> tuple[Cell, ...]:
         found = [int(fullest.arrays[name]) for name in SIZES]
         found += [_largest(agreeing, name) for name in QUANTITIES]
     return (
-        records[0].problem.partition("/")[2],
+        records[0].title,
         *found,
         listed([record.solver for record in agreeing]) or "none",
         "; ".join(remark for record in records if (remark := _remark(record))),

@@ -5,6 +5,7 @@ where they are wanted, how far they are turned away, and by how much a joint is 
 """
 
 import functools
+import xml.etree.ElementTree as ElementTree
 from typing import Any, NamedTuple
 
 import mujoco
@@ -59,11 +60,11 @@ class Judgement(NamedTuple):
 
 def mujoco_model(robot: Robot) -> Any:
     """Return the robot in MuJoCo, all of its links kept."""
-    text = robot.text
-    if text.startswith("<robot"):
-        head, _, rest = text.partition(">")
-        text = f'{head}><mujoco><compiler fusestatic="false"/></mujoco>{rest}'
-    return mujoco.MjModel.from_xml_string(text)
+    tree = ElementTree.fromstring(robot.text)
+    if robot.is_chain:
+        extension = ElementTree.SubElement(tree, "mujoco")
+        ElementTree.SubElement(extension, "compiler", fusestatic="false")
+    return mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
 
 
 class Judge:

@@ -51,7 +51,7 @@ def robot_curves(
 def _budget_curves(records: list[Record], along: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
     panels: dict[str, dict[str, np.ndarray]] = {}
     for record in robots.measured(records):
-        panel = panels.setdefault(robots.robot_of(record), {})
+        panel = panels.setdefault(record.title, {})
         panel[record.solver] = robots.budget_curve(record, along)
     return panels
 

@@ -15,6 +15,7 @@ from ...harness.isolation import Workshop
 from ...harness.worker import Solved
 from ...peers import registry
 from ...peers.registry import Entry, Peer
+from . import REACHABLE, UNREACHABLE
 from .evaluate import Targets, Tolerance, judge
 from .job import Job
 from .problem import PACKAGE, ROBOTS, is_installed, title
@@ -27,9 +28,7 @@ _TARGETS = 0.1
 _BUDGET = 3.0
 # Those out of reach are fewer: the slowest solvers take the longest over them.
 _OUT_OF_REACH = 0.25
-EVERY_ROBOT, EVERY_SOLVER = "robots/all", "all solvers"
-# Between the names of the strata in a record's notes.
-LIST = ", "
+EVERY_SOLVER = "all solvers"
 # Digits kept of times and residuals: more would fill the disk with noise.
 _DIGITS = 5
 
@@ -50,8 +49,9 @@ def blocks(scale: Scale) -> Iterator[Block]:
     here = [name for name in ROBOTS if is_installed(name)]
     for name in ROBOTS:
         if name not in here:
-            absent = partial(not_installed, PACKAGE, title(name))
-            yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"})
+            absent = partial(not_installed, PACKAGE)
+            facts = {"task": REACHABLE, "title": title(name)}
+            yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"}, 0, facts)
     for peer in registry.PEERS:
         for entry in peer.entries:
             yield from _entry_blocks(peer, entry, here, count, _BUDGET * scale.seconds)
@@ -63,16 +63,20 @@ def _entry_blocks(
     solver = peer.called(entry)
     settings = settings_of(peer, entry, TOLERANCE)
     if not peer.version:
-        yield Block(SUITE, EVERY_ROBOT, solver, partial(not_installed, peer.package), settings)
+        absent = partial(not_installed, peer.package)
+        facts = {"task": REACHABLE, "title": "every robot"}
+        yield Block(SUITE, "robots/all", solver, absent, settings, 0, facts)
         return
     few = max(1, round(_OUT_OF_REACH * count))
     for name in robots:
         run = Run(name, peer, entry, TOLERANCE, budget)
         measure = partial(_solve_strata, run, count)
-        yield Block(SUITE, f"robots/{name}", solver, measure, settings, count * len(STRATA))
+        facts = {"task": REACHABLE, "title": title(name)}
+        yield Block(SUITE, f"robots/{name}", solver, measure, settings, count * len(STRATA), facts)
         run = run._replace(budget=_OUT_OF_REACH * budget)
         measure = partial(_solve_unreachable, run, few)
-        yield Block(SUITE, f"unreachable/{name}", solver, measure, settings, few)
+        facts = {"task": UNREACHABLE, "title": title(name)}
+        yield Block(SUITE, f"unreachable/{name}", solver, measure, settings, few, facts)
 
 
 def settings_of(peer: Peer, entry: Entry, tolerance: Tolerance) -> dict[str, Any]:
@@ -87,9 +91,9 @@ def settings_of(peer: Peer, entry: Entry, tolerance: Tolerance) -> dict[str, Any
     }
 
 
-def not_installed(package: str, robot: str = "every robot") -> Measured:
+def not_installed(package: str) -> Measured:
     """Return a block without numbers that says what is missing."""
-    return Measured({}, {"remark": f"{package} is not installed", "robot": robot})
+    return Measured({}, {"remark": f"{package} is not installed"})
 
 
 def _solve_strata(run: Run, count: int) -> Measured:
@@ -119,13 +123,12 @@ def solve(run: Run, targets: Targets) -> Measured:
     arrays = _judged(run, targets, done) if done else {}
     return Measured(
         {**arrays, "setup": np.array(outcome.setup)},
+        {"remark": outcome.trouble},
         {
-            "remark": outcome.trouble,
-            "strata": LIST.join(STRATA),
-            "robot": robot.title,
-            "tips": LIST.join(robot.tips),
-            "joints": str(len(robot.joints)),
-            "freedom": str(judge(run.robot).model.nv),
+            "strata": list(STRATA),
+            "tips": list(robot.tips),
+            "joints": len(robot.joints),
+            "freedom": int(judge(run.robot).model.nv),
             "wanted": "pose" if robot.posed else "position",
         },
     )

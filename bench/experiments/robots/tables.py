@@ -15,6 +15,7 @@ from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
 from ...presentation.results import Results, listed, settings
 from ...presentation.tables import Answer, Cell, Column, Table, words
+from . import REACHABLE, UNREACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}
 # Shares of the targets are shown for these budgets [s] and these ratios to the fastest.
@@ -42,17 +43,12 @@ class Tables(NamedTuple):
     profiles: Callable[[Results], Table]
 
 
-def records_of(results: Results, kind: str, family: str = "robots/") -> list[Record]:
+def records_of(results: Results, kind: str, task: str = REACHABLE) -> list[Record]:
     """Return the records on robots of one kind, robot by robot."""
-    wanted = [r for r in results.all("ik", family) if r.settings.get("kind") in (kind, "any")]
-    order = list(dict.fromkeys(robot_of(record) for record in wanted if "solved" in record.arrays))
-    order += [name for name in map(robot_of, wanted) if name not in order]
-    return sorted(wanted, key=lambda record: order.index(robot_of(record)))
-
-
-def robot_of(record: Record) -> str:
-    """Return how the robot of a record is written."""
-    return record.notes.get("robot", record.problem.rpartition("/")[2])
+    wanted = [r for r in results.all("ik", task=task) if r.settings.get("kind") in (kind, "any")]
+    order = list(dict.fromkeys(record.title for record in wanted if "solved" in record.arrays))
+    order += [name for name in (record.title for record in wanted) if name not in order]
+    return sorted(wanted, key=lambda record: order.index(record.title))
 
 
 def measured(records: Sequence[Record]) -> list[Record]:
@@ -62,10 +58,10 @@ def measured(records: Sequence[Record]) -> list[Record]:
 
 def models(results: Results) -> Table:
     """Return the robots and what is asked of them."""
-    one = {robot_of(r): r for kind in KINDS for r in measured(records_of(results, kind))}
+    one = {r.title: r.facts for kind in KINDS for r in measured(records_of(results, kind))}
     rows = [
-        (robot, int(r.notes["joints"]), int(r.notes["freedom"]), r.notes["tips"], r.notes["wanted"])
-        for robot, r in one.items()
+        (robot, of["joints"], of["freedom"], ", ".join(of["tips"]), of["wanted"])
+        for robot, of in one.items()
     ]
     return Table(
         "robots_list",
@@ -89,7 +85,7 @@ def models(results: Results) -> Table:
 
 def who(results: Results) -> Table:
     """Return the solvers that take part."""
-    present = {r.solver: r for r in results.all("ik", "robots/")}
+    present = {r.solver: r for r in results.all("ik", task=REACHABLE)}
     rows: list[tuple[Cell, ...]] = []
     for peer in registry.PEERS if present else ():
         versions = [
@@ -159,7 +155,7 @@ def _how(records: Sequence[Record]) -> str:
 
 
 def _success_row(record: Record) -> tuple[Cell, ...]:
-    names: tuple[Cell, ...] = (robot_of(record), record.solver)
+    names: tuple[Cell, ...] = (record.title, record.solver)
     remark = record.notes.get("remark", "")
     if "solved" not in record.arrays:
         return (*names, *[None] * 11, remark)
@@ -187,9 +183,9 @@ def false_claims(record: Record) -> int | None:
 
 def _success_answer(records: Sequence[Record]) -> Answer:
     points = []
-    for robot in dict.fromkeys(robot_of(record) for record in measured(records)):
+    for robot in dict.fromkeys(record.title for record in measured(records)):
         said = []
-        for record in (r for r in measured(records) if robot_of(r) == robot):
+        for record in (r for r in measured(records) if r.title == robot):
             share, effort = (
                 metrics.share(record.arrays["solved"]),
                 metrics.effort(record.arrays["seconds"]),
@@ -209,7 +205,7 @@ def _success_answer(records: Sequence[Record]) -> Answer:
 def _strata(kind: str) -> Callable[[Results], Table]:
     def table(results: Results) -> Table:
         records = measured(records_of(results, kind))
-        strata = records[0].notes["strata"].split(", ") if records else []
+        strata = records[0].facts["strata"] if records else []
         return Table(
             f"robots_strata_{KINDS[kind]}",
             f"Robots, {kind}: success in each stratum",
@@ -230,7 +226,7 @@ def _strata(kind: str) -> Callable[[Results], Table]:
 def _strata_row(record: Record, count: int) -> tuple[Cell, ...]:
     stratum, solved = record.arrays["stratum"], record.arrays["solved"]
     shares = [metrics.share(solved[stratum == i]) for i in range(count)]
-    return (robot_of(record), record.solver, *shares)
+    return (record.title, record.solver, *shares)
 
 
 def _strata_answer(records: Sequence[Record], strata: Sequence[str]) -> Answer:
@@ -254,7 +250,7 @@ def _strata_answer(records: Sequence[Record], strata: Sequence[str]) -> Answer:
 
 def _unreachable(kind: str) -> Callable[[Results], Table]:
     def table(results: Results) -> Table:
-        records = measured(records_of(results, kind, "unreachable/"))
+        records = measured(records_of(results, kind, UNREACHABLE))
         return Table(
             f"robots_unreachable_{KINDS[kind]}",
             f"Robots, {kind}: targets out of reach",
@@ -278,7 +274,7 @@ def _unreachable_row(record: Record) -> tuple[Cell, ...]:
     left = record.arrays["position"][np.isfinite(record.arrays["position"])]
     distance = metrics.spread(left)
     return (
-        robot_of(record), record.solver, int(record.arrays["solved"].size), false_claims(record),
+        record.title, record.solver, int(record.arrays["solved"].size), false_claims(record),
         *(metrics.microseconds(seconds) for seconds in metrics.effort(record.arrays["seconds"])),
         *((distance.median, distance.largest) if left.size else (None, None)), int(left.size),
     )  # fmt: skip
@@ -303,7 +299,7 @@ def _budgets(kind: str) -> Callable[[Results], Table]:
             (*_NAMES, *(Column(f"within {_duration(budget)}", "%") for budget in BUDGETS)),
             tuple(
                 (
-                    robot_of(r),
+                    r.title,
                     r.solver,
                     *(metrics.percent(x, 1.0) for x in budget_curve(r, BUDGETS)),
                 )
@@ -330,8 +326,8 @@ def _leaders(
 ) -> Answer:
     """Say who is ahead at each point, robot by robot."""
     said = []
-    for robot in dict.fromkeys(robot_of(record) for record in records):
-        mine = [record for record in records if robot_of(record) == robot]
+    for robot in dict.fromkeys(record.title for record in records):
+        mine = [record for record in records if record.title == robot]
         shares = np.array([curve(record, points) for record in mine])
         best = [
             f"{named(point)} {mine[int(np.argmax(column))].solver} "
@@ -372,8 +368,8 @@ def _ratio_columns() -> list[Column]:
 def profiles(records: Sequence[Record], ratios: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
     """Return the profile of each solver on each robot, over the targets given to all of them."""
     made = {}
-    for robot in dict.fromkeys(robot_of(record) for record in measured(records)):
-        near = [r for r in measured(records) if robot_of(r) == robot]
+    for robot in dict.fromkeys(record.title for record in measured(records)):
+        near = [r for r in measured(records) if r.title == robot]
         most = max(len(record.arrays["solved"]) for record in near)
         near = [record for record in near if ENOUGH * len(record.arrays["solved"]) >= most]
         least = min(len(record.arrays["solved"]) for record in near)

@@ -13,24 +13,24 @@ from ...presentation.figures import (
     finished,
     legend_height,
     plain_powers,
-    ticks,
     written,
 )
-from ...presentation.results import Results, problems, solvers
+from ...presentation.results import Results, by_problem, solvers
 
 
 def timing(subject: str, unit: str, scale: float, title: str) -> Figure:
     """Return a figure of the medians of one subject: a row for each work, a mark for each doer."""
 
     def draw(results: Results) -> Drawing | None:
-        records = results.all("timing", f"{subject}/")
+        records = results.all("timing", subject=subject)
         if not records:
             return None
-        works = problems(records)
+        rows = by_problem(records)
+        works, labels = list(rows), [written(of[0].title) for of in rows.values()]
         height = 0.27 * len(works) + 1.2 + legend_height(solvers(records), 3)
         with canvas(height, 1) as (figure, axes):
             _timing_marks(axes[0], records, works, scale)
-            axes[0].set_yticks(range(len(works)), ticks(works))
+            axes[0].set_yticks(range(len(works)), labels)
             axes[0].set(xscale="log", xlabel=f"median [{unit}], log scale")
             axes[0].set_ylim(-0.6, len(works) - 0.4)
             plain_powers(axes[0])

@@ -39,7 +39,7 @@ def keep(request: pytest.FixtureRequest) -> Callable[[Case, Sequence[float], str
         }
         record = Record(
             TIMING,
-            case.problem,
+            case.work.problem,
             case.solver,
             case.settings,
             seconds(request.config),
@@ -48,6 +48,7 @@ def keep(request: pytest.FixtureRequest) -> Callable[[Case, Sequence[float], str
             stamp(),
             now(),
             float(np.sum(rounds)),
+            case.facts,
         )
         file.append([record])
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, label, problems
+from ...presentation.results import Results, by_problem
 from ...presentation.tables import Answer, Cell, Column, Table, words
 from .case import COMPILED, LIMIT, PLAIN
 
@@ -58,7 +58,7 @@ def cloth(results: Results) -> Table:
 def _table(
     results: Results, subject: str, name: str, title: str, unit: str, scale: float, shows: str
 ) -> Table:
-    records = results.all("timing", f"{subject}/")
+    records = results.all("timing", subject=subject)
     limits = {record.problem: record for record in records if record.solver == LIMIT}
     ours = {record.problem: record for record in records if record.solver == COMPILED}
     doers = [record for record in records if record.solver != LIMIT]
@@ -97,7 +97,7 @@ LIMIT_SENTENCE = (
 def _row(record: Record, ours: Record | None, scale: float) -> tuple[Cell, ...]:
     took = metrics.timing(record.arrays["seconds"])
     return (
-        label(record.problem.partition("/")[2]),
+        record.title,
         record.solver,
         scale * took.median,
         scale * took.low,
@@ -114,15 +114,15 @@ def _limit_cells(record: Record, limit: Record | None) -> tuple[Cell, ...]:
 def _answer(doers: Sequence[Record], limits: dict[str, Record], unit: str, scale: float) -> Answer:
     """Say who takes how long for what, plain Python left out, a point for each group of works."""
     groups: dict[str, list[str]] = {}
-    for problem in problems(doers):
-        _, group, *work = problem.split("/")
-        mine = [r for r in doers if r.problem == problem and r.solver != PLAIN]
+    for problem, records in by_problem(doers).items():
+        group, work = records[0].facts["group"], records[0].facts["work"]
+        mine = [record for record in records if record.solver != PLAIN]
         times = ", ".join(f"{_short(r.solver)} {words(scale * _median(r))}" for r in mine)
         beside = ""
         if mine and problem in limits:
             beside = f" ({words(_times(mine[0], limits[problem]))} times the limit)"
-        groups.setdefault(group, []).append(f"{label('/'.join(work))}: {times} {unit}{beside}")
-    points = (f"{label(group)} – {'; '.join(works)}" for group, works in groups.items())
+        groups.setdefault(group, []).append(f"{work}: {times} {unit}{beside}")
+    points = (f"{group} – {'; '.join(works)}" for group, works in groups.items())
     return Answer("Medians, plain Python left out:", tuple(points))
 
 

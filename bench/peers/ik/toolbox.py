@@ -27,22 +27,26 @@ HALF = 0.5
 def prepare(
     robot: Robot,
     tolerance: Tolerance,
-    method: str = "LM chan 0.1",
+    method: str = "LM",
+    damping: str = "chan",
+    factor: float = 0.1,
     searches: int = 100,
     iterations: int = 30,
     limits: bool = True,
 ) -> Ask:
-    """Return the solver, set up for a robot: `method` is NR, GN, or LM, a rule and its factor."""
+    """Return the solver, set up for a robot.
+
+    `method` is NR, GN or LM, the last with a rule of damping and its factor.
+    """
     needs_a_chain(robot)
     chain = chain_of_transforms(robot)
     shared: dict[str, Any] = {
         "ilimit": iterations, "slimit": searches, "joint_limits": limits,
         "tol": HALF * min(tolerance) ** 2,
     }  # fmt: skip
-    name, *damping = method.split()
-    run: Any = {"LM": chain.ik_LM, "NR": chain.ik_NR, "GN": chain.ik_GN}[name]
-    if damping:
-        shared |= {"method": damping[0], "k": float(damping[1])}
+    run: Any = {"LM": chain.ik_LM, "NR": chain.ik_NR, "GN": chain.ik_GN}[method]
+    if method == "LM":
+        shared |= {"method": damping, "k": factor}
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
         goal = np.eye(4)
