@@ -240,7 +240,7 @@ SPOILT = {
     "no notes": lambda r: replace(r, notes={}),
     "no settings": lambda r: replace(r, settings={}),
     "no facts": lambda r: replace(r, facts={}),
-    "facts of other kinds": lambda r: replace(r, facts=dict.fromkeys(r.facts, ["x"])),
+    "facts of other kinds": lambda r: replace(r, facts={name: ["x"] for name in r.facts}),
     "titles of other kinds": lambda r: replace(r, facts={**r.facts, "title": None}),
     "settings of other kinds": lambda r: replace(r, settings=dict.fromkeys(r.settings, "x")),
     "arrays of other shapes": lambda r: replace(

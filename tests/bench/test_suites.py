@@ -6,13 +6,11 @@ import pytest
 from bench.experiments import SUITES, Scale, blocks
 from bench.experiments.cloth import measurement as cloth
 from bench.experiments.cloth.problem import cloth_swing
-from bench.experiments.timing.cases import cases
 from bench.harness.machine import stamp
 from bench.harness.record import Record, decode, encode, key
 from bench.harness.run import now
 
 TINY = Scale(targets=3, seconds=0.001)
-MEASURED = [suite for suite in SUITES if suite != "timing"]
 
 
 def found(suite, problem, solver, **settings):
@@ -26,25 +24,20 @@ def found(suite, problem, solver, **settings):
     return block
 
 
-@pytest.mark.parametrize("suite", MEASURED)
+@pytest.mark.parametrize("suite", SUITES)
 def test_no_two_blocks_have_the_same_key(suite):
     keys = [key(b.suite, b.problem, b.solver, b.settings) for b in blocks(suite, TINY)]
     assert len(keys) == len(set(keys)) > 0
     assert {name for name, *_ in keys} == {suite}
 
 
-@pytest.mark.parametrize("suite", MEASURED)
+@pytest.mark.parametrize("suite", SUITES)
 def test_the_settings_of_every_block_can_be_read_again(suite):
     for b in blocks(suite, TINY):
         made = Record(b.suite, b.problem, b.solver, b.settings, b.size, stamp=stamp(), when=now())
         back = decode(encode(made))
         assert back.key == made.key
         assert back.stamp == made.stamp
-
-
-def test_no_two_cases_of_the_timing_have_the_same_key():
-    keys = [case.key for case in cases()]
-    assert len(keys) == len(set(keys)) > 0
 
 
 def test_an_unknown_suite_is_refused():

@@ -1,6 +1,6 @@
 """The cases of all subjects, one file a subject."""
 
-from collections.abc import Iterator
+import functools
 
 from . import cloth, ik, kinematics
 from .case import Case
@@ -8,7 +8,7 @@ from .case import Case
 SUBJECTS = (kinematics, ik, cloth)
 
 
-def cases() -> Iterator[Case]:
-    """Yield the cases of all subjects."""
-    for subject in SUBJECTS:
-        yield from subject.cases()
+@functools.cache
+def cases() -> tuple[Case, ...]:
+    """Return the cases of all subjects."""
+    return tuple(case for subject in SUBJECTS for case in subject.cases())
