@@ -66,7 +66,7 @@ SECTIONS = (
         "robots",
         "Robots and a character",
         "Every solver that is installed, on real arms and on a character with two hands to place: "
-        "the same targets, starts and judge for all. Solvers that make one attempt and solvers "
+        "the same targets, starts and evaluation for all. Solvers that make one attempt and those "
         "that start again answer different questions and stand in different tables.",
         (robots.EXPERIMENT, published.EXPERIMENT),
     ),

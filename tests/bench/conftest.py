@@ -33,46 +33,46 @@ def drawn(solver, warm, turn):
         {
             "residual": [1e-5, 2e-5, 3e-4],
             "iterations": [4, 5, 6] if solver == "ccd" else [1, 2, 3],
-            "largest_turn": [turn, turn / 2],
-            "mean_turn": [turn / 4, turn / 4],
+            "largest_angle": [turn, turn / 2],
+            "mean_angle": [turn / 4, turn / 4],
         },
         facts={"task": "curve", "title": "arm, circle", "curve": "circle"},
     )
 
 
 def followed(solver, **turns):
-    """A closed curve of three points followed in three ways; every second turn is half as large."""
+    """A closed curve of three points followed in three modes, its angles halving."""
     return [
         record(
             "tracking",
             "arm/circle",
             solver,
-            {"tolerance": 1e-4, "max_iterations": 100, "way": way},
+            {"tolerance": 1e-4, "max_iterations": 100, "mode": mode},
             {
-                "residual": [1e-5, 2e-5, 3e-5 if way == "coherent" else 3e-4],
-                "iterations": [12, 11, 10] if way == "coherent" else [5, 4, 3],
-                "largest_turn": [turn, turn / 2, turn / 2],
-                "mean_turn": [turn / 4, turn / 4, turn / 8],
+                "residual": [1e-5, 2e-5, 3e-5 if mode == "coherent" else 3e-4],
+                "iterations": [12, 11, 10] if mode == "coherent" else [5, 4, 3],
+                "largest_angle": [turn, turn / 2, turn / 2],
+                "mean_angle": [turn / 4, turn / 4, turn / 8],
             },
             facts={"task": "curve", "title": "arm, circle"},
         )
-        for way, turn in turns.items()
+        for mode, turn in turns.items()
     ]
 
 
 def drifted(solver):
     """Three rounds, warm and coherent."""
-    ways = {"warm": [0.1, 0.2, 0.3], "coherent": [0.0, 1e-9, 0.0]}
+    modes = {"warm": [0.1, 0.2, 0.3], "coherent": [0.0, 1e-9, 0.0]}
     return [
         record(
             "tracking",
             "drift/heart",
             solver,
-            {"way": way},
+            {"mode": mode},
             {"drift": drift},
             facts={"task": "drift"},
         )
-        for way, drift in ways.items()
+        for mode, drift in modes.items()
     ]
 
 
@@ -164,7 +164,7 @@ def swung(solver, cloth="undamped", left=(1.0, 0.5)):
 
 
 def certified(solver="newton", settings=None, arrays=None, notes=None):
-    """One step of a cloth in mid-swing, its answer covered unless told otherwise."""
+    """One step of a cloth in mid-swing, its answer covered unless Newton colours them itself."""
     usual = {"h": 1 / 30, "start": "y", "iterations": 100, "tolerance": 1e-10}
     found = {"size": 10, "iterations": 4, "residual": 1e-12, "balance": 1e-15, "distance": 1e-11}
     found |= {"at_floor": True, "apart": 0.0, "error": 0.0, "above": 0.0}
@@ -242,7 +242,7 @@ def pictured():
     curve = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.3, 0, 0.1]])
     ghosts = [[[0, 1, 0], [0, 0.5, 0.2], point] for point in curve]
     arrays = {"curve": curve, "spacing": [0.1, 0.2], "ghosts": ghosts, "residual": [1e-5] * 3}
-    arrays |= {"iterations": [1, 2, 3], "largest_turn": [0.1, 0.2], "mean_turn": [0.1, 0.1]}
+    arrays |= {"iterations": [1, 2, 3], "largest_angle": [0.1, 0.2], "mean_angle": [0.1, 0.1]}
     spacing = {"min_spacing": 0.01, "max_spacing": 0.02}
     cloth = {"positions": [np.eye(4, 3), 2 * np.eye(4, 3)], "time": [0.0, 1.0], "pinned": [0, 1]}
     return [

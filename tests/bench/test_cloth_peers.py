@@ -22,7 +22,7 @@ from bench.experiments.cloth_peers.problem import (
 )
 from bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, true_motion
 from bench.harness import metrics
-from bench.harness.isolation import Outcome, Workshop
+from bench.harness.isolation import Outcome, WorkerProcess
 from bench.harness.worker import Done, Ready, Solved, Unfit
 from bench.peers import registry
 from bench.peers.cloth.ladder import Rung, motion_rungs, step_rungs
@@ -375,11 +375,11 @@ def test_a_job_without_time_left_begins_no_further_frame(cloth):
 
 
 @pytest.fixture(scope="module")
-def shop(fakes):
-    """A workshop that loses patience with a frame after half a second."""
-    shop = Workshop(start_patience=60.0, target_patience=0.5)
-    yield shop
-    shop.close()
+def worker(fakes):
+    """A worker process that loses patience with a frame after half a second."""
+    worker = WorkerProcess(start_patience=60.0, target_patience=0.5)
+    yield worker
+    worker.close()
 
 
 def fake_peer(manner, package="numpy"):
@@ -405,8 +405,8 @@ LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
         ("explodes", 3, True, ""),
     ],
 )
-def test_every_manner_becomes_one_point(shop, monkeypatch, manner, frames, lost, why):
-    monkeypatch.setattr(peers_cloth, "workshop", lambda: shop)
+def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, lost, why):
+    monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
     monkeypatch.setattr(peers_cloth, "motion_rungs", as_it_is)
     arrays, _, facts = peers_cloth.motion(fake_peer(manner), STIFFNESS, (LEVEL,))
     assert arrays["frames"].tolist() == [frames]
@@ -416,7 +416,7 @@ def test_every_manner_becomes_one_point(shop, monkeypatch, manner, frames, lost,
 
 
 class InThisProcess:
-    """A workshop without a process of its own."""
+    """A worker process without a process of its own."""
 
     def perform(self, job):
         said = list(job.perform())
@@ -427,7 +427,7 @@ class InThisProcess:
 
 @pytest.fixture
 def here(monkeypatch):
-    monkeypatch.setattr(peers_cloth, "workshop", InThisProcess)
+    monkeypatch.setattr(peers_cloth, "worker_process", InThisProcess)
 
 
 def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch):
@@ -438,7 +438,7 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
             tried.append(job)
             return Outcome(0.0, [], "ended after 300 s of silence", silent=True)
 
-    monkeypatch.setattr(peers_cloth, "workshop", Silent)
+    monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})
     arrays, _, facts = peers_cloth.motion(fake_peer("fine"), STIFFNESS, (LEVEL, LEVEL))
     assert len(tried) == 1
@@ -554,7 +554,7 @@ def test_the_table_of_one_step_names_the_cheapest_setting_and_the_fastest_solver
     assert column(table, "time to 1e-6 [ms]") == [None] * 3
     assert column(table, "least error") == [1e-4, 1e-4, 0.4]
     assert column(table, "remark") == ["20 × 20, 10 iterations: tired"] * 3
-    (point,) = table.answer.points
+    (point,) = table.summary.points
     assert point == (
         "20 × 20, 1,000 N/m: to 1e-3 Plumbob Newton, 10.0 ms (then Newton engine, VBD, 500 ms) "
         "and to 1e-6 none"
@@ -566,8 +566,8 @@ def test_the_table_of_motions_says_what_diverged_and_what_was_cut_short(make):
     assert column(table, "distance from the truth [m]") == [None, 2e-2, 1e-3]
     assert column(table, "time for a simulated second [s]") == pytest.approx([0.006, 0.06, 60.0])
     assert column(table, "remark") == ["diverged", "", "out of time before frame 4"]
-    assert "diverged: MuJoCo Euler" in table.answer.sentence
-    assert table.answer.points == ("20 × 20, 1,000 N/m: MuJoCo Euler by 4 steps, 0.0200 m",)
+    assert "diverged: MuJoCo Euler" in table.summary.sentence
+    assert table.summary.points == ("20 × 20, 1,000 N/m: MuJoCo Euler by 4 steps, 0.0200 m",)
     assert "order of 3.50" in table.measured
 
 
@@ -583,13 +583,13 @@ def test_a_missing_engine_has_a_row_in_both_tables(make):
 def test_iterations_that_did_not_suffice_are_said_so(make):
     table = findings.iterations(Results([make.needed("lbfgs", [1, 2, 3, 4] + [np.nan] * 4)]))
     assert table.rows[0][2:10] == (1, 2, 3, 4, None, None, None, None)
-    assert table.answer.points == ("1,000 N/m: L-BFGS more than 100",)
+    assert table.summary.points == ("1,000 N/m: L-BFGS more than 100",)
 
 
 def test_a_limit_is_shown_in_units_of_the_theory(make):
     table = findings.stability(Results([make.bounded("a", 0.02), make.bounded("b", np.nan)]))
     assert column(table, "of 2 / ω") == [pytest.approx(1.0), None]
-    assert table.answer.points == ("a: 1.00 × 2 / ω",)
+    assert table.summary.points == ("a: 1.00 × 2 / ω",)
 
 
 def test_the_published_times_stand_beside_ours(make):

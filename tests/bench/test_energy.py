@@ -53,11 +53,11 @@ def test_table_and_sentence_follow_the_records(make):
     assert [row[:2] for row in table.rows] == [("undamped", "RK4"), ("damped", "discrete")]
     assert table.rows[0][2:5] == (50.0, None, None)
     assert table.rows[0][5:] == (100.0, 50.0)
-    assert table.answer.points == ("RK4: 50.0, never less than 50.0 nor more than 100",)
+    assert table.summary.points == ("RK4: 50.0, never less than 50.0 nor more than 100",)
 
 
 def test_without_a_swing_undamped_nothing_is_said(make):
-    assert findings.energy(Results([make.swung("RK4", "damped")])).answer.sentence == ""
+    assert findings.energy(Results([make.swung("RK4", "damped")])).summary.sentence == ""
 
 
 def test_figure_has_a_panel_for_each_cloth_and_a_line_for_each_integrator(make):

@@ -52,21 +52,21 @@ def test_the_arm_draws_within_tolerance_cold_and_warm(solver):
         arrays = block.measure().arrays
         assert arrays["residual"].max() <= block.settings["tolerance"]
         assert arrays["iterations"].max() <= block.settings["max_iterations"]
-        assert len(arrays["largest_turn"]) == len(arrays["residual"]) - 1
-        assert (arrays["mean_turn"] <= arrays["largest_turn"]).all()
+        assert len(arrays["largest_angle"]) == len(arrays["residual"]) - 1
+        assert (arrays["mean_angle"] <= arrays["largest_angle"]).all()
 
 
-def test_a_coherent_motion_is_the_calmest_and_ends_where_it_began():
+def test_a_coherent_motion_is_the_smoothest_and_ends_where_it_began():
     cold, warm, coherent = (
-        found("tracking", "arm/heart", "ccd", way=way).measure().arrays
-        for way in ("cold", "warm", "coherent")
+        found("tracking", "arm/heart", "ccd", mode=mode).measure().arrays
+        for mode in ("cold", "warm", "coherent")
     )
     assert coherent["residual"].max() <= 1e-4
-    assert coherent["largest_turn"].max() < warm["largest_turn"][:-1].max()
-    assert warm["largest_turn"][:-1].max() < cold["largest_turn"][:-1].max()
-    assert warm["largest_turn"][-1] > 10 * coherent["largest_turn"][-1]
-    for way, least, most in (("warm", 0.1, 2.0), ("coherent", 0.0, 1e-9)):
-        left = found("tracking", "drift/heart", "ccd", way=way).measure().arrays["drift"]
+    assert coherent["largest_angle"].max() < warm["largest_angle"][:-1].max()
+    assert warm["largest_angle"][:-1].max() < cold["largest_angle"][:-1].max()
+    assert warm["largest_angle"][-1] > 10 * coherent["largest_angle"][-1]
+    for mode, least, most in (("warm", 0.1, 2.0), ("coherent", 0.0, 1e-9)):
+        left = found("tracking", "drift/heart", "ccd", mode=mode).measure().arrays["drift"]
         assert (left >= least).all()
         assert (left <= most).all()
 

@@ -19,7 +19,7 @@ from . import CURVE
 
 
 def jitter(results: Results) -> Drawing | None:
-    """Draw the largest turn of a joint on each curve, from rest and from the last solution."""
+    """Draw the largest rotation of a joint on each curve, from rest and from the last solution."""
     records = results.all("arm", task=CURVE, warm=False)
     if not records:
         return None
@@ -31,7 +31,7 @@ def jitter(results: Results) -> Drawing | None:
             colour, _, marker = registry.find(record.solver).style
             y = curves.index(record.problem) + _aside(record.solver, names)
             warm = results.one("arm", record.problem, record.solver, warm=True)
-            ends = [_largest_turn(r) for r in (record, warm) if r is not None]
+            ends = [_largest_angle(r) for r in (record, warm) if r is not None]
             axes[0].plot(ends, [y] * len(ends), color=COLOURS[colour], linewidth=0.9, alpha=0.6)
             for x, filled in zip(ends, ("none", COLOURS[colour]), strict=False):
                 axes[0].plot(
@@ -40,19 +40,21 @@ def jitter(results: Results) -> Drawing | None:
                 )  # fmt: skip
         labels = [written(of[0].facts["curve"]) for of in rows.values()]
         axes[0].set_yticks(range(len(curves)), labels)
-        axes[0].set(xscale="log", xlabel="largest turn of a joint between frames [°], log scale")
+        axes[0].set(
+            xscale="log", xlabel="largest rotation of a joint between frames [°], log scale"
+        )
         axes[0].invert_yaxis()
         plain_powers(axes[0])
         figure.legend(loc="outside upper right", ncols=2)
         return finished(
-            figure, "jitter", "Largest turn of a joint between neighbouring frames",
+            figure, "jitter", "Largest rotation of a joint between neighbouring frames",
             "Hollow: every frame solved from the rest pose; filled: every frame started from the "
             "last solution.",
         )  # fmt: skip
 
 
-def _largest_turn(record: Record) -> float:
-    return metrics.degrees(metrics.spread(record.arrays["largest_turn"]).largest)
+def _largest_angle(record: Record) -> float:
+    return metrics.degrees(metrics.spread(record.arrays["largest_angle"]).largest)
 
 
 def _aside(solver: str, names: list[str]) -> float:

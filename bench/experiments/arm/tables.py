@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, problems, settings, solvers
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from ..chain import BEYOND, CHAIN
 from . import CURVE
 
@@ -38,7 +38,7 @@ def accuracy(results: Results) -> Table:
         measured="Residuals recomputed by forward kinematics of the rotations returned, whatever "
         "the solver says. Starts: the arm’s rest pose, the last frame’s solution, or seeded random "
         f"rotations. At most {settings(records, 'max_iterations')} iterations.",
-        answer=_accuracy_answer(records),
+        summary=_accuracy_summary(records),
     )
 
 
@@ -58,10 +58,10 @@ def _success(record: Record) -> metrics.Share:
     return metrics.share(record.arrays["residual"] <= record.settings["tolerance"])
 
 
-def _accuracy_answer(records: Sequence[Record]) -> Answer:
+def _accuracy_summary(records: Sequence[Record]) -> Summary:
     points = []
     for solver in solvers(records):
         shares = [_success(record) for record in records if record.solver == solver]
         hits, total = sum(share.hits for share in shares), sum(share.total for share in shares)
         points.append(f"{label(solver)}: {words(hits)} of {words(total)}")
-    return Answer("Solved within tolerance, over all these problems:", tuple(points))
+    return Summary("Solved within tolerance, over all these problems:", tuple(points))

@@ -7,7 +7,7 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, by_problem, counted, label, settings, solvers
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from .. import arm
 from . import BEYOND, CHAIN
 
@@ -40,7 +40,7 @@ def beyond_reach(results: Results) -> Table:
         measured=f"Seeded targets in all directions, {_distances(records)} times the reach away. "
         f"Solvers stop at a residual of {settings(records, 'tolerance')} m, ours also as close as "
         f"that to the best one, or after {settings(records, 'max_iterations')} iterations.",
-        answer=_beyond_answer(records),
+        summary=_beyond_summary(records),
     )
 
 
@@ -61,7 +61,7 @@ def _distances(records: Sequence[Record]) -> str:
     return f"{words(low)} to {words(high)}"
 
 
-def _beyond_answer(records: Sequence[Record]) -> Answer:
+def _beyond_summary(records: Sequence[Record]) -> Summary:
     points = []
     for solver in solvers(records):
         mine = [record for record in records if record.solver == solver]
@@ -74,7 +74,7 @@ def _beyond_answer(records: Sequence[Record]) -> Answer:
             f"{words(metrics.percent(metrics.spread(bends).largest, 1.0))} % of the reach off the "
             f"line, {words(excess)} m above distance − reach, {counted(int(most), 'iteration')}"
         )
-    return Answer(
+    return Summary(
         "The best answer is the straight line from root to target. Answers within "
         f"{words(metrics.percent(STRAIGHT, 1.0))} % of the reach of that line:",
         tuple(points),
@@ -109,12 +109,12 @@ def iterations(results: Results) -> Table:
             Column("CCD / FABRIK, means"),
         ),
         tuple(_rival_row(*pair) for pair in pairs),
-        shows="One iteration turns every joint once (CCD) or runs along the chain once in each "
+        shows="One iteration rotates every joint once (CCD) or runs along the chain once in each "
         "direction (FABRIK). Solves that fail count with all the iterations they made.",
         measured="The arm starts each frame from its last solution, or from rest towards targets "
         "beyond its reach; the chain starts from random poses. At most "
         f"{settings(records, 'max_iterations')} iterations.",
-        answer=_rival_answer(pairs),
+        summary=_rival_summary(pairs),
     )
 
 
@@ -134,12 +134,12 @@ def _fewer(ccd: Record, fabrik: Record) -> float:
     )
 
 
-def _rival_answer(pairs: Sequence[tuple[Record, Record]]) -> Answer:
+def _rival_summary(pairs: Sequence[tuple[Record, Record]]) -> Summary:
     if not pairs:
-        return Answer()
+        return Summary()
     factors = [_fewer(ccd, fabrik) for ccd, fabrik in pairs]
     wins = sum(factor > 1 for factor in factors)
-    return Answer(
+    return Summary(
         f"FABRIK needs fewer iterations than CCD on {wins} of {len(pairs)} problems; CCD makes "
         f"{words(min(factors))} to {words(max(factors))} times as many on average "
         f"(median of the problems {words(metrics.spread(np.array(factors)).median)})."

@@ -1,8 +1,8 @@
-"""Closed curves tracked round after round: largest joint steps and drift."""
+"""Tracking of closed curves: how far joints rotate between frames, and drift over repetitions."""
 
 from ...harness.experiment import Experiment
 
-# What a record is about: one round of a curve, or three.
+# What a record is about: a curve followed once, or three times.
 CURVE, DRIFT = "curve", "drift"
 # How the frames of a curve are solved.
 COLD, WARM, COHERENT = "cold", "warm", "coherent"

@@ -10,6 +10,6 @@ ENTRIES = (
         tables.jitter,
         (arm.jitter,),
     ),
-    Entry("What does a calm motion cost?", tables.price),
-    Entry("Does a motion drift from round to round?", tables.drift),
+    Entry("What does a smooth motion cost?", tables.price),
+    Entry("Does a motion drift as it is repeated?", tables.drift),
 )

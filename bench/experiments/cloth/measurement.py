@@ -98,13 +98,13 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
     of the converged motion from where both began.
     """
     converged = converging(problem)
-    hasty = ImplicitEuler(
+    few = ImplicitEuler(
         problem.system, h=problem.h, solver="local_global", tolerance=0.0,
         max_iterations=iterations,
     )  # fmt: skip
     true = converged_motion(problem)[FALLING:]
-    own = motion(true[0], STEPS, hasty)
-    after = [hasty.step(state).state for state in true[:-1]]
+    own = motion(true[0], STEPS, few)
+    after = [few.step(state).state for state in true[:-1]]
     inertial = [converged.objective(state).y for state in true[:-1]]
     positions = [state.positions for state in true[1:]]
     errors = [

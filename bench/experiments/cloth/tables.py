@@ -10,7 +10,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...presentation.results import Results, by_problem, counted, label, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from . import DAMPERS, FEW, ONE_STEP, SWING
 
 LISTED = (1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000)
@@ -42,7 +42,7 @@ def newton_steps(results: Results) -> Table:
         measured=f"The lab’s cloth let go from rest; steps of {_milliseconds(records)} ms after "
         f"the first {settings(records, 'first')}, to a residual of "
         f"{settings(records, 'tolerance')} or the rounding floor.",
-        answer=_newton_answer(records),
+        summary=_newton_summary(records),
     )
 
 
@@ -61,14 +61,14 @@ def _newton_row(record: Record) -> tuple[Cell, ...]:
     )
 
 
-def _newton_answer(records: Sequence[Record]) -> Answer:
+def _newton_summary(records: Sequence[Record]) -> Summary:
     if not records:
-        return Answer()
+        return Summary()
     steps = sum(record.arrays["iterations"].size for record in records)
     done = sum(metrics.share(_solved(record)).hits for record in records)
     iterations = max(metrics.whole(record.arrays["iterations"])[2] for record in records)
     residual = max(metrics.spread(record.arrays["residual"]).largest for record in records)
-    return Answer(
+    return Summary(
         f"Newton converged in {words(done)} of {words(steps)} steps, with at most "
         f"{counted(int(iterations), 'iteration')} and a residual of at most {words(residual)}."
     )
@@ -112,7 +112,7 @@ def convergence(results: Results) -> Table:
         "inertial start y and the converged step x*. Where it stands still, rounding is reached.",
         measured=f"Step {settings(records, 'step')} of the motion, {_milliseconds(records)} ms; "
         "x* by Newton, iterated far beyond the rounding floor.",
-        answer=_convergence_answer(solved),
+        summary=_convergence_summary(solved),
     )
 
 
@@ -122,12 +122,12 @@ def _after(record: Record | None, what: str, k: int) -> float | None:
     return float(record.arrays[what][k])
 
 
-def _convergence_answer(solved: Sequence[tuple[str, dict[str, Record | None]]]) -> Answer:
+def _convergence_summary(solved: Sequence[tuple[str, dict[str, Record | None]]]) -> Summary:
     points = []
     for title, by in solved:
         needed = [f"{label(r.solver)} {_needed(r)}" for r in by.values() if r is not None]
         points.append(f"{title}: {', '.join(needed)}")
-    return Answer(f"Iterations until the error is {words(TARGET_ERROR)}:", tuple(points))
+    return Summary(f"Iterations until the error is {words(TARGET_ERROR)}:", tuple(points))
 
 
 def _needed(record: Record) -> str:
@@ -160,7 +160,7 @@ def few_iterations(results: Results) -> Table:
         measured=f"{settings(records, 'steps')} steps of {_milliseconds(records)} ms of the "
         f"swinging cloth after the first {settings(records, 'first')}; one iteration is the lab’s "
         "version.",
-        answer=_few_answer(records),
+        summary=_few_summary(records),
     )
 
 
@@ -173,7 +173,7 @@ def _few_row(record: Record) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
-def _few_answer(records: Sequence[Record]) -> Answer:
+def _few_summary(records: Sequence[Record]) -> Summary:
     points = []
     for record in records:
         if record.settings["iterations"] == 1:
@@ -184,8 +184,9 @@ def _few_answer(records: Sequence[Record]) -> Answer:
                 f" {words(metrics.percent(drift, path))} % of its path, in "
                 f"{record.settings['steps']} steps"
             )
-    return Answer(
-        "What one iteration leaves of the way to the converged step, in the median:", tuple(points)
+    return Summary(
+        "What one iteration leaves of the distance to the converged step, in the median:",
+        tuple(points),
     )
 
 
@@ -209,7 +210,7 @@ def dampers(results: Results) -> Table:
         measured=f"The lab’s cloth with a damping of {settings(records, 'damping')} N s/m after "
         f"{settings(records, 'first')} steps of its swing; one converged step of each length from "
         "there.",
-        answer=_damper_answer(records),
+        summary=_damper_summary(records),
     )
 
 
@@ -222,8 +223,8 @@ def _damper_rows(record: Record) -> list[tuple[Cell, ...]]:
     ]
 
 
-def _damper_answer(records: Sequence[Record]) -> Answer:
-    return Answer(
+def _damper_summary(records: Sequence[Record]) -> Summary:
+    return Summary(
         "The forces of the two laws differ, relatively, by:" if records else "",
         tuple(
             f"{record.title}: {words(float(record.arrays['apart'][0]))} at "

@@ -15,7 +15,7 @@ from reference import ImplicitEuler, MassSpring, State
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Outcome, Workshop
+from ...harness.isolation import Outcome, WorkerProcess
 from ...peers import registry
 from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
 from ...peers.registry import EXPLICIT, ClothPeer
@@ -159,7 +159,7 @@ def _tried(job: ClothJob) -> Outcome:
     what = job.module, len(job.positions)
     if what in _given_up:
         return Outcome(0.0, [], _given_up[what])
-    outcome = workshop().perform(job)
+    outcome = worker_process().perform(job)
     if outcome.silent and not outcome.lost:
         _given_up[what] = outcome.trouble
     return outcome
@@ -181,9 +181,9 @@ def _remarks(level: Level, rung: Rung, outcome: Outcome) -> list[Remark]:
 
 
 def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
-    """Return what a step leaves of the way from y to converged implicit Euler; inf if it blew up.
+    """Return the error of a step relative to that of its inertial start y; inf if it diverged.
 
-    Beyond what can be squared there is nothing left to compare.
+    The error is the distance from converged implicit Euler.
     """
     if not np.isfinite(positions).all() or np.abs(positions).max() > 1e100:
         return np.inf
@@ -286,7 +286,7 @@ def is_stable(
         peer.module, system.arrays, start.positions, start.velocities,
         h * STABILITY_STEPS, 1, 1, {**peer.settings, "substeps": STABILITY_STEPS}, np.inf,
     )  # fmt: skip
-    outcome = workshop().perform(shape)
+    outcome = worker_process().perform(shape)
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     away = np.abs(outcome.solved[-1].q - rest)
@@ -321,7 +321,7 @@ def liu_2013(solver: str) -> Measured:
     exact = implicit_motion(cloth, 1, published.LIU_2013_FRAME)[0]
     x, v = cloth.start.positions, cloth.start.velocities
     settings = published.LIU_2013[solver].settings
-    outcome = workshop().perform(
+    outcome = worker_process().perform(
         job(
             "bench.peers.cloth.step_solvers", cloth, Rung("", {"solver": solver, **settings}),
             frames=1, repeats=_REPEATS, budget=5.0, frame=published.LIU_2013_FRAME,
@@ -363,6 +363,6 @@ def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[Remark]) -> 
 
 
 @functools.cache
-def workshop() -> Workshop:
+def worker_process() -> WorkerProcess:
     """Return the one process in which all solvers work, one after the other."""
-    return Workshop(_START_PATIENCE, _PATIENCE)
+    return WorkerProcess(_START_PATIENCE, _PATIENCE)

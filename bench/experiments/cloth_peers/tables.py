@@ -9,7 +9,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...presentation.results import Results, label, listed
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 
@@ -109,7 +109,7 @@ def one_step(results: Results) -> Table:
         "system do another step: their error stays, however long they take.",
         measured=f"{_CLOTH}{_FAIR}{_TRUTH}. Times are medians of up to five; settings are those of "
         "a ladder, of which the cheapest that suffices counts.",
-        answer=_step_answer(found),
+        summary=_step_summary(found),
     )
 
 
@@ -147,13 +147,13 @@ def _milliseconds(point: Point) -> float:
     return metrics.milliseconds(point.values["seconds"])
 
 
-def _step_answer(found: Sequence[Point]) -> Answer:
+def _step_summary(found: Sequence[Point]) -> Summary:
     said = []
     for cloth in dict.fromkeys(_cloth_of(point) for point in found):
         groups = _groups([point for point in found if _cloth_of(point) == cloth])
         fastest = [f"to {name} {_fastest(groups, target)}" for name, target in TARGETS.items()]
         said.append(f"{cloth}: {listed(fastest)}")
-    return Answer("The fastest of all solvers in one step:", tuple(said)) if said else Answer()
+    return Summary("The fastest of all solvers in one step:", tuple(said)) if said else Summary()
 
 
 def _engine(point: Point) -> str:
@@ -191,7 +191,7 @@ def motion(results: Results) -> Table:
         shows="Distances are root mean squares over the particles after the last frame. Diverged "
         "means that a particle was farther from its true place than the cloth is wide.",
         measured=f"{_CLOTH}{_FAIR}{_TRUTH}: {_certainty(found)}.",
-        answer=_motion_answer(found),
+        summary=_motion_summary(found),
     )  # fmt: skip
 
 
@@ -233,17 +233,17 @@ def _certainty(found: Sequence[Point]) -> str:
     )
 
 
-def _motion_answer(found: Sequence[Point]) -> Answer:
+def _motion_summary(found: Sequence[Point]) -> Summary:
     lost = dict.fromkeys(point.solver for point in found if point.values["diverged"])
     if not found:
-        return Answer()
+        return Summary()
     said = []
     for cloth in dict.fromkeys(_cloth_of(point) for point in found):
         whole = [p for p in found if _cloth_of(p) == cloth and is_whole(p)]
         if whole:
             said.append(f"{cloth}: {_nearest(whole)}")
     sentence = f"With some settings diverged: {listed(list(lost))}." if lost else "None diverged."
-    return Answer(f"{sentence} Nearest to the truth:", tuple(said))
+    return Summary(f"{sentence} Nearest to the truth:", tuple(said))
 
 
 def _nearest(whole: Sequence[Point]) -> str:
@@ -275,7 +275,7 @@ def iterations(results: Results) -> Table:
         shows="Iterations until |x − x*| / |y − x*| is at most so much; nothing where all that "
         "were tried did not suffice.",
         measured=f"{_CLOTH}{size} × {size} particles. x* by Newton at the rounding floor.",
-        answer=_needed_answer(records),
+        summary=_needed_summary(records),
     )  # fmt: skip
 
 
@@ -287,13 +287,13 @@ def _needed_row(record: Record) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
-def _needed_answer(records: Sequence[Record]) -> Answer:
+def _needed_summary(records: Sequence[Record]) -> Summary:
     said = []
     for stiffness in dict.fromkeys(record.settings["stiffness"] for record in records):
         mine = [record for record in records if record.settings["stiffness"] == stiffness]
         counts = [f"{label(r.solver)} {_count_to(r, DECADES.index('1e-6'))}" for r in mine]
         said.append(f"{words(int(stiffness))} N/m: {listed(counts)}")
-    return Answer("Iterations to an error of 1e-6:", tuple(said)) if said else Answer()
+    return Summary("Iterations to an error of 1e-6:", tuple(said)) if said else Summary()
 
 
 def _count_to(record: Record, i: int) -> str:
@@ -334,14 +334,14 @@ def stability(results: Results) -> Table:
         measured="A cloth of 6 × 6 particles hangs at rest and is pushed by 1e-5 m along its "
         "highest mode; a step is stable if that has not grown a hundredfold 400 steps later. Found "
         "by bisection to two ten-thousandths.",
-        answer=_stability_answer(rows),
+        summary=_stability_summary(rows),
     )  # fmt: skip
 
 
-def _stability_answer(rows: Sequence[tuple[Cell, ...]]) -> Answer:
+def _stability_summary(rows: Sequence[tuple[Cell, ...]]) -> Summary:
     shares = {row[0]: row[4] for row in rows if row[4] is not None}
     said = tuple(f"{solver}: {words(share)} × 2 / ω" for solver, share in shares.items())
-    return Answer("The longest stable step:", said) if said else Answer()
+    return Summary("The longest stable step:", said) if said else Summary()
 
 
 def liu_2013(results: Results) -> Table:
@@ -374,12 +374,12 @@ def liu_2013(results: Results) -> Table:
         f"81, {words(int(published.LIU_2013_STIFFNESS))} N/m, "
         f"one step of {words(metrics.milliseconds(published.LIU_2013_FRAME))} ms from mid-fall, on "
         "one core; Newton to a residual of 1e-6.",
-        answer=_liu_answer(rows),
+        summary=_liu_summary(rows),
     )  # fmt: skip
 
 
-def _liu_answer(rows: Sequence[tuple[Cell, ...]]) -> Answer:
+def _liu_summary(rows: Sequence[tuple[Cell, ...]]) -> Summary:
     if not rows:
-        return Answer()
+        return Summary()
     said = tuple(f"{row[0]}: {words(row[3])} ms, published {words(row[2])} ms" for row in rows)
-    return Answer("A frame of 6,561 vertices:", said)
+    return Summary("A frame of 6,561 vertices:", said)

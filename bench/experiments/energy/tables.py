@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 
 LISTED = (100, 1_000, 10_000)
 
@@ -32,7 +32,7 @@ def energy(results: Results) -> Table:
         f"N s/m and without; {settings(records, 'steps')} steps of {_milliseconds(records)} ms, "
         f"of which every {settings(records, 'every')}th is looked at. Implicit Euler by "
         f"local/global iterations to a residual of {settings(records, 'tolerance')}.",
-        answer=_answer(records),
+        summary=_summary(records),
     )
 
 
@@ -53,11 +53,11 @@ def _left(record: Record, steps: int) -> float | None:
     return metrics.percent(float(left[k]), 1.0) if k < left.size else None
 
 
-def _answer(records: Sequence[Record]) -> Answer:
+def _summary(records: Sequence[Record]) -> Summary:
     undamped = [record for record in records if record.facts["damping"] == 0.0]
     if not undamped:
-        return Answer()
-    return Answer(
+        return Summary()
+    return Summary(
         f"Without dampers all energy should stay. After {settings(undamped, 'steps')} steps there "
         "is left, in percent:",
         tuple(f"{label(record.solver)}: {_course(record)}" for record in undamped),

@@ -83,7 +83,7 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
     )
 
 
-class Answer(NamedTuple):
+class Converged(NamedTuple):
     """Newton's answer x, its certificate, and g there."""
 
     x: FloatArray
@@ -92,11 +92,11 @@ class Answer(NamedTuple):
 
 
 @functools.cache
-def newtons_answer(problem: MidSwing) -> Answer:
+def newtons_answer(problem: MidSwing) -> Converged:
     """Return what Newton's method comes to, iterated far beyond the rounding floor."""
     integrator = ImplicitEuler(problem.system, h=problem.h, tolerance=0.0, max_iterations=50)
     x, objective = integrator.step(problem.state).state.positions, _objective(problem)
-    return Answer(x, certify(objective, x), objective.value(x))
+    return Converged(x, certify(objective, x), objective.value(x))
 
 
 def _objective(problem: MidSwing) -> Objective:

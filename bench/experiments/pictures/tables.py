@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, listed, settings, solvers
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from . import ARM
 
 
@@ -21,24 +21,24 @@ def resampling(results: Results) -> Table:
             Column("gap, least", "m"),
             Column("gap, median", "m"),
             Column("gap, largest", "m"),
-            Column("turn of a joint, mean", "°"),
-            Column("turn of a joint, largest", "°"),
+            Column("rotation of a joint, mean", "°"),
+            Column("rotation of a joint, largest", "°"),
             Column("iterations, largest"),
             Column("residual, largest", "m"),
         ),
         tuple(_resampling_row(record) for record in records),
-        shows="The gap is the distance between neighbouring points; turns are geodesic angles "
+        shows="The gap is the distance between neighbouring points; rotations are geodesic angles "
         "between neighbouring frames, a frame a point.",
         measured=f"Gaps kept from {settings(records, 'min_spacing')} to "
         f"{settings(records, 'max_spacing')} m; {listed([label(s) for s in solvers(records)])}, "
         "each frame started from the last solution.",
-        answer=_resampling_answer(records),
+        summary=_resampling_summary(records),
     )
 
 
 def _resampling_row(record: Record) -> tuple[Cell, ...]:
     gap = metrics.spread(record.arrays["spacing"])
-    largest, mean = _turns(record)
+    largest, mean = _rotations(record)
     return (
         "resampled" if record.settings["evened"] else "as drawn",
         len(record.arrays["curve"]), metrics.extent(record.arrays["spacing"])[0], gap.median,
@@ -47,18 +47,18 @@ def _resampling_row(record: Record) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
-def _turns(record: Record) -> tuple[float, float]:
-    """Return the largest and the mean turn [°]."""
+def _rotations(record: Record) -> tuple[float, float]:
+    """Return the largest and the mean rotation of a joint [°]."""
     return (
-        metrics.degrees(metrics.spread(record.arrays["largest_turn"]).largest),
-        metrics.degrees(metrics.mean(record.arrays["mean_turn"])),
+        metrics.degrees(metrics.spread(record.arrays["largest_angle"]).largest),
+        metrics.degrees(metrics.mean(record.arrays["mean_angle"])),
     )
 
 
-def _resampling_answer(records: Sequence[Record]) -> Answer:
+def _resampling_summary(records: Sequence[Record]) -> Summary:
     points = [
         f"{row[0]}: {words(row[1])} points, {words(row[2])} to {words(row[4])} m apart; a joint "
-        f"turns by up to {words(row[6])}° between frames"
+        f"rotates by up to {words(row[6])}° between frames"
         for row in map(_resampling_row, records)
     ]
-    return Answer("How evenly the points lie, and how calmly the arm follows:", tuple(points))
+    return Summary("How evenly the points lie, and how smoothly the arm follows:", tuple(points))

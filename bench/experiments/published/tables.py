@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
 
@@ -36,9 +36,9 @@ def trac_ik(results: Results) -> Table:
         "middle of the limits, at most 5 ms for TRAC-IK; times of all targets, those that failed "
         "included.",
         measured="Published: 10,000 reachable random poses on a machine of its time. Here: as many "
-        "of our own as the column says, judged by MuJoCo at the norm of three such components; the "
-        "PR2’s continuous joints have two turns either way.",
-        answer=_trac_ik_answer(records),
+        "of our own as the column says, evaluated by MuJoCo at the norm of three such components; "
+        "the PR2’s continuous joints have two revolutions in either direction.",
+        summary=_trac_ik_summary(records),
     )  # fmt: skip
 
 
@@ -53,14 +53,14 @@ def _trac_ik_row(robot: str, record: Record) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
-def _trac_ik_answer(records: Sequence[Record]) -> Answer:
+def _trac_ik_summary(records: Sequence[Record]) -> Summary:
     points = []
     for record in records:
         if "solved" in record.arrays:
             robot = record.facts["robot"]
             row = _trac_ik_row(robot, record)
             points.append(f"{robot}, {record.solver}: {words(row[3])}, mean {words(row[6])} ms")
-    return Answer("Here:", tuple(points)) if points else Answer()
+    return Summary("Here:", tuple(points)) if points else Summary()
 
 
 def toolbox(results: Results) -> Table:
@@ -83,7 +83,7 @@ def toolbox(results: Results) -> Table:
         measured="Published: 10,000 poses, the tutorial’s own Python loops (Haviland and Corke "
         "2022). Here the toolbox’s compiled ones, and ours; half the squared error within "
         f"{words(published.TOOLBOX_HALF_SQUARE)}.",
-        answer=_toolbox_answer(records),
+        summary=_toolbox_summary(records),
     )  # fmt: skip
 
 
@@ -96,7 +96,7 @@ def _toolbox_row(record: Record) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
-def _toolbox_answer(records: Sequence[Record]) -> Answer:
+def _toolbox_summary(records: Sequence[Record]) -> Summary:
     points = []
     for record in records:
         solver, before, own, failed, _ = _toolbox_row(record)
@@ -104,7 +104,7 @@ def _toolbox_answer(records: Sequence[Record]) -> Answer:
         points.append(
             f"{solver}: {words(own)} % infeasible by its own word{beside}; {words(failed)}"
         )
-    return Answer("Not solved by one search:", tuple(points)) if points else Answer()
+    return Summary("Not solved by one search:", tuple(points)) if points else Summary()
 
 
 def fabrik(results: Results) -> Table:
@@ -128,7 +128,7 @@ def fabrik(results: Results) -> Table:
         f"{published.FABRIK_LINKS} links of 0.1 m from straight, {published.FABRIK_RUNS} seeded "
         f"directions, targets at {' and '.join(map(str, published.FABRIK_DISTANCES.values()))} m, "
         f"to {settings(records, 'tolerance')} m.",
-        answer=_fabrik_answer(results, solvers),
+        summary=_fabrik_summary(results, solvers),
     )
 
 
@@ -144,11 +144,13 @@ def _fabrik_row(results: Results, solver: str) -> tuple[Cell, ...]:
     return tuple(cells)
 
 
-def _fabrik_answer(results: Results, solvers: Sequence[str]) -> Answer:
+def _fabrik_summary(results: Results, solvers: Sequence[str]) -> Summary:
     points = [
         f"{row[0]}: {words(row[2])} here, {words(row[1])} published"
         for row in (_fabrik_row(results, solver) for solver in solvers)
     ]
     return (
-        Answer("Mean iterations towards a reachable target:", tuple(points)) if points else Answer()
+        Summary("Mean iterations towards a reachable target:", tuple(points))
+        if points
+        else Summary()
     )

@@ -1,6 +1,6 @@
 """Robots: every solver that is installed on every arm and on the character, in all strata.
 
-Each solver works in a process of its own. Its answers are judged here, by MuJoCo's kinematics.
+Each solver works in a process of its own. Its answers are evaluated here, by MuJoCo's kinematics.
 """
 
 import functools
@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Workshop
+from ...harness.isolation import WorkerProcess
 from ...harness.worker import Solved
 from ...peers import registry
 from ...peers.registry import Entry, Peer
 from . import REACHABLE, UNREACHABLE
-from .evaluate import Targets, Tolerance, judge
+from .evaluate import Targets, Tolerance, evaluator_of
 from .job import Job
 from .problem import PACKAGE, ROBOTS, is_installed, title
 from .targets import STRATA, robot_targets, unreachable_targets
@@ -105,22 +105,22 @@ def _solve_unreachable(run: Run, count: int) -> Measured:
 
 
 def solve(run: Run, targets: Targets) -> Measured:
-    """Let a solver loose on the targets, and judge what came of it, finished or not.
+    """Solve the targets, and evaluate what came of it, finished or not.
 
     A target over which the solver's process was lost counts as one that it did not solve, with the
     time until it was given up; targets never begun do not count.
     """
-    robot = judge(run.robot).robot
+    robot = evaluator_of(run.robot).robot
     job = Job(
         run.peer.module, robot, targets, run.tolerance, run.entry.settings,
         run.entry.restarts, run.budget,
     )  # fmt: skip
-    outcome = workshop().perform(job)
+    outcome = worker_process().perform(job)
     done = outcome.solved
     if outcome.lost and len(done) < len(targets.starts):
         nothing = np.full(targets.starts.shape[-1], np.nan)
-        done = [*done, Solved(nothing, 0, workshop().patience, outcome.trouble)]
-    arrays = _judged(run, targets, done) if done else {}
+        done = [*done, Solved(nothing, 0, worker_process().patience, outcome.trouble)]
+    arrays = _evaluated(run, targets, done) if done else {}
     return Measured(
         {**arrays, "setup": np.array(outcome.setup)},
         {"remark": outcome.trouble},
@@ -128,30 +128,30 @@ def solve(run: Run, targets: Targets) -> Measured:
             "strata": list(STRATA),
             "tips": list(robot.tips),
             "joints": len(robot.joints),
-            "freedom": int(judge(run.robot).model.nv),
+            "freedom": int(evaluator_of(run.robot).model.nv),
             "wanted": "pose" if robot.posed else "position",
         },
     )
 
 
-def _judged(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.ndarray]:
+def _evaluated(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.ndarray]:
     answers = np.array([one.q for one in done])
-    judgement = judge(run.robot).judge(targets, answers, run.tolerance)
+    evaluation = evaluator_of(run.robot).evaluate(targets, answers, run.tolerance)
     return {
-        "solved": judgement.solved,
+        "solved": evaluation.solved,
         "claimed": np.array([one.claimed for one in done]),
         "seconds": _short(np.array([one.seconds for one in done])),
-        "position": _short(judgement.position),
-        "rotation": _short(judgement.rotation),
-        "beyond": _short(judgement.beyond),
+        "position": _short(evaluation.position),
+        "rotation": _short(evaluation.rotation),
+        "beyond": _short(evaluation.beyond),
         "stratum": targets.strata[: len(done)],
     }
 
 
 @functools.cache
-def workshop() -> Workshop:
+def worker_process() -> WorkerProcess:
     """Return the one process in which all solvers work, one after the other."""
-    return Workshop()
+    return WorkerProcess()
 
 
 def _short(values: np.ndarray) -> np.ndarray:

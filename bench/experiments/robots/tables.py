@@ -14,7 +14,7 @@ from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
 from ...presentation.results import Results, listed, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from . import REACHABLE, UNREACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}
@@ -27,9 +27,9 @@ _MEASURED = (
     "Every solver has the same text of the robot, the same targets and the same seeded random "
     "starts. It works in a process of its own, on one core (TRAC-IK on two), and is timed target "
     "by target, as in a loop of solves: after the target before, solved again without counting "
-    "where that takes less than a millisecond; conversions are left out. What it returns is judged "
-    "by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a busy "
-    "machine. Solved means: "
+    "where that takes less than a millisecond; conversions are left out. What it returns is "
+    "evaluated by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a "
+    "busy machine. Solved means: "
 )
 
 
@@ -75,11 +75,11 @@ def models(results: Results) -> Table:
         ),
         tuple(rows),
         shows="Arms are the chains of links that end in the tip, hinges alone, with the limits of "
-        "their files; continuous joints have two turns either way. The character is our own, of "
-        "balls without and hinges with limits.",
+        "their files; continuous joints have two revolutions in either direction. The "
+        "character is our own, of balls without and hinges with limits.",
         measured="The arms’ files are those of example-robot-data, without soft limits; every "
-        "solver and the judge read the same text.",
-        answer=Answer(f"{listed([str(row[0]) for row in rows])}.") if rows else Answer(),
+        "solver and the evaluation read the same text.",
+        summary=Summary(f"{listed([str(row[0]) for row in rows])}.") if rows else Summary(),
     )
 
 
@@ -109,9 +109,11 @@ def who(results: Results) -> Table:
         "random poses until it claims an answer within the limits.",
         measured="Settings are the packages’ own but for those in brackets and what their adapters "
         "in bench/peers say.",
-        answer=Answer(f"{sum(row[2] != 'not installed' for row in rows)} of {len(rows)} installed.")
+        summary=Summary(
+            f"{sum(row[2] != 'not installed' for row in rows)} of {len(rows)} installed."
+        )
         if rows
-        else Answer(),
+        else Summary(),
     )
 
 
@@ -135,10 +137,10 @@ def _success(kind: str) -> Callable[[Results], Table]:
             tuple(_success_row(record) for record in records),
             shows="Times are of all targets within reach, those that failed included. Residuals "
             "are of those solved, not cut off at the tolerance. “Claimed but not so” counts "
-            "answers that the solver calls solved and the judge does not. A solver that runs out "
-            "of time has fewer targets; all have them in one order, the strata taking turns.",
+            "answers that the solver calls solved and the evaluation does not. A solver that runs "
+            "out of time has fewer targets; all have them in one order, the strata alternating.",
             measured=_how(records),
-            answer=_success_answer(records),
+            summary=_success_summary(records),
         )  # fmt: skip
 
     return table
@@ -174,14 +176,14 @@ def _success_row(record: Record) -> tuple[Cell, ...]:
 
 
 def false_claims(record: Record) -> int | None:
-    """Return how many claims the judge denies; None if the solver makes none."""
+    """Return how many claims the evaluation denies; None if the solver makes none."""
     claimed = record.arrays["claimed"]
     return (
         metrics.share((claimed == 1) & ~record.arrays["solved"]).hits if any(claimed >= 0) else None
     )
 
 
-def _success_answer(records: Sequence[Record]) -> Answer:
+def _success_summary(records: Sequence[Record]) -> Summary:
     points = []
     for robot in dict.fromkeys(record.title for record in measured(records)):
         said = []
@@ -196,9 +198,9 @@ def _success_answer(records: Sequence[Record]) -> Answer:
             )
         points.append(f"{robot}: {'; '.join(said)}")
     return (
-        Answer("Solved within reach, and the median time of all:", tuple(points))
+        Summary("Solved within reach, and the median time of all:", tuple(points))
         if points
-        else Answer()
+        else Summary()
     )
 
 
@@ -217,7 +219,7 @@ def _strata(kind: str) -> Callable[[Results], Table]:
             "with the smallest least singular value of the Jacobian; at a limit: one joint put at "
             "one of its limits.",
             measured=_how(records),
-            answer=_strata_answer(records, strata),
+            summary=_strata_summary(records, strata),
         )
 
     return table
@@ -229,7 +231,7 @@ def _strata_row(record: Record, count: int) -> tuple[Cell, ...]:
     return (record.title, record.solver, *shares)
 
 
-def _strata_answer(records: Sequence[Record], strata: Sequence[str]) -> Answer:
+def _strata_summary(records: Sequence[Record], strata: Sequence[str]) -> Summary:
     hardest: dict[str, int] = {}
     for record in records:
         shares = _strata_row(record, len(strata))[2:]
@@ -239,10 +241,10 @@ def _strata_answer(records: Sequence[Record], strata: Sequence[str]) -> Answer:
             hardest[name] = hardest.get(name, 0) + 1
     if not hardest:
         return (
-            Answer("No stratum is harder than the others to any solver.") if records else Answer()
+            Summary("No stratum is harder than the others to any solver.") if records else Summary()
         )
     counts = sorted(hardest.items(), key=lambda item: -item[1])
-    return Answer(
+    return Summary(
         "Hardest, counted over solvers and robots: "
         + listed([f"{name} ({times})" for name, times in counts]) + "."
     )  # fmt: skip
@@ -264,7 +266,7 @@ def _unreachable(kind: str) -> Callable[[Results], Table]:
             shows="Targets farther from the first joint than all links in a row reach. What counts "
             "is how soon a solver gives up, and that it claims nothing.",
             measured=_how(records),
-            answer=_unreachable_answer(records),
+            summary=_unreachable_summary(records),
         )  # fmt: skip
 
     return table
@@ -280,14 +282,14 @@ def _unreachable_row(record: Record) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
-def _unreachable_answer(records: Sequence[Record]) -> Answer:
-    liars = [row for row in map(_unreachable_row, records) if row[3]]
+def _unreachable_summary(records: Sequence[Record]) -> Summary:
+    claimed = [row for row in map(_unreachable_row, records) if row[3]]
     if not records:
-        return Answer()
-    if not liars:
-        return Answer("No solver claims a target that is out of reach.")
-    points = (f"{row[0]}, {row[1]}: {words(row[3])} of {words(row[2])}" for row in liars)
-    return Answer("Claimed though out of reach:", tuple(points))
+        return Summary()
+    if not claimed:
+        return Summary("No solver claims a target that is out of reach.")
+    points = (f"{row[0]}, {row[1]}: {words(row[3])} of {words(row[2])}" for row in claimed)
+    return Summary("Claimed though out of reach:", tuple(points))
 
 
 def _budgets(kind: str) -> Callable[[Results], Table]:
@@ -307,7 +309,7 @@ def _budgets(kind: str) -> Callable[[Results], Table]:
             ),
             shows="Share of the targets within reach that are solved within so much time for each.",
             measured=_how(records),
-            answer=_leaders(records, budget_curve, BUDGETS, lambda b: f"within {_duration(b)}"),
+            summary=_leaders(records, budget_curve, BUDGETS, lambda b: f"within {_duration(b)}"),
         )
 
     return table
@@ -323,7 +325,7 @@ def _leaders(
     curve: Callable[[Record, np.ndarray], np.ndarray],
     points: np.ndarray,
     named: Callable[[float], str],
-) -> Answer:
+) -> Summary:
     """Say who is ahead at each point, robot by robot."""
     said = []
     for robot in dict.fromkeys(record.title for record in records):
@@ -335,7 +337,7 @@ def _leaders(
             for point, column in zip(points, shares.T, strict=True) if column.max() > 0
         ]  # fmt: skip
         said.append(f"{robot}: {'; '.join(best)}")
-    return Answer("Ahead:", tuple(said)) if said else Answer()
+    return Summary("Ahead:", tuple(said)) if said else Summary()
 
 
 def _profiles(kind: str) -> Callable[[Results], Table]:
@@ -355,7 +357,7 @@ def _profiles(kind: str) -> Callable[[Results], Table]:
             "target (Dolan and Moré 2002).",
             measured=f"{_how(records)} The targets are those that all solvers shown were given; a "
             "solver given less than an eighth of them is left out.",
-            answer=_profile_answer(made),
+            summary=_profile_summary(made),
         )  # fmt: skip
 
     return table
@@ -382,13 +384,13 @@ def profiles(records: Sequence[Record], ratios: np.ndarray) -> dict[str, dict[st
     return made
 
 
-def _profile_answer(made: dict[str, dict[str, np.ndarray]]) -> Answer:
+def _profile_summary(made: dict[str, dict[str, np.ndarray]]) -> Summary:
     points = []
     for robot, curves in made.items():
         first = max(curves, key=lambda solver: curves[solver][0])
         rate = words(metrics.percent(float(curves[first][0]), 1.0))
         points.append(f"{robot}: {first}, on {rate} % of the targets")
-    return Answer("Most often the fastest:", tuple(points)) if points else Answer()
+    return Summary("Most often the fastest:", tuple(points)) if points else Summary()
 
 
 def _duration(seconds: float) -> str:

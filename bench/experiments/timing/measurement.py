@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Workshop
+from ...harness.isolation import WorkerProcess
 from .case import TIMING, Case
 from .cases import cases
 from .job import TimingJob
@@ -30,7 +30,7 @@ def timed(case: Case, seconds: float) -> Measured:
     Raises:
         RuntimeError: if there are no rounds; the message says why.
     """
-    outcome = workshop().perform(TimingJob(case.key, seconds))
+    outcome = worker_process().perform(TimingJob(case.key, seconds))
     if outcome.found is None:
         raise RuntimeError(outcome.trouble)
     rounds = np.array(outcome.found["seconds"]) / case.operations
@@ -38,6 +38,6 @@ def timed(case: Case, seconds: float) -> Measured:
 
 
 @functools.cache
-def workshop() -> Workshop:
+def worker_process() -> WorkerProcess:
     """Return the one process in which all cases are timed."""
-    return Workshop(PATIENCE)
+    return WorkerProcess(PATIENCE)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, by_problem
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from .case import COMPILED, LIMIT, PLAIN
 
 
@@ -83,7 +83,7 @@ def _table(
         shows=shows + (LIMIT_SENTENCE if limits else ""),
         measured="pytest-benchmark, one core unless all are named, after a first call that may "
         "compile; each time is a call’s divided by what it does. Spread over rounds of many calls.",
-        answer=_answer(doers, limits, unit, scale),
+        summary=_summary(doers, limits, unit, scale),
     )
 
 
@@ -111,7 +111,9 @@ def _limit_cells(record: Record, limit: Record | None) -> tuple[Cell, ...]:
     return (None, None) if limit is None else (_times(record, limit), _bandwidth(limit))
 
 
-def _answer(doers: Sequence[Record], limits: dict[str, Record], unit: str, scale: float) -> Answer:
+def _summary(
+    doers: Sequence[Record], limits: dict[str, Record], unit: str, scale: float
+) -> Summary:
     """Say who takes how long for what, plain Python left out, a point for each group of works."""
     groups: dict[str, list[str]] = {}
     for problem, records in by_problem(doers).items():
@@ -123,7 +125,7 @@ def _answer(doers: Sequence[Record], limits: dict[str, Record], unit: str, scale
             beside = f" ({words(_times(mine[0], limits[problem]))} times the limit)"
         groups.setdefault(group, []).append(f"{work}: {times} {unit}{beside}")
     points = (f"{group} – {'; '.join(works)}" for group, works in groups.items())
-    return Answer("Medians, plain Python left out:", tuple(points))
+    return Summary("Medians, plain Python left out:", tuple(points))
 
 
 def _short(solver: str) -> str:
