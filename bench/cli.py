@@ -12,7 +12,7 @@ import typer
 
 from . import compile_notice
 from .experiments import SUITES
-from .harness.progress import heard_by
+from .harness.progress import listening
 from .presentation.text import visible
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 INDENT = 2 + max(map(len, SUITES))
 QUICK, FULL = "quick", "full"
 REPORT = Path("report")
-FINE, MISSED, MISUSED, INTERRUPTED, UNREAD = 0, 1, 2, 130, 141
+SUCCESS, MISSED, MISUSED, INTERRUPTED, UNREAD = 0, 1, 2, 130, 141
 _UsageError: Any = typer.BadParameter.__base__
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -59,13 +59,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def run_command(arguments: Sequence[str] | None = None) -> int:
     """Return the exit code.
 
-    0 fine, 1 a check failed, 2 bad usage or input, 130 interrupted, 141 nobody reads the output.
+    0 success, 1 a check failed, 2 bad usage or input, 130 interrupted, 141 nobody reads the output.
     """
     try:
         code = app(arguments, prog_name="plumbob", standalone_mode=False)
         if code == INTERRUPTED:  # typer's own answer to Ctrl-C
             raise KeyboardInterrupt
-        return code if isinstance(code, int) else FINE
+        return code if isinstance(code, int) else SUCCESS
     except (KeyboardInterrupt, typer.Abort):
         print("plumbob: interrupted; what was finished is on record", file=sys.stderr)
         return INTERRUPTED
@@ -118,7 +118,7 @@ def plumbob(
     if context.invoked_subcommand is not None:
         if output or fresh:
             raise ValueError(f"write options behind the command: {context.invoked_subcommand}")
-        return FINE
+        return SUCCESS
     return main_job(output or REPORT, fresh)
 
 
@@ -149,7 +149,7 @@ def check(
     if names:
         for claim in CLAIMS.values():
             print(f"{claim.name}: {claim.ours}, against {claim.theirs}")
-        return FINE
+        return SUCCESS
     chosen = [_known("claim", name, CLAIMS) for name in claims or CLAIMS]
     with progress() as bar:
         task = bar.add_task("", total=len(chosen))
@@ -159,7 +159,7 @@ def check(
     print_verdicts(verdicts)
     if missing := left_out():
         print(missing)
-    return FINE if all(verdict.holds for verdict in verdicts) else MISSED
+    return SUCCESS if all(verdict.holds for verdict in verdicts) else MISSED
 
 
 @app.command(
@@ -221,7 +221,7 @@ def show(
         str | None, typer.Option(help="For an arm fabrik, ccd, ...; for the cloth newton, ...")
     ] = None,
     coherent: Annotated[
-        bool, typer.Option("--coherent", help="Let the arm move as calmly as it can, in a loop.")
+        bool, typer.Option("--coherent", help="Let the arm move as smoothly as it can, in a loop.")
     ] = False,
 ) -> int:
     """Write an animation (GIF) or a picture (SVG) of the arm drawing a curve, or of the cloth.
@@ -242,7 +242,7 @@ def show(
             lambda done, total: bar.update(task, completed=done, total=total), coherent,
         )  # fmt: skip
     print(visible(str(path)))
-    return FINE
+    return SUCCESS
 
 
 def main_job(output: Path, fresh: bool) -> int:
@@ -269,7 +269,7 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
     done, failures = {run.KEPT: 0, run.MEASURED: 0, run.FAILED: 0}, []
     with progress() as bar:
         task = bar.add_task("starting", total=run.count(suites, scale))
-        with heard_by(lambda news: bar.update(task, description=visible(news.what))):
+        with listening(lambda progress: bar.update(task, description=visible(progress.what))):
             for event in run.run(suites, scale, output):
                 bar.update(task, description=visible(f"{event.suite}: {event.what}"))
                 if event.state in done:
@@ -284,7 +284,7 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
     for failure in [*failures, *run.missed_claims(suites, output)]:
         print(f"plumbob: {visible(failure)}", file=sys.stderr)
         done[run.FAILED] += 1
-    return MISSED if done[run.FAILED] else FINE
+    return MISSED if done[run.FAILED] else SUCCESS
 
 
 def write_report(output: Path) -> int:
@@ -294,14 +294,14 @@ def write_report(output: Path) -> int:
     written = write(output)
     for table in written.tables:
         if table.rows:
-            print(f"\n{table.title}\n  {table.answer.sentence}")
-            print("".join(f"    {point}\n" for point in table.answer.points), end="")
+            print(f"\n{table.title}\n  {table.summary.sentence}")
+            print("".join(f"    {point}\n" for point in table.summary.points), end="")
     print()
     for sentence in written.missing:
         print(f"Missing: {sentence}")
     page = visible(str(written.page))
     print(f"{page}: {len(written.tables)} tables, also as Markdown, LaTeX and CSV")
-    return FINE
+    return SUCCESS
 
 
 def check_files(paths: Sequence[str]) -> int:
@@ -322,7 +322,7 @@ def check_files(paths: Sequence[str]) -> int:
     files, summary, disagreements = report(found, checked)
     for table in (files, summary):
         print_table(table)
-    return MISSED if disagreements else FINE
+    return MISSED if disagreements else SUCCESS
 
 
 def print_table(table: "Table") -> None:
@@ -334,9 +334,9 @@ def print_table(table: "Table") -> None:
         return
     from rich.console import Console
 
-    print(f"\n{table.title}\n  {table.answer.sentence}".rstrip())
+    print(f"\n{table.title}\n  {table.summary.sentence}".rstrip())
     Console(highlight=False).print(_aligned(table), markup=False)
-    print("".join(f"    {point}\n" for point in table.answer.points), end="", flush=True)
+    print("".join(f"    {point}\n" for point in table.summary.points), end="", flush=True)
 
 
 def print_tables(suites: Sequence[str], output: Path) -> None:
@@ -344,7 +344,8 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
     from rich.console import Console
 
     from .harness.record import RecordFile
-    from .presentation.sections import Results, plain, sift, tables
+    from .presentation.results import Results, plain, sift
+    from .presentation.sections import tables
 
     console = Console(
         width=None if sys.stdout.isatty() else 240, highlight=False, markup=False, emoji=False
@@ -354,8 +355,8 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
     for made in tables(Results(records), suites):
         if not made.rows:
             continue
-        print(f"\n{made.title}\n  {made.answer.sentence}")
-        print("".join(f"    {point}\n" for point in made.answer.points), end="", flush=True)
+        print(f"\n{made.title}\n  {made.summary.sentence}")
+        print("".join(f"    {point}\n" for point in made.summary.points), end="", flush=True)
         console.print(_aligned(made))
 
 

@@ -25,7 +25,7 @@ from reference.arguments import FloatArray, choice
 from reference.formats import bvh
 
 from .experiments.arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING
-from .experiments.pictures.drawings import ARM_VIEW, CLOTH_VIEW, draw_arm, draw_cloth, seen
+from .experiments.pictures.figures import ARM_VIEW, CLOTH_VIEW, draw_arm, draw_cloth, seen
 from .presentation.figures import COLOURS, STYLE
 
 ARM, CLOTH = "arm", "cloth"

@@ -95,7 +95,8 @@ def test_a_corrupt_result_file_exits_2_and_stays(capsys, empty_folder, arguments
 
 def a_record(solver="ccd", **more):
     """A record that a report can be made of."""
-    return Record("timing", "kinematics/x/one pose a call", solver, {"operations": 1},
+    facts = {"subject": "kinematics", "group": "x", "work": "one pose a call"}
+    return Record("timing", "kinematics/x/one pose a call", solver, {"operations": 1}, facts=facts,
                   arrays={"seconds": np.ones(5), "moved": np.array(0)}, **more)  # fmt: skip
 
 

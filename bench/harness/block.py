@@ -6,10 +6,17 @@ from typing import Any, NamedTuple
 
 
 class Measured(NamedTuple):
-    """What a block found: arrays of numbers, and words that belong to them."""
+    """What a block found.
+
+    Attributes:
+        arrays: numbers, by name.
+        notes: sentences that belong to them, by name.
+        facts: what tables select and sort by, beside the facts of the block; see `Block`.
+    """
 
     arrays: Mapping[str, Any]
     notes: Mapping[str, str] = {}
+    facts: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True)
@@ -27,7 +34,17 @@ SCALES = {"quick": Scale(targets=200, seconds=0.2), "full": Scale(targets=2000, 
 class Block:
     """One problem for one solver with the settings that change the answer, and how to measure it.
 
-    The numbers are made only when `measure` is called. `size` says how many, where that varies.
+    The numbers are made only when `measure` is called.
+
+    Attributes:
+        suite: which family of problems.
+        problem: the name of the problem; with suite, solver and settings it is the block's key.
+        solver: what solves it.
+        measure: measures it.
+        settings: numbers, words and truth values that change the answer.
+        size: how much is measured, where that varies: targets, or seconds of a benchmark.
+        facts: what the names say, as values: numbers, words, truth values and lists of words.
+            "title" is how the problem is written, "task" which of the suite's kinds it is.
     """
 
     suite: str
@@ -35,4 +52,5 @@ class Block:
     solver: str
     measure: Callable[[], Measured]
     settings: Mapping[str, Any] = field(default_factory=dict)
-    size: int = 0
+    size: float = 0
+    facts: Mapping[str, Any] = field(default_factory=dict)

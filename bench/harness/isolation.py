@@ -1,4 +1,4 @@
-"""Solvers in a process of their own, which is ended when it falls silent; what it sent counts."""
+"""Run jobs in a process of their own; kill it when it stays silent, keep what it sent before."""
 
 import atexit
 import contextlib
@@ -16,7 +16,7 @@ from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .progress import News, tell
+from .progress import Progress, announce
 from .worker import LAST, Begun, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
 
 # A worker that says nothing for so long [s] is ended: before it is ready it may compile.
@@ -39,6 +39,7 @@ class Outcome(NamedTuple):
         trouble: why there are no more, or what was raised and how often; else "".
         lost: whether the worker was lost over the next target.
         found: what was measured, if that was the job.
+        silent: whether the worker was ended since it was silent.
     """
 
     setup: float
@@ -46,10 +47,11 @@ class Outcome(NamedTuple):
     trouble: str
     lost: bool = False
     found: Mapping[str, Any] | None = None
+    silent: bool = False
 
 
-class Workshop:
-    """One worker, started when the first job comes, and anew after one that was lost."""
+class WorkerProcess:
+    """A process that performs jobs, started with the first job and again after it was lost."""
 
     def __init__(
         self, start_patience: float = START_PATIENCE, target_patience: float = TARGET_PATIENCE
@@ -65,28 +67,29 @@ class Workshop:
         return self._patience[True]
 
     def perform(self, job: Work) -> Outcome:
-        """Return what came of a job, however it ended."""
+        """Perform a job and collect its messages, however it ends."""
         outcome, ready = Outcome(0.0, [], ""), False
         with contextlib.closing(self.stream(job)) as messages:
             for message in messages:
                 match message:
                     case Ready():
                         outcome, ready = outcome._replace(setup=message.setup), True
-                    case News():
-                        tell(*message)
+                    case Progress():
+                        announce(*message)
                     case Solved():
                         outcome.solved.append(message)
                     case Found():
                         outcome = outcome._replace(found=message.values)
-                    case Unfit() | Lost():
-                        lost = ready and isinstance(message, Lost)
-                        outcome = outcome._replace(trouble=message.why, lost=lost)
+                    case Unfit():
+                        outcome = outcome._replace(trouble=message.why)
+                    case Lost(why, silent):
+                        outcome = outcome._replace(trouble=why, lost=ready, silent=silent)
                     case Done():
                         outcome = outcome._replace(trouble=raised(outcome.solved))
         return outcome
 
     def stream(self, job: Work) -> Generator[Message, None, None]:
-        """Yield what a worker says of a job as it comes; the last is Done, Unfit or Lost.
+        """Perform a job and yield its messages as they come; the last is Done, Unfit or Lost.
 
         A worker that was lost since its last job costs nothing: a new one takes the job.
         """
@@ -148,7 +151,7 @@ class _Worker:
         try:
             message = self._messages.get(timeout=patience)
         except queue.Empty:
-            return Lost(f"ended after {patience:g} s of silence")
+            return Lost(f"ended after {patience:g} s of silence", silent=True)
         if isinstance(message, Message):
             return message
         return Lost(self._end_of_process())

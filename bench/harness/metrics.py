@@ -132,8 +132,8 @@ def excess(residual: Floats, distance: Floats, reach: float) -> Floats:
     return residual - np.maximum(distance - reach, 0.0)
 
 
-def turns(local_rotations: Floats) -> Floats:
-    """Return by how much each joint turns from frame to frame [rad], (frame - 1, joint).
+def rotation_angles(local_rotations: Floats) -> Floats:
+    """Return the angle by which each joint rotates between frames [rad], (frame - 1, joint).
 
     These are geodesic angles. The last frame and the first are no neighbours.
     """

@@ -1,4 +1,4 @@
-"""What a long measurement is doing just now, for whoever shows it."""
+"""Progress reports: a long measurement announces its steps, a caller may listen."""
 
 import contextlib
 from collections.abc import Callable, Iterator
@@ -6,20 +6,20 @@ from contextvars import ContextVar
 from typing import NamedTuple
 
 
-class News(NamedTuple):
-    """What is being done, and where that changes a case's state, the state and why."""
+class Progress(NamedTuple):
+    """What is being done; `state` and `message` where that changes the state of a case."""
 
     what: str
     state: str = ""
     message: str = ""
 
 
-_listener: ContextVar[Callable[[News], None] | None] = ContextVar("listener", default=None)
+_listener: ContextVar[Callable[[Progress], None] | None] = ContextVar("listener", default=None)
 
 
 @contextlib.contextmanager
-def heard_by(listener: Callable[[News], None]) -> Iterator[None]:
-    """Let somebody hear what is told inside the block."""
+def listening(listener: Callable[[Progress], None]) -> Iterator[None]:
+    """Call `listener` with every announcement made inside the block."""
     token = _listener.set(listener)
     try:
         yield
@@ -27,8 +27,8 @@ def heard_by(listener: Callable[[News], None]) -> Iterator[None]:
         _listener.reset(token)
 
 
-def tell(what: str, state: str = "", message: str = "") -> None:
-    """Say what is being done now."""
+def announce(what: str, state: str = "", message: str = "") -> None:
+    """Pass what is being done to the listener, if there is one."""
     listener = _listener.get()
     if listener is not None:
-        listener(News(what, state, message))
+        listener(Progress(what, state, message))

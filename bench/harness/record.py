@@ -15,7 +15,9 @@ from typing import Annotated, Any, Literal, NamedTuple, TypedDict
 import msgspec
 import numpy as np
 
-FORMAT = 1
+FORMAT = 2
+# What lines of earlier formats lack is empty.
+_FORMATS = (1, FORMAT)
 FILE_NAME = "records.jsonl"
 # The suite of the records that say of each other suite that it was gone through to its end.
 FINISHED = "finished"
@@ -49,7 +51,7 @@ class _Stamp(TypedDict, total=False):
 class _Line(msgspec.Struct):
     """What a line has to hold."""
 
-    format: Literal[1]
+    format: Literal[1, 2]
     suite: str
     problem: str
     solver: str
@@ -60,6 +62,7 @@ class _Line(msgspec.Struct):
     stamp: _Stamp
     when: _Moment
     seconds: float
+    facts: dict[str, str | int | float | bool | list[str] | None] = {}
 
 
 _FIELDS = tuple(name for name in _Line.__struct_fields__ if name != "format")
@@ -81,6 +84,7 @@ class Record:
         stamp: machine, versions and digest of the sources, see `bench.harness.machine`.
         when: the moment it was produced, ISO 8601 with time zone.
         seconds: how long it took to produce.
+        facts: what tables select and sort by: numbers, words, truth values and lists of words.
     """
 
     suite: str
@@ -93,6 +97,12 @@ class Record:
     stamp: Mapping[str, Any] = field(default_factory=dict)
     when: str = ""
     seconds: float = 0.0
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """How the problem is written."""
+        return str(self.facts.get("title", self.problem))
 
     @property
     def key(self) -> Key:
@@ -237,8 +247,8 @@ def _kind(mode: int) -> str:
 
 def _is_begun(line: bytes) -> bool:
     """Return whether a line is the beginning of a record, and not a whole one."""
-    begin = f'{{"format": {FORMAT}, "suite": '.encode()
-    if not line or not (line.startswith(begin) or begin.startswith(line)):
+    begins = [f'{{"format": {known}, "suite": '.encode() for known in _FORMATS]
+    if not line or not any(line.startswith(begin) or begin.startswith(line) for begin in begins):
         return False
     return _decoded(line, 0).record is None
 

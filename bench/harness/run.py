@@ -1,9 +1,5 @@
 """Run suites: measure the blocks that are not yet on record, and store each as it is done."""
 
-import contextlib
-import io
-import os
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
@@ -14,18 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..experiments import SCALES, Block, blocks
-from ..experiments.timing import cases as timing_cases
-from ..experiments.timing.case import TIMING
-from .isolation import Workshop
 from .machine import stamp
-from .progress import News
 from .record import FINISHED, Key, Record, RecordFile, key
-from .worker import Done, Lost, Message, Unfit
 
-# At most so many rounds of a benchmark are kept.
-ROUNDS = 200
-# So long [s] a case may take; and the lines of pytest's that say why it failed.
-_CASE_PATIENCE, _LAST_LINES = 1800.0, 20
 KEPT, MEASURING, MEASURED, FAILED = "kept", "measuring", "measured", "failed"
 
 
@@ -68,9 +55,6 @@ def run(suites: Sequence[str], scale: str, folder: Path) -> Iterator[Event]:
 def _run_suite(
     suite: str, scale: str, file: RecordFile, present: dict[Key, Record]
 ) -> Iterator[Event]:
-    if suite == TIMING:
-        yield from _run_timing(scale, file.path.parent, present)
-        return
     for block in blocks(suite, SCALES[scale]):
         yield from _run_block(block, file, present)
 
@@ -117,8 +101,6 @@ def count(suites: Sequence[str], scale: str) -> int:
 
 def keys(suite: str, scale: str) -> set[Key]:
     """Return the keys of all records of a suite that was gone through."""
-    if suite == TIMING:
-        return {case.key for case in timing_cases()}
     return {block_key(block) for block in blocks(suite, SCALES[scale])}
 
 
@@ -157,11 +139,11 @@ def measure(block: Block) -> Record:
     """Measure a block; one that raises becomes a record that says why, and costs no other."""
     begin = time.perf_counter()
     try:
-        arrays, notes = block.measure()
+        arrays, notes, facts = block.measure()
     except Exception as error:  # whatever a solver raises is a result of that solver
         if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
             raise KeyboardInterrupt from None
-        arrays, notes = {}, {"failed": f"{type(error).__name__}: {error}"}
+        arrays, notes, facts = {}, {"failed": f"{type(error).__name__}: {error}"}, {}
     return Record(
         block.suite,
         block.problem,
@@ -173,62 +155,5 @@ def measure(block: Block) -> Record:
         stamp(),
         now(),
         time.perf_counter() - begin,
+        {**block.facts, **facts},
     )
-
-
-def _run_timing(scale: str, folder: Path, present: dict[Key, Record]) -> Iterator[Event]:
-    """Time the cases in a process of its own, which keeps the records, and relay what it says."""
-    length = SCALES[scale].seconds
-    cases = list(timing_cases())
-    kept = [case for case in cases if is_done(present.get(case.key), length)]
-    yield from (Event(KEPT, TIMING, case.name) for case in kept)
-    if len(kept) == len(cases):
-        return
-    with tempfile.TemporaryDirectory() as storage:
-        yield from _relay(timing_arguments(folder, length, storage))
-
-
-def _relay(arguments: Sequence[str]) -> Iterator[Event]:
-    """Run pytest in a worker's process and yield what it tells, and why it fails if it does."""
-    with contextlib.closing(Workshop(_CASE_PATIENCE)) as shop:
-        for message in shop.stream(TimingJob(tuple(arguments))):
-            match message:
-                case News():
-                    yield Event(message.state, TIMING, message.what, message.message)
-                case Unfit() | Lost():
-                    yield Event(FAILED, TIMING, "pytest-benchmark", message.why)
-
-
-class TimingJob(NamedTuple):
-    """All cases to be timed by pytest in a worker's process, given its arguments."""
-
-    arguments: tuple[str, ...]
-
-    def perform(self) -> Iterator[Message]:
-        """Yield the end; what happens until then is told as news."""
-        import pytest
-
-        os.environ["PYTEST_ADDOPTS"] = ""  # what pytest is told to do elsewhere is not meant here
-        said = io.StringIO()
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-            code = pytest.main(list(self.arguments))
-        last = "".join(said.getvalue().splitlines(keepends=True)[-_LAST_LINES:]).strip()
-        yield Unfit(last) if code else Done()
-
-
-def timing_arguments(folder: Path, length: float, storage: str) -> list[str]:
-    """Return pytest's arguments: no configuration but ours, about `length` seconds a case.
-
-    pytest-benchmark makes a folder for results of its own, which `storage` keeps out of the way.
-    """
-    here = Path(__file__).parents[1] / "experiments" / "timing"
-    return [
-        str(here / "time_cases.py"),
-        *("-c", os.devnull, "--rootdir", str(here), "--import-mode=importlib"),
-        *("-p", "no:cacheprovider", "-p", "bench.experiments.timing.plugin", "-s", "-q"),
-        f"--records={folder}",
-        f"--benchmark-storage=file://{storage}",
-        f"--benchmark-max-time={length}",
-        f"--benchmark-min-time={length / ROUNDS}",
-        *("--benchmark-min-rounds=5", "--benchmark-disable-gc", "--benchmark-warmup=off"),
-    ]

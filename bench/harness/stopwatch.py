@@ -1,4 +1,4 @@
-"""The clock of single solves; apart from `run.py` and `timing/`, only this file reads one."""
+"""Time single calls; no other file of the bench but `run.py` and `timing/` reads a clock."""
 
 import time
 from collections.abc import Callable

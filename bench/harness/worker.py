@@ -1,7 +1,7 @@
-"""What a worker says, and its side of the connection: jobs in, messages out, as they come.
+"""The messages of a worker process, and its side of the connection: jobs in, messages out.
 
-A solver may print, crash or hang; whatever it does, it does it in a worker's process, which
-`isolation` starts. Nothing else than messages goes through the connection.
+A solver may print, crash or hang: it does so in a process of its own, which `isolation` starts.
+Only messages go through the connection.
 """
 
 import os
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from .progress import News, heard_by
+from .progress import Progress, listening
 
 
 class Begun(NamedTuple):
@@ -58,12 +58,13 @@ class Found(NamedTuple):
 
 
 class Lost(NamedTuple):
-    """The process is gone, or was ended since it was silent; `why` says which."""
+    """The process is gone; `why` says how, `silent` whether it was ended since it was silent."""
 
     why: str
+    silent: bool = False
 
 
-Message = Begun | Ready | News | Solved | Found | Unfit | Done | Lost
+Message = Begun | Ready | Progress | Solved | Found | Unfit | Done | Lost
 # After one of these there is no more to come.
 LAST = (Unfit, Done, Lost)
 
@@ -82,7 +83,7 @@ def said(error: Exception) -> str:
 
 def serve(connection: Connection) -> None:
     """Perform jobs until the other end is closed."""
-    with heard_by(connection.send):
+    with listening(connection.send):
         while True:
             try:
                 job = connection.recv()

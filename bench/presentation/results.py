@@ -5,25 +5,9 @@ from dataclasses import replace
 from typing import Any
 
 from ..harness.record import Record
+from ..peers import registry
 from .tables import words
 from .text import all_visible, shortened, visible
-
-LABELS = {
-    "ccd": "CCD",
-    "fabrik": "FABRIK",
-    "lm": "LM",
-    "local_global": "local/global",
-    "lbfgs": "L-BFGS",
-    "chebyshev": "Chebyshev",
-    "gauss_newton": "Gauss-Newton",
-    "newton_cg": "Newton-CG",
-    "newton": "Newton",
-    "levenberg_marquardt": "Levenberg-Marquardt",
-    "jacobian_transpose": "Jacobian transpose",
-    "x1": "stiffness × 1",
-    "x10": "stiffness × 10",
-    "x100": "stiffness × 100",
-}
 
 
 class Results:
@@ -33,27 +17,24 @@ class Results:
         """Leave out those that say why there are none."""
         self.records = [record for record in records if not record.failed]
 
-    def all(self, suite: str, problem: str = "", **wanted: Any) -> list[Record]:
-        """Return the records of a suite whose problem begins so and whose settings are these."""
-        return [
-            record
-            for record in self.records
-            if record.suite == suite
-            and record.problem.startswith(problem)
-            and all(record.settings.get(name) == value for name, value in wanted.items())
-        ]
+    def all(self, suite: str, **wanted: Any) -> list[Record]:
+        """Return the records of a suite whose facts and settings are these."""
+        return [record for record in self.records if record.suite == suite and _has(record, wanted)]
 
     def one(self, suite: str, problem: str, solver: str, **wanted: Any) -> Record | None:
         """Return the record of exactly this problem and solver, or None."""
-        for record in self.all(suite, problem, **wanted):
-            if record.problem == problem and record.solver == solver:
-                return record
-        return None
+        found = self.all(suite, **wanted)
+        return next((r for r in found if (r.problem, r.solver) == (problem, solver)), None)
+
+
+def _has(record: Record, wanted: dict[str, Any]) -> bool:
+    known = {**record.settings, **record.facts}
+    return all(known.get(name) == value for name, value in wanted.items())
 
 
 def plain(record: Record) -> Record:
-    """Return a record whose names and notes can be shown anywhere."""
-    names = ("suite", "problem", "solver", "settings", "notes", "stamp")
+    """Return a record whose words can be shown anywhere."""
+    names = ("suite", "problem", "solver", "settings", "notes", "stamp", "facts")
     return replace(record, **{name: all_visible(getattr(record, name)) for name in names})
 
 
@@ -92,9 +73,17 @@ def _does_not_fit(record: Record, error: Exception) -> str:
     return f"The record of {names} is left out, for no table can be made of what it holds ({why})."
 
 
-def label(name: str) -> str:
-    """Return how a problem or solver is written: "arm/plumb_bob" as "arm, plumb bob"."""
-    return ", ".join(LABELS.get(part, part.replace("_", " ")) for part in name.split("/"))
+def label(solver: str) -> str:
+    """Return how a solver is written."""
+    return registry.find(solver).label
+
+
+def by_problem(records: Iterable[Record]) -> dict[str, list[Record]]:
+    """Return the records of each problem, in order."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(record.problem, []).append(record)
+    return groups
 
 
 def problems(records: Iterable[Record]) -> list[str]:

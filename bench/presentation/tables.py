@@ -15,14 +15,14 @@ from ..harness.metrics import Share
 Cell = str | int | float | bool | Share | None
 
 
-class Answer(NamedTuple):
+class Summary(NamedTuple):
     """What a table says: a sentence, and points below it; empty where it says nothing."""
 
     sentence: str = ""
     points: tuple[str, ...] = ()
 
 
-NO_ANSWER = Answer()
+NO_SUMMARY = Summary()
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Table:
         rows: the cells; None where nothing was measured.
         shows: one sentence on what can be read off.
         measured: one sentence on how the numbers came about.
-        answer: what the numbers say, generated from them.
+        summary: what the numbers say, generated from them.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
     shows: str = ""
     measured: str = ""
-    answer: Answer = NO_ANSWER
+    summary: Summary = NO_SUMMARY
 
     def __post_init__(self) -> None:
         """Refuse ragged rows and headings that stand twice."""
@@ -91,9 +91,9 @@ def markdown(table: Table) -> str:
     rule = ["---" if column.words else "---:" for column in table.columns]
     body = [[_markdown(words(cell)) for cell in row] for row in table.rows]
     lines = ["| " + " | ".join(row) + " |" for row in (head, rule, *body)]
-    points = "\n".join(f"- {_markdown(point)}" for point in table.answer.points)
+    points = "\n".join(f"- {_markdown(point)}" for point in table.summary.points)
     about = [_markdown(text) for text in (table.shows, table.measured)]
-    parts = [f"# {_markdown(table.title)}", _markdown(table.answer.sentence), points, *about]
+    parts = [f"# {_markdown(table.title)}", _markdown(table.summary.sentence), points, *about]
     return "\n\n".join([*filter(None, parts), "\n".join(lines)]) + "\n"
 
 

@@ -23,6 +23,14 @@ def record(suite, problem, solver, settings=None, arrays=None, **more):
     return Record(suite, problem, solver, settings or {}, arrays=made, **given)
 
 
+def first_called(name, solver, cold, warm=0.3):
+    """The first call of a function, with nothing compiled and with all of it on disk."""
+    arrays = {"cold compiled": 2, "cold processor": cold, "cold wall": 2 * cold}
+    arrays |= {"warm compiled": 0, "warm processor": warm, "warm wall": 2 * warm}
+    facts = {"title": name.replace("/", ", ")}
+    return record("first_call", name, solver, {}, arrays, facts=facts)
+
+
 def drawn(solver, warm, turn):
     """The arm drawing a curve, in three frames."""
     return record(
@@ -33,37 +41,46 @@ def drawn(solver, warm, turn):
         {
             "residual": [1e-5, 2e-5, 3e-4],
             "iterations": [4, 5, 6] if solver == "ccd" else [1, 2, 3],
-            "largest_turn": [turn, turn / 2],
-            "mean_turn": [turn / 4, turn / 4],
+            "largest_angle": [turn, turn / 2],
+            "mean_angle": [turn / 4, turn / 4],
         },
+        facts={"task": "curve", "title": "arm, circle", "curve": "circle"},
     )
 
 
 def followed(solver, **turns):
-    """A closed curve of three points followed in three ways; every second turn is half as large."""
+    """A closed curve of three points followed in three modes, its angles halving."""
     return [
         record(
             "tracking",
             "arm/circle",
             solver,
-            {"tolerance": 1e-4, "max_iterations": 100, "way": way},
+            {"tolerance": 1e-4, "max_iterations": 100, "mode": mode},
             {
-                "residual": [1e-5, 2e-5, 3e-5 if way == "coherent" else 3e-4],
-                "iterations": [12, 11, 10] if way == "coherent" else [5, 4, 3],
-                "largest_turn": [turn, turn / 2, turn / 2],
-                "mean_turn": [turn / 4, turn / 4, turn / 8],
+                "residual": [1e-5, 2e-5, 3e-5 if mode == "coherent" else 3e-4],
+                "iterations": [12, 11, 10] if mode == "coherent" else [5, 4, 3],
+                "largest_angle": [turn, turn / 2, turn / 2],
+                "mean_angle": [turn / 4, turn / 4, turn / 8],
             },
+            facts={"task": "curve", "title": "arm, circle"},
         )
-        for way, turn in turns.items()
+        for mode, turn in turns.items()
     ]
 
 
 def drifted(solver):
     """Three rounds, warm and coherent."""
-    ways = {"warm": [0.1, 0.2, 0.3], "coherent": [0.0, 1e-9, 0.0]}
+    modes = {"warm": [0.1, 0.2, 0.3], "coherent": [0.0, 1e-9, 0.0]}
     return [
-        record("tracking", "drift/heart", solver, {"way": way}, {"drift": drift})
-        for way, drift in ways.items()
+        record(
+            "tracking",
+            "drift/heart",
+            solver,
+            {"mode": mode},
+            {"drift": drift},
+            facts={"task": "drift"},
+        )
+        for mode, drift in modes.items()
     ]
 
 
@@ -83,6 +100,7 @@ def beyond(solver, bend):
             "reach": 2.0,
         },
         size=2,
+        facts={"task": "beyond", "title": "arm, beyond"},
     )
 
 
@@ -98,10 +116,12 @@ def claim(name="spring forces", held=True, **notes):
     )
 
 
-def timed(solver, seconds, problem="kinematics/10 balls/one pose a call"):
+def timed(solver, seconds, subject="kinematics", group="10 balls", work="one pose a call"):
     """Three rounds of a benchmark."""
-    rounds = [seconds, 2 * seconds, 3 * seconds]
-    return record("timing", problem, solver, {"operations": 1}, {"seconds": rounds, "moved": 0})
+    arrays = {"seconds": [seconds, 2 * seconds, 3 * seconds], "moved": 0}
+    facts = {"subject": subject, "group": group, "work": work, "title": f"{group}, {work}"}
+    problem = f"{subject}/{group}/{work}"
+    return record("timing", problem, solver, {"operations": 1}, arrays, facts=facts)
 
 
 def reached(stratum, solver):
@@ -110,54 +130,67 @@ def reached(stratum, solver):
                (("low", 1e-6), ("median", 1e-5), ("high", 1e-4))}  # fmt: skip
     arrays = {"residual": [1e-5, 1e-6], "iterations": [2, 30], "distance": [0.5, 0.6]}
     limits = {"tolerance": 1e-4, "max_iterations": 1000}
-    return record("ik", f"chain/{stratum}", solver, limits, arrays | history, size=2)
+    facts = {"task": "chain", "stratum": stratum, "title": f"chain, {stratum}"}
+    return record("ik", f"chain/{stratum}", solver, limits, arrays | history, size=2, facts=facts)
 
 
 def stepped(solver):
     """One step of a cloth in three iterations."""
     arrays = {"residual": [1.0, 0.1, 1e-7, 0.0], "error": [1.0, 0.2, 1e-7, 0.0]}
-    return record("cloth", "cloth/x1/one step", solver, {"h": 0.02, "step": 3}, arrays)
+    settings = {"h": 0.02, "step": 3}
+    return record("cloth", "cloth/x1/one step", solver, settings, arrays, facts=cloth("one step"))
+
+
+def cloth(task):
+    """What is known of a record on the lab's cloth as it is."""
+    return {"task": task, "title": "stiffness × 1"}
 
 
 def few(iterations):
     """Two steps of a few iterations."""
     settings = {"h": 0.02, "first": 5, "steps": 2, "iterations": iterations}
     arrays = {"error": [0.5, 0.5], "distance": [0.1, 0.1], "drift": [0.1, 0.2], "path": [1, 2]}
-    return record("cloth", "cloth/x1/few iterations", "local_global", settings, arrays)
+    facts = cloth("few iterations")
+    return record("cloth", "cloth/x1/few iterations", "local_global", settings, arrays, facts=facts)
 
 
 def two_dampers(apart=(0.04, 0.02)):
     """How far the two laws of dampers are apart in two steps."""
     settings = {"first": 5, "longest": 0.02, "halvings": len(apart) - 1, "damping": 0.2}
     h = 0.02 / 2.0 ** np.arange(len(apart))
-    return record("cloth", "cloth/x1/dampers", "newton", settings, {"h": h, "apart": apart})
+    arrays = {"h": h, "apart": apart}
+    return record("cloth", "cloth/x1/dampers", "newton", settings, arrays, facts=cloth("dampers"))
 
 
-def swung(solver, problem="swing/undamped", left=(1.0, 0.5)):
+def swung(solver, cloth="undamped", left=(1.0, 0.5)):
     """What an integrator leaves of the energy of a long swing."""
     settings = {"h": 1 / 60, "steps": 100, "every": 10, "tolerance": 1e-10}
     times = np.arange(len(left)) / 6
-    return record("energy", problem, solver, settings, {"time": times, "left": left})
+    facts = {"title": cloth, "damping": 0.0 if cloth == "undamped" else 0.2}
+    arrays = {"time": times, "left": left}
+    return record("energy", f"swing/{cloth}", solver, settings, arrays, facts=facts)
 
 
 def certified(solver="newton", settings=None, arrays=None, notes=None):
-    """One step of a cloth in mid-swing, its answer covered unless told otherwise."""
+    """One step of a cloth in mid-swing, its answer covered unless Newton colours them itself."""
     usual = {"h": 1 / 30, "start": "y", "iterations": 100, "tolerance": 1e-10}
     found = {"size": 10, "iterations": 4, "residual": 1e-12, "balance": 1e-15, "distance": 1e-11}
     found |= {"at_floor": True, "apart": 0.0, "error": 0.0, "above": 0.0}
     found |= {"covered": True, "same": True, "different": False}
     return record("newton", "swing/k100000", solver, usual | (settings or {}),
-                  found | (arrays or {}), notes=notes or {"coverage": "COVERED"})  # fmt: skip
+                  found | (arrays or {}), notes=notes or {"coverage": "COVERED"},
+                  facts={"stiffness": 1e5})  # fmt: skip
 
 
 def stepping():
     """Three steps by Newton."""
     settings = {"h": 0.02, "first": 5, "steps": 3, "tolerance": 1e-10}
     arrays = {"iterations": [2, 2, 3], "residual": [1e-12, 1e-12, 1e-11], "outcome": [0, 0, 0]}
-    return record("cloth", "cloth/x1", "newton", settings, arrays | {"at_floor": [True] * 3})
+    arrays |= {"at_floor": [True] * 3}
+    return record("cloth", "cloth/x1", "newton", settings, arrays, facts=cloth("swing"))
 
 
-def raced(solver, kind, family="robots", robot="arm", **changed):
+def raced(solver, kind, task="reachable", robot="arm", **changed):
     """Four targets in two strata: one solved, one not, one denied, one beyond the limits."""
     arrays = {
         "solved": [True, False, False, True], "claimed": [1, 0, 1, 1], "stratum": [0, 1, 0, 1],
@@ -165,15 +198,18 @@ def raced(solver, kind, family="robots", robot="arm", **changed):
         "rotation": [1e-8, 0.5, 0.1, 1e-6], "beyond": [0.0, 0.0, 0.0, 0.0], "setup": 0.25,
     } | changed  # fmt: skip
     settings = {"kind": kind, "tolerance": 1e-3, "tolerance_rotation": 1e-3, "version": "1.2"}
-    notes = {"robot": f"the {robot}", "strata": "joint space, space", "remark": ""}
-    notes |= {"tips": "hand", "joints": "7", "freedom": "7", "wanted": "pose"}
-    return record("ik", f"{family}/{robot}", solver, settings, arrays, notes=notes, size=4)
+    facts = {"task": task, "title": f"the {robot}", "strata": ["joint space", "space"]}
+    facts |= {"tips": ["hand"], "joints": 7, "freedom": 7, "wanted": "pose"}
+    problem = f"{'robots' if task == 'reachable' else task}/{robot}"
+    return record("ik", problem, solver, settings, arrays, notes={"remark": ""}, size=4,
+                  facts=facts)  # fmt: skip
 
 
 def lacking(solver, kind, why, robot="all"):
     """A solver that is missing or cannot."""
-    notes = {"robot": "every robot", "remark": why}
-    return record("ik", f"robots/{robot}", solver, {"kind": kind, "version": ""}, notes=notes)
+    facts = {"task": "reachable", "title": "every robot"}
+    settings = {"kind": kind, "version": ""}
+    return record("ik", f"robots/{robot}", solver, settings, notes={"remark": why}, facts=facts)
 
 
 def compared(engine, cause=""):
@@ -182,7 +218,8 @@ def compared(engine, cause=""):
     apart = {"positions": 1e-15, "rotations": 2e-15, "jacobians": 3e-15}
     notes = {"cause": cause, "free mimics": ""}
     settings = {"configurations": 5}
-    return record("robot_models", "robots/arm", engine, settings, sizes | apart, notes=notes)
+    return record("robot_models", "robots/arm", engine, settings, sizes | apart, notes=notes,
+                  facts={"title": "arm"})  # fmt: skip
 
 
 def scaled(solver):
@@ -198,9 +235,12 @@ def republished():
     arrays = {"solved": [True, False], "claimed": [1, 0], "seconds": [1e-3, 3e-3], "setup": 0.1}
     counts = {"iterations": [4, 6], "residual": [1e-7, 1e-8]}
     return [
-        record("ik", "published/trac_ik/ur5", "TRAC-IK, 5 ms", {}, arrays),
-        record("ik", "published/toolbox/ur5", "ik_LM, NR", {"method": "NR"}, arrays),
-        *(record("ik", f"published/fabrik/{s}", "fabrik", {"tolerance": 1e-6}, counts)
+        record("ik", "published/trac_ik/ur5", "TRAC-IK, 5 ms", {}, arrays,
+               facts={"task": "TRAC-IK’s table", "robot": "ur5"}),
+        record("ik", "published/toolbox/ur5", "ik_LM, NR", {"method": "NR"}, arrays,
+               facts={"task": "the toolbox’s table", "infeasible": 11.0}),
+        *(record("ik", f"published/fabrik/{s}", "fabrik", {"tolerance": 1e-6}, counts,
+                 facts={"task": "FABRIK’s table", "stratum": s})
           for s in ("reachable", "unreachable")),
     ]  # fmt: skip
 
@@ -210,22 +250,24 @@ def pictured():
     curve = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.3, 0, 0.1]])
     ghosts = [[[0, 1, 0], [0, 0.5, 0.2], point] for point in curve]
     arrays = {"curve": curve, "spacing": [0.1, 0.2], "ghosts": ghosts, "residual": [1e-5] * 3}
-    arrays |= {"iterations": [1, 2, 3], "largest_turn": [0.1, 0.2], "mean_turn": [0.1, 0.1]}
+    arrays |= {"iterations": [1, 2, 3], "largest_angle": [0.1, 0.2], "mean_angle": [0.1, 0.1]}
     spacing = {"min_spacing": 0.01, "max_spacing": 0.02}
     cloth = {"positions": [np.eye(4, 3), 2 * np.eye(4, 3)], "time": [0.0, 1.0], "pinned": [0, 1]}
     return [
-        *(record("pictures", "arm/x", "ccd", {"evened": e, **spacing}, arrays) for e in (0, 1)),
-        record("pictures", "cloth/x1", "newton", {}, cloth),
-    ]
+        *(record("pictures", "arm/x", "ccd", {"evened": e, **spacing}, arrays,
+                 facts={"task": "arm"}) for e in (0, 1)),
+        record("pictures", "cloth/x1", "newton", {}, cloth, facts={"task": "cloth"}),
+    ]  # fmt: skip
 
 
 def worked(solver, stiffness=1e3, sizes=(20, 20), seconds=(1e-3, 1e-2), error=(0.5, 1e-4)):
     """One step of a cloth with ever more work."""
-    arrays = {"particles": sizes, "seconds": seconds, "error": error}
-    labels = "; ".join(f"{10**i} iterations" for i in range(len(sizes)))
+    arrays = {"particles": sizes, "seconds": seconds, "error": error, "remark_particles": [20]}
+    labels = [f"{10**i} iterations" for i in range(len(sizes))]
     settings = {"stiffness": stiffness, "frame": 1 / 60, "version": "1"}
-    notes = {"rungs": labels, "remark": "20 × 20, 10 iterations: tired"}
-    return record("cloth", f"peers/one step/k{stiffness:g}", solver, settings, arrays, notes=notes)
+    facts = {"task": "work of a step", "rungs": labels}
+    facts |= {"remarks": ["20 × 20, 10 iterations: tired"]}
+    return record("cloth", f"peers/one step/k{stiffness:g}", solver, settings, arrays, facts=facts)
 
 
 def fell(solver, stiffness=1e3, **changed):
@@ -235,30 +277,34 @@ def fell(solver, stiffness=1e3, **changed):
         "seconds": [1e-4, 1e-3, 1.0], "setup": [0.1, 0.2, 0.3],
         "implicit": [np.nan, 1e-2, 1e-3], "true": [np.nan, 2e-2, 1e-3],
         "diverged": [True, False, False], "order": [3.5], "unsure": [1e-9],
+        "remark_particles": [],
     } | changed  # fmt: skip
     settings = {"stiffness": stiffness, "frame": 1 / 60, "version": "1"}
-    notes = {"rungs": "1 step; 4 steps; 16 steps", "remark": ""}
-    return record("cloth", f"peers/motion/k{stiffness:g}", solver, settings, arrays, notes=notes)
+    facts = {"task": "work of a motion", "rungs": ["1 step", "4 steps", "16 steps"], "remarks": []}
+    return record("cloth", f"peers/motion/k{stiffness:g}", solver, settings, arrays, facts=facts)
 
 
 def needed(solver, counts, tried=100):
     """Iterations to each power of ten."""
     settings = {"size": 20, "stiffness": 1e3, "frame": 1 / 60}
     arrays = {"needed": counts, "tried": tried, "least": 1e-3}
-    return record("cloth", "peers/iterations/k1000", solver, settings, arrays)
+    facts = {"task": "iterations of a step"}
+    return record("cloth", "peers/iterations/k1000", solver, settings, arrays, facts=facts)
 
 
 def bounded(solver, limit):
     """The longest stable step at a frequency of 100 rad/s."""
     arrays = {"stiffness": [1e3], "limit": [limit], "frequency": [100.0]}
     notes = {"remark": ""}
-    return record("cloth", "peers/stability", solver, {"size": 6}, arrays, notes=notes)
+    return record("cloth", "peers/stability", solver, {"size": 6}, arrays, notes=notes,
+                  facts={"task": "stability"})  # fmt: skip
 
 
 def as_liu(solver, seconds):
     """A frame of as many vertices as in the paper."""
     arrays = {"seconds": [seconds], "error": 0.5, "vertices": 6561}
-    return record("cloth", "peers/liu2013", solver, {"size": 81}, arrays)
+    facts = {"task": "Liu 2013"}
+    return record("cloth", "peers/liu2013", solver, {"size": 81}, arrays, facts=facts)
 
 
 @pytest.fixture
@@ -271,6 +317,7 @@ def make():
         drifted=drifted,
         beyond=beyond,
         claim=claim,
+        first_called=first_called,
         timed=timed,
         stepped=stepped,
         swung=swung,
@@ -296,6 +343,7 @@ def records():
     arm = [drawn(s, warm, turns[s][warm]) for s in turns for warm in (False, True)]
     return [
         claim(),
+        first_called("solve_ik/chain", "fabrik", 2.0),
         *arm,
         *followed("ccd", cold=1.0, warm=0.5, coherent=0.25),
         *drifted("ccd"),
@@ -307,11 +355,11 @@ def records():
         stepping(),
         two_dampers(),
         certified(),
-        *(swung(s, f"swing/{c}") for c in ("undamped", "damped") for s in ("RK4", "discrete")),
+        *(swung(s, c) for c in ("undamped", "damped") for s in ("RK4", "discrete")),
         *(
-            raced("Plumbob LM", kind, family)
+            raced("Plumbob LM", kind, task)
             for kind in ("one start", "restarts")
-            for family in ("robots", "unreachable")
+            for task in ("reachable", "unreachable")
         ),
         *republished(),
         *(scaled(solver) for solver in ("supernodal", "cholespy")),
@@ -325,6 +373,6 @@ def records():
         *pictured(),
         timed("Plumbob, compiled", 1e-6),
         timed("Pinocchio", 5e-7),
-        *(timed("Plumbob, compiled", 1e-6, f"{work}/near/ccd") for work in ("ik", "cloth")),
+        *(timed("Plumbob, compiled", 1e-6, work, "near", "CCD") for work in ("ik", "cloth")),
         *finished,
     ]

@@ -22,11 +22,13 @@ from bench.experiments.cloth_peers.problem import (
 )
 from bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, true_motion
 from bench.harness import metrics
-from bench.harness.isolation import Outcome, Workshop
+from bench.harness.isolation import Outcome, WorkerProcess
 from bench.harness.worker import Done, Ready, Solved, Unfit
-from bench.peers.cloth import CLOTH_PEERS, EXPLICIT, LINEARISED, ClothPeer, Rung
-from bench.presentation import figures
-from bench.presentation.sections import Results
+from bench.peers import registry
+from bench.peers.cloth.ladder import Rung, motion_rungs, step_rungs
+from bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
+from bench.presentation.report import all_figures
+from bench.presentation.results import Results
 from reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
 from reference.mass_spring import stiffness_matrix
 
@@ -43,7 +45,7 @@ def slow_if_long_to_compile(peer):
     return pytest.param(peer, marks=marks, id=peer.title)
 
 
-@pytest.fixture(params=map(slow_if_long_to_compile, CLOTH_PEERS))
+@pytest.fixture(params=map(slow_if_long_to_compile, registry.cloth_peers()))
 def peer(request):
     """Every solver that is installed."""
     if not request.param.version:
@@ -231,7 +233,7 @@ def test_a_model_kept_by_mujoco_takes_on_the_stiffness_asked_for(stiffness):
     cloth = falling_cloth(SIZE, stiffness)
     level = falling_cloth(SIZE, STIFFNESS).system
     assert not np.array_equal(cloth.system.stiffnesses, level.stiffnesses)
-    for peer in (p for p in CLOTH_PEERS if p.engine == "MuJoCo" and p.kind == EXPLICIT):
+    for peer in (p for p in registry.cloth_peers() if p.engine == "MuJoCo" and p.kind == EXPLICIT):
         moved(peer, falling_cloth(SIZE, STIFFNESS), substeps=8)
         state = cloth.start
         for _ in range(8):
@@ -271,11 +273,11 @@ def test_by_itself_newton_gives_springs_one_colour(cloth):
 
 
 def test_every_entry_has_a_name_and_every_rung_a_label_of_its_own():
-    titles = [peer.title for peer in CLOTH_PEERS]
+    titles = [peer.title for peer in registry.cloth_peers()]
     assert len(set(titles)) == len(titles)
-    for peer in CLOTH_PEERS:
+    for peer in registry.cloth_peers():
         assert peer.title.startswith(peer.engine)
-        for rungs in (peer.step_rungs(1000.0), peer.motion_rungs(1000.0)):
+        for rungs in (step_rungs(peer, 1000.0), motion_rungs(peer, 1000.0)):
             labels = [rung.label for rung in rungs]
             assert len(set(labels)) == len(labels) > 0
 
@@ -373,11 +375,11 @@ def test_a_job_without_time_left_begins_no_further_frame(cloth):
 
 
 @pytest.fixture(scope="module")
-def shop(fakes):
-    """A workshop that loses patience with a frame after half a second."""
-    shop = Workshop(start_patience=60.0, target_patience=0.5)
-    yield shop
-    shop.close()
+def worker(fakes):
+    """A worker process that loses patience with a frame after half a second."""
+    worker = WorkerProcess(start_patience=60.0, target_patience=0.5)
+    yield worker
+    worker.close()
 
 
 def fake_peer(manner, package="numpy"):
@@ -386,13 +388,9 @@ def fake_peer(manner, package="numpy"):
     )  # fmt: skip
 
 
-class OneRung(ClothPeer):
-    """A solver that knows no substeps."""
-
-    def motion_rungs(self, frequency):
-        return [Rung("as it is", self.settings)]
-
-    step_rungs = motion_rungs
+def as_it_is(peer, frequency):
+    """The one rung of a solver that knows no substeps."""
+    return [Rung("as it is", peer.settings)]
 
 
 LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
@@ -407,17 +405,18 @@ LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
         ("explodes", 3, True, ""),
     ],
 )
-def test_every_manner_becomes_one_point(shop, monkeypatch, manner, frames, lost, why):
-    monkeypatch.setattr(peers_cloth, "workshop", lambda: shop)
-    arrays, notes = peers_cloth.motion(OneRung(*fake_peer(manner)), STIFFNESS, (LEVEL,))
+def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, lost, why):
+    monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
+    monkeypatch.setattr(peers_cloth, "motion_rungs", as_it_is)
+    arrays, _, facts = peers_cloth.motion(fake_peer(manner), STIFFNESS, (LEVEL,))
     assert arrays["frames"].tolist() == [frames]
     assert arrays["diverged"].tolist() == [lost]
     assert np.isfinite(arrays["true"]).all() == (not lost)
-    assert notes == {"rungs": "as it is", "remark": why}
+    assert facts == {"rungs": ["as it is"], "remarks": [why] if why else []}
 
 
 class InThisProcess:
-    """A workshop without a process of its own."""
+    """A worker process without a process of its own."""
 
     def perform(self, job):
         said = list(job.perform())
@@ -428,7 +427,7 @@ class InThisProcess:
 
 @pytest.fixture
 def here(monkeypatch):
-    monkeypatch.setattr(peers_cloth, "workshop", InThisProcess)
+    monkeypatch.setattr(peers_cloth, "worker_process", InThisProcess)
 
 
 def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch):
@@ -437,44 +436,44 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
     class Silent:
         def perform(self, job):
             tried.append(job)
-            return Outcome(0.0, [], "ended after 300 s of silence")
+            return Outcome(0.0, [], "ended after 300 s of silence", silent=True)
 
-    monkeypatch.setattr(peers_cloth, "workshop", Silent)
+    monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})
-    arrays, notes = peers_cloth.motion(fake_peer("fine"), STIFFNESS, (LEVEL, LEVEL))
+    arrays, _, facts = peers_cloth.motion(fake_peer("fine"), STIFFNESS, (LEVEL, LEVEL))
     assert len(tried) == 1
     assert arrays["frames"].tolist() == [0, 0]
     assert np.isnan(arrays["true"]).all()
-    assert "silence" in notes["remark"]
+    assert "silence" in facts["remarks"][0]
 
 
 def test_a_ladder_ends_where_it_arrives(here):
     """Two iterations of Newton and three are asked for, and no more once 1e-9 is reached."""
-    newton = next(peer for peer in CLOTH_PEERS if peer.title == "Plumbob Newton")
-    arrays, notes = peers_cloth.one_step(newton, STIFFNESS, (LEVEL,))
+    newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
+    arrays, _, facts = peers_cloth.one_step(newton, STIFFNESS, (LEVEL,))
     assert arrays["error"][0] > arrays["error"][-1] <= peers_cloth.NEAR_ENOUGH
     assert (arrays["error"][:-1] > peers_cloth.NEAR_ENOUGH).all()
-    assert len(notes["rungs"].split("; ")) == len(arrays["error"])
+    assert len(facts["rungs"]) == len(arrays["error"])
 
 
 def test_a_ladder_whose_time_is_used_is_climbed_no_further(here):
-    newton = next(peer for peer in CLOTH_PEERS if peer.title == "Plumbob Newton")
-    arrays, _ = peers_cloth.one_step(newton, STIFFNESS, (LEVEL._replace(budget=1e-9),))
+    newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
+    arrays, _, _ = peers_cloth.one_step(newton, STIFFNESS, (LEVEL._replace(budget=1e-9),))
     assert len(arrays["error"]) == 1
 
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
     gone = [fake_peer(name, "a-package-that-nobody-has") for name in ("one", "two")]
-    monkeypatch.setattr(peers_cloth, "CLOTH_PEERS", gone)
+    monkeypatch.setattr(registry, "cloth_peers", lambda: gone)
     missing = [b for b in peers_cloth.blocks(Scale(1, 0.1)) if b.problem == "peers/all"]
     (block,) = missing
-    arrays, notes = block.measure()
+    arrays, notes, _ = block.measure()
     assert not arrays
     assert notes["remark"] == "a-package-that-nobody-has is not installed"
 
 
 def test_iterations_are_counted_to_each_power_of_ten():
-    arrays, _ = peers_cloth.iterations_needed("newton", 100.0)
+    arrays, *_ = peers_cloth.iterations_needed("newton", 100.0)
     counts = np.array(arrays["needed"])
     assert (np.diff(counts) >= 0).all()
     assert 1 <= counts[0] <= counts[-1] <= arrays["tried"] < 20
@@ -515,7 +514,7 @@ def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
     """A growth of a hundredfold shows a little beyond it: (h omega)² - 4 is 7e-5, or for
     Runge-Kutta, of which |R(ih omega)| climbs with a slope of 2.5, h omega is 0.005 too large.
     """
-    peer = next(peer for peer in CLOTH_PEERS if peer.title == title)
+    peer = next(peer for peer in registry.cloth_peers() if peer.title == title)
     arrays = longest_step(peer, one_spring(), monkeypatch)
     assert arrays["frequency"] == pytest.approx([np.sqrt(7.0 / 2.0)])
     reached = np.array(arrays["limit"]) * np.array(arrays["frequency"])
@@ -524,7 +523,7 @@ def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
 
 def test_a_solver_that_does_not_get_through_has_no_limit(monkeypatch, here):
     peer = fake_peer("unable")
-    arrays, notes = peers_cloth.stability(peer, (STIFFNESS,))
+    arrays, notes, _ = peers_cloth.stability(peer, (STIFFNESS,))
     assert np.isnan(arrays["limit"]).all()
     assert "TypeError" in notes["remark"] or "takes no cloths" in notes["remark"]
 
@@ -555,7 +554,7 @@ def test_the_table_of_one_step_names_the_cheapest_setting_and_the_fastest_solver
     assert column(table, "time to 1e-6 [ms]") == [None] * 3
     assert column(table, "least error") == [1e-4, 1e-4, 0.4]
     assert column(table, "remark") == ["20 × 20, 10 iterations: tired"] * 3
-    (point,) = table.answer.points
+    (point,) = table.summary.points
     assert point == (
         "20 × 20, 1,000 N/m: to 1e-3 Plumbob Newton, 10.0 ms (then Newton engine, VBD, 500 ms) "
         "and to 1e-6 none"
@@ -567,13 +566,14 @@ def test_the_table_of_motions_says_what_diverged_and_what_was_cut_short(make):
     assert column(table, "distance from the truth [m]") == [None, 2e-2, 1e-3]
     assert column(table, "time for a simulated second [s]") == pytest.approx([0.006, 0.06, 60.0])
     assert column(table, "remark") == ["diverged", "", "out of time before frame 4"]
-    assert "diverged: MuJoCo Euler" in table.answer.sentence
-    assert table.answer.points == ("20 × 20, 1,000 N/m: MuJoCo Euler by 4 steps, 0.0200 m",)
+    assert "diverged: MuJoCo Euler" in table.summary.sentence
+    assert table.summary.points == ("20 × 20, 1,000 N/m: MuJoCo Euler by 4 steps, 0.0200 m",)
     assert "order of 3.50" in table.measured
 
 
 def test_a_missing_engine_has_a_row_in_both_tables(make):
-    missing = make.record("cloth", "peers/all", "newton", notes={"remark": "not installed"})
+    notes, facts = {"remark": "not installed"}, {"task": "missing"}
+    missing = make.record("cloth", "peers/all", "newton", notes=notes, facts=facts)
     for table in (findings.one_step(Results([missing])), findings.motion(Results([missing]))):
         (row,) = table.rows
         assert row[:2] == ("every cloth", "newton")
@@ -583,13 +583,13 @@ def test_a_missing_engine_has_a_row_in_both_tables(make):
 def test_iterations_that_did_not_suffice_are_said_so(make):
     table = findings.iterations(Results([make.needed("lbfgs", [1, 2, 3, 4] + [np.nan] * 4)]))
     assert table.rows[0][2:10] == (1, 2, 3, 4, None, None, None, None)
-    assert table.answer.points == ("1,000 N/m: L-BFGS more than 100",)
+    assert table.summary.points == ("1,000 N/m: L-BFGS more than 100",)
 
 
 def test_a_limit_is_shown_in_units_of_the_theory(make):
     table = findings.stability(Results([make.bounded("a", 0.02), make.bounded("b", np.nan)]))
     assert column(table, "of 2 / ω") == [pytest.approx(1.0), None]
-    assert table.answer.points == ("a: 1.00 × 2 / ω",)
+    assert table.summary.points == ("a: 1.00 × 2 / ω",)
 
 
 def test_the_published_times_stand_beside_ours(make):
@@ -614,7 +614,7 @@ def test_a_work_precision_diagram_has_a_panel_for_each_cloth_and_a_curve_for_eac
         for solver in ("Plumbob Newton", "MuJoCo Euler")
         for k in (1e2, 1e4)
     ]
-    made = [draw(Results(records)) for draw in figures.FIGURES]
+    made = [draw(Results(records)) for draw in all_figures()]
     drawn = {drawing.name: drawing.svg for drawing in made if drawing}
     for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", "Plumbob Newton", "MuJoCo Euler"):
         assert text in drawn[name]

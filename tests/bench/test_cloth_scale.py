@@ -10,8 +10,8 @@ import pytest
 from bench.experiments import SCALES, blocks
 from bench.experiments.cloth_scale import measurement as suite
 from bench.experiments.cloth_scale import tables as cloth_scale
-from bench.harness.progress import heard_by
-from bench.presentation.sections import Results
+from bench.harness.progress import listening
+from bench.presentation.results import Results
 from reference.implicit_euler.objective import Objective
 
 SMALL = min(suite.SIZES)
@@ -51,7 +51,7 @@ def test_what_is_measured_is_the_work_it_says(ours):
 
 def test_what_it_is_doing_is_told_on_the_way():
     heard = []
-    with heard_by(lambda news: heard.append(news.what)):
+    with listening(lambda progress: heard.append(progress.what)):
         suite.in_its_own_process(SMALL, suite.OURS)
     assert heard[0] == f"cloth/{SMALL}x{SMALL}, supernodal: cloth"
     assert heard[-1].endswith("factor, once more")
@@ -66,11 +66,11 @@ def test_an_interrupt_ends_its_process(monkeypatch):
             super().__init__(*arguments, **settings)
             children.append(self)
 
-    def interrupt(news):
+    def interrupt(progress):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(subprocess, "Popen", Watched)
-    with heard_by(interrupt), pytest.raises(KeyboardInterrupt):
+    with listening(interrupt), pytest.raises(KeyboardInterrupt):
         suite.in_its_own_process(SMALL, suite.OURS)
     assert children[0].wait(10) == -signal.SIGKILL
 
@@ -107,7 +107,7 @@ def test_iterations_are_told_by_particle_and_nonzero(make):
     np.testing.assert_allclose(
         table.rows[0], [10_000, 50, 20, 1000, 2000, 3000, 30, 2, 1e-3], rtol=1e-12
     )
-    assert table.answer.sentence == (
+    assert table.summary.sentence == (
         "With 10,000 particles 10 iterations take 0.300 s, as long as 30.0 solves, and leave a "
         "residual of 0.00100."
     )
@@ -120,10 +120,10 @@ def test_factors_stand_beside_cholmods(make):
         (10_000, "ours", 2.0, 0.5, 10.0, 2.0),
         (10_000, "CHOLMOD (cholespy)", 4.0, None, 20.0, 1.0),
     )
-    assert table.answer.points == ("10,000 particles: factor 0.500, solve 0.500, memory 2.00",)
+    assert table.summary.points == ("10,000 particles: factor 0.500, solve 0.500, memory 2.00",)
 
 
 def test_nothing_measured_is_nothing_said():
     for table in (cloth_scale.iterations(Results([])), cloth_scale.factors(Results([]))):
         assert table.rows == ()
-        assert table.answer.sentence == ""
+        assert table.summary.sentence == ""

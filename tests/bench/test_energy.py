@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from bench.experiments import Scale, blocks
+from bench.experiments.energy import figures
 from bench.experiments.energy import measurement as suite
 from bench.experiments.energy import tables as findings
-from bench.presentation import figures
-from bench.presentation.sections import Results
+from bench.presentation.results import Results
 
 STEPS = 100
 
@@ -48,21 +48,21 @@ def test_blocks_are_listed_without_measuring():
 
 def test_table_and_sentence_follow_the_records(make):
     left = np.linspace(1.0, 0.5, 11)
-    records = [make.swung("RK4", left=left), make.swung("discrete", "swing/damped", left)]
+    records = [make.swung("RK4", left=left), make.swung("discrete", "damped", left)]
     table = findings.energy(Results(records))
     assert [row[:2] for row in table.rows] == [("undamped", "RK4"), ("damped", "discrete")]
     assert table.rows[0][2:5] == (50.0, None, None)
     assert table.rows[0][5:] == (100.0, 50.0)
-    assert table.answer.points == ("RK4: 50.0, never less than 50.0 nor more than 100",)
+    assert table.summary.points == ("RK4: 50.0, never less than 50.0 nor more than 100",)
 
 
 def test_without_a_swing_undamped_nothing_is_said(make):
-    assert findings.energy(Results([make.swung("RK4", "swing/damped")])).answer.sentence == ""
+    assert findings.energy(Results([make.swung("RK4", "damped")])).summary.sentence == ""
 
 
 def test_figure_has_a_panel_for_each_cloth_and_a_line_for_each_integrator(make):
     records = [
-        make.swung(solver, f"swing/{cloth}")
+        make.swung(solver, cloth)
         for cloth in ("undamped", "damped")
         for solver in ("RK4", "discrete")
     ]

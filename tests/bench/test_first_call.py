@@ -12,12 +12,6 @@ from bench.presentation.results import Results
 from reference import IK_SOLVERS, STEP_SOLVERS
 
 
-def measured(make, name, solver, cold, warm=0.3):
-    arrays = {"cold compiled": 2, "cold processor": cold, "cold wall": 2 * cold}
-    arrays |= {"warm compiled": 0, "warm processor": warm, "warm wall": 2 * warm}
-    return make.record("first_call", name, solver, {}, arrays)
-
-
 def test_the_first_process_compiles_and_the_next_one_does_not():
     (block,) = [b for b in blocks("first_call", SCALES["quick"]) if b.solver == suite.OURS]
     arrays = block.measure().arrays
@@ -67,8 +61,8 @@ def test_importing_the_suite_does_not_import_the_compiler():
 
 def test_the_table_gives_both_and_names_the_dearest(make):
     records = [
-        measured(make, "forward_kinematics/skeleton", suite.OURS, 0.6),
-        measured(make, "solve_ik/robot", "ccd", 8.0, warm=0.4),
+        make.first_called("forward_kinematics/skeleton", suite.OURS, 0.6),
+        make.first_called("solve_ik/robot", "ccd", 8.0, warm=0.4),
     ]
     table = first_call.first_calls(Results(records))
     assert [row[:3] for row in table.rows] == [
@@ -76,11 +70,11 @@ def test_the_table_gives_both_and_names_the_dearest(make):
         ("solve_ik, robot", "CCD", 2),
     ]
     assert table.rows[1][3:] == (8.0, 16.0, 0.4, 0.8)
-    assert "solve_ik, robot by CCD, takes 8.00 s" in table.answer.sentence
-    assert "no first call takes more than 0.400 s" in table.answer.sentence
+    assert "solve_ik, robot by CCD, takes 8.00 s" in table.summary.sentence
+    assert "no first call takes more than 0.400 s" in table.summary.sentence
 
 
 def test_without_records_the_table_is_empty():
     table = first_call.first_calls(Results([]))
     assert table.rows == ()
-    assert not table.answer.sentence
+    assert not table.summary.sentence

@@ -11,15 +11,16 @@ import pytest
 
 from bench.experiments import Scale
 from bench.experiments.robots import measurement as robots
-from bench.experiments.robots.evaluate import Targets, Tolerance, judge
+from bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
 from bench.experiments.robots.job import AGAIN, Job, perform
 from bench.experiments.robots.problem import robot
 from bench.harness import stopwatch
-from bench.harness.isolation import Workshop, raised
+from bench.harness.isolation import WorkerProcess, raised
 from bench.harness.worker import Begun, Done, Ready, Solved, Unfit, serve
-from bench.peers.ik import ONE_START, Entry, Peer
-from bench.peers.ik.protocol import Answer
+from bench.peers import registry
+from bench.peers.ik.protocol import SolverOutput
 from bench.peers.ik.restarts import restarted
+from bench.peers.registry import ONE_START, Entry, Peer
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4
@@ -29,7 +30,7 @@ COUNT = 4
 FAKES = """
 import os, sys, time
 import numpy as np
-from bench.peers.ik.protocol import Answer, UnableError
+from bench.peers.ik.protocol import SolverOutput, UnableError
 
 def prepare(robot, tolerance, manner="perfect", at=2):
     if manner == "unable":
@@ -47,15 +48,15 @@ def prepare(robot, tolerance, manner="perfect", at=2):
                 print("noise", flush=True)
                 os.write(1, b"more noise")
             if manner == "shapeless":
-                return Answer(start[:2], True)
+                return SolverOutput(start[:2], True)
             if manner == "none":
-                return Answer(None, False)
+                return SolverOutput(None, False)
             if manner == "liar":
-                return Answer(start + 0.1, True)
+                return SolverOutput(start + 0.1, True)
             if manner == "beyond":
-                return Answer(start + 2 * np.pi, True)
+                return SolverOutput(start + 2 * np.pi, True)
             if manner == "silent":
-                return Answer(start, None)
+                return SolverOutput(start, None)
             if number == at:
                 if manner == "hangs":
                     time.sleep(600)
@@ -65,7 +66,7 @@ def prepare(robot, tolerance, manner="perfect", at=2):
                     raise ArithmeticError("on\\none target")
                 if manner == "slow":
                     time.sleep(0.3)
-            return Answer(start, True)
+            return SolverOutput(start, True)
         return solve
     return ask
 """
@@ -84,19 +85,19 @@ def fakes(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def shop(fakes):
-    """A workshop that loses patience with a target after half a second."""
-    shop = Workshop(start_patience=60.0, target_patience=0.5)
-    yield shop
-    shop.close()
+def worker(fakes):
+    """A worker process that loses patience with a target after half a second."""
+    worker = WorkerProcess(start_patience=60.0, target_patience=0.5)
+    yield worker
+    worker.close()
 
 
 @pytest.fixture
 def targets(rng):
     """Targets that their starts solve."""
-    mind = judge("iiwa14")
-    q = 0.9 * mind.robot.draw(rng, COUNT)
-    return Targets(*mind.forward(q), q, np.zeros(COUNT, dtype=int))
+    evaluator = evaluator_of("iiwa14")
+    q = 0.9 * evaluator.robot.draw(rng, COUNT)
+    return Targets(*evaluator.forward(q), q, np.zeros(COUNT, dtype=int))
 
 
 def job(targets, manner, restarts=0, budget=60.0, **settings):
@@ -108,11 +109,11 @@ def job(targets, manner, restarts=0, budget=60.0, **settings):
 
 def verdict(targets, solved):
     answers = np.array([one.q for one in solved])
-    return judge("iiwa14").judge(targets, answers, TOLERANCE)
+    return evaluator_of("iiwa14").evaluate(targets, answers, TOLERANCE)
 
 
-def test_a_perfect_solver_is_found_perfect_in_its_own_process(shop, targets):
-    outcome = shop.perform(job(targets, "perfect"))
+def test_a_perfect_solver_is_found_perfect_in_its_own_process(worker, targets):
+    outcome = worker.perform(job(targets, "perfect"))
     assert outcome.trouble == ""
     assert not outcome.lost
     assert [one.claimed for one in outcome.solved] == [1] * COUNT
@@ -122,13 +123,13 @@ def test_a_perfect_solver_is_found_perfect_in_its_own_process(shop, targets):
 
 
 @pytest.mark.parametrize("manner", ["hangs", "crashes"])
-def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(shop, targets, manner):
-    outcome = shop.perform(job(targets, manner))
+def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(worker, targets, manner):
+    outcome = worker.perform(job(targets, manner))
     assert len(outcome.solved) == 2
     assert outcome.lost
     reason = {"hangs": "ended after 0.5 s of silence", "crashes": "its process ended with code 3"}
     assert outcome.trouble == reason[manner]
-    again = shop.perform(job(targets, "perfect"))
+    again = worker.perform(job(targets, "perfect"))
     assert len(again.solved) == COUNT
     assert again.trouble == ""
 
@@ -170,8 +171,8 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
     assert each == [1, 1 + AGAIN, 1, 1 + AGAIN]
 
 
-def test_what_a_solver_prints_does_not_disturb_its_results(shop, targets):
-    outcome = shop.perform(job(targets, "prints"))
+def test_what_a_solver_prints_does_not_disturb_its_results(worker, targets):
+    outcome = worker.perform(job(targets, "prints"))
     assert len(outcome.solved) == COUNT
     assert outcome.trouble == ""
 
@@ -209,11 +210,11 @@ def test_one_that_cannot_be_set_up_says_why(targets, manner, why):
 def test_what_is_claimed_and_what_is_so_are_kept_apart(targets, manner, claimed):
     solved = [m for m in messages(targets, manner) if isinstance(m, Solved)]
     assert {one.claimed for one in solved} == {claimed}
-    judgement = verdict(targets, solved)
-    assert judgement.solved.all() == (manner == "silent")
+    evaluation = verdict(targets, solved)
+    assert evaluation.solved.all() == (manner == "silent")
     if manner == "beyond":
-        assert judgement.position.max() < 1e-12
-        assert judgement.beyond.min() > 1
+        assert evaluation.position.max() < 1e-12
+        assert evaluation.beyond.min() > 1
 
 
 def test_an_answer_of_another_shape_is_none(targets):
@@ -238,11 +239,11 @@ class Attempts:
         return lambda: self.answers.pop(0)
 
 
-@pytest.mark.parametrize("end", [Answer(np.zeros(7), True), Answer(np.zeros(7), None)])
+@pytest.mark.parametrize("end", [SolverOutput(np.zeros(7), True), SolverOutput(np.zeros(7), None)])
 def test_restarts_end_with_the_first_claim_within_the_limits(end):
     """Neither an answer that is not claimed nor one that is beyond the limits ends them."""
-    beyond, nothing = Answer(np.full(7, 9.0), True), Answer(None, False)
-    attempts = Attempts(beyond, nothing, end, Answer(np.ones(7), True))
+    beyond, nothing = SolverOutput(np.full(7, 9.0), True), SolverOutput(None, False)
+    attempts = Attempts(beyond, nothing, end, SolverOutput(np.ones(7), True))
     answer = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))()
     assert (answer.q == (0.0 if end.claimed else 1.0)).all()
     assert len(attempts.starts) == (3 if end.claimed else 4)
@@ -251,7 +252,7 @@ def test_restarts_end_with_the_first_claim_within_the_limits(end):
 
 
 def test_restarts_that_all_fail_claim_nothing():
-    attempts = Attempts(*[Answer(np.full(7, 9.0), True)] * 3)
+    attempts = Attempts(*[SolverOutput(np.full(7, 9.0), True)] * 3)
     assert restarted(attempts, robot("iiwa14"), 2)(None, None, np.zeros(7))().claimed is False
 
 
@@ -272,7 +273,7 @@ def test_a_worker_serves_job_after_job(targets):
 
 
 @pytest.fixture
-def suite(monkeypatch, shop):
+def suite(monkeypatch, worker):
     """The suite with fakes for peers, on the iiwa and the character alone."""
 
     def peer(title, package="numpy", **settings):
@@ -284,9 +285,9 @@ def suite(monkeypatch, shop):
         peer("gone", package="a-package-that-nobody-has"),
         peer("unable", manner="unable"),
     ]
-    monkeypatch.setattr(robots, "PEERS", peers)
+    monkeypatch.setattr(registry, "PEERS", peers)
     monkeypatch.setattr(robots, "ROBOTS", ("iiwa14",))
-    monkeypatch.setattr(robots, "workshop", lambda: shop)
+    monkeypatch.setattr(robots, "worker_process", lambda: worker)
     blocks = {(b.solver, b.problem): b for b in robots.blocks(Scale(targets=3, seconds=10.0))}
     return SimpleNamespace(blocks=blocks)
 
@@ -294,23 +295,23 @@ def suite(monkeypatch, shop):
 def test_a_missing_peer_costs_one_block_that_says_so(suite):
     assert ("gone", "robots/all") in suite.blocks
     assert sum(solver == "gone" for solver, _ in suite.blocks) == 1
-    arrays, notes = suite.blocks["gone", "robots/all"].measure()
+    arrays, notes, _ = suite.blocks["gone", "robots/all"].measure()
     assert not arrays
     assert notes["remark"] == "a-package-that-nobody-has is not installed"
 
 
 def test_every_manner_becomes_one_record(suite):
-    arrays, notes = suite.blocks["liar", "robots/iiwa14"].measure()
+    arrays, notes, _ = suite.blocks["liar", "robots/iiwa14"].measure()
     assert arrays["claimed"].tolist() == [1] * 6
     assert not arrays["solved"].any()
     assert notes["remark"] == ""
-    arrays, notes = suite.blocks["unable", "robots/iiwa14"].measure()
+    arrays, notes, _ = suite.blocks["unable", "robots/iiwa14"].measure()
     assert "solved" not in arrays
     assert notes["remark"] == "takes no iiwas"
 
 
 def test_the_target_that_a_solver_hangs_on_counts_as_failed_with_the_time_it_took(suite):
-    arrays, notes = suite.blocks["hangs", "robots/iiwa14"].measure()
+    arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
     assert len(arrays["solved"]) == 2
     assert not arrays["solved"][1]
     assert arrays["seconds"][1] == 0.5

@@ -6,7 +6,7 @@ import pytest
 from bench.experiments import SCALES, Scale, blocks
 from bench.experiments.newton import measurement as suite
 from bench.experiments.newton import tables as findings
-from bench.presentation.sections import Results
+from bench.presentation.results import Results
 from reference import STEP_SOLVERS
 
 SIZE = 6
@@ -101,8 +101,8 @@ def test_table_and_sentence_follow_the_records(make, stiff):
     assert [row[bound] == "yes" for row in table.rows] == [True, True, False, True]
     assert table.rows[2][columns.index("a minimiser within")] is None
     assert table.rows[0][0] == 1e5
-    assert "in 1 of 1 cloth." in table.answer.sentence
-    assert "3 answers, 2 are proven" in table.answer.sentence
+    assert "in 1 of 1 cloth." in table.summary.sentence
+    assert "3 answers, 2 are proven" in table.summary.sentence
 
 
 def test_another_minimiser_and_a_newton_that_fails_are_said(make, stiff):
@@ -110,8 +110,8 @@ def test_another_minimiser_and_a_newton_that_fails_are_said(make, stiff):
     failed = stored(make, which, measured, residual=1.0, at_floor=False, same=False, different=True)
     table = findings.certified(Results([failed]))
     assert table.rows[0][-1] == "no"
-    assert "in 0 of 1 cloth." in table.answer.sentence
+    assert "in 0 of 1 cloth." in table.summary.sentence
 
 
 def test_without_records_nothing_is_said():
-    assert findings.certified(Results([])).answer.sentence == ""
+    assert findings.certified(Results([])).summary.sentence == ""

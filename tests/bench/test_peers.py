@@ -1,4 +1,4 @@
-"""The adapters: each engine, where it is installed, finds poses that the judge accepts."""
+"""The adapters: each engine, where it is installed, finds poses that are evaluated as solved."""
 
 import importlib
 import importlib.metadata
@@ -6,13 +6,13 @@ import importlib.metadata
 import numpy as np
 import pytest
 
-from bench.experiments.robots.evaluate import Targets, Tolerance, judge
+from bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
 from bench.experiments.robots.job import Job, perform
 from bench.experiments.robots.problem import CHARACTER, is_installed, robot
 from bench.experiments.robots.targets import robot_targets, uniform_targets, unreachable_targets
 from bench.harness.worker import Solved
-from bench.peers.ik import ONE_START, OURS, PEERS, RESTARTS
 from bench.peers.ik.protocol import UnableError
+from bench.peers.registry import ONE_START, OURS, PEERS, RESTARTS
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several tips.
@@ -33,13 +33,13 @@ def module(peer):
 
 
 def answers(peer, entry, name, targets, tolerance=TOLERANCE):
-    """What a peer says of targets, and the judge's verdict."""
+    """What a peer says of targets, and the evaluation."""
     job = Job(peer.module, robot(name), targets, tolerance, entry.settings, entry.restarts, 60.0)
     said = list(perform(job))
     solved = [message for message in said if isinstance(message, Solved)]
     assert solved, said
     q = np.array([one.q for one in solved])
-    return solved, judge(name).judge(targets, q, tolerance)
+    return solved, evaluator_of(name).evaluate(targets, q, tolerance)
 
 
 def first_six(targets):
@@ -58,9 +58,11 @@ def arm(peer):
 
 def test_from_a_start_beside_the_solution_a_peer_finds_it(peer, arm, rng):
     """The start is a tenth of a radian away: no local minimum lies between."""
-    mind = judge(arm)
-    q = 0.7 * mind.robot.draw(rng, FEW)
-    targets = Targets(*mind.forward(q), q + rng.uniform(-0.1, 0.1, q.shape), np.zeros(FEW, int))
+    evaluator = evaluator_of(arm)
+    q = 0.7 * evaluator.robot.draw(rng, FEW)
+    targets = Targets(
+        *evaluator.forward(q), q + rng.uniform(-0.1, 0.1, q.shape), np.zeros(FEW, int)
+    )
     solved, verdict = answers(peer, peer.entries[0], arm, targets)
     assert verdict.solved.all()
     assert all(one.claimed in (1, -1) for one in solved)

@@ -48,6 +48,21 @@ def test_a_line_is_standard_json_whatever_the_numbers():
     json.loads(line, parse_constant=refuse)
 
 
+def test_facts_come_back_as_they_are():
+    facts = {"title": "arm, circle", "joints": 7, "damping": 0.0, "closed": True, "strata": ["a"]}
+    assert decode(encode(Record("s", "p", "v", facts={**facts, "none": None}))).facts == {
+        **facts, "none": None,
+    }  # fmt: skip
+
+
+def test_a_record_of_the_format_before_has_no_facts():
+    content = json.loads(encode(block()))
+    del content["facts"]
+    old = decode(json.dumps({**content, "format": 1}))
+    assert old.facts == {}
+    assert old.title == "arm/circle"
+
+
 def test_what_is_no_number_is_refused():
     with pytest.raises(ValueError, match="expected numbers"):
         encode(Record("s", "p", "v", arrays={"x": np.array(["one"])}))
@@ -124,13 +139,13 @@ WRONG = {
     **dict.fromkeys([("size",), ("seconds",)], NUMBER),
     ("stamp", "machine", "cores"): ("1", 1.5, True, []),
     ("stamp", "machine", "memory_gib"): ("1", True, []),
-    **dict.fromkeys([("settings",), ("arrays",), ("notes",), ("stamp",)], MAP),
+    **dict.fromkeys([("settings",), ("arrays",), ("notes",), ("stamp",), ("facts",)], MAP),
     **dict.fromkeys([("stamp", "machine"), ("stamp", "versions")], MAP),
     ("settings", "tolerance"): ([], {}, [1.0]),
     ("arrays", "residual"): NO_NUMBERS,
-    ("format",): (None, 0, 2, 99, "1", True, [], 1.5),
+    ("format",): (None, 0, 3, 99, "1", True, [], 1.5),
 }
-FIELDS = [path for path in WRONG if len(path) == 1]
+FIELDS = [path for path in WRONG if len(path) == 1 and path != ("facts",)]
 DAMAGED = {
     **{f"{'.'.join(path)}={value!r}": changed(path, value)
        for path, values in WRONG.items() for value in values},

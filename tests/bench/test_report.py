@@ -11,7 +11,7 @@ import pytest
 
 from bench.harness.record import RecordFile
 from bench.presentation import report
-from bench.presentation.sections import SECTIONS
+from bench.presentation.results import Results, plain
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -99,8 +99,8 @@ def test_tables_in_three_formats_and_figures_lie_beside_it(whole):
         for suffix in ("md", "tex", "csv"):
             assert (folder / "tables" / f"{table.name}.{suffix}").stat().st_size > 0
     drawn = {path.stem for path in (folder / "figures").iterdir()}
-    wanted = {name for section in SECTIONS for entry in section.entries for name in entry.drawings}
-    assert drawn == wanted
+    results = Results([plain(record) for record in RecordFile(folder).read().records])
+    assert drawn == {draw(results).name for draw in report.all_figures()}
     assert "<svg" in (folder / "figures" / "jitter.svg").read_text()
 
 
@@ -108,7 +108,7 @@ def test_every_table_and_figure_stands_in_the_page(whole):
     result, page = whole
     text = "".join(page.text)
     assert all(table.rows and table.title in text for table in result.tables)
-    wanted = sum(len(entry.drawings) for section in SECTIONS for entry in section.entries)
+    wanted = len(report.all_figures())
     assert text.count("Not measured yet") == 0
     assert result.page.read_text().count("<figure>") == wanted
 
@@ -207,7 +207,7 @@ def hostile_report(folder, records, field, names):
     return written(folder, [*records, *bad])
 
 
-@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp"])
+@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp", "facts"])
 def test_hostile_names_are_data_in_every_file(tmp_path, records, field):
     few = [r for i, r in enumerate(records) if field == "solver" or i % 3 == 0]
     result, page = hostile_report(tmp_path, few, field, HOSTILE)
@@ -217,7 +217,7 @@ def test_hostile_names_are_data_in_every_file(tmp_path, records, field):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp"])
+@pytest.mark.parametrize("field", ["solver", "problem", "notes", "settings", "stamp", "facts"])
 @pytest.mark.parametrize("name", HOSTILE, ids=[ascii(name)[:20] for name in HOSTILE])
 def test_each_hostile_name_is_data_everywhere(tmp_path, records, field, name):
     hostile_report(tmp_path, records, field, [name])
@@ -239,6 +239,9 @@ SPOILT = {
     "no arrays": lambda r: replace(r, arrays={}),
     "no notes": lambda r: replace(r, notes={}),
     "no settings": lambda r: replace(r, settings={}),
+    "no facts": lambda r: replace(r, facts={}),
+    "facts of other kinds": lambda r: replace(r, facts={name: ["x"] for name in r.facts}),
+    "titles of other kinds": lambda r: replace(r, facts={**r.facts, "title": None}),
     "settings of other kinds": lambda r: replace(r, settings=dict.fromkeys(r.settings, "x")),
     "arrays of other shapes": lambda r: replace(
         r, arrays={name: values[..., None, None] for name, values in r.arrays.items()}
@@ -257,7 +260,7 @@ SPOILT = {
 def drawn(request, monkeypatch):
     """Without and with figures, which take long to draw."""
     if request.param == "tables":
-        monkeypatch.setattr(report, "DRAWINGS", ())
+        monkeypatch.setattr(report, "all_figures", list)
 
 
 @pytest.mark.parametrize("how", SPOILT)

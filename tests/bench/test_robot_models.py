@@ -4,7 +4,7 @@ import pytest
 
 from bench.experiments.robot_models.measurement import compare
 from bench.experiments.robot_models.tables import agreement
-from bench.presentation.sections import Results
+from bench.presentation.results import Results
 from crosscheck.engines import ROBOT_ENGINES
 from crosscheck.robots.models import Model
 
@@ -28,7 +28,7 @@ def compared(make, tmp_path):
         return [
             make.record(
                 "robot_models", f"robots/{name}", engine, {"configurations": 5},
-                measured.arrays, notes=dict(measured.notes),
+                measured.arrays, notes=dict(measured.notes), facts={"title": name},
             )
             for engine in ROBOT_ENGINES
             for measured in [compare(engine, Model(name, path))]
@@ -47,7 +47,7 @@ def test_a_file_that_both_read_is_a_row_with_its_size_and_differences(compared):
     assert table.rows[0][:4] == ("arm.urdf", 3, 2, 1)
     assert 0.0 < column(table, "Jacobians")[0] < 1e-14
     assert table.rows[0][-2:] == ("Pinocchio and MuJoCo", "")
-    assert table.answer.points == ("Pinocchio: 1 of 1 file read", "MuJoCo: 1 of 1 file read")
+    assert table.summary.points == ("Pinocchio: 1 of 1 file read", "MuJoCo: 1 of 1 file read")
 
 
 def test_a_file_that_none_reads_says_why_and_no_path(compared, tmp_path):
@@ -57,7 +57,7 @@ def test_a_file_that_none_reads_says_why_and_no_path(compared, tmp_path):
     assert why.count("does not read it") == 2
     assert str(tmp_path) not in why
     assert table.rows[0][1] is None
-    assert table.answer.sentence == ""
+    assert table.summary.sentence == ""
 
 
 def test_mimic_joints_left_free_are_told(compared, tmp_path):
@@ -73,7 +73,7 @@ def test_an_engine_with_a_known_cause_is_left_out_of_the_numbers(compared):
     pinocchio.notes["cause"] = "something is not read"
     pinocchio.arrays["positions"][...] = 0.25
     table = agreement(Results([pinocchio, mujoco]))
-    assert column(table, "positions, of the room")[0] < 1e-14
+    assert column(table, "positions, of the extent")[0] < 1e-14
     assert column(table, "engines") == ["MuJoCo"]
     assert column(table, "but") == ["Pinocchio is off by 0.250: something is not read"]
-    assert table.answer.points[0].endswith("1 of them otherwise than MuJoCo's documentation says")
+    assert table.summary.points[0].endswith("1 of them otherwise than MuJoCo's documentation says")

@@ -9,7 +9,7 @@ from bench.experiments.robots.evaluate import (
     Targets,
     Tolerance,
     angle_between,
-    judge,
+    evaluator_of,
 )
 from bench.experiments.robots.problem import ALL, CHARACTER, AbsentError, is_installed, links, robot
 from bench.experiments.robots.targets import (
@@ -38,7 +38,7 @@ def name(request):
 
 
 def test_the_limits_and_joints_are_those_that_the_judge_reads(name):
-    known, model = robot(name), judge(name).model
+    known, model = robot(name), evaluator_of(name).model
     hinges = model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)
     finite = np.isfinite(known.lower)
     np.testing.assert_array_equal(known.lower[finite], model.jnt_range[hinges, 0])
@@ -61,7 +61,7 @@ def test_the_chain_of_links_is_the_judges_kinematics(name, rng):
         if axis is not None:
             T[:3, :3] = T[:3, :3] @ rotation.to_matrix(rotation.exponential(q[joint] * axis))
             joint += 1
-    positions, rotations = judge(name).forward(q)
+    positions, rotations = evaluator_of(name).forward(q)
     np.testing.assert_allclose(T[:3, 3], positions[0], atol=1e-14)
     np.testing.assert_allclose(T[:3, :3], rotations[0], atol=1e-14)
 
@@ -98,27 +98,29 @@ def test_targets_are_the_same_every_time_and_every_stratum_has_as_many(name):
 
 
 def test_starts_are_within_the_limits_and_not_at_the_target(name):
-    mind = judge(name)
+    evaluator = evaluator_of(name)
     for targets in (robot_targets(name, COUNT), unreachable_targets(name, COUNT)):
-        assert (targets.starts >= mind.robot.lower).all()
-        assert (targets.starts <= mind.robot.upper).all()
-        assert not mind.judge(targets, targets.starts, TOLERANCE).solved.any()
-        for at in mind.robot.balls:
+        assert (targets.starts >= evaluator.robot.lower).all()
+        assert (targets.starts <= evaluator.robot.upper).all()
+        assert not evaluator.evaluate(targets, targets.starts, TOLERANCE).solved.any()
+        for at in evaluator.robot.balls:
             lengths = np.linalg.norm(targets.starts[:, at : at + 4], axis=-1)
             np.testing.assert_allclose(lengths, 1.0, atol=1e-14)
 
 
 @pytest.fixture
 def poses(name):
-    """The judge, and sixty poses in each stratum."""
-    return judge(name), stratum_poses(judge(name), np.random.default_rng(4), 60)
+    """The evaluator, and sixty poses in each stratum."""
+    return evaluator_of(name), stratum_poses(evaluator_of(name), np.random.default_rng(4), 60)
 
 
 def test_the_shell_is_far_and_the_root_near(poses):
     """Their medians are beyond the last and the first fifth of the uniform poses."""
-    mind, q = poses
+    evaluator, q = poses
     distance = {
-        stratum: np.linalg.norm(mind.forward(q[stratum])[0] - root(mind), axis=-1).max(axis=-1)
+        stratum: np.linalg.norm(evaluator.forward(q[stratum])[0] - root(evaluator), axis=-1).max(
+            axis=-1
+        )
         for stratum in ("joint space", "outer shell", "near the root")
     }
     near, far = np.quantile(distance["joint space"], [0.2, 0.8])
@@ -127,15 +129,15 @@ def test_the_shell_is_far_and_the_root_near(poses):
 
 
 def test_near_singular_is_near_singular(poses):
-    mind, q = poses
-    usual, near = (least_singular_values(mind, q[s]) for s in ("joint space", "near singular"))
+    evaluator, q = poses
+    usual, near = (least_singular_values(evaluator, q[s]) for s in ("joint space", "near singular"))
     assert np.median(near) < np.quantile(usual, 0.2)
     assert near.min() >= 0
 
 
 def test_at_a_limit_one_joint_is_at_it_and_none_beyond(poses):
-    mind, q = poses
-    at = (q["at a limit"] == mind.robot.lower) | (q["at a limit"] == mind.robot.upper)
+    evaluator, q = poses
+    at = (q["at a limit"] == evaluator.robot.lower) | (q["at a limit"] == evaluator.robot.upper)
     assert (at.sum(axis=-1) == 1).all()
     assert at.any(axis=0).sum() > 1
 
@@ -150,18 +152,20 @@ def test_a_crowd_of_tips_is_thinned_out(rng):
 
 
 def test_poses_are_within_the_limits(poses):
-    mind, q = poses
+    evaluator, q = poses
     for stratum in STRATA:
-        assert (q[stratum] >= mind.robot.lower).all()
-        assert (q[stratum] <= mind.robot.upper).all()
+        assert (q[stratum] >= evaluator.robot.lower).all()
+        assert (q[stratum] <= evaluator.robot.upper).all()
 
 
 def test_nothing_reaches_farther_than_all_links_in_a_row(name, rng):
-    mind = judge(name)
-    tips, _ = mind.forward(mind.robot.draw(rng, 300))
-    assert np.linalg.norm(tips - root(mind), axis=-1).max() <= farthest(mind) * (1 + 1e-12)
-    away = np.linalg.norm(unreachable_targets(name, COUNT).positions - root(mind), axis=-1)
-    assert (away >= 1.05 * farthest(mind) * (1 - 1e-12)).all()
+    evaluator = evaluator_of(name)
+    tips, _ = evaluator.forward(evaluator.robot.draw(rng, 300))
+    assert np.linalg.norm(tips - root(evaluator), axis=-1).max() <= farthest(evaluator) * (
+        1 + 1e-12
+    )
+    away = np.linalg.norm(unreachable_targets(name, COUNT).positions - root(evaluator), axis=-1)
+    assert (away >= 1.05 * farthest(evaluator) * (1 - 1e-12)).all()
 
 
 def test_from_the_middle_means_the_middle():
@@ -172,57 +176,61 @@ def test_from_the_middle_means_the_middle():
 
 @pytest.fixture
 def asked(rng):
-    """The iiwa's judge, and targets whose solutions are known."""
-    mind = judge("iiwa14")
-    q = 0.9 * mind.robot.draw(rng, 5)
-    return mind, q, Targets(*mind.forward(q), mind.robot.draw(rng, 5), np.zeros(5, dtype=int))
+    """The iiwa's evaluator, and targets whose solutions are known."""
+    evaluator = evaluator_of("iiwa14")
+    q = 0.9 * evaluator.robot.draw(rng, 5)
+    return (
+        evaluator,
+        q,
+        Targets(*evaluator.forward(q), evaluator.robot.draw(rng, 5), np.zeros(5, dtype=int)),
+    )
 
 
 def test_the_judge_accepts_the_pose_that_made_the_target(asked):
-    mind, q, targets = asked
-    judgement = mind.judge(targets, q, Tolerance(1e-12, 1e-7))
-    assert judgement.solved.all()
-    assert not judgement.beyond.any()
+    evaluator, q, targets = asked
+    evaluation = evaluator.evaluate(targets, q, Tolerance(1e-12, 1e-7))
+    assert evaluation.solved.all()
+    assert not evaluation.beyond.any()
 
 
 def test_the_judge_denies_whole_turns_beyond_the_limits_however_exact(asked):
-    mind, q, targets = asked
-    judgement = mind.judge(targets, q + 2.0 * np.pi, TOLERANCE)
-    assert judgement.position.max() < 1e-12
-    assert (judgement.beyond > 1.0).all()
-    assert not judgement.solved.any()
+    evaluator, q, targets = asked
+    evaluation = evaluator.evaluate(targets, q + 2.0 * np.pi, TOLERANCE)
+    assert evaluation.position.max() < 1e-12
+    assert (evaluation.beyond > 1.0).all()
+    assert not evaluation.solved.any()
 
 
 @pytest.mark.parametrize(("over", "kept"), [(0.5, True), (2.0, False)])
 def test_the_judge_lets_a_limit_be_passed_by_no_more_than_its_tolerance(asked, over, kept):
-    mind, q, targets = asked
-    q[:, 3] = mind.robot.upper[3] + over * LIMIT_TOLERANCE
+    evaluator, q, targets = asked
+    q[:, 3] = evaluator.robot.upper[3] + over * LIMIT_TOLERANCE
     targets = targets._replace(
-        **dict(zip(("positions", "rotations"), mind.forward(q), strict=True))
+        **dict(zip(("positions", "rotations"), evaluator.forward(q), strict=True))
     )
-    assert mind.judge(targets, q, TOLERANCE).solved.all() == kept
+    assert evaluator.evaluate(targets, q, TOLERANCE).solved.all() == kept
 
 
 def test_the_judge_denies_a_tip_in_the_right_place_but_turned(asked):
-    mind, q, targets = asked
+    evaluator, q, targets = asked
     q[:, 6] += 0.01  # the last hinge of the iiwa turns about the flange's own axis
-    judgement = mind.judge(targets, q, TOLERANCE)
-    assert judgement.position.max() < 1e-12
-    np.testing.assert_allclose(judgement.rotation, 0.01, rtol=1e-9)
-    assert not judgement.solved.any()
+    evaluation = evaluator.evaluate(targets, q, TOLERANCE)
+    assert evaluation.position.max() < 1e-12
+    np.testing.assert_allclose(evaluation.rotation, 0.01, rtol=1e-9)
+    assert not evaluation.solved.any()
 
 
 def test_no_answer_is_no_solution_and_costs_no_other(asked):
-    mind, q, targets = asked
+    evaluator, q, targets = asked
     q[1] = np.nan
-    judgement = mind.judge(targets, q, TOLERANCE)
-    assert judgement.solved.tolist() == [True, False, True, True, True]
-    assert np.isnan(judgement.position[1])
+    evaluation = evaluator.evaluate(targets, q, TOLERANCE)
+    assert evaluation.solved.tolist() == [True, False, True, True, True]
+    assert np.isnan(evaluation.position[1])
 
 
 def test_the_first_answers_are_judged_by_the_first_targets(asked):
-    mind, q, targets = asked
-    assert mind.judge(targets, q[:2], TOLERANCE).solved.tolist() == [True, True]
+    evaluator, q, targets = asked
+    assert evaluator.evaluate(targets, q[:2], TOLERANCE).solved.tolist() == [True, True]
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.1, 3.0, np.pi])

@@ -118,11 +118,3 @@ def test_a_suite_is_finished_only_when_it_went_through(suite, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         go(tmp_path)
     assert not any(r.suite == "finished" for r in RecordFile(tmp_path).read().records)
-
-
-def test_timing_that_crashed_is_not_finished(monkeypatch, tmp_path):
-    crashed = run.Event(run.FAILED, run.TIMING, "pytest-benchmark", "killed")
-    monkeypatch.setattr(run, "_relay", lambda arguments: iter([crashed]))
-    events = list(run.run([run.TIMING], "quick", tmp_path))
-    assert events == [crashed]
-    assert RecordFile(tmp_path).read().records == []

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bench.harness.metrics import Share, share
 from bench.presentation import tables
-from bench.presentation.tables import Answer, Column, Table, words
+from bench.presentation.tables import Column, Summary, Table, words
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
 
@@ -95,7 +95,7 @@ def test_a_latex_row_is_no_option_of_the_row_before(name):
 
 @pytest.mark.parametrize("name", ["- x", "+ x", "1. x", "1) x", "= x", "$x$"])
 def test_a_point_in_markdown_begins_no_list_or_formula(name):
-    answered = Table("t", "T", (Column("a"),), ((1,),), answer=Answer(name, (name,)))
+    answered = Table("t", "T", (Column("a"),), ((1,),), summary=Summary(name, (name,)))
     lines = tables.markdown(answered).splitlines()
     assert not any(re.match(r"(- )?([-+=$]|\d[.)]) ?x", line) for line in lines)
 
@@ -139,7 +139,7 @@ def test_csv_keeps_all_digits_and_any_text():
 
 
 def test_an_answer_stands_in_markdown_with_its_points():
-    answered = Table("t", "T", (Column("a"),), ((1,),), answer=Answer("Thus:", ("x", "y")))
+    answered = Table("t", "T", (Column("a"),), ((1,),), summary=Summary("Thus:", ("x", "y")))
     assert "Thus:\n\n- x\n- y\n" in tables.markdown(answered)
 
 

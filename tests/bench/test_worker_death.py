@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bench.harness import isolation
-from bench.harness.isolation import Workshop
+from bench.harness.isolation import WorkerProcess
 from bench.harness.worker import Ready
 
 ROOT = Path(isolation.__file__).parent.parent
@@ -129,14 +129,14 @@ def jobs(tmp_path_factory):
 
 
 @pytest.fixture
-def shop(jobs):
-    shop = Workshop(start_patience=PATIENCE, target_patience=0.3)
-    yield shop
-    shop.close()
+def worker(jobs):
+    worker = WorkerProcess(start_patience=PATIENCE, target_patience=0.3)
+    yield worker
+    worker.close()
 
 
-def pid(shop):
-    return shop._worker._process.pid
+def pid(worker):
+    return worker._worker._process.pid
 
 
 def is_gone(process):
@@ -147,8 +147,8 @@ def is_gone(process):
         return True
 
 
-def assert_works(shop, jobs):
-    outcome = shop.perform(jobs.Dying("leave", "never"))
+def assert_works(worker, jobs):
+    outcome = worker.perform(jobs.Dying("leave", "never"))
     assert (outcome.trouble, len(outcome.solved), outcome.setup) == ("", 2, 0.5)
 
 
@@ -166,30 +166,30 @@ FEW |= {("stranger", "preparing"), ("close", "preparing")}
         if both not in WITHIN
     ],
 )
-def test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job(shop, jobs, manner, moment):
+def test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job(worker, jobs, manner, moment):
     if (manner, moment) == ("raises", "reading"):  # that is an answer
-        assert shop.perform(jobs.Dying(manner, moment)).trouble == "SystemError: from within"
+        assert worker.perform(jobs.Dying(manner, moment)).trouble == "SystemError: from within"
         return
     with pytest.MonkeyPatch.context() as patch:
-        assert_works(shop, jobs)
-        before = pid(shop)
+        assert_works(worker, jobs)
+        before = pid(worker)
         seen = []
         end = isolation._Worker.end
         patch.setattr(isolation._Worker, "end", lambda w: (seen.append(w._process.pid), end(w)))
-        outcome = shop.perform(jobs.Dying(manner, moment))
+        outcome = worker.perform(jobs.Dying(manner, moment))
     assert re.fullmatch(SAYS[manner], outcome.trouble)
     assert len(outcome.solved) == MOMENTS[moment]
     assert outcome.lost == (MOMENTS[moment] > 0)
     assert before in seen
     assert all(is_gone(process) for process in seen)
-    assert_works(shop, jobs)
+    assert_works(worker, jobs)
 
 
 @pytest.mark.parametrize("manner", ["leave", "kill", "close", "stop", "rubbish"])
-def test_a_death_after_the_last_message_costs_nothing(shop, jobs, manner):
-    outcome = shop.perform(jobs.Dying(manner, "after the last"))
+def test_a_death_after_the_last_message_costs_nothing(worker, jobs, manner):
+    outcome = worker.perform(jobs.Dying(manner, "after the last"))
     assert (outcome.trouble, len(outcome.solved)) == ("", 2)
-    assert_works(shop, jobs)
+    assert_works(worker, jobs)
 
 
 STARTS = {
@@ -203,23 +203,23 @@ STARTS = {
 
 @pytest.mark.parametrize("load", [0, LARGE])
 @pytest.mark.parametrize("start", STARTS)
-def test_a_death_before_the_job_is_read_is_a_sentence(shop, jobs, monkeypatch, start, load):
+def test_a_death_before_the_job_is_read_is_a_sentence(worker, jobs, monkeypatch, start, load):
     """A large job does not fit into what the system keeps for a reader."""
     monkeypatch.setattr(isolation, "_START", start)
-    outcome = shop.perform(jobs.Dying("leave", "never", load))
+    outcome = worker.perform(jobs.Dying("leave", "never", load))
     assert re.fullmatch(STARTS[start], outcome.trouble)
     assert (outcome.solved, outcome.lost) == ([], False)
     monkeypatch.undo()
-    assert_works(shop, jobs)
+    assert_works(worker, jobs)
 
 
 @pytest.mark.parametrize("how", ["close", "interrupt", "silence"])
 def test_nothing_is_left_running_not_even_what_a_solver_started(jobs, tmp_path, how):
-    shop, path = Workshop(5.0, 0.3 if how == "silence" else 60.0), tmp_path / "processes"
+    worker, path = WorkerProcess(5.0, 0.3 if how == "silence" else 60.0), tmp_path / "processes"
     if how == "silence":
-        assert "silence" in shop.perform(jobs.WithChild(path)).trouble
+        assert "silence" in worker.perform(jobs.WithChild(path)).trouble
     else:
-        messages = shop.stream(jobs.WithChild(path))
+        messages = worker.stream(jobs.WithChild(path))
         assert isinstance(next(messages), Ready)
         if how == "interrupt":
             with pytest.raises(KeyboardInterrupt):
@@ -238,9 +238,9 @@ def test_a_worker_ends_with_the_program_that_started_it(jobs, tmp_path):
     """Even if that is killed while a solver sleeps."""
     script = (
         "import sys; import os; from pathlib import Path\n"
-        "from bench.harness.isolation import Workshop\n"
+        "from bench.harness.isolation import WorkerProcess\n"
         "from dying_jobs import WithChild\n"
-        "next(Workshop().stream(WithChild(sys.argv[1]))); os.kill(os.getpid(), 9)"
+        "next(WorkerProcess().stream(WithChild(sys.argv[1]))); os.kill(os.getpid(), 9)"
     )
     path = tmp_path / "processes"
     done = subprocess.run([sys.executable, "-c", script, str(path)], cwd=ROOT, check=False)
@@ -262,11 +262,11 @@ def test_what_lies_where_one_works_is_not_imported(jobs, tmp_path, monkeypatch, 
     trace = tmp_path / "imported"
     (tmp_path / name / "__init__.py").write_text(SHADOW.format(path=str(trace)))
     monkeypatch.chdir(tmp_path)
-    shop = Workshop(start_patience=60.0)
+    worker = WorkerProcess(start_patience=60.0)
     try:
-        assert_works(shop, jobs)
+        assert_works(worker, jobs)
     finally:
-        shop.close()
+        worker.close()
     assert not trace.exists()
 
 
@@ -275,9 +275,9 @@ def test_another_bench_on_the_path_is_not_imported(jobs, tmp_path, monkeypatch):
     (tmp_path / "bench" / "__init__.py").write_text("raise SystemExit(9)")
     path = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     monkeypatch.setenv("PYTHONPATH", path)
-    shop = Workshop(start_patience=60.0)
-    assert_works(shop, jobs)
-    shop.close()
+    worker = WorkerProcess(start_patience=60.0)
+    assert_works(worker, jobs)
+    worker.close()
 
 
 COMMAND = """
@@ -291,8 +291,8 @@ isolation._START = "raise SystemExit(3)"
 import dying_jobs
 
 def measure():
-    shop = isolation.Workshop()
-    outcome = shop.perform(dying_jobs.Dying("leave", "never", {load}))
+    worker = isolation.WorkerProcess()
+    outcome = worker.perform(dying_jobs.Dying("leave", "never", {load}))
     return Measured({{"x": [1.0]}}, {{"remark": outcome.trouble}})
 
 run.blocks = lambda suite, scale: [Block("ik", "p", "s", measure)]

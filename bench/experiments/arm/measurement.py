@@ -8,6 +8,7 @@ from reference import IK_SOLVERS, track
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ..chain.measurement import BEYOND_TOLERANCE, Limits, residuals, solve_targets
+from . import BEYOND, CURVE
 from .problem import CurveForArm, arm_beyond, arm_curves
 
 LIMITS = Limits(tolerance=1e-4, max_iterations=100)
@@ -20,11 +21,14 @@ def blocks(scale: Scale) -> Iterator[Block]:
         for solver in IK_SOLVERS:
             for warm in (False, True):
                 settings = {**LIMITS._asdict(), "warm": warm}
-                yield Block("arm", curve.name, solver, partial(draw, curve, solver, warm), settings)
+                facts = {"task": CURVE, "title": f"arm, {curve.title}", "curve": curve.title}
+                measure = partial(draw, curve, solver, warm)
+                yield Block("arm", curve.name, solver, measure, settings, facts=facts)
     far = arm_beyond(scale.targets)
+    facts = {"task": BEYOND, "title": far.title}
     for solver in IK_SOLVERS:
         measure = partial(solve_targets, far, solver, BEYOND_LIMITS)
-        yield Block("arm", far.name, solver, measure, BEYOND_LIMITS._asdict(), scale.targets)
+        yield Block("arm", far.name, solver, measure, BEYOND_LIMITS._asdict(), scale.targets, facts)
 
 
 def draw(problem: CurveForArm, solver: str, warm: bool) -> Measured:
@@ -33,13 +37,13 @@ def draw(problem: CurveForArm, solver: str, warm: bool) -> Measured:
         problem.skeleton, problem.curve, solver, problem.rest, warm=warm, **LIMITS._asdict()
     )
     # The tip keeps its rotation and would only dilute the mean.
-    turns = metrics.turns(motion.local_rotations[:, :-1])
+    turns = metrics.rotation_angles(motion.local_rotations[:, :-1])
     return Measured(
         {
             "residual": residuals(problem.skeleton, motion.local_rotations, problem.curve),
             "iterations": motion.iterations,
             "outcome": motion.outcome,
-            "largest_turn": turns.max(axis=-1),
-            "mean_turn": turns.mean(axis=-1),
+            "largest_angle": turns.max(axis=-1),
+            "mean_angle": turns.mean(axis=-1),
         }
     )

@@ -25,12 +25,14 @@ class CurveForArm:
 
     Attributes:
         name: of the problem.
+        title: how the curve is written.
         skeleton: the arm.
         rest: local rotations of its rest pose, (joint, 4).
         curve: where the tip is wanted in each frame [m], (frame, 3).
     """
 
     name: str
+    title: str
     skeleton: Skeleton
     rest: FloatArray
     curve: FloatArray
@@ -41,7 +43,15 @@ def arm_curves() -> list[CurveForArm]:
     skeleton, rest = scenes.lab_arm()
     even = {name: curves[name](frames) for name, frames in FRAMES.items()}
     even[CUSTOM] = evened_custom_curve()
-    return [CurveForArm(f"arm/{name}", skeleton, rest, curve) for name, curve in even.items()]
+    return [
+        CurveForArm(f"arm/{name}", spaced(name), skeleton, rest, curve)
+        for name, curve in even.items()
+    ]
+
+
+def spaced(name: str) -> str:
+    """Return how the name of a curve is written."""
+    return name.replace("_", " ")
 
 
 def custom_curve() -> FloatArray:
@@ -60,4 +70,4 @@ def arm_beyond(count: int) -> TargetsForSkeleton:
     rng = np.random.default_rng(_SEED)
     distances = skeleton.reach() * rng.uniform(*BEYOND, count)
     targets = skeleton.offsets[0] + distances[:, None] * unit(rng.standard_normal((count, 3)))
-    return TargetsForSkeleton("arm/beyond", skeleton, rest, targets)
+    return TargetsForSkeleton("arm/beyond", "arm, beyond", skeleton, rest, targets)

@@ -1,4 +1,4 @@
-"""Inverse kinematics: a ten-ball chain by us and both engines, robots, published tables."""
+"""Inverse kinematics of a ten-ball chain, by us and on the kinematics of both engines."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -13,9 +13,9 @@ from reference.arguments import FloatArray
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
+from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt
-from ..published import measurement as published
-from ..robots import measurement as robots
+from . import BEYOND, CHAIN
 from .problem import STRATA, TargetsForSkeleton, chain_targets
 
 TOLERANCE = 1e-4
@@ -26,7 +26,6 @@ MAX_ITERATIONS = 1000
 ENGINE_ITERATIONS = 200
 # The residuals of so many iterations are kept for the figure.
 HISTORY = 200
-ENGINE_SOLVER = "lm/{}"
 
 
 class Limits(NamedTuple):
@@ -37,25 +36,21 @@ class Limits(NamedTuple):
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield the chain, every stratum for every solver; then robots and published tables."""
-    yield from _chain_blocks(scale)
-    yield from robots.blocks(scale)
-    yield from published.blocks(scale)
-
-
-def _chain_blocks(scale: Scale) -> Iterator[Block]:
+    """Yield every stratum for every solver of ours, and for one loop on each engine."""
     for stratum in STRATA:
         problem = chain_targets(stratum, scale.targets)
-        tolerance = BEYOND_TOLERANCE if stratum == "beyond" else TOLERANCE
+        facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
+        tolerance = BEYOND_TOLERANCE if stratum == BEYOND else TOLERANCE
         ours = Limits(tolerance, MAX_ITERATIONS)
         for solver in IK_SOLVERS:
             measure = partial(solve_targets, problem, solver, ours, record=True)
-            yield Block("ik", problem.name, solver, measure, ours._asdict(), scale.targets)
+            settings = ours._asdict()
+            yield Block("ik", problem.name, solver, measure, settings, scale.targets, facts)
         theirs = Limits(tolerance, ENGINE_ITERATIONS)
-        for name in SKELETON_ENGINES:
-            measure = partial(solve_with_engine, problem, name, theirs)
-            solver = ENGINE_SOLVER.format(name)
-            yield Block("ik", problem.name, solver, measure, theirs._asdict(), scale.targets)
+        for loop in registry.LOOPS:
+            measure = partial(solve_with_engine, problem, loop.engine, theirs)
+            settings = theirs._asdict()
+            yield Block("ik", problem.name, loop.name, measure, settings, scale.targets, facts)
 
 
 def solve_targets(

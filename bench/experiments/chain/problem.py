@@ -7,6 +7,8 @@ import numpy as np
 from reference import Skeleton, scenes
 from reference.arguments import FloatArray, choice
 
+from . import BEYOND
+
 BALLS = 10
 
 # How far targets lie from the root, as shares of the reach; uniform within the shell.
@@ -14,7 +16,7 @@ STRATA = {
     "near": (0.05, 0.4),
     "far": (0.6, 0.95),
     "edge": (0.99, 0.9999),
-    "beyond": (1.01, 2.0),
+    BEYOND: (1.01, 2.0),
 }
 _SEED = 1986
 
@@ -25,12 +27,14 @@ class TargetsForSkeleton:
 
     Attributes:
         name: of the problem.
+        title: how it is written.
         skeleton: the chain.
         starts: local rotations to start from, (target, joint, 4) or (joint, 4) for all.
         targets: global positions [m], (target, 3).
     """
 
     name: str
+    title: str
     skeleton: Skeleton
     starts: FloatArray
     targets: FloatArray
@@ -48,6 +52,7 @@ def chain_targets(stratum: str, count: int) -> TargetsForSkeleton:
     distances = skeleton.reach() * rng.uniform(low, high, count)
     return TargetsForSkeleton(
         f"chain/{stratum}",
+        f"chain, {stratum}",
         skeleton,
         random_rotations(rng, count, skeleton.joint_count),
         distances[:, None] * unit(rng.standard_normal((count, 3))),

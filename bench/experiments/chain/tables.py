@@ -6,8 +6,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, counted, label, listed, problems, settings, solvers
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.results import Results, by_problem, counted, label, settings, solvers
+from ...presentation.tables import Cell, Column, Summary, Table, words
+from .. import arm
+from . import BEYOND, CHAIN
 
 # A chain counts as straight if no joint is off the line by more than this share of the reach.
 STRAIGHT = 0.01
@@ -16,7 +18,8 @@ RIVALS = ("ccd", "fabrik")
 
 def beyond_reach(results: Results) -> Table:
     """Return Q1: what becomes of a target that is too far away."""
-    records = results.all("arm", "arm/beyond") + results.all("ik", "chain/beyond")
+    records = results.all("arm", task=arm.BEYOND)
+    records += results.all("ik", task=CHAIN, stratum=BEYOND)
     return Table(
         "q1_beyond_reach",
         "Targets beyond reach",
@@ -37,7 +40,7 @@ def beyond_reach(results: Results) -> Table:
         measured=f"Seeded targets in all directions, {_distances(records)} times the reach away. "
         f"Solvers stop at a residual of {settings(records, 'tolerance')} m, ours also as close as "
         f"that to the best one, or after {settings(records, 'max_iterations')} iterations.",
-        answer=_beyond_answer(records),
+        summary=_beyond_summary(records),
     )
 
 
@@ -45,7 +48,7 @@ def _beyond_row(record: Record) -> tuple[Cell, ...]:
     bend, excess = (metrics.spread(record.arrays[name]) for name in ("bend", "excess"))
     median, _, largest = metrics.whole(record.arrays["iterations"])
     return (
-        label(record.problem), label(record.solver), int(record.size), bend.median, bend.largest,
+        record.title, label(record.solver), int(record.size), bend.median, bend.largest,
         excess.median, excess.largest, median, largest,
     )  # fmt: skip
 
@@ -58,7 +61,7 @@ def _distances(records: Sequence[Record]) -> str:
     return f"{words(low)} to {words(high)}"
 
 
-def _beyond_answer(records: Sequence[Record]) -> Answer:
+def _beyond_summary(records: Sequence[Record]) -> Summary:
     points = []
     for solver in solvers(records):
         mine = [record for record in records if record.solver == solver]
@@ -71,7 +74,7 @@ def _beyond_answer(records: Sequence[Record]) -> Answer:
             f"{words(metrics.percent(metrics.spread(bends).largest, 1.0))} % of the reach off the "
             f"line, {words(excess)} m above distance − reach, {counted(int(most), 'iteration')}"
         )
-    return Answer(
+    return Summary(
         "The best answer is the straight line from root to target. Answers within "
         f"{words(metrics.percent(STRAIGHT, 1.0))} % of the reach of that line:",
         tuple(points),
@@ -82,14 +85,13 @@ def iterations(results: Results) -> Table:
     """Return Q2: the iterations of CCD against FABRIK."""
     records = [
         record
-        for record in results.all("arm", warm=True)
-        + results.all("arm", "arm/beyond")
-        + results.all("ik", "chain/")
+        for record in results.all("arm", task=arm.CURVE, warm=True)
+        + results.all("arm", task=arm.BEYOND)
+        + results.all("ik", task=CHAIN)
         if record.solver in RIVALS
     ]
     pairs = []
-    for problem in problems(records):
-        both = [r for r in records if r.problem == problem]
+    for both in by_problem(records).values():
         pair = [next((r for r in both if r.solver == rival), None) for rival in RIVALS]
         if pair[0] is not None and pair[1] is not None:
             pairs.append((pair[0], pair[1]))
@@ -107,19 +109,19 @@ def iterations(results: Results) -> Table:
             Column("CCD / FABRIK, means"),
         ),
         tuple(_rival_row(*pair) for pair in pairs),
-        shows="One iteration turns every joint once (CCD) or runs along the chain once in each "
+        shows="One iteration rotates every joint once (CCD) or runs along the chain once in each "
         "direction (FABRIK). Solves that fail count with all the iterations they made.",
         measured="The arm starts each frame from its last solution, or from rest towards targets "
         "beyond its reach; the chain starts from random poses. At most "
         f"{settings(records, 'max_iterations')} iterations.",
-        answer=_rival_answer(pairs),
+        summary=_rival_summary(pairs),
     )
 
 
 def _rival_row(ccd: Record, fabrik: Record) -> tuple[Cell, ...]:
     spreads = [metrics.whole(record.arrays["iterations"]) for record in (ccd, fabrik)]
     return (
-        label(ccd.problem),
+        ccd.title,
         int(ccd.arrays["iterations"].size),
         *(value for spread in spreads for value in spread),
         _fewer(ccd, fabrik),
@@ -132,124 +134,13 @@ def _fewer(ccd: Record, fabrik: Record) -> float:
     )
 
 
-def _rival_answer(pairs: Sequence[tuple[Record, Record]]) -> Answer:
+def _rival_summary(pairs: Sequence[tuple[Record, Record]]) -> Summary:
     if not pairs:
-        return Answer()
+        return Summary()
     factors = [_fewer(ccd, fabrik) for ccd, fabrik in pairs]
     wins = sum(factor > 1 for factor in factors)
-    return Answer(
+    return Summary(
         f"FABRIK needs fewer iterations than CCD on {wins} of {len(pairs)} problems; CCD makes "
         f"{words(min(factors))} to {words(max(factors))} times as many on average "
         f"(median of the problems {words(metrics.spread(np.array(factors)).median)})."
     )
-
-
-def accuracy(results: Results) -> Table:
-    """Return success and residuals of every solver on every problem within reach."""
-    records = results.all("arm", warm=False) + results.all("arm", warm=True)
-    records += [r for r in results.all("ik", "chain/") if r.problem != "chain/beyond"]
-    order = problems(records)
-    records.sort(key=lambda record: order.index(record.problem))
-    return Table(
-        "accuracy",
-        "Success and residuals within reach",
-        (
-            Column("problem", words=True),
-            Column("solver", words=True),
-            Column("start", words=True),
-            Column("within tolerance (95 % interval)"),
-            Column("residual, median", "m"),
-            Column("residual, 95 %", "m"),
-            Column("residual, largest", "m"),
-            Column("iterations, median"),
-            Column("iterations, 95 %"),
-            Column("iterations, largest"),
-        ),
-        tuple(_accuracy_row(record) for record in records),
-        shows=f"A solve succeeds if the effector is within {settings(records, 'tolerance')} m of "
-        "its target. Residuals are not cut off at the tolerance. The interval is Wilson’s.",
-        measured="Residuals recomputed by forward kinematics of the rotations returned, whatever "
-        "the solver says. Starts: the arm’s rest pose, the last frame’s solution, or seeded random "
-        f"rotations. At most {settings(records, 'max_iterations')} iterations.",
-        answer=_accuracy_answer(records),
-    )
-
-
-def _accuracy_row(record: Record) -> tuple[Cell, ...]:
-    starts = {None: "random", False: "rest", True: "last solution"}
-    return (
-        label(record.problem),
-        label(record.solver),
-        starts[record.settings.get("warm")],
-        _success(record),
-        *metrics.spread(record.arrays["residual"]),
-        *metrics.whole(record.arrays["iterations"]),
-    )
-
-
-def _success(record: Record) -> metrics.Share:
-    return metrics.share(record.arrays["residual"] <= record.settings["tolerance"])
-
-
-def _accuracy_answer(records: Sequence[Record]) -> Answer:
-    points = []
-    for solver in solvers(records):
-        shares = [_success(record) for record in records if record.solver == solver]
-        hits, total = sum(share.hits for share in shares), sum(share.total for share in shares)
-        points.append(f"{label(solver)}: {words(hits)} of {words(total)}")
-    return Answer("Solved within tolerance, over all these problems:", tuple(points))
-
-
-def resampling(results: Results) -> Table:
-    """Return what resampling makes of the custom curve."""
-    records = results.all("pictures", "arm/")
-    return Table(
-        "resampling",
-        "The custom curve before and after resampling",
-        (
-            Column("curve", words=True),
-            Column("points"),
-            Column("gap, least", "m"),
-            Column("gap, median", "m"),
-            Column("gap, largest", "m"),
-            Column("turn of a joint, mean", "°"),
-            Column("turn of a joint, largest", "°"),
-            Column("iterations, largest"),
-            Column("residual, largest", "m"),
-        ),
-        tuple(_resampling_row(record) for record in records),
-        shows="The gap is the distance between neighbouring points; turns are geodesic angles "
-        "between neighbouring frames, a frame a point.",
-        measured=f"Gaps kept from {settings(records, 'min_spacing')} to "
-        f"{settings(records, 'max_spacing')} m; {listed([label(s) for s in solvers(records)])}, "
-        "each frame started from the last solution.",
-        answer=_resampling_answer(records),
-    )
-
-
-def _resampling_row(record: Record) -> tuple[Cell, ...]:
-    gap = metrics.spread(record.arrays["spacing"])
-    largest, mean = _turns(record)
-    return (
-        "resampled" if record.settings["evened"] else "as drawn",
-        len(record.arrays["curve"]), metrics.extent(record.arrays["spacing"])[0], gap.median,
-        gap.largest, mean, largest, metrics.whole(record.arrays["iterations"])[2],
-        metrics.spread(record.arrays["residual"]).largest,
-    )  # fmt: skip
-
-
-def _turns(record: Record) -> tuple[float, float]:
-    """Return the largest and the mean turn [°]."""
-    return (
-        metrics.degrees(metrics.spread(record.arrays["largest_turn"]).largest),
-        metrics.degrees(metrics.mean(record.arrays["mean_turn"])),
-    )
-
-
-def _resampling_answer(records: Sequence[Record]) -> Answer:
-    points = [
-        f"{row[0]}: {words(row[1])} points, {words(row[2])} to {words(row[4])} m apart; a joint "
-        f"turns by up to {words(row[6])}° between frames"
-        for row in map(_resampling_row, records)
-    ]
-    return Answer("How evenly the points lie, and how calmly the arm follows:", tuple(points))

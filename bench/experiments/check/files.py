@@ -19,13 +19,13 @@ from crosscheck.robots.files import (
     Reading,
 )
 
-from ...presentation.tables import Answer, Column, Table
+from ...presentation.tables import Column, Summary, Table
 
 OUTCOMES = (AGREES, DIFFERS, DEVIATES, UNREAD, REFUSED, NEITHER, LOST)
 NAMES = tuple(dict.fromkeys(engine for engines in ENGINES.values() for engine in engines))
 SHOWS = (
     "Differences are the largest in random configurations, or frames: of positions and linear "
-    "velocities over the room that the links take up, of rotation matrices and angular velocities."
+    "velocities over the extent of the links, of rotation matrices and angular velocities."
 )
 
 
@@ -43,7 +43,7 @@ def report(found: Found, checked: Sequence[Checked]) -> Report:
     files = Table(
         "files", "Files", (Column("file", words=True), Column("format", words=True),
         *(Column(name, words=True) for name in NAMES)), tuple(rows), shows=SHOWS,
-        answer=Answer("", tuple(point for one in checked for point in _points(one))),
+        summary=Summary("", tuple(point for one in checked for point in _points(one))),
     )  # fmt: skip
     return Report(files, *_summary(found, checked))
 
@@ -63,7 +63,7 @@ def _summary(found: Found, checked: Sequence[Checked]) -> tuple[Table, int]:
         (Column("format", words=True), Column("beside", words=True), Column("files"),
          *map(Column, outcomes), Column("agrees within")),
         tuple((*of, *_count(these, outcomes)) for of, these in readings.items() if these),
-        answer=Answer(_sentence(found, checked, disagreements)),
+        summary=Summary(_sentence(found, checked, disagreements)),
     )  # fmt: skip
     return summary, disagreements
 

@@ -15,7 +15,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def verdict(name: str) -> Measured:
-    """Judge a claim; keep its numbers and its words."""
+    """Evaluate a claim; keep its numbers and its words."""
     (verdict,) = run_claims([name])
     claim = verdict.claim
     return Measured(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results
-from ...presentation.tables import Answer, Column, Table, words
+from ...presentation.tables import Column, Summary, Table, words
 
 
 def verdicts(results: Results) -> Table:
@@ -39,21 +39,21 @@ def verdicts(results: Results) -> Table:
         shows="Differences are relative, to the reach, the largest force or whatever scale the "
         "claim's tolerance names. A claim holds only if something moved in each of its cases.",
         measured="Each quantity computed twice, by us and by an engine, on seeded random systems.",
-        answer=_sentence(records),
+        summary=_sentence(records),
     )
 
 
-def _sentence(records: Sequence[Record]) -> Answer:
+def _sentence(records: Sequence[Record]) -> Summary:
     if not records:
-        return Answer()
+        return Summary()
     missed = [record.problem for record in records if not record.arrays["held"]]
     cases = sum(int(record.arrays["cases"]) for record in records)
     used = max(
         metrics.ratio(float(record.arrays["difference"]), float(record.arrays["tolerance"]))
         for record in records
     )
-    return Answer(
+    return Summary(
         f"{len(records) - len(missed)} of {len(records)} claims held, over {words(cases)} cases; "
-        f"the closest call used {words(metrics.percent(used, 1.0))} % of its tolerance.",
+        f"the smallest margin used {words(metrics.percent(used, 1.0))} % of its tolerance.",
         tuple(f"Missed: {name}" for name in missed),
     )

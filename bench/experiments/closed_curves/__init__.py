@@ -1,1 +1,13 @@
-"""Closed curves tracked round after round: largest joint steps and drift."""
+"""Tracking of closed curves: how far joints rotate between frames, and drift over repetitions."""
+
+from ...harness.experiment import Experiment
+
+# What a record is about: a curve followed once, or three times.
+CURVE, DRIFT = "curve", "drift"
+# How the frames of a curve are solved.
+COLD, WARM, COHERENT = "cold", "warm", "coherent"
+
+EXPERIMENT = Experiment(
+    __package__, "tracking",
+    "closed curves: frames from rest, from the last solution, and coherently",
+)  # fmt: skip

@@ -1,6 +1,7 @@
 """Following closed curves: each frame from rest, each from the last solution, and coherently."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,11 +10,17 @@ from reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rota
 from reference.arguments import FloatArray
 
 from ...harness.block import SCALES, Block, Measured, Scale
-from .problem import DRIFT_FRAMES, Round, arm_rounds, robot_rounds, three_rounds
+from . import COHERENT, COLD, CURVE, DRIFT, WARM
+from .problem import (
+    DRIFT_FRAMES,
+    ClosedCurve,
+    arm_closed_curves,
+    heart_three_times,
+    robot_closed_curves,
+)
 
 SUITE = "tracking"
 TOLERANCE, ITERATIONS = 1e-4, 100
-COLD, WARM, COHERENT = "cold", "warm", "coherent"
 OPTIONS = {
     COLD: {"warm": False},
     WARM: {},
@@ -24,73 +31,77 @@ ROBOT_SOLVER = "levenberg_marquardt"
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield every curve for every solver in each of the ways, and three rounds."""
-    for problem in arm_rounds():
-        yield from _ways(problem, list(IK_SOLVERS))
+    """Yield every curve for every solver in each mode, and the heart three times."""
+    for problem in arm_closed_curves():
+        yield from _modes(problem, list(IK_SOLVERS))
     some = [ROBOT_SOLVER] if scale == SCALES["quick"] else list(IK_SOLVERS)
-    for problem in robot_rounds():
-        yield from _ways(problem, some)
+    for problem in robot_closed_curves():
+        yield from _modes(problem, some)
     for solver in IK_SOLVERS:
-        for way in (WARM, COHERENT):
-            measure = partial(drift, three_rounds(), solver, way)
-            yield Block(SUITE, three_rounds().name, solver, measure, _settings(way))
+        for mode in (WARM, COHERENT):
+            measure = partial(drift, heart_three_times(), solver, mode)
+            facts = {"task": DRIFT, "title": heart_three_times().title}
+            yield Block(
+                SUITE, heart_three_times().name, solver, measure, _settings(mode), facts=facts
+            )
 
 
-def _ways(problem: Round, solvers: list[str]) -> Iterator[Block]:
+def _modes(problem: ClosedCurve, solvers: list[str]) -> Iterator[Block]:
     for solver in solvers:
-        for way in OPTIONS:
-            measure = partial(follow, problem, solver, way)
-            yield Block(SUITE, problem.name, solver, measure, _settings(way))
+        for mode in OPTIONS:
+            measure = partial(follow, problem, solver, mode)
+            facts = {"task": CURVE, "title": problem.title}
+            yield Block(SUITE, problem.name, solver, measure, _settings(mode), facts=facts)
 
 
-def _settings(way: str) -> dict[str, str | float]:
-    return {"way": way, "tolerance": TOLERANCE, "max_iterations": ITERATIONS}
+def _settings(mode: str) -> dict[str, str | float]:
+    return {"mode": mode, "tolerance": TOLERANCE, "max_iterations": ITERATIONS}
 
 
-def follow(problem: Round, solver: str, way: str) -> Measured:
+def follow(problem: ClosedCurve, solver: str, mode: str) -> Measured:
     """Follow the curve once; residuals are recomputed by forward kinematics of the answers.
 
-    The last turn is that from the last frame back to the first.
+    The last angle is that from the last frame back to the first.
     """
-    motion = _tracked(problem, solver, way)
+    motion = _tracked(problem, solver, mode)
     pose = forward_kinematics(problem.model, motion.coordinates)
-    turned = _turns(problem, motion, np.arange(len(problem.curve)) - len(problem.curve) + 1)
+    turned = _joint_angles(problem, motion, np.arange(len(problem.curve)) - len(problem.curve) + 1)
     return Measured(
         {
             "residual": np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
             "iterations": motion.iterations,
             "outcome": motion.outcome,
-            "largest_turn": turned.max(axis=-1),
-            "mean_turn": turned.mean(axis=-1),
+            "largest_angle": turned.max(axis=-1),
+            "mean_angle": turned.mean(axis=-1),
         }
     )
 
 
-def drift(problem: Round, solver: str, way: str) -> Measured:
+def drift(problem: ClosedCurve, solver: str, mode: str) -> Measured:
     """Follow the curve three times over; return how far the first pose is left behind after each.
 
     A coherent motion is closed: after its last frame comes its first.
     """
     again = (
-        problem.curve if way == COHERENT else np.append(problem.curve, problem.curve[:1], axis=0)
+        problem.curve if mode == COHERENT else np.append(problem.curve, problem.curve[:1], axis=0)
     )
-    motion = _tracked(Round(problem.name, problem.model, problem.start, again), solver, way)
+    motion = _tracked(replace(problem, curve=again), solver, mode)
     later = (DRIFT_FRAMES * np.arange(1, 4)) % len(again)
     turned = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[later])
     return Measured({"drift": turned.max(axis=-1), "residual": motion.residual})
 
 
-def _tracked(problem: Round, solver: str, way: str) -> IKSolution:
+def _tracked(problem: ClosedCurve, solver: str, mode: str) -> IKSolution:
     return track(
         problem.model, problem.curve, solver, problem.start,
-        tolerance=TOLERANCE, max_iterations=ITERATIONS, **OPTIONS[way],
+        tolerance=TOLERANCE, max_iterations=ITERATIONS, **OPTIONS[mode],
     )  # fmt: skip
 
 
-def _turns(problem: Round, motion: IKSolution, following: np.ndarray) -> FloatArray:
-    """Return by how much each joint turns on the way to the following frame [rad], (frame, joint).
+def _joint_angles(problem: ClosedCurve, motion: IKSolution, following: np.ndarray) -> FloatArray:
+    """Return the angle by which each joint rotates to the following frame [rad], (frame, joint).
 
-    A hinge that turns by more than half a turn has done so, though its link looks the same.
+    A hinge's angle is not reduced to half a revolution, though its link looks the same.
     """
     if isinstance(problem.model, Skeleton):
         # The tip keeps its rotation and would only dilute the mean.

@@ -12,7 +12,8 @@ from reference.mass_spring import MassSpring, damper_forces, lengths, spring_for
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ..cloth_peers import measurement as peers_cloth
+from ...peers import registry
+from . import DAMPERS, FEW, ONE_STEP, SWING
 from .problem import DAMPING, FACTORS, ClothSwing, H, cloth_swing
 
 # The cloth falls for three seconds; the steps of the next second are looked at.
@@ -21,10 +22,7 @@ STEPS = 60
 TOLERANCE = 1e-10
 # The step whose convergence is followed iteration by iteration.
 MIDDLE = FALLING + STEPS // 2
-CONVERGENCE = {
-    "local_global": 1000, "chebyshev": 1000, "lbfgs": 200, "newton_cg": 12, "newton": 12,
-}  # fmt: skip
-FEW = (1, 10, 100)
+FEW_ITERATIONS = (1, 10, 100)
 # Steps in which the two laws of dampers are compared [s], each half the one before.
 HALVED = tuple(H / 2**i for i in range(-1, 6))
 
@@ -32,37 +30,34 @@ HALVED = tuple(H / 2**i for i in range(-1, 6))
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield, for each stiffness: consecutive Newton steps, one step's iterations, few iterations.
 
-    The cloth is the same at every scale. Then one cloth for every solver that is installed.
+    The cloth is the same at every scale.
     """
-    yield from _lab_blocks()
-    yield from peers_cloth.blocks(scale)
-
-
-def _lab_blocks() -> Iterator[Block]:
     for factor in FACTORS:
         problem = cloth_swing(factor)
+        facts = {"title": f"stiffness × {factor:g}"}
         swinging = {"h": H, "first": FALLING, "steps": STEPS}
         yield Block(
             "cloth", problem.name, "newton", partial(newton_steps, problem),
-            {**swinging, "tolerance": TOLERANCE},
+            {**swinging, "tolerance": TOLERANCE}, facts={**facts, "task": SWING},
         )  # fmt: skip
-        for solver, iterations in CONVERGENCE.items():
+        for solver in registry.followed_step_solvers():
             yield Block(
-                "cloth", f"{problem.name}/one step", solver,
-                partial(one_step, problem, solver, iterations),
-                {"h": H, "step": MIDDLE, "iterations": iterations},
+                "cloth", f"{problem.name}/one step", solver.name,
+                partial(one_step, problem, solver.name, solver.followed),
+                {"h": H, "step": MIDDLE, "iterations": solver.followed},
+                facts={**facts, "task": ONE_STEP},
             )  # fmt: skip
-        for iterations in FEW:
+        for iterations in FEW_ITERATIONS:
             yield Block(
                 "cloth", f"{problem.name}/few iterations", "local_global",
                 partial(few_iterations, problem, iterations),
-                {**swinging, "iterations": iterations},
+                {**swinging, "iterations": iterations}, facts={**facts, "task": FEW},
             )  # fmt: skip
         damped = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
         halved = {"longest": HALVED[0], "halvings": len(HALVED) - 1}
         yield Block(
             "cloth", f"{problem.name}/dampers", "newton", damped,
-            {"first": MIDDLE, "damping": DAMPING, **halved},
+            {"first": MIDDLE, "damping": DAMPING, **halved}, facts={**facts, "task": DAMPERS},
         )  # fmt: skip
 
 
@@ -103,13 +98,13 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
     of the converged motion from where both began.
     """
     converged = converging(problem)
-    hasty = ImplicitEuler(
+    few = ImplicitEuler(
         problem.system, h=problem.h, solver="local_global", tolerance=0.0,
         max_iterations=iterations,
     )  # fmt: skip
     true = converged_motion(problem)[FALLING:]
-    own = motion(true[0], STEPS, hasty)
-    after = [hasty.step(state).state for state in true[:-1]]
+    own = motion(true[0], STEPS, few)
+    after = [few.step(state).state for state in true[:-1]]
     inertial = [converged.objective(state).y for state in true[:-1]]
     positions = [state.positions for state in true[1:]]
     errors = [

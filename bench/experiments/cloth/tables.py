@@ -8,23 +8,21 @@ from reference import Outcome
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, counted, label, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...peers import registry
+from ...presentation.results import Results, by_problem, counted, label, settings
+from ...presentation.tables import Cell, Column, Summary, Table, words
+from . import DAMPERS, FEW, ONE_STEP, SWING
 
 LISTED = (1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000)
-RIVALS = ("local_global", "chebyshev", "lbfgs", "newton_cg", "newton")
 # Those whose residual is listed beside the error.
 CHECKED = ("local_global", "newton")
-ONE_STEP = "/one step"
-FEW = "/few iterations"
-DAMPERS = "/dampers"
 # The answer in a sentence counts the iterations to this error.
 TARGET_ERROR = 1e-6
 
 
 def newton_steps(results: Results) -> Table:
     """Return how Newton does over consecutive steps."""
-    records = [r for r in results.all("cloth") if "/" not in r.problem.removeprefix("cloth/")]
+    records = results.all("cloth", task=SWING)
     return Table(
         "cloth_newton",
         "Newton over consecutive steps of the swinging cloth",
@@ -44,7 +42,7 @@ def newton_steps(results: Results) -> Table:
         measured=f"The lab’s cloth let go from rest; steps of {_milliseconds(records)} ms after "
         f"the first {settings(records, 'first')}, to a residual of "
         f"{settings(records, 'tolerance')} or the rounding floor.",
-        answer=_newton_answer(records),
+        summary=_newton_summary(records),
     )
 
 
@@ -52,7 +50,7 @@ def _newton_row(record: Record) -> tuple[Cell, ...]:
     residual = metrics.spread(record.arrays["residual"])
     median, _, largest = metrics.whole(record.arrays["iterations"])
     return (
-        _cloth(record.problem),
+        record.title,
         int(record.arrays["iterations"].size),
         metrics.share(_solved(record)),
         median,
@@ -63,14 +61,14 @@ def _newton_row(record: Record) -> tuple[Cell, ...]:
     )
 
 
-def _newton_answer(records: Sequence[Record]) -> Answer:
+def _newton_summary(records: Sequence[Record]) -> Summary:
     if not records:
-        return Answer()
+        return Summary()
     steps = sum(record.arrays["iterations"].size for record in records)
     done = sum(metrics.share(_solved(record)).hits for record in records)
     iterations = max(metrics.whole(record.arrays["iterations"])[2] for record in records)
     residual = max(metrics.spread(record.arrays["residual"]).largest for record in records)
-    return Answer(
+    return Summary(
         f"Newton converged in {words(done)} of {words(steps)} steps, with at most "
         f"{counted(int(iterations), 'iteration')} and a residual of at most {words(residual)}."
     )
@@ -82,30 +80,31 @@ def _solved(record: Record) -> np.ndarray:
 
 def convergence(results: Results) -> Table:
     """Return residual and error after each of some iterations of one step."""
-    problems = [r.problem for r in results.all("cloth") if r.problem.endswith(ONE_STEP)]
-    solved = {
-        problem: {rival: results.one("cloth", problem, rival) for rival in RIVALS}
-        for problem in dict.fromkeys(problems)
-    }
+    rivals = [solver.name for solver in registry.followed_step_solvers()]
+    cloths = by_problem(results.all("cloth", task=ONE_STEP)).values()
+    solved = [
+        (cloth[0].title, {r: next((s for s in cloth if s.solver == r), None) for r in rivals})
+        for cloth in cloths
+    ]
     rows = [
         (
-            _cloth(problem),
+            title,
             k,
-            *(_after(by[rival], "error", k) for rival in RIVALS),
+            *(_after(by[rival], "error", k) for rival in rivals),
             *(_after(by[rival], "residual", k) for rival in CHECKED),
         )
-        for problem, by in solved.items()
+        for title, by in solved
         for k in LISTED
         if any(_after(record, "error", k) is not None for record in by.values())
     ]
-    records = [record for by in solved.values() for record in by.values() if record is not None]
+    records = [record for _, by in solved for record in by.values() if record is not None]
     return Table(
         "cloth_convergence",
         "Convergence of one implicit Euler step",
         (
             Column("cloth", words=True),
             Column("iterations"),
-            *(Column(f"{label(rival)}: error") for rival in RIVALS),
+            *(Column(f"{label(rival)}: error") for rival in rivals),
             *(Column(f"{label(rival)}: residual") for rival in CHECKED),
         ),
         tuple(rows),
@@ -113,7 +112,7 @@ def convergence(results: Results) -> Table:
         "inertial start y and the converged step x*. Where it stands still, rounding is reached.",
         measured=f"Step {settings(records, 'step')} of the motion, {_milliseconds(records)} ms; "
         "x* by Newton, iterated far beyond the rounding floor.",
-        answer=_convergence_answer(solved),
+        summary=_convergence_summary(solved),
     )
 
 
@@ -123,12 +122,12 @@ def _after(record: Record | None, what: str, k: int) -> float | None:
     return float(record.arrays[what][k])
 
 
-def _convergence_answer(solved: dict[str, dict[str, Record | None]]) -> Answer:
+def _convergence_summary(solved: Sequence[tuple[str, dict[str, Record | None]]]) -> Summary:
     points = []
-    for problem, by in solved.items():
+    for title, by in solved:
         needed = [f"{label(r.solver)} {_needed(r)}" for r in by.values() if r is not None]
-        points.append(f"{_cloth(problem)}: {', '.join(needed)}")
-    return Answer(f"Iterations until the error is {words(TARGET_ERROR)}:", tuple(points))
+        points.append(f"{title}: {', '.join(needed)}")
+    return Summary(f"Iterations until the error is {words(TARGET_ERROR)}:", tuple(points))
 
 
 def _needed(record: Record) -> str:
@@ -139,7 +138,7 @@ def _needed(record: Record) -> str:
 
 def few_iterations(results: Results) -> Table:
     """Return the error of the lab's Q x = b, one local/global iteration, and of a few more."""
-    records = [r for r in results.all("cloth") if r.problem.endswith(FEW)]
+    records = results.all("cloth", task=FEW)
     return Table(
         "cloth_few_iterations",
         "The lab’s Q x = b: a fixed number of local/global iterations",
@@ -161,7 +160,7 @@ def few_iterations(results: Results) -> Table:
         measured=f"{settings(records, 'steps')} steps of {_milliseconds(records)} ms of the "
         f"swinging cloth after the first {settings(records, 'first')}; one iteration is the lab’s "
         "version.",
-        answer=_few_answer(records),
+        summary=_few_summary(records),
     )
 
 
@@ -169,30 +168,31 @@ def _few_row(record: Record) -> tuple[Cell, ...]:
     error, distance = (metrics.spread(record.arrays[name]) for name in ("error", "distance"))
     drift, path = _drift(record)
     return (
-        _cloth(record.problem), record.settings["iterations"], error.median,
+        record.title, record.settings["iterations"], error.median,
         error.largest, distance.median, distance.largest, drift, metrics.percent(drift, path),
     )  # fmt: skip
 
 
-def _few_answer(records: Sequence[Record]) -> Answer:
+def _few_summary(records: Sequence[Record]) -> Summary:
     points = []
     for record in records:
         if record.settings["iterations"] == 1:
             error = metrics.percent(metrics.spread(record.arrays["error"]).median, 1.0)
             drift, path = _drift(record)
             points.append(
-                f"{_cloth(record.problem)}: {words(error)} %; the cloth drifts by {words(drift)} m,"
+                f"{record.title}: {words(error)} %; the cloth drifts by {words(drift)} m,"
                 f" {words(metrics.percent(drift, path))} % of its path, in "
                 f"{record.settings['steps']} steps"
             )
-    return Answer(
-        "What one iteration leaves of the way to the converged step, in the median:", tuple(points)
+    return Summary(
+        "What one iteration leaves of the distance to the converged step, in the median:",
+        tuple(points),
     )
 
 
 def dampers(results: Results) -> Table:
     """Return how far the two laws of dampers are apart at the end of one step."""
-    records = [r for r in results.all("cloth") if r.problem.endswith(DAMPERS)]
+    records = results.all("cloth", task=DAMPERS)
     return Table(
         "cloth_dampers",
         "Two laws of dampers at the end of one step",
@@ -210,7 +210,7 @@ def dampers(results: Results) -> Table:
         measured=f"The lab’s cloth with a damping of {settings(records, 'damping')} N s/m after "
         f"{settings(records, 'first')} steps of its swing; one converged step of each length from "
         "there.",
-        answer=_damper_answer(records),
+        summary=_damper_summary(records),
     )
 
 
@@ -218,16 +218,16 @@ def _damper_rows(record: Record) -> list[tuple[Cell, ...]]:
     apart = record.arrays["apart"]
     orders = [None, *np.log2(apart[:-1] / apart[1:])]
     return [
-        (_cloth(record.problem), metrics.milliseconds(float(h)), float(difference), order)
+        (record.title, metrics.milliseconds(float(h)), float(difference), order)
         for h, difference, order in zip(record.arrays["h"], apart, orders, strict=True)
     ]
 
 
-def _damper_answer(records: Sequence[Record]) -> Answer:
-    return Answer(
+def _damper_summary(records: Sequence[Record]) -> Summary:
+    return Summary(
         "The forces of the two laws differ, relatively, by:" if records else "",
         tuple(
-            f"{_cloth(record.problem)}: {words(float(record.arrays['apart'][0]))} at "
+            f"{record.title}: {words(float(record.arrays['apart'][0]))} at "
             f"{words(metrics.milliseconds(float(record.arrays['h'][0])))} ms, "
             f"{words(float(record.arrays['apart'][-1]))} at "
             f"{words(metrics.milliseconds(float(record.arrays['h'][-1])))} ms"
@@ -239,11 +239,6 @@ def _damper_answer(records: Sequence[Record]) -> Answer:
 def _drift(record: Record) -> tuple[float, float]:
     """Return drift and path at the end [m]."""
     return float(record.arrays["drift"][-1]), float(record.arrays["path"][-1])
-
-
-def _cloth(problem: str) -> str:
-    """Return how a cloth is written in a table of cloths: "stiffness × 10"."""
-    return label(problem.split("/")[1])
 
 
 def _milliseconds(records: Sequence[Record]) -> str:

@@ -11,13 +11,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference import STEP_SOLVERS, ImplicitEuler, MassSpring, State
+from reference import ImplicitEuler, MassSpring, State
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Outcome, Workshop
-from ...peers.cloth import CLOTH_PEERS, EXPLICIT, ClothPeer, Rung
+from ...harness.isolation import Outcome, WorkerProcess
+from ...peers import registry
+from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
+from ...peers.registry import EXPLICIT, ClothPeer
 from ..published import problem as published
+from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 from .job import ClothJob
 from .problem import (
     FRAME,
@@ -31,11 +34,6 @@ from .problem import (
 from .truth import ClothTruth, cloth_truth, implicit_motion
 
 SUITE = "cloth"
-ONE_STEP, MOTION, NEEDED = "peers/one step", "peers/motion", "peers/iterations"
-STABILITY, LIU = "peers/stability", "peers/liu2013"
-EVERY_CLOTH = "peers/all"
-# Between the rungs' names in a record's notes.
-LIST = "; "
 # One step is timed so often, but for no more than a twentieth of its ladder's time.
 _REPEATS, _REPEATING = 5, 0.05
 # A ladder ends with the first rung this near to the answer.
@@ -45,8 +43,7 @@ _PATIENCE, _START_PATIENCE = 60.0, 300.0
 
 # Errors whose iterations are counted, on a cloth of so many particles a side.
 DECADES = 10.0 ** -np.arange(1, 9)
-NEEDED_SIZE, NEEDED_LIMIT = 20, {"newton": 60, "newton_cg": 60, "gauss_newton": 20}
-MANY_ITERATIONS = 2000
+NEEDED_SIZE = 20
 
 # A mode is unstable if, begun with this amplitude [m], it grows so much in so many steps.
 STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
@@ -83,38 +80,43 @@ def blocks(scale: Scale) -> Iterator[Block]:
     Larger cloths, the published one among them, are for the full scale.
     """
     sizes = levels(scale)
-    for package in dict.fromkeys(peer.package for peer in CLOTH_PEERS if not peer.version):
-        yield Block(SUITE, EVERY_CLOTH, package, partial(not_installed, package))
+    peers = registry.cloth_peers()
+    for package in dict.fromkeys(peer.package for peer in peers if not peer.version):
+        absent = partial(not_installed, package)
+        yield Block(SUITE, "peers/all", package, absent, facts={"task": MISSING})
     for stiffness in STIFFNESSES:
-        for solver in STEP_SOLVERS:
+        for solver in registry.step_solvers():
             yield Block(
-                SUITE, f"{NEEDED}/k{stiffness:g}", solver,
+                SUITE, f"peers/iterations/k{stiffness:g}", solver,
                 partial(iterations_needed, solver, stiffness),
                 {"size": NEEDED_SIZE, "stiffness": stiffness, "frame": FRAME},
+                facts={"task": NEEDED},
             )  # fmt: skip
-    for peer in (peer for peer in CLOTH_PEERS if peer.version):
+    for peer in (peer for peer in peers if peer.version):
         yield from _peer_blocks(peer, sizes)
     for solver in published.LIU_2013 if sizes == FULL else ():
         yield Block(
-            SUITE, LIU, solver, partial(liu_2013, solver),
+            SUITE, "peers/liu2013", solver, partial(liu_2013, solver),
             {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME},
+            facts={"task": LIU},
         )  # fmt: skip
 
 
 def _peer_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
     most = sum(level.size for level in sizes)
     for stiffness in STIFFNESSES:
-        for problem, measure in ((ONE_STEP, one_step), (MOTION, motion)):
+        for name, task, measure in (("one step", ONE_STEP, one_step), ("motion", MOTION, motion)):
             yield Block(
-                SUITE, f"{problem}/k{stiffness:g}", peer.title,
+                SUITE, f"peers/{name}/k{stiffness:g}", peer.title,
                 partial(measure, peer, stiffness, sizes),
                 {"stiffness": stiffness, "frame": FRAME, "version": peer.version}, most,
+                {"task": task},
             )  # fmt: skip
     if peer.kind == EXPLICIT and not peer.settings.get("iterations"):
         hung = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
         yield Block(
-            SUITE, STABILITY, peer.title, partial(stability, peer, hung),
-            {"size": STABILITY_SIZE, "version": peer.version}, len(hung),
+            SUITE, "peers/stability", peer.title, partial(stability, peer, hung),
+            {"size": STABILITY_SIZE, "version": peer.version}, len(hung), {"task": STABILITY},
         )  # fmt: skip
 
 
@@ -129,11 +131,11 @@ def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Mea
     A ladder that has used its time, or has arrived, is climbed no further.
     """
     rows: list[Row] = []
-    remarks: list[str] = []
+    remarks: list[Remark] = []
     for level in sizes:
         cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
         spent = 0.0
-        for rung in peer.step_rungs(cloth.frequency):
+        for rung in step_rungs(peer, cloth.frequency):
             outcome = _tried(
                 job(
                     peer.module, cloth, rung, frames=1, repeats=_REPEATS,
@@ -157,8 +159,8 @@ def _tried(job: ClothJob) -> Outcome:
     what = job.module, len(job.positions)
     if what in _given_up:
         return Outcome(0.0, [], _given_up[what])
-    outcome = workshop().perform(job)
-    if outcome.trouble.endswith("silence") and not outcome.lost:
+    outcome = worker_process().perform(job)
+    if outcome.silent and not outcome.lost:
         _given_up[what] = outcome.trouble
     return outcome
 
@@ -166,15 +168,22 @@ def _tried(job: ClothJob) -> Outcome:
 _given_up: dict[tuple[str, int], str] = {}
 
 
-def _remarks(level: Level, rung: Rung, outcome: Outcome) -> list[str]:
-    said = f"{level.size} × {level.size}, {rung.label}: {outcome.trouble}"
-    return [said] if outcome.trouble else []
+class Remark(NamedTuple):
+    """A sentence on what happened on a cloth of so many particles a side."""
+
+    particles: int
+    sentence: str
+
+
+def _remarks(level: Level, rung: Rung, outcome: Outcome) -> list[Remark]:
+    sentence = f"{level.size} × {level.size}, {rung.label}: {outcome.trouble}"
+    return [Remark(level.size, sentence)] if outcome.trouble else []
 
 
 def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
-    """Return what a step leaves of the way from y to converged implicit Euler; inf if it blew up.
+    """Return the error of a step relative to that of its inertial start y; inf if it diverged.
 
-    Beyond what can be squared there is nothing left to compare.
+    The error is the distance from converged implicit Euler.
     """
     if not np.isfinite(positions).all() or np.abs(positions).max() > 1e100:
         return np.inf
@@ -184,10 +193,10 @@ def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
 def motion(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measured:
     """Move on frame after frame; keep the distances from implicit Euler and from the truth."""
     rows: list[Row] = []
-    remarks: list[str] = []
+    remarks: list[Remark] = []
     for level in sizes:
         cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
-        for rung in peer.motion_rungs(cloth.frequency):
+        for rung in motion_rungs(peer, cloth.frequency):
             outcome = _tried(
                 job(
                     peer.module, cloth, rung, frames=level.frames, repeats=1, budget=level.budget,
@@ -201,7 +210,7 @@ def motion(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measu
     measured = _columns(names, rows, remarks)
     truths = [_truth(level, stiffness) for level in sizes]
     known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
-    return Measured({**measured.arrays, **known}, measured.notes)
+    return measured._replace(arrays={**measured.arrays, **known})
 
 
 def _moved(outcome: Outcome, level: Level, truth: ClothTruth) -> tuple[float, ...]:
@@ -230,7 +239,7 @@ def iterations_needed(solver: str, stiffness: float) -> Measured:
     truth = cloth_truth(NEEDED_SIZE, stiffness, 1)
     iterates = ImplicitEuler(cloth.system, h=FRAME, solver=solver).iterates(cloth.start)
     errors = []
-    limit = NEEDED_LIMIT.get(solver, MANY_ITERATIONS)
+    limit = registry.step_solvers()[solver].counted
     for _, iterate in zip(range(limit + 1), iterates, strict=False):
         errors.append(step_error(iterate.positions, truth))
         if errors[-1] <= NEAR_ENOUGH:
@@ -261,7 +270,7 @@ def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
             remarks.append(str(error))
     return Measured(
         {"stiffness": stiffnesses, "limit": limits, "frequency": frequencies},
-        {"remark": LIST.join(remarks)},
+        {"remark": "; ".join(remarks)},
     )
 
 
@@ -277,7 +286,7 @@ def is_stable(
         peer.module, system.arrays, start.positions, start.velocities,
         h * STABILITY_STEPS, 1, 1, {**peer.settings, "substeps": STABILITY_STEPS}, np.inf,
     )  # fmt: skip
-    outcome = workshop().perform(shape)
+    outcome = worker_process().perform(shape)
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     away = np.abs(outcome.solved[-1].q - rest)
@@ -312,7 +321,7 @@ def liu_2013(solver: str) -> Measured:
     exact = implicit_motion(cloth, 1, published.LIU_2013_FRAME)[0]
     x, v = cloth.start.positions, cloth.start.velocities
     settings = published.LIU_2013[solver].settings
-    outcome = workshop().perform(
+    outcome = worker_process().perform(
         job(
             "bench.peers.cloth.step_solvers", cloth, Rung("", {"solver": solver, **settings}),
             frames=1, repeats=_REPEATS, budget=5.0, frame=published.LIU_2013_FRAME,
@@ -345,14 +354,15 @@ def _truth(level: Level, stiffness: float) -> ClothTruth:
     return cloth_truth(level.size, stiffness, level.frames)
 
 
-def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[str]) -> Measured:
-    """Return rows, their labels last, as arrays and notes."""
+def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[Remark]) -> Measured:
+    """Return rows, their labels last, as arrays and facts."""
     arrays = {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
-    labels = LIST.join(row[-1] for row in rows)
-    return Measured(arrays, {"rungs": labels, "remark": LIST.join(remarks)})
+    arrays["remark_particles"] = np.array([remark.particles for remark in remarks])
+    sentences = [remark.sentence for remark in remarks]
+    return Measured(arrays, facts={"rungs": [row[-1] for row in rows], "remarks": sentences})
 
 
 @functools.cache
-def workshop() -> Workshop:
+def worker_process() -> WorkerProcess:
     """Return the one process in which all solvers work, one after the other."""
-    return Workshop(_START_PATIENCE, _PATIENCE)
+    return WorkerProcess(_START_PATIENCE, _PATIENCE)

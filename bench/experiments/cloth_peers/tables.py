@@ -7,12 +7,12 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import registry
 from ...presentation.results import Results, label, listed
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from ..published import problem as published
+from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 
-ONE_STEP, MOTION, NEEDED = "peers/one step/", "peers/motion/", "peers/iterations/"
-STABILITY, LIU, MISSING = "peers/stability", "peers/liu2013", "peers/all"
 TARGETS = {"1e-3": 1e-3, "1e-6": 1e-6}
 DECADES = tuple(f"1e-{p}" for p in range(1, 9))
 EVERY = "every cloth"
@@ -52,22 +52,22 @@ class Point(NamedTuple):
     record: Record
 
 
-def points(results: Results, family: str) -> list[Point]:
-    """Return all points of a family, cloth by cloth: stiffness first, then particles."""
-    found = [p for record in results.all("cloth", family) for p in _points_of(record)]
+def points(results: Results, task: str) -> list[Point]:
+    """Return all points of a task, cloth by cloth: stiffness first, then particles."""
+    found = [p for record in results.all("cloth", task=task) for p in _points_of(record)]
     return sorted(found, key=lambda point: (point.stiffness, point.particles))
 
 
 def _points_of(record: Record) -> Iterator[Point]:
     if "particles" not in record.arrays:
         return
-    rungs = record.notes["rungs"].split("; ")
     count = record.arrays["particles"].size
     whole = {name: values for name, values in record.arrays.items() if values.size == count}
     for i in range(count):
         values = {name: float(array[i]) for name, array in whole.items()}
         yield Point(
-            record.settings["stiffness"], int(values["particles"]), record.solver, rungs[i], values,
+            record.settings["stiffness"], int(values["particles"]), record.solver,
+            record.facts["rungs"][i], values,
             record,
         )  # fmt: skip
 
@@ -79,7 +79,7 @@ def _cloth_of(point: Point) -> str:
 def _missing_rows(results: Results, cells: int) -> list[tuple[Cell, ...]]:
     return [
         (EVERY, record.solver, *[None] * (cells - 3), record.notes["remark"])
-        for record in results.all("cloth", MISSING)
+        for record in results.all("cloth", task=MISSING)
     ]
 
 
@@ -109,7 +109,7 @@ def one_step(results: Results) -> Table:
         "system do another step: their error stays, however long they take.",
         measured=f"{_CLOTH}{_FAIR}{_TRUTH}. Times are medians of up to five; settings are those of "
         "a ladder, of which the cheapest that suffices counts.",
-        answer=_step_answer(found),
+        summary=_step_summary(found),
     )
 
 
@@ -138,26 +138,26 @@ def _step_row(group: Sequence[Point]) -> tuple[Cell, ...]:
 
 def _remark(group: Sequence[Point]) -> str:
     """Return what a record says of this cloth."""
-    size = f"{group[0].particles} × {group[0].particles}"
-    remarks = group[0].record.notes.get("remark", "").split("; ")
-    return "; ".join(remark for remark in remarks if remark.startswith(size))
+    record = group[0].record
+    remarks = zip(record.arrays["remark_particles"], record.facts["remarks"], strict=True)
+    return "; ".join(sentence for particles, sentence in remarks if particles == group[0].particles)
 
 
 def _milliseconds(point: Point) -> float:
     return metrics.milliseconds(point.values["seconds"])
 
 
-def _step_answer(found: Sequence[Point]) -> Answer:
+def _step_summary(found: Sequence[Point]) -> Summary:
     said = []
     for cloth in dict.fromkeys(_cloth_of(point) for point in found):
         groups = _groups([point for point in found if _cloth_of(point) == cloth])
         fastest = [f"to {name} {_fastest(groups, target)}" for name, target in TARGETS.items()]
         said.append(f"{cloth}: {listed(fastest)}")
-    return Answer("The fastest of all solvers in one step:", tuple(said)) if said else Answer()
+    return Summary("The fastest of all solvers in one step:", tuple(said)) if said else Summary()
 
 
 def _engine(point: Point) -> str:
-    return point.solver.partition(" ")[0]
+    return registry.find(point.solver).engine
 
 
 def _fastest(groups: Sequence[Sequence[Point]], target: float) -> str:
@@ -191,7 +191,7 @@ def motion(results: Results) -> Table:
         shows="Distances are root mean squares over the particles after the last frame. Diverged "
         "means that a particle was farther from its true place than the cloth is wide.",
         measured=f"{_CLOTH}{_FAIR}{_TRUTH}: {_certainty(found)}.",
-        answer=_motion_answer(found),
+        summary=_motion_summary(found),
     )  # fmt: skip
 
 
@@ -233,17 +233,17 @@ def _certainty(found: Sequence[Point]) -> str:
     )
 
 
-def _motion_answer(found: Sequence[Point]) -> Answer:
+def _motion_summary(found: Sequence[Point]) -> Summary:
     lost = dict.fromkeys(point.solver for point in found if point.values["diverged"])
     if not found:
-        return Answer()
+        return Summary()
     said = []
     for cloth in dict.fromkeys(_cloth_of(point) for point in found):
         whole = [p for p in found if _cloth_of(p) == cloth and is_whole(p)]
         if whole:
             said.append(f"{cloth}: {_nearest(whole)}")
     sentence = f"With some settings diverged: {listed(list(lost))}." if lost else "None diverged."
-    return Answer(f"{sentence} Nearest to the truth:", tuple(said))
+    return Summary(f"{sentence} Nearest to the truth:", tuple(said))
 
 
 def _nearest(whole: Sequence[Point]) -> str:
@@ -261,7 +261,7 @@ def _nearest(whole: Sequence[Point]) -> str:
 
 def iterations(results: Results) -> Table:
     """Return the iterations of our solvers to each power of ten."""
-    records = results.all("cloth", NEEDED)
+    records = results.all("cloth", task=NEEDED)
     size = records[0].settings["size"] if records else 0
     return Table(
         "cloth_iterations",
@@ -275,7 +275,7 @@ def iterations(results: Results) -> Table:
         shows="Iterations until |x − x*| / |y − x*| is at most so much; nothing where all that "
         "were tried did not suffice.",
         measured=f"{_CLOTH}{size} × {size} particles. x* by Newton at the rounding floor.",
-        answer=_needed_answer(records),
+        summary=_needed_summary(records),
     )  # fmt: skip
 
 
@@ -287,13 +287,13 @@ def _needed_row(record: Record) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
-def _needed_answer(records: Sequence[Record]) -> Answer:
+def _needed_summary(records: Sequence[Record]) -> Summary:
     said = []
     for stiffness in dict.fromkeys(record.settings["stiffness"] for record in records):
         mine = [record for record in records if record.settings["stiffness"] == stiffness]
         counts = [f"{label(r.solver)} {_count_to(r, DECADES.index('1e-6'))}" for r in mine]
         said.append(f"{words(int(stiffness))} N/m: {listed(counts)}")
-    return Answer("Iterations to an error of 1e-6:", tuple(said)) if said else Answer()
+    return Summary("Iterations to an error of 1e-6:", tuple(said)) if said else Summary()
 
 
 def _count_to(record: Record, i: int) -> str:
@@ -308,7 +308,7 @@ def _count_to(record: Record, i: int) -> str:
 def stability(results: Results) -> Table:
     """Return the longest stable steps, beside what theory has for them."""
     rows: list[tuple[Cell, ...]] = []
-    for record in results.all("cloth", STABILITY):
+    for record in results.all("cloth", task=STABILITY):
         arrays = record.arrays
         for k, limit, frequency in zip(
             arrays["stiffness"], arrays["limit"], arrays["frequency"], strict=True
@@ -334,19 +334,19 @@ def stability(results: Results) -> Table:
         measured="A cloth of 6 × 6 particles hangs at rest and is pushed by 1e-5 m along its "
         "highest mode; a step is stable if that has not grown a hundredfold 400 steps later. Found "
         "by bisection to two ten-thousandths.",
-        answer=_stability_answer(rows),
+        summary=_stability_summary(rows),
     )  # fmt: skip
 
 
-def _stability_answer(rows: Sequence[tuple[Cell, ...]]) -> Answer:
+def _stability_summary(rows: Sequence[tuple[Cell, ...]]) -> Summary:
     shares = {row[0]: row[4] for row in rows if row[4] is not None}
     said = tuple(f"{solver}: {words(share)} × 2 / ω" for solver, share in shares.items())
-    return Answer("The longest stable step:", said) if said else Answer()
+    return Summary("The longest stable step:", said) if said else Summary()
 
 
 def liu_2013(results: Results) -> Table:
     """Return the published times of Liu et al. 2013, and ours for as many vertices."""
-    wanted = [r for r in results.all("cloth", LIU) if r.solver in published.LIU_2013]
+    wanted = [r for r in results.all("cloth", task=LIU) if r.solver in published.LIU_2013]
     records = [r for r in wanted if "seconds" in r.arrays]
     rows = []
     for record in records:
@@ -374,12 +374,12 @@ def liu_2013(results: Results) -> Table:
         f"81, {words(int(published.LIU_2013_STIFFNESS))} N/m, "
         f"one step of {words(metrics.milliseconds(published.LIU_2013_FRAME))} ms from mid-fall, on "
         "one core; Newton to a residual of 1e-6.",
-        answer=_liu_answer(rows),
+        summary=_liu_summary(rows),
     )  # fmt: skip
 
 
-def _liu_answer(rows: Sequence[tuple[Cell, ...]]) -> Answer:
+def _liu_summary(rows: Sequence[tuple[Cell, ...]]) -> Summary:
     if not rows:
-        return Answer()
+        return Summary()
     said = tuple(f"{row[0]}: {words(row[3])} ms, published {words(row[2])} ms" for row in rows)
-    return Answer("A frame of 6,561 vertices:", said)
+    return Summary("A frame of 6,561 vertices:", said)

@@ -23,18 +23,19 @@ from reference.sparse import CholeskyFactor
 from reference.sparse.linear_solver import factorize
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Workshop
-from ...harness.progress import tell
+from ...harness.isolation import WorkerProcess
+from ...harness.progress import announce
 from ...harness.stopwatch import timed
 from ...harness.worker import Done, Found, Message, Unfit, said
+from ...peers import registry
 
 H = 1 / 60
 STIFFNESS = 1e4
 ITERATIONS = 10
 # Particles along a side, and how long a benchmark may take [s] where the cloth is to be measured.
 SIZES = {32: 0.0, 100: 0.0, 316: 1.0, 1000: 1.0}
-OURS = "supernodal"
-LIBRARIES = (OURS, "cholespy")
+OURS = registry.SUPERNODAL.name
+LIBRARIES = tuple(library.name for library in registry.FACTORS)
 # Rounds in which everything is timed in turn: so many particles in all, within limits.
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
 # What the limit of memory reads again and again: more than any cache holds [bytes].
@@ -60,8 +61,8 @@ def in_its_own_process(size: int, library: str) -> Measured:
     """Measure one cloth in a process that does nothing else; say so if there is no such library."""
     if library != OURS and importlib.util.find_spec(library) is None:
         return Measured({}, {"missing": f"{library} is not installed"})
-    with contextlib.closing(Workshop(PATIENCE)) as shop:
-        outcome = shop.perform(LargeCloth(size, library))
+    with contextlib.closing(WorkerProcess(PATIENCE)) as worker:
+        outcome = worker.perform(LargeCloth(size, library))
     if outcome.found is None:
         raise RuntimeError(outcome.trouble)
     return Measured(dict(outcome.found))
@@ -86,7 +87,7 @@ class LargeCloth(NamedTuple):
 
 def _say(size: int, library: str, what: str) -> None:
     """Say what is being done now."""
-    tell(f"cloth/{size}x{size}, {library}: {what}")
+    announce(f"cloth/{size}x{size}, {library}: {what}")
 
 
 def billowing_cloth(size: int) -> tuple[MassSpring, State]:
@@ -119,7 +120,7 @@ def measure(size: int, library: str) -> dict[str, Any]:
 def steps(
     system: MassSpring, state: State, rounds: int, say: Callable[[str], None]
 ) -> dict[str, Any]:
-    """Return what iterations cost and all their parts, in turn; and what they reach."""
+    """Return the times of iterations and of their parts, and the residual reached."""
     say("matrix")
     matrix, assembly = timed(lambda: global_matrix(system, H))
     say("factor")

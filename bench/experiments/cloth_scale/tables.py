@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...peers import registry
 from ...presentation.results import Results, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 
-OURS = "supernodal"
-PEERS = {OURS: "ours", "cholespy": "CHOLMOD (cholespy)"}
+OURS = registry.SUPERNODAL.name
+PEERS = {library.name: library.label for library in registry.FACTORS}
 GIB = 2.0**30
 
 
@@ -35,7 +36,7 @@ def iterations(results: Results) -> Table:
         "as an iteration has to: the factor twice, the springs, the particles, in memory as near "
         "as theirs. As a factor outgrows a cache, its nonzeros cost more.",
         measured=_measured(records),
-        answer=_iterations_answer(records),
+        summary=_iterations_summary(records),
     )
 
 
@@ -58,7 +59,7 @@ def factors(results: Results) -> Table:
         "needs only the second. The memory is that of a whole process, compiler and cloth "
         "included, but for a second factor beside the first.",
         measured=_measured(records),
-        answer=_factors_answer(records),
+        summary=_factors_summary(records),
     )
 
 
@@ -92,20 +93,20 @@ def _factor_row(record: Record) -> tuple[Cell, ...]:
     )
 
 
-def _iterations_answer(records: Sequence[Record]) -> Answer:
+def _iterations_summary(records: Sequence[Record]) -> Summary:
     if not records:
-        return Answer()
+        return Summary()
     last = max(records, key=lambda record: record.settings["particles"])
     particles, count = words(last.settings["particles"]), words(last.settings["iterations"])
     step, solve = _median(last, "step"), _median(last, "solve")
-    return Answer(
+    return Summary(
         f"With {particles} particles {count} iterations take {words(step)} s, as long as "
         f"{words(metrics.ratio(step, solve))} solves, and leave a residual of "
         f"{words(float(last.arrays['residual']))}."
     )
 
 
-def _factors_answer(records: Sequence[Record]) -> Answer:
+def _factors_summary(records: Sequence[Record]) -> Summary:
     pairs: dict[int, dict[str, Record]] = {}
     for record in (r for r in records if r.arrays):
         pairs.setdefault(record.settings["particles"], {})[record.solver] = record
@@ -115,7 +116,7 @@ def _factors_answer(records: Sequence[Record]) -> Answer:
         for particles, pair in pairs.items()
         if PEERS.keys() <= pair.keys()
     )
-    return Answer("Ours as a multiple of CHOLMOD’s:" if points else "", points)
+    return Summary("Ours as a multiple of CHOLMOD’s:" if points else "", points)
 
 
 def _times(pair: dict[str, Record], name: str) -> str:
@@ -133,5 +134,5 @@ def _measured(records: Sequence[Record]) -> str:
         f"The lab’s cloth, with more particles, a stiffness of {stiffness or '–'} N/m and two "
         f"waves that rise; steps of {h or '–'} s. Each cloth in a process of its own, on one core "
         "but for the springs of the largest, which are summed on all; times are medians of rounds "
-        "in which everything takes its turn."
+        "in which everything is timed once."
     )

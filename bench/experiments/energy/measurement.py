@@ -31,7 +31,8 @@ def blocks(scale: Scale) -> Iterator[Block]:
     for name in DAMPINGS:
         for integrator in INTEGRATORS:
             measure = partial(swing, name, integrator)
-            yield Block("energy", f"swing/{name}", integrator, measure, settings)
+            facts = {"title": name, "damping": DAMPINGS[name]}
+            yield Block("energy", f"swing/{name}", integrator, measure, settings, facts=facts)
 
 
 def swing(name: str, integrator: str, steps: int = STEPS) -> Measured:

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 
-UNDAMPED = "swing/undamped"
 LISTED = (100, 1_000, 10_000)
 
 
@@ -33,14 +32,14 @@ def energy(results: Results) -> Table:
         f"N s/m and without; {settings(records, 'steps')} steps of {_milliseconds(records)} ms, "
         f"of which every {settings(records, 'every')}th is looked at. Implicit Euler by "
         f"local/global iterations to a residual of {settings(records, 'tolerance')}.",
-        answer=_answer(records),
+        summary=_summary(records),
     )
 
 
 def _row(record: Record) -> tuple[Cell, ...]:
     low, high = metrics.extent(record.arrays["left"])
     return (
-        label(record.problem.removeprefix("swing/")),
+        record.title,
         label(record.solver),
         *(_left(record, k) for k in LISTED),
         metrics.percent(high, 1.0),
@@ -54,11 +53,11 @@ def _left(record: Record, steps: int) -> float | None:
     return metrics.percent(float(left[k]), 1.0) if k < left.size else None
 
 
-def _answer(records: Sequence[Record]) -> Answer:
-    undamped = [record for record in records if record.problem == UNDAMPED]
+def _summary(records: Sequence[Record]) -> Summary:
+    undamped = [record for record in records if record.facts["damping"] == 0.0]
     if not undamped:
-        return Answer()
-    return Answer(
+        return Summary()
+    return Summary(
         f"Without dampers all energy should stay. After {settings(undamped, 'steps')} steps there "
         "is left, in percent:",
         tuple(f"{label(record.solver)}: {_course(record)}" for record in undamped),

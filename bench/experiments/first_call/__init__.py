@@ -1,1 +1,7 @@
 """What the first call of each public function costs: compiled then, or read from disk."""
+
+from ...harness.experiment import Experiment
+
+EXPERIMENT = Experiment(
+    __package__, "first_call", "the first call of each public function, with nothing compiled yet"
+)

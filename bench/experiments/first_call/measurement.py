@@ -19,7 +19,7 @@ from reference.backend.compilation import on_compile
 from reference.jacobians import jacobian
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Workshop
+from ...harness.isolation import WorkerProcess
 from ...harness.stopwatch import timed_twice
 from ...harness.worker import Done, Found, Message, Unfit, said
 
@@ -42,7 +42,8 @@ PATIENCE = 600.0
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield a block for every public function and solver."""
     for name, solver in calls() if scale.seconds >= ALL_FROM else QUICK:
-        yield Block("first_call", name, solver, partial(cold_and_warm, name, solver))
+        facts = {"title": name.replace("/", ", ")}
+        yield Block("first_call", name, solver, partial(cold_and_warm, name, solver), facts=facts)
 
 
 def calls() -> list[tuple[str, str]]:
@@ -59,7 +60,7 @@ def cold_and_warm(name: str, solver: str) -> Measured:
 
 def in_a_fresh_process(name: str, solver: str, folder: str) -> Mapping[str, Any]:
     """Measure a call, with compiled kernels kept in a folder."""
-    with contextlib.closing(Workshop(PATIENCE)) as shop:
+    with contextlib.closing(WorkerProcess(PATIENCE)) as shop:
         outcome = shop.perform(FirstCall(name, solver, os.fspath(folder)))
     if outcome.found is None:
         raise RuntimeError(outcome.trouble)

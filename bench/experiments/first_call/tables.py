@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ...harness.record import Record
 from ...presentation.results import Results, label
-from ...presentation.tables import Answer, Column, Table, words
+from ...presentation.tables import Column, Summary, Table, words
 
 
 def first_calls(results: Results) -> Table:
@@ -24,7 +24,7 @@ def first_calls(results: Results) -> Table:
         ),
         tuple(
             (
-                _function(record.problem),
+                record.title,
                 label(record.solver),
                 int(record.arrays["cold compiled"]),
                 *(float(record.arrays[name]) for name in TIMES),
@@ -36,26 +36,20 @@ def first_calls(results: Results) -> Table:
         "the kernels compiled, each with all that it calls.",
         measured="Each in two fresh processes, the first with an empty folder for what is "
         "compiled.",
-        answer=_answer(records),
+        summary=_summary(records),
     )
 
 
 TIMES = ("cold processor", "cold wall", "warm processor", "warm wall")
 
 
-def _function(problem: str) -> str:
-    """Return the name of a function as it is called, and what it works on."""
-    name, _, on = problem.partition("/")
-    return f"{name}, {on}" if on else name
-
-
-def _answer(records: Sequence[Record]) -> Answer:
+def _summary(records: Sequence[Record]) -> Summary:
     if not records:
-        return Answer()
+        return Summary()
     dearest = max(records, key=lambda record: float(record.arrays["cold processor"]))
     warm = max(float(record.arrays["warm processor"]) for record in records)
-    return Answer(
-        f"With nothing on disk the dearest, {_function(dearest.problem)} by "
+    return Summary(
+        f"With nothing on disk the dearest, {dearest.title} by "
         f"{label(dearest.solver)}, takes {words(float(dearest.arrays['cold processor']))} s of the "
         f"processor; once compiled, no first call takes more than {words(warm)} s."
     )

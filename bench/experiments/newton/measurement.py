@@ -16,13 +16,13 @@ from reference.implicit_euler.objective import Objective
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
+from ...peers import registry
 from .problem import STIFFNESSES, H, MidSwing, mid_swing
 
 SUITE = "newton"
 TOLERANCE = 1e-10
-# The most iterations of solvers that need many, and what is usual where steps have to be quick.
-MANY, USUAL = 3000, 10
-LIMITS = {"newton": 100, "gauss_newton": 1}
+# Iterations that are usual where steps have to be quick, and more than those of a quick solver.
+USUAL, SLOW = 10, 1000
 # From this stiffness on [N/m] the slow solvers also start beside Newton's answer, every coordinate
 # off by about so much [m].
 STIFF, BESIDE = 1e5, 1e-6
@@ -35,10 +35,10 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """Yield, for each stiffness, every solver's limit and ten local/global iterations."""
     size = FULL if scale.targets >= _FULL else QUICK
     for stiffness in STIFFNESSES:
-        for solver in STEP_SOLVERS:
-            limit = LIMITS.get(solver, MANY)
+        for solver, known in registry.step_solvers().items():
+            limit = known.certified
             yield _block(size, stiffness, solver, FROM_Y, limit)
-            if stiffness >= STIFF and limit == MANY:
+            if stiffness >= STIFF and limit >= SLOW:
                 yield _block(size, stiffness, solver, FROM_BESIDE, limit)
         yield _block(size, stiffness, "local_global", FROM_Y, USUAL)
 
@@ -46,7 +46,8 @@ def blocks(scale: Scale) -> Iterator[Block]:
 def _block(size: int, stiffness: float, solver: str, start: str, limit: int) -> Block:
     settings = {"h": H, "start": start, "iterations": limit, "tolerance": TOLERANCE}
     measure = partial(certified_step, size, stiffness, solver, start, limit)
-    return Block(SUITE, f"swing/k{stiffness:g}", solver, measure, settings, size)
+    facts = {"stiffness": stiffness}
+    return Block(SUITE, f"swing/k{stiffness:g}", solver, measure, settings, size, facts)
 
 
 def certified_step(size: int, stiffness: float, solver: str, start: str, limit: int) -> Measured:
@@ -82,7 +83,7 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
     )
 
 
-class Answer(NamedTuple):
+class Converged(NamedTuple):
     """Newton's answer x, its certificate, and g there."""
 
     x: FloatArray
@@ -91,11 +92,11 @@ class Answer(NamedTuple):
 
 
 @functools.cache
-def newtons_answer(problem: MidSwing) -> Answer:
+def newtons_answer(problem: MidSwing) -> Converged:
     """Return what Newton's method comes to, iterated far beyond the rounding floor."""
     integrator = ImplicitEuler(problem.system, h=problem.h, tolerance=0.0, max_iterations=50)
     x, objective = integrator.step(problem.state).state.positions, _objective(problem)
-    return Answer(x, certify(objective, x), objective.value(x))
+    return Converged(x, certify(objective, x), objective.value(x))
 
 
 def _objective(problem: MidSwing) -> Objective:

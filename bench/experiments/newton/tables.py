@@ -7,7 +7,7 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, counted, label, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 
 
 def certified(results: Results) -> Table:
@@ -38,7 +38,7 @@ def certified(results: Results) -> Table:
         measured=f"The lab’s cloth of {_sizes(records)} particles under 9.81 m/s², half a second "
         f"after it was let go; one step of {settings(records, 'h')} s, to a residual of "
         f"{settings(records, 'tolerance')}, the rounding floor, or the solver’s last iteration.",
-        answer=_answer(records),
+        summary=_summary(records),
     )
 
 
@@ -58,15 +58,15 @@ def _row(record: Record) -> tuple[Cell, ...]:
     )
 
 
-def _answer(records: Sequence[Record]) -> Answer:
+def _summary(records: Sequence[Record]) -> Summary:
     if not records:
-        return Answer()
+        return Summary()
     newton = [record for record in records if record.solver == "newton"]
     others = [record for record in records if record.solver != "newton"]
     done = metrics.share(np.array([_is_solved(record) for record in newton]))
     same = [record for record in others if record.arrays["same"]]
     apart = [float(record.arrays["apart"]) for record in same]
-    return Answer(
+    return Summary(
         f"Newton reached the tolerance or the rounding floor in {words(done.hits)} of "
         f"{counted(done.total, 'cloth')}. Of the other solvers’ "
         f"{counted(len(others), 'answer')}, {words(len(same))} are proven to belong to the same "
@@ -80,7 +80,7 @@ def _is_solved(record: Record) -> bool:
 
 
 def _stiffness(record: Record) -> float:
-    return float(record.problem.rpartition("/k")[2])
+    return float(record.facts["stiffness"])
 
 
 def _sizes(records: Sequence[Record]) -> str:

@@ -1,1 +1,8 @@
 """The poses and cloths that the report draws."""
+
+from ...harness.experiment import Experiment
+
+# What a record is about.
+ARM, CLOTH = "arm", "cloth"
+
+EXPERIMENT = Experiment(__package__, "pictures", "the poses and cloths that the report draws")

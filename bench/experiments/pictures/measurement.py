@@ -12,6 +12,7 @@ from ...harness.block import Block, Measured, Scale
 from ..arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
 from ..cloth.measurement import converged_motion
 from ..cloth.problem import H, cloth_swing
+from . import ARM, CLOTH
 
 GHOSTS = 9
 FRAMES = 6
@@ -24,10 +25,11 @@ def blocks(scale: Scale) -> Iterator[Block]:
         yield Block(
             "pictures", f"arm/{CUSTOM}", solver, partial(drawing, solver, evened),
             {"evened": evened, "min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING},
+            facts={"task": ARM},
         )  # fmt: skip
     yield Block(
         "pictures", "cloth/x1", "newton", falling_cloth,
-        {"h": H, "frames": FRAMES},
+        {"h": H, "frames": FRAMES}, facts={"task": CLOTH},
     )  # fmt: skip
 
 
@@ -36,15 +38,15 @@ def drawing(solver: str, evened: bool) -> Measured:
     skeleton, rest = scenes.lab_arm()
     curve = evened_custom_curve() if evened else custom_curve()
     motion = track(skeleton, curve, solver, rest)
-    turns = metrics.turns(motion.local_rotations[:, :-1])
+    turns = metrics.rotation_angles(motion.local_rotations[:, :-1])
     ghosts = np.linspace(0, len(curve) - 1, GHOSTS).round().astype(int)
     return Measured(
         {
             "curve": curve,
             "residual": motion.residual,
             "iterations": motion.iterations,
-            "largest_turn": turns.max(axis=-1),
-            "mean_turn": turns.mean(axis=-1),
+            "largest_angle": turns.max(axis=-1),
+            "mean_angle": turns.mean(axis=-1),
             "spacing": np.linalg.norm(np.diff(curve, axis=0), axis=-1),
             "ghosts": motion.positions[ghosts],
         }

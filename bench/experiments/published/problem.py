@@ -35,10 +35,26 @@ TRAC_IK = (
 )
 TRAC_IK_TOLERANCE = 1e-5
 
+
 # Haviland and Corke, "Manipulator differential kinematics" (2022), part I, table 1, by the notebook
 # that goes with it: UR5, 10,000 random poses, one search of at most 500 iterations from a random
 # start, half the squared error within 1e-6, limits not looked at. Infeasible [%].
-TOOLBOX = {"NR": 11.0, "GN": 10.58, "LM chan 0.1": 9.62, "LM wampler 1e-6": 5.34}
+class PublishedSearch(NamedTuple):
+    """A search of the toolbox's, the settings of our adapter that stand for it, and the rate."""
+
+    title: str
+    settings: dict[str, str | float]
+    infeasible: float
+
+
+TOOLBOX = (
+    PublishedSearch("NR", {"method": "NR"}, 11.0),
+    PublishedSearch("GN", {"method": "GN"}, 10.58),
+    PublishedSearch("LM chan 0.1", {"method": "LM", "damping": "chan", "factor": 0.1}, 9.62),
+    PublishedSearch(
+        "LM wampler 1e-6", {"method": "LM", "damping": "wampler", "factor": 1e-6}, 5.34
+    ),
+)
 TOOLBOX_ITERATIONS = 500
 # Half the squared error, as the toolbox has it, at which a target counts as reached.
 TOOLBOX_HALF_SQUARE = 1e-6

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
+from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
 
 HERE = "here"
@@ -13,10 +14,10 @@ HERE = "here"
 
 def trac_ik(results: Results) -> Table:
     """Return TRAC-IK's table, and what the solvers do here."""
-    records = results.all("ik", "published/trac_ik/")
+    records = results.all("ik", task=TRAC_IK)
     rows: list[tuple[Cell, ...]] = []
     for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK):
-        here = [r for r in records if r.problem.endswith(f"/{robot}")]
+        here = [r for r in records if r.facts["robot"] == robot]
         rows += [
             (robot, rate.solver, rate.source, None, rate.percent, None, rate.milliseconds)
             for rate in published.TRAC_IK if here and rate.robot == robot
@@ -35,9 +36,9 @@ def trac_ik(results: Results) -> Table:
         "middle of the limits, at most 5 ms for TRAC-IK; times of all targets, those that failed "
         "included.",
         measured="Published: 10,000 reachable random poses on a machine of its time. Here: as many "
-        "of our own as the column says, judged by MuJoCo at the norm of three such components; the "
-        "PR2’s continuous joints have two turns either way.",
-        answer=_trac_ik_answer(records),
+        "of our own as the column says, evaluated by MuJoCo at the norm of three such components; "
+        "the PR2’s continuous joints have two revolutions in either direction.",
+        summary=_trac_ik_summary(records),
     )  # fmt: skip
 
 
@@ -52,19 +53,19 @@ def _trac_ik_row(robot: str, record: Record) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
-def _trac_ik_answer(records: Sequence[Record]) -> Answer:
+def _trac_ik_summary(records: Sequence[Record]) -> Summary:
     points = []
     for record in records:
         if "solved" in record.arrays:
-            robot = record.problem.rpartition("/")[2]
+            robot = record.facts["robot"]
             row = _trac_ik_row(robot, record)
             points.append(f"{robot}, {record.solver}: {words(row[3])}, mean {words(row[6])} ms")
-    return Answer("Here:", tuple(points)) if points else Answer()
+    return Summary("Here:", tuple(points)) if points else Summary()
 
 
 def toolbox(results: Results) -> Table:
     """Return the Robotics Toolbox's table of one search, and what the solvers do here."""
-    records = [r for r in results.all("ik", "published/toolbox/") if "solved" in r.arrays]
+    records = [r for r in results.all("ik", task=TOOLBOX) if "solved" in r.arrays]
     return Table(
         "published_toolbox",
         "The Robotics Toolbox tutorial’s table of one search, and here",
@@ -82,21 +83,20 @@ def toolbox(results: Results) -> Table:
         measured="Published: 10,000 poses, the tutorial’s own Python loops (Haviland and Corke "
         "2022). Here the toolbox’s compiled ones, and ours; half the squared error within "
         f"{words(published.TOOLBOX_HALF_SQUARE)}.",
-        answer=_toolbox_answer(records),
+        summary=_toolbox_summary(records),
     )  # fmt: skip
 
 
 def _toolbox_row(record: Record) -> tuple[Cell, ...]:
-    method = record.settings.get("method", "")
     failed = metrics.share(~record.arrays["solved"])
     own = metrics.share(record.arrays["claimed"] != 1)
     return (
-        record.solver, published.TOOLBOX.get(method), metrics.percent(own.hits, own.total), failed,
+        record.solver, record.facts.get("infeasible"), metrics.percent(own.hits, own.total), failed,
         metrics.microseconds(metrics.effort(record.arrays["seconds"]).median),
     )  # fmt: skip
 
 
-def _toolbox_answer(records: Sequence[Record]) -> Answer:
+def _toolbox_summary(records: Sequence[Record]) -> Summary:
     points = []
     for record in records:
         solver, before, own, failed, _ = _toolbox_row(record)
@@ -104,12 +104,12 @@ def _toolbox_answer(records: Sequence[Record]) -> Answer:
         points.append(
             f"{solver}: {words(own)} % infeasible by its own word{beside}; {words(failed)}"
         )
-    return Answer("Not solved by one search:", tuple(points)) if points else Answer()
+    return Summary("Not solved by one search:", tuple(points)) if points else Summary()
 
 
 def fabrik(results: Results) -> Table:
     """Return table 1 of the paper on FABRIK, and our iterations."""
-    records = results.all("ik", "published/fabrik/")
+    records = results.all("ik", task=FABRIK)
     solvers = list(dict.fromkeys(record.solver for record in records))
     columns = [
         Column(f"{stratum}, {what}")
@@ -128,14 +128,15 @@ def fabrik(results: Results) -> Table:
         f"{published.FABRIK_LINKS} links of 0.1 m from straight, {published.FABRIK_RUNS} seeded "
         f"directions, targets at {' and '.join(map(str, published.FABRIK_DISTANCES.values()))} m, "
         f"to {settings(records, 'tolerance')} m.",
-        answer=_fabrik_answer(results, solvers),
+        summary=_fabrik_summary(results, solvers),
     )
 
 
 def _fabrik_row(results: Results, solver: str) -> tuple[Cell, ...]:
     cells: list[Cell] = [label(solver)]
     for i, stratum in enumerate(published.FABRIK_DISTANCES):
-        record = results.one("ik", f"published/fabrik/{stratum}", solver)
+        found = results.all("ik", task=FABRIK, stratum=stratum)
+        record = next((r for r in found if r.solver == solver), None)
         cells.append(published.FABRIK[solver][i] if solver in published.FABRIK else None)
         counts = None if record is None else record.arrays["iterations"]
         cells.append(None if counts is None else metrics.mean(counts))
@@ -143,11 +144,13 @@ def _fabrik_row(results: Results, solver: str) -> tuple[Cell, ...]:
     return tuple(cells)
 
 
-def _fabrik_answer(results: Results, solvers: Sequence[str]) -> Answer:
+def _fabrik_summary(results: Results, solvers: Sequence[str]) -> Summary:
     points = [
         f"{row[0]}: {words(row[2])} here, {words(row[1])} published"
         for row in (_fabrik_row(results, solver) for solver in solvers)
     ]
     return (
-        Answer("Mean iterations towards a reachable target:", tuple(points)) if points else Answer()
+        Summary("Mean iterations towards a reachable target:", tuple(points))
+        if points
+        else Summary()
     )

@@ -21,7 +21,8 @@ def blocks(scale: Scale) -> Iterator[Block]:
         for model in models(family):
             for engine in ROBOT_ENGINES:
                 measure = partial(compare, engine, model)
-                yield Block(SUITE, f"{family}/{model.name}", engine, measure, settings)
+                facts = {"title": model.name}
+                yield Block(SUITE, f"{family}/{model.name}", engine, measure, settings, facts=facts)
 
 
 def compare(engine: str, model: Model) -> Measured:

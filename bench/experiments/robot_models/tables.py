@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ...harness.record import Record
 from ...presentation.results import Results, counted, listed, problems, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
 
 SIZES = ("links", "joints", "freedoms")
 QUANTITIES = ("positions", "rotations", "jacobians")
@@ -21,7 +21,7 @@ def agreement(results: Results) -> Table:
             Column("links"),
             Column("moving joints"),
             Column("freedoms"),
-            Column("positions, of the room"),
+            Column("positions, of the extent"),
             Column("rotations"),
             Column("Jacobians"),
             Column("engines", words=True),
@@ -29,12 +29,12 @@ def agreement(results: Results) -> Table:
         ),
         tuple(_row([r for r in records if r.problem == name]) for name in problems(records)),
         shows="The reference reads each file itself. Differences are the largest of all links in "
-        "all configurations; positions are measured against the room that the links take up, "
+        "all configurations; positions are measured against the extent of the links, "
         "Jacobians against that and one radian. An engine that is known to place links elsewhere "
         "is left out of the numbers, and the cause is given.",
         measured=f"{settings(records, 'configurations') or 'No'} random configurations of each "
         "file, within the limits; links and joints are matched by name.",
-        answer=_answer(records),
+        summary=_summary(records),
     )
 
 
@@ -46,7 +46,7 @@ def _row(records: Sequence[Record]) -> tuple[Cell, ...]:
         found = [int(fullest.arrays[name]) for name in SIZES]
         found += [_largest(agreeing, name) for name in QUANTITIES]
     return (
-        records[0].problem.partition("/")[2],
+        records[0].title,
         *found,
         listed([record.solver for record in agreeing]) or "none",
         "; ".join(remark for record in records if (remark := _remark(record))),
@@ -74,10 +74,10 @@ def _remark(record: Record) -> str:
     return ""
 
 
-def _answer(records: Sequence[Record]) -> Answer:
+def _summary(records: Sequence[Record]) -> Summary:
     agreeing = [record for record in records if _agrees(record)]
     if not agreeing:
-        return Answer()
+        return Summary()
     worst = [words(_largest(agreeing, quantity)) for quantity in QUANTITIES]
     points = []
     for engine in dict.fromkeys(record.solver for record in records):
@@ -90,8 +90,8 @@ def _answer(records: Sequence[Record]) -> Answer:
             if off
             else f"{engine}: {words(len(read))} of {counted(len(mine), 'file')} read"
         )
-    return Answer(
+    return Summary(
         f"Over {counted(len(problems(agreeing)), 'file')} positions differ by at most {worst[0]} "
-        f"of the room, rotations by {worst[1]}, Jacobians by {worst[2]}:",
+        f"of the extent, rotations by {worst[1]}, Jacobians by {worst[2]}:",
         tuple(points),
     )

@@ -1,10 +1,11 @@
-"""The judge: what an answer comes to, by MuJoCo's kinematics of the robot's own text.
+"""Evaluate solutions of inverse kinematics by MuJoCo's kinematics of the robot's own text.
 
-It shares no code with the reference, and says the same of every solver: how far the tips are from
-where they are wanted, how far they are turned away, and by how much a joint is beyond its limits.
+It shares no code with the reference, and measures the same for every solver: the distance and the
+angle of each tip from its target, and by how much a joint is beyond its limits.
 """
 
 import functools
+import xml.etree.ElementTree as ElementTree
 from typing import Any, NamedTuple
 
 import mujoco
@@ -41,12 +42,12 @@ class Targets(NamedTuple):
     strata: np.ndarray
 
 
-class Judgement(NamedTuple):
+class Evaluation(NamedTuple):
     """What the answers come to, one entry a target.
 
     Attributes:
         position: the farthest tip's distance from its target [m]; NaN if there is no answer.
-        rotation: the most turned tip's angle from its target [rad]; zero where none is wanted.
+        rotation: the largest angle of a tip from its target [rad]; zero where none is wanted.
         beyond: by how much the worst joint is beyond its limit [rad].
         solved: whether all three are within tolerance.
     """
@@ -59,14 +60,14 @@ class Judgement(NamedTuple):
 
 def mujoco_model(robot: Robot) -> Any:
     """Return the robot in MuJoCo, all of its links kept."""
-    text = robot.text
-    if text.startswith("<robot"):
-        head, _, rest = text.partition(">")
-        text = f'{head}><mujoco><compiler fusestatic="false"/></mujoco>{rest}'
-    return mujoco.MjModel.from_xml_string(text)
+    tree = ElementTree.fromstring(robot.text)
+    if robot.is_chain:
+        extension = ElementTree.SubElement(tree, "mujoco")
+        ElementTree.SubElement(extension, "compiler", fusestatic="false")
+    return mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
 
 
-class Judge:
+class Evaluator:
     """The kinematics of one robot."""
 
     def __init__(self, robot: Robot) -> None:
@@ -91,31 +92,31 @@ class Judge:
         )
 
     def jacobians(self, q: FloatArray) -> FloatArray:
-        """Return what moves and turns the tips, (row, 6 tip, freedom)."""
+        """Return the Jacobians of the tips' positions and rotations, (row, 6 tip, freedom)."""
         J = np.empty((len(q), 6 * len(self._tips), self.model.nv))
         for i, row in enumerate(q):
             self._place(row)
             mujoco.mj_comPos(self.model, self._data)
             for k, tip in enumerate(self._tips):
-                moves, turns = J[i, 6 * k : 6 * k + 3], J[i, 6 * k + 3 : 6 * k + 6]
-                mujoco.mj_jacBody(self.model, self._data, moves, turns, tip)
+                linear, angular = J[i, 6 * k : 6 * k + 3], J[i, 6 * k + 3 : 6 * k + 6]
+                mujoco.mj_jacBody(self.model, self._data, linear, angular, tip)
         return J
 
-    def judge(self, targets: Targets, q: FloatArray, tolerance: Tolerance) -> Judgement:
+    def evaluate(self, targets: Targets, q: FloatArray, tolerance: Tolerance) -> Evaluation:
         """Return what answers (target, coordinate) to the first targets come to; NaN is none."""
         given = np.asarray(np.isfinite(q).all(axis=-1))
         positions, rotations = self.forward(np.where(given[:, None], q, targets.starts[: len(q)]))
-        aside = np.linalg.norm(positions - targets.positions[: len(q)], axis=-1).max(axis=-1)
-        turned = angle_between(rotations, targets.rotations[: len(q)]).max(axis=-1)
-        turned = turned if self.robot.posed else np.zeros_like(turned)
+        distance = np.linalg.norm(positions - targets.positions[: len(q)], axis=-1).max(axis=-1)
+        angle = angle_between(rotations, targets.rotations[: len(q)]).max(axis=-1)
+        angle = angle if self.robot.posed else np.zeros_like(angle)
         over = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
-        aside, turned, over = (np.where(given, x, np.nan) for x in (aside, turned, over))
+        distance, angle, over = (np.where(given, x, np.nan) for x in (distance, angle, over))
         solved = (
-            (aside <= tolerance.position)
-            & (turned <= tolerance.rotation)
+            (distance <= tolerance.position)
+            & (angle <= tolerance.rotation)
             & (over <= LIMIT_TOLERANCE)
         )
-        return Judgement(aside, turned, over, solved)
+        return Evaluation(distance, angle, over, solved)
 
     def _place(self, q: FloatArray) -> None:
         self._data.qpos[:] = q
@@ -132,6 +133,6 @@ def angle_between(A: FloatArray, B: FloatArray) -> FloatArray:
 
 
 @functools.cache
-def judge(name: str) -> Judge:
-    """Return the judge of a robot by name."""
-    return Judge(robot(name))
+def evaluator_of(name: str) -> Evaluator:
+    """Return the evaluator of a robot by name."""
+    return Evaluator(robot(name))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...harness.stopwatch import Budget, timed
 from ...harness.worker import Done, Message, Ready, Solved, Unfit, said
-from ...peers.ik.protocol import Answer, Ask, Solve, UnableError
+from ...peers.ik.protocol import Ask, Solve, SolverOutput, UnableError
 from ...peers.ik.restarts import restarted
 from .evaluate import Targets, Tolerance
 from .problem import Robot
@@ -85,13 +85,13 @@ def _asked(ask: Ask, job: Job, i: int) -> Solve:
 def _solve(solve: Solve, job: Job) -> Solved:
     trouble, starts = "", job.targets.starts
 
-    def attempt() -> Answer:
+    def attempt() -> SolverOutput:
         nonlocal trouble
         try:
             return solve()
         except Exception as error:  # one target lost, not the rest
             trouble = said(error)
-            return Answer(None, False)
+            return SolverOutput(None, False)
 
     answer, seconds = timed(attempt)
     nothing = np.full(starts.shape[-1], np.nan)

@@ -1,6 +1,6 @@
 """Robots: every solver that is installed on every arm and on the character, in all strata.
 
-Each solver works in a process of its own. Its answers are judged here, by MuJoCo's kinematics.
+Each solver works in a process of its own. Its answers are evaluated here, by MuJoCo's kinematics.
 """
 
 import functools
@@ -11,10 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Workshop
+from ...harness.isolation import WorkerProcess
 from ...harness.worker import Solved
-from ...peers.ik import PEERS, Entry, Peer
-from .evaluate import Targets, Tolerance, judge
+from ...peers import registry
+from ...peers.registry import Entry, Peer
+from . import REACHABLE, UNREACHABLE
+from .evaluate import Targets, Tolerance, evaluator_of
 from .job import Job
 from .problem import PACKAGE, ROBOTS, is_installed, title
 from .targets import STRATA, robot_targets, unreachable_targets
@@ -26,9 +28,7 @@ _TARGETS = 0.1
 _BUDGET = 3.0
 # Those out of reach are fewer: the slowest solvers take the longest over them.
 _OUT_OF_REACH = 0.25
-EVERY_ROBOT, EVERY_SOLVER = "robots/all", "all solvers"
-# Between the names of the strata in a record's notes.
-LIST = ", "
+EVERY_SOLVER = "all solvers"
 # Digits kept of times and residuals: more would fill the disk with noise.
 _DIGITS = 5
 
@@ -49,9 +49,10 @@ def blocks(scale: Scale) -> Iterator[Block]:
     here = [name for name in ROBOTS if is_installed(name)]
     for name in ROBOTS:
         if name not in here:
-            absent = partial(not_installed, PACKAGE, title(name))
-            yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"})
-    for peer in PEERS:
+            absent = partial(not_installed, PACKAGE)
+            facts = {"task": REACHABLE, "title": title(name)}
+            yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"}, 0, facts)
+    for peer in registry.PEERS:
         for entry in peer.entries:
             yield from _entry_blocks(peer, entry, here, count, _BUDGET * scale.seconds)
 
@@ -62,16 +63,20 @@ def _entry_blocks(
     solver = peer.called(entry)
     settings = settings_of(peer, entry, TOLERANCE)
     if not peer.version:
-        yield Block(SUITE, EVERY_ROBOT, solver, partial(not_installed, peer.package), settings)
+        absent = partial(not_installed, peer.package)
+        facts = {"task": REACHABLE, "title": "every robot"}
+        yield Block(SUITE, "robots/all", solver, absent, settings, 0, facts)
         return
     few = max(1, round(_OUT_OF_REACH * count))
     for name in robots:
         run = Run(name, peer, entry, TOLERANCE, budget)
         measure = partial(_solve_strata, run, count)
-        yield Block(SUITE, f"robots/{name}", solver, measure, settings, count * len(STRATA))
+        facts = {"task": REACHABLE, "title": title(name)}
+        yield Block(SUITE, f"robots/{name}", solver, measure, settings, count * len(STRATA), facts)
         run = run._replace(budget=_OUT_OF_REACH * budget)
         measure = partial(_solve_unreachable, run, few)
-        yield Block(SUITE, f"unreachable/{name}", solver, measure, settings, few)
+        facts = {"task": UNREACHABLE, "title": title(name)}
+        yield Block(SUITE, f"unreachable/{name}", solver, measure, settings, few, facts)
 
 
 def settings_of(peer: Peer, entry: Entry, tolerance: Tolerance) -> dict[str, Any]:
@@ -86,9 +91,9 @@ def settings_of(peer: Peer, entry: Entry, tolerance: Tolerance) -> dict[str, Any
     }
 
 
-def not_installed(package: str, robot: str = "every robot") -> Measured:
+def not_installed(package: str) -> Measured:
     """Return a block without numbers that says what is missing."""
-    return Measured({}, {"remark": f"{package} is not installed", "robot": robot})
+    return Measured({}, {"remark": f"{package} is not installed"})
 
 
 def _solve_strata(run: Run, count: int) -> Measured:
@@ -100,54 +105,53 @@ def _solve_unreachable(run: Run, count: int) -> Measured:
 
 
 def solve(run: Run, targets: Targets) -> Measured:
-    """Let a solver loose on the targets, and judge what came of it, finished or not.
+    """Solve the targets, and evaluate what came of it, finished or not.
 
     A target over which the solver's process was lost counts as one that it did not solve, with the
     time until it was given up; targets never begun do not count.
     """
-    robot = judge(run.robot).robot
+    robot = evaluator_of(run.robot).robot
     job = Job(
         run.peer.module, robot, targets, run.tolerance, run.entry.settings,
         run.entry.restarts, run.budget,
     )  # fmt: skip
-    outcome = workshop().perform(job)
+    outcome = worker_process().perform(job)
     done = outcome.solved
     if outcome.lost and len(done) < len(targets.starts):
         nothing = np.full(targets.starts.shape[-1], np.nan)
-        done = [*done, Solved(nothing, 0, workshop().patience, outcome.trouble)]
-    arrays = _judged(run, targets, done) if done else {}
+        done = [*done, Solved(nothing, 0, worker_process().patience, outcome.trouble)]
+    arrays = _evaluated(run, targets, done) if done else {}
     return Measured(
         {**arrays, "setup": np.array(outcome.setup)},
+        {"remark": outcome.trouble},
         {
-            "remark": outcome.trouble,
-            "strata": LIST.join(STRATA),
-            "robot": robot.title,
-            "tips": LIST.join(robot.tips),
-            "joints": str(len(robot.joints)),
-            "freedom": str(judge(run.robot).model.nv),
+            "strata": list(STRATA),
+            "tips": list(robot.tips),
+            "joints": len(robot.joints),
+            "freedom": int(evaluator_of(run.robot).model.nv),
             "wanted": "pose" if robot.posed else "position",
         },
     )
 
 
-def _judged(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.ndarray]:
+def _evaluated(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.ndarray]:
     answers = np.array([one.q for one in done])
-    judgement = judge(run.robot).judge(targets, answers, run.tolerance)
+    evaluation = evaluator_of(run.robot).evaluate(targets, answers, run.tolerance)
     return {
-        "solved": judgement.solved,
+        "solved": evaluation.solved,
         "claimed": np.array([one.claimed for one in done]),
         "seconds": _short(np.array([one.seconds for one in done])),
-        "position": _short(judgement.position),
-        "rotation": _short(judgement.rotation),
-        "beyond": _short(judgement.beyond),
+        "position": _short(evaluation.position),
+        "rotation": _short(evaluation.rotation),
+        "beyond": _short(evaluation.beyond),
         "stratum": targets.strata[: len(done)],
     }
 
 
 @functools.cache
-def workshop() -> Workshop:
+def worker_process() -> WorkerProcess:
     """Return the one process in which all solvers work, one after the other."""
-    return Workshop()
+    return WorkerProcess()
 
 
 def _short(values: np.ndarray) -> np.ndarray:

@@ -2,8 +2,8 @@
 
 An arm is the chain of links from a root to a tip. Everything that is not kinematics is dropped from
 the file, and so are soft limits, which some readers take for the limits. Continuous joints are
-given two turns either way, so that every solver has one number a joint. All solvers and the judge
-read this same text.
+limited to two revolutions in either direction, so that every solver has one number a joint. All
+solvers and the evaluation read this same text.
 """
 
 import functools
@@ -62,7 +62,7 @@ class Robot:
         return not self.balls and len(self.tips) == 1
 
     def draw(self, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return random coordinates, (count, coordinate): hinges even, balls turned by about 1."""
+        """Return random coordinates, (count, coordinate): hinges even, balls rotated by about 1."""
         free = np.isfinite(self.lower)
         q = np.zeros((count, len(self.lower)))
         q[:, free] = rng.uniform(self.lower[free], self.upper[free], (count, int(free.sum())))
@@ -75,7 +75,7 @@ class Robot:
 
 
 class Link(NamedTuple):
-    """A step along a chain: a fixed transform, then a turn about an axis; None where fixed."""
+    """A step along a chain: a fixed transform, then a rotation about an axis; None where fixed."""
 
     transform: FloatArray
     axis: FloatArray | None
@@ -150,7 +150,7 @@ def links(chain: Robot) -> list[Link]:
         transform = np.eye(4)
         if origin is not None:
             transform[:3, 3] = _numbers(origin.get("xyz", "0 0 0"))
-            transform[:3, :3] = _turned(*_numbers(origin.get("rpy", "0 0 0")))
+            transform[:3, :3] = _from_roll_pitch_yaw(*_numbers(origin.get("rpy", "0 0 0")))
         axis = joint.find("axis")
         fixed = joint.get("type") == "fixed"
         along = _numbers("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
@@ -304,7 +304,7 @@ def _numbers(text: str) -> FloatArray:
     return np.array([float(word) for word in text.split()])
 
 
-def _turned(roll: float, pitch: float, yaw: float) -> FloatArray:
+def _from_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> FloatArray:
     """Return the rotation by roll about x, then pitch about y, then yaw about z, all fixed axes."""
     (cx, cy, cz), (sx, sy, sz) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
     return np.array(

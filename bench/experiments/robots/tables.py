@@ -11,9 +11,11 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...peers.ik import ONE_START, PEERS, RESTARTS
+from ...peers import registry
+from ...peers.registry import ONE_START, RESTARTS
 from ...presentation.results import Results, listed, settings
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.tables import Cell, Column, Summary, Table, words
+from . import REACHABLE, UNREACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}
 # Shares of the targets are shown for these budgets [s] and these ratios to the fastest.
@@ -25,9 +27,9 @@ _MEASURED = (
     "Every solver has the same text of the robot, the same targets and the same seeded random "
     "starts. It works in a process of its own, on one core (TRAC-IK on two), and is timed target "
     "by target, as in a loop of solves: after the target before, solved again without counting "
-    "where that takes less than a millisecond; conversions are left out. What it returns is judged "
-    "by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a busy "
-    "machine. Solved means: "
+    "where that takes less than a millisecond; conversions are left out. What it returns is "
+    "evaluated by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a "
+    "busy machine. Solved means: "
 )
 
 
@@ -41,17 +43,12 @@ class Tables(NamedTuple):
     profiles: Callable[[Results], Table]
 
 
-def records_of(results: Results, kind: str, family: str = "robots/") -> list[Record]:
+def records_of(results: Results, kind: str, task: str = REACHABLE) -> list[Record]:
     """Return the records on robots of one kind, robot by robot."""
-    wanted = [r for r in results.all("ik", family) if r.settings.get("kind") in (kind, "any")]
-    order = list(dict.fromkeys(robot_of(record) for record in wanted if "solved" in record.arrays))
-    order += [name for name in map(robot_of, wanted) if name not in order]
-    return sorted(wanted, key=lambda record: order.index(robot_of(record)))
-
-
-def robot_of(record: Record) -> str:
-    """Return how the robot of a record is written."""
-    return record.notes.get("robot", record.problem.rpartition("/")[2])
+    wanted = [r for r in results.all("ik", task=task) if r.settings.get("kind") in (kind, "any")]
+    order = list(dict.fromkeys(record.title for record in wanted if "solved" in record.arrays))
+    order += [name for name in (record.title for record in wanted) if name not in order]
+    return sorted(wanted, key=lambda record: order.index(record.title))
 
 
 def measured(records: Sequence[Record]) -> list[Record]:
@@ -61,10 +58,10 @@ def measured(records: Sequence[Record]) -> list[Record]:
 
 def models(results: Results) -> Table:
     """Return the robots and what is asked of them."""
-    one = {robot_of(r): r for kind in KINDS for r in measured(records_of(results, kind))}
+    one = {r.title: r.facts for kind in KINDS for r in measured(records_of(results, kind))}
     rows = [
-        (robot, int(r.notes["joints"]), int(r.notes["freedom"]), r.notes["tips"], r.notes["wanted"])
-        for robot, r in one.items()
+        (robot, of["joints"], of["freedom"], ", ".join(of["tips"]), of["wanted"])
+        for robot, of in one.items()
     ]
     return Table(
         "robots_list",
@@ -78,19 +75,19 @@ def models(results: Results) -> Table:
         ),
         tuple(rows),
         shows="Arms are the chains of links that end in the tip, hinges alone, with the limits of "
-        "their files; continuous joints have two turns either way. The character is our own, of "
-        "balls without and hinges with limits.",
+        "their files; continuous joints have two revolutions in either direction. The "
+        "character is our own, of balls without and hinges with limits.",
         measured="The arms’ files are those of example-robot-data, without soft limits; every "
-        "solver and the judge read the same text.",
-        answer=Answer(f"{listed([str(row[0]) for row in rows])}.") if rows else Answer(),
+        "solver and the evaluation read the same text.",
+        summary=Summary(f"{listed([str(row[0]) for row in rows])}.") if rows else Summary(),
     )
 
 
 def who(results: Results) -> Table:
     """Return the solvers that take part."""
-    present = {r.solver: r for r in results.all("ik", "robots/")}
+    present = {r.solver: r for r in results.all("ik", task=REACHABLE)}
     rows: list[tuple[Cell, ...]] = []
-    for peer in PEERS if present else ():
+    for peer in registry.PEERS if present else ():
         versions = [
             present[peer.called(entry)].settings.get("version", "")
             for entry in peer.entries if peer.called(entry) in present
@@ -111,10 +108,12 @@ def who(results: Results) -> Table:
         shows="A solver that makes one attempt is also started again by the bench, from seeded "
         "random poses until it claims an answer within the limits.",
         measured="Settings are the packages’ own but for those in brackets and what their adapters "
-        "in bench/solvers say.",
-        answer=Answer(f"{sum(row[2] != 'not installed' for row in rows)} of {len(rows)} installed.")
+        "in bench/peers say.",
+        summary=Summary(
+            f"{sum(row[2] != 'not installed' for row in rows)} of {len(rows)} installed."
+        )
         if rows
-        else Answer(),
+        else Summary(),
     )
 
 
@@ -138,10 +137,10 @@ def _success(kind: str) -> Callable[[Results], Table]:
             tuple(_success_row(record) for record in records),
             shows="Times are of all targets within reach, those that failed included. Residuals "
             "are of those solved, not cut off at the tolerance. “Claimed but not so” counts "
-            "answers that the solver calls solved and the judge does not. A solver that runs out "
-            "of time has fewer targets; all have them in one order, the strata taking turns.",
+            "answers that the solver calls solved and the evaluation does not. A solver that runs "
+            "out of time has fewer targets; all have them in one order, the strata alternating.",
             measured=_how(records),
-            answer=_success_answer(records),
+            summary=_success_summary(records),
         )  # fmt: skip
 
     return table
@@ -158,7 +157,7 @@ def _how(records: Sequence[Record]) -> str:
 
 
 def _success_row(record: Record) -> tuple[Cell, ...]:
-    names: tuple[Cell, ...] = (robot_of(record), record.solver)
+    names: tuple[Cell, ...] = (record.title, record.solver)
     remark = record.notes.get("remark", "")
     if "solved" not in record.arrays:
         return (*names, *[None] * 11, remark)
@@ -177,18 +176,18 @@ def _success_row(record: Record) -> tuple[Cell, ...]:
 
 
 def false_claims(record: Record) -> int | None:
-    """Return how many claims the judge denies; None if the solver makes none."""
+    """Return how many claims the evaluation denies; None if the solver makes none."""
     claimed = record.arrays["claimed"]
     return (
         metrics.share((claimed == 1) & ~record.arrays["solved"]).hits if any(claimed >= 0) else None
     )
 
 
-def _success_answer(records: Sequence[Record]) -> Answer:
+def _success_summary(records: Sequence[Record]) -> Summary:
     points = []
-    for robot in dict.fromkeys(robot_of(record) for record in measured(records)):
+    for robot in dict.fromkeys(record.title for record in measured(records)):
         said = []
-        for record in (r for r in measured(records) if robot_of(r) == robot):
+        for record in (r for r in measured(records) if r.title == robot):
             share, effort = (
                 metrics.share(record.arrays["solved"]),
                 metrics.effort(record.arrays["seconds"]),
@@ -199,16 +198,16 @@ def _success_answer(records: Sequence[Record]) -> Answer:
             )
         points.append(f"{robot}: {'; '.join(said)}")
     return (
-        Answer("Solved within reach, and the median time of all:", tuple(points))
+        Summary("Solved within reach, and the median time of all:", tuple(points))
         if points
-        else Answer()
+        else Summary()
     )
 
 
 def _strata(kind: str) -> Callable[[Results], Table]:
     def table(results: Results) -> Table:
         records = measured(records_of(results, kind))
-        strata = records[0].notes["strata"].split(", ") if records else []
+        strata = records[0].facts["strata"] if records else []
         return Table(
             f"robots_strata_{KINDS[kind]}",
             f"Robots, {kind}: success in each stratum",
@@ -220,7 +219,7 @@ def _strata(kind: str) -> Callable[[Results], Table]:
             "with the smallest least singular value of the Jacobian; at a limit: one joint put at "
             "one of its limits.",
             measured=_how(records),
-            answer=_strata_answer(records, strata),
+            summary=_strata_summary(records, strata),
         )
 
     return table
@@ -229,10 +228,10 @@ def _strata(kind: str) -> Callable[[Results], Table]:
 def _strata_row(record: Record, count: int) -> tuple[Cell, ...]:
     stratum, solved = record.arrays["stratum"], record.arrays["solved"]
     shares = [metrics.share(solved[stratum == i]) for i in range(count)]
-    return (robot_of(record), record.solver, *shares)
+    return (record.title, record.solver, *shares)
 
 
-def _strata_answer(records: Sequence[Record], strata: Sequence[str]) -> Answer:
+def _strata_summary(records: Sequence[Record], strata: Sequence[str]) -> Summary:
     hardest: dict[str, int] = {}
     for record in records:
         shares = _strata_row(record, len(strata))[2:]
@@ -242,10 +241,10 @@ def _strata_answer(records: Sequence[Record], strata: Sequence[str]) -> Answer:
             hardest[name] = hardest.get(name, 0) + 1
     if not hardest:
         return (
-            Answer("No stratum is harder than the others to any solver.") if records else Answer()
+            Summary("No stratum is harder than the others to any solver.") if records else Summary()
         )
     counts = sorted(hardest.items(), key=lambda item: -item[1])
-    return Answer(
+    return Summary(
         "Hardest, counted over solvers and robots: "
         + listed([f"{name} ({times})" for name, times in counts]) + "."
     )  # fmt: skip
@@ -253,7 +252,7 @@ def _strata_answer(records: Sequence[Record], strata: Sequence[str]) -> Answer:
 
 def _unreachable(kind: str) -> Callable[[Results], Table]:
     def table(results: Results) -> Table:
-        records = measured(records_of(results, kind, "unreachable/"))
+        records = measured(records_of(results, kind, UNREACHABLE))
         return Table(
             f"robots_unreachable_{KINDS[kind]}",
             f"Robots, {kind}: targets out of reach",
@@ -267,7 +266,7 @@ def _unreachable(kind: str) -> Callable[[Results], Table]:
             shows="Targets farther from the first joint than all links in a row reach. What counts "
             "is how soon a solver gives up, and that it claims nothing.",
             measured=_how(records),
-            answer=_unreachable_answer(records),
+            summary=_unreachable_summary(records),
         )  # fmt: skip
 
     return table
@@ -277,20 +276,20 @@ def _unreachable_row(record: Record) -> tuple[Cell, ...]:
     left = record.arrays["position"][np.isfinite(record.arrays["position"])]
     distance = metrics.spread(left)
     return (
-        robot_of(record), record.solver, int(record.arrays["solved"].size), false_claims(record),
+        record.title, record.solver, int(record.arrays["solved"].size), false_claims(record),
         *(metrics.microseconds(seconds) for seconds in metrics.effort(record.arrays["seconds"])),
         *((distance.median, distance.largest) if left.size else (None, None)), int(left.size),
     )  # fmt: skip
 
 
-def _unreachable_answer(records: Sequence[Record]) -> Answer:
-    liars = [row for row in map(_unreachable_row, records) if row[3]]
+def _unreachable_summary(records: Sequence[Record]) -> Summary:
+    claimed = [row for row in map(_unreachable_row, records) if row[3]]
     if not records:
-        return Answer()
-    if not liars:
-        return Answer("No solver claims a target that is out of reach.")
-    points = (f"{row[0]}, {row[1]}: {words(row[3])} of {words(row[2])}" for row in liars)
-    return Answer("Claimed though out of reach:", tuple(points))
+        return Summary()
+    if not claimed:
+        return Summary("No solver claims a target that is out of reach.")
+    points = (f"{row[0]}, {row[1]}: {words(row[3])} of {words(row[2])}" for row in claimed)
+    return Summary("Claimed though out of reach:", tuple(points))
 
 
 def _budgets(kind: str) -> Callable[[Results], Table]:
@@ -302,7 +301,7 @@ def _budgets(kind: str) -> Callable[[Results], Table]:
             (*_NAMES, *(Column(f"within {_duration(budget)}", "%") for budget in BUDGETS)),
             tuple(
                 (
-                    robot_of(r),
+                    r.title,
                     r.solver,
                     *(metrics.percent(x, 1.0) for x in budget_curve(r, BUDGETS)),
                 )
@@ -310,7 +309,7 @@ def _budgets(kind: str) -> Callable[[Results], Table]:
             ),
             shows="Share of the targets within reach that are solved within so much time for each.",
             measured=_how(records),
-            answer=_leaders(records, budget_curve, BUDGETS, lambda b: f"within {_duration(b)}"),
+            summary=_leaders(records, budget_curve, BUDGETS, lambda b: f"within {_duration(b)}"),
         )
 
     return table
@@ -326,11 +325,11 @@ def _leaders(
     curve: Callable[[Record, np.ndarray], np.ndarray],
     points: np.ndarray,
     named: Callable[[float], str],
-) -> Answer:
+) -> Summary:
     """Say who is ahead at each point, robot by robot."""
     said = []
-    for robot in dict.fromkeys(robot_of(record) for record in records):
-        mine = [record for record in records if robot_of(record) == robot]
+    for robot in dict.fromkeys(record.title for record in records):
+        mine = [record for record in records if record.title == robot]
         shares = np.array([curve(record, points) for record in mine])
         best = [
             f"{named(point)} {mine[int(np.argmax(column))].solver} "
@@ -338,7 +337,7 @@ def _leaders(
             for point, column in zip(points, shares.T, strict=True) if column.max() > 0
         ]  # fmt: skip
         said.append(f"{robot}: {'; '.join(best)}")
-    return Answer("Ahead:", tuple(said)) if said else Answer()
+    return Summary("Ahead:", tuple(said)) if said else Summary()
 
 
 def _profiles(kind: str) -> Callable[[Results], Table]:
@@ -358,7 +357,7 @@ def _profiles(kind: str) -> Callable[[Results], Table]:
             "target (Dolan and Moré 2002).",
             measured=f"{_how(records)} The targets are those that all solvers shown were given; a "
             "solver given less than an eighth of them is left out.",
-            answer=_profile_answer(made),
+            summary=_profile_summary(made),
         )  # fmt: skip
 
     return table
@@ -371,8 +370,8 @@ def _ratio_columns() -> list[Column]:
 def profiles(records: Sequence[Record], ratios: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
     """Return the profile of each solver on each robot, over the targets given to all of them."""
     made = {}
-    for robot in dict.fromkeys(robot_of(record) for record in measured(records)):
-        near = [r for r in measured(records) if robot_of(r) == robot]
+    for robot in dict.fromkeys(record.title for record in measured(records)):
+        near = [r for r in measured(records) if r.title == robot]
         most = max(len(record.arrays["solved"]) for record in near)
         near = [record for record in near if ENOUGH * len(record.arrays["solved"]) >= most]
         least = min(len(record.arrays["solved"]) for record in near)
@@ -385,13 +384,13 @@ def profiles(records: Sequence[Record], ratios: np.ndarray) -> dict[str, dict[st
     return made
 
 
-def _profile_answer(made: dict[str, dict[str, np.ndarray]]) -> Answer:
+def _profile_summary(made: dict[str, dict[str, np.ndarray]]) -> Summary:
     points = []
     for robot, curves in made.items():
         first = max(curves, key=lambda solver: curves[solver][0])
         rate = words(metrics.percent(float(curves[first][0]), 1.0))
         points.append(f"{robot}: {first}, on {rate} % of the targets")
-    return Answer("Most often the fastest:", tuple(points)) if points else Answer()
+    return Summary("Most often the fastest:", tuple(points)) if points else Summary()
 
 
 def _duration(seconds: float) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from reference.arguments import FloatArray
 
 from ..chain.problem import random_rotations, unit
-from .evaluate import Judge, Targets, judge
+from .evaluate import Evaluator, Targets, evaluator_of
 from .problem import ALL, links
 
 STRATA = {
@@ -33,35 +33,37 @@ _SEED = 1986
 
 @functools.lru_cache(maxsize=16)
 def robot_targets(name: str, count: int) -> Targets:
-    """Return `count` targets in each stratum, the strata taking turns, and random starts.
+    """Return `count` targets in each stratum, the strata alternating, and random starts.
 
     Raises:
         ValueError: if there is no such robot.
         AbsentError: if its file is not installed.
     """
-    mind = judge(name)
+    evaluator = evaluator_of(name)
     rng = np.random.default_rng([_SEED, ALL.index(name)])
-    poses = stratum_poses(mind, rng, count).values()
+    poses = stratum_poses(evaluator, rng, count).values()
     positions, rotations = (
         np.stack(parts, axis=1).reshape(count * len(STRATA), *parts[0].shape[1:])
-        for parts in zip(*(mind.forward(q) for q in poses), strict=True)
+        for parts in zip(*(evaluator.forward(q) for q in poses), strict=True)
     )
     strata = np.tile(np.arange(len(STRATA)), count)
-    return Targets(positions, rotations, mind.robot.draw(rng, len(strata)), strata)
+    return Targets(positions, rotations, evaluator.robot.draw(rng, len(strata)), strata)
 
 
-def stratum_poses(mind: Judge, rng: np.random.Generator, count: int) -> dict[str, FloatArray]:
+def stratum_poses(
+    evaluator: Evaluator, rng: np.random.Generator, count: int
+) -> dict[str, FloatArray]:
     """Return the poses whose tips are the targets, (count, coordinate) for each stratum."""
-    pool = mind.robot.draw(rng, _POOL * count)
-    tips, _ = mind.forward(pool)
-    distance = np.linalg.norm(tips - root(mind), axis=-1).max(axis=-1)
+    pool = evaluator.robot.draw(rng, _POOL * count)
+    tips, _ = evaluator.forward(pool)
+    distance = np.linalg.norm(tips - root(evaluator), axis=-1).max(axis=-1)
     chosen = [
         pool[:count],
         pool[spread(rng, tips, count)],
         pool[_extreme(rng, -distance, count)],
         pool[_extreme(rng, distance, count)],
-        pool[_extreme(rng, least_singular_values(mind, pool), count)],
-        _at_a_limit(rng, mind, count),
+        pool[_extreme(rng, least_singular_values(evaluator, pool), count)],
+        _at_a_limit(rng, evaluator, count),
     ]
     return dict(zip(STRATA, chosen, strict=True))
 
@@ -74,10 +76,12 @@ def unreachable_targets(name: str, count: int) -> Targets:
         ValueError: if there is no such robot.
         AbsentError: if its file is not installed.
     """
-    mind = judge(name)
+    evaluator = evaluator_of(name)
     rng = np.random.default_rng([_SEED, ALL.index(name), 1])
-    positions, rotations = _unreachable(rng, mind, count)
-    return Targets(positions, rotations, mind.robot.draw(rng, count), np.zeros(count, dtype=int))
+    positions, rotations = _unreachable(rng, evaluator, count)
+    return Targets(
+        positions, rotations, evaluator.robot.draw(rng, count), np.zeros(count, dtype=int)
+    )
 
 
 @functools.lru_cache(maxsize=16)
@@ -88,20 +92,20 @@ def uniform_targets(name: str, count: int, middle: bool) -> Targets:
         ValueError: if there is no such robot.
         AbsentError: if its file is not installed.
     """
-    mind = judge(name)
+    evaluator = evaluator_of(name)
     rng = np.random.default_rng([_SEED, ALL.index(name), count])
-    positions, rotations = mind.forward(mind.robot.draw(rng, count))
-    starts = mind.robot.draw(rng, count)
+    positions, rotations = evaluator.forward(evaluator.robot.draw(rng, count))
+    starts = evaluator.robot.draw(rng, count)
     if middle:
-        starts[:] = (mind.robot.lower + mind.robot.upper) / 2
+        starts[:] = (evaluator.robot.lower + evaluator.robot.upper) / 2
     return Targets(positions, rotations, starts, np.zeros(count, dtype=int))
 
 
-def least_singular_values(mind: Judge, q: FloatArray) -> FloatArray:
+def least_singular_values(evaluator: Evaluator, q: FloatArray) -> FloatArray:
     """Return the least singular value of each pose's Jacobian, lengths in units of the reach."""
-    J = mind.jacobians(q).reshape(len(q), len(mind.robot.tips), 2, 3, -1)
-    J[:, :, 0] /= farthest(mind)
-    if not mind.robot.posed:  # the tips' rotations do not count
+    J = evaluator.jacobians(q).reshape(len(q), len(evaluator.robot.tips), 2, 3, -1)
+    J[:, :, 0] /= farthest(evaluator)
+    if not evaluator.robot.posed:  # the tips' rotations do not count
         J = J[:, :, :1]
     values = np.linalg.svd(J.reshape(len(q), -1, J.shape[-1]), compute_uv=False)
     return np.asarray(values[:, -1], dtype=float)
@@ -126,21 +130,23 @@ def spread(rng: np.random.Generator, tips: FloatArray, count: int) -> FloatArray
     return np.array([rng.choice(members[cell]) for cell in drawn])
 
 
-def _at_a_limit(rng: np.random.Generator, mind: Judge, count: int) -> FloatArray:
-    q = mind.robot.draw(rng, count)
-    limited = np.flatnonzero(np.isfinite(mind.robot.lower))
+def _at_a_limit(rng: np.random.Generator, evaluator: Evaluator, count: int) -> FloatArray:
+    q = evaluator.robot.draw(rng, count)
+    limited = np.flatnonzero(np.isfinite(evaluator.robot.lower))
     joint = rng.choice(limited, count)
-    ends = np.where(rng.random(count) < 0.5, mind.robot.lower[joint], mind.robot.upper[joint])
+    ends = np.where(
+        rng.random(count) < 0.5, evaluator.robot.lower[joint], evaluator.robot.upper[joint]
+    )
     q[np.arange(count), joint] = ends
     return q
 
 
 def _unreachable(
-    rng: np.random.Generator, mind: Judge, count: int
+    rng: np.random.Generator, evaluator: Evaluator, count: int
 ) -> tuple[FloatArray, FloatArray]:
-    tips = len(mind.robot.tips)
-    distance = farthest(mind) * rng.uniform(1.05, 1.5, (count, tips, 1))
-    positions = root(mind) + distance * unit(rng.standard_normal((count, tips, 3)))
+    tips = len(evaluator.robot.tips)
+    distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (count, tips, 1))
+    positions = root(evaluator) + distance * unit(rng.standard_normal((count, tips, 3)))
     w, x, y, z = np.moveaxis(random_rotations(rng, count, tips), -1, 0)
     rotations = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -150,21 +156,21 @@ def _unreachable(
     return positions, np.moveaxis(np.array(rotations), (0, 1), (-2, -1))
 
 
-def root(mind: Judge) -> FloatArray:
+def root(evaluator: Evaluator) -> FloatArray:
     """Return where the first joint is: nothing before it moves [m], (3,)."""
-    if mind.robot.is_chain:
-        return links(mind.robot)[0].transform[:3, 3]
-    return np.array(mind.model.body(mind.model.jnt_bodyid[0]).pos)
+    if evaluator.robot.is_chain:
+        return links(evaluator.robot)[0].transform[:3, 3]
+    return np.array(evaluator.model.body(evaluator.model.jnt_bodyid[0]).pos)
 
 
-def farthest(mind: Judge) -> float:
+def farthest(evaluator: Evaluator) -> float:
     """Return a distance from the first joint that no tip exceeds [m]: all its links in a row."""
     lengths = []
-    for tip in mind.robot.tips:
-        body, length = mind.model.body(tip).id, 0.0
-        first = mind.model.jnt_bodyid[0]
+    for tip in evaluator.robot.tips:
+        body, length = evaluator.model.body(tip).id, 0.0
+        first = evaluator.model.jnt_bodyid[0]
         while body not in (first, 0):
-            length += float(np.linalg.norm(mind.model.body_pos[body]))
-            body = int(mind.model.body_parentid[body])
+            length += float(np.linalg.norm(evaluator.model.body_pos[body]))
+            body = int(evaluator.model.body_parentid[body])
         lengths.append(length)
     return max(lengths)

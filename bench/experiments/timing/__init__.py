@@ -1,13 +1,7 @@
-"""Timing by pytest-benchmark: cases in one file a subject, taken by `time_cases.py`."""
+"""Timing by pytest-benchmark: forward kinematics, solves and steps, in one file a subject."""
 
-from collections.abc import Iterator
+from ...harness.experiment import Experiment
 
-from .case import Case
-
-
-def cases() -> Iterator[Case]:
-    """Yield the cases of all subjects; engines are imported only now."""
-    from . import cloth, ik, kinematics
-
-    for subject in (kinematics, ik, cloth):
-        yield from subject.cases()
+EXPERIMENT = Experiment(
+    __package__, "timing", "forward kinematics, solves and steps beside both engines"
+)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,13 +11,27 @@ from reference.backend.compiled import TwoSpeeds
 from reference.backend.threads import in_slices
 
 from ...harness.record import Key, key
+from ...peers import registry
 
 TIMING = "timing"
-# The same names in every subject, so that the tables find their columns.
-COMPILED = "Plumbob, compiled"
-PLAIN = "Plumbob, plain Python"
-OURS = "Plumbob's kinematics"
-LIMIT = "limit: copying as many bytes"
+COMPILED, PLAIN, LIMIT = registry.COMPILED.name, registry.PLAIN.name, registry.LIMIT.name
+OURS = registry.OUR_KINEMATICS.name
+
+
+class Work(NamedTuple):
+    """What is to be timed, whoever does it.
+
+    Attributes:
+        problem: the name in the records.
+        subject: kinematics, ik or cloth: each has a table and a figure.
+        group: what the work is done on, such as "10 balls".
+        title: how the work is written within its group.
+    """
+
+    problem: str
+    subject: str
+    group: str
+    title: str
 
 
 @dataclass(frozen=True)
@@ -25,7 +39,7 @@ class Case:
     """Work to be timed.
 
     Attributes:
-        problem: what is done, such as "forward kinematics/10 balls".
+        work: what is done.
         solver: by what.
         prepare: sets everything up and returns the call to be timed.
         operations: how many poses, solves or steps one call makes; times are for one.
@@ -34,7 +48,7 @@ class Case:
         cores: on how many of them; None is all that there are.
     """
 
-    problem: str
+    work: Work
     solver: str
     prepare: Callable[[], Callable[[], Any]]
     operations: int = 1
@@ -45,30 +59,37 @@ class Case:
     @property
     def name(self) -> str:
         """Problem and solver in one."""
-        return f"{self.problem}, {self.solver}"
+        return f"{self.work.problem}, {self.solver}"
 
     @property
     def key(self) -> Key:
         """The key of its record."""
-        return key(TIMING, self.problem, self.solver, self.settings)
+        return key(TIMING, self.work.problem, self.solver, self.settings)
 
     @property
     def settings(self) -> dict[str, Any]:
         """What distinguishes it from another case of the same problem and solver."""
         return {"operations": self.operations}
 
+    @property
+    def facts(self) -> dict[str, str]:
+        """What the names say, as values."""
+        _, subject, group, title = self.work
+        written = f"{group}, {title}"
+        return {"subject": subject, "group": group, "work": title, "title": written}
 
-def copying(problem: str, size: int, *, passes: int = 1, operations: int = 1) -> Case:
+
+def copying(work: Work, size: int, *, passes: int = 1, operations: int = 1) -> Case:
     """Return the limit of memory: copies that read and write as many bytes, half and half.
 
     `size` bytes are moved in each pass, so that they come from as near a cache as the work's do.
     """
     prepare = partial(_copies, size // 16, passes)
-    return Case(problem, LIMIT, prepare, operations, moved=size * passes)
+    return Case(work, LIMIT, prepare, operations, moved=size * passes)
 
 
 def streaming(
-    problem: str, read: int, written: int, *, operations: int = 1,
+    work: Work, read: int, written: int, *, operations: int = 1,
     cores: int | None = 1, least: int = 0,
 ) -> Case:  # fmt: skip
     """Return the limit of memory: a compiled loop that reads and writes so many bytes.
@@ -77,7 +98,7 @@ def streaming(
     cores the loop is cut into slices that read at least `least` bytes each.
     """
     prepare = partial(_streams, read // 8, written // 8, least // 8)
-    return Case(problem, LIMIT, prepare, operations, read + 2 * written, cores=cores)
+    return Case(work, LIMIT, prepare, operations, read + 2 * written, cores=cores)
 
 
 def stream(source, sink):

@@ -13,7 +13,7 @@ from reference.sparse import CholeskyFactor
 
 from ..cloth.measurement import MIDDLE, converged_motion, motion
 from ..cloth.problem import ClothSwing, cloth_swing
-from .case import COMPILED, PLAIN, Case, copying
+from .case import COMPILED, PLAIN, Case, Work, copying
 
 FACTORS = (1, 100)
 SUBSTEPS = 10
@@ -29,17 +29,20 @@ def cases() -> Iterator[Case]:
     """Yield one frame of 1/60 s in four ways, at two stiffnesses, and of a larger cloth."""
     for factor in FACTORS:
         problem = cloth_swing(factor)
-        for work, (ours, theirs) in WORKS.items():
-            name = f"cloth/x{factor:g}/{work}"
-            yield Case(name, COMPILED, partial(ours, problem))
-            yield Case(name, PLAIN, partial(ours, problem), speed="plain")
+        written = f"stiffness × {factor:g}"
+        for title, (ours, theirs) in WORKS.items():
+            work = Work(f"cloth/x{factor:g}/{title}", "cloth", written, title)
+            yield Case(work, COMPILED, partial(ours, problem))
+            yield Case(work, PLAIN, partial(ours, problem), speed="plain")
             if theirs:
-                yield Case(name, MUJOCO, partial(theirs, problem))
-        yield solving(f"cloth/x{factor:g}/{LOCAL_GLOBAL}", problem)
+                yield Case(work, MUJOCO, partial(theirs, problem))
+        work = Work(f"cloth/x{factor:g}/{LOCAL_GLOBAL}", "cloth", written, LOCAL_GLOBAL)
+        yield solving(work, problem)
     large = cloth_swing(1, LARGE)
-    name = f"cloth/{LARGE} × {LARGE} particles/{LOCAL_GLOBAL}"
-    yield Case(name, COMPILED, partial(local_global, large))
-    yield solving(name, large)
+    group = f"{LARGE} × {LARGE} particles"
+    work = Work(f"cloth/{group}/{LOCAL_GLOBAL}", "cloth", group, LOCAL_GLOBAL)
+    yield Case(work, COMPILED, partial(local_global, large))
+    yield solving(work, large)
 
 
 def local_global(problem: ClothSwing) -> Callable[[], Any]:
@@ -97,9 +100,9 @@ def moving(problem: ClothSwing) -> State:
     return converged_motion(problem)[MIDDLE]
 
 
-def solving(name: str, problem: ClothSwing) -> Case:
+def solving(work: Work, problem: ClothSwing) -> Case:
     """Return the limit of the triangular solves, two an iteration, which each read all of L."""
-    return copying(name, factor_bytes(problem), passes=2 * ITERATIONS)
+    return copying(work, factor_bytes(problem), passes=2 * ITERATIONS)
 
 
 def factor_bytes(problem: ClothSwing) -> int:

@@ -8,11 +8,12 @@ from crosscheck.engines import SKELETON_ENGINES, SkeletonEngine
 from crosscheck.engines.skeleton_engine import coordinates
 from reference import IK_SOLVERS, solve_ik
 
+from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt
 from ...peers.ik.reference_kinematics import ReferenceKinematics
 from ..chain.measurement import ENGINE_ITERATIONS, MAX_ITERATIONS, TOLERANCE, Limits
 from ..chain.problem import chain_targets
-from .case import COMPILED, OURS, PLAIN, Case
+from .case import COMPILED, OURS, PLAIN, Case, Work
 
 STRATA = ("near", "far")
 TARGETS = 50
@@ -27,17 +28,18 @@ def cases() -> Iterator[Case]:
     """Yield our solvers at both speeds and as one batch, and one loop on all three kinematics."""
     for stratum in STRATA:
         for solver in IK_SOLVERS:
-            problem = f"ik/{stratum}/{solver}"
-            yield Case(problem, COMPILED, partial(one_by_one, stratum, solver, TARGETS), TARGETS)
+            work = Work(f"ik/{stratum}/{solver}", "ik", stratum, registry.find(solver).label)
+            yield Case(work, COMPILED, partial(one_by_one, stratum, solver, TARGETS), TARGETS)
             yield Case(
-                problem, PLAIN, partial(one_by_one, stratum, solver, FEW_TARGETS), FEW_TARGETS,
+                work, PLAIN, partial(one_by_one, stratum, solver, FEW_TARGETS), FEW_TARGETS,
                 speed="plain",
             )  # fmt: skip
-            batch = f"{problem}/{TARGETS} targets a call"
+            calls = f"{TARGETS} targets a call"
+            batch = work._replace(problem=f"{work.problem}/{calls}", title=f"{work.title}, {calls}")
             yield Case(batch, COMPILED, partial(at_once, stratum, solver), TARGETS)
         for name in (OURS, *SKELETON_ENGINES):
-            problem = f"ik/{stratum}/{LOOP}"
-            yield Case(problem, name, partial(by_loop, stratum, name), TARGETS)
+            work = Work(f"ik/{stratum}/{LOOP}", "ik", stratum, registry.find(LOOP).label)
+            yield Case(work, name, partial(by_loop, stratum, name), TARGETS)
 
 
 def one_by_one(stratum: str, solver: str, count: int) -> Callable[[], Any]:

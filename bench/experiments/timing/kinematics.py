@@ -11,7 +11,7 @@ from crosscheck.engines.skeleton_engine import coordinates
 from reference import Skeleton, forward_kinematics, rotation, scenes
 from reference.kinematics import THREAD_JOINTS
 
-from .case import COMPILED, PLAIN, Case, streaming
+from .case import COMPILED, PLAIN, Case, Work, streaming
 
 # Of each joint a local rotation is read, its position and global rotation are written.
 READ, WRITTEN = 8 * 4, 8 * (3 + 4)
@@ -32,21 +32,25 @@ def cases() -> Iterator[Case]:
     """Yield one pose by everyone, and batches by us, each with the least that memory allows."""
     for name, (skeleton, batch) in models().items():
         bytes_moved = np.array([READ, WRITTEN]) * skeleton.joint_count
-        one = f"kinematics/{name}/one pose a call"
+        one = _work(name, "one pose a call")
         yield Case(one, COMPILED, partial(by_us, skeleton))
         yield Case(one, PLAIN, partial(by_us, skeleton), speed="plain")
         for engine in SKELETON_ENGINES:
             yield Case(one, engine, partial(by_engine, engine, skeleton))
         yield streaming(one, *bytes_moved)
-        many = f"kinematics/{name}/{batch:,} poses a call"
+        many = _work(name, f"{batch:,} poses a call")
         yield Case(many, COMPILED, partial(by_us, skeleton, batch), batch)
         yield streaming(many, *(batch * bytes_moved), operations=batch)
         batch *= LONGER
-        many = f"kinematics/{name}/{batch:,} poses a call, all cores"
+        many = _work(name, f"{batch:,} poses a call, all cores")
         yield Case(many, COMPILED, partial(by_us, skeleton, batch), batch, cores=None)
         yield streaming(
             many, *(batch * bytes_moved), operations=batch, cores=None, least=READ * THREAD_JOINTS
         )
+
+
+def _work(name: str, title: str) -> Work:
+    return Work(f"kinematics/{name}/{title}", "kinematics", name, title)
 
 
 def models() -> dict[str, Model]:

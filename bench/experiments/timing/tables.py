@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, label, problems
-from ...presentation.tables import Answer, Cell, Column, Table, words
+from ...presentation.results import Results, by_problem
+from ...presentation.tables import Cell, Column, Summary, Table, words
 from .case import COMPILED, LIMIT, PLAIN
 
 
@@ -58,7 +58,7 @@ def cloth(results: Results) -> Table:
 def _table(
     results: Results, subject: str, name: str, title: str, unit: str, scale: float, shows: str
 ) -> Table:
-    records = results.all("timing", f"{subject}/")
+    records = results.all("timing", subject=subject)
     limits = {record.problem: record for record in records if record.solver == LIMIT}
     ours = {record.problem: record for record in records if record.solver == COMPILED}
     doers = [record for record in records if record.solver != LIMIT]
@@ -83,7 +83,7 @@ def _table(
         shows=shows + (LIMIT_SENTENCE if limits else ""),
         measured="pytest-benchmark, one core unless all are named, after a first call that may "
         "compile; each time is a call’s divided by what it does. Spread over rounds of many calls.",
-        answer=_answer(doers, limits, unit, scale),
+        summary=_summary(doers, limits, unit, scale),
     )
 
 
@@ -97,7 +97,7 @@ LIMIT_SENTENCE = (
 def _row(record: Record, ours: Record | None, scale: float) -> tuple[Cell, ...]:
     took = metrics.timing(record.arrays["seconds"])
     return (
-        label(record.problem.partition("/")[2]),
+        record.title,
         record.solver,
         scale * took.median,
         scale * took.low,
@@ -111,19 +111,21 @@ def _limit_cells(record: Record, limit: Record | None) -> tuple[Cell, ...]:
     return (None, None) if limit is None else (_times(record, limit), _bandwidth(limit))
 
 
-def _answer(doers: Sequence[Record], limits: dict[str, Record], unit: str, scale: float) -> Answer:
+def _summary(
+    doers: Sequence[Record], limits: dict[str, Record], unit: str, scale: float
+) -> Summary:
     """Say who takes how long for what, plain Python left out, a point for each group of works."""
     groups: dict[str, list[str]] = {}
-    for problem in problems(doers):
-        _, group, *work = problem.split("/")
-        mine = [r for r in doers if r.problem == problem and r.solver != PLAIN]
+    for problem, records in by_problem(doers).items():
+        group, work = records[0].facts["group"], records[0].facts["work"]
+        mine = [record for record in records if record.solver != PLAIN]
         times = ", ".join(f"{_short(r.solver)} {words(scale * _median(r))}" for r in mine)
         beside = ""
         if mine and problem in limits:
             beside = f" ({words(_times(mine[0], limits[problem]))} times the limit)"
-        groups.setdefault(group, []).append(f"{label('/'.join(work))}: {times} {unit}{beside}")
-    points = (f"{label(group)} – {'; '.join(works)}" for group, works in groups.items())
-    return Answer("Medians, plain Python left out:", tuple(points))
+        groups.setdefault(group, []).append(f"{work}: {times} {unit}{beside}")
+    points = (f"{group} – {'; '.join(works)}" for group, works in groups.items())
+    return Summary("Medians, plain Python left out:", tuple(points))
 
 
 def _short(solver: str) -> str:

@@ -1,21 +1,12 @@
-"""The one benchmark, run on every case by `pytest -p bench.experiments.timing.plugin`."""
+"""The one benchmark, which pytest runs on the case that `job.Timed` holds."""
 
-from bench.harness.progress import tell
 from reference import cores, speed
 
 
-def test_speed(benchmark, case, keep):
+def test_speed(benchmark, timed):
     """Time a case; the first call, which may compile, is not counted."""
-    tell(case.name, "measuring")
-    try:
-        with speed(case.speed), cores(case.cores):
-            call = case.prepare()
-            call()
-            benchmark(call)
-    except Exception as error:  # one that fails must not cost the others
-        failed = f"{type(error).__name__}: {error}"
-        keep(case, [], failed)
-        tell(case.name, "failed", failed)
-        return
-    keep(case, benchmark.stats.stats.data, "")
-    tell(case.name, "measured")
+    with speed(timed.case.speed), cores(timed.case.cores):
+        call = timed.case.prepare()
+        call()
+        benchmark(call)
+    timed.rounds = list(benchmark.stats.stats.data)

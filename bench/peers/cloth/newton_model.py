@@ -58,7 +58,7 @@ class NewtonSteps:
 
 
 def model(system: MassSpring, *, own_colours: bool = False) -> Any:
-    """Return the model; particles of one colour have no spring in common, unless told otherwise."""
+    """Return the model, coloured by its springs, or by Newton if `own_colours`."""
     builder = newton.ModelBuilder(gravity=wp.vec3(*system.gravity))
     nowhere = wp.vec3(0.0, 0.0, 0.0)
     for mass, free in zip(system.masses, system.free, strict=True):

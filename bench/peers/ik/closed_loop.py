@@ -14,7 +14,7 @@ from reference.arguments import FloatArray
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
 from .pinocchio_model import from_pinocchio, pinocchio_model, to_pinocchio
-from .protocol import Answer, Ask, Solve
+from .protocol import Ask, Solve, SolverOutput
 
 STEP = 0.1
 DAMPING = 1e-12
@@ -27,19 +27,19 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 1000) -> Ask:
     frames = [model.getFrameId(tip) for tip in robot.tips]
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        goals = [pinocchio.SE3(R, x) for R, x in zip(rotations, positions, strict=True)]
+        targets = [pinocchio.SE3(R, x) for R, x in zip(rotations, positions, strict=True)]
         q0 = to_pinocchio(robot, start)
 
-        def solve() -> Answer:
+        def solve() -> SolverOutput:
             q = q0
             for iteration in range(iterations + 1):
-                e, J = _error(model, data, q, frames, goals, robot.posed)
+                e, J = _error(model, data, q, frames, targets, robot.posed)
                 done = bool(np.linalg.norm(e) < tolerance.position)
                 if done or iteration == iterations:
                     break
                 damped = J @ J.T + DAMPING * np.eye(len(e))
                 q = pinocchio.integrate(model, q, -STEP * (J.T @ np.linalg.solve(damped, e)))
-            return Answer(from_pinocchio(robot, q), done)
+            return SolverOutput(from_pinocchio(robot, q), done)
 
         return solve
 
@@ -51,20 +51,20 @@ def _error(
     data: pinocchio.Data,
     q: FloatArray,
     frames: Sequence[int],
-    goals: Sequence[pinocchio.SE3],
+    targets: Sequence[pinocchio.SE3],
     posed: bool,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the error of all tips and its derivative, of positions alone unless posed."""
     pinocchio.computeJointJacobians(model, data, q)
     pinocchio.updateFramePlacements(model, data)
     errors, slopes = [], []
-    for frame, goal in zip(frames, goals, strict=True):
-        to_goal = data.oMf[frame].actInv(goal)
+    for frame, target in zip(frames, targets, strict=True):
+        to_target = data.oMf[frame].actInv(target)
         J = pinocchio.getFrameJacobian(model, data, frame, pinocchio.LOCAL)
         if posed:
-            errors.append(pinocchio.log(to_goal).vector)
-            slopes.append(-pinocchio.Jlog6(to_goal.inverse()) @ J)
+            errors.append(pinocchio.log(to_target).vector)
+            slopes.append(-pinocchio.Jlog6(to_target.inverse()) @ J)
         else:
-            errors.append(to_goal.translation)
+            errors.append(to_target.translation)
             slopes.append(-J[:3])
     return np.concatenate(errors), np.vstack(slopes)

@@ -1,7 +1,7 @@
 """EAIK: all solutions at once by subproblems, for arms whose axes allow it.
 
 Some of what it returns are least-squares answers to what cannot be solved, marked `is_LS`; those
-are left out, and so are solutions beyond the limits, after whole turns are tried. It needs no
+are left out, and so are solutions beyond the limits, after whole revolutions are tried. It needs no
 start.
 """
 
@@ -12,38 +12,38 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import LIMIT_TOLERANCE, Tolerance
 from ...experiments.robots.problem import Robot, links
-from .protocol import Answer, Ask, Solve, UnableError, needs_a_chain
+from .protocol import Ask, Solve, SolverOutput, UnableError, needs_a_chain
 
-TURN = 2.0 * np.pi
+REVOLUTION = 2.0 * np.pi
 MOST = 6
 
 
 def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
-    """Return the solver, set up for a robot; it has no tolerance to be told.
+    """Return the solver, set up for a robot; it takes no tolerance.
 
     Raises:
         UnableError: if it knows no decomposition of this robot.
     """
     needs_a_chain(robot)
-    axes, offsets, turned = axes_at_zero(robot)
+    axes, offsets, rotation = axes_at_zero(robot)
     if len(axes) > MOST:
         raise UnableError(f"takes {MOST} hinges at the most")
-    engine = EAIK.Robot(axes.T, offsets.T, turned, [], True)
+    engine = EAIK.Robot(axes.T, offsets.T, rotation, [], True)
     if not engine.has_known_decomposition():
         raise UnableError("knows no decomposition of this arm")
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        goal = np.eye(4)
-        goal[:3, :3], goal[:3, 3] = rotations[0], positions[0]
+        target = np.eye(4)
+        target[:3, :3], target[:3, 3] = rotations[0], positions[0]
 
-        def solve() -> Answer:
-            found = engine.calculate_IK(goal)
+        def solve() -> SolverOutput:
+            found = engine.calculate_IK(target)
             exact = [q for q, nearest in zip(found.Q, found.is_LS, strict=True) if not nearest]
             for q in exact:
                 q = within(robot, np.asarray(q))
                 if ((q >= robot.lower) & (q <= robot.upper)).all():
-                    return Answer(q, True)
-            return Answer(None, False)
+                    return SolverOutput(q, True)
+            return SolverOutput(None, False)
 
         return solve
 
@@ -51,9 +51,9 @@ def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
 
 
 def within(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return angles brought within the limits by whole turns where that can be done."""
-    q = q + TURN * np.ceil((robot.lower - LIMIT_TOLERANCE - q) / TURN).clip(0.0)
-    q = q - TURN * np.ceil((q - robot.upper - LIMIT_TOLERANCE) / TURN).clip(0.0)
+    """Return angles brought within the limits by whole revolutions where that can be done."""
+    q = q + REVOLUTION * np.ceil((robot.lower - LIMIT_TOLERANCE - q) / REVOLUTION).clip(0.0)
+    q = q - REVOLUTION * np.ceil((q - robot.upper - LIMIT_TOLERANCE) / REVOLUTION).clip(0.0)
     nearest = np.clip(q, robot.lower, robot.upper)
     return np.where(np.abs(q - nearest) <= LIMIT_TOLERANCE, nearest, q)
 

@@ -14,11 +14,11 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
-from .protocol import Answer, Ask, Solve, needs_a_chain
+from .protocol import Ask, Solve, SolverOutput, needs_a_chain
 
 
 def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
-    """Return the solver, set up for a robot; it has no tolerance to be told."""
+    """Return the solver, set up for a robot; it takes no tolerance."""
     needs_a_chain(robot)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -32,11 +32,11 @@ def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
         first = np.zeros(len(moving))
         first[moving] = start
 
-        def solve() -> Answer:
+        def solve() -> SolverOutput:
             found = chain.inverse_kinematics(
                 positions[0], rotations[0], "all", initial_position=first
             )
-            return Answer(found[moving], None)
+            return SolverOutput(found[moving], None)
 
         return solve
 

@@ -25,7 +25,7 @@ class Kinematics(Protocol):
         """Return the coordinates reached from q by moving with the velocity v for 1 s."""
 
 
-class Answer(NamedTuple):
+class LoopOutput(NamedTuple):
     """The coordinates found, the distance left [m] and the number of iterations."""
 
     q: FloatArray
@@ -41,7 +41,7 @@ def levenberg_marquardt(
     *,
     tolerance: float,
     max_iterations: int,
-) -> Answer:
+) -> LoopOutput:
     """Return coordinates that bring the effector to the target, from q."""
     for iteration in range(max_iterations + 1):
         J = kinematics.jacobian(q, effector)
@@ -52,4 +52,4 @@ def levenberg_marquardt(
         damped = J @ J.T
         damped[np.diag_indices(3)] += 0.5 * residual**2
         q = kinematics.integrate(q, J.T @ np.linalg.solve(damped, e))
-    return Answer(q, residual, iteration)
+    return LoopOutput(q, residual, iteration)

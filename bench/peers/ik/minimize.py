@@ -1,7 +1,7 @@
 """mujoco.minimize: box-constrained nonlinear least squares (Gauss-Newton with damping).
 
-The residual is the tip's distance and its turn from the target, with the Jacobians of both. It
-works on coordinates, not on rotations, so it takes hinges only.
+The residual is the tip's displacement and rotation vector from the target, with the Jacobians of
+both. It works on coordinates, not on rotations, so it takes hinges only.
 """
 
 import mujoco
@@ -12,7 +12,7 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance, mujoco_model
 from ...experiments.robots.problem import Robot
-from .protocol import Answer, Ask, Solve, needs_a_chain
+from .protocol import Ask, Solve, SolverOutput, needs_a_chain
 
 
 def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
@@ -22,14 +22,14 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
     reach = _Reach(robot)
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        def solve() -> Answer:
+        def solve() -> SolverOutput:
             reach.aim(positions[0], rotations[0])
             q, _ = minimize.least_squares(
                 start[:, None], reach.residuals, bounds, reach.jacobian, max_iter=iterations,
                 verbose=minimize.Verbosity.SILENT,
             )  # fmt: skip
             left = np.linalg.norm(reach.residual(q.ravel()).reshape(2, 3), axis=-1)
-            return Answer(q.ravel(), bool((left <= tolerance).all()))
+            return SolverOutput(q.ravel(), bool((left <= tolerance).all()))
 
         return solve
 
@@ -37,24 +37,24 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
 
 
 class _Reach:
-    """What is to vanish: the tip's distance and turn from the target last aimed at."""
+    """The residual of the tip from the target last aimed at: displacement and rotation vector."""
 
     def __init__(self, robot: Robot) -> None:
         self._model = mujoco_model(robot)
         self._data = mujoco.MjData(self._model)
         self._tip = self._model.body(robot.tips[0]).id
-        self._position, self._turn = np.zeros(3), np.zeros(4)
+        self._position, self._rotation = np.zeros(3), np.zeros(4)
 
     def aim(self, position: FloatArray, rotation: FloatArray) -> None:
         self._position = position
-        mujoco.mju_mat2Quat(self._turn, rotation.ravel())
+        mujoco.mju_mat2Quat(self._rotation, rotation.ravel())
 
     def residual(self, q: FloatArray) -> FloatArray:
-        """Return distance [m] and turn [rad], (6,)."""
+        """Return displacement [m] and rotation vector [rad], (6,)."""
         self._place(q)
-        turned = np.empty(3)
-        mujoco.mju_subQuat(turned, self._turn, self._data.xquat[self._tip])
-        return np.concatenate([self._data.xpos[self._tip] - self._position, turned])
+        rotation_vector = np.empty(3)
+        mujoco.mju_subQuat(rotation_vector, self._rotation, self._data.xquat[self._tip])
+        return np.concatenate([self._data.xpos[self._tip] - self._position, rotation_vector])
 
     def residuals(self, columns: FloatArray) -> FloatArray:
         """Return the residual of each column, (6, column)."""
@@ -64,12 +64,12 @@ class _Reach:
         """Return the residual's derivative, (6, coordinate)."""
         self._place(q.ravel())
         mujoco.mj_comPos(self._model, self._data)
-        moves, turns = np.empty((3, self._model.nv)), np.empty((3, self._model.nv))
-        mujoco.mj_jacBody(self._model, self._data, moves, turns, self._tip)
+        linear, angular = np.empty((3, self._model.nv)), np.empty((3, self._model.nv))
+        mujoco.mj_jacBody(self._model, self._data, linear, angular, self._tip)
         slope = np.empty((3, 3))
-        mujoco.mjd_subQuat(self._turn, self._data.xquat[self._tip], None, slope)
-        # The derivative takes turns in the tip's own frame, J gives them in the world's.
-        return np.vstack([moves, slope @ self._data.xmat[self._tip].reshape(3, 3).T @ turns])
+        mujoco.mjd_subQuat(self._rotation, self._data.xquat[self._tip], None, slope)
+        # The derivative is by rotation vectors in the tip's frame, J gives them in the world's.
+        return np.vstack([linear, slope @ self._data.xmat[self._tip].reshape(3, 3).T @ angular])
 
     def _place(self, q: FloatArray) -> None:
         self._data.qpos[:] = q

@@ -11,7 +11,7 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance, mujoco_model
 from ...experiments.robots.problem import Robot
-from .protocol import Answer, Ask, Solve
+from .protocol import Ask, Solve, SolverOutput
 
 
 def prepare(
@@ -30,21 +30,21 @@ def prepare(
         return bool((sizes <= limit).all())
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        goals = [
+        targets = [
             mink.SE3.from_rotation_and_translation(mink.SO3.from_matrix(R), x)
             for R, x in zip(rotations, positions, strict=True)
         ]
 
-        def solve() -> Answer:
-            for task, goal in zip(tasks, goals, strict=True):
-                task.set_target(goal)
+        def solve() -> SolverOutput:
+            for task, target in zip(tasks, targets, strict=True):
+                task.set_target(target)
             configuration.update(start)
             for _ in range(iterations):
                 if solved():
                     break
                 velocity = mink.solve_ik(configuration, tasks, 1.0, solver="daqp", limits=limits)
                 configuration.integrate_inplace(velocity, 1.0)
-            return Answer(configuration.q.copy(), solved())
+            return SolverOutput(configuration.q.copy(), solved())
 
         return solve
 

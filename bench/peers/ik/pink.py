@@ -12,7 +12,7 @@ from reference.arguments import FloatArray
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
 from .pinocchio_model import from_pinocchio, pinocchio_model, to_pinocchio
-from .protocol import Answer, Ask, Solve
+from .protocol import Ask, Solve, SolverOutput
 
 
 def prepare(
@@ -31,14 +31,14 @@ def prepare(
         return bool((sizes <= limit).all())
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        goals = [
+        targets = [
             pink.configuration.pin.SE3(R, x) for R, x in zip(rotations, positions, strict=True)
         ]
         q0 = to_pinocchio(robot, start)
 
-        def solve() -> Answer:
-            for task, goal in zip(tasks, goals, strict=True):
-                task.set_target(goal)
+        def solve() -> SolverOutput:
+            for task, target in zip(tasks, targets, strict=True):
+                task.set_target(target)
             configuration = pink.Configuration(model, data, q0)
             for _ in range(iterations):
                 if solved(configuration):
@@ -48,7 +48,7 @@ def prepare(
                     safety_break=False,
                 )  # fmt: skip
                 configuration.integrate_inplace(velocity, 1.0)
-            return Answer(from_pinocchio(robot, configuration.q), solved(configuration))
+            return SolverOutput(from_pinocchio(robot, configuration.q), solved(configuration))
 
         return solve
 

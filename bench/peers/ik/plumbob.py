@@ -8,7 +8,7 @@ from reference.formats import mjcf, urdf
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
-from .protocol import Answer, Ask, Solve
+from .protocol import Ask, Solve, SolverOutput
 
 
 def prepare(
@@ -27,15 +27,15 @@ def prepare(
     }  # fmt: skip
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        turns = rotation.from_matrix(rotations) if robot.posed else [None] * len(robot.tips)
+        quaternions = rotation.from_matrix(rotations) if robot.posed else [None] * len(robot.tips)
         targets = [
-            Target(position, turn, tip)
-            for position, turn, tip in zip(positions, turns, robot.tips, strict=True)
+            Target(position, quaternion, tip)
+            for position, quaternion, tip in zip(positions, quaternions, robot.tips, strict=True)
         ]
 
-        def solve() -> Answer:
+        def solve() -> SolverOutput:
             solution = solve_ik(articulation, start, targets, **settings)
-            return Answer(solution.coordinates, solution.outcome == Outcome.CONVERGED)
+            return SolverOutput(solution.coordinates, solution.outcome == Outcome.CONVERGED)
 
         return solve
 

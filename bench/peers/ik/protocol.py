@@ -2,8 +2,8 @@
 
 An adapter is a module with one function, `prepare(robot, tolerance, **settings)`: it sets the
 engine up once for a robot and returns a function `ask(positions, rotations, start)`. That puts one
-target in the engine's own words and returns the call to be timed, which returns an `Answer`. So
-conversions cost no solver anything, and set-up is timed apart.
+target in the engine's own types and returns the call to be timed, which returns a `SolverOutput`:
+neither conversions nor set-up count as time of a solve.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
 
 
-class Answer(NamedTuple):
+class SolverOutput(NamedTuple):
     """What a solver found.
 
     Attributes:
@@ -27,7 +27,7 @@ class Answer(NamedTuple):
     claimed: bool | None
 
 
-Solve = Callable[[], Answer]
+Solve = Callable[[], SolverOutput]
 
 
 class Ask(Protocol):

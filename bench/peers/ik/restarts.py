@@ -5,7 +5,7 @@ import numpy as np
 from reference.arguments import FloatArray
 
 from ...experiments.robots.problem import Robot
-from .protocol import Answer, Ask, Solve
+from .protocol import Ask, Solve, SolverOutput
 
 _SEED = 1986
 
@@ -21,14 +21,14 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
         return bool((q >= robot.lower).all() and (q <= robot.upper).all())
 
     def again(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        def solve() -> Answer:
+        def solve() -> SolverOutput:
             answer = ask(positions, rotations, start)()
             for _ in range(restarts):
                 if answer.claimed and answer.q is not None and keeps_limits(answer.q):
                     return answer
                 answer = ask(positions, rotations, robot.draw(rng, 1)[0])()
             good = answer.claimed and answer.q is not None and keeps_limits(answer.q)
-            return Answer(answer.q, good if answer.claimed is not None else None)
+            return SolverOutput(answer.q, good if answer.claimed is not None else None)
 
         return solve
 

@@ -13,7 +13,7 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot, links
-from .protocol import Answer, Ask, Solve, needs_a_chain
+from .protocol import Ask, Solve, SolverOutput, needs_a_chain
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -27,30 +27,34 @@ HALF = 0.5
 def prepare(
     robot: Robot,
     tolerance: Tolerance,
-    method: str = "LM chan 0.1",
+    method: str = "LM",
+    damping: str = "chan",
+    factor: float = 0.1,
     searches: int = 100,
     iterations: int = 30,
     limits: bool = True,
 ) -> Ask:
-    """Return the solver, set up for a robot: `method` is NR, GN, or LM, a rule and its factor."""
+    """Return the solver, set up for a robot.
+
+    `method` is NR, GN or LM, the last with a rule of damping and its factor.
+    """
     needs_a_chain(robot)
     chain = chain_of_transforms(robot)
     shared: dict[str, Any] = {
         "ilimit": iterations, "slimit": searches, "joint_limits": limits,
         "tol": HALF * min(tolerance) ** 2,
     }  # fmt: skip
-    name, *damping = method.split()
-    run: Any = {"LM": chain.ik_LM, "NR": chain.ik_NR, "GN": chain.ik_GN}[name]
-    if damping:
-        shared |= {"method": damping[0], "k": float(damping[1])}
+    run: Any = {"LM": chain.ik_LM, "NR": chain.ik_NR, "GN": chain.ik_GN}[method]
+    if method == "LM":
+        shared |= {"method": damping, "k": factor}
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        goal = np.eye(4)
-        goal[:3, :3], goal[:3, 3] = rotations[0], positions[0]
+        target = np.eye(4)
+        target[:3, :3], target[:3, 3] = rotations[0], positions[0]
 
-        def solve() -> Answer:
-            solution = run(goal, q0=start, **shared)
-            return Answer(solution.q, bool(solution.success))
+        def solve() -> SolverOutput:
+            solution = run(target, q0=start, **shared)
+            return SolverOutput(solution.q, bool(solution.success))
 
         return solve
 
@@ -58,17 +62,17 @@ def prepare(
 
 
 def chain_of_transforms(robot: Robot) -> ETS:
-    """Return the robot as elementary transforms: each hinge turned so that it is one about z."""
+    """Return the robot as elementary transforms: each hinge in a frame whose z is its axis."""
     steps, ahead, joint = [], np.eye(4), 0
     for transform, axis in links(robot):
         ahead = ahead @ transform
         if axis is None:
             continue
-        turn = np.eye(4)
-        turn[:3, :3] = frame_with_z(axis)
+        frame = np.eye(4)
+        frame[:3, :3] = frame_with_z(axis)
         bounds = [robot.lower[joint], robot.upper[joint]]
-        steps += [ET.SE3(ahead @ turn), ET.Rz(qlim=bounds)]
-        ahead, joint = turn.T, joint + 1
+        steps += [ET.SE3(ahead @ frame), ET.Rz(qlim=bounds)]
+        ahead, joint = frame.T, joint + 1
     return ETS([*steps, ET.SE3(ahead)])
 
 

@@ -1,8 +1,8 @@
 """TRAC-IK by pytracik: two searches at once, in two threads, restarted until time is up.
 
 One is Newton's with random jumps, the other sequential quadratic programming. It stops when the six
-components of the error are within eps. Its limits are single precision. The tolerance of the judge
-is on two norms of three components each, so eps is a part of it.
+components of the error are within eps. Its limits are single precision. The evaluation's tolerance
+is on two norms of three components each, so eps is that over the square root of three.
 """
 
 import math
@@ -14,7 +14,7 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
-from .protocol import Answer, Ask, Solve, needs_a_chain
+from .protocol import Ask, Solve, SolverOutput, needs_a_chain
 
 
 def prepare(robot: Robot, tolerance: Tolerance, seconds: float = 0.005) -> Ask:
@@ -26,11 +26,15 @@ def prepare(robot: Robot, tolerance: Tolerance, seconds: float = 0.005) -> Ask:
     )
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        goal = (*positions[0], *quaternion_with_w_last(rotations[0]))
+        target = (*positions[0], *quaternion_with_w_last(rotations[0]))
 
-        def solve() -> Answer:
-            found = pytracik.ik(engine, start, *goal)
-            return Answer(found[1:], bool(found[0] >= 0)) if found[0] >= 0 else Answer(None, False)
+        def solve() -> SolverOutput:
+            found = pytracik.ik(engine, start, *target)
+            return (
+                SolverOutput(found[1:], bool(found[0] >= 0))
+                if found[0] >= 0
+                else SolverOutput(None, False)
+            )
 
         return solve
 

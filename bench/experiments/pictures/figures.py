@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...harness.record import Record
 from ...presentation.figures import COLOURS, Drawing, canvas, finished
 from ...presentation.results import Results
+from . import ARM, CLOTH
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ LIGHT = np.array([0.4, 0.8, 0.45])
 
 def arm_draws(results: Results) -> Drawing | None:
     """Draw the arm on the custom curve, before and after resampling, points by their spacing."""
-    records = results.all("pictures", "arm/")
+    records = results.all("pictures", task=ARM)
     if not records:
         return None
     with canvas(5.4, len(records), sharex=True, sharey=True) as (figure, axes):
@@ -49,7 +50,7 @@ def arm_draws(results: Results) -> Drawing | None:
 
 def falling_cloth(results: Results) -> Drawing | None:
     """Draw a filmstrip of the falling cloth."""
-    records = results.all("pictures", "cloth/")
+    records = results.all("pictures", task=CLOTH)
     if not records:
         return None
     arrays = records[0].arrays
@@ -127,6 +128,3 @@ def _ghosts(ax: Axes, ghosts: Floats) -> None:
 def _bare(ax: Axes) -> None:
     ax.set_aspect("equal")
     ax.axis("off")
-
-
-PICTURES = (arm_draws, falling_cloth)

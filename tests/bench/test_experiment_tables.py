@@ -1,4 +1,4 @@
-"""Findings: the numbers of the records reach the tables, and the sentences follow the numbers."""
+"""Tables of experiments show the numbers of the records, and their sentences follow them."""
 
 import math
 from dataclasses import replace
@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bench.experiments import SUITES
+from bench.experiments.arm import tables as arm
 from bench.experiments.chain import tables as kinematics
 from bench.experiments.check import tables as check
 from bench.experiments.closed_curves import tables as tracking
@@ -14,7 +15,8 @@ from bench.experiments.cloth import tables as cloth
 from bench.experiments.published import tables as published
 from bench.experiments.robots import tables as robots
 from bench.experiments.timing import tables as timing
-from bench.presentation.sections import SECTIONS, Results, tables
+from bench.presentation.results import Results
+from bench.presentation.sections import SECTIONS, tables
 
 
 def column(table, heading):
@@ -40,14 +42,14 @@ def test_every_section_has_a_name_of_its_own():
 def test_a_missed_claim_is_named_in_table_and_answer(make):
     table = check.verdicts(Results([make.claim(), make.claim("damper forces", held=False)]))
     assert column(table, "verdict") == ["held", "MISSED: they differ"]
-    assert table.answer.sentence.startswith("1 of 2 claims held")
-    assert table.answer.points == ("Missed: damper forces",)
+    assert table.summary.sentence.startswith("1 of 2 claims held")
+    assert table.summary.points == ("Missed: damper forces",)
 
 
 def test_chains_are_counted_as_straight_only_if_they_are(make):
     table = kinematics.beyond_reach(Results([make.beyond("ccd", 0.5), make.beyond("fabrik", 1e-9)]))
     assert column(table, "off the line, largest [m]") == [0.5, 1e-9]
-    ccd, fabrik = table.answer.points
+    ccd, fabrik = table.summary.points
     assert ccd.startswith("CCD: 1 of 2; at worst 25.0 % of the reach")
     assert fabrik.startswith("FABRIK: 2 of 2;")
 
@@ -56,22 +58,22 @@ def test_iterations_count_for_whoever_needs_fewer(records):
     table = kinematics.iterations(Results(records))
     assert column(table, "problem") == ["arm, circle", "arm, beyond", "chain, near"]
     assert column(table, "CCD / FABRIK, means") == [2.5, 1.0, 1.0]
-    assert "fewer iterations than CCD on 1 of 3 problems" in table.answer.sentence
+    assert "fewer iterations than CCD on 1 of 3 problems" in table.summary.sentence
 
 
 def test_jitter_is_the_largest_turn_in_degrees_and_the_seam_stands_apart(make):
     table = tracking.jitter(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
-    for way, turn in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
-        assert column(table, f"{way}, largest [°]") == [pytest.approx(math.degrees(turn))]
-        assert column(table, f"{way}, mean [°]") == [pytest.approx(math.degrees(turn / 4))]
+    for mode, turn in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
+        assert column(table, f"{mode}, largest [°]") == [pytest.approx(math.degrees(turn))]
+        assert column(table, f"{mode}, mean [°]") == [pytest.approx(math.degrees(turn / 4))]
     assert column(table, "coherent, last to first [°]") == [pytest.approx(math.degrees(0.125))]
-    assert "in 1 of 1 cases, and in 1 the way" in table.answer.sentence
-    assert table.answer.points[0] == "cold: 57.3° (arm, circle, CCD)"
+    assert "in 1 of 1 cases, and in 1 the step" in table.summary.sentence
+    assert table.summary.points[0] == "cold: 57.3° (arm, circle, CCD)"
 
 
 def test_jitter_that_grows_is_said_too(make):
     table = tracking.jitter(Results(make.followed("ccd", cold=0.1, warm=0.1, coherent=1.0)))
-    assert "in 0 of 1 cases" in table.answer.sentence
+    assert "in 0 of 1 cases" in table.summary.sentence
 
 
 def test_a_curve_that_was_not_followed_in_all_ways_has_no_row(make):
@@ -83,17 +85,17 @@ def test_iterations_over_all_frames_are_those_that_every_frame_has_more(make):
     table = tracking.price(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
     assert column(table, "of these over all frames at once") == [7]
     assert [share.hits for share in column(table, "coherent, within tolerance")] == [3]
-    assert "together 7 to 7 times" in table.answer.sentence
+    assert "together 7 to 7 times" in table.summary.sentence
 
 
 def test_drift_is_shown_after_each_round(make):
     table = tracking.drift(Results(make.drifted("ccd")))
     assert [round(x) for x in table.rows[0][1:]] == [6, 11, 17, 0, 0, 0]
-    assert "17.2 to 17.2° from its first pose" in table.answer.sentence
+    assert "17.2 to 17.2° from its first pose" in table.summary.sentence
 
 
 def test_success_is_counted_by_the_residual_not_by_the_solver(records):
-    table = kinematics.accuracy(Results(records))
+    table = arm.accuracy(Results(records))
     shares = column(table, "within tolerance (95 % interval)")
     assert [(share.hits, share.total) for share in shares] == [(2, 3)] * 4 + [(2, 2)] * 2
     assert max(column(table, "residual, largest [m]")) == 3e-4
@@ -101,18 +103,18 @@ def test_success_is_counted_by_the_residual_not_by_the_solver(records):
 
 def test_the_cloths_tables_count_iterations_and_drift(records):
     results = Results(records)
-    assert "at most 3 iterations" in cloth.newton_steps(results).answer.sentence
-    points = cloth.convergence(results).answer.points
+    assert "at most 3 iterations" in cloth.newton_steps(results).summary.sentence
+    points = cloth.convergence(results).summary.points
     assert points == ("stiffness × 1: local/global 2, Newton 2",)
     table = cloth.few_iterations(results)
     assert column(table, "drift, share of the path [%]") == [10.0, 10.0]
-    assert len(table.answer.points) == 1
+    assert len(table.summary.points) == 1
 
 
 def test_iterations_that_do_not_suffice_are_said_so(make):
     made = make.stepped("newton")
     short = replace(made, arrays=made.arrays | {"error": np.array([1.0, 0.5])})
-    assert "Newton more than 1" in cloth.convergence(Results([short])).answer.points[0]
+    assert "Newton more than 1" in cloth.convergence(Results([short])).summary.points[0]
 
 
 def test_times_are_medians_beside_ours(records):
@@ -199,7 +201,7 @@ def test_strata_are_counted_apart_and_the_hardest_is_named(make):
     hard = make.raced("a", "one start", solved=[True, False, True, True])
     table = ONE.strata(Results([hard]))
     assert [(share.hits, share.total) for share in table.rows[0][2:]] == [(2, 2), (1, 2)]
-    assert table.answer.sentence == "Hardest, counted over solvers and robots: space (1)."
+    assert table.summary.sentence == "Hardest, counted over solvers and robots: space (1)."
 
 
 def test_claims_out_of_reach_are_named(make):
@@ -209,9 +211,9 @@ def test_claims_out_of_reach_are_named(make):
     assert column(table, "claimed as solved") == [3]
     assert column(table, "distance left, largest [m]") == [0.7]
     assert column(table, "answers") == [3]
-    assert table.answer.points == ("the arm, a: 3 of 4",)
+    assert table.summary.points == ("the arm, a: 3 of 4",)
     honest = make.raced("a", "one start", "unreachable", claimed=[0] * 4, **far)
-    assert ONE.unreachable(Results([honest])).answer.sentence.startswith("No solver claims")
+    assert ONE.unreachable(Results([honest])).summary.sentence.startswith("No solver claims")
 
 
 def test_budgets_and_profiles_show_who_is_ahead(make):
@@ -256,8 +258,8 @@ def test_the_two_laws_of_dampers_are_listed_with_their_order(make):
     table = cloth.dampers(Results([make.two_dampers((0.04, 0.02, 0.01))]))
     assert column(table, "h [ms]") == [20.0, 10.0, 5.0]
     assert column(table, "observed order") == [None, 1.0, 1.0]
-    assert table.answer.points == ("stiffness × 1: 0.0400 at 20.0 ms, 0.0100 at 5.00 ms",)
-    assert cloth.dampers(Results([])).answer.sentence == ""
+    assert table.summary.points == ("stiffness × 1: 0.0400 at 20.0 ms, 0.0100 at 5.00 ms",)
+    assert cloth.dampers(Results([])).summary.sentence == ""
 
 
 def test_steps_at_rounding_count_as_solved(make):

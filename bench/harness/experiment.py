@@ -1,0 +1,25 @@
+"""An experiment: a folder that holds a problem, its measurement, its tables and its figures."""
+
+import importlib
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from .block import Block, Scale
+
+
+class Experiment(NamedTuple):
+    """What one folder of `bench/experiments` measures, without importing what measures it.
+
+    Attributes:
+        package: the folder, by its full name as a package.
+        suite: what the command line calls it; experiments may share a suite.
+        about: what the suite answers; "" where another experiment of the suite says so.
+    """
+
+    package: str
+    suite: str
+    about: str = ""
+
+    def blocks(self, scale: Scale) -> Iterator[Block]:
+        """Yield what there is to be measured; engines are imported only now."""
+        yield from importlib.import_module(f"{self.package}.measurement").blocks(scale)

@@ -1,0 +1,391 @@
+"""Every solver that the bench knows: what it is called, how it is drawn, how far it is taken.
+
+A solver of the reference takes part as soon as the reference lists it; a line here gives it a label
+and a style, and limits other than the usual ones. A peer is an adapter of its own and a line here.
+Nothing here imports an engine.
+"""
+
+import importlib.metadata
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from reference import IK_SOLVERS, STEP_SOLVERS
+
+PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
+
+
+class Style(NamedTuple):
+    """A colour by its name in `presentation.figures`, a line style and a marker of matplotlib's."""
+
+    colour: str
+    line: Any
+    marker: str
+
+
+FIRST = Style("orange", "-", "o")
+SECOND = Style("blue", "--", "s")
+THIRD = Style("green", "-.", "^")
+FOURTH = Style("purple", (0, (1, 1)), "v")
+FIFTH = Style("brass", (0, (4, 1, 1, 1, 1, 1)), "D")
+OTHER = Style("faint", ":", "P")
+# The markers of solvers for cloths, by whose they are.
+ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^"}
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A solver as tables and figures show it.
+
+    Attributes:
+        name: what records call it.
+        label: how it is written.
+        engine: whose it is; "" if that is not known.
+        style: how it is drawn where each solver has a style of its own.
+    """
+
+    name: str
+    label: str
+    engine: str = PLUMBOB
+    style: Style = OTHER
+
+
+# Iterations of a step, or of a frame of a motion, that a solver of cloths is tried with.
+MANY = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+FEW = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 40)
+SOME = (1, 10, 100)
+
+
+@dataclass(frozen=True)
+class StepSolver(Solver):
+    """A solver of implicit Euler's steps, and how far each experiment takes it.
+
+    Attributes:
+        is_linear: whether it solves one linear system, and so makes one iteration only.
+        converges: whether it goes on until a step is solved, in few iterations.
+        followed: iterations of one step whose residual and error are kept; 0 for none.
+        counted: the most iterations of one step in which powers of ten of the error are counted.
+        certified: the most iterations before an answer is certified.
+        ladder: iterations of one step in a work-precision diagram.
+        motion: iterations of a frame there.
+    """
+
+    is_linear: bool = False
+    converges: bool = False
+    followed: int = 200
+    counted: int = 2000
+    certified: int = 3000
+    ladder: tuple[int, ...] = MANY
+    motion: tuple[int, ...] = SOME
+
+
+_IK = (
+    Solver("ccd", "CCD", style=FIRST),
+    Solver("fabrik", "FABRIK", style=SECOND),
+    Solver("levenberg_marquardt", "Levenberg-Marquardt", style=THIRD),
+    Solver("damped_least_squares", "damped least squares", style=FOURTH),
+    Solver("jacobian_transpose", "Jacobian transpose", style=FIFTH),
+)
+_STEP = (
+    StepSolver("local_global", "local/global", style=FIRST, followed=1000),
+    StepSolver("chebyshev", "Chebyshev", style=THIRD, followed=1000),
+    StepSolver("lbfgs", "L-BFGS", style=FOURTH),
+    StepSolver(
+        "newton_cg", "Newton-CG", style=FIFTH, converges=True, followed=12, counted=60,
+        ladder=FEW, motion=(1, 3),
+    ),
+    StepSolver(
+        "newton", "Newton", style=SECOND, converges=True, followed=12, counted=60, certified=100,
+        ladder=FEW, motion=(1, 3),
+    ),
+    StepSolver(
+        "gauss_newton", "Gauss-Newton", is_linear=True, followed=0, counted=20, certified=1
+    ),
+)  # fmt: skip
+
+# One Levenberg-Marquardt loop on the kinematics of either engine.
+LOOPS = tuple(Solver(f"lm/{engine}", f"LM, {engine}", engine) for engine in (PINOCCHIO, MUJOCO))
+# Those that are timed.
+COMPILED = Solver("Plumbob, compiled", "Plumbob, compiled", style=Style("blue", "", "o"))
+PLAIN = Solver("Plumbob, plain Python", "Plumbob, plain Python", style=Style("orange", "", "D"))
+OUR_KINEMATICS = Solver(
+    "Plumbob's kinematics", "Plumbob's kinematics", style=Style("brass", "", "v")
+)
+LIMIT = Solver(
+    "limit: copying as many bytes", "limit: copying as many bytes", "", Style("ink", "", "|")
+)
+TIMED = (
+    COMPILED,
+    PLAIN,
+    OUR_KINEMATICS,
+    Solver(PINOCCHIO, PINOCCHIO, PINOCCHIO, Style("green", "", "s")),
+    Solver(MUJOCO, MUJOCO, MUJOCO, Style("purple", "", "^")),
+    LIMIT,
+)
+# Libraries that factor matrices, ours first.
+SUPERNODAL = Solver("supernodal", "ours")
+CHOLMOD = Solver("cholespy", "CHOLMOD (cholespy)", "CHOLMOD")
+FACTORS = (SUPERNODAL, CHOLMOD)
+
+
+def _version(package: str) -> str:
+    """Return the version of a package, "" if it is not installed."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+
+
+# Peers of inverse kinematics. A solver that makes one attempt from the start it is given and one
+# that starts again from random poses until it is done answer different questions.
+ONE_START, RESTARTS = "one start", "restarts"
+
+
+class Entry(NamedTuple):
+    """A peer with settings, as it enters the tables.
+
+    Attributes:
+        kind: one start, or restarts.
+        settings: what its adapter is prepared with.
+        restarts: further attempts from random poses, for solvers that make only one.
+        note: what distinguishes it from another entry of the same solver and kind.
+    """
+
+    kind: str
+    settings: Mapping[str, Any] = {}
+    restarts: int = 0
+    note: str = ""
+
+
+class Peer(NamedTuple):
+    """A solver for robots.
+
+    Attributes:
+        title: how it is written.
+        module: its adapter.
+        package: what must be installed.
+        license: of the package.
+        can: what it takes.
+        entries: with which settings it takes part.
+    """
+
+    title: str
+    module: str
+    package: str
+    license: str
+    can: str
+    entries: tuple[Entry, ...]
+
+    @property
+    def version(self) -> str:
+        """The version that is installed, "" if none is."""
+        return _version(self.package)
+
+    def called(self, entry: Entry) -> str:
+        """Return how an entry is written."""
+        return f"{self.title}, {entry.note}" if entry.note else self.title
+
+
+# Attempts beside the first where the bench starts a solver again.
+AGAIN = 20
+
+
+def _either(iterations: int | None = None) -> tuple[Entry, Entry]:
+    """Return an entry with one start and one with restarts, of fewer iterations each if given."""
+    fewer = {} if iterations is None else {"iterations": iterations}
+    return Entry(ONE_START), Entry(RESTARTS, fewer, AGAIN, f"{AGAIN} restarts")
+
+
+_CHAINS = "poses and limits of one chain of hinges"
+OURS = Peer(
+    "Plumbob LM", "bench.peers.ik.plumbob", "plumbob", "MIT",
+    "poses, positions and limits of several tips, balls",
+    (
+        Entry(ONE_START, {"restarts": 0}),
+        Entry(RESTARTS, {"restarts": 100}, note="100 restarts"),
+    ),
+)  # fmt: skip
+TOOLBOX = Peer(
+    "Robotics Toolbox ik_LM", "bench.peers.ik.toolbox", "roboticstoolbox-python", "MIT",
+    _CHAINS,
+    (
+        Entry(ONE_START, {"searches": 1, "iterations": 100}),
+        Entry(RESTARTS, {"searches": 100, "iterations": 30}, note="100 searches"),
+    ),
+)  # fmt: skip
+TRAC_IK = Peer(
+    "TRAC-IK", "bench.peers.ik.trac_ik", "pytracik", "MIT", _CHAINS,
+    (
+        Entry(RESTARTS, {"seconds": 0.005}, note="5 ms"),
+        Entry(RESTARTS, {"seconds": 0.05}, note="50 ms"),
+    ),
+)  # fmt: skip
+PEERS = (
+    OURS,
+    Peer(
+        "Pinocchio’s closed loop", "bench.peers.ik.closed_loop", "pin", "BSD-3-Clause",
+        "poses and positions of several tips, balls; looks at no limits", _either(200),
+    ),
+    Peer(
+        "pink", "bench.peers.ik.pink", "pin-pink", "Apache-2.0",
+        "poses, positions and limits of several tips, balls", _either(50),
+    ),
+    Peer(
+        "mink", "bench.peers.ik.mink", "mink", "Apache-2.0",
+        "poses, positions and limits of several tips, balls", _either(50),
+    ),
+    Peer("mujoco.minimize", "bench.peers.ik.minimize", "mujoco", "Apache-2.0", _CHAINS, _either()),
+    TOOLBOX,
+    TRAC_IK,
+    Peer(
+        "ikpy", "bench.peers.ik.ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims",
+        (Entry(ONE_START),),
+    ),
+    Peer(
+        "EAIK", "bench.peers.ik.eaik", "eaik", "BSD-3-Clause",
+        "poses of six hinges or fewer, analytically",
+        (Entry(RESTARTS, note="all solutions, no start"),),
+    ),
+)  # fmt: skip
+
+
+# Peers for cloths: what distinguishes the settings that each is tried with.
+ITERATED, LINEARISED, EXPLICIT = "iterations", "one linear solve", "explicit"
+
+
+@dataclass(frozen=True)
+class ClothPeer:
+    """A solver for cloths.
+
+    Attributes:
+        title: how it is written.
+        engine: whose it is.
+        module: its adapter.
+        package: what must be installed.
+        kind: what distinguishes its rungs.
+        settings: with which its adapter is always prepared.
+        ladder: iterations in one step, where it iterates.
+        motion: iterations a frame when it moves on frame after frame.
+        converges: whether it goes on until a step is solved.
+    """
+
+    title: str
+    engine: str
+    module: str
+    package: str
+    kind: str
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    ladder: tuple[int, ...] = ()
+    motion: tuple[int, ...] = ()
+    converges: bool = False
+
+    @property
+    def version(self) -> str:
+        """The version that is installed, "" if none is."""
+        return _version(self.package)
+
+
+def _of_ours(solver: StepSolver) -> ClothPeer:
+    """Return a solver of the reference as a peer."""
+    title, module = f"Plumbob {solver.label}", "bench.peers.cloth.step_solvers"
+    settings: dict[str, Any] = {"solver": solver.name}
+    if solver.is_linear:
+        settings |= {"iterations": 1}
+        return ClothPeer(title, PLUMBOB, module, "plumbob", LINEARISED, settings)
+    return ClothPeer(
+        title, PLUMBOB, module, "plumbob", ITERATED, settings, solver.ladder, solver.motion,
+        solver.converges,
+    )  # fmt: skip
+
+
+_TENDONS, _FLEX = "bench.peers.cloth.mujoco_tendons", "bench.peers.cloth.mujoco_flex"
+_NEWTON = "bench.peers.cloth.newton_{}"
+CLOTH_ENGINES = (
+    *(
+        ClothPeer(
+            f"Plumbob {title}", PLUMBOB, "bench.peers.cloth.explicit", "plumbob", EXPLICIT,
+            {"integrator": name},
+        )
+        for name, title in (
+            ("symplectic_euler", "symplectic Euler"), ("runge_kutta", "Runge-Kutta"),
+        )
+    ),
+    *(
+        ClothPeer(
+            f"MuJoCo {name}", MUJOCO, _TENDONS, "mujoco", EXPLICIT, {"integrator": name}
+        )
+        for name in ("Euler", "implicitfast")
+    ),
+    ClothPeer("MuJoCo flex, Euler", MUJOCO, _FLEX, "mujoco", EXPLICIT),
+    ClothPeer(
+        "MuJoCo discrete", MUJOCO, _TENDONS, "mujoco", LINEARISED, {"integrator": "discrete"}
+    ),
+    ClothPeer(
+        "MuJoCo discrete, to the end", MUJOCO, _TENDONS, "mujoco", LINEARISED,
+        {"integrator": "discrete", "iterations": 5000, "tolerance": 1e-15},
+    ),
+    ClothPeer(
+        "Newton engine, semi-implicit", NEWTON, _NEWTON.format("semi_implicit"), "newton",
+        EXPLICIT,
+    ),
+    ClothPeer(
+        "Newton engine, VBD", NEWTON, _NEWTON.format("vbd"), "newton", ITERATED, {},
+        MANY, SOME,
+    ),
+    ClothPeer(
+        "Newton engine, VBD, its own colours", NEWTON, _NEWTON.format("vbd"), "newton", ITERATED,
+        {"own": 1}, SOME, SOME,
+    ),
+    ClothPeer(
+        "Newton engine, XPBD", NEWTON, _NEWTON.format("xpbd"), "newton", ITERATED, {},
+        SOME, SOME,
+    ),
+    ClothPeer(
+        "Newton engine, XPBD, substeps", NEWTON, _NEWTON.format("xpbd"), "newton", EXPLICIT,
+        {"iterations": 1},
+    ),
+)  # fmt: skip
+
+
+def ik_solvers() -> dict[str, Solver]:
+    """Return the solvers of inverse kinematics that the reference has, by name, in its order."""
+    known = {solver.name: solver for solver in _IK}
+    return {name: known.get(name, Solver(name, _spaced(name))) for name in IK_SOLVERS}
+
+
+def step_solvers() -> dict[str, StepSolver]:
+    """Return the solvers of steps that the reference has, by name, in its order."""
+    known = {solver.name: solver for solver in _STEP}
+    return {name: known.get(name, StepSolver(name, _spaced(name))) for name in STEP_SOLVERS}
+
+
+def followed_step_solvers() -> list[StepSolver]:
+    """Return those whose convergence is followed: the known ones in order, then others."""
+    found = step_solvers()
+    order = [solver.name for solver in _STEP if solver.name in found]
+    order += [name for name in found if name not in order]
+    return [found[name] for name in order if found[name].followed]
+
+
+def cloth_peers() -> tuple[ClothPeer, ...]:
+    """Return the solvers for cloths: the reference's, then those of engines."""
+    return (*(_of_ours(solver) for solver in step_solvers().values()), *CLOTH_ENGINES)
+
+
+def find(name: str) -> Solver:
+    """Return the solver that records call so; one that nobody knows is written as it is called."""
+    return next((s for s in _solvers() if s.name == name), Solver(name, _spaced(name), ""))
+
+
+def _solvers() -> Iterator[Solver]:
+    yield from ik_solvers().values()
+    yield from step_solvers().values()
+    yield from (*LOOPS, *TIMED, *FACTORS)
+    yield from (Solver(peer.title, peer.title, peer.engine) for peer in cloth_peers())
+    for peer in PEERS:
+        names = [peer.called(entry) for entry in peer.entries]
+        yield from (Solver(name, name, peer.package) for name in names)
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")

@@ -1,0 +1,64 @@
+"""Figures as parts of a page: an SVG file's tree made fit to stand within HTML."""
+
+import xml.etree.ElementTree as ElementTree
+
+from markupsafe import Markup
+
+from .figures import COLOURS, Drawing
+
+_SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
+_LEFT_OUT = {"metadata", "style", "title"}
+# What the page says itself: its own size of figures, and that it is SVG.
+_OF_THE_FILE = {"width", "height", "version"}
+_VARIABLES = {colour: f"var(--{name})" for name, colour in COLOURS.items()}
+
+
+def inline(drawing: Drawing) -> Markup:
+    """Return an SVG fit to stand in a page: own ids, colours by name, no links, the page's fonts.
+
+    Ids are made unique, since all drawings of a page share one name space.
+    """
+    root = ElementTree.fromstring(drawing.svg)
+    _shorten(root)
+    for element in root.iter():
+        element.tag = element.tag.removeprefix(_SVG)
+        element.attrib = _attributes(element.attrib, drawing.name)
+    for name in _OF_THE_FILE:
+        root.attrib.pop(name, None)
+    root.attrib |= {"role": "img", "aria-label": drawing.title}
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def _shorten(element: ElementTree.Element) -> None:
+    """Remove what describes the file and what styles it as a whole."""
+    for child in list(element):
+        if child.tag.removeprefix(_SVG) in _LEFT_OUT:
+            element.remove(child)
+        else:
+            _shorten(child)
+
+
+def _attributes(given: dict[str, str], name: str) -> dict[str, str]:
+    """Return attributes whose ids, and references to ids, are within the drawing of this name."""
+    kept = {}
+    for key, value in given.items():
+        key = key.removeprefix(_XLINK)
+        if key == "id":
+            value = f"{name}-{value}"
+        elif key == "href":
+            value = value.replace("#", f"#{name}-", 1)
+        elif key == "style":
+            value = _style(value)
+        kept[key] = value.replace("url(#", f"url(#{name}-")
+    return kept
+
+
+def _style(text: str) -> str:
+    """Return a style whose colours are the page's, and whose fonts are sizes and weights alone."""
+    declared = dict(part.strip().split(": ", 1) for part in text.split(";") if part.strip())
+    declared.pop("font-family", None)
+    if font := declared.pop("font", ""):  # a weight, where it is not the usual one, and the size
+        words = font.split()
+        i = next(i for i, word in enumerate(words) if word.endswith("px"))
+        declared |= {"font-size": words[i], **({"font-weight": words[0]} if i else {})}
+    return "; ".join(f"{key}: {_VARIABLES.get(value, value)}" for key, value in declared.items())
