@@ -24,19 +24,32 @@ class Summary(NamedTuple):
 
 NO_SUMMARY = Summary()
 
+# How a share is written: with the interval that holds the true rate.
+INTERVAL = "95 % interval"
+
 
 @dataclass(frozen=True)
 class Column:
-    """A heading with its unit, such as `Column("median", "µs")`; words are set to the left."""
+    """A heading with its unit, such as `Column("median", "µs")`; words are set to the left.
+
+    The note says how a cell is written, such as `INTERVAL`; it is left out where parts of the cell
+    have columns of their own.
+    """
 
     title: str
     unit: str = ""
     words: bool = False
+    note: str = ""
+
+    @property
+    def titled(self) -> str:
+        """Title and note in one."""
+        return f"{self.title} ({self.note})" if self.note else self.title
 
     @property
     def heading(self) -> str:
-        """Title and unit in one."""
-        return f"{self.title} [{self.unit}]" if self.unit else self.title
+        """Title, note and unit in one."""
+        return f"{self.titled} [{self.unit}]" if self.unit else self.titled
 
 
 @dataclass(frozen=True)
@@ -225,9 +238,7 @@ def _csv_head(table: Table, spread_out: list[bool]) -> list[str]:
     parts = ("hits", "total", "95 % low", "95 % high")
     head: list[str] = []
     for column, several in zip(table.columns, spread_out, strict=True):
-        # What stands in brackets, "(95 % interval)", belongs to the form that the parts replace.
-        title = column.title.partition(" (")[0]
-        head += [f"{title}, {part}" for part in parts] if several else [column.heading]
+        head += [f"{column.title}, {part}" for part in parts] if several else [column.heading]
     return head
 
 

@@ -126,7 +126,7 @@ def test_latex_separates_groups_only_where_there_are_some():
 
 def test_csv_keeps_all_digits_and_any_text():
     third = 1 / 3
-    columns = (Column("name", words=True), Column("value", "m"), Column("hits (95 %)"))
+    columns = (Column("name", words=True), Column("value", "m"), Column("hits", note="95 %"))
     text = tables.comma_separated(
         table((HOSTILE, third, share(np.array([True]))), ("-", None, None), columns=columns)
     )

@@ -6,6 +6,8 @@ from ...harness.experiment import Experiment
 CURVE, BEYOND = "curve", "beyond"
 
 EXPERIMENT = Experiment(
-    __package__, "arm",
-    "the lab's arm on every curve, and reaching for what is too far",
-)  # fmt: skip
+    __package__,
+    suite="arm",
+    chapter="kinematics",
+    about="the lab's arm on every curve, and reaching for what is too far",
+)

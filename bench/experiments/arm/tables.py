@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, problems, settings, solvers
-from ...presentation.tables import Cell, Column, Summary, Table, words
+from ...presentation.tables import INTERVAL, Cell, Column, Summary, Table, words
 from ..chain import BEYOND, CHAIN
 from . import CURVE
 
@@ -24,7 +24,7 @@ def accuracy(results: Results) -> Table:
             Column("problem", words=True),
             Column("solver", words=True),
             Column("start", words=True),
-            Column("within tolerance (95 % interval)"),
+            Column("within tolerance", note=INTERVAL),
             Column("residual, median", "m"),
             Column("residual, 95 %", "m"),
             Column("residual, largest", "m"),

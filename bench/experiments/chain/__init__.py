@@ -6,6 +6,8 @@ from ...harness.experiment import Experiment
 CHAIN, BEYOND = "chain", "beyond"
 
 EXPERIMENT = Experiment(
-    __package__, "ik",
-    "a chain of ten ball joints, robots and a character, beside every solver installed",
-)  # fmt: skip
+    __package__,
+    suite="ik",
+    chapter="kinematics",
+    about="a chain of ten ball joints, robots and a character, beside every solver installed",
+)

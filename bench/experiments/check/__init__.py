@@ -3,6 +3,8 @@
 from ...harness.experiment import Experiment
 
 EXPERIMENT = Experiment(
-    __package__, "check",
-    "the reference against Pinocchio and MuJoCo, claim by claim",
-)  # fmt: skip
+    __package__,
+    suite="check",
+    chapter="right",
+    about="the reference against Pinocchio and MuJoCo, claim by claim",
+)

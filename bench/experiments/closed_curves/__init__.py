@@ -8,6 +8,8 @@ CURVE, DRIFT = "curve", "drift"
 COLD, WARM, COHERENT = "cold", "warm", "coherent"
 
 EXPERIMENT = Experiment(
-    __package__, "tracking",
-    "closed curves: frames from rest, from the last solution, and coherently",
-)  # fmt: skip
+    __package__,
+    suite="tracking",
+    chapter="kinematics",
+    about="closed curves: frames from rest, from the last solution, and coherently",
+)

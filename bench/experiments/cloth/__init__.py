@@ -6,6 +6,8 @@ from ...harness.experiment import Experiment
 SWING, ONE_STEP, FEW, DAMPERS = "swing", "one step", "few iterations", "dampers"
 
 EXPERIMENT = Experiment(
-    __package__, "cloth",
-    "the lab's cloth at three stiffnesses: convergence; one cloth for every solver",
-)  # fmt: skip
+    __package__,
+    suite="cloth",
+    chapter="cloth",
+    about="the lab's cloth at three stiffnesses: convergence; one cloth for every solver",
+)

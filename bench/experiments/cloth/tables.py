@@ -10,7 +10,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...presentation.results import Results, by_problem, counted, label, settings
-from ...presentation.tables import Cell, Column, Summary, Table, words
+from ...presentation.tables import INTERVAL, Cell, Column, Summary, Table, words
 from . import DAMPERS, FEW, ONE_STEP, SWING
 
 LISTED = (1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000)
@@ -29,7 +29,7 @@ def newton_steps(results: Results) -> Table:
         (
             Column("cloth", words=True),
             Column("steps"),
-            Column("converged (95 % interval)"),
+            Column("converged", note=INTERVAL),
             Column("iterations, median"),
             Column("iterations, largest"),
             Column("residual, median"),

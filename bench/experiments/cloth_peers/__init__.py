@@ -6,4 +6,4 @@ from ...harness.experiment import Experiment
 ONE_STEP, MOTION, NEEDED = "work of a step", "work of a motion", "iterations of a step"
 STABILITY, LIU, MISSING = "stability", "Liu 2013", "missing"
 
-EXPERIMENT = Experiment(__package__, "cloth")
+EXPERIMENT = Experiment(__package__, suite="cloth", chapter="cloth")

@@ -17,7 +17,7 @@ from reference.arguments import FloatArray
 from ...harness import metrics
 from .problem import FRAME, FallingCloth, explicit_substeps, falling_cloth
 
-# Newton goes on to the rounding floor, which is above this, so that errors of 1e-8 can be told.
+# Newton goes on to the rounding floor, which is above this, so that errors of 1e-8 can be measured.
 TOLERANCE = 1e-14
 MOST_ITERATIONS = 200
 # Steps of the coarsest of the three motions, for those at symplectic Euler's limit.

@@ -3,6 +3,8 @@
 from ...harness.experiment import Experiment
 
 EXPERIMENT = Experiment(
-    __package__, "cloth_scale",
-    "cloths of a thousand particles and more: factors, solves, memory",
-)  # fmt: skip
+    __package__,
+    suite="cloth_scale",
+    chapter="speed",
+    about="cloths of a thousand particles and more: factors, solves, memory",
+)

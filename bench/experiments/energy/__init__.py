@@ -3,6 +3,8 @@
 from ...harness.experiment import Experiment
 
 EXPERIMENT = Experiment(
-    __package__, "energy",
-    "what integrators do to the energy of a cloth over 10,000 steps",
-)  # fmt: skip
+    __package__,
+    suite="energy",
+    chapter="cloth",
+    about="what integrators do to the energy of a cloth over 10,000 steps",
+)

@@ -3,5 +3,8 @@
 from ...harness.experiment import Experiment
 
 EXPERIMENT = Experiment(
-    __package__, "first_call", "the first call of each public function, with nothing compiled yet"
+    __package__,
+    suite="first_call",
+    chapter="speed",
+    about="the first call of each public function, with nothing compiled yet",
 )

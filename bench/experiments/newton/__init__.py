@@ -3,6 +3,8 @@
 from ...harness.experiment import Experiment
 
 EXPERIMENT = Experiment(
-    __package__, "newton",
-    "one step of a heavy cloth by every solver: how far from a minimiser, proven",
-)  # fmt: skip
+    __package__,
+    suite="newton",
+    chapter="cloth",
+    about="one step of a heavy cloth by every solver: how far from a minimiser, proven",
+)

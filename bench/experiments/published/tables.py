@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, settings
-from ...presentation.tables import Cell, Column, Summary, Table, words
+from ...presentation.tables import INTERVAL, Cell, Column, Summary, Table, words
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
 
@@ -28,7 +28,7 @@ def trac_ik(results: Results) -> Table:
         "TRAC-IK’s published table, and here",
         (
             Column("robot", words=True), Column("solver", words=True), Column("from", words=True),
-            Column("solved (95 % interval)"), Column("solved", "%"), Column("time, median", "ms"),
+            Column("solved", note=INTERVAL), Column("solved", "%"), Column("time, median", "ms"),
             Column("time, mean", "ms"),
         ),
         tuple(rows),
@@ -72,7 +72,7 @@ def toolbox(results: Results) -> Table:
         (
             Column("solver", words=True), Column("published, infeasible", "%"),
             Column("here, by its own word", "%"),
-            Column("here, not solved within the limits (95 % interval)"),
+            Column("here, not solved within the limits", note=INTERVAL),
             Column("time, median", "µs"),
         ),
         tuple(_toolbox_row(record) for record in records),

@@ -3,6 +3,8 @@
 from ...harness.experiment import Experiment
 
 EXPERIMENT = Experiment(
-    __package__, "robot_models",
-    "robots and characters from files of others, beside both engines",
-)  # fmt: skip
+    __package__,
+    suite="robot_models",
+    chapter="right",
+    about="robots and characters from files of others, beside both engines",
+)

@@ -5,4 +5,4 @@ from ...harness.experiment import Experiment
 # What a record is about: targets within reach of a robot, or out of it.
 REACHABLE, UNREACHABLE = "reachable", "unreachable"
 
-EXPERIMENT = Experiment(__package__, "ik")
+EXPERIMENT = Experiment(__package__, suite="ik", chapter="robots")

@@ -14,7 +14,7 @@ from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
 from ...presentation.results import Results, listed, settings
-from ...presentation.tables import Cell, Column, Summary, Table, words
+from ...presentation.tables import INTERVAL, Cell, Column, Summary, Table, words
 from . import REACHABLE, UNREACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}
@@ -125,8 +125,8 @@ def _success(kind: str) -> Callable[[Results], Table]:
             f"Robots, {kind}: success, time and accuracy",
             (
                 *_NAMES,
-                Column("solved, uniform in joint space (95 % interval)"),
-                Column("solved, all strata within reach (95 % interval)"),
+                Column("solved, uniform in joint space", note=INTERVAL),
+                Column("solved, all strata within reach", note=INTERVAL),
                 *(Column(f"time, {what}", "µs") for what in ("median", "95 %", "mean")),
                 Column("position residual, median", "m"), Column("position residual, largest", "m"),
                 Column("rotation residual, median", "rad"),
@@ -211,7 +211,7 @@ def _strata(kind: str) -> Callable[[Results], Table]:
         return Table(
             f"robots_strata_{KINDS[kind]}",
             f"Robots, {kind}: success in each stratum",
-            (*_NAMES, *(Column(f"{name} (95 % interval)") for name in strata)),
+            (*_NAMES, *(Column(f"{name}", note=INTERVAL) for name in strata)),
             tuple(_strata_row(record, len(strata)) for record in records),
             shows="Targets from random poses within the limits. Space: the tip spread evenly over "
             "the cells of a grid; outer shell and near the root: the twentieth of the poses whose "

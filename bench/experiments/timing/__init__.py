@@ -3,5 +3,8 @@
 from ...harness.experiment import Experiment
 
 EXPERIMENT = Experiment(
-    __package__, "timing", "forward kinematics, solves and steps beside both engines"
+    __package__,
+    suite="timing",
+    chapter="speed",
+    about="forward kinematics, solves and steps beside both engines",
 )

@@ -58,7 +58,7 @@ class TimingJob(NamedTuple):
 
 def _run(timed: Timed, options: list[str]) -> str:
     """Run pytest; return the last lines of what it says."""
-    os.environ["PYTEST_ADDOPTS"] = ""  # what pytest is told to do elsewhere is not meant here
+    os.environ["PYTEST_ADDOPTS"] = ""  # options of the user's own test runs are not meant here
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         pytest.main(options, [timed])

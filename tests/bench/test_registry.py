@@ -1,0 +1,186 @@
+"""What is new takes one file and one line: a step solver, a peer, a table, an experiment."""
+
+import sys
+from dataclasses import replace
+from functools import partial
+
+import pytest
+
+import bench.experiments
+from bench.experiments import Scale, blocks
+from bench.experiments.cloth import measurement as cloth
+from bench.experiments.cloth import tables as cloth_tables
+from bench.experiments.cloth.problem import cloth_swing
+from bench.experiments.newton import tables as newton_tables
+from bench.experiments.robots import measurement as robots
+from bench.experiments.robots import tables as robot_tables
+from bench.harness import run
+from bench.harness.isolation import Outcome
+from bench.harness.record import RecordFile
+from bench.harness.worker import Found, Solved, Unfit
+from bench.peers import registry
+from bench.peers.registry import ONE_START, Entry, Peer
+from bench.presentation import entry, report
+from bench.presentation.results import Results
+from bench.presentation.sections import tables
+from bench.presentation.tables import Column, Table
+from reference import STEP_SOLVERS
+from reference.implicit_euler.local_global import LocalGlobal
+
+TINY = Scale(targets=1, seconds=0.01)
+
+
+class Damped(LocalGlobal):
+    """A step solver that nobody knows yet."""
+
+
+@pytest.fixture
+def damped(monkeypatch):
+    """The one line that makes it known to the reference."""
+    monkeypatch.setitem(STEP_SOLVERS, "damped_global", Damped)
+
+
+@pytest.mark.usefixtures("damped")
+def test_a_new_step_solver_takes_part_in_every_suite_of_steps():
+    for suite, problem in (("cloth", "cloth/x1/one step"), ("newton", "swing/k1000"),
+                           ("cloth", "peers/iterations/k100")):  # fmt: skip
+        assert "damped_global" in [b.solver for b in blocks(suite, TINY) if b.problem == problem]
+    assert "Plumbob damped global" in [peer.title for peer in registry.cloth_peers()]
+    assert registry.find("Plumbob damped global").engine == registry.PLUMBOB
+
+
+@pytest.mark.usefixtures("damped")
+def test_a_new_step_solver_stands_in_the_tables(make):
+    (block,) = [
+        b for b in blocks("cloth", TINY)
+        if (b.problem, b.solver) == ("cloth/x1/one step", "damped_global")
+    ]  # fmt: skip
+    small = partial(cloth.one_step, cloth_swing(1, size=5), "damped_global", 20)
+    record = run.measure(replace(block, measure=small))
+    assert not record.failed
+    table = cloth_tables.convergence(Results([record]))
+    errors = [row[[c.title for c in table.columns].index("damped global: error")]
+              for row in table.rows]  # fmt: skip
+    assert errors[0] == record.arrays["error"][1] < 1.0
+    certified = newton_tables.certified(Results([make.certified("damped_global")]))
+    assert certified.rows[0][1] == "damped global"
+
+
+ADAPTER = """
+from bench.peers.ik.protocol import SolverOutput
+
+def prepare(robot, tolerance):
+    return lambda positions, rotations, start: lambda: SolverOutput(start, False)
+"""
+
+
+class InThisProcess:
+    """A worker process that is none."""
+
+    patience = 1.0
+
+    def perform(self, job):
+        outcome = Outcome(0.0, [], "")
+        for message in job.perform():
+            match message:
+                case Solved():
+                    outcome.solved.append(message)
+                case Unfit(why):
+                    outcome = outcome._replace(trouble=why)
+                case Found(values):
+                    outcome = outcome._replace(found=values)
+        return outcome
+
+
+def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, monkeypatch):
+    (tmp_path / "stays_put.py").write_text(ADAPTER)
+    monkeypatch.syspath_prepend(tmp_path)
+    line = Peer("Stays put", "stays_put", "numpy", "MIT", "anything", (Entry(ONE_START),))
+    monkeypatch.setattr(registry, "PEERS", (*registry.PEERS, line))
+    monkeypatch.setattr(robots, "worker_process", InThisProcess)
+    mine = [b for b in blocks("ik", TINY) if b.solver == "Stays put"]
+    (block,) = [b for b in mine if b.problem == "robots/character"]
+    record = run.measure(block)
+    monkeypatch.delitem(sys.modules, "stays_put")
+    assert not record.failed
+    results = Results([record])
+    (row,) = robot_tables.TABLES[ONE_START].success(results).rows
+    assert row[:2] == ("character", "Stays put")
+    assert "Stays put" in [row[0] for row in robot_tables.who(results).rows]
+
+
+def counted(results):
+    """A table of how many records there are."""
+    rows = ((len(results.records),),)
+    return Table("counted", "Records, counted", (Column("records"),), rows, "All.", "Counted.")
+
+
+def test_a_new_table_is_a_function_and_a_line_and_stands_in_the_page(
+    tmp_path, monkeypatch, records
+):
+    from bench.experiments.arm import entries
+
+    line = entry.Entry("How many records are there?", counted)
+    monkeypatch.setattr(entries, "ENTRIES", (*entries.ENTRIES, line))
+    assert "counted" in [table.name for table in tables(Results([]), ["arm"])]
+    monkeypatch.setattr(report, "all_figures", list)
+    RecordFile(tmp_path).append(records)
+    report.write(tmp_path)
+    assert "Records, counted" in (tmp_path / "tables" / "counted.md").read_text()
+    page = (tmp_path / "index.html").read_text()
+    assert "How many records are there?" in page
+    assert "Records, counted" in page
+
+
+FOLDER = {
+    "__init__.py": """
+from bench.harness.experiment import Experiment
+EXPERIMENT = Experiment(__package__, suite="sums", chapter="speed", about="is 1 + 1 two?")
+""",
+    "measurement.py": """
+from bench.harness.block import Block, Measured
+
+def blocks(scale):
+    yield Block("sums", "1 + 1", "Python", lambda: Measured({"sum": [2]}), facts={"title": "One"})
+""",
+    "tables.py": """
+from bench.presentation.tables import Column, Table
+
+def sums(results):
+    rows = tuple((r.title, int(r.arrays["sum"][0])) for r in results.all("sums"))
+    return Table("sums", "Sums", (Column("of", words=True), Column("sum")), rows, "a", "b")
+""",
+    "entries.py": """
+from bench.presentation.entry import Entry
+from . import tables
+ENTRIES = (Entry("What is 1 + 1?", tables.sums),)
+""",
+}
+
+
+def test_a_new_experiment_is_a_folder_and_a_line(tmp_path, monkeypatch):
+    folder = tmp_path / "sums_experiment"
+    folder.mkdir()
+    for name, text in FOLDER.items():
+        (folder / name).write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    import sums_experiment
+
+    bench.experiments.EXPERIMENTS.append(sums_experiment.EXPERIMENT)
+    try:
+        monkeypatch.setitem(bench.experiments.SUITES, "sums", sums_experiment.EXPERIMENT.about)
+        states = [event.state for event in run.run(["sums"], "quick", tmp_path / "out")]
+        assert states == [run.MEASURING, run.MEASURED]
+        results = Results(RecordFile(tmp_path / "out").read().records)
+        (table,) = [t for t in tables(results, ["sums"]) if t.name == "sums"]
+        assert table.rows == (("One", 2),)
+    finally:
+        bench.experiments.EXPERIMENTS.remove(sums_experiment.EXPERIMENT)
+
+
+def test_every_solver_has_one_entry_and_every_style_is_its_own():
+    names = [solver.name for solver in registry._solvers()]
+    assert len(names) == len(set(names))
+    for known in (registry.ik_solvers(), registry.step_solvers()):
+        styles = [s.style for s in known.values() if s.style != registry.OTHER]
+        assert len(styles) == len(set(styles)) >= 5
