@@ -42,3 +42,35 @@ SHOWS = ["presentation/tables.py", "presentation/report.py", "experiments/chain/
 def test_what_shows_numbers_solves_nothing(file):
     roots = {module.split(".")[0] for module in imports(BENCH / file)}
     assert not roots & {"reference", "crosscheck", "scipy"}
+
+
+TAKES_APART = {"startswith", "endswith", "split", "partition", "rpartition", "removeprefix",
+               "removesuffix", "rsplit", "find", "index", "match", "fullmatch"}  # fmt: skip
+NAMES = {"problem", "solver", "suite", "notes"}
+
+
+def names_taken_apart(text):
+    """The lines that take a name or a note of a record apart, where a fact should be read."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            inner = {n.attr for n in ast.walk(node.func.value) if isinstance(n, ast.Attribute)}
+            if node.func.attr in TAKES_APART and inner & NAMES:
+                yield node.lineno
+
+
+def test_no_name_of_a_record_is_taken_apart():
+    found = {name(path): list(names_taken_apart(path.read_text("utf-8"))) for path in SOURCES}
+    assert not {file: lines for file, lines in found.items() if lines}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        'float(record.problem.rpartition("/k")[2])',
+        'record.notes["rungs"].split("; ")',
+        'point.solver.partition(" ")[0]',
+        'record.notes.get("remark", "").split("; ")',
+    ],
+)
+def test_a_name_that_is_taken_apart_is_found(line):
+    assert list(names_taken_apart(line)) == [1]
