@@ -13,16 +13,9 @@ from numpy.typing import ArrayLike
 from . import arguments
 from .arguments import FloatArray
 from .articulation import (
-    AT,
-    AXIS,
     BALL,
     FIXED,
     FREE,
-    FREEDOM,
-    KIND,
-    LEADER,
-    MULTIPLIER,
-    PARENT,
     SLIDE,
     Articulation,
     articulated_pose,
@@ -93,7 +86,7 @@ def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
     step = arguments.coordinates("v", v, "...", model.freedom_count)
     start, step = _spread("v", start, step)
     moved = start.copy()
-    _integrate(model.arrays, one_batch(step), one_batch(moved))
+    _integrate(model.joints, one_batch(step), one_batch(moved))
     return moved.reshape(*moved.shape[:-1], -1, 4) if isinstance(articulation, Skeleton) else moved
 
 
@@ -109,7 +102,7 @@ def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
     _, end = _coordinates("q1", articulation, q1)
     start, end = _spread("q1", start, end)
     v = np.empty((*start.shape[:-1], model.freedom_count))
-    _difference(model.arrays, one_batch(end), one_batch(start), one_batch(v))
+    _difference(model.joints, one_batch(end), one_batch(start), one_batch(v))
     return v
 
 
@@ -119,7 +112,7 @@ def fill_jacobian(joints, effector, q, positions, rotations, J):
     while j >= 0:
         arm = subtract(x, vector_at(positions, j))
         add_joint(joints, j, q, quaternion_at(rotations, j), arm, J)
-        j = joints.integers[j, PARENT]
+        j = joints["parent"][j]
 
 
 def add_joint(joints, j, q, R, arm, J):
@@ -128,20 +121,20 @@ def add_joint(joints, j, q, R, arm, J):
     A joint does not turn its own axis: R takes the axis of a hinge or slide to the world, moved
     or not.
     """
-    kind, first = joints.integers[j, KIND], joints.integers[j, FREEDOM]
+    kind, first = joints["kind"][j], joints["freedom"][j]
     if kind == FIXED:
         return
     if kind == BALL:
         add_turns(R, arm, J, first)
     elif kind == FREE:
-        at = joints.integers[j, AT] + 3
+        at = joints["coordinate"][j] + 3
         unmoved = multiply(R, conjugate((q[at], q[at + 1], q[at + 2], q[at + 3])))
         add_shift(rotate(unmoved, (1.0, 0.0, 0.0)), J, first)
         add_shift(rotate(unmoved, (0.0, 1.0, 0.0)), J, first + 1)
         add_shift(rotate(unmoved, (0.0, 0.0, 1.0)), J, first + 2)
         add_turns(R, arm, J, first + 3)
     else:
-        axis = scale(joints.numbers[j, MULTIPLIER], rotate(R, vector_at(joints.numbers, j, AXIS)))
+        axis = scale(joints["multiplier"][j], rotate(R, vector_at(joints["axis"], j)))
         if kind == SLIDE:
             add_shift(axis, J, first)
         else:
@@ -174,8 +167,8 @@ def add_shift(way, J, column):
 
 def move_joint(joints, j, v, q):
     """Move the coordinates of one joint by its velocity, for one second."""
-    kind, at, first = joints.integers[j, KIND], joints.integers[j, AT], joints.integers[j, FREEDOM]
-    if kind == FIXED or joints.integers[j, LEADER] != j:
+    kind, at, first = joints["kind"][j], joints["coordinate"][j], joints["freedom"][j]
+    if kind == FIXED or joints["leader"][j] != j:
         return
     if kind == BALL:
         turn_right(q, at, (v[first], v[first + 1], v[first + 2]))
@@ -196,8 +189,8 @@ def turn_right(q, at, turn):
 
 def joint_difference(joints, j, q1, q0, v):
     """Fill the velocity that takes one joint from q0 to q1."""
-    kind, at, first = joints.integers[j, KIND], joints.integers[j, AT], joints.integers[j, FREEDOM]
-    if kind == FIXED or joints.integers[j, LEADER] != j:
+    kind, at, first = joints["kind"][j], joints["coordinate"][j], joints["freedom"][j]
+    if kind == FIXED or joints["leader"][j] != j:
         return
     if kind == BALL:
         v[first], v[first + 1], v[first + 2] = turn_between(q1, q0, at)
@@ -216,7 +209,7 @@ def turn_between(q1, q0, at):
 
 
 def _jacobians_batch(joints, effectors, q, J):
-    count = len(joints.integers)
+    count = len(joints)
     positions, rotations = np.empty((count, 3)), np.empty((count, 4))
     for i in range(len(q)):
         articulated_pose(joints, q[i], positions, rotations)
@@ -226,13 +219,13 @@ def _jacobians_batch(joints, effectors, q, J):
 
 def _integrate_batch(joints, v, q):
     for i in range(len(q)):
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             move_joint(joints, j, v[i], q[i])
 
 
 def _difference_batch(joints, q1, q0, v):
     for i in range(len(v)):
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             joint_difference(joints, j, q1[i], q0[i], v[i])
 
 
@@ -243,7 +236,7 @@ _difference = TwoSpeeds(_difference_batch)
 
 def _jacobians(model: Articulation, effectors: np.ndarray, q: FloatArray) -> FloatArray:
     J = np.zeros((*q.shape[:-1], len(effectors), 6, model.freedom_count))
-    _fill(model.arrays, effectors, one_batch(q), one_batch(J, 3))
+    _fill(model.joints, effectors, one_batch(q), one_batch(J, 3))
     return J
 
 

@@ -2,7 +2,7 @@
 
 import math
 
-from ..articulation import AT, BALL, FREE, FREEDOM, HINGE, KIND, LEADER, SLIDE
+from ..articulation import BALL, FREE, HINGE, SLIDE
 from ..quaternion import (
     IDENTITY,
     add,
@@ -22,21 +22,16 @@ from ..quaternion import (
 from .chain import place_joints
 from .joint_updates import ball_at, move_by, put_ball, shift_free, turn_ball
 from .mechanism import (
-    ORIENTED,
-    POSITION,
-    WEIGHT,
     axis_of,
+    cost,
+    effector_position,
+    effector_rotation,
     frame_of,
-    is_followed,
-    misfit,
-    moves,
-    place,
     position_error,
-    put_tip,
-    tip,
-    tip_rotation,
-    turn_weight,
-    wrong_turn,
+    put_effector,
+    rotation_error,
+    rotation_weight,
+    update_forward_kinematics,
 )
 from .stacked import freedom_worth, inner, linearise_all, squared
 from .wahba import NOTHING, add_outer, add_turn, best_angle, best_rotation, turn_value
@@ -79,134 +74,134 @@ def ccd_turn(joint, effector, target):
     return between(arm, way), add(joint, scale(math.sqrt(dot(arm, arm) / square), way))
 
 
-def ccd_update(mechanism, goal, posture, room):
+def ccd_update(mechanism, goal, data, room):
     """Move each joint, from the effectors to the root, to bring all effectors below it nearest.
 
     A joint turns what is below it as one body: Wahba's problem, for a hinge about its axis. A hinge
     or slide stops at its limit on the way; a ball whose limits leave only worse stays.
     """
     joints = mechanism.joints
-    for j in range(len(joints.integers) - 1, -1, -1):
-        if is_followed(mechanism, j):
-            descend(mechanism, goal, posture, room, j)
-        elif joints.integers[j, LEADER] == j:
-            move_joint(mechanism, goal, posture, room, j)
-    place(mechanism, posture)
+    for j in range(len(joints) - 1, -1, -1):
+        if mechanism.joints["followed"][j]:
+            descend(mechanism, goal, data, room, j)
+        elif joints["leader"][j] == j:
+            move_joint(mechanism, goal, data, room, j)
+    update_forward_kinematics(mechanism, data)
 
 
-def move_joint(mechanism, goal, posture, room, j):
+def move_joint(mechanism, goal, data, room, j):
     """Give one joint its best coordinates; the effectors follow, the joints below do not yet."""
-    joints, q, kind = mechanism.joints, posture.q, mechanism.joints.integers[j, KIND]
-    R = quaternion_at(posture.rotations, j)
+    joints, q, kind = mechanism.joints, data.q, mechanism.joints["kind"][j]
+    R = quaternion_at(data.rotations, j)
     if kind == SLIDE:
         axis = axis_of(joints, j, R)
-        way = move_by(joints, q, j, dot(axis, mean_way(mechanism, goal, posture, j)))
-        shift_tips(mechanism, posture, j, scale(way, axis))
+        way = move_by(joints, q, j, dot(axis, mean_way(mechanism, goal, data, j)))
+        shift_tips(mechanism, data, j, scale(way, axis))
         return
-    M = arms_to_targets(mechanism, goal, posture, j)
+    M = arms_to_targets(mechanism, goal, data, j)
     if kind == HINGE:
         axis = axis_of(joints, j, R)
         turn = turn_about(axis, move_by(joints, q, j, best_angle(M, axis)))
     else:
-        turn = better_turn(mechanism, goal, posture, room, j, M)
-    turn_tips(mechanism, posture, j, turn)
+        turn = better_turn(mechanism, goal, data, room, j, M)
+    turn_tips(mechanism, data, j, turn)
     if kind == FREE:
-        way = mean_way(mechanism, goal, posture, j)
-        shift_tips(mechanism, posture, j, way)
-        shift_free(joints, q, j, rotate(conjugate(frame_of(joints, j, posture)), way))
+        way = mean_way(mechanism, goal, data, j)
+        shift_tips(mechanism, data, j, way)
+        shift_free(joints, q, j, rotate(conjugate(frame_of(joints, j, data)), way))
 
 
-def arms_to_targets(mechanism, goal, posture, j):
+def arms_to_targets(mechanism, goal, data, j):
     """Return Wahba's M of the arms from joint j to the effectors below and of their rotations."""
-    M, x = NOTHING, vector_at(posture.positions, j)
+    M, x = NOTHING, vector_at(data.positions, j)
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            weight = goal[e, WEIGHT]
-            arm = subtract(tip(mechanism, posture, e), x)
-            M = add_outer(M, weight, subtract(vector_at(goal, e, POSITION), x), arm)
-            if mechanism.effectors[e, ORIENTED]:
-                wanted = wrong_turn(mechanism, goal, posture, e)
-                M = add_turn(M, weight * turn_weight(mechanism), wanted)
+        if mechanism.moves[j, e]:
+            weight = goal["weight"][e]
+            arm = subtract(effector_position(mechanism, data, e), x)
+            M = add_outer(M, weight, subtract(vector_at(goal["position"], e), x), arm)
+            if mechanism.effectors["oriented"][e]:
+                wanted = rotation_error(mechanism, goal, data, e)
+                M = add_turn(M, weight * rotation_weight(mechanism), wanted)
     return M
 
 
-def mean_way(mechanism, goal, posture, j):
+def mean_way(mechanism, goal, data, j):
     """Return the weighted mean of the ways from the effectors below joint j to their targets."""
     total, way = 0.0, (0.0, 0.0, 0.0)
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            total += goal[e, WEIGHT]
-            way = add(way, scale(goal[e, WEIGHT], position_error(mechanism, goal, posture, e)))
+        if mechanism.moves[j, e]:
+            total += goal["weight"][e]
+            way = add(way, scale(goal["weight"][e], position_error(mechanism, goal, data, e)))
     return scale(1.0 / total, way) if total > 0.0 else way
 
 
-def better_turn(mechanism, goal, posture, room, j, M):
+def better_turn(mechanism, goal, data, room, j, M):
     """Turn a ball, or the ball of a free joint, as is best within its limits; return the turn."""
-    joints, R = mechanism.joints, quaternion_at(posture.rotations, j)
-    turn = best_turn(mechanism, goal, posture, room, j, M)
-    before = ball_at(joints, posture.q, j)
-    moved = turn_ball(joints, posture.q, j, frame_of(joints, j, posture), multiply(turn, R))
+    joints, R = mechanism.joints, quaternion_at(data.rotations, j)
+    turn = best_turn(mechanism, goal, data, room, j, M)
+    before = ball_at(joints, data.q, j)
+    moved = turn_ball(joints, data.q, j, frame_of(joints, j, data), multiply(turn, R))
     allowed = renormalised(multiply(moved, conjugate(R)))
-    if joints.integers[j, KIND] == BALL and turn_value(M, allowed) < turn_value(M, IDENTITY):
-        put_ball(joints, posture.q, j, before)
+    if joints["kind"][j] == BALL and turn_value(M, allowed) < turn_value(M, IDENTITY):
+        put_ball(joints, data.q, j, before)
         return IDENTITY
     return allowed
 
 
-def best_turn(mechanism, goal, posture, room, j, M):
+def best_turn(mechanism, goal, data, room, j, M):
     """Return the best turn of joint j without limits, for one position the shortest one."""
     e = only_position(mechanism, j)
     if e < 0:
         return best_rotation(M, room.eigen[0], room.eigen[1])
-    x = vector_at(posture.positions, j)
-    arm = subtract(tip(mechanism, posture, e), x)
-    return between(arm, subtract(vector_at(goal, e, POSITION), x))
+    x = vector_at(data.positions, j)
+    arm = subtract(effector_position(mechanism, data, e), x)
+    return between(arm, subtract(vector_at(goal["position"], e), x))
 
 
 def only_position(mechanism, j):
     """Return the effector below joint j if it is the only one and its rotation free, else -1."""
     only = -1
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            if only >= 0 or mechanism.effectors[e, ORIENTED]:
+        if mechanism.moves[j, e]:
+            if only >= 0 or mechanism.effectors["oriented"][e]:
                 return -1
             only = e
     return only
 
 
-def turn_tips(mechanism, posture, j, turn):
+def turn_tips(mechanism, data, j, turn):
     """Turn the effectors below joint j about it."""
-    x = vector_at(posture.positions, j)
+    x = vector_at(data.positions, j)
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            arm = subtract(tip(mechanism, posture, e), x)
-            R = multiply(turn, tip_rotation(mechanism, posture, e))
-            put_tip(mechanism, posture, e, add(x, rotate(turn, arm)), R)
+        if mechanism.moves[j, e]:
+            arm = subtract(effector_position(mechanism, data, e), x)
+            R = multiply(turn, effector_rotation(mechanism, data, e))
+            put_effector(mechanism, data, e, add(x, rotate(turn, arm)), R)
 
 
-def shift_tips(mechanism, posture, j, way):
+def shift_tips(mechanism, data, j, way):
     """Shift the effectors below joint j."""
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            moved = add(tip(mechanism, posture, e), way)
-            put_tip(mechanism, posture, e, moved, tip_rotation(mechanism, posture, e))
+        if mechanism.moves[j, e]:
+            moved = add(effector_position(mechanism, data, e), way)
+            put_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
 
 
-def descend(mechanism, goal, posture, room, j):
+def descend(mechanism, goal, data, room, j):
     """Move a joint that others follow down the gradient, half as far until that is no worse."""
-    q, at, k = posture.q, mechanism.joints.integers[j, AT], mechanism.joints.integers[j, FREEDOM]
-    place(mechanism, posture)
-    linearise_all(mechanism, goal, posture, room.stack)
+    q, at, k = data.q, mechanism.joints["coordinate"][j], mechanism.joints["freedom"][j]
+    update_forward_kinematics(mechanism, data)
+    linearise_all(mechanism, goal, data, room.stack)
     slope = inner(room.stack.J[k], room.stack.e)
     square = squared(room.stack.J[k])
-    before, start = misfit(mechanism, goal, posture), q[at]
+    before, start = cost(mechanism, goal, data), q[at]
     worth = freedom_worth(mechanism, j)
     step = worth * slope / square if square > 0.0 else 0.0
     for _ in range(HALVINGS):
         move_by(mechanism.joints, q, j, step)
-        place(mechanism, posture)
-        if misfit(mechanism, goal, posture) <= before:
+        update_forward_kinematics(mechanism, data)
+        if cost(mechanism, goal, data) <= before:
             return
         q[at] = start
         step *= 0.5
-    place(mechanism, posture)
+    update_forward_kinematics(mechanism, data)

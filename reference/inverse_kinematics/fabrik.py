@@ -6,7 +6,7 @@ rotation for all children of a branch, a free joint as one body. What cannot be 
 residual.
 """
 
-from ..articulation import BALL, FREE, HINGE, KIND, LEADER, PARENT, SLIDE, joint_transform
+from ..articulation import BALL, FREE, HINGE, SLIDE, joint_transform
 from ..quaternion import (
     add,
     between,
@@ -27,20 +27,10 @@ from ..quaternion import (
 from .chain import in_hole, out_of_reach, root_distance
 from .joint_updates import move_by, shift_free, turn_ball
 from .mechanism import (
-    ARM,
-    HANGS,
-    ORIENTED,
-    POSITION,
-    ROTATION,
-    TURN,
-    WEIGHT,
     axis_of,
     frame_of,
-    moves,
-    place,
-    sees,
-    sees_tip,
-    turn_weight,
+    rotation_weight,
+    update_forward_kinematics,
 )
 from .wahba import NOTHING, add_outer, add_turn, best_angle, best_rotation
 
@@ -106,17 +96,17 @@ def place_towards(start, end, length):
     return add(start, scale(length / distance, way))
 
 
-def fabrik_update(mechanism, goal, posture, room):
+def fabrik_update(mechanism, goal, data, room):
     """Reach backward for where each joint should be, then forward, turning joints towards that."""
-    wish(mechanism, goal, posture, room)
+    wish(mechanism, goal, data, room)
     joints = mechanism.joints
-    for j in range(len(joints.integers)):
-        put_frame(joints, posture, room, j)
-        move_towards_wishes(mechanism, goal, posture, room, j)
-    place(mechanism, posture)
+    for j in range(len(joints)):
+        put_frame(joints, data, room, j)
+        move_towards_wishes(mechanism, goal, data, room, j)
+    update_forward_kinematics(mechanism, data)
 
 
-def wish(mechanism, goal, posture, room):
+def wish(mechanism, goal, data, room):
     """Fill where each joint would be if the effectors were on their targets, the lengths kept.
 
     A joint with several children takes the weighted mean of what each would pull it to.
@@ -125,32 +115,32 @@ def wish(mechanism, goal, posture, room):
     for j in range(len(wishes)):
         put_quaternion(wishes, j, (0.0, 0.0, 0.0, 0.0))
     for e in range(len(mechanism.effectors)):
-        j = mechanism.effectors[e, HANGS]
+        j = mechanism.effectors["joint"][e]
         if j >= 0:
-            add_wish(room, j, goal[e, WEIGHT], wish_of_effector(mechanism, goal, posture, e, j))
+            add_wish(room, j, goal["weight"][e], wish_of_effector(mechanism, goal, data, e, j))
     for j in range(len(wishes) - 1, -1, -1):
         if wishes[j, WISHED] > 0.0:
             put_vector(wishes, j, scale(1.0 / wishes[j, WISHED], vector_at(wishes, j)))
-        parent = mechanism.joints.integers[j, PARENT]
+        parent = mechanism.joints["parent"][j]
         if parent >= 0 and wishes[j, WISHED] > 0.0:
-            x, x_parent = vector_at(posture.positions, j), vector_at(posture.positions, parent)
+            x, x_parent = vector_at(data.positions, j), vector_at(data.positions, parent)
             length = norm(subtract(x, x_parent))
             pulled = place_towards(vector_at(wishes, j), x_parent, length)
             add_wish(room, parent, wishes[j, WISHED], pulled)
 
 
-def wish_of_effector(mechanism, goal, posture, e, j):
+def wish_of_effector(mechanism, goal, data, e, j):
     """Return where the joint that an effector hangs on would be with the effector on its target."""
-    target, arm = vector_at(goal, e, POSITION), vector_at(mechanism.tips, e, ARM)
-    if mechanism.effectors[e, ORIENTED]:
+    target, arm = vector_at(goal["position"], e), vector_at(mechanism.effectors["position"], e)
+    if mechanism.effectors["oriented"][e]:
         return subtract(target, rotate(wished_rotation(mechanism, goal, e), arm))
-    return place_towards(target, vector_at(posture.positions, j), norm(arm))
+    return place_towards(target, vector_at(data.positions, j), norm(arm))
 
 
 def wished_rotation(mechanism, goal, e):
     """Return the rotation that the joint needs for its effector to have the target's."""
-    frame = conjugate(quaternion_at(mechanism.tips, e, TURN))
-    return multiply(quaternion_at(goal, e, ROTATION), frame)
+    frame = conjugate(quaternion_at(mechanism.effectors["rotation"], e))
+    return multiply(quaternion_at(goal["rotation"], e), frame)
 
 
 def add_wish(room, j, weight, position):
@@ -159,98 +149,98 @@ def add_wish(room, j, weight, position):
     room.wishes[j, WISHED] += weight
 
 
-def put_frame(joints, posture, room, j):
+def put_frame(joints, data, room, j):
     """Put a joint where its parent now has it, moved by its coordinates; a ball keeps its turn."""
-    x, R = joint_transform(joints, j, posture.q)
-    parent = joints.integers[j, PARENT]
+    x, R = joint_transform(joints, j, data.q)
+    parent = joints["parent"][j]
     if parent >= 0:
-        R_parent = quaternion_at(posture.rotations, parent)
-        x = add(vector_at(posture.positions, parent), rotate(R_parent, x))
+        R_parent = quaternion_at(data.rotations, parent)
+        x = add(vector_at(data.positions, parent), rotate(R_parent, x))
         R = multiply(R_parent, R)
-    put_vector(posture.positions, j, x)
-    if joints.integers[j, KIND] != BALL or room.wishes[j, WISHED] == 0.0:
-        put_quaternion(posture.rotations, j, R)
+    put_vector(data.positions, j, x)
+    if joints["kind"][j] != BALL or room.wishes[j, WISHED] == 0.0:
+        put_quaternion(data.rotations, j, R)
 
 
-def move_towards_wishes(mechanism, goal, posture, room, j):
+def move_towards_wishes(mechanism, goal, data, room, j):
     """Move one joint, its parent in place, to bring its children nearest to their wishes."""
-    joints, q, kind = mechanism.joints, posture.q, mechanism.joints.integers[j, KIND]
-    R, x = quaternion_at(posture.rotations, j), vector_at(posture.positions, j)
+    joints, q, kind = mechanism.joints, data.q, mechanism.joints["kind"][j]
+    R, x = quaternion_at(data.rotations, j), vector_at(data.positions, j)
     if kind == FREE and room.wishes[j, WISHED] > 0.0:
-        fit_free(mechanism, goal, posture, room, j)
+        fit_free(mechanism, goal, data, room, j)
         return
-    if kind == SLIDE and joints.integers[j, LEADER] == j:
+    if kind == SLIDE and joints["leader"][j] == j:
         axis = axis_of(joints, j, R)
-        way = dot(axis, mean_wish(mechanism, goal, posture, room, j))
+        way = dot(axis, mean_wish(mechanism, goal, data, room, j))
         x = add(x, scale(move_by(joints, q, j, way), axis))
-    put_vector(posture.positions, j, x)
-    if kind == HINGE and joints.integers[j, LEADER] == j:
+    put_vector(data.positions, j, x)
+    if kind == HINGE and joints["leader"][j] == j:
         axis = axis_of(joints, j, R)
-        angle = best_angle(arms_to_wishes(mechanism, goal, posture, room, j), axis)
+        angle = best_angle(arms_to_wishes(mechanism, goal, data, room, j), axis)
         R = multiply(turn_about(axis, move_by(joints, q, j, angle)), R)
     elif kind == BALL and room.wishes[j, WISHED] > 0.0:
-        turn = turn_to_wishes(mechanism, goal, posture, room, j)
-        R = turn_ball(joints, q, j, frame_of(joints, j, posture), multiply(turn, R))
-    put_quaternion(posture.rotations, j, normalised(R))
+        turn = turn_to_wishes(mechanism, goal, data, room, j)
+        R = turn_ball(joints, q, j, frame_of(joints, j, data), multiply(turn, R))
+    put_quaternion(data.rotations, j, normalised(R))
 
 
-def fit_free(mechanism, goal, posture, room, j):
+def fit_free(mechanism, goal, data, room, j):
     """Move a free joint as one body to bring what is below nearest to its wishes (Horn 1987).
 
     The centre of the arms goes to the centre of their wishes, the rotation is the best about it: a
     joint that first went to its own wish and then turned about that would overshoot and oscillate.
     """
-    joints, x = mechanism.joints, vector_at(posture.positions, j)
-    total, arm, way = mean_arm_and_wish(mechanism, goal, posture, room, j)
-    M = arms_to_wishes(mechanism, goal, posture, room, j)
+    joints, x = mechanism.joints, vector_at(data.positions, j)
+    total, arm, way = mean_arm_and_wish(mechanism, goal, data, room, j)
+    M = arms_to_wishes(mechanism, goal, data, room, j)
     M = add_outer(M, -total, way, arm)
     turn = best_rotation(M, room.eigen[0], room.eigen[1])
-    shift, frame = subtract(way, rotate(turn, arm)), frame_of(joints, j, posture)
-    R = multiply(turn, quaternion_at(posture.rotations, j))
-    R = turn_ball(joints, posture.q, j, frame, R)
-    shift_free(joints, posture.q, j, rotate(conjugate(frame), shift))
-    put_vector(posture.positions, j, add(x, shift))
-    put_quaternion(posture.rotations, j, normalised(R))
+    shift, frame = subtract(way, rotate(turn, arm)), frame_of(joints, j, data)
+    R = multiply(turn, quaternion_at(data.rotations, j))
+    R = turn_ball(joints, data.q, j, frame, R)
+    shift_free(joints, data.q, j, rotate(conjugate(frame), shift))
+    put_vector(data.positions, j, add(x, shift))
+    put_quaternion(data.rotations, j, normalised(R))
 
 
-def mean_arm_and_wish(mechanism, goal, posture, room, j):
+def mean_arm_and_wish(mechanism, goal, data, room, j):
     """Return the weight of what `arms_to_wishes` counts, and the mean of arms and of wishes."""
     total, arms, ways = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
+        if mechanism.moves[j, e]:
+            arm, way = arm_and_wish(mechanism, goal, data, e, j)
             arms, ways = (
-                add(arms, scale(goal[e, WEIGHT], arm)),
-                add(ways, scale(goal[e, WEIGHT], way)),
+                add(arms, scale(goal["weight"][e], arm)),
+                add(ways, scale(goal["weight"][e], way)),
             )
-            total += goal[e, WEIGHT]
+            total += goal["weight"][e]
     for c in range(j + 1, len(room.wishes)):
-        if sees(mechanism, j, c):
-            arm, way = joint_and_wish(mechanism, posture, room, c, j)
+        if mechanism.adjacent[j, c]:
+            arm, way = joint_and_wish(mechanism, data, room, c, j)
             weight = room.wishes[c, WISHED]
             arms, ways = add(arms, scale(weight, arm)), add(ways, scale(weight, way))
             total += weight
     return total, scale(1.0 / total, arms), scale(1.0 / total, ways)
 
 
-def turn_to_wishes(mechanism, goal, posture, room, j):
+def turn_to_wishes(mechanism, goal, data, room, j):
     """Return the turn of joint j that brings what it sees nearest, the shortest if it is one."""
     found, arm, way = 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for e in range(len(mechanism.effectors)):
-        if sees_tip(mechanism, j, e):
-            found += 2 if mechanism.effectors[e, ORIENTED] else 1
-            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
+        if mechanism.adjacent[j, len(mechanism.joints) + e]:
+            found += 2 if mechanism.effectors["oriented"][e] else 1
+            arm, way = arm_and_wish(mechanism, goal, data, e, j)
     for c in range(j + 1, len(room.wishes)):
-        if sees(mechanism, j, c) and room.wishes[c, WISHED] > 0.0:
+        if mechanism.adjacent[j, c] and room.wishes[c, WISHED] > 0.0:
             found += 1
-            arm, way = joint_and_wish(mechanism, posture, room, c, j)
+            arm, way = joint_and_wish(mechanism, data, room, c, j)
     if found == 1:
         return between(arm, way)
-    M = arms_to_wishes(mechanism, goal, posture, room, j)
+    M = arms_to_wishes(mechanism, goal, data, room, j)
     return best_rotation(M, room.eigen[0], room.eigen[1])
 
 
-def arms_to_wishes(mechanism, goal, posture, room, j):
+def arms_to_wishes(mechanism, goal, data, room, j):
     """Return Wahba's M of the arms from joint j to what it sees below, and of the wishes.
 
     All effectors below count as well: a hinge often cannot meet its child's wish, and would else
@@ -258,63 +248,63 @@ def arms_to_wishes(mechanism, goal, posture, room, j):
     """
     M = NOTHING
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
-            M = add_outer(M, goal[e, WEIGHT], way, arm)
-            if mechanism.effectors[e, ORIENTED]:
-                R = rotation_below(mechanism, posture, j, e)
-                wanted = multiply(quaternion_at(goal, e, ROTATION), conjugate(R))
-                M = add_turn(M, goal[e, WEIGHT] * turn_weight(mechanism), wanted)
+        if mechanism.moves[j, e]:
+            arm, way = arm_and_wish(mechanism, goal, data, e, j)
+            M = add_outer(M, goal["weight"][e], way, arm)
+            if mechanism.effectors["oriented"][e]:
+                R = rotation_below(mechanism, data, j, e)
+                wanted = multiply(quaternion_at(goal["rotation"], e), conjugate(R))
+                M = add_turn(M, goal["weight"][e] * rotation_weight(mechanism), wanted)
     for c in range(j + 1, len(room.wishes)):
-        if sees(mechanism, j, c):
-            arm, way = joint_and_wish(mechanism, posture, room, c, j)
+        if mechanism.adjacent[j, c]:
+            arm, way = joint_and_wish(mechanism, data, room, c, j)
             M = add_outer(M, room.wishes[c, WISHED], way, arm)
     return M
 
 
-def mean_wish(mechanism, goal, posture, room, j):
+def mean_wish(mechanism, goal, data, room, j):
     """Return the weighted mean of the ways from joint j's children to their wishes."""
     total, mean = 0.0, (0.0, 0.0, 0.0)
     for e in range(len(mechanism.effectors)):
-        if mechanism.effectors[e, HANGS] == j:
-            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
-            mean = add(mean, scale(goal[e, WEIGHT], subtract(way, arm)))
-            total += goal[e, WEIGHT]
+        if mechanism.effectors["joint"][e] == j:
+            arm, way = arm_and_wish(mechanism, goal, data, e, j)
+            mean = add(mean, scale(goal["weight"][e], subtract(way, arm)))
+            total += goal["weight"][e]
     for c in range(j + 1, len(room.wishes)):
-        if mechanism.joints.integers[c, PARENT] == j and room.wishes[c, WISHED] > 0.0:
-            arm, way = joint_and_wish(mechanism, posture, room, c, j)
+        if mechanism.joints["parent"][c] == j and room.wishes[c, WISHED] > 0.0:
+            arm, way = joint_and_wish(mechanism, data, room, c, j)
             mean = add(mean, scale(room.wishes[c, WISHED], subtract(way, arm)))
             total += room.wishes[c, WISHED]
     return scale(1.0 / total, mean) if total > 0.0 else mean
 
 
-def arm_and_wish(mechanism, goal, posture, e, j):
+def arm_and_wish(mechanism, goal, data, e, j):
     """Return where an effector is and should be, seen from joint j, in the world's axes [m]."""
-    x = vector_at(mechanism.tips, e, ARM)
-    arm = seen_from(mechanism.joints, posture, j, mechanism.effectors[e, HANGS], x)
-    return arm, subtract(vector_at(goal, e, POSITION), vector_at(posture.positions, j))
+    x = vector_at(mechanism.effectors["position"], e)
+    arm = seen_from(mechanism.joints, data, j, mechanism.effectors["joint"][e], x)
+    return arm, subtract(vector_at(goal["position"], e), vector_at(data.positions, j))
 
 
-def joint_and_wish(mechanism, posture, room, c, j):
+def joint_and_wish(mechanism, data, room, c, j):
     """Return where a joint below is and should be, seen from joint j, in the world's axes [m]."""
-    x, _ = joint_transform(mechanism.joints, c, posture.q)
-    arm = seen_from(mechanism.joints, posture, j, mechanism.joints.integers[c, PARENT], x)
-    return arm, subtract(vector_at(room.wishes, c), vector_at(posture.positions, j))
+    x, _ = joint_transform(mechanism.joints, c, data.q)
+    arm = seen_from(mechanism.joints, data, j, mechanism.joints["parent"][c], x)
+    return arm, subtract(vector_at(room.wishes, c), vector_at(data.positions, j))
 
 
-def seen_from(joints, posture, j, k, x):
+def seen_from(joints, data, j, k, x):
     """Return a point of the frame of joint k, below j or j itself, seen from j, in world axes."""
     while k != j:
-        way, R = joint_transform(joints, k, posture.q)
+        way, R = joint_transform(joints, k, data.q)
         x = add(way, rotate(R, x))
-        k = joints.integers[k, PARENT]
-    return rotate(quaternion_at(posture.rotations, j), x)
+        k = joints["parent"][k]
+    return rotate(quaternion_at(data.rotations, j), x)
 
 
-def rotation_below(mechanism, posture, j, e):
+def rotation_below(mechanism, data, j, e):
     """Return the rotation of an effector as the coordinates from joint j down have it."""
-    R, k = quaternion_at(mechanism.tips, e, TURN), mechanism.effectors[e, HANGS]
+    R, k = quaternion_at(mechanism.effectors["rotation"], e), mechanism.effectors["joint"][e]
     while k != j:
-        _, R_joint = joint_transform(mechanism.joints, k, posture.q)
-        R, k = multiply(R_joint, R), mechanism.joints.integers[k, PARENT]
-    return multiply(quaternion_at(posture.rotations, j), R)
+        _, R_joint = joint_transform(mechanism.joints, k, data.q)
+        R, k = multiply(R_joint, R), mechanism.joints["parent"][k]
+    return multiply(quaternion_at(data.rotations, j), R)

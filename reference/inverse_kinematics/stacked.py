@@ -13,17 +13,10 @@ import numpy as np
 
 from ..arguments import FloatArray
 from ..articulation import (
-    AT,
     BALL,
     FREE,
-    FREEDOM,
     HINGE,
-    KIND,
-    LEADER,
-    LOWER,
-    MULTIPLIER,
     SLIDE,
-    UPPER,
     clamp_joint,
 )
 from ..quaternion import (
@@ -41,17 +34,12 @@ from ..quaternion import (
 from .jacobian import ROUNDING
 from .mechanism import (
     LEVER,
-    ORIENTED,
-    ROW,
-    WEIGHT,
     axis_of,
+    effector_position,
     frame_of,
-    is_followed,
-    moves,
-    place,
     position_error,
-    tip,
-    wrong_turn,
+    rotation_error,
+    update_forward_kinematics,
 )
 
 WHOLE = 2.0 * math.pi
@@ -86,43 +74,43 @@ def new_stack(mechanism):
     )
 
 
-def linearise_all(mechanism, goal, posture, stack):
-    """Fill e and J at a posture."""
+def linearise_all(mechanism, goal, data, stack):
+    """Fill e and J at a data."""
     lever = LEVER * mechanism.reach
     for e in range(len(mechanism.effectors)):
-        row, root = mechanism.effectors[e, ROW], math.sqrt(goal[e, WEIGHT])
-        put(stack.e, row, scale(root, position_error(mechanism, goal, posture, e)))
-        if mechanism.effectors[e, ORIENTED]:
+        row, root = mechanism.effectors["row"][e], math.sqrt(goal["weight"][e])
+        put(stack.e, row, scale(root, position_error(mechanism, goal, data, e)))
+        if mechanism.effectors["oriented"][e]:
             put(
                 stack.e,
                 row + 3,
-                scale(root * lever, logarithm(wrong_turn(mechanism, goal, posture, e))),
+                scale(root * lever, logarithm(rotation_error(mechanism, goal, data, e))),
             )
     joints = mechanism.joints
     for k in range(len(stack.J)):
         clear(stack.J[k])
-    for j in range(len(joints.integers)):
-        R = quaternion_at(posture.rotations, j)
-        kind, k = joints.integers[j, KIND], joints.integers[j, FREEDOM]
-        leader = joints.integers[j, LEADER]
-        factor = joints.numbers[j, MULTIPLIER] * freedom_worth(mechanism, leader)
+    for j in range(len(joints)):
+        R = quaternion_at(data.rotations, j)
+        kind, k = joints["kind"][j], joints["freedom"][j]
+        leader = joints["leader"][j]
+        factor = joints["multiplier"][j] * freedom_worth(mechanism, leader)
         if kind == HINGE:
             axis = scale(factor, axis_of(joints, j, R))
-            add_turn_row(mechanism, goal, posture, stack, j, k, axis)
+            add_turn_row(mechanism, goal, data, stack, j, k, axis)
         elif kind == SLIDE:
             add_shift_row(mechanism, goal, stack, j, k, scale(factor, axis_of(joints, j, R)))
         elif kind == BALL:
-            add_turn_rows(mechanism, goal, posture, stack, j, k, R)
+            add_turn_rows(mechanism, goal, data, stack, j, k, R)
         elif kind == FREE:
-            add_shift_rows(mechanism, goal, stack, j, k, frame_of(joints, j, posture))
-            add_turn_rows(mechanism, goal, posture, stack, j, k + 3, R)
+            add_shift_rows(mechanism, goal, stack, j, k, frame_of(joints, j, data))
+            add_turn_rows(mechanism, goal, data, stack, j, k + 3, R)
 
 
-def add_turn_rows(mechanism, goal, posture, stack, j, k, R):
+def add_turn_rows(mechanism, goal, data, stack, j, k, R):
     """Add to J the turns of joint j about the axes of its own frame, from freedom k on."""
-    add_turn_row(mechanism, goal, posture, stack, j, k, rotate(R, (1.0, 0.0, 0.0)))
-    add_turn_row(mechanism, goal, posture, stack, j, k + 1, rotate(R, (0.0, 1.0, 0.0)))
-    add_turn_row(mechanism, goal, posture, stack, j, k + 2, rotate(R, (0.0, 0.0, 1.0)))
+    add_turn_row(mechanism, goal, data, stack, j, k, rotate(R, (1.0, 0.0, 0.0)))
+    add_turn_row(mechanism, goal, data, stack, j, k + 1, rotate(R, (0.0, 1.0, 0.0)))
+    add_turn_row(mechanism, goal, data, stack, j, k + 2, rotate(R, (0.0, 0.0, 1.0)))
 
 
 def add_shift_rows(mechanism, goal, stack, j, k, R):
@@ -133,25 +121,25 @@ def add_shift_rows(mechanism, goal, stack, j, k, R):
     add_shift_row(mechanism, goal, stack, j, k + 2, rotate(R, (0.0, 0.0, reach)))
 
 
-def add_turn_row(mechanism, goal, posture, stack, j, k, axis):
+def add_turn_row(mechanism, goal, data, stack, j, k, axis):
     """Add to row k what a turn of joint j about a world axis does to the effectors below."""
     lever = LEVER * mechanism.reach
-    x = vector_at(posture.positions, j)
+    x = vector_at(data.positions, j)
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            row, root = mechanism.effectors[e, ROW], math.sqrt(goal[e, WEIGHT])
-            move = cross(axis, subtract(tip(mechanism, posture, e), x))
+        if mechanism.moves[j, e]:
+            row, root = mechanism.effectors["row"][e], math.sqrt(goal["weight"][e])
+            move = cross(axis, subtract(effector_position(mechanism, data, e), x))
             put_sum(stack.J[k], row, scale(root, move))
-            if mechanism.effectors[e, ORIENTED]:
+            if mechanism.effectors["oriented"][e]:
                 put_sum(stack.J[k], row + 3, scale(root * lever, axis))
 
 
 def add_shift_row(mechanism, goal, stack, j, k, way):
     """Add to row k what a shift of joint j by a way in the world does to the effectors below."""
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            root = math.sqrt(goal[e, WEIGHT])
-            put_sum(stack.J[k], mechanism.effectors[e, ROW], scale(root, way))
+        if mechanism.moves[j, e]:
+            root = math.sqrt(goal["weight"][e])
+            put_sum(stack.J[k], mechanism.effectors["row"][e], scale(root, way))
 
 
 def clear(row):
@@ -180,7 +168,7 @@ def squared(v):
     return total
 
 
-def damped_step(mechanism, posture, stack, damping):
+def damped_step(mechanism, data, stack, damping):
     """Fill the step J' (J J' + damping 1)^-1 e within the limits of hinges and slides.
 
     A freedom that the step would take beyond its limit is held at it, its part of the way is taken
@@ -195,7 +183,7 @@ def damped_step(mechanism, posture, stack, damping):
         for k in range(len(stack.step)):
             if stack.held[k] == 0.0:
                 stack.step[k] = inner(stack.J[k], stack.z)
-        if hold_limited(mechanism, posture, stack):
+        if hold_limited(mechanism, data, stack):
             any_held = True
         elif not (any_held and let_go(stack)):
             return
@@ -220,7 +208,7 @@ def let_go(stack):
     return True
 
 
-def transposed_step(mechanism, posture, stack):
+def transposed_step(mechanism, data, stack):
     """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without what limits stop."""
     clear(stack.held)
     for _ in range(len(stack.step) + 1):
@@ -230,7 +218,7 @@ def transposed_step(mechanism, posture, stack):
                 stack.step[k] *= square / moved
             else:
                 stack.step[k] = 0.0
-        if not stop_at_limits(mechanism, posture, stack):
+        if not stop_at_limits(mechanism, data, stack):
             return
 
 
@@ -245,14 +233,14 @@ def along_gradient(stack):
     return inner(stack.e, stack.z), squared(stack.z)
 
 
-def stop_at_limits(mechanism, posture, stack):
+def stop_at_limits(mechanism, data, stack):
     """Hold the freedoms at a limit that the step would take further; return whether any were."""
     joints, any_held = mechanism.joints, False
-    for j in range(len(joints.integers)):
-        k = joints.integers[j, FREEDOM]
+    for j in range(len(joints)):
+        k = joints["freedom"][j]
         if is_limited(joints, j) and stack.held[k] == 0.0:
-            q, step = posture.q[joints.integers[j, AT]], stack.step[k]
-            beyond = q >= joints.numbers[j, UPPER] if step > 0.0 else q <= joints.numbers[j, LOWER]
+            q, step = data.q[joints["coordinate"][j]], stack.step[k]
+            beyond = q >= joints["upper"][j] if step > 0.0 else q <= joints["lower"][j]
             if beyond and step != 0.0:
                 stack.held[k] = 1.0
                 any_held = True
@@ -261,12 +249,12 @@ def stop_at_limits(mechanism, posture, stack):
 
 def freedom_worth(mechanism, j):
     """Return what a unit of a hinge's or slide's freedom is worth: 1 rad, or the reach [m]."""
-    return mechanism.reach if mechanism.joints.integers[j, KIND] == SLIDE else 1.0
+    return mechanism.reach if mechanism.joints["kind"][j] == SLIDE else 1.0
 
 
 def is_limited(joints, j):
     """Return whether a joint is a hinge or slide that moves by itself."""
-    return joints.integers[j, KIND] in (HINGE, SLIDE) and joints.integers[j, LEADER] == j
+    return joints["kind"][j] in (HINGE, SLIDE) and joints["leader"][j] == j
 
 
 def solve_damped(stack, damping):
@@ -333,16 +321,16 @@ def inner(a, b):
     return total
 
 
-def hold_limited(mechanism, posture, stack):
+def hold_limited(mechanism, data, stack):
     """Hold the freedoms that the step takes beyond their limits; return whether there were any."""
     joints, any_held = mechanism.joints, False
-    for j in range(len(joints.integers)):
-        kind, k = joints.integers[j, KIND], joints.integers[j, FREEDOM]
-        if joints.integers[j, LEADER] != j or kind not in (HINGE, SLIDE) or stack.held[k] != 0.0:
+    for j in range(len(joints)):
+        kind, k = joints["kind"][j], joints["freedom"][j]
+        if joints["leader"][j] != j or kind not in (HINGE, SLIDE) or stack.held[k] != 0.0:
             continue
-        q, worth = posture.q[joints.integers[j, AT]], freedom_worth(mechanism, j)
+        q, worth = data.q[joints["coordinate"][j]], freedom_worth(mechanism, j)
         wanted = q + worth * stack.step[k]
-        bounded = min(max(wanted, joints.numbers[j, LOWER]), joints.numbers[j, UPPER])
+        bounded = min(max(wanted, joints["lower"][j]), joints["upper"][j])
         if bounded != wanted and not turns_round(mechanism, j):
             stack.held[k] = 1.0 if wanted > bounded else -1.0
             stack.step[k] = (bounded - q) / worth
@@ -352,12 +340,12 @@ def hold_limited(mechanism, posture, stack):
     return any_held
 
 
-def take_step(mechanism, posture, stack):
+def take_step(mechanism, data, stack):
     """Change the coordinates by the step, within the limits."""
-    joints, q, step = mechanism.joints, posture.q, stack.step
-    for j in range(len(joints.integers)):
-        kind, k, at = joints.integers[j, KIND], joints.integers[j, FREEDOM], joints.integers[j, AT]
-        if joints.integers[j, LEADER] != j:
+    joints, q, step = mechanism.joints, data.q, stack.step
+    for j in range(len(joints)):
+        kind, k, at = joints["kind"][j], joints["freedom"][j], joints["coordinate"][j]
+        if joints["leader"][j] != j:
             continue
         if kind in (HINGE, SLIDE):
             q[at] += freedom_worth(mechanism, j) * step[k]
@@ -370,19 +358,19 @@ def take_step(mechanism, posture, stack):
                 q[at + i] += mechanism.reach * step[k + i]
             turn_by(q, at + 3, step, k + 3)
         clamp_joint(joints, j, q)
-    place(mechanism, posture)
+    update_forward_kinematics(mechanism, data)
 
 
 def turns_round(mechanism, j):
     """Return whether a hinge's limits leave a whole turn, so that none of them need stop it."""
     joints = mechanism.joints
-    turn = joints.numbers[j, UPPER] - joints.numbers[j, LOWER]
-    return joints.integers[j, KIND] == HINGE and turn >= WHOLE and not is_followed(mechanism, j)
+    turn = joints["upper"][j] - joints["lower"][j]
+    return joints["kind"][j] == HINGE and turn >= WHOLE and not mechanism.joints["followed"][j]
 
 
 def same_turn(joints, j, angle):
     """Return the angle that is the same turn within the limits, the nearest to that given."""
-    lower, upper = joints.numbers[j, LOWER], joints.numbers[j, UPPER]
+    lower, upper = joints["lower"][j], joints["upper"][j]
     if angle > upper:
         return angle - WHOLE * math.ceil((angle - upper) / WHOLE)
     if angle < lower:

@@ -13,21 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import FloatArray, IndexArray
-from ..articulation import BALL, FREE, FREEDOM, FREEDOMS, HINGE, KIND, MULTIPLIER, SLIDE
+from ..articulation import BALL, FREE, FREEDOMS, HINGE, SLIDE
 from ..inverse_kinematics.mechanism import (
     LEVER,
-    ORIENTED,
-    ROW,
-    WEIGHT,
-    Posture,
+    ConfigurationData,
     axis_of,
+    effector_position,
     frame_of,
-    moves,
-    new_posture,
-    place,
+    new_data,
     position_error,
-    tip,
-    wrong_turn,
+    rotation_error,
+    update_forward_kinematics,
 )
 from ..quaternion import (
     add,
@@ -65,18 +61,18 @@ class Motions(NamedTuple):
 class Workspace(NamedTuple):
     """The pose of one frame, and the motions of its joints."""
 
-    pose: Posture
+    pose: ConfigurationData
     motions: Motions
 
 
 def new_workspace(mechanism):
     """Return a workspace to be filled."""
     count = 0
-    for j in range(len(mechanism.joints.integers)):
-        count += FREEDOMS[mechanism.joints.integers[j, KIND]]
+    for j in range(len(mechanism.joints)):
+        count += FREEDOMS[mechanism.joints["kind"][j]]
     owners = np.empty((count, 2), dtype=np.int64)
     motions = Motions(owners, np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)))
-    return Workspace(new_posture(mechanism), motions)
+    return Workspace(new_data(mechanism), motions)
 
 
 def fill_errors_and_jacobians(problem, q, e, J):
@@ -106,27 +102,27 @@ def set_frame(mechanism, q, work):
     """Compute the forward kinematics of one frame."""
     for c in range(len(q)):
         work.pose.q[c] = q[c]
-    place(mechanism, work.pose)
+    update_forward_kinematics(mechanism, work.pose)
 
 
 def fill_errors(mechanism, target, work, errors):
     """Fill the errors of a frame: displacements [m], and rotation vectors times the lever [m]."""
     for e in range(len(mechanism.effectors)):
-        row, root = mechanism.effectors[e, ROW], np.sqrt(target[e, WEIGHT])
+        row, root = mechanism.effectors["row"][e], np.sqrt(target["weight"][e])
         error = scale(root, position_error(mechanism, target, work.pose, e))
         errors[row], errors[row + 1], errors[row + 2] = error
-        if mechanism.effectors[e, ORIENTED]:
+        if mechanism.effectors["oriented"][e]:
             lever = root * LEVER * mechanism.reach
-            error = scale(lever, logarithm(wrong_turn(mechanism, target, work.pose, e)))
+            error = scale(lever, logarithm(rotation_error(mechanism, target, work.pose, e)))
             errors[row + 3], errors[row + 4], errors[row + 5] = error
 
 
 def fill_motions(mechanism, units, work):
     """Fill the motions of a frame, but for their moments."""
     joints, motions, at = mechanism.joints, work.motions, 0
-    for j in range(len(joints.integers)):
-        R, k = quaternion_at(work.pose.rotations, j), joints.integers[j, FREEDOM]
-        kind, factor = joints.integers[j, KIND], joints.numbers[j, MULTIPLIER]
+    for j in range(len(joints)):
+        R, k = quaternion_at(work.pose.rotations, j), joints["freedom"][j]
+        kind, factor = joints["kind"][j], joints["multiplier"][j]
         if kind == HINGE:
             at = put_motion(motions, at, j, k, scale(factor, axis_of(joints, j, R)), ZERO)
         elif kind == SLIDE:
@@ -166,11 +162,11 @@ def fill_jacobian(mechanism, target, work, J):
     J[:] = 0.0
     owners = work.motions.owners
     for e in range(len(mechanism.effectors)):
-        row, root = mechanism.effectors[e, ROW], np.sqrt(target[e, WEIGHT])
+        row, root = mechanism.effectors["row"][e], np.sqrt(target["weight"][e])
         for b in range(len(owners)):
-            if moves(mechanism, owners[b, 0], e):
+            if mechanism.moves[owners[b, 0], e]:
                 add_to_column(J, row, owners[b, 1], scale(root, velocity(mechanism, work, e, b)))
-                if mechanism.effectors[e, ORIENTED]:
+                if mechanism.effectors["oriented"][e]:
                     lever = root * LEVER * mechanism.reach
                     angular = scale(lever, vector_at(work.motions.angular, b))
                     add_to_column(J, row + 3, owners[b, 1], angular)
@@ -179,17 +175,17 @@ def fill_jacobian(mechanism, target, work, J):
 def velocity(mechanism, work, e, b):
     """Return the linear velocity of an effector by a motion."""
     x = vector_at(work.pose.positions, work.motions.owners[b, 0])
-    arm = subtract(tip(mechanism, work.pose, e), x)
+    arm = subtract(effector_position(mechanism, work.pose, e), x)
     return add(cross(vector_at(work.motions.angular, b), arm), vector_at(work.motions.linear, b))
 
 
 def fill_moments(mechanism, target, work, m, e):
     """Fill the moments of all motions for an effector."""
-    row, root = mechanism.effectors[e, ROW], np.sqrt(target[e, WEIGHT])
+    row, root = mechanism.effectors["row"][e], np.sqrt(target["weight"][e])
     force = scale(root, (m[row], m[row + 1], m[row + 2]))
     for b in range(len(work.motions.owners)):
         moment = cross(velocity(mechanism, work, e, b), force)
-        if mechanism.effectors[e, ORIENTED]:
+        if mechanism.effectors["oriented"][e]:
             lever = 0.5 * root * LEVER * mechanism.reach
             torque = scale(lever, (m[row + 3], m[row + 4], m[row + 5]))
             moment = add(moment, cross(vector_at(work.motions.angular, b), torque))
@@ -201,11 +197,11 @@ def subtract_effector(mechanism, work, e, diagonal):
     owners, angular, _, moments = work.motions
     for b in range(len(owners)):
         j, k = owners[b]
-        if not moves(mechanism, j, e):
+        if not mechanism.moves[j, e]:
             continue
         for a in range(b + 1):
             above, i = owners[a]
-            if moves(mechanism, above, e):
+            if mechanism.moves[above, e]:
                 second = dot(vector_at(angular, a), vector_at(moments, b))
                 if above == j and is_rotation(work.motions, a):
                     second = 0.5 * (second + dot(vector_at(angular, b), vector_at(moments, a)))
