@@ -3,6 +3,7 @@
 import math
 
 from ..articulation import BALL, FREE, HINGE, SLIDE
+from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
     IDENTITY,
     add,
@@ -19,21 +20,19 @@ from ..quaternion import (
     turn_about,
     vector_at,
 )
+from .box_step import freedom_scale, inner, linearise_task, squared
 from .chain import place_joints
 from .joint_updates import ball_at, move_by, put_ball, shift_free, turn_ball
 from .mechanism import (
-    axis_of,
     cost,
     effector_position,
     effector_rotation,
-    frame_of,
     position_error,
     put_effector,
     rotation_error,
     rotation_weight,
     update_forward_kinematics,
 )
-from .stacked import freedom_worth, inner, linearise_all, squared
 from .wahba import NOTHING, add_outer, add_turn, best_angle, best_rotation, turn_value
 
 # A step of a joint that others follow is halved at most so often.
@@ -108,7 +107,7 @@ def move_joint(mechanism, goal, data, room, j):
     if kind == FREE:
         way = mean_way(mechanism, goal, data, j)
         shift_tips(mechanism, data, j, way)
-        shift_free(joints, q, j, rotate(conjugate(frame_of(joints, j, data)), way))
+        shift_free(joints, q, j, rotate(conjugate(frame_of(joints, j, data.rotations)), way))
 
 
 def arms_to_targets(mechanism, goal, data, j):
@@ -140,7 +139,7 @@ def better_turn(mechanism, goal, data, room, j, M):
     joints, R = mechanism.joints, quaternion_at(data.rotations, j)
     turn = best_turn(mechanism, goal, data, room, j, M)
     before = ball_at(joints, data.q, j)
-    moved = turn_ball(joints, data.q, j, frame_of(joints, j, data), multiply(turn, R))
+    moved = turn_ball(joints, data.q, j, frame_of(joints, j, data.rotations), multiply(turn, R))
     allowed = renormalised(multiply(moved, conjugate(R)))
     if joints["kind"][j] == BALL and turn_value(M, allowed) < turn_value(M, IDENTITY):
         put_ball(joints, data.q, j, before)
@@ -191,12 +190,12 @@ def descend(mechanism, goal, data, room, j):
     """Move a joint that others follow down the gradient, half as far until that is no worse."""
     q, at, k = data.q, mechanism.joints["coordinate"][j], mechanism.joints["freedom"][j]
     update_forward_kinematics(mechanism, data)
-    linearise_all(mechanism, goal, data, room.stack)
-    slope = inner(room.stack.J[k], room.stack.e)
-    square = squared(room.stack.J[k])
+    linearise_task(mechanism, goal, data, room.system)
+    slope = inner(room.system.J[k], room.system.e)
+    square = squared(room.system.J[k])
     before, start = cost(mechanism, goal, data), q[at]
-    worth = freedom_worth(mechanism, j)
-    step = worth * slope / square if square > 0.0 else 0.0
+    scale_of_step = freedom_scale(mechanism, j)
+    step = scale_of_step * slope / square if square > 0.0 else 0.0
     for _ in range(HALVINGS):
         move_by(mechanism.joints, q, j, step)
         update_forward_kinematics(mechanism, data)

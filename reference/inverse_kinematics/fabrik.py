@@ -7,6 +7,7 @@ residual.
 """
 
 from ..articulation import BALL, FREE, HINGE, SLIDE, joint_transform
+from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
     add,
     between,
@@ -27,8 +28,6 @@ from ..quaternion import (
 from .chain import in_hole, out_of_reach, root_distance
 from .joint_updates import move_by, shift_free, turn_ball
 from .mechanism import (
-    axis_of,
-    frame_of,
     rotation_weight,
     update_forward_kinematics,
 )
@@ -180,7 +179,7 @@ def move_towards_wishes(mechanism, goal, data, room, j):
         R = multiply(turn_about(axis, move_by(joints, q, j, angle)), R)
     elif kind == BALL and room.wishes[j, WISHED] > 0.0:
         turn = turn_to_wishes(mechanism, goal, data, room, j)
-        R = turn_ball(joints, q, j, frame_of(joints, j, data), multiply(turn, R))
+        R = turn_ball(joints, q, j, frame_of(joints, j, data.rotations), multiply(turn, R))
     put_quaternion(data.rotations, j, normalised(R))
 
 
@@ -195,7 +194,7 @@ def fit_free(mechanism, goal, data, room, j):
     M = arms_to_wishes(mechanism, goal, data, room, j)
     M = add_outer(M, -total, way, arm)
     turn = best_rotation(M, room.eigen[0], room.eigen[1])
-    shift, frame = subtract(way, rotate(turn, arm)), frame_of(joints, j, data)
+    shift, frame = subtract(way, rotate(turn, arm)), frame_of(joints, j, data.rotations)
     R = multiply(turn, quaternion_at(data.rotations, j))
     R = turn_ball(joints, data.q, j, frame, R)
     shift_free(joints, data.q, j, rotate(conjugate(frame), shift))

@@ -5,8 +5,8 @@ nearest point within reach; elsewhere they may swing about it.
 """
 
 from ..quaternion import dot, scale
+from .box_step import linearise_task, take_step, transposed_step
 from .jacobian import linearise, times, turn_joints
-from .stacked import linearise_all, take_step, transposed_step
 
 # A target on an unlimited chain is drawn to within so much of its reach, over the reach. From
 # further off steps would swing; at reach itself they would take the longer the nearer they are.
@@ -25,8 +25,8 @@ def jacobian_transpose_sweep(chain, target):
         turn_joints(chain, scale(dot(e, move) / dot(move, move), e))
 
 
-def jacobian_transpose_update(mechanism, goal, posture, room):
+def jacobian_transpose_update(mechanism, goal, data, room):
     """Change the coordinates by a J' e with the same a, within their limits."""
-    linearise_all(mechanism, goal, posture, room.stack)
-    transposed_step(mechanism, posture, room.stack)
-    take_step(mechanism, posture, room.stack)
+    linearise_task(mechanism, goal, data, room.system)
+    transposed_step(mechanism, data, room.system)
+    take_step(mechanism, data, room.system)

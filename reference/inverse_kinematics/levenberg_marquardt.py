@@ -8,8 +8,8 @@ for mu is a tenth of |e|^2, the factor of Chan & Lawrence 1988, which needs fewe
 """
 
 from ..quaternion import dot
+from .box_step import damped_step, linearise_task, squared, take_step
 from .jacobian import ROUNDING, linearise, solve_damped, turn_joints
-from .stacked import damped_step, linearise_all, squared, take_step
 
 # Of the squared error: for positions, and for positions and rotations.
 DAMPING, DAMPING_OF_POSES = 0.5, 0.1
@@ -25,11 +25,11 @@ def levenberg_marquardt_sweep(chain, target):
     turn_joints(chain, solve_damped(A, damping, e))
 
 
-def levenberg_marquardt_update(mechanism, goal, posture, room):
+def levenberg_marquardt_update(mechanism, goal, data, room):
     """Change the coordinates by J' (J J' + mu 1)^-1 e, within their limits."""
-    linearise_all(mechanism, goal, posture, room.stack)
+    linearise_task(mechanism, goal, data, room.system)
     positions = 3 * len(mechanism.effectors) == mechanism.equations
     share = DAMPING if positions else DAMPING_OF_POSES
-    damping = share * squared(room.stack.e) + BIAS * mechanism.reach * mechanism.reach
-    damped_step(mechanism, posture, room.stack, damping)
-    take_step(mechanism, posture, room.stack)
+    damping = share * squared(room.system.e) + BIAS * mechanism.reach * mechanism.reach
+    damped_step(mechanism, data, room.system, damping)
+    take_step(mechanism, data, room.system)

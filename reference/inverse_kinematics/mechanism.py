@@ -153,19 +153,6 @@ def put_effector(mechanism, data, e, x, R):
     put_quaternion(data.rotations, len(mechanism.joints) + e, R)
 
 
-def axis_of(joints, j, R):
-    """Return a joint's axis in the world, R its rotation there."""
-    return rotate(R, vector_at(joints["axis"], j))
-
-
-def frame_of(joints, j, data):
-    """Return the rotation in the world that a joint has where its coordinates are zero."""
-    frame = quaternion_at(joints["frame"], j)
-    if joints["parent"][j] < 0:
-        return frame
-    return multiply(quaternion_at(data.rotations, joints["parent"][j]), frame)
-
-
 def position_error(mechanism, target, data, e):
     """Return the vector from an effector to its target [m]."""
     return subtract(vector_at(target["position"], e), effector_position(mechanism, data, e))

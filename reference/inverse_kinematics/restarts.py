@@ -37,6 +37,7 @@ from .batch import (
     RESIDUAL_ROTATION,
     put_if_room,
 )
+from .box_step import TaskSystem, new_task_system
 from .chain import BEND, ROUNDING
 from .joint_updates import ball_at, move_by, put_ball
 from .levenberg_marquardt import levenberg_marquardt_update as update  # bound to each solver's
@@ -52,7 +53,6 @@ from .mechanism import (
     update_forward_kinematics,
     weighted_square,
 )
-from .stacked import Stack, new_stack
 
 # An attempt that others may follow is given up once this many iterations have not brought it this
 # much nearer. If none of the others reaches the target either it goes on, so many times as patient
@@ -80,7 +80,7 @@ class Room(NamedTuple):
     """Room for a solver.
 
     Attributes:
-        stack: of the Jacobian methods.
+        system: of the Jacobian methods.
         wishes: where FABRIK wishes joints to be [m], and by what weight, (joint, 4).
         eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
         q: coordinates of the mechanism where each attempt is, the first from the start,
@@ -88,7 +88,7 @@ class Room(NamedTuple):
         progress: of each attempt and of all, see above, (1 + restart + 1, 6).
     """
 
-    stack: Stack
+    system: TaskSystem
     wishes: FloatArray
     eigen: FloatArray
     q: FloatArray
@@ -197,7 +197,7 @@ def new_room(mechanism, restarts):
     """Return room for a solver of a mechanism."""
     n = len(mechanism.joints)
     return Room(
-        new_stack(mechanism), np.empty((n, 4)), np.empty((2, 4, 4)),
+        new_task_system(mechanism), np.empty((n, 4)), np.empty((2, 4, 4)),
         np.empty((restarts + 2, mechanism.coordinates)), np.empty((restarts + 2, 6)),
     )  # fmt: skip
 

@@ -363,6 +363,8 @@ MODELS = {
     "free": (["free", "hinge", "ball", "hinge", "fixed"], {}, [-1], True),
     "mimic": (["hinge", "slide", "hinge", "ball", "hinge"], {2: Mimic(0, -0.7, 0.1),
               1: Mimic(4, 0.3)}, [-1], False),
+    "hinge after slide": (["hinge", "slide", "hinge", "ball", "hinge"], {2: Mimic(1, -0.7, 0.1)},
+                          [-1], False),
     "two": (["ball", "hinge", "slide", "ball", "ball"], {}, [2, 4], True),
 }  # fmt: skip
 

@@ -14,6 +14,7 @@ from reference import (
     forward_kinematics,
     rotation,
 )
+from reference.inverse_kinematics.box_step import new_task_system
 from reference.inverse_kinematics.mechanism import (
     TARGET,
     gather,
@@ -21,7 +22,6 @@ from reference.inverse_kinematics.mechanism import (
     update_forward_kinematics,
 )
 from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.stacked import new_stack
 
 
 @pytest.fixture(params=IK_SOLVERS)
@@ -120,7 +120,7 @@ def machine_of(model, q, targets):
     update_forward_kinematics(mechanism, data)
     count = len(mechanism.joints)
     room = SimpleNamespace(
-        stack=new_stack(mechanism), wishes=np.empty((count, 4)), eigen=np.empty((2, 4, 4))
+        system=new_task_system(mechanism), wishes=np.empty((count, 4)), eigen=np.empty((2, 4, 4))
     )
     return Machine(mechanism, goal, data, room)
 
