@@ -24,20 +24,20 @@ def put_ball(joints, q, j, Q):
     q[at], q[at + 1], q[at + 2], q[at + 3] = Q
 
 
-def turn_ball(joints, q, j, frame, R):
-    """Turn a ball or free joint to the global rotation R as far as its limits allow.
+def rotate_to(joints, q, j, frame, R):
+    """Rotate a ball or free joint to R in the world as far as its limits allow.
 
-    Returns the global rotation it then has; `frame` is its global rotation at rest.
+    Returns the rotation it then has; `frame` is that where its coordinates are zero.
     """
     Q = normalised(multiply(conjugate(frame), R))
     if joints["kind"][j] != FREE:
-        lower, upper = joints["lower"][j], joints["upper"][j]
-        Q = clamp_ball(Q, vector_at(joints["axis"], j), lower, upper, joints["cone"][j])
+        axis, cone = vector_at(joints["axis"], j), joints["cone"][j]
+        Q = clamp_ball(Q, axis, joints["lower"][j], joints["upper"][j], cone)
     put_ball(joints, q, j, Q)
     return multiply(frame, Q)
 
 
-def shift_free(joints, q, j, way):
-    """Shift a free joint in its own frame at rest."""
+def translate_free(joints, q, j, v):
+    """Translate a free joint by a vector in its own frame at zero."""
     at = joints["coordinate"][j]
-    q[at], q[at + 1], q[at + 2] = q[at] + way[0], q[at + 1] + way[1], q[at + 2] + way[2]
+    q[at], q[at + 1], q[at + 2] = q[at] + v[0], q[at + 1] + v[1], q[at + 2] + v[2]

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import LARGEST_COORDINATE, FloatArray
+from ..arguments import LARGEST_COORDINATE, FloatArray, RecordArray
 from ..articulation import (
     BALL,
     FREE,
@@ -39,6 +39,7 @@ from .batch import (
 )
 from .box_step import TaskSystem, new_task_system
 from .chain import BEND, ROUNDING
+from .fabrik import BACKWARD
 from .joint_updates import ball_at, move_by, put_ball
 from .levenberg_marquardt import levenberg_marquardt_update as update  # bound to each solver's
 from .mechanism import (
@@ -81,7 +82,7 @@ class Room(NamedTuple):
 
     Attributes:
         system: of the Jacobian methods.
-        wishes: where FABRIK wishes joints to be [m], and by what weight, (joint, 4).
+        backward: FABRIK's backward positions, records BACKWARD, (joint,).
         eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
         q: coordinates of the mechanism where each attempt is, the first from the start,
             and in the last row the best end of one, (1 + restart + 1, coordinate).
@@ -89,7 +90,7 @@ class Room(NamedTuple):
     """
 
     system: TaskSystem
-    wishes: FloatArray
+    backward: RecordArray
     eigen: FloatArray
     q: FloatArray
     progress: FloatArray
@@ -197,7 +198,7 @@ def new_room(mechanism, restarts):
     """Return room for a solver of a mechanism."""
     n = len(mechanism.joints)
     return Room(
-        new_task_system(mechanism), np.empty((n, 4)), np.empty((2, 4, 4)),
+        new_task_system(mechanism), np.empty(n, BACKWARD), np.empty((2, 4, 4)),
         np.empty((restarts + 2, mechanism.coordinates)), np.empty((restarts + 2, 6)),
     )  # fmt: skip
 

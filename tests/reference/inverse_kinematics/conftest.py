@@ -15,6 +15,7 @@ from reference import (
     rotation,
 )
 from reference.inverse_kinematics.box_step import new_task_system
+from reference.inverse_kinematics.fabrik import BACKWARD
 from reference.inverse_kinematics.mechanism import (
     TARGET,
     gather,
@@ -120,7 +121,9 @@ def machine_of(model, q, targets):
     update_forward_kinematics(mechanism, data)
     count = len(mechanism.joints)
     room = SimpleNamespace(
-        system=new_task_system(mechanism), wishes=np.empty((count, 4)), eigen=np.empty((2, 4, 4))
+        system=new_task_system(mechanism),
+        backward=np.empty(count, BACKWARD),
+        eigen=np.empty((2, 4, 4)),
     )
     return Machine(mechanism, goal, data, room)
 

@@ -15,13 +15,12 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.inverse_kinematics.ccd import descend, move_joint
+from reference.inverse_kinematics.ccd import descend, update_joint
 from reference.inverse_kinematics.fabrik import (
-    WISHED,
+    backward_pass,
     fabrik_update,
-    move_towards_wishes,
-    put_frame,
-    wish,
+    forward_joint,
+    put_joint,
 )
 from reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
 from reference.inverse_kinematics.reduce import prepare
@@ -42,7 +41,7 @@ def planar(links, **limits):
 
 
 def updates(machine):
-    """Update joint after joint as CCD does; yield the joint and the misfit before and after."""
+    """Update joint after joint as CCD does; yield the joint and the cost before and after."""
     mechanism, goal, data, room = machine
     joints = mechanism.joints
     for j in range(len(joints) - 1, -1, -1):
@@ -50,7 +49,7 @@ def updates(machine):
         if mechanism.joints["followed"][j]:
             descend(mechanism, goal, data, room, j)
         elif joints["leader"][j] == j:
-            move_joint(mechanism, goal, data, room, j)
+            update_joint(mechanism, goal, data, room, j)
         tips = data.positions.copy(), data.rotations.copy()
         yield j, before, cost(mechanism, goal, data), tips
     update_forward_kinematics(mechanism, data)
@@ -59,7 +58,7 @@ def updates(machine):
 @shared
 @with_examples
 @given(**TREES)
-def test_no_update_of_a_joint_makes_the_misfit_larger(articulated, machine, reachable, kinds, seed):
+def test_no_update_of_a_joint_raises_the_cost(articulated, machine, reachable, kinds, seed):
     """Whatever the kind, whatever limits stop it, and whoever follows."""
     model, rng = articulated(kinds, seed), np.random.default_rng(seed)
     targets, _ = reachable(model, rng, 3)
@@ -96,7 +95,7 @@ def _units(quaternions):
 
 @pytest.mark.parametrize("kind", ["hinge", "slide", "ball", "free"])
 def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, machine, rng):
-    """No small move of the joint alone, in any direction, makes the misfit smaller."""
+    """No small move of the joint alone, in any direction, lowers the cost."""
     model = chain_of_joints(kind, rng, links=3)
     pose = forward_kinematics(model, model.random(rng))
     targets = [
@@ -104,7 +103,7 @@ def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, mac
         Target(pose.positions[2] + rng.standard_normal(3), None, 2, 0.7),
     ]
     ready = machine(model, model.random(rng), targets)
-    move_joint(*ready, 1)
+    update_joint(*ready, 1)
     update_forward_kinematics(ready.mechanism, ready.data)
     least, q = cost(*ready[:3]), ready.data.q.copy()
     width = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}[kind]
@@ -164,7 +163,7 @@ def test_inside_a_cone_an_update_that_would_be_worse_is_refused(machine, rng):
         target = Target(rotation.rotate(rotation.random(rng), [1.0, 0.3, 0.2]), effector=1)
         ready = machine(ball, ball.random(rng), [target])
         before, q = cost(*ready[:3]), ready.data.q.copy()
-        move_joint(*ready, 0)
+        update_joint(*ready, 0)
         assert cost(*ready[:3]) <= before + ROUNDING
         assert ball.within_limits(ready.data.q, 1e-9)
         refused += (ready.data.q == q).all()
@@ -209,10 +208,10 @@ def test_backward_a_branch_takes_the_weighted_mean_of_what_its_children_ask(mach
         Target([1.0, 1.2, 0.0], effector=3, weight=1.0),
     ]
     ready = machine(model, rotation.identity(4).ravel(), targets)
-    wish(*ready)
+    backward_pass(*ready[:3], ready.room.backward)
     expected = (3.0 * np.array([1.5, 0.0, 0.0]) + np.array([1.0, 0.2, 0.0])) / 4.0
-    np.testing.assert_allclose(ready.room.wishes[1, :3], expected, rtol=0, atol=1e-15)
-    assert ready.room.wishes[1, WISHED] == 4.0
+    np.testing.assert_allclose(ready.room.backward["position"][1], expected, rtol=0, atol=1e-15)
+    assert ready.room.backward["weight"][1] == 4.0
 
 
 def test_forward_a_branch_turns_all_its_children_alike(machine, rng):
@@ -266,11 +265,11 @@ def test_forward_each_joint_is_left_where_the_coordinates_put_it(
     )  # fmt: skip
     targets, _ = reachable(model, rng, 2)
     mechanism, goal, data, room = machine(model, model.random(rng), targets)
-    wish(mechanism, goal, data, room)
+    backward_pass(mechanism, goal, data, room.backward)
     count = len(mechanism.joints)
     for j in range(count):
-        put_frame(mechanism.joints, data, room, j)
-        move_towards_wishes(mechanism, goal, data, room, j)
+        put_joint(mechanism.joints, data, room.backward, j)
+        forward_joint(mechanism, goal, data, room, j)
     positions, rotations = data.positions[:count].copy(), data.rotations[:count].copy()
     update_forward_kinematics(mechanism, data)
     np.testing.assert_allclose(positions, data.positions[:count], rtol=0, atol=ROUNDING)
@@ -278,7 +277,7 @@ def test_forward_each_joint_is_left_where_the_coordinates_put_it(
     np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-9)
 
 
-def test_fabrik_turns_a_hinge_to_its_child_s_wish_within_its_limits(speed):
+def test_fabrik_rotates_a_hinge_towards_its_child_s_backward_position_within_its_limits(speed):
     for upper, expected in ((2.0, 1.0), (0.4, 0.4)):
         arm = planar(1, lower=-2.0, upper=upper)
         target = [np.cos(1.0), np.sin(1.0), 0.0]
