@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from . import compile_notice
 from .experiments import SUITES
 from .harness.progress import heard_by
 from .presentation.text import visible
@@ -112,6 +113,8 @@ def plumbob(
 
         print(f"plumbob {importlib.metadata.version('plumbob')}")
         raise typer.Exit
+    if sys.stderr.isatty():
+        compile_notice.install()
     if context.invoked_subcommand is not None:
         if output or fresh:
             raise ValueError(f"write options behind the command: {context.invoked_subcommand}")
@@ -140,7 +143,7 @@ def check(
     """Hold the reference against Pinocchio and MuJoCo: a verdict table, exit 1 on a miss."""
     if files:
         return check_files(claims or [])
-    from crosscheck.identities import CLAIMS, run_claims
+    from crosscheck.claims import CLAIMS, run_claims
     from crosscheck.robots.models import left_out
 
     if names:
@@ -156,7 +159,7 @@ def check(
     print_verdicts(verdicts)
     if missing := left_out():
         print(missing)
-    return FINE if all(verdict.held for verdict in verdicts) else MISSED
+    return FINE if all(verdict.holds for verdict in verdicts) else MISSED
 
 
 @app.command(
@@ -383,14 +386,14 @@ def print_verdicts(verdicts: Iterable[Any]) -> None:
         table.add_column(heading, justify="left" if heading in ("claim", "verdict") else "right")
     held = 0
     for verdict in verdicts:
-        held += verdict.held
+        held += verdict.holds
         table.add_row(
             verdict.claim.name,
             words(verdict.cases),
             words(verdict.difference),
             words(verdict.claim.tolerance.value),
-            "held" if verdict.held else f"MISSED: {verdict.missed}",
-            style=None if verdict.held else "bold red",
+            "held" if verdict.holds else f"MISSED: {verdict.missed}",
+            style=None if verdict.holds else "bold red",
         )
     console = Console(
         width=None if sys.stdout.isatty() else 120, highlight=False, markup=False, emoji=False

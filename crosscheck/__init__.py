@@ -1,1 +1,1 @@
-"""Is the reference right? Engines beside it, claim by claim."""
+"""Compare the reference with physics engines and closed forms, claim by claim."""

@@ -1,4 +1,4 @@
-"""Skeletons: our kinematics beside an engine's, case by case."""
+"""Comparisons of our kinematics of skeletons with an engine's."""
 
 import functools
 import itertools
@@ -21,13 +21,13 @@ POSES = 4
 
 
 def joint_positions(engine: str, cases: int) -> Iterator[Comparison]:
-    """Compare all joints' global positions, over the reach."""
+    """Compare all joints' global positions, relative to the reach."""
     for case in range(cases):
         skeleton, local = _posed(case)
         yield Comparison(
             ours=forward_kinematics(skeleton, local).positions,
             theirs=_engine_pose(engine, case).positions,
-            still=forward_kinematics(skeleton, rotation.identity(*local.shape[:-1])).positions,
+            baseline=forward_kinematics(skeleton, rotation.identity(*local.shape[:-1])).positions,
             scale=full_reach(skeleton),
         )
 
@@ -40,7 +40,7 @@ def joint_rotations(engine: str, cases: int) -> Iterator[Comparison]:
 
 
 def back_to_local(engine: str, cases: int) -> Iterator[Comparison]:
-    """Compare the local rotations we find in an engine's global ones with those it was given."""
+    """Compare the local rotations that we derive from an engine's global ones with its input."""
     for case in range(cases):
         skeleton, local = _posed(case)
         ours = local_from_global(skeleton, _engine_pose(engine, case).rotations)
@@ -48,7 +48,7 @@ def back_to_local(engine: str, cases: int) -> Iterator[Comparison]:
 
 
 def ik_answers(engine: str, cases: int) -> Iterator[Comparison]:
-    """Compare the joints' positions and the residual of IK answers, by each solver in turn."""
+    """Compare the joints' positions and the residual of IK solutions, alternating the solvers."""
     problems = ((problem, solver) for problem in itertools.count() for solver in IK_SOLVERS)
     for problem, solver in itertools.islice(problems, cases):
         skeleton, start, effector, target = samples.reach(problem)
@@ -57,17 +57,17 @@ def ik_answers(engine: str, cases: int) -> Iterator[Comparison]:
             skeleton, start, target, solver, effector, tolerance=1e-6 * reach, max_iterations=50
         )
         theirs = _by(engine, skeleton, solution.local_rotations).positions
-        still = forward_kinematics(skeleton, start).positions
+        initial = forward_kinematics(skeleton, start).positions
         yield Comparison(
             ours=np.append(solution.positions, solution.residual),
             theirs=np.append(theirs, np.linalg.norm(theirs[effector] - target)),
-            still=np.append(still, np.linalg.norm(still[effector] - target)),
+            baseline=np.append(initial, np.linalg.norm(initial[effector] - target)),
             scale=reach,
         )
 
 
 def full_reach(skeleton: Skeleton) -> float:
-    """Return the greatest distance any joint can have from the root [m]."""
+    """Return the largest distance that any joint can have from the root [m]."""
     distances = np.zeros(skeleton.joint_count)
     for j in range(1, skeleton.joint_count):
         distances[j] = distances[skeleton.parents[j]] + skeleton.link_lengths[j]
@@ -81,7 +81,7 @@ def _posed(case: int) -> tuple[Skeleton, FloatArray]:
 
 @functools.cache
 def _engine_pose(engine: str, case: int) -> Pose:
-    """Return the engine's poses of a case, kept for the claims that follow."""
+    """Return the engine's poses of a case, cached for other claims."""
     return _by(engine, *_posed(case))
 
 
@@ -90,10 +90,10 @@ def _by(engine: str, skeleton: Skeleton, local: FloatArray) -> Pose:
 
 
 def _rotations(ours: FloatArray, theirs: FloatArray) -> Comparison:
-    still = rotation.identity(*ours.shape[:-1])
-    return Comparison(ours, _same_sign(theirs, ours), _same_sign(still, ours), scale=1.0)
+    identity = rotation.identity(*ours.shape[:-1])
+    return Comparison(ours, _same_sign(theirs, ours), _same_sign(identity, ours), scale=1.0)
 
 
 def _same_sign(q: FloatArray, other: FloatArray) -> FloatArray:
-    """Return q or -q, which is the same rotation, whichever is nearer to the other."""
+    """Return q or -q, the same rotation, whichever is closer to the other."""
     return np.where(np.sum(q * other, axis=-1, keepdims=True) < 0.0, -q, q)

@@ -1,4 +1,4 @@
-"""The seeded random systems on which claims are judged; case i is the same in every run."""
+"""Random systems on which claims are checked, seeded so that case i is the same in every run."""
 
 from typing import Any, NamedTuple
 
@@ -11,9 +11,9 @@ from reference.skeleton import Skeleton, checked_skeleton
 
 MOST_JOINTS = 50
 LEAST_PARTICLES, MOST_PARTICLES = 5, 500
-# The sizes come round after so many cases: by then each decade has had its share.
+# Number of cases after which the sizes repeat.
 SIZES = 10
-# The step of a smooth motion times its highest rate.
+# h omega of a smooth problem, with omega its highest rate.
 RESOLVED = 0.04
 
 
@@ -26,8 +26,8 @@ def generator(quantity: str, case: int) -> np.random.Generator:
 def skeleton(case: int) -> Skeleton:
     """Return a chain (even cases) or a tree (odd ones) of 2 to 50 joints, 50 in cases 0 and 1.
 
-    The names are shuffled, so that neither our order nor an engine's is theirs. Small skeletons
-    are more frequent: the memory Pinocchio wants grows with the cube of the joints.
+    The names are shuffled, so that their order differs from ours and from an engine's. Small
+    skeletons are more frequent because Pinocchio's memory grows with the cube of the joints.
     """
     rng = generator("skeleton", case)
     joints = MOST_JOINTS if case < 2 else int(2 * (MOST_JOINTS / 2) ** rng.uniform())
@@ -45,7 +45,7 @@ def local_rotations(case: int, skeleton: Skeleton, *batch: int) -> FloatArray:
 
 
 class Reach(NamedTuple):
-    """An inverse kinematics problem: bring the effector from the start to the target."""
+    """An inverse kinematics problem: move the effector from its start to the target."""
 
     skeleton: Skeleton
     start: FloatArray
@@ -54,7 +54,7 @@ class Reach(NamedTuple):
 
 
 def reach(case: int) -> Reach:
-    """Return a problem with any joint but the root as effector; one target in four is too far."""
+    """Return a problem whose effector is any joint but the root; some targets are beyond reach."""
     rng = generator("target", case)
     tree = skeleton(case)
     effector = int(rng.integers(1, tree.joint_count))
@@ -64,8 +64,8 @@ def reach(case: int) -> Reach:
     return Reach(tree, local_rotations(case, tree), effector, target)
 
 
-class Motion(NamedTuple):
-    """A mass-spring system in motion, and the time step to take [s]."""
+class StepProblem(NamedTuple):
+    """A mass-spring system, its state, external forces [N] and the time step [s]."""
 
     system: MassSpring
     state: State
@@ -73,14 +73,14 @@ class Motion(NamedTuple):
     h: float
 
 
-def motion(case: int, *, damped: bool = True) -> Motion:
-    """Return a random network of 5 to 500 particles, all of them unequal, one or two pinned.
+def network(case: int, *, damped: bool = True) -> StepProblem:
+    """Return a random network of 5 to 500 unequal particles, one or two of them pinned.
 
-    Every spring is stretched or squeezed by up to a third; none is at its rest length, where
-    MuJoCo's integrator "discrete" sees no stiffness. In every fifth case the ends of one spring
+    Every spring is stretched or compressed by up to a third; none is at its rest length, where
+    MuJoCo's integrator "discrete" omits its stiffness. In every fifth case the ends of one spring
     coincide, and in odd cases half of the springs are tension-only.
     """
-    return _motion(
+    return _random_problem(
         "motion",
         case,
         particles(case),
@@ -90,30 +90,31 @@ def motion(case: int, *, damped: bool = True) -> Motion:
     )
 
 
-def alike(case: int) -> Motion:
-    """Return the same kind of motion, one pin, one stiffness and one damping for all springs."""
-    return _motion("alike", case, particles(case), uniform=True, pins=1)
+def uniform(case: int) -> StepProblem:
+    """Return a random network with one pin and the same stiffness and damping for all springs."""
+    return _random_problem("alike", case, particles(case), uniform=True, pins=1)
 
 
-def smooth(case: int) -> Motion:
-    """Return a motion of 5 to 23 particles, no two in one place, in steps that resolve it.
+def smooth(case: int) -> StepProblem:
+    """Return a problem of 5 to 23 particles, none coincident, with a step that resolves it.
 
-    At most `RESOLVED` is h omega, with omega a bound on the frequencies and decay rates.
+    h omega is at most `RESOLVED`, where omega bounds the frequencies and decay rates.
     """
-    system, state, external, _ = _motion("smooth", case, _few(case))
-    return Motion(system, state, external, RESOLVED / highest_rate(system))
+    system, state, external, _ = _random_problem("smooth", case, _few(case))
+    return StepProblem(system, state, external, RESOLVED / highest_rate(system))
 
 
-def unpinned(case: int) -> Motion:
-    """Return a smooth motion of 5 to 23 particles, none of them pinned."""
-    system, state, external, _ = _motion("unpinned", case, _few(case), pins=0)
-    return Motion(system, state, external, RESOLVED / highest_rate(system))
+def unpinned(case: int) -> StepProblem:
+    """Return a smooth problem of 5 to 23 particles, none of them pinned."""
+    system, state, external, _ = _random_problem("unpinned", case, _few(case), pins=0)
+    return StepProblem(system, state, external, RESOLVED / highest_rate(system))
 
 
-def drifting(case: int) -> Motion:
-    """Return a smooth motion without pins, gravity or external forces: nothing turns it."""
-    system, state, _, _ = _motion("drifting", case, _few(case), pins=0, gravity=0.0)
-    return Motion(system, state, np.zeros_like(state.positions), RESOLVED / highest_rate(system))
+def drifting(case: int) -> StepProblem:
+    """Return a smooth problem without pins, gravity or external forces, and so without torque."""
+    system, state, _, _ = _random_problem("drifting", case, _few(case), pins=0, gravity=0.0)
+    none = np.zeros_like(state.positions)
+    return StepProblem(system, state, none, RESOLVED / highest_rate(system))
 
 
 class Oscillator(NamedTuple):
@@ -125,7 +126,7 @@ class Oscillator(NamedTuple):
 
 
 def oscillator(case: int) -> Oscillator:
-    """Return an oscillator, h omega from 0.01 to 1, somewhere in its swing."""
+    """Return an oscillator at a random phase, with h omega from 0.01 to 1."""
     rng = generator("oscillator", case)
     mass, stiffness = rng.uniform(0.2, 2.0), 10.0 ** rng.uniform(1.0, 3.0)
     system = MassSpring([1.0, mass], [[0, 1]], 0.0, stiffness, pinned=[0], gravity=(0, 0, 0))
@@ -135,10 +136,10 @@ def oscillator(case: int) -> Oscillator:
     return Oscillator(system, State(x, v), float(h))
 
 
-def line(case: int) -> Motion:
-    """Return a chain on the x axis that stays on it, its first particle pinned, by 1/60 s.
+def line(case: int) -> StepProblem:
+    """Return a chain that stays on the x axis, its first particle pinned, with h = 1/60 s.
 
-    Spring i joins particle i to i + 1, and none is stretched or pushed so far as to turn over.
+    Spring i joins particle i to i + 1, and none is compressed so far that its ends swap.
     """
     rng = generator("line", case)
     n = 5 + 15 * case
@@ -150,11 +151,11 @@ def line(case: int) -> Motion:
     )
     x, v, f = np.zeros((3, n, 3))
     x[1:, 0], v[1:, 0], f[1:, 0] = np.cumsum(lengths), *rng.standard_normal((2, n - 1))
-    return Motion(system, State(x, v), f, 1 / 60)
+    return StepProblem(system, State(x, v), f, 1 / 60)
 
 
 def particles(case: int) -> int:
-    """Return how many particles a case has: the sizes are spread evenly over their magnitudes."""
+    """Return the number of particles of a case, spread evenly on a logarithmic scale."""
     share = arguments.integer("case", case, least=0) * 3 % SIZES / (SIZES - 1)
     return round(LEAST_PARTICLES * (MOST_PARTICLES / LEAST_PARTICLES) ** share)
 
@@ -168,15 +169,15 @@ def highest_rate(system: MassSpring) -> float:
     """Return a bound on the frequencies and decay rates of a system [1/s], by Gershgorin."""
     arguments.instance("system", system, MassSpring)
 
-    def busiest(per_spring: FloatArray) -> float:
+    def largest(per_spring: FloatArray) -> float:
         total = np.zeros(system.particle_count)
         np.add.at(total, system.springs, per_spring[:, None])
         return float((2.0 * total / system.masses).max())
 
-    return max(np.sqrt(busiest(system.stiffnesses)), busiest(system.dampings))
+    return max(np.sqrt(largest(system.stiffnesses)), largest(system.dampings))
 
 
-def _motion(
+def _random_problem(
     quantity: str,
     case: int,
     n: int,
@@ -187,7 +188,7 @@ def _motion(
     tension_only: float = 0.0,
     pins: int | None = None,
     gravity: float = 5.0,
-) -> Motion:
+) -> StepProblem:
     rng = generator(quantity, case)
     damped = arguments.boolean("damped", damped)
     springs = _network(rng, n)
@@ -206,11 +207,12 @@ def _motion(
     parts["tension_only"] = rng.uniform(size=len(springs)) < tension_only
     if not damped:
         parts["dampings"] = 0.0
-    return Motion(MassSpring(masses, **parts, pinned=pinned, gravity=weight), state, external, h)
+    system = MassSpring(masses, **parts, pinned=pinned, gravity=weight)
+    return StepProblem(system, state, external, h)
 
 
 def _springs(rng: np.random.Generator, springs: np.ndarray, lengths: FloatArray) -> dict[str, Any]:
-    """Return what makes springs of these lengths [m], each under strain."""
+    """Return the arguments of strained springs of these lengths [m]."""
     s = len(springs)
     strain = rng.uniform(0.02, 0.33, s) * rng.choice([-1.0, 1.0], s)
     return {
@@ -222,7 +224,7 @@ def _springs(rng: np.random.Generator, springs: np.ndarray, lengths: FloatArray)
 
 
 def _network(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Return springs, (spring, 2): a spanning tree and as many others, ends in either order."""
+    """Return a spanning tree and as many other springs, with shuffled ends, (spring, 2)."""
     tree = [(int(rng.integers(i)), i) for i in range(1, n)]
     others = [tuple(map(int, rng.choice(n, 2, replace=False))) for _ in range(n)]
     pairs = sorted({(min(pair), max(pair)) for pair in tree + others})

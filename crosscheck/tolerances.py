@@ -1,13 +1,13 @@
-"""Every tolerance of the cross-checks once, with the reason for its size."""
+"""The tolerances of the cross-checks, each with the reason for its size."""
 
 from typing import NamedTuple
 
 
 class Tolerance(NamedTuple):
-    """The largest difference that two right answers may show, and why it is no smaller.
+    """The largest difference allowed between two correct results, and the reason for it.
 
     Attributes:
-        value: relative to the scale that the claim names.
+        value: relative to the scale of the comparison.
         reason: a sentence.
     """
 
@@ -23,11 +23,11 @@ POSITION = Tolerance(
 ROTATION = Tolerance(
     1e-13,
     "of one: each joint adds a few roundings of 1e-16, 50 joints about 1e-14 if none cancel, and "
-    "one engine turns matrices back into quaternions",
+    "one engine converts matrices to quaternions",
 )
 JACOBIAN = Tolerance(
     1e-13,
-    "of the room that the links take up, and of one radian: an axis and an arm are off by a few "
+    "of the extent of the links, and of one radian: an axis and an arm are off by a few "
     "roundings of 1e-16 a joint, as poses are, and their product by both",
 )
 FORCE = Tolerance(
@@ -68,7 +68,7 @@ LINE = Tolerance(
 REST = Tolerance(
     1e-12,
     "of the largest coordinate: forces are rounded by 1e-16 of stiffness times coordinate, and "
-    "the softest way to move is a thousand times as soft as a spring",
+    "the softest mode is a thousand times as soft as a spring",
 )
 MOMENTUM = Tolerance(
     5e-12,

@@ -1,4 +1,4 @@
-"""A claim that two independent computations agree, and the one judge of all claims."""
+"""A claim that two independent computations agree, and the function that checks it."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -11,24 +11,24 @@ from reference.arguments import FloatArray
 
 from .tolerances import Tolerance
 
-# A case counts only if our quantity differs from what it would be had nothing moved by this, of
-# the scale: far more than any tolerance, so that two answers that both stood still are no proof.
-LEAST_MOVEMENT = 1e-4
+# Least distance of our quantity from its baseline, relative to the scale. It exceeds all tolerances
+# by far, so that a comparison of two results at rest proves nothing.
+LEAST_DISPLACEMENT = 1e-4
 
 
 class Comparison(NamedTuple):
-    """One case: a quantity by us and by the others.
+    """One case: a quantity computed by the reference and independently.
 
     Attributes:
-        ours: our quantity, of any shape.
-        theirs: the same, computed independently.
-        still: what it would be if nothing moved, turned or pulled.
-        scale: what a difference is measured against, greater than zero.
+        ours: the quantity by the reference, of any shape.
+        theirs: the same quantity, computed independently.
+        baseline: its value without motion and forces.
+        scale: the positive number to which differences are relative.
     """
 
     ours: FloatArray
     theirs: FloatArray
-    still: FloatArray
+    baseline: FloatArray
     scale: float
 
 
@@ -37,12 +37,12 @@ class Claim:
     """Our quantity equals theirs, in every case, to a tolerance.
 
     Attributes:
-        name: unique, for tables and for asking for it.
-        ours: what we compute.
-        theirs: with what it is held against.
-        compare: makes the comparisons of the first so many cases.
+        name: unique, for tables and the command line.
+        ours: description of our quantity.
+        theirs: description of the independent one.
+        compare: yields the comparisons of the first n cases.
         tolerance: the largest difference allowed, with its reason.
-        cases: how many cases a full check takes.
+        cases: number of cases in a full check.
     """
 
     name: str
@@ -55,30 +55,30 @@ class Claim:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What came of a claim.
+    """The result of checking a claim.
 
     Attributes:
         claim: the claim.
         cases: the number of cases compared.
-        difference: the largest difference over its scale; NaN if a case is not all numbers.
-        moved: the least movement of a case over its scale; NaN likewise.
-        missed: why the claim does not hold, in words; empty if it holds.
+        difference: the largest relative difference of a case; NaN if a value is not finite.
+        displacement: the least relative distance of a case from its baseline; NaN likewise.
+        missed: the reason why the claim does not hold; empty if it holds.
     """
 
     claim: Claim
     cases: int
     difference: float
-    moved: float
+    displacement: float
     missed: str
 
     @property
-    def held(self) -> bool:
+    def holds(self) -> bool:
         """Whether the claim holds."""
         return not self.missed
 
 
-def judge(claim: Claim, cases: int | None = None) -> Verdict:
-    """Compare all cases of a claim, or the number given, and return the verdict.
+def check_claim(claim: Claim, cases: int | None = None) -> Verdict:
+    """Compare all cases of a claim, or the first few, and return the verdict.
 
     Raises:
         ValueError: if it is no claim, or the number not an integer of at least 0.
@@ -86,17 +86,19 @@ def judge(claim: Claim, cases: int | None = None) -> Verdict:
     arguments.instance("claim", claim, Claim)
     count = claim.cases if cases is None else arguments.integer("cases", cases, least=0)
     compared = list(claim.compare(count))
-    difference = np.max([_apart(c.ours, c.theirs, c.scale) for c in compared], initial=0.0)
-    moved = np.min([_apart(c.ours, c.still, c.scale) for c in compared] or [0.0])
-    missed = _missed(len(compared), difference, moved, claim.tolerance.value)
-    return Verdict(claim, len(compared), float(difference), float(moved), missed)
+    differences = [_relative_difference(c.ours, c.theirs, c.scale) for c in compared]
+    displacements = [_relative_difference(c.ours, c.baseline, c.scale) for c in compared]
+    difference = float(np.max(differences, initial=0.0))
+    displacement = float(np.min(displacements or [0.0]))
+    missed = _missed(len(compared), difference, displacement, claim.tolerance.value)
+    return Verdict(claim, len(compared), difference, displacement, missed)
 
 
-def _apart(a: FloatArray, b: FloatArray, scale: float) -> float:
-    """Return the largest difference over the scale, NaN if there is anything but numbers.
+def _relative_difference(a: FloatArray, b: FloatArray, scale: float) -> float:
+    """Return the largest difference over the scale, or NaN if a value is not finite.
 
     Raises:
-        ValueError: if the shapes differ, which would broadcast, or there is nothing to compare.
+        ValueError: if the shapes differ, which would broadcast, or are empty.
     """
     if a.shape != b.shape or a.size == 0:
         raise ValueError(f"comparison: expected two equal shapes, got {a.shape} and {b.shape}")
@@ -105,13 +107,13 @@ def _apart(a: FloatArray, b: FloatArray, scale: float) -> float:
     return float(np.max(np.abs(a - b))) / scale
 
 
-def _missed(cases: int, difference: float, moved: float, tolerance: float) -> str:
+def _missed(cases: int, difference: float, displacement: float, tolerance: float) -> str:
     if cases == 0:
         return "no cases"
-    if not np.isfinite([difference, moved]).all():
+    if not np.isfinite([difference, displacement]).all():
         return "not a number"
     if difference > tolerance:
         return "they differ"
-    if moved < LEAST_MOVEMENT:
+    if displacement < LEAST_DISPLACEMENT:
         return "nothing moved"
     return ""

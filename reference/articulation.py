@@ -498,7 +498,7 @@ def _forward_batch(joints, q, positions, rotations):
 _clamp = TwoSpeeds(_clamp_batch)
 _excess = TwoSpeeds(_excess_batch)
 _locals = TwoSpeeds(_locals_batch)
-_forward = TwoSpeeds(_forward_batch)
+_forward = TwoSpeeds(_forward_batch, label="forward_kinematics of articulations")
 
 
 def _checked_kinds(kinds: str | Sequence[str], count: int) -> tuple[str, ...]:

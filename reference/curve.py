@@ -1,4 +1,4 @@
-"""Curves for an effector to draw, and evening out the spacing of their samples."""
+"""Named curves for an effector to draw, and resampling to an even spacing."""
 
 from collections.abc import Callable
 
@@ -21,7 +21,7 @@ def circle(count: int = 150) -> FloatArray:
     Raises:
         ValueError: if count is not a positive integer.
     """
-    t = _turns(count)
+    t = _angles(count)
     return _in_plane(0.6 * np.cos(t), 0.6 * np.sin(t))
 
 
@@ -40,7 +40,7 @@ def heart(count: int = 150) -> FloatArray:
     Raises:
         ValueError: if count is not a positive integer.
     """
-    t = _turns(count)
+    t = _angles(count)
     r = 0.5 * (1.0 - np.sin(t))
     return _in_plane(r * np.cos(t), r * np.sin(t))
 
@@ -55,7 +55,7 @@ def triangle(count: int = 150) -> FloatArray:
 
 
 def star(count: int = 400) -> FloatArray:
-    """Return samples of the pentagram of radius 0.4, every second of five points in turn.
+    """Return samples of the pentagram of radius 0.4, which joins every second of five points.
 
     Raises:
         ValueError: if count is not a positive integer.
@@ -65,11 +65,11 @@ def star(count: int = 400) -> FloatArray:
 
 
 def plumb_bob(count: int = 1200) -> FloatArray:
-    """Return samples of a drawing of a plumb bob, in strokes, very unevenly spaced.
+    """Return unevenly spaced samples of a drawing of a plumb bob.
 
-    Five strokes (line, eye, collar, body, plumb mark) follow one another, the pen jumping between
-    them. Within a stroke the pen slows to a crawl and speeds up again, s = u + sin(2 pi n u) / (2
-    pi n) for even u, as hand-drawn input does: crowded where it crawls, sparse where it runs.
+    It consists of five strokes: line, eye, collar, body and plumb mark. Within a stroke the arc
+    length is s = u + sin(2 pi n u) / (2 pi n) for evenly spaced u, so that samples are dense in
+    some parts and sparse in others, as in hand-drawn input.
 
     Returns:
         Shape (frame, 3) [m].
@@ -80,7 +80,7 @@ def plumb_bob(count: int = 1200) -> FloatArray:
     count = arguments.integer("count", count, least=1)
     parts = np.array_split(np.arange(count), len(_BOB_STROKES))
     return np.concatenate(
-        [stroke(_hurried(len(part))) for stroke, part in zip(_BOB_STROKES, parts, strict=True)]
+        [stroke(_uneven(len(part))) for stroke, part in zip(_BOB_STROKES, parts, strict=True)]
     )
 
 
@@ -97,16 +97,17 @@ curves: dict[str, Callable[..., FloatArray]] = {
 def resample(
     curve: ArrayLike, *, min_spacing: float, max_spacing: float, closed: bool = False
 ) -> FloatArray:
-    """Return the curve with every gap between neighbours from min_spacing to max_spacing.
+    """Return the curve with distances between neighbours from min_spacing to max_spacing.
 
-    Points too close to the last one kept are dropped, and gaps too wide are divided evenly. Both
-    ends are kept. Only where no point of the curve is min_spacing away from both ends, and these
-    are closer than that to each other, does nothing but the two ends remain.
+    Drop points that are too close to the last one kept, divide wide gaps evenly, and keep both
+    ends. Only the two ends remain if they are closer than min_spacing to each other and no point of
+    the curve is min_spacing away from both.
 
     Args:
         curve: points, shape (point, 3) [m].
         min_spacing: the least distance of neighbours [m].
-        max_spacing: the greatest, at least twice min_spacing, so that halves are not too short.
+        max_spacing: the greatest, at least twice min_spacing, so that a divided gap is not too
+            short.
         closed: whether the last point is a neighbour of the first.
 
     Raises:
@@ -128,16 +129,16 @@ def resample(
 
 
 def _drop_close(points: FloatArray, min_spacing: float) -> FloatArray:
-    """Return points at least min_spacing from the one before, both ends among them."""
+    """Return points at least min_spacing from their predecessor, both ends included."""
     kept = np.empty(len(points), dtype=np.int64)
     return points[kept[: _keep(points, min_spacing, kept)]]
 
 
 def keep_spaced(points, min_spacing, kept):
-    """Fill the indices of points to keep, in order; return how many.
+    """Store the indices of the points to keep, in order; return their count.
 
-    From the end of the greedy choice points are given up again until the last point of the curve
-    fits. If none would remain, any point far enough from both ends is taken.
+    Choose points greedily, then drop the last ones until the end of the curve is far enough from
+    the rest. If none remains between the ends, take a point far enough from both.
     """
     last = len(points) - 1
     count = 1
@@ -150,8 +151,8 @@ def keep_spaced(points, min_spacing, kept):
         count -= 1
     if count == 1 and spacing(points, 0, last) < min_spacing:
         for i in range(last - 1, 0, -1):
-            apart = min(spacing(points, 0, i), spacing(points, i, last))
-            if apart >= min_spacing and count == 1:
+            distance = min(spacing(points, 0, i), spacing(points, i, last))
+            if distance >= min_spacing and count == 1:
                 kept[count] = i
                 count += 1
     if last > 0:
@@ -180,7 +181,7 @@ def _check_count(points: FloatArray, max_spacing: float) -> None:
 
 
 def _divide_gaps(points: FloatArray, max_spacing: float) -> FloatArray:
-    """Return the points with as many more between neighbours as the spacing asks, evenly."""
+    """Return the points with evenly spaced ones added in gaps wider than max_spacing."""
     if len(points) == 1:
         return points
     gaps = np.linalg.norm(np.diff(points, axis=0), axis=-1)
@@ -192,7 +193,7 @@ def _divide_gaps(points: FloatArray, max_spacing: float) -> FloatArray:
     return np.concatenate([between, points[-1:]])
 
 
-def _turns(count: int) -> FloatArray:
+def _angles(count: int) -> FloatArray:
     return 2.0 * np.pi * np.arange(arguments.integer("count", count, least=1)) / count
 
 
@@ -203,36 +204,36 @@ def _in_plane(x: ArrayLike, z: ArrayLike) -> FloatArray:
 def _polygon(corners: ArrayLike, count: int) -> FloatArray:
     """Return samples, evenly spaced along the closed polygon of corners (corner, 2)."""
     count = arguments.integer("count", count, least=1)
-    around = np.concatenate([corners, np.asarray(corners)[:1]])
-    return _stroke(around)(np.arange(count) / count)
+    closed = np.concatenate([corners, np.asarray(corners)[:1]])
+    return _stroke(closed)(np.arange(count) / count)
 
 
 def _stroke(corners: ArrayLike) -> Callable[[FloatArray], FloatArray]:
-    """Return the polyline of corners (corner, 2) as a function of its length's fraction."""
+    """Return the polyline of corners (corner, 2) as a function of the fraction of its length."""
     x, z = np.asarray(corners, dtype=np.float64).T
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
+    arc_length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(z)))])
 
     def at(s: FloatArray) -> FloatArray:
-        length = s * along[-1]
-        return _in_plane(np.interp(length, along, x), np.interp(length, along, z))
+        length = s * arc_length[-1]
+        return _in_plane(np.interp(length, arc_length, x), np.interp(length, arc_length, z))
 
     return at
 
 
-def _hurried(count: int, halts: int = 3) -> FloatArray:
-    """Return fractions from 0 to 1 that stand still `halts` times and run in between."""
+def _uneven(count: int, halts: int = 3) -> FloatArray:
+    """Return fractions from 0 to 1, dense at `halts` points and sparse in between."""
     u = np.linspace(0.0, 1.0, count)
     return u + np.sin(2.0 * np.pi * halts * u) / (2.0 * np.pi * halts)
 
 
 def _body(u: FloatArray) -> FloatArray:
-    """Return the outline of the body: a point below that widens to a round shoulder."""
+    """Return the outline of the body, pointed below and round above."""
     t = 2.0 * np.pi * u
     return _in_plane(0.28 * np.sin(t) * (0.5 - 0.5 * np.cos(t)) ** 0.5, -0.05 - 0.4 * np.cos(t))
 
 
 def _eye(u: FloatArray) -> FloatArray:
-    """Return the ring through which the line runs."""
+    """Return the ring to which the line is tied."""
     t = 2.0 * np.pi * u
     return _in_plane(0.06 * np.sin(t), 0.51 + 0.06 * np.cos(t))
 

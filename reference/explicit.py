@@ -1,16 +1,17 @@
-"""Explicit integrators: symplectic Euler, and the classical Runge-Kutta method as truth at tiny h.
+"""Explicit integrators: symplectic Euler, and the classical Runge-Kutta method of order 4.
 
-Dampers pull with -c ((v_i - v_j)·u) u at the velocities of the moment; those of implicit Euler's
-step have another law, which `reference.mass_spring.damper_forces` compares. A pin that is taken
-somewhere moves there in a straight line at constant speed, which is its velocity from the start of
-the step to its end; a pin that stays has none, whatever the state says.
+Dampers pull with -c ((v_i - v_j)·u) u at the current velocities, unlike in a step of implicit
+Euler; `reference.mass_spring.damper_forces` compares the two laws. A pin moves to its position at
+the end of the step in a straight line at constant velocity; the velocity of pins in the state is
+ignored.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import LARGEST_COORDINATE, FloatArray, number
-from .mass_spring import MassSpring, State, _pulls, constant_forces, motion, pin_goal
+from .mass_spring import MassSpring, State, checked_state, constant_forces, pin_targets
+from .springs import pulls
 
 
 def symplectic_euler(
@@ -23,23 +24,23 @@ def symplectic_euler(
     """Return the state a time h [s] later: v' = v + h M^-1 f(x, v), then x' = x + h v'.
 
     Args:
-        system: the system that steps; it is stable for h below about 2 / (its highest frequency).
-        state: where it starts.
+        system: masses and springs; stable for h below about 2 / (highest angular frequency).
+        state: positions and velocities at the start.
         h: the step [s].
         external_forces: [N], shape (particle, 3), besides gravity.
-        pin_positions: where the pinned particles, in ascending order, are at the end of the step
-            [m], shape (pinned, 3); by default they stay.
+        pin_positions: positions of the pinned particles, in ascending order, at the end of the
+            step [m], shape (pinned, 3); by default they do not move.
 
     Raises:
         ValueError: if h is not positive, the state has another number of particles, or the
             external forces or pin positions have another shape or are not finite.
-        FloatingPointError: if the step goes beyond 1e75, as it does after many unstable ones.
+        FloatingPointError: if a coordinate or velocity exceeds 1e75, as after many unstable steps.
     """
     h = number("h", h, above=0)
     with np.errstate(over="ignore", invalid="ignore"):
-        x, v, goal = _start(system, state, h, pin_positions)
+        x, v, targets = _start(system, state, h, pin_positions)
         v = v + h * _accelerations(system, x, v, constant_forces(system, external_forces))
-        return _end("symplectic_euler", system, x + h * v, v, goal)
+        return _end("symplectic_euler", system, x + h * v, v, targets)
 
 
 def runge_kutta(
@@ -54,30 +55,30 @@ def runge_kutta(
     Arguments and errors are those of `symplectic_euler`; the external forces stay through the step.
     """
     h = number("h", h, above=0)
-    outer = constant_forces(system, external_forces)
+    constant = constant_forces(system, external_forces)
 
     def rates(shift: float, dx: FloatArray, dv: FloatArray) -> tuple[FloatArray, FloatArray]:
-        v_there = v + shift * dv
-        return v_there, _accelerations(system, x + shift * dx, v_there, outer)
+        v_shifted = v + shift * dv
+        return v_shifted, _accelerations(system, x + shift * dx, v_shifted, constant)
 
     with np.errstate(over="ignore", invalid="ignore"):
-        x, v, goal = _start(system, state, h, pin_positions)
-        k1 = v, _accelerations(system, x, v, outer)
+        x, v, targets = _start(system, state, h, pin_positions)
+        k1 = v, _accelerations(system, x, v, constant)
         k2 = rates(h / 2, *k1)
         k3 = rates(h / 2, *k2)
         k4 = rates(h, *k3)
         dx, dv = (a + 2 * b + 2 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
-        return _end("runge_kutta", system, x + h / 6 * dx, v + h / 6 * dv, goal)
+        return _end("runge_kutta", system, x + h / 6 * dx, v + h / 6 * dv, targets)
 
 
 def _accelerations(
     system: MassSpring, x: FloatArray, v: FloatArray, constant: FloatArray
 ) -> FloatArray:
-    """Return M^-1 f, zero at the pins, shape (particle, 3) [m/s²], unchecked.
+    """Return M^-1 f, zero at the pins, shape (particle, 3) [m/s²].
 
-    `constant` are the forces besides those of springs and dampers [N], shape (particle, 3).
+    `constant` holds all forces but those of springs and dampers [N], shape (particle, 3).
     """
-    total, free = constant + _pulls(x, v, system.arrays), system.free
+    total, free = constant + pulls(x, v, system.arrays), system.free
     result = np.zeros_like(total)
     result[free] = total[free] / system.masses[free, None]
     return result
@@ -86,12 +87,12 @@ def _accelerations(
 def _start(
     system: MassSpring, state: State, h: float, pin_positions: ArrayLike | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return positions and velocities, those of the pins as they move, and where the pins go."""
-    x, v = motion(system, state)
-    here = x[system.pinned]
-    goal = here if pin_positions is None else pin_goal(system, pin_positions)
-    v[system.pinned] = (goal - here) / h
-    return x, v, goal
+    """Return positions, velocities and the positions of the pins at the end of the step."""
+    x, v = checked_state(system, state)
+    pins = x[system.pinned]
+    targets = pins if pin_positions is None else pin_targets(system, pin_positions)
+    v[system.pinned] = (targets - pins) / h
+    return x, v, targets
 
 
 def _end(
@@ -99,10 +100,10 @@ def _end(
     system: MassSpring,
     positions: FloatArray,
     velocities: FloatArray,
-    goal: FloatArray,
+    targets: FloatArray,
 ) -> State:
-    """Return the state, the pins exactly where they were to go."""
-    positions[system.pinned] = goal
+    """Return the checked state with the pins exactly at their targets."""
+    positions[system.pinned] = targets
     if not np.abs([positions, velocities]).max() <= LARGEST_COORDINATE:
         raise FloatingPointError(
             f"{name}: the step left the numbers up to {LARGEST_COORDINATE:g}; h is too large"

@@ -180,7 +180,7 @@ def _difference_batch(joints, q1, q0, v):
             joint_difference(joints, j, q1[i], q0[i], v[i])
 
 
-_fill = TwoSpeeds(_jacobians_batch)
+_fill = TwoSpeeds(_jacobians_batch, label="jacobian")
 _integrate = TwoSpeeds(_integrate_batch)
 _difference = TwoSpeeds(_difference_batch)
 

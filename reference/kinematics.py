@@ -8,37 +8,23 @@ from numpy.typing import ArrayLike
 from . import arguments, rotation
 from .arguments import FloatArray, frozen
 from .articulation import Articulation
-from .backend.compiled import TwoSpeeds, bind
-from .backend.simd.lanes import (
+from .backend.compiled import TwoSpeeds
+from .backend.simd.poses import (
     LANES,
-    all_within,
-    lanes_at,
-    put_lanes,
-    put_quaternions,
-    put_vectors,
-    quaternions_at,
-    vectors_at,
+    in_lanes,
+    load_position,
+    load_rotation,
+    load_unit,
+    store_position,
+    store_rotation,
+    store_unit,
 )
 from .backend.threads import in_slices
 from .model import Model, checked_model
-from .quaternion import (
-    add,
-    conjugate,
-    made_unit,
-    multiply,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
-    rotate,
-    vector_at,
-)
-
-# The same under the names of what they read back: in lanes that is read in another way.
-from .quaternion import quaternion_at as rotation_at
-from .quaternion import vector_at as position_at
+from .quaternion import add, conjugate, made_unit, multiply, rotate, vector_at
 from .skeleton import Pose, Skeleton, SkeletonArrays, checked_skeleton
 
-# A slice of a batch with fewer joints than this is done before another thread is well under way.
+# A slice of a batch with fewer joints than this is done before another thread has begun.
 THREAD_JOINTS = 100_000
 
 
@@ -46,8 +32,8 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
     """Return the global pose of every joint.
 
     A joint with parent p has the rotation R = R_p Q and the position x = x_p + R_p offset. The
-    offset is turned by the *parent's* global rotation; a joint's own rotation moves only what
-    hangs below it.
+    offset is rotated by the *parent's* global rotation; a joint's own rotation moves only its
+    descendants.
 
     Args:
         skeleton: the tree, an Articulation, or a Robot read from a file.
@@ -71,11 +57,11 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
     count = len(tree.parents)
     local = arguments.floats("local_rotations", local_rotations, "...", count, 4)
     positions, rotations = np.empty((*local.shape[:-1], 3)), np.empty(local.shape)
-    if local.ndim == 2:  # one pose, most often one of many calls, is spared all that it can be
-        fine = _forward(*tree, local, positions, rotations)
+    if local.ndim == 2:  # one pose: most often one of many calls, so that overhead counts
+        valid = _forward(*tree, local, positions, rotations)
     else:
-        fine = _in_slices(_forward_batch, tree, local, positions, rotations)
-    if not fine:  # raise, or the lengths were on the very edge of the tolerance
+        valid = _in_slices(_forward_batch, tree, local, positions, rotations)
+    if not valid:  # raise, or the lengths were within rounding of the tolerance
         return forward_kinematics(skeleton, rotation.unit("local_rotations", local))
     positions.setflags(write=False)
     rotations.setflags(write=False)
@@ -90,15 +76,15 @@ def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
             from unit length.
     """
     tree = checked_skeleton(skeleton).arrays
-    given = arguments.floats("rotations", rotations, "...", len(tree.parents), 4)
-    local = np.empty(given.shape)
-    if not _in_slices(_local_batch, tree, given, local):
-        return local_from_global(skeleton, rotation.unit("rotations", given))
+    poses = arguments.floats("rotations", rotations, "...", len(tree.parents), 4)
+    local = np.empty(poses.shape)
+    if not _in_slices(_local_batch, tree, poses, local):
+        return local_from_global(skeleton, rotation.unit("rotations", poses))
     return local
 
 
 def _in_slices(kernel: TwoSpeeds, tree: SkeletonArrays, *poses: FloatArray) -> bool:
-    """Run a kernel on slices of arrays (..., joint, 3 or 4); return whether all were fine."""
+    """Run a kernel on slices of arrays (..., joint, 3 or 4); return whether all were valid."""
     flat = [values.reshape(-1, *values.shape[-2:]) for values in poses]
     least = math.ceil(THREAD_JOINTS / len(tree.parents))
     done = in_slices(
@@ -109,103 +95,89 @@ def _in_slices(kernel: TwoSpeeds, tree: SkeletonArrays, *poses: FloatArray) -> b
 
 def forward_pose(parents, offsets, local, positions, rotations):
     """Fill positions (joint, 3) and rotations (joint, 4) of one pose from unit quaternions."""
-    x, R = vector_at(offsets, 0), quaternion_at(local, 0)
-    put_vector(positions, 0, x)
-    put_quaternion(rotations, 0, R)
+    x, R = vector_at(offsets, 0), load_unit(local, 0)
+    store_position(positions, 0, x)
+    store_rotation(rotations, 0, R)
     for j in range(1, len(parents)):
-        if parents[j] != j - 1:  # along a chain the parent is still at hand
-            x, R = position_at(positions, parents[j]), rotation_at(rotations, parents[j])
+        if parents[j] != j - 1:  # along a chain x and R are the parent's already
+            x, R = load_position(positions, parents[j]), load_rotation(rotations, parents[j])
         x = add(x, rotate(R, vector_at(offsets, j)))
-        R = multiply(R, quaternion_at(local, j))
-        put_vector(positions, j, x)
-        put_quaternion(rotations, j, R)
+        R = multiply(R, load_unit(local, j))
+        store_position(positions, j, x)
+        store_rotation(rotations, j, R)
 
 
 def local_pose(parents, rotations, local):
-    """Fill local rotations (joint, 4) of one pose from global ones."""
-    put_quaternion(local, 0, quaternion_at(rotations, 0))
+    """Fill local rotations (joint, 4) of one pose from global unit quaternions."""
+    store_rotation(local, 0, load_unit(rotations, 0))
     for j in range(1, len(parents)):
-        R_parent = quaternion_at(rotations, parents[j])
-        put_quaternion(local, j, multiply(conjugate(R_parent), quaternion_at(rotations, j)))
+        R_parent = load_unit(rotations, parents[j])
+        store_rotation(local, j, multiply(conjugate(R_parent), load_unit(rotations, j)))
 
 
-def normalise(given, unit):
-    """Fill unit quaternions (joint, 4); return whether all given ones were unit within 1e-6."""
-    fine = True
+def normalise(rotations, unit):
+    """Fill unit quaternions (joint, 4); return whether all rotations were unit within 1e-6."""
+    valid = True
     for j in range(len(unit)):
-        Q, near = made_unit(quaternion_at(given, j))
-        put_quaternion(unit, j, Q)
-        fine &= near
-    return fine
+        Q, near = made_unit(load_rotation(rotations, j))
+        store_unit(unit, j, Q)
+        valid &= near
+    return valid
 
 
-# The same on LANES poses side by side: a tile of a batch, and unit quaternions in a scratch array.
-forward_tile = bind(
-    forward_pose,
-    quaternion_at=lanes_at,
-    position_at=vectors_at,
-    rotation_at=quaternions_at,
-    put_vector=put_vectors,
-    put_quaternion=put_quaternions,
-)
-local_tile = bind(local_pose, quaternion_at=lanes_at, put_quaternion=put_quaternions)
-normalise_tile = bind(
-    normalise,
-    quaternion_at=quaternions_at,
-    made_unit=bind(made_unit, within=all_within),
-    put_quaternion=put_lanes,
-)
+forward_tile, local_tile = in_lanes(forward_pose), in_lanes(local_pose)
+normalise_tile = in_lanes(normalise)
 
 
-def _forward_one(parents, offsets, given, positions, rotations):
-    local = np.empty(given.shape)
-    if not normalise(given, local):
+def _forward_one(parents, offsets, poses, positions, rotations):
+    local = np.empty(poses.shape)
+    if not normalise(poses, local):
         return False
     forward_pose(parents, offsets, local, positions, rotations)
     return True
 
 
-def _forward_each(parents, offsets, given, positions, rotations):
-    fine = True
-    for i in range(len(given)):
-        fine &= _forward_one(parents, offsets, given[i], positions[i], rotations[i])
-    return fine
+def _forward_each(parents, offsets, poses, positions, rotations):
+    valid = True
+    for i in range(len(poses)):
+        valid &= _forward_one(parents, offsets, poses[i], positions[i], rotations[i])
+    return valid
 
 
-def _forward_many(parents, offsets, given, positions, rotations):
-    if len(given) < LANES:
-        return _forward_each(parents, offsets, given, positions, rotations)
+def _forward_many(parents, offsets, poses, positions, rotations):
+    if len(poses) < LANES:
+        return _forward_each(parents, offsets, poses, positions, rotations)
     local = np.empty((len(parents), 4, LANES))
-    for i in range(0, len(given), LANES):
-        first = min(i, len(given) - LANES)  # the last tile overlaps the one before
+    for i in range(0, len(poses), LANES):
+        first = min(i, len(poses) - LANES)  # the last tile overlaps the one before
         end = first + LANES
-        if not normalise_tile(given[first:end], local):
+        if not normalise_tile(poses[first:end], local):
             return False
         forward_tile(parents, offsets, local, positions[first:end], rotations[first:end])
     return True
 
 
-def _local_each(parents, given, local):
-    rotations = np.empty(given.shape[1:])
-    for i in range(len(given)):
-        if not normalise(given[i], rotations):
+def _local_each(parents, poses, local):
+    rotations = np.empty(poses.shape[1:])
+    for i in range(len(poses)):
+        if not normalise(poses[i], rotations):
             return False
         local_pose(parents, rotations, local[i])
     return True
 
 
-def _local_many(parents, offsets, given, local):
-    if len(given) < LANES:
-        return _local_each(parents, given, local)
+def _local_many(parents, offsets, poses, local):
+    if len(poses) < LANES:
+        return _local_each(parents, poses, local)
     rotations = np.empty((len(parents), 4, LANES))
-    for i in range(0, len(given), LANES):
-        first = min(i, len(given) - LANES)
-        if not normalise_tile(given[first : first + LANES], rotations):
+    for i in range(0, len(poses), LANES):
+        first = min(i, len(poses) - LANES)
+        if not normalise_tile(poses[first : first + LANES], rotations):
             return False
         local_tile(parents, rotations, local[first : first + LANES])
     return True
 
 
-_forward = TwoSpeeds(_forward_one)
-_forward_batch = TwoSpeeds(_forward_many)
-_local_batch = TwoSpeeds(_local_many)
+_forward = TwoSpeeds(_forward_one, label="forward_kinematics")
+_forward_batch = TwoSpeeds(_forward_many, label="forward_kinematics of a batch")
+_local_batch = TwoSpeeds(_local_many, label="local_from_global")

@@ -4,14 +4,14 @@ A spring from particle i to particle j has length l = |x_i - x_j| and direction
 u = (x_i - x_j) / l. It stores k/2 (l - r)² and pulls i with -(k (l - r) + c (v_i - v_j)·u) u; the
 dampers of an implicit Euler step have another law, see `damper_forces`.
 
-A tension-only spring, such as a rope, stores nothing and does not pull while it is slack, l <= r;
-its damper acts all the same, as in MuJoCo. Its stiffness jumps where l passes r: exactly there it
-is zero, the one-sided second derivative from the slack side, as in MuJoCo again. One with r = 0 has
-no slack side and is a linear spring.
+A tension-only spring, such as a rope, stores no energy and does not pull while it is slack, l <= r;
+its damper acts in all states, as in MuJoCo. Its stiffness jumps at l = r, where it is defined as
+zero, the one-sided second derivative from the slack side, again as in MuJoCo. A tension-only spring
+with r = 0 is never slack and equals a linear spring.
 
-Where its ends coincide a spring has no direction of its own: u is then (1, 0, 0), as in MuJoCo. It
-points from its second particle to its first, so which end is pushed to which side depends on their
-order; only a spring with r = 0, whose force vanishes there, and a slack one do not care.
+Where the ends of a spring coincide, its direction is undefined and u is set to (1, 0, 0), as in
+MuJoCo. The order of its particles then decides which end is pushed in which direction; a slack
+spring and one with r = 0 exert no force there.
 """
 
 import functools
@@ -38,17 +38,17 @@ from .backend.compiled import TwoSpeeds
 from .backend.partition import LARGE, Regions, cut
 from .sparse.assembly import BlockSum
 from .springs import (
+    blocks,
+    pulls,
     spring_lengths,
-    spring_pulls,
     spring_rest_vectors,
     spring_stretches,
-    stiffness_blocks,
     sum_springs,
 )
 
 
 class SystemArrays(NamedTuple):
-    """What the kernels read of a mass-spring system."""
+    """The arrays of a mass-spring system that kernels read."""
 
     masses: FloatArray
     springs: IndexArray
@@ -71,12 +71,12 @@ class MassSpring:
         stiffnesses: [N/m], shape (spring,).
         dampings: along the springs [N s/m], shape (spring,).
         tension_only: whether each spring goes slack below its rest length, bool, shape (spring,).
-        pinned: the particles that stay where the state has them, or go where a step is told to
-            take them, ascending, shape (pinned,); what velocity a state gives them counts as zero.
+        pinned: particles that keep their position in the state unless a step is called with
+            `pin_positions`, ascending, shape (pinned,); their velocity in a state is ignored.
         free: whether each particle may move, bool, shape (particle,).
         gravity: acceleration [m/s²], shape (3,).
-        damped: whether any spring is.
-        arrays: what the kernels read; never to be written to.
+        damped: whether any spring has a damper.
+        arrays: the arguments of the kernels; do not write to them.
     """
 
     masses: FloatArray
@@ -102,7 +102,7 @@ class MassSpring:
         gravity: ArrayLike = (0.0, -9.81, 0.0),
         tension_only: ArrayLike = False,
     ) -> None:
-        """Check and copy the system; what belongs to springs may be one value for all of them.
+        """Check and copy the system; a property of springs may be one value for all of them.
 
         Raises:
             ValueError: if a shape is wrong, a number is negative, not finite or beyond 1e75, an
@@ -111,7 +111,7 @@ class MassSpring:
         """
         mass = _masses(masses)
         ends = _springs(springs, len(mass))
-        self._hold(
+        self._store(
             SystemArrays(
                 mass,
                 ends,
@@ -129,7 +129,7 @@ class MassSpring:
                 f"masses: expected free particles to have mass, got 0 at index {weightless[0]}"
             )
 
-    def _hold(self, arrays: SystemArrays) -> None:
+    def _store(self, arrays: SystemArrays) -> None:
         free = np.ones(len(arrays.masses), dtype=bool)
         free[arrays.pinned] = False
         shown = {name: frozen(values) for name, values in arrays._asdict().items()}
@@ -139,27 +139,26 @@ class MassSpring:
     def replaced(self, **arrays: Any) -> "MassSpring":
         """Return the system with some of its `SystemArrays` replaced, unchecked and not copied."""
         system = object.__new__(MassSpring)
-        system._hold(self.arrays._replace(**arrays))
+        system._store(self.arrays._replace(**arrays))
         return system
 
     @functools.cached_property
-    def dampers_apart(self) -> "MassSpring":
-        """The same system, the dampers of its tension-only springs made springs of their own.
+    def with_separate_dampers(self) -> "MassSpring":
+        """The same system with every damper of a tension-only spring as a spring of its own.
 
-        They have no stiffness and come after all other springs. Without such dampers it is the
-        system itself.
+        These springs have no stiffness and follow all others. The system itself if there are none.
         """
         both = np.flatnonzero(self.tension_only & (self.dampings > 0))
         if len(both) == 0:
             return self
-        arrays, none = self.arrays, np.zeros(len(both))
-        kept = np.where(self.tension_only, 0.0, self.dampings)
+        arrays, zeros = self.arrays, np.zeros(len(both))
+        dampings = np.where(self.tension_only, 0.0, self.dampings)
         return self.replaced(
             springs=np.concatenate([arrays.springs, arrays.springs[both]]),
             rest_lengths=np.concatenate([arrays.rest_lengths, arrays.rest_lengths[both]]),
-            stiffnesses=np.concatenate([arrays.stiffnesses, none]),
-            dampings=np.concatenate([kept, arrays.dampings[both]]),
-            tension_only=np.concatenate([arrays.tension_only, none > 0]),
+            stiffnesses=np.concatenate([arrays.stiffnesses, zeros]),
+            dampings=np.concatenate([dampings, arrays.dampings[both]]),
+            tension_only=np.concatenate([arrays.tension_only, zeros > 0]),
         )
 
     @property
@@ -169,7 +168,7 @@ class MassSpring:
 
     @functools.cached_property
     def weights(self) -> FloatArray:
-        """The weight of each particle [N], shape (particle, 3); never to be written to."""
+        """The weight of each particle [N], shape (particle, 3); do not write to it."""
         return self.masses[:, None] * self.gravity
 
     @functools.cached_property
@@ -181,25 +180,25 @@ class MassSpring:
 
     @functools.cached_property
     def regions(self) -> Regions | None:
-        """How a large system is summed side by side; None for a small one."""
+        """The partition of a large system for sums over several threads; None for a small one."""
         large = len(self.arrays.springs) >= LARGE
         return cut(self.arrays.springs, self.particle_count) if large else None
 
     @functools.cached_property
     def free_incidence(self) -> Any:
-        """The columns A_i with the rows of pinned particles emptied, sparse (particle, spring)."""
-        held = scipy.sparse.diags_array(self.free.astype(float)) @ incidence(self)
-        held.eliminate_zeros()
-        return held
+        """A with empty rows for pinned particles, sparse (particle, spring); see `Derivation`."""
+        free = scipy.sparse.diags_array(self.free.astype(float)) @ incidence(self)
+        free.eliminate_zeros()
+        return free
 
     @functools.cached_property
     def free_blocks(self) -> "BlockSum":
-        """The sum over springs in which the rows and columns of pinned particles are empty."""
+        """The sum of 3 x 3 blocks over springs, rows and columns of pinned particles left empty."""
         return BlockSum(self.free_incidence)
 
     @functools.cached_property
     def free_masses(self) -> FloatArray:
-        """The masses with a one at each pin, shape (particle,): eliminated, not made heavy."""
+        """The masses, replaced by one at the pins, whose rows are eliminated; shape (particle,)."""
         return frozen(np.where(self.free, self.masses, 1.0))
 
     def __repr__(self) -> str:
@@ -209,7 +208,7 @@ class MassSpring:
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class State:
-    """Where the particles are and how they move, at one instant.
+    """Positions and velocities of the particles at one instant.
 
     Attributes:
         positions: [m], shape (particle, 3).
@@ -227,16 +226,16 @@ class State:
         """
         x = coordinates("positions", positions, "particle", 3)
         v = array("velocities", velocities, len(x), 3)
-        self._hold(x.copy(), v.copy())
+        self._store(x.copy(), v.copy())
 
-    def _hold(self, positions: FloatArray, velocities: FloatArray) -> None:
+    def _store(self, positions: FloatArray, velocities: FloatArray) -> None:
         self.__dict__.update(positions=frozen(positions), velocities=frozen(velocities))
 
     @classmethod
     def of(cls, positions: FloatArray, velocities: FloatArray) -> "State":
-        """Return a state that keeps these very arrays, unchecked."""
+        """Return a state that shares these arrays, neither checked nor copied."""
         state = object.__new__(cls)
-        state._hold(positions, velocities)
+        state._store(positions, velocities)
         return state
 
     def __repr__(self) -> str:
@@ -244,7 +243,7 @@ class State:
 
 
 class Derivation(NamedTuple):
-    """The matrices of Liu et al. 2013, sparse, each to be read times the 3 x 3 identity.
+    """The sparse matrices of Liu et al. 2013, before the Kronecker product with the 3 x 3 identity.
 
     Attributes:
         A: shape (particle, spring); column A_i is 1 at spring i's first end, -1 at the other.
@@ -260,14 +259,14 @@ class Derivation(NamedTuple):
 
 
 def derivation(system: MassSpring) -> Derivation:
-    """Return A, S, L and J of the system; pins play no part in them."""
+    """Return A, S, L and J of the system, pinned particles treated as free ones."""
     A, K = incidence(system), scipy.sparse.diags_array(system.stiffnesses, format="csc")
     S = scipy.sparse.eye_array(len(system.springs), format="csc")
     return Derivation(A=A, S=S, L=A @ K @ A.T, J=A @ K @ S.T)
 
 
 def incidence(system: MassSpring) -> Any:
-    """Return A alone, sparse CSC (particle, spring)."""
+    """Return the incidence matrix A, sparse CSC (particle, spring)."""
     n, s = _system(system).particle_count, len(system.springs)
     signs, starts = np.tile([1.0, -1.0], s), 2 * np.arange(s + 1)
     return scipy.sparse.csc_array((signs, system.springs.ravel(), starts), shape=(n, s))
@@ -276,8 +275,8 @@ def incidence(system: MassSpring) -> Any:
 def rest_vectors(system: MassSpring, positions: ArrayLike) -> FloatArray:
     """Return d, shape (spring, 3) [m]: d_i = r_i u_i, each spring's vector at its rest length.
 
-    Of all vectors of length r_i it is the nearest to the spring's own (Liu et al. 2013). A
-    tension-only spring may have any shorter one as well: where it is slack, d_i is its own vector.
+    Of all vectors of length r_i, d_i is the nearest to the spring's own vector (Liu et al. 2013).
+    For a slack tension-only spring, d_i is the spring's own vector.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
@@ -304,9 +303,9 @@ def stretches(system: MassSpring, positions: ArrayLike) -> FloatArray:
 
 
 def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
-    """Return the energy of springs and gravity [J]: sum of k/2 (l - r)² less that of m g·x.
+    """Return the energy of springs and gravity [J]: sum of k/2 (l - r)² - sum of m g·x.
 
-    Slack springs have none.
+    Slack springs store none.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
@@ -316,7 +315,7 @@ def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
 
 
 def spring_energy(system: MassSpring, positions: ArrayLike) -> float:
-    """Return the energy of the springs [J]: the sum of k/2 (l - r)², over those not slack.
+    """Return the energy of the springs [J]: the sum of k/2 (l - r)² over those not slack.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
@@ -331,23 +330,23 @@ def kinetic_energy(system: MassSpring, state: State) -> float:
     Raises:
         ValueError: if the state has another number of particles.
     """
-    _, v = motion(system, state)
+    _, v = checked_state(system, state)
     return float(np.sum(0.5 * system.masses[:, None] * v**2))
 
 
 def forces(
     system: MassSpring, state: State, external_forces: ArrayLike | None = None
 ) -> FloatArray:
-    """Return the force on each particle [N], shape (particle, 3): springs, dampers, gravity, given.
+    """Return the total force on each particle [N], shape (particle, 3), external forces included.
 
-    At a pinned particle it is what the pin has to hold.
+    At a pinned particle it is the load on the pin.
 
     Raises:
         ValueError: if the state has another number of particles, or the external forces [N] have
             a shape other than (particle, 3) or are not finite.
     """
-    x, v = motion(system, state)
-    return constant_forces(system, external_forces) + _pulls(x, v, system.arrays)
+    x, v = checked_state(system, state)
+    return constant_forces(system, external_forces) + pulls(x, v, system.arrays)
 
 
 def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None) -> FloatArray:
@@ -363,43 +362,42 @@ def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None
 
 
 def spring_forces(system: MassSpring, positions: ArrayLike) -> FloatArray:
-    """Return the springs' forces -k (l - r) u at their first ends, the opposite at the other [N].
+    """Return the sum over springs of -k (l - r) u at the first end, its opposite at the second [N].
 
-    Shape (particle, 3). Slack springs have none.
+    Shape (particle, 3). Slack springs exert none.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
     x = _positions(system, positions)
-    return _pulls(x, np.zeros_like(x), system.arrays)
+    return pulls(x, np.zeros_like(x), system.arrays)
 
 
 def damper_forces(system: MassSpring, state: State) -> FloatArray:
     """Return the dampers' forces -c ((v_i - v_j)·u) u at their first ends [N], (particle, 3).
 
-    Those of slack springs act as well. A step of implicit Euler has another law, in which the
-    dampers have an energy: -(c/h) (l - l_n) u, l_n being the length before the step. At the end of
-    a step the two differ by the rotation of a spring within it, about c h/2 |w across u|² / l with
-    w = v_i - v_j: in proportion to h.
+    Dampers of slack springs act as well. A step of implicit Euler uses -(c/h) (l - l_n) u instead,
+    which has an energy; l_n is the length before the step. At the end of a step the two forces
+    differ by about c h/2 |w_t|² / l, where w_t is the part of v_i - v_j at a right angle to u.
 
     Raises:
         ValueError: if the state has another number of particles.
     """
-    x, v = motion(system, state)
-    return _pulls(x, v, system.arrays._replace(stiffnesses=np.zeros(len(system.springs))))
+    x, v = checked_state(system, state)
+    return pulls(x, v, system.arrays._replace(stiffnesses=np.zeros(len(system.springs))))
 
 
 def stiffness_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     """Return the exact Hessian of the spring energy [N/m], sparse (3 particle, 3 particle).
 
-    It is the sum of (A_i A_i') x (k u u' + k (1 - r/l) (I - u u')); the second, geometric term is
-    left out where a spring with a rest length has shrunk to a point. Slack springs have none.
+    It is the sum of (A_i A_i') x (k u u' + k (1 - r/l) (I - u u')) over springs that are not slack;
+    the second, geometric term is zero for a spring with a rest length whose ends coincide.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
-    blocks = _blocks(_positions(system, positions), system.arrays, True)
-    return BlockSum(incidence(system)).matrix(blocks)
+    stiffness = spring_blocks(system, positions)
+    return BlockSum(incidence(system)).matrix(stiffness)
 
 
 def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
@@ -412,29 +410,23 @@ def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     """
     x, never_slack = _positions(system, positions), np.zeros(len(system.springs), dtype=bool)
     dampers = system.arrays._replace(stiffnesses=system.arrays.dampings, tension_only=never_slack)
-    blocks = _blocks(x, dampers, False)
-    return BlockSum(incidence(system)).matrix(blocks)
+    return BlockSum(incidence(system)).matrix(blocks(x, dampers, False))
 
 
 def spring_blocks(
     system: MassSpring, positions: ArrayLike, *, geometric: bool = True
 ) -> FloatArray:
-    """Return each spring's 3 x 3 stiffness [N/m], with or without the geometric term.
+    """Return each spring's 3 x 3 stiffness [N/m], the geometric term included or left out.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
     """
     x, geometric = _positions(system, positions), boolean("geometric", geometric)
-    return _spring_blocks(system, x, geometric=geometric)
+    return blocks(x, system.arrays, geometric)
 
 
-def _spring_blocks(system: MassSpring, x: FloatArray, *, geometric: bool = True) -> FloatArray:
-    """Return what `spring_blocks` does; for steps, whose positions are their own."""
-    return _blocks(x, system.arrays, geometric)
-
-
-def motion(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
-    """Return positions and velocities of a state of the system, those of the pins zero.
+def checked_state(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
+    """Return copies of a state's positions and velocities, the velocities of the pins set to zero.
 
     Raises:
         ValueError: if they are no MassSpring and State, or differ in their number of particles.
@@ -449,8 +441,8 @@ def motion(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
     return np.array(state.positions), v
 
 
-def pin_goal(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
-    """Return where the pins are to be at the end of a step, shape (pinned, 3) [m].
+def pin_targets(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
+    """Return the checked positions of the pins at the end of a step, shape (pinned, 3) [m].
 
     Raises:
         ValueError: if they have another shape or are not finite.
@@ -458,8 +450,6 @@ def pin_goal(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
     return coordinates("pin_positions", pin_positions, len(system.pinned), 3)
 
 
-_pulls = TwoSpeeds(spring_pulls)
-_blocks = TwoSpeeds(stiffness_blocks)
 _lengths = TwoSpeeds(spring_lengths)
 _sums = TwoSpeeds(sum_springs)
 _stretches = TwoSpeeds(spring_stretches)
@@ -495,15 +485,15 @@ def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:
 
 
 def _per_spring(name: str, value: ArrayLike, count: int) -> FloatArray:
-    given = array(name, value, "...")
-    if given.ndim == 0:
-        return _not_negative(name, np.full(count, given))
-    return _not_negative(name, array(name, given, count).copy())
+    values = array(name, value, "...")
+    if values.ndim == 0:
+        return _not_negative(name, np.full(count, values))
+    return _not_negative(name, array(name, values, count).copy())
 
 
 def _not_negative(name: str, values: FloatArray) -> FloatArray:
     negative = np.flatnonzero(values < 0)
     if len(negative):
-        where = negative[0]
-        raise ValueError(f"{name}: expected none below 0, got {values[where]} at index {where}")
+        first = negative[0]
+        raise ValueError(f"{name}: expected none below 0, got {values[first]} at index {first}")
     return values

@@ -1,9 +1,9 @@
 """Unit quaternions and vectors as tuples of components: the algebra inside the kernels.
 
-Hamilton product, (w, x, y, z), active: `rotate(q, v)` turns v by q, and `multiply(a, b)` turns by
-b first, then by a. The components may be floats or arrays of one shape, but for `between`,
-`exponential` and `logarithm`, which decide by value and take floats. See `rotation.py` for arrays
-of quaternions.
+Hamilton product, (w, x, y, z), active: `rotate(q, v)` rotates v by q, and `multiply(a, b)` is the
+rotation by b, then by a. The components may be floats or arrays of one shape; `between`,
+`exponential` and `logarithm` branch on values and take floats. See `rotation.py` for arrays of
+quaternions.
 """
 
 import math
@@ -19,7 +19,7 @@ SHORT = 0.62
 NEARLY_OPPOSITE = 1e-2
 # Below this the product of two lengths has lost some.
 TINY = 1e-140
-# A quaternion given may be so far from unit length.
+# How far from unit length a quaternion in an argument may be.
 UNIT_TOLERANCE = 1e-6
 
 
@@ -158,7 +158,7 @@ def renormalised(q):
 
 
 def between(a, b):
-    """Return the shortest-arc rotation that turns the direction of a into that of b.
+    """Return the shortest-arc rotation from the direction of a to that of b.
 
     It is (|a| |b| + a.b, a x b) made unit: no trigonometry, and accurate for small angles. A zero
     vector has no direction and gives the identity.
@@ -176,7 +176,7 @@ def between_opposite(a, b):
     """Return the same where |a| |b| + a.b would cancel or underflow.
 
     With unit vectors, w = |a + b| / 2 and the vector part is (a x b) / |a + b|. Antiparallel
-    vectors turn by pi about `perpendicular(a)`.
+    vectors are rotated by pi about `perpendicular(a)`.
     """
     length_a, length_b = norm(a), norm(b)
     if length_a == 0.0 or length_b == 0.0:
@@ -239,7 +239,7 @@ def turn_about(axis, angle):
 
 
 def half_turn(angle):
-    """Return cosine and sine of half an angle; up to half a turn by the series of its quarter."""
+    """Return cosine and sine of half an angle; up to pi by the series of its quarter."""
     quarter = 0.25 * angle
     t = quarter * quarter
     if t < SHORT:
@@ -249,7 +249,7 @@ def half_turn(angle):
 
 
 def logarithm(q):
-    """Return the rotation vector of the shorter way round, at most pi long."""
+    """Return the rotation vector of least length, at most pi."""
     w, x, y, z = q
     if w < 0.0:
         w, x, y, z = -w, -x, -y, -z

@@ -1,6 +1,6 @@
 """Arrays of unit quaternions, (..., 4), w first; leading axes broadcast.
 
-Hamilton product, active rotations: `rotate(q, v)` turns v by q, `multiply(a, b)` turns by b first.
+Hamilton product, active rotations: `rotate(q, v)` rotates v by q, `multiply(a, b)` by b first.
 """
 
 import numpy as np
@@ -61,9 +61,7 @@ def normalise(quaternions: ArrayLike) -> tuple[FloatArray, FloatArray]:
         raise ValueError(f"quaternions: expected lengths above 0, got 0 at index {where}")
     scaled = given / largest  # no square overflows or vanishes
     lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
-    with np.errstate(over="ignore"):  # the length of the largest numbers is none itself
-        deviation = np.abs(lengths * largest - 1.0)[..., 0]
-    return scaled / lengths, deviation
+    return scaled / lengths, np.abs(lengths * largest - 1.0)[..., 0]
 
 
 def check_unit(name: str, lengths: FloatArray) -> None:
@@ -97,7 +95,7 @@ def conjugate(q: ArrayLike) -> FloatArray:
 
 
 def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
-    """Return the vectors v, (..., 3), turned by unit quaternions q, (..., 4).
+    """Return the vectors v, (..., 3), rotated by unit quaternions q, (..., 4).
 
     Raises:
         ValueError: if an argument does not hold finite quaternions or vectors.
@@ -109,8 +107,8 @@ def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
 def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
     """Return the shortest-arc rotations from directions a to b, (..., 3) each, as (..., 4).
 
-    Antiparallel directions turn by pi about a fixed axis perpendicular to a; a zero vector has no
-    direction and gives the identity.
+    Antiparallel directions are rotated by pi about a fixed axis perpendicular to a; a zero vector
+    has no direction and gives the identity.
 
     Raises:
         ValueError: if an argument does not hold finite vectors.

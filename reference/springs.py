@@ -1,14 +1,15 @@
-"""Springs one by one, in kernels: lengths and directions, pulls, blocks of the stiffness matrix.
+"""Kernels over springs: lengths, directions, forces and blocks of the stiffness matrix.
 
-See `mass_spring` for what a spring is.
+`mass_spring` defines a spring's energy and force.
 """
 
 import numpy as np
 from numpy import uint64 as at
 
+from .backend.compiled import TwoSpeeds
 from .quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
 
-# Ends closer than this [m] coincide: the square of their distance is no normal number.
+# Ends closer than this [m] count as coincident: the square of their distance would be subnormal.
 COINCIDENT = 1e-150
 
 
@@ -27,25 +28,25 @@ def spring_pulls(x, v, system):
 
 
 def stiffness_blocks(x, system, geometric):
-    """Return each spring's k u u', with k (1 - r/l) (I - u u') added if geometric; 0 if slack."""
+    """Return the 3 x 3 stiffness of each spring, zero if slack; see `mass_spring.spring_blocks`."""
     blocks = np.zeros((len(system.springs), 3, 3))
     for s in range(len(system.springs)):
         i, j = system.springs[s, 0], system.springs[s, 1]
         length, u = spring_frame(x, i, j)
         if is_slack(length, system.rest_lengths[s], system.tension_only[s]):
             continue
-        k, across = system.stiffnesses[s], 0.0
+        k, transverse = system.stiffnesses[s], 0.0
         if geometric:
-            across = k * share_across(length, system.rest_lengths[s])
+            transverse = k * transverse_share(length, system.rest_lengths[s])
         for a in range(3):
-            blocks[s, a, a] = across
+            blocks[s, a, a] = transverse
             for b in range(3):
-                blocks[s, a, b] += (k - across) * (u[a] * u[b])
+                blocks[s, a, b] += (k - transverse) * (u[a] * u[b])
     return blocks
 
 
-def share_across(length, rest_length):
-    """Return 1 - r/l; where the ends coincide, 1 without a rest length and 0 with one."""
+def transverse_share(length, rest_length):
+    """Return 1 - r/l; where the ends coincide, 1 if the rest length is zero and 0 otherwise."""
     if length >= COINCIDENT:
         return 1.0 - rest_length / length
     return 1.0 if rest_length == 0.0 else 0.0
@@ -79,7 +80,7 @@ def spring_stretches(x, system):
 
 
 def spring_rest_vectors(x, system):
-    """Return r u of every spring, l u if slack, shape (spring, 3)."""
+    """Return d of every spring, shape (spring, 3); see `mass_spring.rest_vectors`."""
     vectors = np.empty((len(system.springs), 3))
     for s in range(len(system.springs)):
         length, u = spring_frame(x, system.springs[s, 0], system.springs[s, 1])
@@ -97,7 +98,7 @@ def spring_stretch(length, rest_length, tension_only):
 
 
 def is_slack(length, rest_length, tension_only):
-    """Return whether a tension-only spring hangs loose; one without a rest length never does."""
+    """Return whether a spring is slack: tension-only, with a rest length, and no longer than it."""
     return tension_only and rest_length > 0.0 and length <= rest_length
 
 
@@ -109,3 +110,7 @@ def spring_frame(x, i, j):
     if length < COINCIDENT:
         p, s = (1.0, 0.0, 0.0), 1.0
     return length, scale(s, p)
+
+
+pulls = TwoSpeeds(spring_pulls)
+blocks = TwoSpeeds(stiffness_blocks)

@@ -1,15 +1,15 @@
 """Wind on a cloth: drag and lift on its triangles as external forces.
 
 After Keckeisen, Kimmerle, Thomaszewski and Wacker 2004, "Modelling Effects of Wind Fields in Cloth
-Animations". A triangle of area A and unit normal n, past which the air moves with w, relative to
-the mean of its corners, feels with e = w / |w|
+Animations". On a triangle of area A and unit normal n, where w is the velocity of the air relative
+to the mean velocity of the corners and e = w / |w|, act
 
     drag = density/2 C_drag |w|² A |n·e| e,
     lift = density/2 C_lift |w|² A (n·e) (n - (n·e) e).
 
-|n·e| A is the area that faces the wind. Drag goes with the wind and lift at a right angle to it,
-like the sine and cosine of the angle of attack together; both are the same for n and -n. The air
-is not moved in return, and one triangle does not shelter another.
+|n·e| A is the area projected along the wind. Drag is parallel to the wind and lift perpendicular to
+it; both are the same for n and -n. The air is not affected by the cloth, and triangles do not
+shelter each other.
 """
 
 import numpy as np
@@ -32,13 +32,13 @@ def wind_forces(
 ) -> FloatArray:
     """Return the force of the wind on each particle [N], shape (particle, 3).
 
-    Each triangle gives a third of its force to each of its corners. A step takes the result as
-    `external_forces`: the wind of the moment at which the step starts, which is explicit, so that
-    the step has to be short against the time in which the wind stops a particle.
+    The force on a triangle is shared equally among its corners. Pass the result to a step as
+    `external_forces`: it is evaluated at the start of the step and so explicit, which is stable
+    only for steps that are short compared with the time in which drag stops a particle.
 
     Args:
-        state: positions and velocities, those of pins as they stand there.
-        triangles: indices of particles, shape (triangle, 3); how they turn does not matter.
+        state: positions and velocities; those of pins count too.
+        triangles: indices of particles, shape (triangle, 3), in either orientation.
         wind: velocity of the air [m/s], shape (3,), or (particle, 3) if it differs.
         density: of the air [kg/m³].
         drag: the coefficient of drag, about 1 for a flat plate.
@@ -65,31 +65,34 @@ def wind_forces(
 
 
 def triangle_forces(x, w, triangles, drag, lift):
-    """Return the force on each particle; w is the wind past it, shape (particle, 3)."""
+    """Return the force on each particle; w is the air's velocity relative to it, (particle, 3)."""
     total = np.zeros(x.shape)
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         first = vector_at(x, i)
         normal = cross(subtract(vector_at(x, j), first), subtract(vector_at(x, k), first))
-        past = scale(1.0 / 3.0, add(add(vector_at(w, i), vector_at(w, j)), vector_at(w, k)))
-        share = scale(1.0 / 3.0, plate_force(normal, past, drag, lift))
+        relative = scale(1.0 / 3.0, add(add(vector_at(w, i), vector_at(w, j)), vector_at(w, k)))
+        share = scale(1.0 / 3.0, plate_force(normal, relative, drag, lift))
         for corner in (i, j, k):
             put_vector(total, corner, add(vector_at(total, corner), share))
     return total
 
 
 def plate_force(normal, w, drag, lift):
-    """Return drag and lift; the normal is as long as twice the area, density/2 is in the rest."""
+    """Return drag plus lift on a triangle whose area is half the length of its normal.
+
+    The coefficients contain the factor density/2.
+    """
     twice_area, speed = norm(normal), norm(w)
     if twice_area == 0.0 or speed == 0.0:
         return 0.0, 0.0, 0.0
     n, e = scale(1.0 / twice_area, normal), scale(1.0 / speed, w)
-    facing = dot(n, e)
+    cosine = dot(n, e)
     pressure = 0.5 * twice_area * speed * speed
-    upwards = subtract(n, scale(facing, e))
+    perpendicular = subtract(n, scale(cosine, e))
     return add(
-        scale(drag * pressure * abs(facing), e),
-        scale(lift * pressure * facing, upwards),
+        scale(drag * pressure * abs(cosine), e),
+        scale(lift * pressure * cosine, perpendicular),
     )
 
 

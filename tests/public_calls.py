@@ -63,9 +63,12 @@ INTERNAL = {
     "reference.skeleton.checked_skeleton": "is a border itself",
     "reference.skeleton.Skeleton.path_array": "of an index that is checked already",
     "reference.articulation.Articulation.checked": "is a border itself",
-    "reference.mass_spring.motion": "is a border itself",
-    "reference.mass_spring.pin_goal": "is a border itself",
+    "reference.mass_spring.checked_state": "is a border itself",
+    "reference.mass_spring.pin_targets": "is a border itself",
     "reference.mass_spring.constant_forces": "is a border itself",
+    "reference.implicit_euler.objective.Objective.iterate_at": "unchecked twin of evaluate",
+    "reference.implicit_euler.objective.Objective.hessian_at": "unchecked twin of hessian",
+    "reference.implicit_euler.objective.Objective.pin_gradient_at": "unchecked twin",
     "reference.implicit_euler.objective.Iterate": "made by an Objective alone",
     "reference.implicit_euler.objective.Iterate.within": "of a share in our own sources",
     "reference.judging.step.StepJudgement": "made by judge_step alone",
@@ -81,17 +84,15 @@ INTERNAL = {
     "reference.implicit_euler.certificate.newton_length": "a part of the proof",
     "reference.implicit_euler.certificate.hessian_change": "a part of the proof",
     "reference.implicit_euler.certificate.laplacian_norm": "a part of the proof",
-    "reference.implicit_euler.certificate.rounding": "a part of the proof",
+    "reference.implicit_euler.certificate.rounding_errors": "a part of the proof",
     "reference.sparse.linear_solver.Factor.solve": "a protocol",
     "reference.sparse.linear_solver.Factor.refactorize": "a protocol",
     "reference.backend.compiled.TwoSpeeds": "for kernels",
     "reference.backend.compiled.compile_kernel": "for kernels",
     "reference.backend.compiled.bind": "for kernels",
     "reference.backend.compiled.compiled_in": "for kernels",
-    "reference.backend.compiled.digest": "for kernels",
-    "reference.backend.compiled.allocates": "for kernels",
     "reference.backend.threads.in_slices": "for kernels",
-    "crosscheck.verdict.Verdict": "made by judge alone",
+    "crosscheck.verdict.Verdict": "made by check_claim alone",
     "crosscheck.verdict.Claim": "made by claims",
     "crosscheck.samples.generator": "of names in the sources",
     "crosscheck.samples.particles": "of a case that is checked already",
@@ -452,7 +453,7 @@ def _steps():
         ),
         o + ".residual": Call(g.residual, {"iterate": g.start}),
         o + ".hessian": Call(g.hessian, {"positions": x, "geometric": True}),
-        o + ".pull_of_pins": Call(g.pull_of_pins, {"positions": x, "geometric": False}),
+        o + ".pin_gradient": Call(g.pin_gradient, {"positions": x, "geometric": False}),
         o + ".quadratic_form": Call(g.quadratic_form, {"positions": x, "d": g.rest_vectors(x)}),
         "reference.implicit_euler.certificate.certify": Call(
             certificate.certify, {"objective": g, "positions": x}),
@@ -602,16 +603,16 @@ def _samples():
     claim = verdict.Claim("a", "b", "c", _compared, POSITION, 1)
     table = {
         s + name: Call(getattr(samples, name), {"case": 0})
-        for name in ("skeleton", "reach", "alike", "smooth", "unpinned", "drifting", "oscillator",
+        for name in ("skeleton", "reach", "uniform", "smooth", "unpinned", "drifting", "oscillator",
                      "line")
     }  # fmt: skip
     return table | {
-        s + "motion": Call(samples.motion, {"case": 0, "damped": True}),
+        s + "network": Call(samples.network, {"case": 0, "damped": True}),
         s + "local_rotations": Call(
             lambda case, skeleton, batch: samples.local_rotations(case, skeleton, batch),
             {"case": 0, "skeleton": tree, "batch": 2}, names="shape"),
         s + "highest_rate": Call(samples.highest_rate, {"system": system()[0]}),
-        "crosscheck.verdict.judge": Call(verdict.judge, {"claim": claim, "cases": 1}),
+        "crosscheck.verdict.check_claim": Call(verdict.check_claim, {"claim": claim, "cases": 1}),
     }  # fmt: skip
 
 

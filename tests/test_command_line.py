@@ -10,7 +10,7 @@ import pytest
 
 from bench import cli
 from bench.harness.record import Record, RecordFile
-from crosscheck.identities import CLAIMS
+from crosscheck.claims import CLAIMS
 from crosscheck.verdict import Verdict
 
 
@@ -251,7 +251,7 @@ def judged(missed):
 
 
 def test_a_missed_claim_exits_1_and_stands_in_the_table(capsys, monkeypatch):
-    monkeypatch.setattr("crosscheck.identities.run_claims", judged("they differ"))
+    monkeypatch.setattr("crosscheck.claims.run_claims", judged("they differ"))
     code, out, _ = plumbob(capsys, "check", "spring forces")
     assert code == 1
     assert "MISSED: they differ" in out
@@ -259,7 +259,7 @@ def test_a_missed_claim_exits_1_and_stands_in_the_table(capsys, monkeypatch):
 
 
 def test_claims_that_hold_exit_0(capsys, monkeypatch):
-    monkeypatch.setattr("crosscheck.identities.run_claims", judged(""))
+    monkeypatch.setattr("crosscheck.claims.run_claims", judged(""))
     code, out, _ = plumbob(capsys, "check")
     assert code == 0
     assert f"{len(CLAIMS)} of {len(CLAIMS)} claims held" in out
@@ -285,7 +285,7 @@ def robots(empty_folder, monkeypatch):
     monkeypatch.setattr(
         child_process.ChildProcess, "call", lambda self, function, *given: function(*given)
     )
-    monkeypatch.setattr(files, "departures", lambda path: [])
+    monkeypatch.setattr(files, "known_deviations", lambda path: [])
     folder = empty_folder / "robots"
     (folder / "arms").mkdir(parents=True)
     (folder / "arms" / "arm|1.urdf").write_text('<robot name="r"><link name="a"/></robot>')

@@ -19,6 +19,7 @@ SUITES = {
     "newton": "one step of a heavy cloth by every solver: how far from a minimiser, proven",
     "cloth_scale": "cloths of a thousand particles and more: factors, solves, memory",
     "timing": "forward kinematics, solves and steps beside both engines",
+    "first_call": "the first call of each public function, with nothing compiled yet",
     "pictures": "the poses and cloths that the report draws",
 }
 

@@ -10,6 +10,7 @@ from ..experiments.cloth import tables as cloth
 from ..experiments.cloth_peers import tables as cloth_peers
 from ..experiments.cloth_scale import tables as cloth_scale
 from ..experiments.energy import tables as energy
+from ..experiments.first_call import tables as first_call
 from ..experiments.newton import tables as newton
 from ..experiments.published import tables as published
 from ..experiments.robot_models import tables as robot_models
@@ -163,8 +164,9 @@ SECTIONS = (
             Entry("A step of the cloth", timing.cloth, ("timing_cloth",)),
             Entry("Iterations, up to a million particles", cloth_scale.iterations),
             Entry("Factors, up to a million particles", cloth_scale.factors),
+            Entry("What does the first call cost, which compiles?", first_call.first_calls),
         ),
-        ("timing", "cloth_scale"),
+        ("timing", "cloth_scale", "first_call"),
     ),
 )
 

@@ -164,7 +164,8 @@ def _trimmed(digits: str) -> str:
     return digits.rstrip("0").rstrip(".")
 
 
-_MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=]|(?<=^\d)[.)])")
+# Marks anywhere, and what begins a list, a rule or a heading; a number is none of these.
+_MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=](?=[-+=\s]|$)|(?<=^\d)[.)](?=\s|$))")
 
 
 def _markdown(text: str) -> str:

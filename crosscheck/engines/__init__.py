@@ -1,4 +1,4 @@
-"""Our models as the engines see them; every convention is translated here and nowhere else."""
+"""Our models in other engines, and the translation of all conventions."""
 
 from .mujoco_flex import MujocoFlex
 from .mujoco_joint_chain import MujocoJointChain

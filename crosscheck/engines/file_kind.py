@@ -1,4 +1,4 @@
-"""What a file of a robot, a character or a motion is, told by its name and its first element."""
+"""Detect the format of a file from its name and its root element."""
 
 import re
 from pathlib import Path
@@ -7,9 +7,9 @@ from xml.etree import ElementTree
 from reference.formats.source import LARGEST
 
 URDF, MJCF, BVH = "URDF", "MJCF", "BVH"
-# What takes the place of <include> in other files, and is no model by itself.
+# The content of an <include> in other files, not a model by itself.
 FRAGMENT = "fragment"
-# The first element, behind a declaration, a document type and comments.
+# The root element, after a declaration, a document type and comments.
 FIRST = re.compile(r"\s*(?:<\?.*?\?>|<!--.*?-->|<![A-Za-z].*?>|\s+)*<([^\s<>/!?]+)", re.DOTALL)
 BY_SUFFIX = {".urdf": URDF, ".bvh": BVH}
 BY_ROOT = {"robot": URDF, "mujoco": MJCF, "mujocoinclude": FRAGMENT}
@@ -17,7 +17,7 @@ XML = (".xml", ".mjcf")
 
 
 def xml_root(path: Path) -> ElementTree.Element:
-    """Return the root element of an XML file, white space before the declaration left out.
+    """Return the root element of an XML file; white space before the declaration is allowed.
 
     Raises:
         ValueError: if it cannot be opened, or is not well-formed.
@@ -29,10 +29,10 @@ def xml_root(path: Path) -> ElementTree.Element:
 
 
 def file_kind(path: Path) -> str:
-    """Return URDF, MJCF, BVH or FRAGMENT, "" if it is none of these.
+    """Return URDF, MJCF, BVH or FRAGMENT, or "" for other formats.
 
-    An XML file of MJCF that neither holds nor includes a <worldbody> is a fragment; one whose root
-    is a <robot> without a <link> is none of these.
+    An MJCF file without <worldbody> and <include> is a fragment; a <robot> without a <link> is
+    another format.
 
     Raises:
         OSError: if it cannot be opened.

@@ -8,16 +8,16 @@ from reference.mass_spring import MassSpring
 
 from .mujoco_mass_spring import MujocoMassSpring, particle_name, particles_spec
 
-# Of the edges as capsules [m]: nothing collides, but there has to be one.
+# Radius of the edges [m], required although collisions are disabled.
 RADIUS = 1e-4
 
 
 class MujocoFlex(MujocoMassSpring):
     """A mass-spring system in MuJoCo whose springs are the edges of a flex of dimension one.
 
-    A flex has one stiffness and one damping for all its edges, and none of them is tension-only.
-    Between two pinned particles an edge is rigid and stores no energy. The integrator "discrete"
-    refuses such a flex.
+    All edges of a flex have the same stiffness and damping, and none is tension-only. An edge
+    between two pinned particles is rigid and stores no energy. The integrator "discrete" does not
+    support such a flex.
     """
 
     def lengths(self) -> FloatArray:
@@ -27,9 +27,9 @@ class MujocoFlex(MujocoMassSpring):
     def _build(self, system: MassSpring) -> mujoco.MjModel:
         """Return the model.
 
-        An edge's rest length is its length where the bodies stand at first, and none may be zero:
-        they are put apart, and back to the origin when all rest lengths are overwritten. MuJoCo
-        sorts the edges.
+        MuJoCo computes the rest lengths of edges from the initial positions and does not accept
+        zero: the bodies start at distinct positions, which are then reset to the origin while the
+        rest lengths are overwritten. MuJoCo sorts the edges.
 
         Raises:
             ValueError: if the springs differ in stiffness or in damping, or there are none.

@@ -1,4 +1,4 @@
-"""Chains along a line in MuJoCo: nested slide joints, or hinges on one axis, with springs."""
+"""Chains of particles on a line in MuJoCo, as nested slide joints or hinges with springs."""
 
 import mujoco
 import numpy as np
@@ -16,13 +16,13 @@ ALONG_X = np.array([1.0, 0.0, 0.0])
 class MujocoJointChain:
     """A chain of particles on the x axis, each joined to the one before it; the first is pinned.
 
-    Each particle's body hangs in the one before it by a joint with a spring and a damper, so that
-    the joint's coordinate is the length of the spring between them, and the mass matrix couples
-    all of them. On hinges about one common axis the masses are moments of inertia [kg m²], the
-    coordinates angles [rad], and the forces torques: the same equations.
+    Each particle is a child body of the previous one, connected by a joint with a spring and a
+    damper. The coordinate of the joint is the length of the spring, and the mass matrix couples all
+    joints. With hinges about a common axis, masses become moments of inertia [kg m²], coordinates
+    angles [rad] and forces torques in the same equations.
 
-    The forces of springs are linear in the coordinates as long as no spring turns over: "discrete"
-    then is implicit Euler itself.
+    The forces of springs are linear in the coordinates as long as the ends of no spring swap; then
+    "discrete" equals implicit Euler.
 
     Attributes:
         model: the mujoco.MjModel.
@@ -48,9 +48,10 @@ class MujocoJointChain:
     def step(
         self, state: State, external_forces: ArrayLike, *, steps: int = 1
     ) -> tuple[FloatArray, FloatArray]:
-        """Return positions and velocities along x some steps later, each of shape (particle,).
+        """Return positions and velocities along x after some steps, each of shape (particle,).
 
-        Of a state only x counts. Gravity is applied as a force: it cannot turn a hinge.
+        Only the x components of the state are used. Gravity is applied as a force because MuJoCo's
+        gravity exerts no torque on these hinges.
         """
         start = state.positions[0, 0]
         forces = np.asarray(external_forces)[1:, 0] + self._weights

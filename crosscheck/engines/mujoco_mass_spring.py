@@ -1,4 +1,4 @@
-"""Mass-spring systems in MuJoCo: point masses on slides, joined by tendons."""
+"""Mass-spring systems in MuJoCo, with point masses on slides and tendons as springs."""
 
 import mujoco
 import numpy as np
@@ -17,8 +17,8 @@ INTEGRATORS = {
     "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
 }
 
-# MuJoCo's own guess at the memory for so many particles is more than there is. What it comes to use
-# was measured at up to 10,000: two bytes for each pair.
+# Above this number of particles MuJoCo's default estimate of its memory is excessive. The actual
+# use, measured for up to 10,000 particles, is two bytes for each pair.
 MANY = 1000
 BASE_MEMORY, PAIR_MEMORY = 2**27, 8
 
@@ -27,24 +27,24 @@ class MujocoMassSpring:
     """A mass-spring system as a MuJoCo model: point masses on three slides, springs as tendons.
 
     A free particle is a body at the world's origin with three slide joints, so that its qpos are
-    its global position; a pinned one is a body of the world, moved by `place`. A spring is a
-    spatial tendon between the sites of two bodies: its `springlength` is the rest length, or for a
-    tension-only spring anything from zero to it, its stiffness and damping act along it.
+    its global position; a pinned one is a body without joints, positioned by `update_forces`. A
+    spring is a spatial tendon between the sites of two bodies. Its `springlength` is the rest
+    length, or for a tension-only spring the interval from zero to it.
 
-    A tendon exactly at its rest length has no stiffness for the integrator "discrete", which then
-    takes another step than Gauss-Newton: start from a state that has moved.
+    The integrator "discrete" omits the stiffness of a tendon that is exactly at its rest length and
+    then differs from Gauss-Newton: do not start from the rest lengths.
 
-    "implicitfast" keeps of the dampers' matrix what fits the pattern of MuJoCo's mass matrix. A
-    body that is a point mass on three slides along the axes is `body_simple` to it: its mass
-    matrix is a diagonal. Bodies with their mass off their origin or with slanting slides would
-    keep the whole 3 x 3 block, as "implicit" always does. Neither keeps what couples two bodies.
+    "implicitfast" keeps the entries of the damping matrix in the sparsity pattern of MuJoCo's mass
+    matrix. For point masses on three slides along the axes, which MuJoCo marks `body_simple`, that
+    is its diagonal. Otherwise it would be the 3 x 3 blocks, as for "implicit". Both drop the
+    coupling of different bodies.
 
     Attributes:
         model: the mujoco.MjModel.
         data: its mujoco.MjData.
         bodies: MuJoCo's index of each particle's body, found by name.
-        free: which particles may move, bool, shape (particle,).
-        columns: where each free particle's coordinates stand in qpos and qvel, shape (free, 3).
+        free: whether each particle is free, bool, shape (particle,).
+        columns: indices of each free particle's coordinates in qpos and qvel, shape (free, 3).
     """
 
     def __init__(
@@ -61,15 +61,15 @@ class MujocoMassSpring:
             system: the particles and springs.
             h: time step [s].
             integrator: one of `INTEGRATORS`.
-            iterations: most conjugate gradient iterations of "discrete"; MuJoCo's own default of
-                100 stops it short on larger systems.
+            iterations: most conjugate gradient iterations of "discrete"; MuJoCo's default of 100
+                does not suffice for larger systems.
 
         Raises:
-            ValueError: if there is no such integrator.
+            ValueError: if the integrator is unknown.
         """
         self.model = self._build(system)
         self.model.opt.timestep = h
-        self.choose(integrator)
+        self.set_integrator(integrator)
         self.model.opt.tolerance = 1e-15
         self.model.opt.iterations = iterations
         self.data = mujoco.MjData(self.model)
@@ -83,18 +83,18 @@ class MujocoMassSpring:
     def _build(self, system: MassSpring) -> mujoco.MjModel:
         return tendon_model(system)
 
-    def choose(self, integrator: str) -> None:
-        """Step with this integrator from now on.
+    def set_integrator(self, integrator: str) -> None:
+        """Set the integrator of the following steps.
 
         Raises:
-            ValueError: if there is no such integrator.
+            ValueError: if the integrator is unknown.
         """
         self.model.opt.integrator = INTEGRATORS[choice("integrator", integrator, INTEGRATORS)]
 
     def write(self, state: State, external_forces: ArrayLike | None = None) -> None:
-        """Write a state and external forces [N], (particle, 3), into MuJoCo's data, reset first.
+        """Reset MuJoCo's data, then write a state and external forces [N], (particle, 3), into it.
 
-        A reset forgets the last step's solution, with which "discrete" would start.
+        The reset clears the solution of the last step, from which "discrete" would start.
         """
         mujoco.mj_resetData(self.model, self.data)
         self.model.body_pos[self.bodies[~self.free]] = state.positions[~self.free]
@@ -103,8 +103,8 @@ class MujocoMassSpring:
         if external_forces is not None:
             self.data.qfrc_applied[self.columns] = np.asarray(external_forces)[self.free]
 
-    def place(self, state: State) -> None:
-        """Write a state and let MuJoCo compute all forces and energies there."""
+    def update_forces(self, state: State) -> None:
+        """Write a state and compute all forces and energies."""
         self.write(state)
         mujoco.mj_forward(self.model, self.data)
 
@@ -119,17 +119,17 @@ class MujocoMassSpring:
     def step(
         self, state: State, external_forces: ArrayLike | None = None, *, steps: int = 1
     ) -> State:
-        """Return the state some time steps later, one if not told, by MuJoCo's integrator."""
+        """Return the state after some time steps, by default one, of MuJoCo's integrator."""
         self.write(state, external_forces)
-        self.go_on(steps)
+        self.advance(steps)
         return self.read()
 
-    def go_on(self, steps: int) -> None:
-        """Take so many steps more from where the last one ended."""
+    def advance(self, steps: int) -> None:
+        """Continue by some steps from the current state."""
         mujoco.mj_step(self.model, self.data, steps)
 
     def spring_forces(self) -> FloatArray:
-        """Read the springs' forces on the free particles [N], (free, 3), after `place`."""
+        """Read the springs' forces on the free particles [N], (free, 3), after `update_forces`."""
         return self.data.qfrc_spring[self.columns]
 
     def damper_forces(self) -> FloatArray:
@@ -139,8 +139,8 @@ class MujocoMassSpring:
     def gravity_forces(self) -> FloatArray:
         """Read the weights of the free particles [N], (free, 3).
 
-        MuJoCo counts gravity into the bias on the other side of the equation of motion. Point
-        masses on slides have no Coriolis forces, so gravity is all there is in it.
+        MuJoCo includes gravity, with the opposite sign, in the bias force, whose other part, the
+        Coriolis forces, vanishes for point masses on slides.
         """
         return -self.data.qfrc_bias[self.columns]
 
@@ -158,11 +158,11 @@ class MujocoMassSpring:
 
 
 def tendon_model(system: MassSpring) -> mujoco.MjModel:
-    """Return the bodies of the system, and its springs as tendons.
+    """Return the model with the springs as tendons.
 
-    Our spring's direction runs from its second particle to its first, a tendon's from its first
-    site to its second: the sites are given in reverse order. It matters only where they coincide,
-    and both of us then take the direction (1, 0, 0).
+    The direction of our springs is from the second particle to the first, that of a tendon from the
+    first site to the second: the sites are in reverse order. This matters only where they coincide,
+    because MuJoCo, too, then sets the direction to (1, 0, 0).
     """
     spec = particles_spec(system)
     for i, j in system.springs:
@@ -178,9 +178,9 @@ def tendon_model(system: MassSpring) -> mujoco.MjModel:
 
 
 def particles_spec(system: MassSpring) -> mujoco.MjSpec:
-    """Return the bodies of the system, each with a site, with energies at every forward pass.
+    """Return the bodies of the system, each with a site; energies are computed in forward passes.
 
-    A motion that blows up is left to do so: MuJoCo would start it afresh.
+    MuJoCo's automatic reset of diverging simulations is disabled.
     """
     spec = mujoco.MjSpec()
     spec.option.gravity = system.gravity

@@ -1,4 +1,4 @@
-"""Robots and characters in MuJoCo, which reads URDF and MJCF files itself."""
+"""Robots and characters in MuJoCo, read from URDF and MJCF files by its own reader."""
 
 import contextlib
 from collections.abc import Iterator, Mapping
@@ -12,20 +12,20 @@ import numpy as np
 from reference.arguments import FloatArray
 
 from .file_kind import URDF, file_kind, xml_root
-from .robot_engine import Placement, UnreadableError, columns
+from .robot_engine import LinkPoses, UnreadableError, select_columns
 
-# What MuJoCo would refuse or lose in a URDF, and kinematics does not read.
+# Elements of a URDF that kinematics does not need and that MuJoCo may refuse.
 LEFT_OUT = ("visual", "collision", "inertial")
-# What is left out of an MJCF file that MuJoCo refuses as it is: what uses others comes first.
+# Elements to remove from an MJCF file that MuJoCo refuses, those that refer to others first.
 SHAPES = (
     "keys", "sensors", "actuators", "tendons", "equalities", "pairs", "excludes", "skins",
     "flexes", "sites", "geoms", "meshes", "hfields", "materials", "textures",
 )  # fmt: skip
-KINDS = ("free", "ball", "slide", "hinge")  # by MuJoCo's number
+KINDS = ("free", "ball", "slide", "hinge")  # in the order of mujoco.mjtJoint
 
 
 class Follower(NamedTuple):
-    """A joint held to another: qpos - qpos0 = shift + multiplier (leader's qpos - qpos0)."""
+    """A joint coupled to another: qpos - qpos0 = shift + multiplier (leader's qpos - qpos0)."""
 
     joint: int
     leader: int
@@ -34,20 +34,20 @@ class Follower(NamedTuple):
 
 
 class MujocoRobot:
-    """A file as MuJoCo reads it, without anything but kinematics.
+    """The kinematics of a file as MuJoCo reads it.
 
-    Its links are MuJoCo's bodies; one without a name is called after its number, body#3, and a
-    joint without one after its body, its type and its place there, body#3/hinge1. MuJoCo orders
-    bodies and joints depth-first: all are found by name. A URDF's mimic joints become equality
-    constraints, which kinematics does not enforce: the followers are placed, and their columns
-    added to their leaders', as the constraints say.
+    Its links are MuJoCo's bodies. A body without a name is called "body#3" by its index, a joint
+    without one "body#3/hinge1" by its body, its type and its index in the body. MuJoCo orders
+    bodies and joints depth first: all are found by name. A URDF's mimic joints become equality
+    constraints, which kinematics does not enforce: this class sets the coordinates of followers and
+    adds their columns of the Jacobian to those of their leaders.
 
     Attributes:
         model: the mujoco.MjModel.
         data: its mujoco.MjData.
         links: MuJoCo's index of each body.
         joints: MuJoCo's index of each joint.
-        followers: the joints that are held to others, each behind its leader.
+        followers: the joints that follow others, each after its leader.
     """
 
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
@@ -65,8 +65,8 @@ class MujocoRobot:
         at = self.model.jnt_dofadr
         self._at = {name: int(at[joint]) for name, joint in self.joints.items()}
 
-    def place(self, values: Mapping[str, FloatArray]) -> None:
-        """Put the joints where the coordinates say; our conventions are MuJoCo's."""
+    def update_kinematics(self, values: Mapping[str, FloatArray]) -> None:
+        """Set the coordinates of joints and compute the poses; our conventions are MuJoCo's."""
         q, q0, at = self.data.qpos, self.model.qpos0, self.model.jnt_qposadr
         q[:] = q0
         for name, value in values.items():
@@ -74,33 +74,32 @@ class MujocoRobot:
                 first = at[self.joints[name]]
                 q[first : first + len(value)] = value
         for joint, leader, shift, multiplier in self.followers:
-            moved = q[at[leader]] - q0[at[leader]]
-            q[at[joint]] = q0[at[joint]] + shift + multiplier * moved
+            displacement = q[at[leader]] - q0[at[leader]]
+            q[at[joint]] = q0[at[joint]] + shift + multiplier * displacement
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
 
-    def placement(self, links: list[str]) -> Placement:
-        """Read where `place` has put some links."""
+    def link_poses(self, links: list[str]) -> LinkPoses:
+        """Return the current poses of some links."""
         bodies = [self.links[link] for link in links]
-        return Placement(self.data.xpos[bodies], self.data.xmat[bodies].reshape(-1, 3, 3))
+        return LinkPoses(self.data.xpos[bodies], self.data.xmat[bodies].reshape(-1, 3, 3))
 
     def jacobians(self, links: list[str], freedoms: Mapping[str, int]) -> FloatArray:
-        """Return the links' velocities by those of the joints named, (link, 6, freedom)."""
+        """Return the Jacobians of links with respect to the named joints, (link, 6, freedom)."""
         J = np.empty((len(links), 6, self.model.nv))
         for part, link in zip(J, links, strict=True):
             mujoco.mj_jacBody(self.model, self.data, part[:3], part[3:], self.links[link])
         at = self.model.jnt_dofadr
         for joint, leader, _, multiplier in reversed(self.followers):
             J[..., at[leader]] += multiplier * J[..., at[joint]]
-        return columns(J, self._at, freedoms)
+        return select_columns(J, self._at, freedoms)
 
 
 def mujoco_urdf(path: Path) -> mujoco.MjModel:
-    """Return the model of a URDF file of which only links and joints are left.
+    """Return the model of the links and joints of a URDF file.
 
-    The shapes need files that may not be there, many links have an inertia that MuJoCo refuses,
-    and by itself it joins links that a fixed joint holds together. Kinematics reads neither
-    shapes nor masses: every link is given the same one.
+    Shapes are removed because their files may be missing, inertias are replaced because MuJoCo
+    refuses many, and MuJoCo's fusion of links connected by fixed joints is disabled.
 
     Raises:
         ValueError: if MuJoCo does not read it.
@@ -122,9 +121,9 @@ def mujoco_urdf(path: Path) -> mujoco.MjModel:
 
 
 def mujoco_mjcf(path: Path) -> mujoco.MjModel:
-    """Return the model of an MJCF file, read as it is, or else without shapes and masses.
+    """Return the model of an MJCF file, without shapes and masses if MuJoCo refuses it.
 
-    Files of shapes may not be there, and some masses MuJoCo refuses.
+    Files of shapes may be missing, and MuJoCo refuses some masses.
 
     Raises:
         ValueError: if MuJoCo does not read it.
@@ -138,7 +137,7 @@ def mujoco_mjcf(path: Path) -> mujoco.MjModel:
 
 
 def _without_shapes(path: Path) -> mujoco.MjModel:
-    """Return the model of an MJCF file of which only bodies and joints are left, all as heavy."""
+    """Return the model of the bodies and joints of an MJCF file, with equal masses."""
     spec = mujoco.MjSpec.from_file(str(path))
     for kind in SHAPES:
         for element in list(getattr(spec, kind)):
@@ -151,7 +150,7 @@ def _without_shapes(path: Path) -> mujoco.MjModel:
 
 @contextlib.contextmanager
 def silent() -> Iterator[None]:
-    """Keep MuJoCo's warnings about a file out of the terminal and out of its log file."""
+    """Suppress MuJoCo's warnings on the terminal and in its log file."""
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda message: None)
     try:
@@ -169,17 +168,17 @@ def _unit_inertia() -> ElementTree.Element:
 
 
 def _joint_name(model: mujoco.MjModel, bodies: list[str], joint: int) -> str:
-    """Return a joint's name, or that of its body, its type and its place there."""
+    """Return a joint's name, or else one made of its body, its type and its index there."""
     body = model.jnt_bodyid[joint]
-    place = joint - model.body_jntadr[body] + 1
-    return model.joint(joint).name or f"{bodies[body]}/{KINDS[model.jnt_type[joint]]}{place}"
+    index = joint - model.body_jntadr[body] + 1
+    return model.joint(joint).name or f"{bodies[body]}/{KINDS[model.jnt_type[joint]]}{index}"
 
 
 def _followers(model: mujoco.MjModel) -> list[Follower]:
-    """Return the joints that are held to others, each behind its leader.
+    """Return the joints that follow others, each after its leader.
 
     Raises:
-        ValueError: if some are held to each other in a ring.
+        ValueError: if some follow each other in a ring.
     """
     waiting = {
         int(model.eq_obj1id[i]): Follower(

@@ -1,4 +1,4 @@
-"""Skeletons in MuJoCo: a body with a ball joint for each of ours."""
+"""Skeletons in MuJoCo, with a body and a ball joint for each joint."""
 
 import mujoco
 import numpy as np
@@ -10,16 +10,15 @@ from .mujoco_bodies import add_point_mass
 
 
 class MujocoSkeleton:
-    """A skeleton as a MuJoCo model: a body with a ball joint for each of our joints.
+    """A skeleton as a MuJoCo model, with a body and a ball joint for each joint.
 
-    MuJoCo orders bodies depth-first, we keep the order given: joints are found by name. It
-    normalises quaternions itself.
+    MuJoCo orders bodies depth first: joints are found by name. It normalises quaternions itself.
 
     Attributes:
         model: the mujoco.MjModel; its bodies and joints carry our names.
         data: its mujoco.MjData.
         bodies: MuJoCo's index of each of our joints' bodies.
-        columns: where each joint's (w, x, y, z) stand in qpos, shape (joint, 4).
+        columns: indices of each joint's (w, x, y, z) in qpos, shape (joint, 4).
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -29,41 +28,41 @@ class MujocoSkeleton:
         first = np.array([self.model.joint(name).qposadr[0] for name in skeleton.names])
         self.columns = first[:, None] + np.arange(4)
 
-    def place(self, q: FloatArray) -> None:
-        """Put the skeleton where the coordinates q say."""
+    def update_kinematics(self, q: FloatArray) -> None:
+        """Set the coordinates and compute forward kinematics."""
         self.data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self.data)
 
     def pose(self) -> Pose:
-        """Read where `place` has put every joint."""
+        """Return the current pose of all joints."""
         return Pose(self.data.xpos[self.bodies], self.data.xquat[self.bodies])
 
     def position(self, joint: int) -> FloatArray:
-        """Read where `place` has put one joint [m], shape (3,)."""
+        """Return the current position of a joint [m], shape (3,)."""
         return np.array(self.data.xpos[self.bodies[joint]])
 
     def jacobian(self, q: FloatArray, joint: int) -> FloatArray:
-        """Place, and return the joint's velocity [m] per velocity coordinate, (3, 3 joint).
+        """Set the coordinates and return the Jacobian of a joint's position [m], (3, 3 joint).
 
-        `mj_jacBody` reads the joints' axes that `mj_comPos` computes from the kinematics.
+        `mj_jacBody` requires the joint axes that `mj_comPos` computes.
         """
-        self.place(q)
+        self.update_kinematics(q)
         mujoco.mj_comPos(self.model, self.data)
         J = np.empty((3, self.model.nv))
         mujoco.mj_jacBody(self.model, self.data, J, None, self.bodies[joint])
         return J
 
     def integrate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the coordinates reached from q by moving with the velocity v for 1 s."""
-        moved = np.array(q)
-        mujoco.mj_integratePos(self.model, moved, v, 1.0)
-        return moved
+        """Return the coordinates after motion from q with velocity v for 1 s."""
+        result = np.array(q)
+        mujoco.mj_integratePos(self.model, result, v, 1.0)
+        return result
 
 
 def mujoco_skeleton(skeleton: Skeleton) -> mujoco.MjModel:
-    """Return the tree of bodies, each at its offset in its parent's frame, with a ball joint there.
+    """Return a tree of bodies with ball joints, each at its offset in its parent's frame.
 
-    MuJoCo asks for masses; kinematics does not read them.
+    MuJoCo requires masses, which do not affect kinematics.
     """
     spec = mujoco.MjSpec()
     bodies: list[mujoco.MjsBody] = []

@@ -1,4 +1,4 @@
-"""Robots and characters in Pinocchio, which reads URDF and MJCF files itself."""
+"""Robots and characters in Pinocchio, read from URDF and MJCF files by its own readers."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -12,36 +12,36 @@ from reference import rotation
 from reference.arguments import FloatArray
 
 from .file_kind import URDF, file_kind, xml_root
-from .robot_engine import Placement, UnreadableError, columns
+from .robot_engine import LinkPoses, UnreadableError, select_columns
 
 COMPOSITE = "JointModelComposite"
-# Its own name of the world: a joint of that name ends the process.
+# Pinocchio's name of the world; a joint of that name crashes the process.
 WORLD = "universe"
 
 
-class Place(NamedTuple):
-    """Where a joint's coordinates begin in q and how many there are, and so its velocities."""
+class JointIndices(NamedTuple):
+    """The first index and number of a joint's coordinates in q and of its velocities in v."""
 
-    at: int
-    width: int
-    freedom: int
-    freedoms: int
+    q: int
+    nq: int
+    v: int
+    nv: int
 
 
 class PinocchioRobot:
-    """A file as Pinocchio reads it, standing still on the world.
+    """The kinematics of a file as Pinocchio reads it, with a root fixed to the world.
 
-    Its links are Pinocchio's body frames. Of the coordinates, a hinge without limits in a URDF
-    takes cosine and sine, quaternions are (x, y, z, w), and the linear velocity of a free joint is
-    in its own, moved frame. Several joints of one body in an MJCF file are one composite joint:
-    the file says which they are. One without a name is called after its body, its type and its
-    place there, trunk/hinge1.
+    Its links are Pinocchio's body frames. The coordinates of a hinge without limits in a URDF are
+    cosine and sine, quaternions are (x, y, z, w), and the linear velocity of a free joint is in its
+    own, moving frame. Several joints of one body in an MJCF file form one composite joint, whose
+    parts are found from the file. A joint without a name is called "trunk/hinge1" by its body, its
+    type and its index in the body.
 
     Attributes:
         model: the pinocchio.Model.
         data: its pinocchio.Data.
         links: Pinocchio's index of each link's frame.
-        joints: where the coordinates and velocities of each joint stand.
+        joints: the indices of each joint's coordinates and velocities.
     """
 
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
@@ -57,22 +57,21 @@ class PinocchioRobot:
         self.data = self.model.createData()
         frames = enumerate(self.model.frames)
         self.links = {f.name: i for i, f in frames if f.type == pinocchio.FrameType.BODY}
-        self.joints = dict(_places(self.model) if is_urdf else _places_by_body(self.model, root))
-        self._at = {name: place.freedom for name, place in self.joints.items()}
-        self._turns: dict[str, FloatArray] = {}
+        self.joints = dict(_indices(self.model) if is_urdf else _indices_by_body(self.model, root))
+        self._at = {name: indices.v for name, indices in self.joints.items()}
+        self._free_rotations: dict[str, FloatArray] = {}
 
-    def place(self, values: Mapping[str, FloatArray]) -> None:
-        """Put the joints where the coordinates say, in Pinocchio's conventions.
+    def update_kinematics(self, values: Mapping[str, FloatArray]) -> None:
+        """Set the coordinates of joints and compute the poses and Jacobians.
 
-        Frames are placed by `updateFramePlacements`, and it is `computeJointJacobians`, in the
-        plural, that fills what `getFrameJacobian` reads.
+        `getFrameJacobian` requires a call of `computeJointJacobians`, in the plural.
         """
         q = pinocchio.neutral(self.model)
         for name, value in values.items():
             if name in self.joints:
-                place = self.joints[name]
-                q[place.at : place.at + place.width] = _theirs(value, place)
-        self._turns = {
+                indices = self.joints[name]
+                q[indices.q : indices.q + indices.nq] = _theirs(value, indices.nq)
+        self._free_rotations = {
             name: rotation.to_matrix(value[3:])
             for name, value in values.items()
             if len(value) == 7 and name in self.joints
@@ -80,35 +79,36 @@ class PinocchioRobot:
         pinocchio.computeJointJacobians(self.model, self.data, q)
         pinocchio.updateFramePlacements(self.model, self.data)
 
-    def placement(self, links: list[str]) -> Placement:
-        """Read where `place` has put some links."""
-        placed = [self.data.oMf[self.links[link]] for link in links]
-        return Placement(
-            np.array([M.translation for M in placed]), np.array([M.rotation for M in placed])
+    def link_poses(self, links: list[str]) -> LinkPoses:
+        """Return the current poses of some links."""
+        frames = [self.data.oMf[self.links[link]] for link in links]
+        return LinkPoses(
+            np.array([M.translation for M in frames]), np.array([M.rotation for M in frames])
         )
 
     def jacobians(self, links: list[str], freedoms: Mapping[str, int]) -> FloatArray:
-        """Return the links' velocities by those of the joints named, (link, 6, freedom).
+        """Return the Jacobians of links with respect to the named joints, (link, 6, freedom).
 
-        With v in the moved frame and p' in the unmoved one, v = R^T p'. Where nothing can move
-        `getFrameJacobian` would end the process, and a single column it returns as a vector.
+        The velocity of a free joint is v = R^T p' in its moving frame and p' in the fixed one.
+        `getFrameJacobian` crashes for a model without freedoms and returns a single column as a
+        vector.
         """
         J = np.empty((len(links), 6, self.model.nv))
         frame = pinocchio.LOCAL_WORLD_ALIGNED
         for part, link in zip(J if self.model.nv else (), links, strict=False):
             one = pinocchio.getFrameJacobian(self.model, self.data, self.links[link], frame)
             part[:] = one.reshape(6, -1)
-        for name, R in self._turns.items():
-            first = self.joints[name].freedom
+        for name, R in self._free_rotations.items():
+            first = self.joints[name].v
             J[..., first : first + 3] = J[..., first : first + 3] @ R.T
-        return columns(J, self._at, freedoms)
+        return select_columns(J, self._at, freedoms)
 
 
 def pinocchio_urdf(path: Path, root: ElementTree.Element, mimic: bool) -> pinocchio.Model:
     """Return the model of a URDF file.
 
     Raises:
-        ValueError: if there is no link in it, which Pinocchio would also print.
+        ValueError: if it has no link, about which Pinocchio would print a message.
         RuntimeError: if Pinocchio refuses it.
     """
     if root.find("link") is None:
@@ -120,9 +120,9 @@ def _mjcf(path: Path, root: ElementTree.Element) -> pinocchio.Model:
     """Return the model of an MJCF file.
 
     Raises:
-        ValueError: if it would read something twice, or end the process.
+        ValueError: if Pinocchio would read a part twice or crash.
         RuntimeError: if Pinocchio refuses it.
-        LookupError: if Pinocchio looks for what it has not read, such as a class.
+        LookupError: if Pinocchio does not find something, such as a class.
     """
     if len(root.findall("worldbody")) > 1:
         raise ValueError("it reads the first of several <worldbody> again for each")
@@ -131,38 +131,38 @@ def _mjcf(path: Path, root: ElementTree.Element) -> pinocchio.Model:
     return pinocchio.buildModelFromMJCF(str(path))
 
 
-def _theirs(value: FloatArray, place: Place) -> FloatArray:
-    """Return our coordinates of one joint as Pinocchio's."""
-    if place.width == 2:
+def _theirs(value: FloatArray, nq: int) -> FloatArray:
+    """Return our coordinates of one joint as Pinocchio's, nq of them."""
+    if nq == 2:
         return np.array([np.cos(value[0]), np.sin(value[0])])
-    if place.width in (4, 7):
+    if nq in (4, 7):
         return np.concatenate([value[:-4], np.roll(value[-4:], -1)])
     return value
 
 
-def _places(model: pinocchio.Model) -> Iterator[tuple[str, Place]]:
-    """Yield each joint's name and place."""
+def _indices(model: pinocchio.Model) -> Iterator[tuple[str, JointIndices]]:
+    """Yield each joint's name and indices."""
     for name, joint in zip(model.names[1:], list(model.joints)[1:], strict=True):
-        yield name, _place(joint)
+        yield name, _joint_indices(joint)
 
 
-def _places_by_body(
+def _indices_by_body(
     model: pinocchio.Model, root: ElementTree.Element
-) -> Iterator[tuple[str, Place]]:
-    """Yield the name and place of each joint of an MJCF file that stands in a body itself."""
-    movers = {f.name: f.parentJoint for f in model.frames if f.type == pinocchio.FrameType.BODY}
+) -> Iterator[tuple[str, JointIndices]]:
+    """Yield the name and indices of each joint of an MJCF file that is a child of a body."""
+    joints = {f.name: f.parentJoint for f in model.frames if f.type == pinocchio.FrameType.BODY}
     for body in root.iter("body"):
         name = body.get("name", "")
         elements = [child for child in body if child.tag in ("joint", "freejoint")]
-        if elements and movers.get(name):
-            joint = model.joints[movers[name]]
+        if elements and joints.get(name):
+            joint = model.joints[joints[name]]
             parts = joint.extract().joints if joint.shortname() == COMPOSITE else [joint]
             for i, (element, part) in enumerate(zip(elements, parts, strict=True), 1):
-                yield element.get("name") or f"{name}/{_kind(part)}{i}", _place(part)
+                yield element.get("name") or f"{name}/{_kind(part)}{i}", _joint_indices(part)
 
 
-def _place(joint: pinocchio.JointModel) -> Place:
-    return Place(joint.idx_q, joint.nq, joint.idx_v, joint.nv)
+def _joint_indices(joint: pinocchio.JointModel) -> JointIndices:
+    return JointIndices(joint.idx_q, joint.nq, joint.idx_v, joint.nv)
 
 
 def _kind(joint: pinocchio.JointModel) -> str:

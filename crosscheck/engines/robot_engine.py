@@ -1,4 +1,4 @@
-"""What every engine's robot can do: the engine reads the file itself and is spoken to by names."""
+"""The interface of a robot in an engine that reads files itself; links and joints have names."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,8 +13,8 @@ class UnreadableError(Exception):
     """The engine does not read the file; the message says why."""
 
 
-class Placement(NamedTuple):
-    """Where links are.
+class LinkPoses(NamedTuple):
+    """Positions and rotations of links.
 
     Attributes:
         positions: of the links' origins [m], shape (link, 3).
@@ -28,21 +28,21 @@ class Placement(NamedTuple):
 class RobotEngine(Protocol):
     """A robot or character as an engine reads it from its file.
 
-    Joints without a name go by that of their body, their type and their place there, arm/hinge1.
+    A joint without a name is called "arm/hinge1" by its body, its type and its index in the body.
 
-    Coordinates go in, by the name of the file's joint, as our conventions have them: a number for
-    a hinge [rad] or slide [m], (w, x, y, z) for a ball, a position [m] and (w, x, y, z) for a free
-    joint, both in the frame where it is unmoved. Velocities come out likewise: of a ball the
-    angular one in its own frame, of a free joint the rate of its position, then the angular one.
+    Coordinates, by the name of the file's joint, follow our conventions: a number for a hinge [rad]
+    or slide [m], (w, x, y, z) for a ball, and for a free joint a position [m] and (w, x, y, z),
+    both in the frame of its zero configuration. Velocities are the angular velocity of a ball in
+    its own frame and, of a free joint, the rate of its position followed by its angular velocity.
     """
 
     @property
     def links(self) -> Mapping[str, int]:
-        """The links or bodies of the file that the engine can place, by name."""
+        """The index of each link or body that the engine knows, by name."""
 
     @property
     def joints(self) -> Mapping[str, object]:
-        """The joints it can move, by name."""
+        """The movable joints, by name."""
 
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
         """Read a URDF or MJCF file.
@@ -55,27 +55,27 @@ class RobotEngine(Protocol):
             UnreadableError: if the engine refuses.
         """
 
-    def place(self, values: Mapping[str, FloatArray]) -> None:
-        """Put the joints where the coordinates say; joints not named stay where the file shows."""
+    def update_kinematics(self, values: Mapping[str, FloatArray]) -> None:
+        """Set the coordinates of joints, others being as in the file, and compute the poses."""
 
-    def placement(self, links: list[str]) -> Placement:
-        """Read where `place` has put some links."""
+    def link_poses(self, links: list[str]) -> LinkPoses:
+        """Return the current poses of some links."""
 
     def jacobians(self, links: list[str], freedoms: Mapping[str, int]) -> FloatArray:
-        """Return the velocities of links by the velocities of the joints named, in their order.
+        """Return the Jacobians of links with respect to the named joints.
 
         Args:
             links: their names.
-            freedoms: how many each joint has; columns of joints that there are none of are zero.
+            freedoms: number of freedoms of each joint; columns of unknown joints are zero.
 
         Returns:
-            (link, 6, freedom): linear [m], then angular, of the links' origins, along the axes of
-            the world.
+            (link, 6, freedom): linear [m], then angular velocity, of the links' origins, in the
+            frame of the world.
         """
 
 
-def columns(J: FloatArray, at: Mapping[str, int], freedoms: Mapping[str, int]) -> FloatArray:
-    """Return the columns of named joints in their order, zero where a joint begins nowhere."""
+def select_columns(J: FloatArray, at: Mapping[str, int], freedoms: Mapping[str, int]) -> FloatArray:
+    """Return the columns of named joints in their order, zero for joints that `at` lacks."""
     result = np.zeros((*J.shape[:-1], sum(freedoms.values())))
     first = 0
     for name, width in freedoms.items():

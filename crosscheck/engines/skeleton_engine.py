@@ -1,4 +1,4 @@
-"""What every engine's skeleton can do, and forward kinematics with any of them."""
+"""The interface of a skeleton in an engine, and forward kinematics through it."""
 
 from typing import Protocol
 
@@ -10,33 +10,33 @@ from reference.skeleton import Pose, Skeleton
 
 
 class SkeletonEngine(Protocol):
-    """A skeleton inside an engine: its coordinates q, and where they put the joints.
+    """A skeleton in an engine, with the engine's coordinates q.
 
-    In both engines the 3 joint coordinates of a velocity are the angular velocities of the balls,
-    each in the frame of its own joint: `integrate` turns by them from the right.
+    In both engines a velocity consists of the angular velocities of the balls, each in the frame of
+    its own joint: `integrate` multiplies rotations from the right.
 
     Attributes:
-        columns: where each joint's (w, x, y, z) stand in q, shape (joint, 4).
+        columns: indices of each joint's (w, x, y, z) in q, shape (joint, 4).
     """
 
     columns: np.ndarray
 
     def __init__(self, skeleton: Skeleton) -> None: ...
 
-    def place(self, q: FloatArray) -> None:
-        """Put the skeleton where the coordinates q say: the engine's forward kinematics."""
+    def update_kinematics(self, q: FloatArray) -> None:
+        """Set the coordinates and compute the engine's forward kinematics."""
 
     def pose(self) -> Pose:
-        """Read where `place` has put every joint."""
+        """Return the current pose of all joints."""
 
     def position(self, joint: int) -> FloatArray:
-        """Read where `place` has put one joint [m], shape (3,)."""
+        """Return the current position of a joint [m], shape (3,)."""
 
     def jacobian(self, q: FloatArray, joint: int) -> FloatArray:
-        """Place, and return the joint's velocity [m] per velocity coordinate, (3, 3 joint)."""
+        """Set the coordinates and return the Jacobian of a joint's position [m], (3, 3 joint)."""
 
     def integrate(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Return the coordinates reached from q by moving with the velocity v for 1 s."""
+        """Return the coordinates after motion from q with velocity v for 1 s."""
 
 
 def coordinates(engine: SkeletonEngine, local_rotations: ArrayLike) -> FloatArray:
@@ -48,11 +48,11 @@ def coordinates(engine: SkeletonEngine, local_rotations: ArrayLike) -> FloatArra
 
 
 def forward_kinematics_by(engine: SkeletonEngine, local_rotations: ArrayLike) -> Pose:
-    """Return the pose the engine gives to local rotations, shape (..., joint, 4), as our `Pose`."""
+    """Return the engine's pose for local rotations, shape (..., joint, 4), as our `Pose`."""
     q = coordinates(engine, local_rotations)
     poses = []
     for row in q.reshape(-1, q.shape[-1]):
-        engine.place(row)
+        engine.update_kinematics(row)
         poses.append(engine.pose())
     batch = (*q.shape[:-1], len(engine.columns))
     positions = np.array([pose.positions for pose in poses])

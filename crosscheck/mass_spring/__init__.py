@@ -1,4 +1,4 @@
-"""Mass-spring systems: our forces, steps, motions and rests beside MuJoCo's and closed forms."""
+"""Comparisons of mass-spring systems with MuJoCo and closed forms."""
 
 from .balances import balance_residual
 

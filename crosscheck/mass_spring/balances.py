@@ -1,4 +1,4 @@
-"""The converged step of implicit Euler: no engine takes it, but an engine's forces confirm it."""
+"""The balance of forces at the end of a step of implicit Euler, with MuJoCo's forces."""
 
 from collections.abc import Iterator
 
@@ -13,18 +13,17 @@ from .. import samples
 from ..engines import MujocoMassSpring
 from ..verdict import Comparison
 
-# Newton's iterations for a balance: the hardest case needs 6 to end in rounding, where another one
-# changes nothing.
+# The slowest case needs 6 iterations to reach rounding error.
 NEWTON_ITERATIONS = 12
 
 
 def implicit_balances(cases: int, *, damped: bool) -> Iterator[Comparison]:
-    """Compare M (x - y) of our converged step with h² f(x), all forces by MuJoCo at our x.
+    """Compare M (x - y) of our converged step with h² f(x), with MuJoCo's forces at our x.
 
-    Both are taken over |M (x - y)| + h² sum |spring force|.
+    The scale is |M (x - y)| + h² sum |spring force|.
     """
     for case in range(cases):
-        system, state, external, h = samples.motion(case, damped=damped)
+        system, state, external, h = samples.network(case, damped=damped)
         euler = ImplicitEuler(
             system, h=h, solver="newton", tolerance=0.0, max_iterations=NEWTON_ITERATIONS
         )
@@ -38,10 +37,10 @@ def balance_residual(
     h: float,
     external_forces: ArrayLike | None = None,
 ) -> float:
-    """Return how far the end x of a step, (particle, 3), is from balance, all forces by MuJoCo.
+    """Return the relative residual of the balance of forces at the end x of a step, (particle, 3).
 
-    It is |M (x - y) - h² f(x)| over the free particles, over |M (x - y)| + h² sum |spring force|,
-    f being MuJoCo's forces at x; see `forces_of_the_step` for the dampers.
+    It is |M (x - y) - h² f(x)| / (|M (x - y)| + h² sum |spring force|) over the free particles,
+    where f are MuJoCo's forces at x; see `forces_of_the_step` for the dampers.
     """
     sides = balance(system, state, x, h, external_forces)
     return float(np.linalg.norm(sides.ours - sides.theirs) / sides.scale)
@@ -54,18 +53,18 @@ def balance(
     h: float,
     external_forces: ArrayLike | None = None,
 ) -> Comparison:
-    """Return M (x - y), ours, and h² f(x) by MuJoCo, at the end x of a step of the free particles.
+    """Return M (x - y) and h² f(x) by MuJoCo at the end x of a step, for the free particles.
 
-    Pins play no part but in the forces: x has them where the step takes them.
+    Pins affect the forces only; x contains their positions at the end of the step.
     """
     y = state.positions + h * state.velocities
     inertia = (system.masses[:, None] * (x - y))[system.free]
-    given = np.zeros_like(x) if external_forces is None else np.asarray(external_forces)
+    loads = np.zeros_like(x) if external_forces is None else np.asarray(external_forces)
     forces, tensions = forces_of_the_step(system, state, x, h)
     return Comparison(
         ours=inertia,
-        theirs=h**2 * (forces + given[system.free]),
-        still=np.zeros_like(inertia),
+        theirs=h**2 * (forces + loads[system.free]),
+        baseline=np.zeros_like(inertia),
         scale=float(np.linalg.norm(inertia) + h**2 * tensions),
     )
 
@@ -73,32 +72,31 @@ def balance(
 def forces_of_the_step(
     system: MassSpring, state: State, x: FloatArray, h: float
 ) -> tuple[FloatArray, float]:
-    """Return MuJoCo's forces at the end x of an implicit step from a state, and their sum's size.
+    """Return MuJoCo's forces at the end x of an implicit step, and the sum of their magnitudes.
 
-    Springs and gravity are MuJoCo's at x. The damper of the step is not MuJoCo's damper at the
-    velocity (x - x_n)/h: that one takes the part of the velocity along the spring as it stands at
-    x, and so sees a spring that only turns by a finite angle grow shorter. The damper in E sees
-    the length itself, -c (l(x) - l_n)/h: to MuJoCo it is a tendon of stiffness c/h and rest length
-    l_n, its own length of the spring at x_n.
+    Springs and gravity are MuJoCo's at x. The damper of the step is -c (l(x) - l_n)/h, a tendon of
+    stiffness c/h and rest length l_n in MuJoCo, with l_n its own length of the spring at x_n.
+    MuJoCo's damper at the velocity (x - x_n)/h is another one: it takes the component of the
+    velocity along the spring at x, which is not zero for a spring that only rotates.
 
     Returns:
         Forces on the free particles [N], shape (free, 3); sum of |force| over all springs [N].
     """
-    l_n = _placed(system, state).lengths()
+    l_n = _engine_at(system, state).lengths()
     dampers = MassSpring(
         system.masses, system.springs, l_n, system.dampings / h,
         pinned=system.pinned, gravity=(0.0, 0.0, 0.0),
     )  # fmt: skip
     end = State(x, np.zeros_like(x))
-    springs_at_end, dampers_at_end = _placed(system, end), _placed(dampers, end)
+    springs_at_end, dampers_at_end = _engine_at(system, end), _engine_at(dampers, end)
     forces = springs_at_end.spring_forces() + springs_at_end.gravity_forces()
     pulls = _tensions(system, springs_at_end), _tensions(dampers, dampers_at_end)
     return forces + dampers_at_end.spring_forces(), float(np.abs(pulls).sum())
 
 
-def _placed(system: MassSpring, state: State) -> MujocoMassSpring:
+def _engine_at(system: MassSpring, state: State) -> MujocoMassSpring:
     engine = MujocoMassSpring(system)
-    engine.place(state)
+    engine.update_forces(state)
     return engine
 
 

@@ -1,4 +1,4 @@
-"""What is claimed of mass-spring systems."""
+"""The claims about mass-spring systems."""
 
 from functools import partial
 
@@ -16,7 +16,7 @@ from ..tolerances import (
     STIFFNESS,
 )
 from ..verdict import Claim
-from . import balances, equilibria, forces, invariants, lines, motions, orders, steps
+from . import balances, equilibria, forces, integrators, invariants, lines, orders, steps
 
 MANY = 20  # cases: two rounds of all sizes from 5 to 500 particles
 FEW = 10  # one round
@@ -102,7 +102,7 @@ STEPS = [
         "symplectic Euler, 1,000 steps",
         "symplectic_euler with dampers and external forces",
         "MuJoCo's integrator Euler",
-        partial(motions.long_motions, "symplectic Euler", "MuJoCo Euler", 1000),
+        partial(integrators.long_simulations, "symplectic Euler", "MuJoCo Euler", 1000),
         MOTION,
         cases=4,
     ),
@@ -118,7 +118,7 @@ STEPS = [
         "Runge-Kutta, 2,000 steps",
         "runge_kutta with dampers and external forces",
         "MuJoCo's integrator RK4",
-        partial(motions.long_motions, "Runge-Kutta", "MuJoCo RK4", 2000),
+        partial(integrators.long_simulations, "Runge-Kutta", "MuJoCo RK4", 2000),
         MOTION,
         cases=1,
     ),

@@ -1,4 +1,4 @@
-"""How integrators treat the energy over many steps."""
+"""The energy of a system over many steps of an integrator."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,14 +8,14 @@ import numpy as np
 from reference.arguments import FloatArray, integer
 from reference.mass_spring import MassSpring, State, kinetic_energy, potential_energy
 
-from .motions import Motion
+from .integrators import Simulation
 
 
 class EnergySeries(NamedTuple):
-    """The energy of a system along a motion.
+    """The energy of a system over time.
 
     Attributes:
-        times: [s], shape (sample,), the start first.
+        times: [s], shape (sample,), from zero.
         energies: kinetic and potential [J], shape (sample,).
     """
 
@@ -24,7 +24,7 @@ class EnergySeries(NamedTuple):
 
 
 def energy_series(
-    integrator: Callable[[MassSpring, float], Motion],
+    integrator: Callable[[MassSpring, float], Simulation],
     system: MassSpring,
     state: State,
     h: float,
@@ -32,14 +32,14 @@ def energy_series(
     steps: int,
     every: int = 1,
 ) -> EnergySeries:
-    """Return the energy at the start and after every so many steps of a motion.
+    """Return the energy at the start and after every `every` steps.
 
     Args:
-        integrator: one of `MOTIONS`, or made like them.
-        system: the system that moves, under gravity alone.
-        state: its start.
+        integrator: one of `SIMULATORS`, or a function of the same form.
+        system: particles and springs, without external forces.
+        state: the initial state.
         h: the step [s].
-        steps: how many to take, a multiple of `every`.
+        steps: number of steps, a multiple of `every`.
         every: steps between two samples.
 
     Raises:
@@ -48,14 +48,14 @@ def energy_series(
     count, rest = divmod(integer("steps", steps, least=1), integer("every", every, least=1))
     if rest:
         raise ValueError(f"steps: expected a multiple of {every}, got {steps}")
-    move = integrator(system, h)
+    simulate = integrator(system, h)
     energies = [mechanical_energy(system, state)]
     for _ in range(count):
-        state = move(state, None, every)
+        state = simulate(state, None, every)
         energies.append(mechanical_energy(system, state))
     return EnergySeries(h * every * np.arange(count + 1, dtype=np.float64), np.array(energies))
 
 
 def mechanical_energy(system: MassSpring, state: State) -> float:
-    """Return the energy of motion, springs and gravity [J]."""
+    """Return the kinetic energy plus that of springs and gravity [J]."""
     return kinetic_energy(system, state) + potential_energy(system, state.positions)

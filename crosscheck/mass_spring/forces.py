@@ -1,4 +1,4 @@
-"""Forces, energies and their derivatives: tendons and flex edges beside our formulas."""
+"""Comparisons of forces, energies and stiffness with MuJoCo's tendons and flex edges."""
 
 from collections.abc import Iterator
 
@@ -16,44 +16,44 @@ from reference.mass_spring import (
 from .. import samples
 from ..engines import MujocoMassSpring
 from ..verdict import Comparison
-from .comparing import engine_of, flex, forces, numbers, placed
+from .comparison import engine_at_start, engine_of, flex, forces, numbers
 
-# Central differences of order 6: offsets in steps, and weights. The step is short beside springs
-# and long beside the rounding of their lengths.
+# Central differences of order 6: offsets in steps, and weights. The step is short compared with
+# springs and long compared with the rounding error of their lengths.
 OFFSETS = np.array([-3, -2, -1, 1, 2, 3])
 WEIGHTS = np.array([-1, 9, -45, 45, -9, 1]) / 60.0
 DIFFERENCE_STEP = 5e-4
 
 
 def tendon_springs(cases: int) -> Iterator[Comparison]:
-    """Compare the springs' forces on the free particles, over the largest."""
+    """Compare the springs' forces on the free particles, relative to the largest."""
     for case in range(cases):
-        system, state, _, _ = samples.motion(case)
+        system, state, _, _ = samples.network(case)
         ours = spring_forces(system, state.positions)[system.free]
-        yield forces(ours, placed(case).spring_forces())
+        yield forces(ours, engine_at_start(case).spring_forces())
 
 
 def tendon_dampers(cases: int) -> Iterator[Comparison]:
-    """Compare the dampers' forces on the free particles, over the largest."""
+    """Compare the dampers' forces on the free particles, relative to the largest."""
     for case in range(cases):
-        system, state, _, _ = samples.motion(case)
+        system, state, _, _ = samples.network(case)
         ours = damper_forces(system, state)[system.free]
-        yield forces(ours, placed(case).damper_forces())
+        yield forces(ours, engine_at_start(case).damper_forces())
 
 
 def tendon_stiffness(cases: int) -> Iterator[Comparison]:
-    """Compare K times a direction with differences of MuJoCo's forces along it, over the largest.
+    """Compare K times a direction with differences of MuJoCo's forces along it.
 
-    Where a spring's ends coincide, its force has no derivative: those cases are not taken.
+    Cases in which the ends of a spring coincide are left out: its force has no derivative there.
     """
     smooth = (case for case in range(2 * cases) if case % 5 != 1)
     for _, case in zip(range(cases), smooth, strict=False):
-        system, state, along, _ = samples.motion(case)
+        system, state, along, _ = samples.network(case)
         d = np.where(system.free[:, None], along, 0.0)
         pulls = []
         for offset in OFFSETS * DIFFERENCE_STEP:
             engine = engine_of(case)
-            engine.place(State(state.positions + offset * d, state.velocities))
+            engine.update_forces(State(state.positions + offset * d, state.velocities))
             pulls.append(engine.spring_forces())
         theirs = -np.tensordot(WEIGHTS, pulls, 1) / DIFFERENCE_STEP
         ours = (stiffness_matrix(system, state.positions) @ d.ravel()).reshape(-1, 3)
@@ -61,36 +61,36 @@ def tendon_stiffness(cases: int) -> Iterator[Comparison]:
 
 
 def tendon_potential(cases: int) -> Iterator[Comparison]:
-    """Compare the energy of springs and gravity, over the sum of its terms' magnitudes."""
+    """Compare the energy of springs and gravity, relative to the sum of its terms' magnitudes."""
     for case in range(cases):
-        yield _potential(samples.motion(case), placed(case))
+        yield _potential(samples.network(case), engine_at_start(case))
 
 
 def point_kinetic(cases: int) -> Iterator[Comparison]:
-    """Compare the kinetic energy, over itself."""
+    """Compare the kinetic energy, relative to itself."""
     for case in range(cases):
-        system, state, _, _ = samples.motion(case)
-        theirs = placed(case).kinetic_energy()
+        system, state, _, _ = samples.network(case)
+        theirs = engine_at_start(case).kinetic_energy()
         yield numbers(kinetic_energy(system, state), theirs, scale=theirs)
 
 
 def flex_forces(cases: int) -> Iterator[Comparison]:
-    """Compare springs and dampers that are the edges of a flex, over the largest force."""
+    """Compare the forces of springs and dampers with those of the edges of a flex."""
     for case in range(cases):
-        system, state, _, _ = samples.alike(case)
+        system, state, _, _ = samples.uniform(case)
         ours = spring_forces(system, state.positions) + damper_forces(system, state)
         engine = flex(case)
         yield forces(ours[system.free], engine.spring_forces() + engine.damper_forces())
 
 
 def flex_potential(cases: int) -> Iterator[Comparison]:
-    """Compare the energy of a flex's edges and gravity, over the sum of its terms' magnitudes."""
+    """Compare the energy of springs and gravity with that of a flex, like `tendon_potential`."""
     for case in range(cases):
-        yield _potential(samples.alike(case), flex(case))
+        yield _potential(samples.uniform(case), flex(case))
 
 
-def _potential(motion: samples.Motion, engine: MujocoMassSpring) -> Comparison:
-    system, state, _, _ = motion
+def _potential(problem: samples.StepProblem, engine: MujocoMassSpring) -> Comparison:
+    system, state, _, _ = problem
     stored = 0.5 * system.stiffnesses * (engine.lengths() - system.rest_lengths) ** 2
     raised = np.abs(system.masses[:, None] * system.gravity * state.positions)
     ours = potential_energy(system, state.positions)

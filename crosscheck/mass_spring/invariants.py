@@ -1,4 +1,4 @@
-"""Closed forms: what the motions of any right integrator keep, and what implicit Euler loses."""
+"""Conserved quantities, and the dissipation of implicit Euler in closed form."""
 
 from collections.abc import Iterator, Sequence
 
@@ -10,63 +10,64 @@ from reference.mass_spring import MassSpring, State
 from .. import samples
 from ..verdict import Comparison
 from .energy import mechanical_energy
-from .motions import MOTIONS
+from .integrators import SIMULATORS
 from .orders import observed_order
 
 STEPS = 40
 
 
 def linear_momenta(names: Sequence[str], cases: int) -> Iterator[Comparison]:
-    """Compare the momentum after many steps with P + t F, over the sum of all |m v| and |t F|.
+    """Compare the momentum after many steps with P + t F, relative to the sum of |m v| and |t F|.
 
-    F is the sum of the weights and the external forces: springs and dampers give nothing to it.
+    F is the sum of the weights and the external forces; springs and dampers cancel.
     """
     for case in range(cases):
         system, state, external, h = samples.unpinned(case)
-        push = STEPS * h * (system.masses[:, None] * system.gravity + external)
+        impulse = STEPS * h * (system.masses[:, None] * system.gravity + external)
         before = linear_momentum(system, state)
         after = [
-            linear_momentum(system, MOTIONS[name](system, h)(state, external, STEPS))
+            linear_momentum(system, SIMULATORS[name](system, h)(state, external, STEPS))
             for name in names
         ]
-        carried = np.abs(system.masses[:, None] * state.velocities).sum()
+        momenta = np.abs(system.masses[:, None] * state.velocities).sum()
         yield Comparison(
             ours=np.array(after),
-            theirs=np.tile(before + push.sum(axis=0), (len(names), 1)),
-            still=np.tile(before, (len(names), 1)),
-            scale=float(carried + np.abs(push).sum()),
+            theirs=np.tile(before + impulse.sum(axis=0), (len(names), 1)),
+            baseline=np.tile(before, (len(names), 1)),
+            scale=float(momenta + np.abs(impulse).sum()),
         )
 
 
 def angular_momenta(names: Sequence[str], cases: int) -> Iterator[Comparison]:
-    """Compare the angular momentum after many steps with that before, over the sum of |x| |m v|."""
+    """Compare the angular momentum before and after, relative to the sum of |x| |m v|."""
     for case in range(cases):
         system, state, external, h = samples.drifting(case)
-        ends = [MOTIONS[name](system, h)(state, external, STEPS) for name in names]
+        ends = [SIMULATORS[name](system, h)(state, external, STEPS) for name in names]
         yield Comparison(
             ours=np.array([angular_momentum(system, end) for end in ends]),
             theirs=np.tile(angular_momentum(system, state), (len(names), 1)),
-            still=np.zeros((len(names), 3)),
-            scale=_turning(system, state),
+            baseline=np.zeros((len(names), 3)),
+            scale=_angular_scale(system, state),
         )
 
 
 def angular_momentum_orders(name: str, order: int, cases: int) -> Iterator[Comparison]:
-    """Compare the order of h at which the angular momentum strays with the one expected."""
+    """Compare the order in h of the error of the angular momentum with the expected one."""
     for case in range(cases):
-        observed = np.array(observed_order(_strayed(case, name, 1), _strayed(case, name, 2)))
+        errors = [_angular_error(case, name, refinement) for refinement in (1, 2)]
+        observed = np.array(observed_order(*errors))
         yield Comparison(observed, np.array(float(order)), np.array(0.0), scale=1.0)
 
 
 def scalar_spring_energies(cases: int) -> Iterator[Comparison]:
-    """Compare the energy of one spring after many steps with (1 + h² omega²)^-n times the first.
+    """Compare the ratio of the energies of one spring after and before n steps of implicit Euler.
 
-    The spring has no rest length, and so is linear in space.
+    It is (1 + h² omega²)^-n for a spring of rest length zero, whose force is linear in x.
     """
     for case in range(cases):
         system, state, h = samples.oscillator(case)
         omega = np.sqrt(system.stiffnesses[0] / system.masses[1])
-        end = MOTIONS["implicit Euler"](system, h)(state, None, STEPS)
+        end = SIMULATORS["implicit Euler"](system, h)(state, None, STEPS)
         left = (1.0 + (h * omega) ** 2) ** -STEPS
         ratio = mechanical_energy(system, end) / mechanical_energy(system, state)
         yield Comparison(np.array(ratio), np.array(left), np.array(1.0), scale=float(left))
@@ -82,13 +83,12 @@ def angular_momentum(system: MassSpring, state: State) -> FloatArray:
     return np.sum(np.cross(state.positions, system.masses[:, None] * state.velocities), axis=0)
 
 
-def _strayed(case: int, name: str, halved: int) -> FloatArray:
+def _angular_error(case: int, name: str, refinement: int) -> FloatArray:
     system, state, external, h = samples.drifting(case)
-    end = MOTIONS[name](system, h / halved)(state, external, STEPS * halved)
+    end = SIMULATORS[name](system, h / refinement)(state, external, STEPS * refinement)
     return angular_momentum(system, end) - angular_momentum(system, state)
 
 
-def _turning(system: MassSpring, state: State) -> float:
-    reach = np.linalg.norm(state.positions, axis=1)
-    carried = system.masses * np.linalg.norm(state.velocities, axis=1)
-    return float(np.sum(reach * carried))
+def _angular_scale(system: MassSpring, state: State) -> float:
+    momenta = system.masses * np.linalg.norm(state.velocities, axis=1)
+    return float(np.sum(np.linalg.norm(state.positions, axis=1) * momenta))

@@ -1,4 +1,4 @@
-"""On a line springs are linear: there MuJoCo's discrete is implicit Euler itself."""
+"""Chains on a line, where springs are linear and MuJoCo's discrete equals implicit Euler."""
 
 from collections.abc import Iterator
 
@@ -11,14 +11,14 @@ from ..engines.mujoco_joint_chain import JOINTS, MujocoJointChain
 from ..verdict import Comparison
 
 STEPS = 100
-# What a step is solved to, in terms of its residual: a few roundings.
+# Residual of a step: a few rounding errors.
 TOLERANCE = 1e-14
 
 
 def joint_chains(cases: int) -> Iterator[Comparison]:
     """Compare 100 steps of implicit Euler with those of nested slides and of nested hinges.
 
-    Positions are taken over the largest, velocities likewise.
+    Positions and velocities are relative to the largest of each.
     """
     for case in range(cases):
         system, state, external, h = samples.line(case)
@@ -33,6 +33,8 @@ def joint_chains(cases: int) -> Iterator[Comparison]:
             ]
         )
         scales = np.abs(theirs).max(axis=(0, 2))[:, None]
-        ours, still = (np.stack([s.positions[:, 0], s.velocities[:, 0]]) for s in (end, state))
-        both = np.ones((len(JOINTS), 1, 1))
-        yield Comparison(both * ours / scales, theirs / scales, both * still / scales, scale=1.0)
+        ours, start = (
+            np.tile([s.positions[:, 0], s.velocities[:, 0]], (len(JOINTS), 1, 1))
+            for s in (end, state)
+        )
+        yield Comparison(ours / scales, theirs / scales, start / scales, scale=1.0)

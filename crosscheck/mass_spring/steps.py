@@ -1,4 +1,4 @@
-"""One step: ours, explicit, semi-implicit and linearised, beside MuJoCo's integrators."""
+"""Comparisons of single explicit, semi-implicit and linearised steps with MuJoCo's."""
 
 from collections.abc import Iterator
 
@@ -13,20 +13,20 @@ from reference.mass_spring import forces as all_forces
 
 from .. import samples
 from ..verdict import Comparison
-from .comparing import engine_of, flex, states
+from .comparison import engine_of, flex, states
 
 
 def symplectic_steps(cases: int) -> Iterator[Comparison]:
     """Compare the state after one step of symplectic Euler with one of MuJoCo's Euler."""
     for case in range(cases):
-        system, state, external, h = samples.motion(case)
-        yield _beside("Euler", case, symplectic_euler(system, state, h, external))
+        system, state, external, h = samples.network(case)
+        yield _compare_with("Euler", case, symplectic_euler(system, state, h, external))
 
 
 def flex_steps(cases: int) -> Iterator[Comparison]:
     """Compare the state after one step of symplectic Euler with MuJoCo's Euler on a flex."""
     for case in range(cases):
-        system, state, external, h = samples.alike(case)
+        system, state, external, h = samples.uniform(case)
         ours = symplectic_euler(system, state, h, external)
         yield states(ours, flex(case).step(state, external), state)
 
@@ -34,32 +34,32 @@ def flex_steps(cases: int) -> Iterator[Comparison]:
 def runge_kutta_steps(cases: int) -> Iterator[Comparison]:
     """Compare the state after one step of the classical Runge-Kutta method with MuJoCo's RK4."""
     for case in range(cases):
-        system, state, external, h = samples.motion(case)
-        yield _beside("RK4", case, runge_kutta(system, state, h, external))
+        system, state, external, h = samples.network(case)
+        yield _compare_with("RK4", case, runge_kutta(system, state, h, external))
 
 
 def damper_diagonal_steps(cases: int) -> Iterator[Comparison]:
-    """Compare the step that takes diag(C) implicitly with MuJoCo's implicitfast."""
+    """Compare the step with implicit diag(C) with MuJoCo's implicitfast."""
     for case in range(cases):
-        system, state, external, h = samples.motion(case)
+        system, state, external, h = samples.network(case)
         D = damper_blocks(system, state) * np.eye(3)
-        yield _beside("implicitfast", case, semi_implicit(system, state, h, external, D))
+        yield _compare_with("implicitfast", case, semi_implicit(system, state, h, external, D))
 
 
 def damper_block_steps(cases: int) -> Iterator[Comparison]:
-    """Compare the step that takes C's 3 x 3 blocks implicitly with MuJoCo's implicit."""
+    """Compare the step with implicit 3 x 3 blocks of C with MuJoCo's implicit."""
     for case in range(cases):
-        system, state, external, h = samples.motion(case)
+        system, state, external, h = samples.network(case)
         D = damper_blocks(system, state)
-        yield _beside("implicit", case, semi_implicit(system, state, h, external, D))
+        yield _compare_with("implicit", case, semi_implicit(system, state, h, external, D))
 
 
 def gauss_newton_steps(cases: int, *, damped: bool) -> Iterator[Comparison]:
     """Compare the state after one Gauss-Newton step with one of MuJoCo's discrete."""
     for case in range(cases):
-        system, state, external, h = samples.motion(case, damped=damped)
+        system, state, external, h = samples.network(case, damped=damped)
         ours = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, external).state
-        yield _beside("discrete", case, ours, damped=damped)
+        yield _compare_with("discrete", case, ours, damped=damped)
 
 
 def semi_implicit(
@@ -67,7 +67,7 @@ def semi_implicit(
 ) -> State:
     """Return the state after (M + h D) (v' - v) = h f(x, v), x' = x + h v'.
 
-    Springs are explicit, and of the dampers only D (particle, 3, 3) is implicit.
+    Springs are explicit; of the dampers, only D (particle, 3, 3) is implicit.
     """
     free = system.free
     M = system.masses[free, None, None] * np.eye(3)
@@ -78,7 +78,7 @@ def semi_implicit(
 
 
 def damper_blocks(system: MassSpring, state: State) -> FloatArray:
-    """Return the 3 x 3 blocks on the diagonal of the dampers' matrix C, (particle, 3, 3)."""
+    """Return the 3 x 3 blocks on the diagonal of the damping matrix C, (particle, 3, 3)."""
     C = damping_matrix(system, state.positions).tocoo()
     blocks = np.zeros((system.particle_count, 3, 3))
     same = C.row // 3 == C.col // 3
@@ -86,8 +86,8 @@ def damper_blocks(system: MassSpring, state: State) -> FloatArray:
     return blocks
 
 
-def _beside(integrator: str, case: int, ours: State, *, damped: bool = True) -> Comparison:
-    _, state, external, _ = samples.motion(case, damped=damped)
+def _compare_with(integrator: str, case: int, ours: State, *, damped: bool = True) -> Comparison:
+    _, state, external, _ = samples.network(case, damped=damped)
     engine = engine_of(case, damped=damped)
-    engine.choose(integrator)
+    engine.set_integrator(integrator)
     return states(ours, engine.step(state, external), state)

@@ -1,1 +1,1 @@
-"""Robots and characters from files: the reference reads them itself, and so do the engines."""
+"""Comparisons of robots and characters that the reference and an engine each read from files."""

@@ -1,4 +1,4 @@
-"""What is claimed of robots and characters, where the packages with their files are installed."""
+"""The claims about robots and characters, for the packages of files that are installed."""
 
 from functools import partial
 
@@ -13,24 +13,18 @@ FILES = {ROBOTS: "the URDFs of example-robot-data", CHARACTERS: "characters in M
 
 
 def robot_claims(family: str, engine: str) -> list[Claim]:
-    """Return what is claimed of one family of files beside one engine that reads them itself."""
-    files = FILES[family]
+    """Return the claims about one family of files against one engine."""
+    poses = "forward_kinematics in random configurations"
     quantities = {
-        "positions": (
-            f"{READS[family]}, forward_kinematics in random configurations: all links",
-            POSITION,
-        ),
-        "rotations": (
-            f"{READS[family]}, forward_kinematics in random configurations: all links",
-            ROTATION,
-        ),
-        "Jacobians": (f"{READS[family]}, jacobians.jacobians: all links", JACOBIAN),
+        "positions": (poses, POSITION),
+        "rotations": (poses, ROTATION),
+        "Jacobians": ("jacobians.jacobians", JACOBIAN),
     }
     return [
         Claim(
             f"{family[:-1]} {quantity}, {engine}",
-            ours,
-            f"{files} as {engine} reads them, links and joints matched by name",
+            f"{READS[family]}, {ours}: all links",
+            f"{FILES[family]} as {engine} reads them, links and joints matched by name",
             partial(getattr(comparisons, quantity.lower()), family, engine),
             tolerance,
             cases=len(comparable(family, engine, moving=quantity == "positions")),

@@ -1,4 +1,4 @@
-"""Robots and characters: where links are, how they are turned and how they move, case by case."""
+"""Comparisons of the poses and Jacobians of the links of robots and characters."""
 
 import contextlib
 from collections.abc import Iterator
@@ -11,38 +11,38 @@ from reference.arguments import FloatArray
 from ..engines.robot_engine import UnreadableError
 from ..verdict import Comparison
 from .models import comparable
-from .sweep import Motion, Sweep, ours, sweep
+from .sweep import LinkKinematics, Sweep, reference_kinematics, sweep
 
 
 def positions(family: str, engine: str, cases: int) -> Iterator[Comparison]:
-    """Compare the positions of all links, over the room that they take up."""
-    for swept, mine in _read(family, engine, cases, moving=True):
+    """Compare the positions of all links, relative to their extent."""
+    for swept, ours in _read(family, engine, cases, moving=True):
         yield Comparison(
-            mine.positions, swept.theirs.positions, _at_zero(swept).positions, room(mine)
+            ours.positions, swept.theirs.positions, _at_zero(swept).positions, extent(ours)
         )
 
 
 def rotations(family: str, engine: str, cases: int) -> Iterator[Comparison]:
     """Compare the rotation matrices of all links."""
-    for swept, mine in _read(family, engine, cases):
-        yield Comparison(mine.matrices, swept.theirs.matrices, _at_zero(swept).matrices, 1.0)
+    for swept, ours in _read(family, engine, cases):
+        yield Comparison(ours.matrices, swept.theirs.matrices, _at_zero(swept).matrices, 1.0)
 
 
 def jacobians(family: str, engine: str, cases: int) -> Iterator[Comparison]:
-    """Compare the Jacobians of all links, linear velocities over the room that they take up."""
-    for swept, mine in _read(family, engine, cases):
-        size = sizes(mine)
+    """Compare the Jacobians of all links, linear velocities relative to the links' extent."""
+    for swept, ours in _read(family, engine, cases):
+        size = jacobian_scales(ours)
         theirs = swept.theirs.jacobians / size
-        yield Comparison(mine.jacobians / size, theirs, np.zeros_like(theirs), 1.0)
+        yield Comparison(ours.jacobians / size, theirs, np.zeros_like(theirs), 1.0)
 
 
 class Differences(NamedTuple):
     """The largest differences in one model.
 
     Attributes:
-        positions: over the room that the links take up.
+        positions: relative to the extent of the links.
         rotations: of matrices.
-        jacobians: of linear velocities over the room, of angular ones over one radian.
+        jacobians: of linear velocities relative to the extent, of angular ones to one radian.
     """
 
     positions: float
@@ -51,35 +51,35 @@ class Differences(NamedTuple):
 
 
 def differences(swept: Sweep) -> Differences:
-    """Return by how much the reference and the engine differ; 0 where there is nothing to move."""
-    mine, theirs = ours(swept.robot, swept.q, swept.links), swept.theirs
-    apart = [np.abs(a - b) for a, b in zip(mine, theirs, strict=True)]
-    apart[0] /= room(mine) or 1.0
-    apart[2] /= sizes(mine)
-    return Differences(*(float(values.max(initial=0.0)) for values in apart))
+    """Return the largest differences between the reference and the engine; 0 without links."""
+    ours = reference_kinematics(swept.robot, swept.q, swept.links)
+    errors = [np.abs(a - b) for a, b in zip(ours, swept.theirs, strict=True)]
+    errors[0] /= extent(ours) or 1.0
+    errors[2] /= jacobian_scales(ours)
+    return Differences(*(float(values.max(initial=0.0)) for values in errors))
 
 
-def room(motion: Motion) -> float:
+def extent(links: LinkKinematics) -> float:
     """Return the largest side of the box around all links in all configurations [m]."""
-    return float(np.ptp(motion.positions.reshape(-1, 3), axis=0).max())
+    return float(np.ptp(links.positions.reshape(-1, 3), axis=0).max())
 
 
-def sizes(motion: Motion) -> FloatArray:
-    """Return what rows of a Jacobian are measured against, (6, 1): the room, and one radian."""
-    return np.repeat([room(motion) or 1.0, 1.0], 3)[:, None]
+def jacobian_scales(links: LinkKinematics) -> FloatArray:
+    """Return the scales of the rows of a Jacobian, (6, 1): the extent [m], and one radian."""
+    return np.repeat([extent(links) or 1.0, 1.0], 3)[:, None]
 
 
 def _read(
     family: str, engine: str, cases: int, *, moving: bool = False
-) -> Iterator[tuple[Sweep, Motion]]:
-    """Yield the first so many models, without those that the engine turns out not to read."""
+) -> Iterator[tuple[Sweep, LinkKinematics]]:
+    """Yield the first few models, except those that the engine cannot read."""
     for model in comparable(family, engine, moving=moving)[:cases]:
         with contextlib.suppress(UnreadableError):
             swept = sweep(engine, model)
-            yield swept, ours(swept.robot, swept.q, swept.links)
+            yield swept, reference_kinematics(swept.robot, swept.q, swept.links)
 
 
-def _at_zero(swept: Sweep) -> Motion:
-    """Return the same with all coordinates at zero."""
+def _at_zero(swept: Sweep) -> LinkKinematics:
+    """Return the kinematics by the reference with all coordinates at zero."""
     zero = np.tile(swept.robot.articulation.zero(), (len(swept.q), 1))
-    return ours(swept.robot, zero, swept.links)
+    return reference_kinematics(swept.robot, zero, swept.links)

@@ -1,48 +1,47 @@
-"""Files of anyone, found in folders: the reference beside every engine that reads their kind."""
+"""Compare the reference with other readers on all files in folders."""
 
 import os
-import re
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from reference import Articulation, Skeleton, forward_kinematics, jacobians, rotation
 from reference.formats import bvh
-from reference.formats.source import LARGEST, read_text
+from reference.formats.source import read_text
 
 from ..child_process import ChildProcess, LostError
 from ..engines import ROBOT_ENGINES
-from ..engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
+from ..engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind, xml_root
 from ..engines.robot_engine import UnreadableError
 from ..tolerances import POSITION
 from .comparisons import differences
-from .departures import departures
+from .deviations import known_deviations
+from .independent_bvh import global_poses
 from .models import Model
-from .second_bvh import placements
-from .sweep import sweep_anew
+from .sweep import sweep_model
 
 SECOND_READER = "second reader"
 ENGINES = {URDF: tuple(ROBOT_ENGINES), MJCF: tuple(ROBOT_ENGINES), BVH: (SECOND_READER,)}
-AGREES, DIFFERS, DEPARTS = "agrees", "differs", "reads otherwise"
+AGREES, DIFFERS, DEVIATES = "agrees", "differs", "reads otherwise"
 UNREAD, REFUSED, NEITHER, LOST = "not read", "not read by us", "read by neither", "lost"
-INCLUDE = re.compile(rb"<include\s[^>]*?\bfile\s*=\s*[\"']([^\"'<>]{1,1000})[\"']")
 
 
 class Reading(NamedTuple):
-    """One file, by the reference and by an engine.
+    """The comparison of the reference and an engine on one file.
 
     Attributes:
-        engine: its name.
-        outcome: AGREES or DIFFERS if both read it, DEPARTS if they differ by a known cause; UNREAD
-            if only the engine does not read it, REFUSED if only the reference does not, NEITHER;
-            LOST if the process crashed or took too long.
-        difference: the largest of positions and linear velocities over the room that the links
-            take up, and of rotation matrices and angular velocities; None unless both read it.
-        why: of the outcome, a sentence; else "".
-        notes: what the reference warned of.
+        engine: name of the engine.
+        outcome: AGREES or DIFFERS if both read it, DEVIATES if they differ for a known reason;
+            UNREAD if only the engine does not read it, REFUSED if only the reference does not,
+            NEITHER if both do not; LOST if the process crashed or took too long.
+        difference: the largest one of positions and linear velocities, relative to the extent of
+            the links, and of rotation matrices and angular velocities; None unless both read it.
+        why: the reason for the outcome, or "".
+        notes: the warnings of the reference.
     """
 
     engine: str
@@ -53,7 +52,7 @@ class Reading(NamedTuple):
 
 
 class File(NamedTuple):
-    """A file that was found, its kind, and the folder that what it includes must be in."""
+    """A file, its kind, and the folder that must contain the files it includes."""
 
     path: Path
     kind: str
@@ -61,14 +60,14 @@ class File(NamedTuple):
 
 
 class Checked(NamedTuple):
-    """A file and its readings, none of a fragment."""
+    """A file and its readings; a fragment has none."""
 
     file: File
     readings: tuple[Reading, ...]
 
 
 class Found(NamedTuple):
-    """What folders hold: files to read, and how many files of other kinds that end in .xml."""
+    """The files to read in some folders, and the number of XML files of other kinds."""
 
     files: tuple[File, ...]
     others: int
@@ -78,7 +77,7 @@ def find(paths: Iterable[str | Path]) -> Found:
     """Return the URDF, MJCF and BVH files at some paths and in folders below them, in order.
 
     Raises:
-        ValueError: if there is nothing at a path, or no such file.
+        ValueError: if a path does not exist, or there are no such files.
     """
     files: dict[Path, File] = {}
     others = 0
@@ -98,11 +97,11 @@ def find(paths: Iterable[str | Path]) -> Found:
 
 
 def check(files: Iterable[File], patience: float = 60.0) -> Iterator[Checked]:
-    """Yield what comes of each file; one that crashes an engine or never ends costs only itself.
+    """Yield the readings of each file, in a child process that survives crashes and time-outs.
 
     Args:
         files: as `find` returns them.
-        patience: how long an engine may take over a file [s].
+        patience: time limit for an engine and a file [s].
     """
     files = tuple(files)
     included = {path for file in files for path in _includes(file)}
@@ -116,59 +115,61 @@ def check(files: Iterable[File], patience: float = 60.0) -> Iterator[Checked]:
 
 
 def compare(engine: str, file: File) -> Reading:
-    """Read a file by the reference and an engine, and compare; whatever it raises is its answer."""
+    """Read a file by the reference and an engine and compare them; exceptions become outcomes."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            apart = _motions(file) if engine == SECOND_READER else _robots(engine, file)
-            outcome, why = (AGREES if apart <= POSITION.value else DIFFERS), ""
+            difference = _largest_difference(engine, file)
+            outcome, why = (AGREES if difference <= POSITION.value else DIFFERS), ""
         except UnreadableError as error:
             ours = _refusal(file)
-            apart, outcome = None, NEITHER if ours else UNREAD
+            difference, outcome = None, NEITHER if ours else UNREAD
             why = "; ".join(filter(None, [_sentence(error, file), ours]))
         except ValueError as error:
-            apart, outcome, why = None, REFUSED, _sentence(error, file)
+            difference, outcome, why = None, REFUSED, _sentence(error, file)
         except Exception as error:
-            apart, outcome = None, LOST
+            difference, outcome = None, LOST
             why = f"it ends in {type(error).__name__}: {_sentence(error, file)}"
     notes = dict.fromkeys(_sentence(warning.message, file) for warning in caught)
-    return Reading(engine, outcome, apart, why, tuple(notes))
+    return Reading(engine, outcome, difference, why, tuple(notes))
 
 
 def prepare() -> None:
-    """Compile what every comparison runs."""
+    """Compile the kernels that all comparisons call."""
     arm = Articulation(Skeleton([-1, 0], np.eye(2, 3)), ["free", "hinge"])
     forward_kinematics(arm, arm.neutral()[None])
     jacobians.jacobians(arm, arm.neutral()[None])
 
 
-def _robots(engine: str, file: File) -> float:
-    """Return the largest difference in random configurations, NaN if one is no number."""
-    swept = sweep_anew(engine, Model(file.path.name, file.path, file.root))
+def _largest_difference(engine: str, file: File) -> float:
+    """Return the largest difference in random configurations or frames, or NaN."""
+    if engine == SECOND_READER:
+        return _compare_motions(file)
+    swept = sweep_model(engine, Model(file.path.name, file.path, file.root))
     return float(np.max(differences(swept)))
 
 
-def _motions(file: File) -> float:
-    """Return the largest difference over all frames of a motion, NaN if one is no number."""
+def _compare_motions(file: File) -> float:
+    """Return the largest difference over all frames of a motion, or NaN."""
     motion = bvh.read(file.path)
     pose = motion.pose()
-    room = float(np.ptp(pose.positions.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
-    worst, seen = 0.0, 0
+    extent = float(np.ptp(pose.positions.reshape(-1, 3), axis=0).max(initial=0.0)) or 1.0
+    largest, found = 0.0, 0
     try:
-        for name, x, R in placements(read_text(file.path)):
+        for name, x, R in global_poses(read_text(file.path)):
             if name in motion.skeleton.names:
                 j = motion.skeleton.index(name)
-                seen += 1
-                apart = [np.abs(x - pose.positions[:, j]) / room]
-                apart += [np.abs(R - rotation.to_matrix(pose.rotations[:, j]))]
-                worst = np.max([worst, *(part.max(initial=0.0) for part in apart)])
+                found += 1
+                errors = [np.abs(x - pose.positions[:, j]) / extent]
+                errors += [np.abs(R - rotation.to_matrix(pose.rotations[:, j]))]
+                largest = np.max([largest, *(part.max(initial=0.0) for part in errors)])
     except Exception as error:
         raise UnreadableError(f"it ends in {type(error).__name__}: {error}") from None
-    return float(worst) if seen == motion.skeleton.joint_count else np.nan
+    return float(largest) if found == motion.skeleton.joint_count else np.nan
 
 
 def _refusal(file: File) -> str:
-    """Return why the reference does not read a file, "" if it does."""
+    """Return the reason why the reference does not read a file, or ""."""
     try:
         if file.kind == BVH:
             bvh.read(file.path)
@@ -187,11 +188,11 @@ def _read(child: ChildProcess, engine: str, file: File) -> Reading:
 
 
 def _with_causes(file: File, readings: list[Reading]) -> tuple[Reading, ...]:
-    """Name why Pinocchio differs, where MuJoCo agrees with us and a cause is known."""
-    causes = "; ".join(departures(file.path)) if file.kind == MJCF else ""
+    """Explain a difference of Pinocchio by known causes if MuJoCo agrees with the reference."""
+    causes = "; ".join(known_deviations(file.path)) if file.kind == MJCF else ""
     excused = causes and any(r.engine == "MuJoCo" and r.outcome == AGREES for r in readings)
     return tuple(
-        r._replace(outcome=DEPARTS, why=causes)
+        r._replace(outcome=DEVIATES, why=causes)
         if excused and r.engine == "Pinocchio" and r.outcome == DIFFERS
         else r
         for r in readings
@@ -206,7 +207,7 @@ def _kind(path: Path) -> str:
 
 
 def _below(path: Path) -> list[Path]:
-    """Return the regular files at a path or below it that may be of a kind we know, in order."""
+    """Return the regular files with known suffixes at a path or below it, in order."""
     if not path.is_dir():
         return [path] if path.is_file() else []
     found = [Path(folder) / name for folder, _, names in os.walk(path) for name in names]
@@ -219,15 +220,16 @@ def _root(path: Path) -> Path:
 
 
 def _includes(file: File) -> list[Path]:
-    """Return the files that an MJCF file names as included, beside it."""
-    if file.kind != MJCF:
+    """Return the files that an MJCF file includes, relative to its folder."""
+    try:
+        root = xml_root(file.path) if file.kind == MJCF else Element("")
+    except ValueError:
         return []
-    with file.path.open("rb") as opened:
-        names = INCLUDE.findall(opened.read(LARGEST))
-    return [(file.path.parent / os.fsdecode(name)).resolve() for name in names]
+    names = [include.get("file", "") for include in root.iter("include")]
+    return [(file.path.parent / name).resolve() for name in names]
 
 
 def _sentence(error: object, file: File) -> str:
-    """Return what is said in one line, without the folder of the file."""
-    said = str(error).replace(f"{file.path}", file.path.name)
-    return " ".join(said.split())[:300]
+    """Return a message as one line, without the folder of the file."""
+    message = str(error).replace(f"{file.path}", file.path.name)
+    return " ".join(message.split())[:300]

@@ -13,7 +13,7 @@ from reference.formats import mjcf, urdf
 from reference.formats.robot import Robot
 
 from ..engines.file_kind import URDF, file_kind
-from .departures import CLASS_ANCHOR, OUTER_ROOT, TURNED_ROOT
+from .deviations import CLASS_ANCHOR, OUTER_ROOT, ROTATED_ROOT
 
 ROBOTS, CHARACTERS = "robots", "characters"
 # dm_control needs labmaze, of which there are no wheels from Python 3.13 on.
@@ -51,23 +51,23 @@ _CHARACTERS = (
     "third_party/kinova/jaco_arm.xml",
     "mujoco/testing/assets/model_with_ball_joints.xml",
 )
-# What an engine is known to place elsewhere, and why; each cause is a test of its own.
+# Models that an engine is known to read differently, and why; a test reproduces each cause.
 CAUSES = {
     ("Pinocchio", "suite/dog.xml"): CLASS_ANCHOR,
-    ("Pinocchio", "suite/humanoid_CMU.xml"): TURNED_ROOT,
+    ("Pinocchio", "suite/humanoid_CMU.xml"): ROTATED_ROOT,
     ("Pinocchio", "locomotion/walkers/assets/rodent.xml"): f"{OUTER_ROOT}; {CLASS_ANCHOR}",
     ("Pinocchio", "locomotion/walkers/assets/dog_v2/dog.xml"): CLASS_ANCHOR,
     ("Pinocchio", "third_party/ant/ant.xml"): OUTER_ROOT,
 }
-# What an engine is known not to read, and why.
+# Models that an engine is known not to read, and why.
 UNREAD = {
     ("Pinocchio", "suite/quadruped.xml"): "height fields are refused",
     ("Pinocchio", "mujoco/testing/assets/model_with_ball_joints.xml"): "its bodies have no names",
 }
-# Files whose links turn and stay where they are: rotors on a rigid frame.
-TURNING = ("iris_description/robots/iris.urdf",)
-# Files that describe nothing that could move: a link alone, links fixed to each other, or none.
-STILL = (
+# Models whose links rotate but do not change position: rotors on a rigid frame.
+ROTATING_IN_PLACE = ("iris_description/robots/iris.urdf",)
+# Models without movable joints.
+IMMOBILE = (
     "hector_description/robots/quadrotor_base.urdf",
     "iris_description/robots/iris_simple.urdf",
     "ur_description/urdf/ur3.urdf",
@@ -76,12 +76,12 @@ STILL = (
 
 @dataclass(frozen=True)
 class Model:
-    """A file.
+    """A file with a robot or a character.
 
     Attributes:
         name: its path below the folder of its package.
         path: of the file.
-        root: the folder that files which it includes must be in; its own if None.
+        root: the folder that must contain all included files; that of the file if None.
     """
 
     name: str
@@ -89,10 +89,10 @@ class Model:
     root: Path | None = None
 
     def read(self, *, mimic: bool = True) -> Robot:
-        """Return what the reference makes of it.
+        """Read the file with the reference.
 
         Raises:
-            ValueError: if the file is wrong.
+            ValueError: if the file is invalid.
         """
         if file_kind(self.path) == URDF:
             return urdf.read(self.path, mimic=mimic)
@@ -113,12 +113,12 @@ def _names(family: str, root: Path) -> list[str]:
 
 
 def comparable(family: str, engine: str, *, moving: bool = False) -> list[Model]:
-    """Return the models that an engine reads, as far as we know, and reads right.
+    """Return the models that an engine reads without known deviations and that have freedoms.
 
-    Something turns in all of them; with `moving`, some link also moves from its place.
+    With `moving`, leave out models whose links only rotate in place.
     """
     known = {name for by, name in (*CAUSES, *UNREAD) if by == engine}
-    left_out = {*STILL, *known, *(TURNING if moving else ())}
+    left_out = {*IMMOBILE, *known, *(ROTATING_IN_PLACE if moving else ())}
     return [model for model in models(family) if model.name not in left_out]
 
 
@@ -146,7 +146,7 @@ def left_out() -> str:
 
 @dataclass(frozen=True)
 class Slot:
-    """A joint of the file with coordinates of its own: where they are, and its freedoms."""
+    """A joint of the file with its own coordinates: the slices of these and of its freedoms."""
 
     name: str
     coordinates: slice
@@ -154,7 +154,7 @@ class Slot:
 
 
 def slots(robot: Robot) -> list[Slot]:
-    """Return the joints that have coordinates of their own, in the order of their freedoms."""
+    """Return the joints with their own coordinates, in the order of their freedoms."""
     model = robot.articulation
     found = [
         Slot(name, model.coordinates_of(j), model.freedoms_of(j))
@@ -164,17 +164,17 @@ def slots(robot: Robot) -> list[Slot]:
     return sorted(found, key=lambda slot: slot.freedoms.start)
 
 
-def draw(model: Articulation, rng: np.random.Generator, count: int) -> FloatArray:
-    """Return random coordinates, (count, coordinate), within the limits.
+def random_coordinates(model: Articulation, rng: np.random.Generator, count: int) -> FloatArray:
+    """Return random coordinates within the limits, (count, coordinate).
 
-    Where these are equal a joint is moved by up to 1 rad or m all the same: some files say 0 to 0
-    where there is no limit.
+    The coordinate of a joint whose limits are equal is up to 1 rad or m: some files state the
+    limits 0 and 0 for joints without limits.
     """
     q = model.random(rng, count)
-    held = [
+    equal_limits = [
         model.coordinates_of(int(j)).start
         for j in np.flatnonzero(model.lower == model.upper)
         if model.kinds[j] in ("hinge", "slide") and j not in model.mimics
     ]
-    q[:, held] = rng.uniform(-1.0, 1.0, (count, len(held)))
+    q[:, equal_limits] = rng.uniform(-1.0, 1.0, (count, len(equal_limits)))
     return q

@@ -1,4 +1,4 @@
-"""A model in random configurations, by the reference and by an engine, each with its own reader."""
+"""A model in random configurations, read and evaluated by the reference and by an engine."""
 
 import functools
 from typing import NamedTuple
@@ -13,13 +13,13 @@ from reference.kinematics import forward_kinematics
 from .. import samples
 from ..engines import ROBOT_ENGINES
 from ..engines.robot_engine import RobotEngine, UnreadableError
-from .models import Model, draw, slots
+from .models import Model, random_coordinates, slots
 
 CONFIGURATIONS = 5
 
 
-class Motion(NamedTuple):
-    """Where links are, and how they move, in each configuration.
+class LinkKinematics(NamedTuple):
+    """Poses and Jacobians of links in each configuration.
 
     Attributes:
         positions: of the links' origins [m], (configuration, link, 3).
@@ -33,31 +33,31 @@ class Motion(NamedTuple):
 
 
 class Sweep(NamedTuple):
-    """A model that both read, and what the engine makes of random configurations.
+    """A model in random configurations with the engine's kinematics of its links.
 
     Attributes:
-        robot: what the reference read.
+        robot: the model as the reference reads it.
         q: the configurations, (configuration, coordinate).
-        links: the indices of the joints of ours whose links the engine knows.
-        theirs: what the engine says of those links.
-        free_mimics: why mimic joints move by themselves here; empty if they follow.
+        links: indices of our joints whose links the engine knows.
+        theirs: the engine's kinematics of those links.
+        free_mimics: why mimic joints move independently here; empty if they follow their leaders.
     """
 
     robot: Robot
     q: FloatArray
     links: np.ndarray
-    theirs: Motion
+    theirs: LinkKinematics
     free_mimics: str
 
 
-def sweep_anew(engine: str, model: Model) -> Sweep:
-    """Return a model as an engine sees it, read from its file.
+def sweep_model(engine: str, model: Model) -> Sweep:
+    """Read a model and evaluate it by an engine in random configurations.
 
-    Where one of both does not take the file's mimic joints, they move by themselves for both.
+    If the reference or the engine refuses the mimic joints, these move independently for both.
 
     Raises:
         UnreadableError: if the engine does not read the file.
-        ValueError: if the engine does but the reference does not.
+        ValueError: if only the reference does not read it.
     """
     try:
         return _sweep(engine, model, "")
@@ -65,14 +65,14 @@ def sweep_anew(engine: str, model: Model) -> Sweep:
         return _sweep(engine, model, str(error).replace(str(model.path), model.path.name))
 
 
-# The same, kept: several claims are made of every model.
-sweep = functools.cache(sweep_anew)
+# Cached, because there are several claims about every model.
+sweep = functools.cache(sweep_model)
 
 
-def ours(robot: Robot, q: FloatArray, links: np.ndarray) -> Motion:
-    """Return what the reference says of some links, given by the indices of their joints."""
+def reference_kinematics(robot: Robot, q: FloatArray, links: np.ndarray) -> LinkKinematics:
+    """Return the kinematics of some links by the reference, from the indices of their joints."""
     pose = forward_kinematics(robot.articulation, q)
-    return Motion(
+    return LinkKinematics(
         pose.positions[:, links],
         rotation.to_matrix(pose.rotations[:, links]),
         jacobians.jacobians(robot.articulation, q)[:, links],
@@ -83,21 +83,23 @@ def _sweep(engine: str, model: Model, free_mimics: str) -> Sweep:
     theirs = ROBOT_ENGINES[engine](model.path, mimic=not free_mimics)
     robot = model.read(mimic=not free_mimics)
     articulation = robot.articulation
-    q = draw(articulation, samples.generator(model.name, 0), CONFIGURATIONS)
+    q = random_coordinates(articulation, samples.generator(model.name, 0), CONFIGURATIONS)
     known = [j for j, name in enumerate(articulation.names) if name in theirs.links]
     names = [articulation.names[j] for j in known]
     if not known:
         raise UnreadableError("it gives none of the links its name")
-    return Sweep(robot, q, np.array(known), _motion(theirs, robot, q, names), free_mimics)
+    return Sweep(robot, q, np.array(known), _kinematics(theirs, robot, q, names), free_mimics)
 
 
-def _motion(engine: RobotEngine, robot: Robot, q: FloatArray, links: list[str]) -> Motion:
-    places = slots(robot)
-    freedoms = {slot.name: slot.freedoms.stop - slot.freedoms.start for slot in places}
-    placements, jacobians = [], []
+def _kinematics(
+    engine: RobotEngine, robot: Robot, q: FloatArray, links: list[str]
+) -> LinkKinematics:
+    joints = slots(robot)
+    freedoms = {slot.name: slot.freedoms.stop - slot.freedoms.start for slot in joints}
+    poses, jacobians = [], []
     for row in q:
-        engine.place({slot.name: row[slot.coordinates] for slot in places})
-        placements.append(engine.placement(links))
+        engine.update_kinematics({slot.name: row[slot.coordinates] for slot in joints})
+        poses.append(engine.link_poses(links))
         jacobians.append(engine.jacobians(links, freedoms))
-    positions, matrices = (np.array(parts) for parts in zip(*placements, strict=True))
-    return Motion(positions, matrices, np.array(jacobians))
+    positions, matrices = (np.array(parts) for parts in zip(*poses, strict=True))
+    return LinkKinematics(positions, matrices, np.array(jacobians))

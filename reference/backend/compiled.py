@@ -11,27 +11,28 @@ digest of everything it is made from.
 """
 
 import contextlib
-import enum
+import dis
 import functools
-import hashlib
 import importlib
 import types
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from typing import Any
 
-import numpy as np
-
 from .. import arguments
+from . import compilation
+from .digest import Kernel, callees, code_objects, digest
 
 SPEEDS = ("compiled", "plain")
 # What a relaxed kernel's compiler may do; infinities and NaN keep their meaning.
 RELAXATIONS = {"reassoc", "contract", "nsz"}
 # What a kernel mentions if it makes arrays.
 ALLOCATING = {"np", "copy"}
-
-# A plain function at module level: it has __code__ and __globals__, which Callable cannot say.
-Kernel = Any
+# Instructions of the interpreter from which on a callee has no more than one inlined copy.
+LARGE = 5000
+# The interpreter's instructions that read a global.
+GLOBAL_LOADS = {"LOAD_GLOBAL", "LOAD_NAME"}
 
 _speed: ContextVar[str] = ContextVar("speed", default="compiled")
 
@@ -54,18 +55,19 @@ class TwoSpeeds:
     """A kernel that runs compiled or plain, as `speed` says; compiled at its first call.
 
     `relaxed` lets the compiler reorder sums and fuse products with them: both speeds then agree
-    only to rounding, and dense loops run up to four times faster.
+    only to rounding, and dense loops run up to four times faster. `label` is what a user calls it.
     """
 
-    def __init__(self, plain: Kernel, *, relaxed: bool = False):
+    def __init__(self, plain: Kernel, *, relaxed: bool = False, label: str | None = None):
         self.plain = plain
         self.relaxed = relaxed
+        self.label = label
         functools.update_wrapper(self, plain)
 
     @functools.cached_property
     def compiled(self) -> Kernel:
         """The version compiled by numba, on the same arguments."""
-        return compile_kernel(self.plain, self.relaxed)
+        return compile_kernel(self.plain, self.relaxed, self.label)
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the kernel at the speed in force."""
@@ -74,17 +76,21 @@ class TwoSpeeds:
         return self.compiled(*arguments)
 
 
-def compile_kernel(kernel: Kernel, relaxed: bool = False) -> Kernel:
+def compile_kernel(kernel: Kernel, relaxed: bool = False, label: str | None = None) -> Kernel:
     """Compile a kernel and all kernels it calls, from their plain sources; cached on disk.
 
     Division by zero gives infinity or NaN, as in NumPy. Unless it is relaxed, floating point is
     strict: no reordering and no fused operations, so that both speeds round alike.
+
+    Callees are inlined: a call would hand over every number of every array in its tuples, a hundred
+    and more, and cost more than most kernels do. The exception is a LARGE one that its caller
+    calls in several places, as copies of it would take seconds to compile.
     """
-    return _jit(kernel, True, relaxed)
+    return _entry(kernel, relaxed, label)
 
 
 def bind(kernel: Kernel, **callees: Kernel) -> Kernel:
-    """Return a kernel that calls other kernels under the given names: one loop, many solvers.
+    """Return a kernel that calls other kernels under these names, so that solvers share a loop.
 
     Raises:
         ValueError: if the kernel does not name one of them, or has a closure.
@@ -109,60 +115,71 @@ def compiled_in(module: str) -> Callable[[Kernel], Kernel]:
     return mark
 
 
-def digest(kernel: Kernel) -> str:
-    """Sixteen hex digits of the code, constants and globals of a kernel and all its callees."""
-    parts: list[bytes] = []
-    _collect(kernel, parts, seen=set())
-    return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
+@functools.cache
+def _entry(kernel: Kernel, relaxed: bool, label: str | None) -> Kernel:
+    """Compile what Python calls; cached on disk together with all that it calls."""
+    from . import disk_cache
+
+    compilation.watch_numba()
+    compiled = _jit(kernel, relaxed)
+    compiled.label = label or kernel.__name__.strip("_").replace("_", " ")
+    disk_cache.use_cache(compiled)
+    return compiled
 
 
 @functools.cache
-def _jit(kernel: Kernel, cache: bool, relaxed: bool) -> Kernel:
-    """Compile; a callee is part of its caller's cached code and needs no cache of its own.
+def _callee(kernel: Kernel, relaxed: bool, inline: bool) -> Kernel:
+    """Compile what another kernel calls: a part of that one's code, with no door for Python."""
+    module = getattr(kernel, "compiled_in", None)
+    if module is not None:
+        return getattr(importlib.import_module(module), kernel.__name__)
+    from . import linking
 
-    Callees are inlined, whatever their size: a call hands over every number of every array in its
-    tuples, a hundred and more, and costs more than most kernels do.
-    """
+    options: dict[str, Any] = {"no_cpython_wrapper": True, "forceinline": inline}
+    if not allocates(kernel):
+        options["_nrt"] = False
+    compiled = _jit(kernel, relaxed, pipeline_class=linking.LinkedCompiler, **options)
+    return linking.ignore_literals(compiled)
+
+
+def _jit(kernel: Kernel, relaxed: bool, **options: Any) -> Kernel:
     import numba
 
-    callees = {
-        name: _callee(value, relaxed)
-        for name, value in _named_globals(kernel)
-        if isinstance(value, types.FunctionType) and value is not kernel
+    calls = _calls(kernel)
+    compiled_callees = {
+        name: _callee(callee, relaxed, calls[name] == 1 or _inlined_size(callee) <= LARGE)
+        for name, callee in callees(kernel)
     }
-    rebuilt = _rebuild(kernel, kernel.__globals__ | callees)
+    rebuilt = _rebuild(kernel, kernel.__globals__ | compiled_callees)
     rebuilt.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{'_relaxed' * relaxed}"
-    options: dict[str, Any] = {
-        "no_cpython_wrapper": not cache,  # what Python never calls needs no door to it
-        "no_cfunc_wrapper": True,
-        "forceinline": not cache,
-        "fastmath": RELAXATIONS if relaxed else False,
-    }
-    if not (cache or allocates(kernel)):
-        options["_nrt"] = False
-    return numba.njit(cache=cache, error_model="numpy", nogil=True, **options)(rebuilt)
+    options |= {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
+    return numba.njit(fastmath=RELAXATIONS if relaxed else False, **options)(rebuilt)
 
 
-def _callee(kernel: Kernel, relaxed: bool) -> Kernel:
-    module = getattr(kernel, "compiled_in", None)
-    if module is None:
-        return _jit(kernel, False, relaxed)
-    return getattr(importlib.import_module(module), kernel.__name__)
+def _calls(kernel: Kernel) -> Counter[str]:
+    """Return how many times a kernel mentions each of its globals."""
+    found = (dis.get_instructions(code) for code in code_objects(kernel.__code__))
+    return Counter(i.argval for code in found for i in code if i.opname in GLOBAL_LOADS)
 
 
+@functools.cache
+def _inlined_size(kernel: Kernel) -> int:
+    """Return the number of instructions of the interpreter, all callees inlined."""
+    own = sum(len(list(dis.get_instructions(code))) for code in code_objects(kernel.__code__))
+    calls = _calls(kernel)
+    return own + sum(calls[name] * _inlined_size(callee) for name, callee in callees(kernel))
+
+
+@functools.cache
 def allocates(kernel: Kernel) -> bool:
     """Return whether a kernel, or one that it calls, may make arrays.
 
-    One that makes none is compiled without counting references to those it is given, which is
-    half of the work where arrays come many in a tuple. numba refuses to compile an error here.
+    One that makes none is compiled without counting references to its arguments, which is half of
+    the work where a tuple holds many arrays. numba would refuse to compile an error.
     """
-    names = {name for code in _codes(kernel.__code__) for name in code.co_names}
+    names = {name for code in code_objects(kernel.__code__) for name in code.co_names}
     return bool(ALLOCATING & names) or any(
-        allocates(value)
-        for _, value in _named_globals(kernel)
-        if isinstance(value, types.FunctionType)
-        and value is not kernel
-        and not hasattr(value, "compiled_in")
+        allocates(callee) for _, callee in callees(kernel) if not hasattr(callee, "compiled_in")
     )
 
 
@@ -174,61 +191,3 @@ def _rebuild(kernel: Kernel, new_globals: dict[str, Any]) -> Kernel:
     rebuilt.__qualname__ = kernel.__qualname__
     rebuilt.__doc__ = kernel.__doc__
     return rebuilt
-
-
-def _named_globals(kernel: Kernel) -> list[tuple[str, Any]]:
-    names = sorted({name for code in _codes(kernel.__code__) for name in code.co_names})
-    return [(name, kernel.__globals__[name]) for name in names if name in kernel.__globals__]
-
-
-def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
-    """Yield the code object and those nested in it, such as comprehensions."""
-    yield code
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            yield from _codes(constant)
-
-
-def _collect(kernel: Kernel, parts: list[bytes], seen: set[Any]) -> None:
-    if kernel in seen:
-        return
-    seen.add(kernel)
-    _collect_code(kernel.__code__, parts)
-    parts.append(repr(kernel.__defaults__).encode())
-    if hasattr(kernel, "compiled_in"):
-        parts.append(_module_fingerprint(kernel.compiled_in))
-    for name, value in _named_globals(kernel):
-        parts.append(name.encode())
-        if isinstance(value, types.FunctionType):
-            _collect(value, parts, seen)
-        else:
-            parts.append(_fingerprint(value))
-
-
-def _collect_code(whole: types.CodeType, parts: list[bytes]) -> None:
-    for code in _codes(whole):
-        constants = [c for c in code.co_consts if not isinstance(c, types.CodeType)]
-        parts += [code.co_code, repr((constants, code.co_names, code.co_varnames)).encode()]
-
-
-@functools.cache
-def _module_fingerprint(name: str) -> bytes:
-    """Return all of a module: what it registers with numba is reached by no function's name."""
-    module = importlib.import_module(name)
-    loader: Any = module.__loader__
-    parts: list[bytes] = []
-    _collect_code(loader.get_code(name), parts)
-    numbers = {k: v for k, v in vars(module).items() if isinstance(v, int | float)}
-    return b"\0".join([*parts, repr(sorted(numbers.items())).encode()])
-
-
-def _fingerprint(value: Any) -> bytes:
-    if isinstance(value, np.ndarray):
-        return repr((value.dtype.str, value.shape)).encode() + value.tobytes()
-    if isinstance(value, types.ModuleType):
-        return repr((value.__name__, getattr(value, "__version__", ""))).encode()
-    if isinstance(value, enum.EnumMeta):
-        return repr(list(value)).encode()
-    if isinstance(value, type):
-        return repr((value.__qualname__, getattr(value, "_fields", ()))).encode()
-    return repr(value).encode()

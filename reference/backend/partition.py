@@ -1,10 +1,9 @@
-"""A large system cut into regions of particles, so that its springs can be summed side by side.
+"""Divide a large system into regions of particles, so that threads can sum its springs.
 
 A region is a run of particles by number, and has the springs whose two ends both lie in it. What is
-summed over one touches no other. Springs between regions come last, one after the other: few where
-neighbours have numbers near each other, as in cloths and lattices; otherwise nothing is lost but
-the gain. The cut depends on the system alone, so that results are the same bits on any number of
-cores.
+summed over one touches no other. Springs between regions come last, one after the other: they are
+few where neighbours have numbers near each other, as in cloths and lattices. The regions depend on
+the system only, so that results are the same bits on any number of cores.
 """
 
 from typing import NamedTuple
@@ -13,7 +12,7 @@ import numpy as np
 
 from ..arguments import IndexArray
 
-# A system with fewer springs is summed sooner than another thread begins.
+# The fewest springs for which a second thread is worth while.
 LARGE = 1_000_000
 REGIONS = 32
 

@@ -1,6 +1,6 @@
-"""Batches on all cores: slices of a batch, each by a kernel in a thread of its own.
+"""Spread a batch over all cores: each slice is computed by a kernel in a thread of a pool.
 
-Compiled kernels let go of the interpreter, so threads are enough; they are started once and kept.
+Compiled kernels release the interpreter's lock, so that threads suffice; they are kept for reuse.
 """
 
 import contextlib
@@ -13,12 +13,12 @@ from typing import Any
 
 from .. import arguments
 
-# More slices than cores, so that a core whose slices were easy takes some of the others'.
+# More slices than cores, so that a core that is done early can take another slice.
 SLICES_PER_CORE = 4
-# How long to wait for a slice at a time [s].
-TURN = 0.1
+# How often a waiting thread looks for an interrupt [s].
+POLL = 0.1
 
-# By their size, each with its threads.
+# Pools by their size, each with its threads.
 _pools: dict[int, tuple[ThreadPoolExecutor, list[threading.Thread]]] = {}
 _cores: ContextVar[int | None] = ContextVar("cores", default=None)
 
@@ -42,34 +42,34 @@ def cores(count: int | None) -> Iterator[None]:
 def in_slices(
     kernel: Callable[..., Any],
     count: int,
-    given: Callable[[slice], tuple[Any, ...]],
+    arguments_of: Callable[[slice], tuple[Any, ...]],
     *,
     least: int,
 ) -> list[Any]:
     """Call a kernel on slices of a batch, side by side; return what it returns, slice by slice.
 
     A batch of less than two slices of `least` is one call in the caller's thread. The first error
-    is raised, and slices not yet begun are dropped, as they are at an interrupt. A slice is not cut
-    again by what it calls.
+    is raised, and slices not yet begun are dropped, as at an interrupt. Calls of this function
+    within a slice do not divide it again.
 
         in_slices(kernel, len(x), lambda part: (model, x[part], result[part]), least=100)
 
     Args:
-        kernel: what fills its part of the results, most often a TwoSpeeds.
+        kernel: fills its part of the results, most often a TwoSpeeds.
         count: the length of the batch.
-        given: returns the kernel's arguments for a slice.
+        arguments_of: returns the kernel's arguments for a slice.
         least: items in a slice; fewer would not be worth a thread.
     """
     threads = (_cores.get() or _all_cores()) if count >= 2 * least else 1
     if threads == 1:
-        return [kernel(*given(slice(0, count)))]
+        return [kernel(*arguments_of(slice(0, count)))]
     slices = min(count // least, SLICES_PER_CORE * threads)
     pool, parts = _pool(threads), []
     try:
         for begin, end in pairwise(count * i // slices for i in range(slices + 1)):
-            as_here = copy_context()  # each thread is to see the speed in force
-            as_here.run(_cores.set, 1)
-            parts.append(pool.submit(as_here.run, kernel, *given(slice(begin, end))))
+            context = copy_context()  # so that each thread sees the speed in force
+            context.run(_cores.set, 1)
+            parts.append(pool.submit(context.run, kernel, *arguments_of(slice(begin, end))))
         return [_result(part) for part in parts]
     finally:
         for part in parts:
@@ -77,10 +77,10 @@ def in_slices(
 
 
 def _result(part: Future) -> Any:
-    """Wait in turns: an interrupt that comes just before a turn is seen after it."""
+    """Wait for a slice, and see an interrupt within `POLL` seconds."""
     while not part.done():
         with contextlib.suppress(TimeoutError):
-            part.result(TURN)
+            part.result(POLL)
     return part.result()
 
 
@@ -93,7 +93,7 @@ def _all_cores() -> int:
 
 
 def _pool(size: int) -> ThreadPoolExecutor:
-    """Return a pool that is kept; a process forked from ours has none of its threads."""
+    """Return a pool of threads, a new one where a fork has left none of its threads alive."""
     pool, threads = _pools.get(size, (None, []))
     if pool is None or not all(thread.is_alive() for thread in threads):
         threads = []

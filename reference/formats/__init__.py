@@ -1,4 +1,4 @@
-"""Files of other programs, read into our models: the only door for files in the reference."""
+"""Readers and writers of URDF, MJCF, BVH and OBJ, the only part of the reference to open files."""
 
 from . import bvh, mjcf, urdf
 from .obj import Mesh, parse_obj, read_obj

@@ -1,7 +1,6 @@
 """Wavefront OBJ: the vertices and faces of a file as a triangle mesh.
 
-Vertices (`v`) and faces (`f`) count; texture coordinates, normals, lines, groups, materials and
-free forms are read over.
+Texture coordinates, normals, lines, groups, materials and free-form surfaces are ignored.
 """
 
 import itertools
@@ -17,15 +16,15 @@ from .. import arguments
 from ..arguments import FloatArray, IndexArray, frozen
 from .source import read_text
 
-# Statements of the format that say nothing about vertices and faces.
-READ_OVER = {
+# Statements of the format other than vertices and faces.
+IGNORED = {
     "vt", "vn", "vp", "p", "l", "cstype", "deg", "bmat", "step", "curv", "curv2", "surf",
     "parm", "trim", "hole", "scrv", "sp", "end", "con", "g", "s", "mg", "o", "bevel",
     "c_interp", "d_interp", "lod", "usemtl", "mtllib", "usemap", "maplib", "shadow_obj",
     "trace_obj", "ctech", "stech",
 }  # fmt: skip
 
-# v, v/vt, v//vn or v/vt/vn. More digits than these are no index of anything.
+# v, v/vt, v//vn or v/vt/vn, with a limit on the digits of an index.
 CORNER = re.compile(r"(-?[0-9]{1,15})(?:/(?:-?[0-9]{1,15})?(?:/(?:-?[0-9]{1,15})?)?)?")
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
@@ -54,21 +53,21 @@ def read_obj(path: str | os.PathLike[str]) -> Mesh:
 def parse_obj(text: str, *, name: str = "text") -> Mesh:
     """Return the mesh that an OBJ text describes, with its vertices in their order.
 
-    Polygons become fans of triangles about their first corner. What follows the third coordinate
-    of a vertex, a weight or a colour, is read over. A backslash at the end of a line, before any
-    comment, continues it. Faces may name vertices that come later, by positive indices;
-    negative ones count back from the last vertex so far.
+    Polygons become fans of triangles about their first corner. A weight or colour after the third
+    coordinate of a vertex is ignored. A backslash at the end of a line, before any comment,
+    continues it. Positive indices may refer to later vertices; negative ones count back from the
+    last vertex so far.
 
     Raises:
-        ValueError: naming the text and the line, if a statement is none of the format, a
-            coordinate is no finite number, a face has fewer than three corners, names a vertex
-            twice or one that does not exist, or there is no face at all.
+        ValueError: if a statement is not of the format, a coordinate is not a finite number, a face
+            has fewer than three corners, repeats a vertex or refers to one that does not exist, or
+            there are no faces; names the text and the line.
     """
     arguments.text("text", text)
     arguments.text("name", name)
     vertices: list[float] = []
     triangles: list[int] = []
-    furthest = -1, 0  # the highest vertex that a face names, and the line that does
+    highest = -1, 0  # the highest vertex index of a face, and its line
     for line, words in _statements(text):
         try:
             if words[0] == "v":
@@ -76,28 +75,28 @@ def parse_obj(text: str, *, name: str = "text") -> Mesh:
             elif words[0] == "f":
                 corners = _face(words[1:], len(vertices) // 3)
                 triangles += _fan(corners)
-                furthest = max(furthest, (max(corners), line))
-            elif words[0] not in READ_OVER:
+                highest = max(highest, (max(corners), line))
+            elif words[0] not in IGNORED:
                 raise ValueError(f"expected a statement of the format, got {words[0]!r:.40}")
         except ValueError as error:
             raise ValueError(f"{name}, line {line}: {error}") from None
-    return _mesh(name, vertices, triangles, *furthest)
+    return _mesh(name, vertices, triangles, *highest)
 
 
 def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield the words of each statement and the line that it starts on."""
-    begun: list[str] = []
+    """Yield the first line number and the words of each statement."""
+    words: list[str] = []
     start = 1
-    for line, written in enumerate(text.split("\n"), 1):
-        said = written.partition("#")[0].rstrip()
-        continues = said.endswith("\\")
-        start = start if begun else line
-        begun += said.removesuffix("\\").split() if continues else said.split()
-        if begun and not continues:
-            yield start, begun
-            begun = []
-    if begun:
-        yield start, begun
+    for number, line in enumerate(text.split("\n"), 1):
+        code = line.partition("#")[0].rstrip()
+        continues = code.endswith("\\")
+        start = start if words else number
+        words += code.removesuffix("\\").split() if continues else code.split()
+        if words and not continues:
+            yield start, words
+            words = []
+    if words:
+        yield start, words
 
 
 def _vertex(words: list[str]) -> list[float]:
@@ -136,7 +135,7 @@ def _corner(word: str, vertex_count: int) -> int:
 
 
 def _fan(corners: list[int]) -> list[int]:
-    """Return the corners of the triangles of a polygon, three by three."""
+    """Return the corners of the triangles of a polygon, concatenated."""
     return [
         corner
         for one, other in itertools.pairwise(corners[1:])
@@ -144,11 +143,11 @@ def _fan(corners: list[int]) -> list[int]:
     ]
 
 
-def _mesh(name: str, vertices: list[float], triangles: list[int], furthest: int, line: int) -> Mesh:
+def _mesh(name: str, vertices: list[float], triangles: list[int], highest: int, line: int) -> Mesh:
     if not triangles:
         raise ValueError(f"{name}: expected faces, got none")
-    if furthest >= len(vertices) // 3:
-        got = f"{furthest + 1} of {len(vertices) // 3}"
+    if highest >= len(vertices) // 3:
+        got = f"{highest + 1} of {len(vertices) // 3}"
         raise ValueError(f"{name}, line {line}: expected a vertex of the file, got {got}")
     return Mesh(
         frozen(np.array(vertices).reshape(-1, 3)),

@@ -1,4 +1,4 @@
-"""What a file describes: an articulation, its joints by name, and where it stands."""
+"""The robot that a reader returns: an articulation, its joints by name and its home position."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -20,10 +20,10 @@ class Robot(NamedTuple):
     """A robot or a character read from a file.
 
     Attributes:
-        articulation: its joints, named after the file's links or bodies, whose poses they are.
-        joints: the articulation's joint, by the name of the file's joint: its place in q is
-            `articulation.coordinates_of(joints[name])`.
-        home: the coordinates in which the file shows it, (coordinate,).
+        articulation: one joint for each link or body of the file, with its name and pose.
+        joints: index of the articulation's joint by the name of the file's joint; its coordinates
+            in q are `articulation.coordinates_of(joints[name])`.
+        home: the coordinates of the configuration in the file, (coordinate,).
     """
 
     articulation: Articulation
@@ -32,11 +32,11 @@ class Robot(NamedTuple):
 
 
 class Link(NamedTuple):
-    """One joint of an articulation, as a reader finds it.
+    """One joint of an articulation, as read from a file.
 
     Attributes:
         name: of the joint.
-        parent: the number of its parent among the links, -1 for the root.
+        parent: index of its parent among the links, -1 for the root.
         offset: its position in the parent's frame [m].
         frame: its rotation in the parent's frame.
         kind: of the joint.
@@ -58,7 +58,7 @@ class Link(NamedTuple):
 
 
 def upright(axis: Vector) -> Quaternion:
-    """Return the shortest rotation of z onto an axis; onto -z, half a turn about x, like MuJoCo."""
+    """Return the shortest rotation of z onto an axis; onto -z, by pi about x, like MuJoCo."""
     x, y, z = axis
     if z < 0.0 and max(abs(x), abs(y)) < 1e-10 * -z:
         return 0.0, 1.0, 0.0, 0.0
@@ -71,10 +71,10 @@ def assemble(
     joints: dict[str, int],
     mimics: Mapping[int | str, Mimic] | None = None,
 ) -> Robot:
-    """Return the robot of these links, at home where its coordinates are zero.
+    """Return the robot of these links, with zero coordinates as its home.
 
     Raises:
-        ValueError: naming the origin, if there are more than MOST_JOINTS, or one is wrong.
+        ValueError: if there are more than MOST_JOINTS, or one is invalid; names the origin.
     """
     if len(links) > MOST_JOINTS:
         raise ValueError(f"{origin}: expected at most {MOST_JOINTS:,} joints, got {len(links):,}")

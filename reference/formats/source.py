@@ -1,4 +1,4 @@
-"""Text from files that nobody has vouched for."""
+"""Text from untrusted files, with limits on its size and encoding."""
 
 import os
 import warnings
@@ -10,22 +10,22 @@ LARGEST = 256 * 2**20  # bytes
 
 
 class FormatWarning(UserWarning):
-    """A file departs from its format in what can be read all the same; the message says how."""
+    """A file violates its format but can be read; the message says how."""
 
 
 def warn(problem: str) -> None:
-    """Warn of what a file says, by a sentence that names the file and the line."""
+    """Emit a `FormatWarning`; the sentence names the file and the line."""
     warnings.warn(problem, FormatWarning, stacklevel=3)
 
 
 def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST) -> str:
-    r"""Return the text of a file, its lines ended by \n alone, without a byte order mark.
+    r"""Return the text of a file with line ends \n and without a byte order mark.
 
-    No more than `largest` bytes and one are ever read, whatever size the file claims.
+    Read at most `largest` + 1 bytes, whatever the size of the file.
 
     Raises:
-        ValueError: if there is no such file, it is no regular file or cannot be read, it is larger
-            than `largest` bytes, or it holds a NUL or what is not UTF-8.
+        ValueError: if the file does not exist, is not regular, cannot be read, is larger than
+            `largest` bytes, contains a NUL byte or is not UTF-8.
     """
     data = _bytes(path, largest)
     if b"\0" in data:

@@ -1,10 +1,10 @@
 """The kinematic part of a URDF file.
 
-Every link is a joint of the articulation, of the link's name: the one that moves it. The root is
-fixed to the world; where a base moves, the file says so with a floating joint. Links come before
-what hangs on them, and siblings in the order of the file. A planar joint becomes two slides and a
-hinge, the slides named after the joint, with " x" and " y" added. Nothing else of a file is read:
-no masses, shapes, transmissions or safety controllers.
+Every link becomes a joint of the articulation, the one that moves the link, with the link's name.
+The root link is fixed to the world; a file with a moving base has a floating joint. Links precede
+their descendants, and siblings keep the order of the file. A planar joint becomes two slides, named
+after the joint with " x" and " y" added, and a hinge. Masses, shapes, transmissions and safety
+controllers are ignored.
 """
 
 from collections.abc import Mapping
@@ -28,10 +28,10 @@ KINDS = {
     "floating": "free",
     "planar": "hinge",
 }
-# What becomes of limits whose lower one is above the upper one. MuJoCo reads none; Pinocchio keeps
-# both as they are, so that no coordinate is within them.
+# Treatments of limits with lower > upper. MuJoCo drops them; Pinocchio keeps both as they are, so
+# that no coordinate is within them.
 CROSSED_LIMITS = ("unlimited", "ordered", "refused")
-MOVED_BY_ONE_NUMBER = ("revolute", "continuous", "prismatic")
+SCALAR_TYPES = ("revolute", "continuous", "prismatic")
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
 
@@ -48,10 +48,9 @@ def read(path: str | Path, *, mimic: bool = True, crossed_limits: str = "unlimit
 
     Args:
         path: of the file.
-        mimic: whether mimic joints move with their leaders; if False, by themselves.
-        crossed_limits: what becomes of limits whose lower one is above the upper one:
-            "unlimited" reads none, as MuJoCo does, "ordered" exchanges them, both with a
-            FormatWarning; "refused" raises. (Pinocchio keeps them: nothing is within them then.)
+        mimic: whether mimic joints follow their leaders; if False, they move independently.
+        crossed_limits: treatment of limits with lower > upper: "unlimited" drops them, as MuJoCo
+            does, "ordered" exchanges them, both with a FormatWarning; "refused" raises.
 
     Raises:
         ValueError: naming file, line and element, if it cannot be read or is not a URDF file of one
@@ -79,27 +78,24 @@ def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robo
     below = _joints_below(root, joints)
     base = _base(root, joints, below)
     follows = arguments.boolean("mimic", mimic)
-    links, at, carriers = [Link(base, -1)], {base: 0}, {}
+    links, link_index, joint_index = [Link(base, -1)], {base: 0}, {}
     waiting = below[base][::-1]
     while waiting:
         joint = waiting.pop()
-        links += _links(joint, at[joint.parent], len(links), crossed_limits)
-        at[joint.child] = carriers[joint.name] = len(links) - 1
+        links += _links(joint, link_index[joint.parent], len(links), crossed_limits)
+        link_index[joint.child] = joint_index[joint.name] = len(links) - 1
         waiting += below[joint.child][::-1]
     for joint in joints.values():
-        if joint.child not in at:
-            raise joint.element.error(f"expected a way to the root {base!r}, got a ring of links")
-    return assemble(origin, links, carriers, _mimics(joints, carriers) if follows else {})
+        if joint.child not in link_index:
+            raise joint.element.error(f"expected a path to the root {base!r}, got a ring of links")
+    return assemble(origin, links, joint_index, _mimics(joints, joint_index) if follows else {})
 
 
 def _check_expanded(root: Element) -> None:
-    """Refuse what is left of xacro's macros, wherever it stands."""
-    waiting = [root]
-    while waiting:
-        element = waiting.pop()
+    """Raise a ValueError if an element or attribute belongs to xacro."""
+    for element in root.walk():
         if any(name.startswith("xacro:") for name in (element.tag, *element.attributes)):
             raise element.error("expected a URDF file, got xacro: run xacro first")
-        waiting += reversed(element.children)
 
 
 def _joint(element: Element) -> _Joint:
@@ -127,7 +123,7 @@ def _distinct(joints: list[_Joint]) -> dict[str, _Joint]:
 
 
 def _joints_below(root: Element, joints: Mapping[str, _Joint]) -> dict[str, list[_Joint]]:
-    """Return the joints that hang on each link, in the order of the file."""
+    """Return the child joints of each link, in the order of the file."""
     below: dict[str, list[_Joint]] = {}
     for link in root.named("link"):
         if link.word("name") in below:
@@ -142,31 +138,31 @@ def _joints_below(root: Element, joints: Mapping[str, _Joint]) -> dict[str, list
 
 
 def _base(root: Element, joints: Mapping[str, _Joint], links: Mapping[str, list[_Joint]]) -> str:
-    """Return the one link that no joint moves."""
-    movers: dict[str, str] = {}
+    """Return the root: the only link that is no joint's child."""
+    parent_joints: dict[str, str] = {}
     for joint in joints.values():
-        if joint.child in movers:
+        if joint.child in parent_joints:
             raise joint.element.error(
                 f"expected one joint to move link {joint.child!r:.80}, "
-                f"got {movers[joint.child]!r:.80} as well"
+                f"got {parent_joints[joint.child]!r:.80} as well"
             )
-        movers[joint.child] = joint.name
+        parent_joints[joint.child] = joint.name
     if not links:
         raise root.error("expected a <link>, got none")
-    bases = [link for link in links if link not in movers]
+    bases = [link for link in links if link not in parent_joints]
     if len(bases) != 1:
-        came = f"{len(bases)}: {', '.join(map(repr, bases[:3])):.80}" if bases else "none"
-        raise root.error(f"expected one link that no joint moves, the root, got {came}")
+        got = f"{len(bases)}: {', '.join(map(repr, bases[:3])):.80}" if bases else "none"
+        raise root.error(f"expected one link that no joint moves, the root, got {got}")
     return bases[0]
 
 
 def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list[Link]:
-    """Return what a joint becomes, in a list that begins with that number."""
+    """Return the links that a joint becomes, numbered from `number` on."""
     origin = joint.element.single("origin")
     offset = origin.numbers("xyz", ORIGIN) if origin else ORIGIN
     roll, pitch, yaw = origin.numbers("rpy", ORIGIN) if origin else ORIGIN
-    turned = multiply(exponential((0.0, pitch, 0.0)), exponential((roll, 0.0, 0.0)))
-    frame = multiply(exponential((0.0, 0.0, yaw)), turned)
+    pitch_roll = multiply(exponential((0.0, pitch, 0.0)), exponential((roll, 0.0, 0.0)))
+    frame = multiply(exponential((0.0, 0.0, yaw)), pitch_roll)
     if joint.type in ("fixed", "floating"):
         return [Link(joint.child, parent, offset, frame, KINDS[joint.type])]
     axis = _axis(joint.element)
@@ -182,8 +178,8 @@ def _links(joint: _Joint, parent: int, number: int, crossed_limits: str) -> list
 
 
 def _axis(element: Element) -> Vector:
-    given = element.single("axis")
-    axis = given.numbers("xyz", X) if given else X
+    tag = element.single("axis")
+    axis = tag.numbers("xyz", X) if tag else X
     if axis == ORIGIN:
         raise element.error("expected an <axis> that is not zero, got xyz='0 0 0'")
     return axis
@@ -206,7 +202,7 @@ def _limits(joint: _Joint, crossed: str) -> tuple[float, float]:
     return (upper, lower) if crossed == "ordered" else (-INFINITY, INFINITY)
 
 
-def _mimics(joints: Mapping[str, _Joint], carriers: Mapping[str, int]) -> dict[int | str, Mimic]:
+def _mimics(joints: Mapping[str, _Joint], index: Mapping[str, int]) -> dict[int | str, Mimic]:
     mimics: dict[int | str, Mimic] = {}
     for joint in joints.values():
         tag = joint.element.single("mimic")
@@ -214,28 +210,12 @@ def _mimics(joints: Mapping[str, _Joint], carriers: Mapping[str, int]) -> dict[i
             continue
         leader = joints.get(tag.word("joint"))
         for one, name in ((joint, joint.name), (leader, tag.word("joint"))):
-            if one is None or one.type not in MOVED_BY_ONE_NUMBER:
-                came = one.type if one else "none of that name"
+            if one is None or one.type not in SCALAR_TYPES:
+                got = one.type if one else "none of that name"
                 raise joint.element.error(
                     f"expected a mimic and its leader to be one of "
-                    f"{', '.join(MOVED_BY_ONE_NUMBER)}, got {came} for {name!r:.80}"
+                    f"{', '.join(SCALAR_TYPES)}, got {got} for {name!r:.80}"
                 )
         (multiplier,), (shift,) = tag.numbers("multiplier", (1.0,)), tag.numbers("offset", (0.0,))
-        mimics[carriers[joint.name]] = Mimic(carriers[tag.word("joint")], multiplier, shift)
-    return _through_chains(mimics)
-
-
-def _through_chains(mimics: dict[int | str, Mimic]) -> dict[int | str, Mimic]:
-    """Return mimics of leaders that follow none themselves, each chain walked once."""
-    through: dict[int | str, Mimic] = {}
-    for joint in mimics:
-        chain = []
-        while joint in mimics and joint not in through:
-            chain.append(joint)
-            through[joint] = mimics[joint]
-            joint = mimics[joint].leader
-        for follower in reversed(chain):
-            leader, multiplier, shift = mimics[follower]
-            first, factor, further = through.get(leader, Mimic(leader))
-            through[follower] = Mimic(first, multiplier * factor, multiplier * further + shift)
-    return through
+        mimics[index[joint.name]] = Mimic(index[tag.word("joint")], multiplier, shift)
+    return mimics

@@ -1,11 +1,12 @@
-"""Elements of an XML file that may come from anywhere.
+"""A reader of untrusted XML files: elements and attributes with their line numbers.
 
-Only elements and attributes are kept. A document type is refused, and with it every entity that a
-file could define: those that grow without bound and those that read other files.
+A document type declaration is refused, and with it entities that expand without bound or read other
+files.
 """
 
 import math
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 from xml.parsers import expat
@@ -15,9 +16,9 @@ from ..arguments import LARGEST_COORDINATE
 from .source import read_text, warn
 
 MOST_ELEMENTS = 100_000
-# As deep as TinyXML2, which MuJoCo and ROS read with.
+# The limit of TinyXML2, the parser of MuJoCo and ROS.
 MOST_DEPTH = 500
-# In an attribute that is read: one that goes into every joint must not be a file of its own.
+# In an attribute that is read: a default value is copied to every joint.
 MOST_CHARACTERS = 2000
 MISPLACED_DECLARATION = re.compile(r"(\s+)<\?xml\s[^<>]{0,200}\?>")
 
@@ -29,15 +30,23 @@ class Element(NamedTuple):
 
     Attributes:
         tag: its name.
-        attributes: what they say, by name.
+        attributes: their values, by name.
         children: the elements in it, in the order of the file.
-        place: the file and the line it begins in.
+        location: the file and the line where it begins.
     """
 
     tag: str
     attributes: dict[str, str]
     children: list["Element"]
-    place: str
+    location: str
+
+    def walk(self) -> Iterator["Element"]:
+        """Yield the element and all its descendants in the order of the file."""
+        waiting = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting += reversed(element.children)
 
     def named(self, tag: str) -> list["Element"]:
         """Return the children of that name."""
@@ -62,15 +71,15 @@ class Element(NamedTuple):
         """
         value = self._short(name) if name in self.attributes else default
         if not value:
-            came = "none" if value is None else "an empty one"
-            raise self.error(f"expected an attribute {name!r}, got {came}")
+            got = "none" if value is None else "an empty one"
+            raise self.error(f"expected an attribute {name!r}, got {got}")
         return value
 
     def numbers(self, name: str, default: Numbers) -> Numbers:
         """Return as many finite numbers as the default has, or the default itself.
 
         Raises:
-            ValueError: if they are fewer, more, no numbers, or beyond 1e75.
+            ValueError: if their count differs, or one is not a number or beyond 1e75.
         """
         values = self.limits(name, default)
         if not all(abs(value) <= LARGEST_COORDINATE for value in values):
@@ -78,10 +87,10 @@ class Element(NamedTuple):
         return values
 
     def limits(self, name: str, default: Numbers) -> Numbers:
-        """Return the same, infinite ones let through.
+        """Return the same, infinite numbers allowed.
 
         Raises:
-            ValueError: if they are fewer, more, or not numbers.
+            ValueError: if their count differs, or one is not a number.
         """
         words = self._short(name).split()
         if not words:
@@ -92,9 +101,9 @@ class Element(NamedTuple):
         return cast(Numbers, values)
 
     def error(self, problem: str) -> ValueError:
-        """Return an error that says where, in which element and what."""
+        """Return an error that names the location, the element and the problem."""
         name = f" name={self.attributes['name']!r:.60}" if "name" in self.attributes else ""
-        return ValueError(f"{self.place}: <{self.tag:.60}{name}>: {problem}")
+        return ValueError(f"{self.location}: <{self.tag:.60}{name}>: {problem}")
 
     def _short(self, name: str) -> str:
         value = self.attributes.get(name, "")
@@ -141,7 +150,7 @@ def parse(text: str, origin: str) -> Element:
 
 
 class _Builder:
-    """Gathers the elements that the parser reports."""
+    """A handler of the parser's events that builds the tree of elements."""
 
     def __init__(self, origin: str) -> None:
         self.origin = origin
@@ -153,18 +162,18 @@ class _Builder:
         self.parser.EndElementHandler = self.end
         self.parser.StartDoctypeDeclHandler = self.refuse_document_type
 
-    def place(self) -> str:
+    def location(self) -> str:
         return f"{self.origin}, line {self.parser.CurrentLineNumber}"
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         self.count += 1
         if self.count > MOST_ELEMENTS:
-            raise ValueError(f"{self.place()}: expected at most {MOST_ELEMENTS:,} elements")
+            raise ValueError(f"{self.location()}: expected at most {MOST_ELEMENTS:,} elements")
         if len(self.open) > MOST_DEPTH:
             raise ValueError(
-                f"{self.place()}: expected at most {MOST_DEPTH} elements in each other"
+                f"{self.location()}: expected at most {MOST_DEPTH} elements in each other"
             )
-        element = Element(tag, attributes, [], self.place())
+        element = Element(tag, attributes, [], self.location())
         self.open[-1].children.append(element)
         self.open.append(element)
 
@@ -172,11 +181,11 @@ class _Builder:
         self.open.pop()
 
     def refuse_document_type(self, name: str, *declaration: Any) -> None:
-        raise ValueError(f"{self.place()}: expected no document type, got <!DOCTYPE {name:.60}>")
+        raise ValueError(f"{self.location()}: expected no document type, got <!DOCTYPE {name:.60}>")
 
 
 def _number(word: str) -> float:
-    """Return the number a word stands for, infinity included; NaN if for none."""
+    """Return the number that a word denotes, possibly infinite, or NaN if it denotes none."""
     try:
         return math.nan if "_" in word else float(word)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Implicit Euler: one definition of the step in `objective`, one file for each way to solve it."""
+"""Implicit Euler: the step as a minimisation in `objective`, one file for each solver."""
 
 from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass, field
@@ -21,17 +21,17 @@ from .objective import STARTS, Iterate, Objective
 
 
 class StepSolver(Protocol):
-    """A way to minimise g, prepared for one system and one step length."""
+    """A minimiser of g for one system and one step length."""
 
     default_iterations: int
 
     def __init__(self, system: MassSpring, h: float) -> None:
-        """Prepare what stays the same from step to step."""
+        """Compute what all steps share, such as a factor or a sparsity pattern."""
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield the start, then the iterate after each iteration, without end.
 
-        A solver that can do no more yields the very same iterate again.
+        A solver that cannot improve an iterate yields the same object again.
         """
         ...
 
@@ -45,22 +45,23 @@ STEP_SOLVERS: dict[str, type[StepSolver]] = {
     "gauss_newton": GaussNewton,
 }
 
-# Progress has ended once the least residual is so many iterations old, and this share of them all:
-# an accelerated solver's residual rises and falls, the longer the slower it converges.
-PATIENCE, PATIENT_SHARE = 3, 0.25
+# Stop early once the least residual was found at least PATIENCE iterations ago, and at least
+# PATIENCE_RATIO of all iterations ago: the residual of an accelerated solver oscillates, with a
+# period that grows as its convergence slows down.
+PATIENCE, PATIENCE_RATIO = 3, 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class StepResult:
-    """One step of implicit Euler and how well it was solved.
+    """The result of one step of implicit Euler.
 
     Attributes:
         state: positions x and velocities (x - x_n) / h after the step.
         residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles; infinity if the
-            very start overflowed or all went beyond 1e75, and then the state is the one before.
-        iterations: how many were run.
-        outcome: how the solve ended.
-        at_floor: whether |grad g(x)| is within what rounding can leave of it.
+            start overflows or the result exceeds 1e75, in which case the state is the initial one.
+        iterations: number of iterations.
+        outcome: why the solver stopped.
+        at_floor: whether |grad g(x)| is no more than rounding errors can cause.
         history: the residual before and after each iteration, shape (iterations + 1,).
         objectives: g before and after each iteration, shape (iterations + 1,) [kg m²].
     """
@@ -76,16 +77,16 @@ class StepResult:
 
 @dataclass(frozen=True, eq=False)
 class ImplicitEuler:
-    """Steps of implicit Euler, velocities and positions at their ends: M v' = M v + h f(x').
+    """An integrator that solves M v' = M v + h f(x'), x' = x + h v' in every step.
 
     Attributes:
-        system: the system that steps.
+        system: particles and springs.
         h: the step [s].
         solver: one of `STEP_SOLVERS`.
-        tolerance: the residual at which a step is solved; at 0 all iterations are run.
-        max_iterations: the most iterations in a step; None means the solver's own number.
-        start: where the iterations begin, "y" or "x_n"; None means y for all but gauss_newton,
-            which begins at x_n by definition. Residuals are measured by y all the same.
+        tolerance: residual at which the iterations stop; 0 runs all of them.
+        max_iterations: most iterations in a step; None means the solver's default.
+        start: first iterate, "y" or "x_n"; None means y for all but gauss_newton, which starts at
+            x_n by definition. Residuals are relative to y in both cases.
     """
 
     system: MassSpring
@@ -96,20 +97,20 @@ class ImplicitEuler:
     max_iterations: int | None = None
     start: str | None = None
     _solver: StepSolver = field(init=False, repr=False)
-    _limit: int = field(init=False, repr=False)
+    _iteration_limit: int = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the settings and let the solver prepare itself.
+        """Check the settings and prepare the solver.
 
         Raises:
-            ValueError: naming the setting, if one is out of range or unknown.
+            ValueError: if a setting is out of range or unknown.
         """
         instance("system", self.system, MassSpring)
         object.__setattr__(self, "h", number("h", self.h, above=0))
         object.__setattr__(self, "tolerance", number("tolerance", self.tolerance, least=0))
         method = STEP_SOLVERS[choice("solver", self.solver, STEP_SOLVERS)]
         limit = method.default_iterations if self.max_iterations is None else self.max_iterations
-        object.__setattr__(self, "_limit", integer("max_iterations", limit, least=0))
+        object.__setattr__(self, "_iteration_limit", integer("max_iterations", limit, least=0))
         object.__setattr__(self, "start", _start(self.solver, self.start))
         object.__setattr__(self, "_solver", method(self.system, self.h))
 
@@ -119,20 +120,20 @@ class ImplicitEuler:
         external_forces: ArrayLike | None = None,
         pin_positions: ArrayLike | None = None,
     ) -> StepResult:
-        """Return the state one step later and how well the step was solved.
+        """Return the state one step later, with the residual and outcome of the solver.
 
         Args:
-            state: where the step starts.
-            external_forces: [N], shape (particle, 3), besides gravity; they stay through the step.
-            pin_positions: where the pinned particles, in ascending order, are at the end of the
-                step [m], shape (pinned, 3); by default they stay. Their velocity in the result is
-                their way over h.
+            state: positions and velocities at the start of the step.
+            external_forces: [N], shape (particle, 3), besides gravity; constant during the step.
+            pin_positions: positions of the pinned particles, in ascending order, at the end of the
+                step [m], shape (pinned, 3); by default they do not move. Their velocity in the
+                result is their displacement over h.
 
         Raises:
             ValueError: if the state has another number of particles, or the external forces or pin
                 positions have another shape or are not finite.
         """
-        with np.errstate(over="ignore", invalid="ignore"):  # overflow is an outcome here
+        with np.errstate(over="ignore", invalid="ignore"):  # overflow ends in DIVERGED
             objective = self.objective(state, external_forces, pin_positions)
             last, outcome, history, objectives = self._solve(objective)
             return _result(state, objective, last, outcome, history, objectives)
@@ -158,12 +159,11 @@ class ImplicitEuler:
         external_forces: ArrayLike | None = None,
         pin_positions: ArrayLike | None = None,
     ) -> Certificate:
-        """Return what is known for sure about the end of a step, given what `step` was given.
+        """Return a proven bound on the distance from a result to the minimiser of g.
 
-        `result` is what `step` returned, or anyone's positions, shape (particle, 3) [m]. It costs
-        about as much as three iterations of Newton's method; `certificate` says how it is proven. A
-        result keeps nothing of the step that it solves, so that motions stay small: this is why the
-        state and the forces are asked for again.
+        `result` is a `StepResult` or positions, shape (particle, 3) [m]; the other arguments are
+        those of the step, which a result does not keep. It costs about as much as three iterations
+        of Newton's method; `certificate` states the proof.
 
         Raises:
             ValueError: as for `step`, or if the positions have a wrong shape or are not finite.
@@ -181,7 +181,7 @@ class ImplicitEuler:
     ) -> Iterator[Iterate]:
         """Yield the solver's start and the iterate after each iteration, without end.
 
-        `step` takes the same ones and stops by tolerance and max_iterations.
+        `step` runs the same iterates and stops by tolerance and max_iterations.
 
         Raises:
             ValueError: as for `step`.
@@ -191,7 +191,7 @@ class ImplicitEuler:
     def _solve(
         self, objective: Objective
     ) -> tuple[Iterate | None, Outcome, list[float], list[float]]:
-        """Return the last finite iterate, the outcome, and residual and g of each iterate."""
+        """Return the last finite iterate, the outcome, and the residuals and g of all iterates."""
         last: Iterate | None = None
         residuals: list[float] = []
         values: list[float] = []
@@ -214,19 +214,19 @@ class ImplicitEuler:
     def _outcome(
         self, iterate: Iterate, residuals: list[float], best: int, stuck: bool
     ) -> Outcome | None:
-        """Return how the solve ends with this iterate, or None if it goes on.
+        """Return the outcome if the solver stops at this iterate, else None.
 
-        The floor is a bound, often a thousand times what rounding really leaves: to be within it
-        ends a solve only where the least residual, the one at `best`, is no longer improved upon.
-        A start at rest, though, is not iterated.
+        The floor is an upper bound, often a thousand times the actual rounding error. A gradient
+        below it therefore stops the solver only once the least residual, the one at index `best`,
+        is no longer improved, or if the start is at rest.
         """
         count = len(residuals) - 1
-        final = count >= self._limit
+        final = count >= self._iteration_limit
         if self.tolerance > 0 or final:
             if residuals[-1] <= self.tolerance:
                 return Outcome.CONVERGED
             since = count - best
-            ended = stuck or (since >= PATIENCE and since >= PATIENT_SHARE * count)
+            ended = stuck or (since >= PATIENCE and since >= PATIENCE_RATIO * count)
             if (ended and iterate.at_floor) or (count == 0 and iterate.at_rest):
                 return Outcome.AT_ROUNDING
             if stuck:
@@ -235,10 +235,10 @@ class ImplicitEuler:
 
 
 def _start(solver: str, start: str | None) -> str:
-    """Return where a solver begins.
+    """Return the checked first iterate of a solver.
 
     Raises:
-        ValueError: if the start is unknown, or Gauss-Newton is to begin at y.
+        ValueError: if the start is unknown, or y for Gauss-Newton.
     """
     valid = STARTS[1:] if solver == "gauss_newton" else STARTS
     return valid[0] if start is None else choice("start", start, valid)
@@ -265,5 +265,5 @@ def _result(
                 history=frozen(np.array(residuals)),
                 objectives=frozen(np.array(values)),
             )
-    nothing = frozen(np.array([np.inf]))
-    return StepResult(before, np.inf, 0, Outcome.DIVERGED, False, nothing, nothing)
+    infinite = frozen(np.array([np.inf]))
+    return StepResult(before, np.inf, 0, Outcome.DIVERGED, False, infinite, infinite)

@@ -1,8 +1,8 @@
-"""How far a step's answer is from a minimiser of g at most: a proof, where one can be given.
+"""A proven upper bound on the distance from positions x to a minimiser of g.
 
-Let mu be a lower bound of the smallest eigenvalue of H, the Hessian of g at x over the free
-particles, let eta be at least |H^-1 grad g(x)|, the length of the Newton step, and let the Hessian
-change by no more than L times the distance within 2 eta of x. Then
+Let mu > 0 be a lower bound of the smallest eigenvalue of H, the Hessian of g at x over the free
+particles, let eta be an upper bound of |H^-1 grad g(x)|, the length of the Newton step, and let L
+be a Lipschitz constant of the Hessian within 2 eta of x. Then
 
     L eta < mu / 2  =>  a minimiser lies within d = 2 eta / (1 + (1 - 2 L eta / mu)^1/2),
 
@@ -12,12 +12,13 @@ Within 2 eta of x, |N'(z)| = |H^-1 (H - H(z))| <= 2 L eta / mu < 1 and, by integ
 fixed point there. Its distance t from x has t <= eta + L t² / (2 mu) and t <= 2 eta < mu / L, so
 that t <= d, the smaller root; and H(z) >= mu - L d = mu (1 - 2 L eta / mu)^1/2 > 0 there.
 
-Since eta <= |grad g(x)| / mu, it covers all that the convexity of g on a ball of radius
-2 |grad g(x)| / mu does, and says more: the Newton step knows which directions are stiff.
+Since |H^-1 grad g(x)| <= |grad g(x)| / mu, the bound is never worse than the one that follows from
+the convexity of g on a ball of radius 2 |grad g(x)| / mu, and it is sharper where some directions
+are stiffer than others.
 
-Every number here is a bound in exact arithmetic of the g that the given floats define: rounding of
-x_n + h v_n, of the effective springs, of the gradient, of the Hessian, of its Cholesky factor (Rump
-2006, "Verification of Positive Definiteness") and of the linear solve is allowed for.
+The bounds hold in exact arithmetic for the g that the floating-point inputs define. They include
+the rounding errors of x_n + h v_n, the effective springs, the gradient, the Hessian, its Cholesky
+factor (Rump 2006, "Verification of Positive Definiteness") and the linear solve.
 """
 
 import math
@@ -35,22 +36,23 @@ from ..sparse.linear_solver import Factor, NotPositiveDefiniteError, factorize
 from .objective import Objective
 
 EPS = float(np.finfo(float).eps)
-# A term of the gradient is made by at most 27 roundings of half an EPS, and an entry of a spring's
-# block by at most 60; a block's norm is at most three times its largest entry.
+# Computing a term of the gradient takes at most 27 roundings of EPS/2 each, an entry of a spring's
+# block at most 60; the norm of a block is at most three times its largest entry.
 GRADIENT_ROUNDING = 16
 HESSIAN_ROUNDING = 128
-# What the sums and roots of the bounds themselves may be off by, with millions of particles.
+# Factor that covers the rounding errors of the bounds themselves, for millions of particles.
 SLACK = 1.0 + 1e-8
 # The norm of the third derivative of the length |p| is this over |p|².
 THIRD_DERIVATIVE = 2.0 / math.sqrt(3.0)
-# Lengths are no shorter than this [m] where one divides by them.
+# Least length [m] to divide by.
 TINY = 1e-150
-# Where the shift that proves the smallest eigenvalue begins, and how close its estimate is.
-SHARE, ESTIMATE = 0.98, 1e-2
+# The first shift tried as a lower bound of the smallest eigenvalue, relative to its estimate, and
+# the relative accuracy of the estimate.
+FIRST_SHIFT, ESTIMATE_TOLERANCE = 0.98, 1e-2
 
 
 class Coverage(IntEnum):
-    """Whether there is a bound on the distance to a minimiser, or why not."""
+    """Whether the distance to a minimiser is bounded, or why it is not."""
 
     COVERED = 0
     OVERFLOWN = 1
@@ -76,31 +78,31 @@ _SENTENCES = {
     "the minimiser, and there g has no derivative.",
     Coverage.KINK: "No bound: a tension-only spring may go slack, or taut, as near as the "
     "minimiser, and there the Hessian jumps.",
-    Coverage.TOO_FAR: "No bound: the Hessian may change too much on the way of a Newton step.",
+    Coverage.TOO_FAR: "No bound: the Hessian may change too much along the Newton step.",
 }
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What is known for sure about an answer x to a step.
+    """Proven bounds for positions x as the result of a step.
 
-    Distances are Euclidean norms over all coordinates, so that no particle is further away.
+    Distances are Euclidean norms over all coordinates and so bound that of every particle.
 
     Attributes:
         residual: |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows.
         coverage: whether there is a bound, or why not.
-        distance: within which a minimiser of g lies [m]; infinite if there is no bound.
-        alone_within: no stationary point but this minimiser is so near to x [m]; 0 without a bound.
-        newton_step: eta, at least the length of the Newton step [m]; not a number if there is none.
-        curvature: mu, below every eigenvalue of the Hessian [kg]; 0 if it may not be positive.
-        lipschitz: L, by which the Hessian changes at most per distance within `alone_within` or,
-            without a bound, within 2 eta [kg/m]; not a number where it has none.
+        distance: radius about x that contains a minimiser of g [m]; infinite without a bound.
+        unique_within: radius about x that contains no other stationary point [m]; 0 without a
+            bound.
+        newton_step: eta, an upper bound of the length of the Newton step [m]; NaN if unknown.
+        curvature: mu, a lower bound of the eigenvalues of the Hessian [kg]; 0 if none is positive.
+        lipschitz: L, a Lipschitz constant of the Hessian within 2 eta of x [kg/m]; NaN if unknown.
     """
 
     residual: float
     coverage: Coverage
     distance: float = math.inf
-    alone_within: float = 0.0
+    unique_within: float = 0.0
     newton_step: float = math.nan
     curvature: float = 0.0
     lipschitz: float = math.nan
@@ -111,10 +113,10 @@ class Certificate:
         return self.coverage == Coverage.COVERED
 
     def shares_minimiser(self, other: "Certificate", apart: float) -> bool | None:
-        """Return whether the minimisers near two answers to the same step are one and the same.
+        """Return whether two results of the same step have the same minimiser nearby.
 
-        `apart` is the distance of the two answers [m]. None means that this is not proven either
-        way, as where one of them has no bound.
+        `apart` is the distance between the two results [m]. None means that neither is proven, as
+        when one of the certificates has no bound.
 
         Raises:
             ValueError: if the other is no certificate, or the distance no number of at least 0.
@@ -126,15 +128,15 @@ class Certificate:
         if not (self.covered and other.covered):
             return None
         one, two = apart * SLACK + other.distance, apart * SLACK + self.distance
-        if one <= self.alone_within or two <= other.alone_within:
+        if one <= self.unique_within or two <= other.unique_within:
             return True
         return False if apart > (self.distance + other.distance) * SLACK else None
 
 
 def certify(objective: Objective, positions: ArrayLike) -> Certificate:
-    """Return what is known for sure about positions, shape (particle, 3), as the end of a step.
+    """Return the certificate of positions, shape (particle, 3) [m], as the result of a step.
 
-    It takes two or three Cholesky factorisations of the Hessian and some 20 to 60 solves with one.
+    It takes two or three Cholesky factorisations of the Hessian and 20 to 60 solves.
 
     Raises:
         ValueError: if the positions have a wrong shape or are not finite.
@@ -142,7 +144,7 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     system = instance("objective", objective, Objective).system
     x = coordinates("positions", positions, system.particle_count, 3)
     with np.errstate(over="ignore", invalid="ignore"):
-        here = objective._evaluate(x)
+        here = objective.iterate_at(x)
         if not (here.finite and objective.inertial.finite):
             return Certificate(math.inf, Coverage.OVERFLOWN)
     residual = objective.residual(here)
@@ -153,46 +155,46 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     smooth, _ = hessian_change(objective, x, 0.0)
     if smooth != Coverage.COVERED:
         return Certificate(residual, smooth)
-    return _near(objective, x, here.gradient, residual)
+    return _certify_smooth(objective, x, here.gradient, residual)
 
 
-def _near(
+def _certify_smooth(
     objective: Objective, x: FloatArray, gradient: FloatArray, residual: float
 ) -> Certificate:
-    """Return the certificate of finite positions where g has a Hessian and something is free."""
-    free, doubts = np.repeat(objective.system.free, 3), rounding(objective, x)
-    H = objective._hessian(x)[free][:, free].tocsc()
-    mu, factor = least_curvature(H, doubts.hessian)
+    """Return the certificate of positions at which g is twice differentiable."""
+    free, errors = np.repeat(objective.system.free, 3), rounding_errors(objective, x)
+    H = objective.hessian_at(x)[free][:, free].tocsc()
+    mu, factor = least_curvature(H, errors.hessian)
     if factor is None:
         return Certificate(residual, Coverage.NOT_CONVEX)
-    eta = newton_length(H, factor, gradient.ravel()[free], mu, doubts)
+    eta = newton_length(H, factor, gradient.ravel()[free], mu, errors)
     coverage, L = hessian_change(objective, x, 2.0 * eta)
-    share = SLACK * L * eta / mu
-    if coverage == Coverage.COVERED and not 2.0 * share < 1.0:
+    ratio = SLACK * L * eta / mu
+    if coverage == Coverage.COVERED and not 2.0 * ratio < 1.0:
         coverage = Coverage.TOO_FAR
     if coverage != Coverage.COVERED:
         return Certificate(residual, coverage, newton_step=eta, curvature=mu, lipschitz=L)
-    distance = min(SLACK * kantorovich_distance(eta, share), 2.0 * eta)
+    distance = min(SLACK * kantorovich_distance(eta, ratio), 2.0 * eta)
     return Certificate(residual, coverage, distance, 2.0 * eta, eta, mu, L)
 
 
-def kantorovich_distance(eta: float, share: float) -> float:
-    """Return d = 2 eta / (1 + (1 - 2 share)^1/2), the share being L eta / mu."""
-    return 2.0 * eta / (1.0 + math.sqrt(1.0 - 2.0 * share))
+def kantorovich_distance(eta: float, ratio: float) -> float:
+    """Return d = 2 eta / (1 + (1 - 2 ratio)^1/2) for the ratio L eta / mu."""
+    return 2.0 * eta / (1.0 + math.sqrt(1.0 - 2.0 * ratio))
 
 
-def least_curvature(H: Any, doubt: float) -> tuple[float, Factor | None]:
-    """Return a lower bound of the smallest eigenvalue and the factor of H; 0 and None if none.
+def least_curvature(H: Any, error: float) -> tuple[float, Factor | None]:
+    """Return a positive lower bound of the smallest eigenvalue and the factor of H, or 0 and None.
 
-    The bound holds for every matrix within `doubt` of H in norm. An estimate by Lanczos is no
-    bound, but that H less so much of the identity has a Cholesky factor is one: the product of the
-    factor is off by at most (n + 1) EPS of the trace (Rump 2006).
+    The bound holds for every matrix within `error` of H in norm. Lanczos estimates the eigenvalue;
+    a Cholesky factorisation of H - shift I that succeeds proves it, up to the rounding error of the
+    factorisation, which is at most (n + 1) EPS times the trace (Rump 2006).
     """
     n = H.shape[0]
-    allowance = doubt + (n + GRADIENT_ROUNDING) * EPS * float(H.trace())
+    allowance = error + (n + GRADIENT_ROUNDING) * EPS * float(H.trace())
     try:
         factor = factorize(H)
-        shift = SHARE * _estimate(factor, n)
+        shift = FIRST_SHIFT * _estimate_smallest_eigenvalue(factor, n)
         while shift > allowance:
             if _is_definite(factor, H - shift * scipy.sparse.eye_array(n, format="csc")):
                 return shift - allowance, factor
@@ -203,31 +205,32 @@ def least_curvature(H: Any, doubt: float) -> tuple[float, Factor | None]:
 
 
 def newton_length(
-    H: Any, factor: Factor, gradient: FloatArray, mu: float, doubts: "Rounding"
+    H: Any, factor: Factor, gradient: FloatArray, mu: float, errors: "RoundingErrors"
 ) -> float:
-    """Return at least |H^-1 grad g| [m] of the true H and gradient: |p| + |grad g + H p| / mu."""
+    """Return an upper bound of |H^-1 grad g| [m], namely |p| + |grad g + H p| / mu."""
     p = -factor.solve(gradient)
     length = float(np.linalg.norm(p))
-    left = float(np.linalg.norm(gradient + H @ p)) + doubts.gradient + doubts.hessian * length
-    return SLACK * (length + left / mu)
+    remainder = float(np.linalg.norm(gradient + H @ p)) + errors.gradient + errors.hessian * length
+    return SLACK * (length + remainder / mu)
 
 
 def hessian_change(objective: Objective, x: FloatArray, radius: float) -> tuple[Coverage, float]:
-    """Return L [kg/m]: by how much the Hessian changes at most, per distance, within a radius.
+    """Return L [kg/m], a Lipschitz constant of the Hessian of g within a radius of x.
 
-    Of a spring's block k I - k r/l (I - u u') only the second part changes, k r times the second
-    derivative of the length l: by at most k r THIRD_DERIVATIVE / l² times what one end moves
-    against the other. That is at most 2^1/2 times the distance, or once if one end is pinned. So
-    H(z) - H(x) lies between plus and minus |z - x| (W x I), W = sum of c_i A_i A_i' for these c.
+    Only the second part of a spring's block k I - k r/l (I - u u') depends on x. It is k r times
+    the second derivative of l and changes by at most k r THIRD_DERIVATIVE / l² times the relative
+    displacement of the ends, which is at most 2^1/2 |z - x|, or |z - x| if one end is pinned. With
+    c_i the product of these factors, -|z - x| W x I <= H(z) - H(x) <= |z - x| W x I for
+    W = sum of c_i A_i A_i', so that L is the norm of W.
 
     Returns:
-        COVERED and L, or why g may lack a second derivative in there and not a number.
+        COVERED and L, or the reason why g may not be twice differentiable there and NaN.
     """
     system, ends = objective.effective, objective.effective.springs
     k, r, length = objective.h**2 * system.stiffnesses, system.rest_lengths, lengths(system, x)
     free_ends = system.free[ends].sum(axis=1)
-    doubt = GRADIENT_ROUNDING * EPS * (length + _makings(objective))
-    reach = SLACK * np.sqrt(free_ends) * radius + doubt
+    error = GRADIENT_ROUNDING * EPS * (length + _rest_length_terms(objective))
+    reach = SLACK * np.sqrt(free_ends) * radius + error
     acts = (k > 0) & (r > 0) & (free_ends > 0)
     rope = acts & system.tension_only
     if (rope & (np.abs(length - r) <= reach)).any():
@@ -237,68 +240,67 @@ def hessian_change(objective: Objective, x: FloatArray, radius: float) -> tuple[
         return Coverage.COINCIDENT, math.nan
     c = np.zeros(len(k))
     nearest = (length - reach)[acts]
-    c[acts] = (k * (r + doubt) * np.sqrt(free_ends))[acts] * THIRD_DERIVATIVE / nearest**2
+    c[acts] = (k * (r + error) * np.sqrt(free_ends))[acts] * THIRD_DERIVATIVE / nearest**2
     return Coverage.COVERED, SLACK * laplacian_norm(system.free, ends, c)
 
 
 def laplacian_norm(free: BoolArray, springs: IndexArray, weights: FloatArray) -> float:
-    """Return at least the largest eigenvalue of the sum of c_i A_i A_i', pins eliminated.
-
-    By Gershgorin: a particle's springs weigh c_i on the diagonal and, but for pins, beside it.
-    """
+    """Return a bound of the norm of sum c_i A_i A_i' over the free particles, by Gershgorin."""
     i, j = springs.T
-    rows = _gathered(len(free), springs, weights * (1 + free[j]), weights * (1 + free[i]))
+    rows = _sum_over_springs(len(free), springs, weights * (1 + free[j]), weights * (1 + free[i]))
     return float(rows[free].max())
 
 
-class Rounding(NamedTuple):
-    """How far the computed gradient [kg m] and Hessian [kg] may be from the true ones, in norm."""
+class RoundingErrors(NamedTuple):
+    """Upper bounds of the rounding errors of the gradient [kg m] and the Hessian [kg], in norm."""
 
     gradient: float
     hessian: float
 
 
-def rounding(objective: Objective, x: FloatArray) -> Rounding:
-    """Return what rounding can do to the gradient and to the Hessian at x.
+def rounding_errors(objective: Objective, x: FloatArray) -> RoundingErrors:
+    """Return upper bounds of the rounding errors of the gradient and the Hessian at x.
 
-    Unlike the floor of a residual it counts a spring by its lengths and not by its coordinates,
-    whose differences are exact to their last digit, and it counts what rounding has done before:
-    to y, to the external forces and to the effective springs.
+    The error of a spring is relative to its length, not to its coordinates as in the floor of a
+    residual, because differences of coordinates are rounded only once. The bounds include the
+    rounding errors of y, of the external forces and of the effective springs.
     """
     system, h, springs = objective.system, objective.h, objective.effective.springs
     k, length = h * h * objective.effective.stiffnesses, lengths(objective.effective, x)
-    made, m, free = _makings(objective), system.masses, system.free
-    places = _norms(x) + _norms(objective.y) + _norms(objective.x_n)
-    given = _norms(objective.external) + m * np.linalg.norm(system.gravity)
-    pulls = k * (length + made)
-    acts = (k > 0) & (made > 0) & free[springs].any(axis=1)
+    rest_terms, m, free = _rest_length_terms(objective), system.masses, system.free
+    coordinate_norms = _norms(x) + _norms(objective.y) + _norms(objective.x_n)
+    loads = _norms(objective.external) + m * np.linalg.norm(system.gravity)
+    pulls = k * (length + rest_terms)
+    acts = (k > 0) & (rest_terms > 0) & free[springs].any(axis=1)
     acts &= ~(objective.effective.tension_only & (length < objective.effective.rest_lengths))
-    bent = np.zeros_like(length)
-    bent[acts] = made[acts] / np.maximum(length[acts], TINY)
-    blocks = 2.0 * k * (1.0 + bent)
-    gradient = m * places + h * h * given + _gathered(len(m), springs, pulls, pulls)
-    hessian = m + _gathered(len(m), springs, blocks, blocks)
-    busiest = int(np.bincount(springs.ravel(), minlength=1).max())
-    return Rounding(
-        (GRADIENT_ROUNDING + busiest) * EPS * float(np.linalg.norm(gradient[free])),
-        (HESSIAN_ROUNDING + busiest) * EPS * float(hessian[free].max()),
+    geometric = np.zeros_like(length)
+    geometric[acts] = rest_terms[acts] / np.maximum(length[acts], TINY)
+    blocks = 2.0 * k * (1.0 + geometric)
+    gradient = m * coordinate_norms + h * h * loads
+    gradient += _sum_over_springs(len(m), springs, pulls, pulls)
+    hessian = m + _sum_over_springs(len(m), springs, blocks, blocks)
+    most_springs = int(np.bincount(springs.ravel(), minlength=1).max())
+    return RoundingErrors(
+        (GRADIENT_ROUNDING + most_springs) * EPS * float(np.linalg.norm(gradient[free])),
+        (HESSIAN_ROUNDING + most_springs) * EPS * float(hessian[free].max()),
     )
 
 
-def _makings(objective: Objective) -> FloatArray:
-    """Return what each effective rest length is made from [m], shape (spring,).
+def _rest_length_terms(objective: Objective) -> FloatArray:
+    """Return the size of the terms in each effective rest length [m], shape (spring,).
 
-    A blend r + share (l_n - r) is rounded as r is and as itself, which is no less than share l_n.
+    The rounding error of r + share (l_n - r) is relative to r and to the sum itself, which is at
+    least share l_n.
     """
-    return objective.system.dampers_apart.rest_lengths + objective.effective.rest_lengths
+    return objective.system.with_separate_dampers.rest_lengths + objective.effective.rest_lengths
 
 
-def _estimate(factor: Factor, n: int) -> float:
-    """Return about the smallest eigenvalue, and not less, by Lanczos with the inverse."""
+def _estimate_smallest_eigenvalue(factor: Factor, n: int) -> float:
+    """Return an estimate from above of the smallest eigenvalue, by Lanczos with the inverse."""
     inverse = scipy.sparse.linalg.LinearOperator((n, n), matvec=factor.solve, dtype=float)
     start = np.random.default_rng(n).standard_normal(n)
     (largest,) = scipy.sparse.linalg.eigsh(
-        inverse, k=1, which="LA", v0=start, tol=ESTIMATE, return_eigenvectors=False
+        inverse, k=1, which="LA", v0=start, tol=ESTIMATE_TOLERANCE, return_eigenvectors=False
     )
     return 1.0 / float(largest)
 
@@ -311,10 +313,10 @@ def _is_definite(factor: Factor, matrix: Any) -> bool:
     return True
 
 
-def _gathered(
+def _sum_over_springs(
     count: int, springs: IndexArray, at_first: FloatArray, at_second: FloatArray
 ) -> FloatArray:
-    """Return the sum over each particle's springs of what they bring to it, shape (particle,)."""
+    """Return the sum over each particle's springs of the value at its end, shape (particle,)."""
     i, j = springs.T
     total = np.zeros(count)
     np.add.at(total, i, at_first)

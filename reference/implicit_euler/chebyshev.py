@@ -1,23 +1,24 @@
-"""Local/global iterations, accelerated.
+"""Local/global iterations accelerated by Chebyshev's semi-iterative method.
 
 Wang 2015, "A Chebyshev Semi-Iterative Approach for Accelerating Projective and Position-based
-Dynamics", takes from an iterate x_k, the one before it and a local/global step s the next as
+Dynamics", computes the next iterate from x_k, x_k-1 and a local/global step s as
 
     x_k+1 = w_k+1 (c s + x_k - x_k-1) + x_k-1,    w_1 = 1, w_2 = 2 / (2 - R²),
                                                   w_k+1 = 4 / (4 - R² w_k),
 
-after some plain ones, since the springs' directions turn most in the beginning. Near the solution
-an iteration multiplies errors by numbers from 0 to rho < 1, because M + h² L is above the Hessian
-of g. With c = 1 + R and R = rho / (2 - rho) the relaxed steps multiply them by -R to R, which is
-what the weights are made for; Wang has c = 1 and R = rho, for numbers from -rho to rho.
+after some plain iterations, since the directions of springs change most at first. Near the solution
+a plain iteration multiplies the components of the error by factors from 0 to rho < 1, because
+M + h² L bounds the Hessian of g from above. Steps relaxed by c = 1 + R with R = rho / (2 - rho)
+multiply them by factors from -R to R, the interval for which the weights are optimal; Wang takes
+c = 1 and R = rho, for factors from -rho to rho.
 
-No rho has to be given. It begins as the last ratio of two plain steps and is measured again by how
-steps shrink: k accelerated iterations should shrink them by 1 / cosh(k arcosh(1/R)), and if they
-shrink by B times that only, R times cosh(arcosh(B) / k) was there (Hageman and Young 1981,
-"Applied Iterative Methods", section 5.4).
+rho is estimated, first from the ratio of two plain steps and then from how fast the steps shrink:
+k accelerated iterations should reduce them by 1 / cosh(k arcosh(1/R)). If the reduction is B times
+weaker, the estimate becomes R cosh(arcosh(B) / k) (Hageman and Young 1981, "Applied Iterative
+Methods", section 5.4).
 
-Far from the solution all this is hope: wherever g would grow, a plain iteration, by which it never
-does, takes the place of the accelerated one.
+Far from the solution the theory does not hold: an accelerated iteration that would increase g is
+replaced by a plain one, which never does.
 """
 
 import math
@@ -25,69 +26,58 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..mass_spring import MassSpring
-from .factor_cache import global_factor
+from .factor_cache import GlobalMatrixSolver
 from .objective import Iterate, Objective
 
 PLAIN = 5  # iterations before the acceleration begins
-TRIAL = 5  # accelerated iterations at least before R is doubted
-PATIENCE = 0.65  # R is doubted where steps shrink by less than this power of what they should
+TRIAL = 5  # least number of accelerated iterations between two estimates of R
+TOLERATED_POWER = 0.65  # R is estimated again if steps shrink by less than this power of the theory
 LARGEST = 0.99999  # R
-FARTHEST = 300.0  # exponent of what steps may be hoped to shrink by: no number overflows
+LARGEST_EXPONENT = 300.0  # of the expected reduction, so that no number overflows
 
 
-class Chebyshev:
-    """Accelerated local/global iterations; M + h² L is factorised here, for all steps."""
+class Chebyshev(GlobalMatrixSolver):
+    """Accelerated local/global iterations."""
 
     default_iterations = 1000
 
-    def __init__(self, system: MassSpring, h: float) -> None:
-        """Factorise M + h² L.
-
-        Raises:
-            NotPositiveDefiniteError: if it is singular to rounding, masses being too small.
-        """
-        self._factor = global_factor(system, h)
-
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield the objective's start and then one iterate after the other, without end."""
+        """Yield the objective's start, then the iterate after each iteration."""
         before = iterate = objective.start
-        pace = Pace()
+        acceleration = Acceleration()
         while True:
             yield iterate
             x, step = iterate.positions, -self._factor.solve(iterate.gradient)
-            weight, relaxation = pace.next(math.sqrt(abs(np.sum(step * iterate.gradient))))
-            way = (weight - 1) * (x - before.positions) + (weight * relaxation) * step
-            after = objective._evaluate(x + way)
+            size = math.sqrt(abs(np.sum(step * iterate.gradient)))
+            weight, relaxation = acceleration.next(size)
+            displacement = (weight - 1) * (x - before.positions) + (weight * relaxation) * step
+            after = objective.iterate_at(x + displacement)
             if after.is_above(iterate):
-                after = objective._evaluate(x + step)
-                pace.restart()
+                after = objective.iterate_at(x + step)
+                acceleration.restart()
             before, iterate = iterate, after
 
 
-class Pace:
-    """The weights w and the relaxation c, from how the plain steps shrink.
-
-    A step s has the size sqrt(s' (M + h² L) s), in which iterations multiply errors as said above.
-    """
+class Acceleration:
+    """The weights w and the relaxation c, from the sizes sqrt(s' (M + h² L) s) of plain steps s."""
 
     def __init__(self) -> None:
-        """Begin with plain iterations."""
+        """Start with plain iterations."""
         self._R, self._plain, self._last = 0.0, 0, 0.0
         self.restart()
 
     def restart(self) -> None:
-        """Let the next iteration be the first of those that are accelerated with this R."""
+        """Start the sequence of weights again with the current R."""
         self._count, self._weight = 0, 1.0
 
     def next(self, size: float) -> tuple[float, float]:
-        """Return w and c of the next iteration, before which the plain step has this size."""
+        """Return w and c of the next iteration from the size of its plain step."""
         if self._plain < PLAIN:
             self._plain += 1
         elif self._R == 0.0:
-            self._begin(size)
+            self._first_estimate(size)
         elif self._count >= TRIAL:
-            self._doubt(size)
+            self._correct_estimate(size)
         if self._count == 0:
             self._first = size
         elif self._count == 1:
@@ -97,14 +87,14 @@ class Pace:
         self._count, self._last = self._count + 1, size
         return self._weight, 1 + self._R
 
-    def _begin(self, size: float) -> None:
+    def _first_estimate(self, size: float) -> None:
         rho = min(size / self._last, LARGEST) if self._last > 0 else 0.0
         self._R = rho / (2 - rho)
         self.restart()
 
-    def _doubt(self, size: float) -> None:
-        share = 1 / math.cosh(min(self._count * math.acosh(1 / self._R), FARTHEST))
-        if size > share**PATIENCE * self._first > 0:
-            short = math.acosh(max(size / (share * self._first), 1.0)) / self._count
-            self._R = min(self._R * math.cosh(short), LARGEST)
+    def _correct_estimate(self, size: float) -> None:
+        expected = 1 / math.cosh(min(self._count * math.acosh(1 / self._R), LARGEST_EXPONENT))
+        if size > expected**TOLERATED_POWER * self._first > 0:
+            excess = math.acosh(max(size / (expected * self._first), 1.0)) / self._count
+            self._R = min(self._R * math.cosh(excess), LARGEST)
             self.restart()

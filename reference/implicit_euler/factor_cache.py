@@ -1,8 +1,8 @@
-"""Factors made before any step and kept: each matrix once, each pattern analysed once.
+"""A cache of factors, so that each matrix is factorised once and each pattern analysed once.
 
-While an integrator holds a factor, others find it here: for the same system and h as it is; for
-another h or stiffness its order and structure, which follow from the pattern alone. Nothing of a
-result depends on what was found.
+A factor stays in the cache as long as some integrator uses it. Another integrator for the same
+system and h shares it; one for another h or stiffness shares its ordering and symbolic structure,
+which depend only on the sparsity pattern. Results do not depend on the contents of the cache.
 """
 
 import hashlib
@@ -15,30 +15,37 @@ from ..mass_spring import MassSpring
 from ..sparse.linear_solver import Factor, factorize
 from .objective import global_matrix
 
-# By digests of the matrix, and of its pattern alone.
-_same: WeakValueDictionary[bytes, Factor] = WeakValueDictionary()
-_alike: WeakValueDictionary[bytes, Factor] = WeakValueDictionary()
+# Factors by the digest of their matrix and by the digest of its sparsity pattern.
+_by_matrix: WeakValueDictionary[bytes, Factor] = WeakValueDictionary()
+_by_pattern: WeakValueDictionary[bytes, Factor] = WeakValueDictionary()
+
+
+class GlobalMatrixSolver:
+    """A step solver that factorises M + h² L once for all steps."""
+
+    def __init__(self, system: MassSpring, h: float) -> None:
+        self._factor = global_factor(system, h)
 
 
 def global_factor(system: MassSpring, h: float) -> Factor:
     """Return the factor of M + h² L.
 
     Raises:
-        NotPositiveDefiniteError: if it is singular to rounding, masses being too small.
+        NotPositiveDefiniteError: if it is singular to rounding because masses are too small.
     """
     return prefactored(global_matrix(system, h))
 
 
 def hessian_factor(system: MassSpring) -> Factor:
-    """Return the factor of M in the pattern of the Hessians of g, to be refactorised for each."""
-    springs = system.dampers_apart.free_blocks
-    M = springs.matrix(np.zeros((len(system.dampers_apart.springs), 3, 3)))
+    """Return the factor of M stored in the sparsity pattern of the Hessian of g."""
+    springs = system.with_separate_dampers.free_blocks
+    M = springs.matrix(np.zeros((len(system.with_separate_dampers.springs), 3, 3)))
     M.data[springs.diagonal] = np.repeat(system.free_masses, 3)
     return prefactored(M)
 
 
 def prefactored(matrix: Any) -> Factor:
-    """Return the factor of a sparse CSC matrix, found or made from one that is alike, or made anew.
+    """Return the factor of a sparse CSC matrix from the cache, or factorise it.
 
     Raises:
         NotPositiveDefiniteError: if the matrix is not positive definite.
@@ -47,15 +54,15 @@ def prefactored(matrix: Any) -> Factor:
     digest.update(matrix.indices)
     pattern = digest.digest()
     digest.update(matrix.data)
-    factor = _same.get(digest.digest())
+    factor = _by_matrix.get(digest.digest())
     if factor is None:
-        alike = _alike.get(pattern)
-        factor = factorize(matrix) if alike is None else alike.refactorize(matrix)
-        _same[digest.digest()] = _alike[pattern] = factor
+        analysed = _by_pattern.get(pattern)
+        factor = factorize(matrix) if analysed is None else analysed.refactorize(matrix)
+        _by_matrix[digest.digest()] = _by_pattern[pattern] = factor
     return factor
 
 
-def forget() -> None:
-    """Find no factor again of those alive now."""
-    _same.clear()
-    _alike.clear()
+def clear() -> None:
+    """Empty the cache."""
+    _by_matrix.clear()
+    _by_pattern.clear()

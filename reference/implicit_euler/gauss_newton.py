@@ -1,4 +1,4 @@
-"""Gauss-Newton: implicit Euler with the springs linearised where the step starts.
+"""Gauss-Newton: implicit Euler with the springs linearised at the start of the step.
 
 At x_n the dampers of E are at rest length, grad g(x_n) = -h (M v_n + h f), and with their Hessian
 without geometric terms the step h (v_n + dv) = -(M + h C + h² J' k J)^-1 grad g(x_n) is
@@ -7,8 +7,8 @@ without geometric terms the step h (v_n + dv) = -(M + h C + h² J' k J)^-1 grad 
 
 J here being the Jacobian of the lengths and f all forces with the dampers' -C v_n: one step of
 Baraff and Witkin 1998, "Large Steps in Cloth Simulation", without geometric stiffness, and the
-integrator that MuJoCo calls `discrete`. Pins that move do so from x_n, where the springs are still
-linearised: their way adds h² J' k J (x_pins - x_n) to the gradient of the free particles.
+integrator that MuJoCo calls `discrete`. Springs are linearised at x_n for pins that move, too: the
+displacement of the pins adds h² J' k J (x_pins - x_n) to the gradient at the free particles.
 """
 
 from collections.abc import Iterator
@@ -22,30 +22,30 @@ from .objective import Iterate, Objective
 
 
 class GaussNewton:
-    """Gauss-Newton steps from x_n, one unless more are asked for; the pattern is analysed here."""
+    """Gauss-Newton iterations from x_n, by default one."""
 
     default_iterations = 1
 
     def __init__(self, system: MassSpring, h: float) -> None:
-        """Analyse the pattern; the matrix is another in every step."""
+        """Analyse the sparsity pattern that the matrices of all steps share."""
         self._analysed = hessian_factor(system)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield x_n, but for the pins, and then one iterate after the other, without end.
+        """Yield x_n with the pins at their targets, then the iterate after each iteration.
 
-        It is the last one again where the matrix is singular to rounding.
+        Where the matrix is singular to rounding, yield the last iterate again.
         """
         x = objective.x_n
-        iterate = objective._evaluate(x)
-        gradient = iterate.gradient + objective._pull_of_pins(x, geometric=False)
+        iterate = objective.iterate_at(x)
+        gradient = iterate.gradient + objective.pin_gradient_at(x, geometric=False)
         if np.any(objective.y[objective.system.pinned] != x[objective.system.pinned]):
-            iterate = objective._evaluate(np.where(objective.system.free[:, None], x, objective.y))
+            iterate = objective.iterate_at(np.where(objective.system.free[:, None], x, objective.y))
         while True:
             yield iterate
             try:
-                factor = self._analysed.refactorize(objective._hessian(x, geometric=False))
-            except NotPositiveDefiniteError:  # to rounding the masses are nothing beside h² k
+                factor = self._analysed.refactorize(objective.hessian_at(x, geometric=False))
+            except NotPositiveDefiniteError:  # the masses vanish beside h² k
                 continue
             correction = factor.solve(gradient.ravel()).reshape(-1, 3)
-            iterate = objective._evaluate(iterate.positions - correction)
+            iterate = objective.iterate_at(iterate.positions - correction)
             x, gradient = iterate.positions, iterate.gradient

@@ -1,8 +1,8 @@
-"""How far to go along a descent step: halved until g decreases enough (Armijo 1966).
+"""Backtracking line search: halve a descent step until g decreases enough (Armijo 1966).
 
-Close to the minimum g can no longer tell, since its changes drown in rounding: there the slope
-decides (the approximate Wolfe condition of Hager and Zhang 2005, "A New Conjugate Gradient Method
-with Guaranteed Descent").
+Close to the minimum the changes of g are smaller than its rounding error; there the slope decides,
+by the approximate Wolfe condition of Hager and Zhang 2005, "A New Conjugate Gradient Method with
+Guaranteed Descent".
 """
 
 import numpy as np
@@ -10,16 +10,16 @@ import numpy as np
 from ..arguments import FloatArray
 from .objective import Iterate, Objective
 
-ARMIJO = 1e-4  # least share of the decrease promised by the slope
+ARMIJO = 1e-4  # least decrease relative to the one predicted by the slope
 HALVINGS = 40
 
 
 def line_search(objective: Objective, start: Iterate, step: FloatArray) -> Iterate:
-    """Return an acceptable iterate along a descent step, or the start itself if there is none."""
+    """Return an acceptable iterate along a descent step, or the start if there is none."""
     slope = float(np.sum(start.gradient * step))
     length = 1.0
     for _ in range(HALVINGS):
-        end = objective._evaluate(start.positions + length * step)
+        end = objective.iterate_at(start.positions + length * step)
         if accepts(start, end, step, slope, length):
             return end
         length /= 2
@@ -27,7 +27,7 @@ def line_search(objective: Objective, start: Iterate, step: FloatArray) -> Itera
 
 
 def accepts(start: Iterate, end: Iterate, step: FloatArray, slope: float, length: float) -> bool:
-    """Return whether g decreased enough or, where rounding hides that, does not climb steeply."""
+    """Return whether g decreased enough or, within rounding, the slope at the end is small."""
     rise = end.value - start.value
     if rise <= ARMIJO * length * slope:
         return True

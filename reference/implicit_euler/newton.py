@@ -1,8 +1,7 @@
 """Newton's method on g with its exact Hessian.
 
-Where springs are compressed the Hessian M + h² K may be indefinite; a multiple of M is then added
-until it is positive definite, which bends the step towards the inertial one (a Levenberg shift in
-the metric of M).
+Where springs are compressed the Hessian M + h² K may be indefinite. A multiple of M is then added
+until it is positive definite, a Levenberg shift in the metric of M.
 """
 
 from collections.abc import Iterator
@@ -21,29 +20,29 @@ SHIFT_GROWTH, SHIFT_DECAY = 4.0, 2.0
 
 
 class Newton:
-    """Newton iterations; the Hessian's pattern is analysed here, once for all steps."""
+    """Newton iterations; the sparsity pattern of the Hessian is analysed once for all steps."""
 
     default_iterations = 100
 
     def __init__(self, system: MassSpring, h: float) -> None:
-        """Analyse the pattern; keep M, which shifts the Hessian, and its place in it."""
+        """Analyse the pattern; store M and the entries of the Hessian's diagonal."""
         self._analysed = hessian_factor(system)
         self._M = np.repeat(system.free_masses, 3)
-        self._diagonal = system.dampers_apart.free_blocks.diagonal
+        self._diagonal = system.with_separate_dampers.free_blocks.diagonal
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield the objective's start, then iterate after iterate; once stuck the last again."""
+        """Yield the objective's start, then the iterate after each iteration."""
         iterate, shift = objective.start, 0.0
         while True:
             yield iterate
-            factor, shift = self._factor(objective._hessian(iterate.positions), shift)
+            factor, shift = self._factor(objective.hessian_at(iterate.positions), shift)
             step = -factor.solve(iterate.gradient.ravel()).reshape(-1, 3)
             iterate = line_search(objective, iterate, step)
 
     def _factor(self, hessian: Any, shift: float) -> tuple[Factor, float]:
         """Return the factor of the Hessian plus a multiple of M, and the multiple.
 
-        The first one tried is below that of the last iteration, so that it fades out.
+        Start below the multiple of the last iteration, so that it decays when no longer needed.
         """
         shift = shift / SHIFT_DECAY if shift > FIRST_SHIFT else 0.0
         unshifted = hessian.data[self._diagonal]

@@ -1,13 +1,13 @@
-"""Newton's method on g by conjugate gradients: for cloths too large to factorise their Hessian.
+"""Truncated Newton by conjugate gradients, for systems too large to factorise their Hessian.
 
-The Newton step solves H s = -grad g(x), H = M + h² K the exact Hessian, as far as is worth while
-(Dembo and Steihaug 1983, "Truncated-Newton Algorithms for Large-Scale Unconstrained Optimization"):
-to a share of its size that falls with the square root of the gradient, which makes convergence
-faster than linear. Where H has no positive curvature along a direction, the step ends before it.
+The Newton system H s = -grad g(x), with the exact Hessian H = M + h² K, is solved inexactly (Dembo
+and Steihaug 1983, "Truncated-Newton Algorithms for Large-Scale Unconstrained Optimization"). The
+relative tolerance falls with the square root of the gradient, so that convergence is superlinear.
+The conjugate gradients stop at a direction of non-positive curvature.
 
-The conjugate gradients are preconditioned by M + h² L, the matrix of the local/global iterations,
-which is factorised for all steps and a third as wide as H. It is above H, so that one iteration is
-one of these or better; H is never assembled, only multiplied with, spring by spring.
+The preconditioner is M + h² L, the matrix of the local/global iterations, which is factorised once
+for all steps and has a third of the rows of H. The first conjugate gradient iterate is a multiple
+of a local/global step. H is never assembled, only multiplied with, spring by spring.
 """
 
 from collections.abc import Iterator
@@ -16,48 +16,40 @@ import numpy as np
 
 from ..arguments import FloatArray
 from ..backend.compiled import TwoSpeeds
-from ..mass_spring import MassSpring, _spring_blocks
 from ..quaternion import add, put_vector, scale, subtract, vector_at
-from .factor_cache import global_factor
+from ..springs import blocks
+from .factor_cache import GlobalMatrixSolver
 from .line_search import line_search
 from .objective import Iterate, Objective
 
-LOOSEST = 0.1  # share of the Newton step's size that may be left of its error
-TIGHTENING = 0.3  # times the square root of what is left of the gradient
-LIMIT = 500  # conjugate gradients in one step
+LARGEST_TOLERANCE = 0.1  # of the error of a step, relative to the step
+TOLERANCE_FACTOR = 0.3  # times the square root of the relative gradient
+MOST_CG_ITERATIONS = 500
 
 
-class NewtonCG:
-    """Truncated Newton iterations; M + h² L is factorised here, once for all steps."""
+class NewtonCG(GlobalMatrixSolver):
+    """Truncated Newton iterations."""
 
     default_iterations = 100
 
-    def __init__(self, system: MassSpring, h: float) -> None:
-        """Factorise M + h² L.
-
-        Raises:
-            NotPositiveDefiniteError: if it is singular to rounding, masses being too small.
-        """
-        self._factor = global_factor(system, h)
-
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield the objective's start, then iterate after iterate; once stuck the last again."""
+        """Yield the objective's start, then the iterate after each iteration."""
         iterate = objective.start
         while True:
             yield iterate
-            left = iterate.gradient_norm / (objective.inertial.gradient_norm or 1.0)
-            share = min(LOOSEST, TIGHTENING * np.sqrt(left))
-            iterate = line_search(objective, iterate, self._step(objective, iterate, share))
+            relative = iterate.gradient_norm / (objective.inertial.gradient_norm or 1.0)
+            tolerance = min(LARGEST_TOLERANCE, TOLERANCE_FACTOR * np.sqrt(relative))
+            iterate = line_search(objective, iterate, self._step(objective, iterate, tolerance))
 
-    def _step(self, objective: Objective, iterate: Iterate, share: float) -> FloatArray:
-        """Return s with H s = -grad g but for a share, or s before H lacks positive curvature."""
-        blocks = objective.h**2 * _spring_blocks(objective.effective, iterate.positions)
+    def _step(self, objective: Objective, iterate: Iterate, tolerance: float) -> FloatArray:
+        """Return s with H s = -grad g to a relative tolerance, truncated at negative curvature."""
         arrays, r = objective.effective.arrays, -iterate.gradient
+        K = objective.h**2 * blocks(iterate.positions, arrays, True)
         p = self._factor.solve(r)
         s, size = np.zeros_like(r), float(np.sum(r * p))
-        enough = share * share * size
-        for k in range(LIMIT):
-            Hp = _product(blocks, p, arrays.masses, arrays.springs, arrays.pinned)
+        enough = tolerance * tolerance * size
+        for k in range(MOST_CG_ITERATIONS):
+            Hp = _product(K, p, arrays.masses, arrays.springs, arrays.pinned)
             curvature = float(np.sum(p * Hp))
             if not curvature > 0:
                 return s if k else p
@@ -72,7 +64,7 @@ class NewtonCG:
 
 
 def hessian_product(blocks, p, masses, springs, pinned):
-    """Return M p plus the sum of (A_i A_i') x B_i p, zero at the pins, where p is as well."""
+    """Return M p + sum of (A_i A_i') x B_i p for a p that is zero at the pins; zero there too."""
     product = np.empty(p.shape)
     for i in range(len(p)):
         put_vector(product, i, scale(masses[i], vector_at(p, i)))

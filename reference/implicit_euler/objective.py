@@ -1,19 +1,19 @@
-"""g, whose minimum is the implicit Euler step, with its gradient, Hessian and rounding error.
+"""The objective g that an implicit Euler step minimises: value, gradient, Hessian, rounding error.
 
-Implicit Euler asks for M (x - y) = h² f(x), where y = x_n + h v_n. With f = -grad E that is
+Implicit Euler requires M (x - y) = h² f(x), where y = x_n + h v_n. With f = -grad E this is
 grad g(x) = 0 for (Liu et al. 2013)
 
     g(x) = 1/2 (x - y)' M (x - y) + h² E(x),    E(x) = sum of k/2 (l(x) - r)² - f_ext' x,
 
-where f_ext is gravity and what else is given. A damper adds c/(2h) (l(x) - l_n)² to E, so that
-a damped spring acts through the step as a spring of stiffness k + c/h and of rest length
-(k r + c l_n/h) / (k + c/h). A tension-only spring stores nothing where it is slack, but its damper
-acts all the same: the damper becomes a spring of its own, of stiffness c/h and rest length l_n.
-So a step's damper pulls with -(c/h) (l - l_n) u, a law with an energy, and not with the rate at the
-end of the step, -c ((v_i - v_j)·u) u, as `mass_spring.damper_forces` and explicit integrators do;
-the two differ in proportion to h, by how far the spring rotates within the step.
-Pinned particles are no variables: y has them at the end of their path, at x_n if they stay, and
-their rows of the gradient are zero.
+where f_ext is the sum of gravity and external forces and l_n the length of a spring at x_n. A
+damper adds c/(2h) (l(x) - l_n)² to E, so that a damped spring acts within the step as a spring of
+stiffness k + c/h and rest length (k r + c l_n/h) / (k + c/h). The damper of a tension-only spring
+also acts while the spring is slack and becomes a spring of its own, of stiffness c/h and rest
+length l_n. The force of a damper in a step is therefore -(c/h) (l - l_n) u, not the
+-c ((v_i - v_j)·u) u of explicit integrators; `mass_spring.damper_forces` compares the two.
+
+Pinned particles are not variables: y holds their positions at the end of the step, and their rows
+of the gradient are zero.
 """
 
 import functools
@@ -27,17 +27,18 @@ from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, boolean, choice, coordinates, instance, number
 from ..backend.compiled import TwoSpeeds
+from ..backend.partition import Regions
 from ..backend.threads import in_slices
 from ..mass_spring import (
     MassSpring,
     State,
-    _spring_blocks,
+    checked_state,
     constant_forces,
     derivation,
-    motion,
-    pin_goal,
+    pin_targets,
     rest_vectors,
 )
+from ..springs import blocks
 from .terms import (
     EPS,
     ROUNDING,
@@ -45,22 +46,22 @@ from .terms import (
     evaluate_objective,
     evaluate_regions,
     join_regions,
-    measure_rounding,
-    most_rounding,
+    rounding_bounds,
+    rounding_coefficients,
 )
 
 STARTS = ("y", "x_n")
 
 
 class Iterate:
-    """One point on the way to the minimum of g.
+    """Positions with g and its gradient there.
 
     Attributes:
         positions: x, shape (particle, 3) [m].
         gradient: grad g(x), shape (particle, 3) [kg m], zero at the pins.
         value: g(x) [kg m²].
         gradient_norm: |grad g(x)|.
-        most: no less than the floor, and quicker to know.
+        floor_bound: an upper bound of `floor` that is cheaper to compute.
     """
 
     def __init__(
@@ -69,53 +70,54 @@ class Iterate:
         gradient: FloatArray,
         value: float,
         gradient_norm: float,
-        most: float,
-        measure: Callable[[FloatArray], tuple[float, float]],
+        floor_bound: float,
+        rounding: Callable[[FloatArray], tuple[float, float]],
     ) -> None:
-        """Keep them, and how to measure what rounding can do."""
+        """Store them, with the function that returns `floor` and `value_floor`."""
         self.positions = positions
         self.gradient = gradient
         self.value = value
         self.gradient_norm = gradient_norm
-        self.most = most
-        self._measure = measure
+        self.floor_bound = floor_bound
+        self._compute_rounding = rounding
 
     @functools.cached_property
     def _rounding(self) -> tuple[float, float]:
-        return self._measure(self.positions)
+        return self._compute_rounding(self.positions)
 
     @property
     def floor(self) -> float:
-        """What rounding alone can leave of |grad g(x)|."""
+        """Bound on the rounding error of |grad g(x)|."""
         return self._rounding[0]
 
     @property
     def value_floor(self) -> float:
-        """How far rounding alone can move g(x)."""
+        """Bound on the rounding error of g(x)."""
         return self._rounding[1]
 
     @property
     def finite(self) -> bool:
-        """Whether neither g nor its gradient, nor what is needed for the floor, overflows."""
-        terms = self.most / ROUNDING
+        """Whether g, its gradient and the terms of the floor are finite."""
+        terms = self.floor_bound / ROUNDING
         return math.isfinite(self.value + self.gradient_norm + terms * terms)
 
     @property
     def at_floor(self) -> bool:
-        """Whether rounding alone may have left this gradient."""
+        """Whether the gradient is no larger than its rounding error."""
         return self.within(1.0)
 
     @property
     def at_rest(self) -> bool:
-        """Whether the floats nearest to a minimiser may have this gradient: an EPS of its terms."""
+        """Whether the gradient is within EPS of its terms, as at the floats next to a minimiser."""
         return self.within(EPS / ROUNDING)
 
     def within(self, share: float) -> bool:
-        """Return whether the gradient is within a share of the floor."""
-        return self.gradient_norm <= share * self.most and self.gradient_norm <= share * self.floor
+        """Return whether the norm of the gradient is at most `share` times the floor."""
+        norm = self.gradient_norm  # its bound is tried before the floor, which costs more
+        return norm <= share * self.floor_bound and norm <= share * self.floor
 
     def is_above(self, other: "Iterate") -> bool:
-        """Return whether g is greater than at the other, or no number, beyond rounding."""
+        """Return whether g is NaN or, beyond rounding, greater than at the other iterate."""
         return not (self.value <= other.value or self.value <= other.value + self.value_floor)
 
 
@@ -123,14 +125,14 @@ class Objective:
     """g of one step, in SI units.
 
     Attributes:
-        system: the system that steps.
+        system: particles and springs.
         h: the step [s].
-        x_n: the positions before the step, shape (particle, 3).
-        y: where the particles would go by themselves, and the pins do, shape (particle, 3).
-        external: gravity and other given forces [N], shape (particle, 3); never to be written to.
-        effective: the system with its dampers made into springs, as above; those that belong to
-            tension-only springs come after all others.
-        inertial: the iterate at y, by which residuals are measured.
+        x_n: positions at the start of the step, shape (particle, 3).
+        y: x_n + h v_n, with pins at the end of their path, shape (particle, 3).
+        external: gravity and external forces [N], shape (particle, 3); do not write to it.
+        effective: the system with its dampers replaced by springs, as above; those of tension-only
+            springs follow all other springs.
+        inertial: the iterate at y, to which residuals are relative.
     """
 
     def __init__(
@@ -142,7 +144,7 @@ class Objective:
         pin_positions: ArrayLike | None = None,
         start: str = "y",
     ) -> None:
-        """Set up the step of length h from a state; solvers begin at `start`, "y" or "x_n".
+        """Set up the step of length h from a state; `start` is the first iterate, "y" or "x_n".
 
         Raises:
             ValueError: if h is not positive, the state has another number of particles, or the
@@ -151,11 +153,11 @@ class Objective:
         """
         self.system = system
         self.h = h = number("h", h, above=0)
-        self.x_n, v_n = motion(system, state)
+        self.x_n, v_n = checked_state(system, state)
         self.y = np.multiply(v_n, h, out=v_n)
         self.y += self.x_n
         if pin_positions is not None:
-            self.y[system.pinned] = pin_goal(system, pin_positions)
+            self.y[system.pinned] = pin_targets(system, pin_positions)
         self.external = system.weights
         if external_forces is not None:
             self.external = constant_forces(system, external_forces)
@@ -165,18 +167,18 @@ class Objective:
             self.y, self.external, h, self._constant, arrays.masses, arrays.springs,
             arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only, arrays.pinned,
         )  # fmt: skip
-        self._most = _most_rounding(
+        self._floor_coefficients = _rounding_coefficients(
             self.y, self.external, h, arrays.masses, self.effective.spring_sums, system.free
         )
         self._start = choice("start", start, STARTS)
-        self.inertial = self._evaluate(self.y)
+        self.inertial = self.iterate_at(self.y)
 
     @functools.cached_property
     def start(self) -> Iterate:
-        """The iterate at which solvers begin: y, or x_n with the pins at their places in y."""
+        """The first iterate: y, or x_n with the pins where they are in y."""
         if self._start == "y":
             return self.inertial
-        return self._evaluate(np.where(self.system.free[:, None], self.x_n, self.y))
+        return self.iterate_at(np.where(self.system.free[:, None], self.x_n, self.y))
 
     def evaluate(self, positions: ArrayLike) -> Iterate:
         """Return g and its gradient at positions of shape (particle, 3) [m].
@@ -184,22 +186,23 @@ class Objective:
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
         """
-        return self._evaluate(self._positions(positions))
+        return self.iterate_at(self._positions(positions))
 
-    def _evaluate(self, positions: FloatArray) -> Iterate:
-        """Return what `evaluate` does; the solvers' own, whose positions it keeps and trusts."""
-        regions = self.system.dampers_apart.regions
+    def iterate_at(self, positions: FloatArray) -> Iterate:
+        """Return g and its gradient at positions that are not checked and not copied."""
+        regions = self.system.with_separate_dampers.regions
         if regions is None:
-            gradient, value, norm, reach = _evaluate(positions, *self._arguments)
+            found = _evaluate(positions, *self._arguments)
         else:
-            gradient, value, norm, reach = _side_by_side(positions, *self._arguments, regions)
-        still, moving = self._most
-        return Iterate(positions, gradient, value, norm, still + moving * reach, self._measure)
+            found = _evaluate_in_parallel(positions, self._arguments, regions)
+        gradient, value, norm, reach = found
+        a, b = self._floor_coefficients
+        return Iterate(positions, gradient, value, norm, a + b * reach, self._rounding)
 
-    def _measure(self, positions: FloatArray) -> tuple[float, float]:
-        """Return what rounding can leave of the gradient's norm, and move of g."""
+    def _rounding(self, positions: FloatArray) -> tuple[float, float]:
+        """Return bounds on the rounding errors of the gradient's norm and of g."""
         y, external, h, _, *springs = self._arguments
-        return _rounding(positions, y, external, h, *springs)
+        return _rounding_bounds(positions, y, external, h, *springs)
 
     def residual(self, iterate: Iterate) -> float:
         """Return |grad g(x)| / max(|grad g(y)|, floor).
@@ -210,12 +213,12 @@ class Objective:
         if instance("iterate", iterate, Iterate).gradient_norm == 0.0:
             return 0.0
         scale = self.inertial.gradient_norm
-        if scale < iterate.most:
+        if scale < iterate.floor_bound:
             scale = max(scale, iterate.floor)
         return float(iterate.gradient_norm / scale)
 
     def value(self, positions: ArrayLike) -> float:
-        """Return g(x) [kg m²]; the pins contribute what does not change.
+        """Return g(x) [kg m²], up to a constant that depends on the pins.
 
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
@@ -239,44 +242,43 @@ class Objective:
             ValueError: if the positions have a wrong shape or are not finite.
         """
         geometric = boolean("geometric", geometric)
-        return self._hessian(self._positions(positions), geometric=geometric)
+        return self.hessian_at(self._positions(positions), geometric=geometric)
 
-    def _hessian(self, x: FloatArray, *, geometric: bool = True) -> Any:
-        """Return what `hessian` does, of the solvers' own positions."""
-        blocks = _spring_blocks(self.effective, x, geometric=geometric)
-        springs = self.system.dampers_apart.free_blocks
-        hessian = springs.matrix(self.h * self.h * blocks)
+    def hessian_at(self, x: FloatArray, *, geometric: bool = True) -> Any:
+        """Return the Hessian at positions that are not checked."""
+        springs = self.system.with_separate_dampers.free_blocks
+        hessian = springs.matrix(self.h * self.h * blocks(x, self.effective.arrays, geometric))
         hessian.data[springs.diagonal] += np.repeat(self.system.free_masses, 3)
         return hessian
 
-    def pull_of_pins(self, positions: ArrayLike, *, geometric: bool = True) -> FloatArray:
-        """Return h² K times the way of the pins from x_n to y, shape (particle, 3) [kg m].
+    def pin_gradient(self, positions: ArrayLike, *, geometric: bool = True) -> FloatArray:
+        """Return h² K times the displacement of the pins from x_n to y, shape (particle, 3) [kg m].
 
-        It is what their way adds to the gradient at the free particles when the springs are
-        linearised at x; zero at the pins. K is as for `hessian`.
+        It is the contribution of the pins to the gradient at the free particles when the springs
+        are linearised at x; zero at the pins. K is as for `hessian`.
 
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
         """
         geometric = boolean("geometric", geometric)
-        return self._pull_of_pins(self._positions(positions), geometric=geometric)
+        return self.pin_gradient_at(self._positions(positions), geometric=geometric)
 
-    def _pull_of_pins(self, x: FloatArray, *, geometric: bool) -> FloatArray:
-        """Return what `pull_of_pins` does, of the solvers' own positions."""
-        way = np.where(self.system.free[:, None], 0.0, self.y - self.x_n)
-        if not way.any():
-            return way
+    def pin_gradient_at(self, x: FloatArray, *, geometric: bool) -> FloatArray:
+        """Return `pin_gradient` at positions that are not checked."""
+        displacement = np.where(self.system.free[:, None], 0.0, self.y - self.x_n)
+        if not displacement.any():
+            return displacement
         i, j = self.effective.springs.T
-        blocks = _spring_blocks(self.effective, x, geometric=geometric)
-        pulls = np.einsum("sab,sb->sa", self.h * self.h * blocks, way[i] - way[j])
-        return self.system.dampers_apart.free_incidence @ pulls
+        K = self.h * self.h * blocks(x, self.effective.arrays, geometric)
+        pulls = np.einsum("sab,sb->sa", K, displacement[i] - displacement[j])
+        return self.system.with_separate_dampers.free_incidence @ pulls
 
     def quadratic_form(self, positions: ArrayLike, d: ArrayLike) -> float:
-        """Return what g becomes when each spring's vector at rest length is held at d, (spring, 3).
+        """Return g as a quadratic form in x for constant rest vectors d, shape (spring, 3).
 
         1/2 x' (M + h² L) x - h² x' J d - x' (M y + h² f_ext) + constant (Liu et al. 2013), with
-        L and J of the effective springs. With the d of `rest_vectors(x)` it is g(x), with any other
-        d of the effective rest lengths, or shorter in a tension-only spring, it is more.
+        L and J of the effective springs. It equals g(x) for d = rest_vectors(x) and is larger for
+        any other d of the effective rest lengths, or of shorter ones in tension-only springs.
 
         Raises:
             ValueError: if the positions or d have a wrong shape or are not finite.
@@ -291,7 +293,7 @@ class Objective:
         return float(0.5 * np.sum(x * ((M + hh * L) @ x)) - np.sum(x * linear) + constant)
 
     def rest_vectors(self, positions: ArrayLike) -> FloatArray:
-        """Return the optimal d at x, of the effective springs, shape (spring, 3) [m].
+        """Return the optimal d of the effective springs at x, shape (spring, 3) [m].
 
         Raises:
             ValueError: if the positions have a wrong shape or are not finite.
@@ -305,8 +307,8 @@ class Objective:
 def global_matrix(system: MassSpring, h: float) -> Any:
     """Return M + h² L of the effective springs [kg], sparse (particle, particle).
 
-    It is the Hessian of g with d held, the same for x, y and z and for all steps of length h. The
-    pins are eliminated: their rows and columns are those of the identity.
+    It is the Hessian of the quadratic form of g for constant d, the same for each coordinate and
+    for all steps of length h. The rows and columns of pins are those of the identity.
     """
     weights = h * h * effective_stiffnesses(system, h)
     return system.free_blocks.scalar_matrix(weights, system.free_masses)
@@ -318,38 +320,32 @@ def effective_stiffnesses(system: MassSpring, h: float) -> FloatArray:
 
 
 def _effective(system: MassSpring, x_n: FloatArray, h: float) -> tuple[MassSpring, float]:
-    """Return the system with dampers made into springs, and the energy that this leaves out."""
+    """Return the system with dampers replaced by springs, and the constant this leaves out of E."""
     if not system.damped:
         return system, 0.0
-    apart = system.dampers_apart
-    stiffnesses = effective_stiffnesses(apart, h)
-    rest_lengths, constant = _blend(x_n, h, stiffnesses, apart.arrays)
+    separate = system.with_separate_dampers
+    stiffnesses = effective_stiffnesses(separate, h)
+    rest_lengths, constant = _blend(x_n, h, stiffnesses, separate.arrays)
     springs = {"rest_lengths": rest_lengths, "stiffnesses": stiffnesses}
-    return apart.replaced(**springs, dampings=np.zeros(len(stiffnesses))), constant
+    return separate.replaced(**springs, dampings=np.zeros(len(stiffnesses))), constant
 
 
-def _side_by_side(
-    x, y, external, h, constant, masses, springs, rest_lengths, stiffnesses, tension_only, pinned,
-    regions,
-):  # fmt: skip
-    """Return what `evaluate_objective` does, summed region by region on all cores."""
+def _evaluate_in_parallel(
+    x: FloatArray, step: tuple[Any, ...], regions: Regions
+) -> tuple[FloatArray, float, float, float]:
+    """Return the same as `evaluate_objective`, with the regions shared among threads."""
+    y, external, h, constant, masses, _, *elastic, pinned = step
     gradient, sums = np.empty(x.shape), np.empty((len(regions.particles) - 1, 2))
-    elastic = rest_lengths, stiffnesses, tension_only
+    terms = x, y, external, h, masses, *elastic, regions
     in_slices(
-        _regions,
-        len(sums),
-        lambda part: (
-            x, y, external, h, masses, *elastic, regions, part.start, part.stop, gradient, sums,
-        ),
-        least=1,
-    )  # fmt: skip
-    joined = _join(x, h, constant, *elastic, pinned, regions, gradient, sums)
-    return gradient, *joined
+        _regions, len(sums), lambda part: (*terms, part.start, part.stop, gradient, sums), least=1
+    )
+    return gradient, *_join(x, h, constant, *elastic, pinned, regions, gradient, sums)
 
 
-_evaluate = TwoSpeeds(evaluate_objective)
+_evaluate = TwoSpeeds(evaluate_objective, label="the objective of implicit Euler")
 _regions = TwoSpeeds(evaluate_regions)
 _join = TwoSpeeds(join_regions)
-_rounding = TwoSpeeds(measure_rounding)
-_most_rounding = TwoSpeeds(most_rounding)
+_rounding_bounds = TwoSpeeds(rounding_bounds)
+_rounding_coefficients = TwoSpeeds(rounding_coefficients)
 _blend = TwoSpeeds(blend_dampers)

@@ -1,6 +1,6 @@
-"""The terms of g, summed by kernels: its value and gradient, its dampers, and what rounding does.
+"""Kernels that sum the terms of g: value, gradient, effective dampers and rounding errors.
 
-What every kernel here is given is in SI units; see `objective` for the definition of g.
+All arguments are in SI units; `objective` defines g.
 """
 
 import math
@@ -11,17 +11,18 @@ from numpy import uint64 as at
 from ..quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
 from ..springs import spring_frame, spring_stretch
 
-# Rounding errors in the gradient are a few units in the last place of the terms that it sums.
+# Bound on the rounding error of the gradient, relative to the norm of the terms that it sums.
 EPS = float(np.finfo(float).eps)
 ROUNDING = 64 * EPS
-# What is said to be no less than the floor is rounded itself.
+# Covers the rounding error of the upper bound of the floor itself.
 MARGIN = 1.000001
 
 
 def blend_dampers(x_n, h, stiffnesses, system):
     """Return the effective rest lengths, and the constant that completes the square.
 
-    k/2 (l - a)² + b/2 (l - e)² = (k + b)/2 (l - rest)² + k b / (k + b) / 2 (a - e)².
+    For a damper of stiffness b = c/h and rest length l_n on a spring of stiffness k, rest length r:
+    k/2 (l - r)² + b/2 (l - l_n)² = (k + b)/2 (l - rest)² + k b / (k + b) / 2 (r - l_n)².
     """
     rest_lengths = system.rest_lengths.copy()
     constant = 0.0
@@ -38,50 +39,50 @@ def blend_dampers(x_n, h, stiffnesses, system):
 def evaluate_objective(
     x, y, external, h, constant, masses, springs, rest_lengths, stiffnesses, tension_only, pinned
 ):
-    """Return grad g, g, |grad g| and the farthest that a particle is from the origin."""
+    """Return grad g, g, |grad g| and the largest distance of a particle from the origin."""
     gradient, hh = np.empty(x.shape), h * h
-    value, farthest = add_particles(x, y, external, hh, masses, 0, len(x), gradient)
+    value, largest = add_particles(x, y, external, hh, masses, 0, len(x), gradient)
     value += hh * constant
     for s in range(len(springs)):
         i, j, k = at(springs[s, 0]), at(springs[s, 1]), hh * stiffnesses[s]
         value += add_spring(x, i, j, k, rest_lengths[s], tension_only[s], gradient)
-    return gradient, value, settle(pinned, gradient), math.sqrt(farthest)
+    return gradient, value, zero_pins(pinned, gradient), math.sqrt(largest)
 
 
 def evaluate_regions(
     x, y, external, h, masses, rest_lengths, stiffnesses, tension_only, regions, first, last,
     gradient, sums,
 ):  # fmt: skip
-    """Do the part of `evaluate_objective` that lies within some regions.
+    """Add to the gradient the terms of the particles and springs inside regions first to last - 1.
 
-    Each region's share of g and farthest squared distance from the origin go into `sums`, (region,
+    Store each region's part of g and largest squared distance from the origin in `sums`, (region,
     2).
     """
     hh, elastic = h * h, (rest_lengths, stiffnesses, tension_only)
     for r in range(first, last):
         begin, end = regions.particles[r], regions.particles[r + 1]
-        value, farthest = add_particles(x, y, external, hh, masses, begin, end, gradient)
+        value, largest = add_particles(x, y, external, hh, masses, begin, end, gradient)
         begin, end = regions.starts[r], regions.starts[r + 1]
-        sums[r, 0] = value + add_ordered(x, hh, elastic, regions, begin, end, gradient)
-        sums[r, 1] = farthest
+        sums[r, 0] = value + add_ordered_springs(x, hh, elastic, regions, begin, end, gradient)
+        sums[r, 1] = largest
 
 
 def join_regions(
     x, h, constant, rest_lengths, stiffnesses, tension_only, pinned, regions, gradient, sums
 ):
-    """Add the springs between regions; return g, |grad g| and the farthest distance."""
+    """Add the springs between regions; return g, |grad g| and the largest |x_i|."""
     hh, elastic = h * h, (rest_lengths, stiffnesses, tension_only)
-    value, farthest = hh * constant, 0.0
+    value, largest = hh * constant, 0.0
     for r in range(len(sums)):
         value += sums[r, 0]
-        farthest = max(farthest, sums[r, 1])
+        largest = max(largest, sums[r, 1])
     begin, end = regions.starts[-1], len(regions.order)
-    value += add_ordered(x, hh, elastic, regions, begin, end, gradient)
-    return value, settle(pinned, gradient), math.sqrt(farthest)
+    value += add_ordered_springs(x, hh, elastic, regions, begin, end, gradient)
+    return value, zero_pins(pinned, gradient), math.sqrt(largest)
 
 
-def add_ordered(x, hh, elastic, regions, begin, end, gradient):
-    """Add h² times the gradient of a run of springs in the order of regions; return their g."""
+def add_ordered_springs(x, hh, elastic, regions, begin, end, gradient):
+    """Add the gradient of springs begin to end - 1 of the ordered ones; return their part of g."""
     value, (rest_lengths, stiffnesses, tension_only) = 0.0, elastic
     for t in range(begin, end):
         i, j = at(regions.springs[at(t), 0]), at(regions.springs[at(t), 1])
@@ -93,23 +94,23 @@ def add_ordered(x, hh, elastic, regions, begin, end, gradient):
 
 
 def add_particles(x, y, external, hh, masses, first, last, gradient):
-    """Fill the gradient of some particles without springs.
+    """Set the gradient of particles first to last - 1 to its terms other than springs.
 
-    Return their share of g, and the farthest squared distance from the origin.
+    Return their part of g, and their largest squared distance from the origin.
     """
-    value, farthest = 0.0, 0.0
+    value, largest = 0.0, 0.0
     for i in range(first, last):
         x_i, f = vector_at(x, i), scale(hh, vector_at(external, i))
         away = subtract(x_i, vector_at(y, i))
         inertia = scale(masses[i], away)
         put_vector(gradient, i, subtract(inertia, f))
         value += 0.5 * dot(inertia, away) - dot(f, x_i)
-        farthest = max(farthest, dot(x_i, x_i))
-    return value, farthest
+        largest = max(largest, dot(x_i, x_i))
+    return value, largest
 
 
 def add_spring(x, i, j, k, rest_length, tension_only, gradient):
-    """Add the gradient of a spring of stiffness k, h² and all; return its share of g."""
+    """Add the gradient of a spring, k being h² times its stiffness; return its part of g."""
     length, u = spring_frame(x, i, j)
     stretch = spring_stretch(length, rest_length, tension_only)
     pull = scale(k * stretch, u)
@@ -118,8 +119,8 @@ def add_spring(x, i, j, k, rest_length, tension_only, gradient):
     return 0.5 * k * stretch * stretch
 
 
-def settle(pinned, gradient):
-    """Set the gradient of the pins to zero; return its norm."""
+def zero_pins(pinned, gradient):
+    """Set the gradient at the pins to zero; return its norm."""
     squares = 0.0
     for p in pinned:
         put_vector(gradient, p, (0.0, 0.0, 0.0))
@@ -128,10 +129,10 @@ def settle(pinned, gradient):
     return math.sqrt(squares)
 
 
-def measure_rounding(
+def rounding_bounds(
     x, y, external, h, masses, springs, rest_lengths, stiffnesses, tension_only, pinned
 ):
-    """Return what rounding can leave of |grad g| and move of g."""
+    """Return upper bounds of the rounding errors of |grad g| and of g."""
     size, reach, value_size, squares = np.empty(len(x)), np.empty(len(x)), 0.0, 0.0
     for i in range(len(x)):
         x_i, y_i, pull = vector_at(x, i), vector_at(y, i), h * h * norm(vector_at(external, i))
@@ -154,18 +155,17 @@ def measure_rounding(
     return ROUNDING * math.sqrt(squares), ROUNDING * value_size
 
 
-def most_rounding(y, external, h, masses, spring_sums, free):
-    """Return a and b: wherever no particle is farther than r from the origin, a + b r is no less.
+def rounding_coefficients(y, external, h, masses, spring_sums, free):
+    """Return a, b such that a + b r bounds the rounding error of |grad g| when all |x_i| <= r.
 
-    No less, that is, than what rounding can leave of |grad g|: its terms are summed with r for
-    every |x_i|, and the norm of a sum is at most the sum of norms.
+    It is the bound of `rounding_bounds` with r for every |x_i|, by the triangle inequality.
     """
     a, b = 0.0, 0.0
     for i in range(len(y)):
         if free[i]:
             pull = norm(vector_at(external, i)) + spring_sums[i, 0]
-            still = masses[i] * norm(vector_at(y, i)) + h * h * pull
-            moving = masses[i] + h * h * spring_sums[i, 1]
-            a += still * still
-            b += moving * moving
+            constant = masses[i] * norm(vector_at(y, i)) + h * h * pull
+            slope = masses[i] + h * h * spring_sums[i, 1]
+            a += constant * constant
+            b += slope * slope
     return MARGIN * ROUNDING * math.sqrt(a), MARGIN * ROUNDING * math.sqrt(b)

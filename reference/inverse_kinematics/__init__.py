@@ -63,24 +63,25 @@ class IKSolver(NamedTuple):
     mechanism: TwoSpeeds
 
 
-def _solver(sweep, update) -> IKSolver:
+def _solver(name, sweep, update) -> IKSolver:
     periods = bind(iterate_periods, iterate=bind(iterate, sweep=sweep))
     chains = bind(solve_batch, iterate_periods=periods)
     many = bind(attempts, attempt=bind(attempt, update=update))
     mechanisms = bind(answer_batch, attempts=many)
     return IKSolver(
-        TwoSpeeds(bind(solve_given, solve_batch=chains)),
-        TwoSpeeds(bind(answer_given, answer_batch=mechanisms)),
+        TwoSpeeds(bind(solve_given, solve_batch=chains), label=f"{name} for chains"),
+        TwoSpeeds(bind(answer_given, answer_batch=mechanisms), label=f"{name} for mechanisms"),
     )
 
 
-IK_SOLVERS = {
-    "ccd": _solver(ccd_sweep, ccd_update),
-    "fabrik": _solver(fabrik_sweep, fabrik_update),
-    "levenberg_marquardt": _solver(levenberg_marquardt_sweep, levenberg_marquardt_update),
-    "damped_least_squares": _solver(damped_least_squares_sweep, damped_least_squares_update),
-    "jacobian_transpose": _solver(jacobian_transpose_sweep, jacobian_transpose_update),
+_SWEEPS_AND_UPDATES = {
+    "ccd": (ccd_sweep, ccd_update),
+    "fabrik": (fabrik_sweep, fabrik_update),
+    "levenberg_marquardt": (levenberg_marquardt_sweep, levenberg_marquardt_update),
+    "damped_least_squares": (damped_least_squares_sweep, damped_least_squares_update),
+    "jacobian_transpose": (jacobian_transpose_sweep, jacobian_transpose_update),
 }
+IK_SOLVERS = {name: _solver(name, *kernels) for name, kernels in _SWEEPS_AND_UPDATES.items()}
 
 
 # Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.

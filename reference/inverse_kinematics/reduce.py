@@ -52,8 +52,10 @@ def prepare(
     if key not in articulation.mechanisms:
         mechanism, columns = _prepared(articulation, effectors, oriented)
         poses = _random_poses(articulation, restarts, seed)
-        x, R = articulation.forward(poses)
-        tips = np.concatenate([x, R], axis=-1)[:, list(effectors)]
+        tips = np.empty((0, len(effectors), 7))
+        if restarts:  # without, forward kinematics need not be compiled
+            x, R = articulation.forward(poses)
+            tips = np.concatenate([x, R], axis=-1)[:, list(effectors)]
         articulation.mechanisms[key] = Prepared(
             mechanism, np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(tips),
             (articulation.joints, *mechanism),

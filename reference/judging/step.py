@@ -1,12 +1,12 @@
-"""Anyone's answer to a step of implicit Euler, held against the minimiser of g.
+"""Evaluate positions from any solver as the result of a step of implicit Euler.
 
-The residual |grad g(x)| / |grad g(y)| is no measure of the distance to the minimiser where springs
-are stiff, and it does not see pins at all, which are no variables of g. So positions are held
-against x*, what Newton's method comes to from y when it goes on as long as rounding lets it, by
+The residual |grad g(x)| / |grad g(y)| says little about the distance to the minimiser where springs
+are stiff, and nothing about pins, which are not variables of g. Positions are therefore compared
+with x*, the limit of Newton's method from y, by the error
 
     |x - x*| / |y - x*|,
 
-over all particles and pins: 0 at x*, 1 at the inertial start y.
+over all particles and pins, which is 0 at x* and 1 at the inertial start y.
 """
 
 import math
@@ -22,33 +22,33 @@ from ..implicit_euler.objective import Objective
 from ..mass_spring import MassSpring, State
 from ..outcome import Outcome
 
-# No residual but 0 is so small: Newton's method goes on until rounding stops it.
+# Smaller than any residual but 0, so that only rounding stops Newton's method.
 TOLERANCE = 1e-300
 MOST_ITERATIONS = 500
 
 
 @dataclass(frozen=True, eq=False)
 class StepJudgement:
-    """What is known of positions x that are said to be the end of a step.
+    """Errors and proven bounds of positions x as the result of a step.
 
     Attributes:
-        error: |x - x*| / |y - x*|; 0 where both are 0, infinite where only |y - x*| is, or where
-            there is no x*.
+        error: |x - x*| / |y - x*|; 0 if both distances are 0, infinite if only |y - x*| is, or if
+            Newton's method found no x*.
         distance: |x - x*| over all coordinates [m].
         displacement: |y - x*| over all coordinates [m].
-        pin_displacement: the largest distance of a pinned particle from where the step takes it
-            [m].
-        velocity_error: the largest difference of a velocity from (x - x_n) / h [m/s]; None if no
-            velocities were given.
+        pin_displacement: the largest distance of a pinned particle from its position at the end of
+            the step [m].
+        velocity_error: the largest difference of a velocity from (x - x_n) / h [m/s]; None without
+            velocities.
         residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles.
-        certificate: what is proven about the free particles, the pins put where the step takes
-            them.
-        reference_certificate: what is proven about x*, which might be a saddle point.
-        same_minimiser: whether the minimiser near x is proven to be x* (True) or another one
-            (False); None if neither is proven.
+        certificate: the certificate of x with the pins moved to their positions at the end of the
+            step.
+        reference_certificate: the certificate of x*, which might be a saddle point.
+        same_minimiser: whether the minimiser near x is proven to be the one near x* (True) or
+            another one (False); None if neither is proven.
         minimiser: x*, shape (particle, 3) [m]; x_n if there is none.
-        iterations: how many Newton's method took to x*.
-        outcome: how it ended; unless it is `solved` there is no x*.
+        iterations: number of iterations of Newton's method.
+        outcome: the outcome of Newton's method; there is no x* unless it is `solved`.
     """
 
     error: float
@@ -66,7 +66,7 @@ class StepJudgement:
 
     @property
     def summary(self) -> str:
-        """What was found, in a few sentences, worst first."""
+        """The findings in a few sentences, worst first."""
         return " ".join([*self._pins(), self._distance(), self._proof(), *self._velocities()])
 
     def _pins(self) -> list[str]:
@@ -109,39 +109,42 @@ def judge_step(
     external_forces: ArrayLike | None = None,
     pin_positions: ArrayLike | None = None,
 ) -> StepJudgement:
-    """Return how far positions are from the end of a step, and what is proven about them.
+    """Return the errors of positions as the result of a step, with certificates.
 
     Args:
-        system: the system that steps.
-        state: where the step starts.
+        system: particles and springs.
+        state: positions and velocities at the start of the step.
         h: the step [s].
-        positions: the answer to be judged [m], shape (particle, 3).
-        velocities: its velocities [m/s], shape (particle, 3), if they are to be judged too.
-        external_forces: [N], shape (particle, 3), besides gravity; they stay through the step.
-        pin_positions: where the pinned particles, in ascending order, are at the end of the step
-            [m], shape (pinned, 3); by default they stay.
+        positions: the result to be judged [m], shape (particle, 3).
+        velocities: its velocities [m/s], shape (particle, 3), or None to judge positions only.
+        external_forces: [N], shape (particle, 3), besides gravity; constant during the step.
+        pin_positions: positions of the pinned particles, in ascending order, at the end of the
+            step [m], shape (pinned, 3); by default they do not move.
 
     Raises:
         ValueError: if an argument has a wrong shape or is not finite.
     """
     integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE, max_iterations=MOST_ITERATIONS)
-    given = external_forces, pin_positions
-    objective = integrator.objective(state, *given)
+    loads = external_forces, pin_positions
+    objective = integrator.objective(state, *loads)
     x = coordinates("positions", positions, system.particle_count, 3)
-    found = integrator.step(state, *given)
-    best, placed = found.state.positions, np.where(system.free[:, None], x, objective.y)
-    known, true = (integrator.certify(state, at, *given) for at in (placed, best))
+    solution = integrator.step(state, *loads)
+    best, with_pins = solution.state.positions, np.where(system.free[:, None], x, objective.y)
+    certificate, reference = (
+        integrator.certify(state, points, *loads) for points in (with_pins, best)
+    )
+    apart = float(np.linalg.norm(with_pins - best))
     return StepJudgement(
-        **_distances(x, best, objective.y, found.outcome.solved),
+        **_distances(x, best, objective.y, solution.outcome.solved),
         pin_displacement=_largest((x - objective.y)[system.pinned]),
         velocity_error=_velocity_error(x, velocities, objective),
-        residual=integrator.certify(state, x, *given).residual,
-        certificate=known,
-        reference_certificate=true,
-        same_minimiser=known.shares_minimiser(true, float(np.linalg.norm(placed - best))),
+        residual=integrator.certify(state, x, *loads).residual,
+        certificate=certificate,
+        reference_certificate=reference,
+        same_minimiser=certificate.shares_minimiser(reference, apart),
         minimiser=frozen(best),
-        iterations=found.iterations,
-        outcome=found.outcome,
+        iterations=solution.iterations,
+        outcome=solution.outcome,
     )
 
 

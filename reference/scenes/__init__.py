@@ -1,4 +1,4 @@
-"""Named scenes: each function returns a model and its state at the start."""
+"""Named scenes: each function returns a model and its initial state."""
 
 from .grids import grid_cloth, grid_triangles, hanging_rope, lab_cloth, lattice, net
 from .meshes import cloth_from_mesh

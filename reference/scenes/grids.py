@@ -9,7 +9,7 @@ from ..arguments import FloatArray, IndexArray, boolean, integer, number, sequen
 from ..mass_spring import MassSpring, State
 from .rest import at_rest
 
-# Steps along rows and columns from a particle of the cloth to those that springs join it to.
+# Offsets in rows and columns from a particle of the cloth to those it is joined to by springs.
 NEIGHBOURS = [(1, 0), (0, 1)]
 NEXT_BUT_ONE = [(2, 0), (0, 2)]
 DIAGONALS = [(1, 1), (1, -1)]
@@ -74,10 +74,10 @@ def grid_cloth(
     pinned: ArrayLike | None = None,
     gravity: float = 9.81,
 ) -> tuple[MassSpring, State]:
-    """Return a cloth at rest in a level rectangle.
+    """Return a rectangular cloth at rest in a horizontal plane.
 
     Particle number columns i + j lies at x = spacing i, y = height and
-    z = spacing (j - (columns - 1) / 2). Springs join neighbours, then next but one neighbours
+    z = spacing (j - (columns - 1) / 2). Springs join neighbours, then particles two apart
     (bending), then the diagonals of each square (shear).
 
     Args:
@@ -88,15 +88,15 @@ def grid_cloth(
         mass: of each particle [kg].
         stiffness: of the springs between neighbours [N/m].
         shear_stiffness: of the diagonals; 0 leaves them out, None means the stiffness.
-        bending_stiffness: of the springs to the next but one; as for shear.
+        bending_stiffness: of the springs between particles two apart; as for shear.
         damping: of each spring [N s/m].
         tension_only: whether the springs go slack.
         pinned: particles; by default the two corners at x = 0.
         gravity: downwards [m/s²].
 
     Raises:
-        ValueError: if a count is less than 1, spacing or mass not positive, a pinned particle
-            none of the cloth, or a number negative or not finite.
+        ValueError: if a count is less than 1, spacing or mass not positive, a pinned index out of
+            range, or a number negative or not finite.
     """
     rows, columns = integer("rows", rows, least=1), integer("columns", columns, least=1)
     stiffness = number("stiffness", stiffness, least=0)
@@ -120,9 +120,9 @@ def grid_cloth(
 
 
 def grid_triangles(rows: int, columns: int) -> IndexArray:
-    """Return the triangles of a `grid_cloth`, two to a square, shape (triangle, 3).
+    """Return the triangles of a `grid_cloth`, two per square, shape (triangle, 3).
 
-    Seen from above they turn counter-clockwise.
+    They are counter-clockwise as seen from above.
 
     Raises:
         ValueError: if a count is less than 1.
@@ -147,12 +147,12 @@ def net(
     damping: float = 0.0,
     gravity: float = 9.81,
 ) -> tuple[MassSpring, State]:
-    """Return a level net of ropes, which only pull, held at its four corners.
+    """Return a horizontal net of tension-only ropes, pinned at its four corners.
 
-    It is a `grid_cloth` without diagonals and bending springs; arguments and errors are as there.
+    It is a `grid_cloth` without shear and bending springs, with the same arguments and errors.
     """
     rows, columns = integer("rows", rows, least=1), integer("columns", columns, least=1)
-    last = rows * columns
+    count = rows * columns
     return grid_cloth(
         rows,
         columns,
@@ -164,7 +164,7 @@ def net(
         bending_stiffness=0.0,
         damping=damping,
         tension_only=True,
-        pinned=[0, columns - 1, last - columns, last - 1],
+        pinned=[0, columns - 1, count - columns, count - 1],
         gravity=gravity,
     )
 
@@ -178,10 +178,10 @@ def lattice(
     damping: float = 0.0,
     gravity: float = 9.81,
 ) -> tuple[MassSpring, State]:
-    """Return a block of tetrahedra, springs along their edges, clamped at its face x = 0.
+    """Return a block of tetrahedra with springs along their edges, clamped at its face x = 0.
 
-    The particles lie on a cubic grid from the origin, numbered along z first and along x last;
-    each cube is six tetrahedra around its diagonal.
+    The particles lie on a cubic grid that starts at the origin, numbered with z fastest and x
+    slowest; each cube consists of six tetrahedra around its diagonal.
 
     Args:
         counts: particles along x, y and z, 1 or more each.
@@ -197,9 +197,9 @@ def lattice(
     """
     along = sequence("counts", counts, 3, "an axis")
     nx, ny, nz = (integer("counts", count, least=1) for count in along)
-    places = np.indices((nx, ny, nz)).reshape(3, -1).T.astype(np.float64)
+    cells = np.indices((nx, ny, nz)).reshape(3, -1).T.astype(np.float64)
     return at_rest(
-        number("spacing", spacing, above=0) * places,
+        number("spacing", spacing, above=0) * cells,
         _springs((nx, ny, nz), TETRAHEDRA),
         masses=np.full(nx * ny * nz, number("mass", mass, above=0)),
         stiffnesses=number("stiffness", stiffness, least=0),
@@ -219,13 +219,13 @@ def hanging_rope(
     gravity: float = 9.81,
     tension_only: bool = False,
 ) -> tuple[MassSpring, State]:
-    """Return a rope that hangs straight down from a pin at the origin, not yet stretched.
+    """Return an unstretched rope that hangs vertically from a pin at the origin.
 
-    In equilibrium each spring carries what hangs below it: spring i, counted from the top, is
-    longer than at rest by (particles - 1 - i) mass gravity / stiffness.
+    In equilibrium spring i, counted from the top, carries the particles below it and is stretched
+    by (particles - 1 - i) mass gravity / stiffness.
 
     Args:
-        particles: 2 or more, the pinned one, number 0, included.
+        particles: 2 or more, including the pinned one, number 0.
         length: at rest [m].
         mass: of each particle [kg].
         stiffness: of each spring [N/m].
@@ -257,7 +257,7 @@ def _stiffness(name: str, value: float | None, default: float) -> float:
 
 
 def _level(rows: int, columns: int, spacing: float, height: float) -> FloatArray:
-    """Return the positions of a level grid, shape (rows columns, 3)."""
+    """Return the positions of a horizontal grid, shape (rows columns, 3)."""
     positions = np.empty((rows, columns, 3))
     positions[..., 0] = spacing * np.arange(rows)[:, None]
     positions[..., 1] = height
@@ -266,7 +266,7 @@ def _level(rows: int, columns: int, spacing: float, height: float) -> FloatArray
 
 
 def _springs(counts: tuple[int, ...], steps: Sequence[tuple[int, ...]]) -> IndexArray:
-    """Return springs from each particle of a grid to the one each step leads to, (spring, 2)."""
+    """Return springs from each particle of a grid to those at each offset, (spring, 2)."""
     number_of = np.arange(np.prod(counts)).reshape(counts)
     springs = []
     for step in steps:

@@ -1,4 +1,4 @@
-"""Cloth from a triangle mesh: a spring along every edge, and one across it against bending."""
+"""Cloth from a triangle mesh: a spring along every edge, and a bending spring across it."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -7,7 +7,7 @@ from ..arguments import FloatArray, IndexArray, array, boolean, indices, number
 from ..mass_spring import MassSpring, State
 from .rest import at_rest
 
-MOST_AT_AN_EDGE = 16  # triangles; k of them ask for k (k - 1) / 2 bending springs
+MOST_AT_AN_EDGE = 16  # triangles; k of them need k (k - 1) / 2 bending springs
 
 
 def cloth_from_mesh(
@@ -25,27 +25,26 @@ def cloth_from_mesh(
 ) -> tuple[MassSpring, State]:
     """Return the mesh as a cloth at rest: a particle at each vertex, a spring along each edge.
 
-    Bending springs join the vertices that face each other across an edge; where more than two
-    triangles meet at it, every two of them. Two particles share at most one spring: where an edge
-    joins them already, they get no bending spring.
+    A bending spring joins each pair of vertices opposite to a shared edge, unless an edge joins
+    them already.
 
     Args:
         vertices: [m], shape (particle, 3).
-        triangles: indices of vertices, shape (triangle, 3); how they turn does not matter.
-        density: of the cloth [kg/m²]; each triangle gives a third of its mass to each corner.
+        triangles: indices of vertices, shape (triangle, 3), in either orientation.
+        density: of the cloth [kg/m²]; the mass of a triangle is shared equally by its corners.
         mass: of each particle [kg], instead of a density.
         stiffness: of the springs along edges [N/m].
-        bending_stiffness: of those across edges [N/m]; 0 leaves them out.
+        bending_stiffness: of the bending springs [N/m]; 0 leaves them out.
         damping: of each spring [N s/m].
         tension_only: whether the springs along edges go slack.
-        pinned: particles that stay where they are.
+        pinned: particles that do not move.
         gravity: downwards [m/s²].
 
     Raises:
-        ValueError: if not exactly one of density and mass is given, a triangle names a vertex
-            twice or is there twice, more than 16 triangles meet at an edge, a free vertex belongs
-            to no triangle that has an area and so would have no mass, or an argument has a wrong
-            shape or is out of range.
+        ValueError: unless exactly one of density and mass is a number; if a triangle repeats a
+            vertex or another triangle, more than 16 triangles meet at an edge, a free vertex has
+            no mass because its triangles have no area, or an argument has a wrong shape or is out
+            of range.
     """
     x = array("vertices", vertices, "particle", 3)
     corners = _triangles(triangles, len(x))
@@ -82,7 +81,7 @@ def mesh_springs(
 
 
 def _facing_pairs(keys: IndexArray, facing: IndexArray) -> IndexArray:
-    """Return every two vertices that face the same edge, (pair, 2); the keys are sorted."""
+    """Return all pairs of vertices opposite to the same edge, (pair, 2); the keys are sorted."""
     pairs = [np.empty((0, 2), dtype=np.int64)]
     for apart in range(1, MOST_AT_AN_EDGE + 1):
         same = np.flatnonzero(keys[apart:] == keys[:-apart])
@@ -93,12 +92,12 @@ def _facing_pairs(keys: IndexArray, facing: IndexArray) -> IndexArray:
 
 
 def _keys(ends: IndexArray, vertex_count: int) -> IndexArray:
-    """Return one number for each pair, whatever its order."""
+    """Return a number for each pair that does not depend on its order."""
     return ends.min(axis=1) * vertex_count + ends.max(axis=1)
 
 
 def _distinct(keys: IndexArray) -> IndexArray:
-    """Return each key once, ascending; much faster here than the hashing of `np.unique`."""
+    """Return the distinct keys in ascending order, much faster than `np.unique`."""
     ordered = np.sort(keys)
     return ordered[np.diff(ordered, prepend=-1) > 0]
 

@@ -1,4 +1,4 @@
-"""Random networks: unequal particles and springs in motion, the same for the same seed."""
+"""Random networks of unequal particles and springs in motion, reproducible by their seed."""
 
 import numpy as np
 
@@ -18,13 +18,14 @@ def random_network(
 
     Masses lie between 0.2 and 2 kg, stiffnesses between 10 and 1000 N/m. Positions and velocities
     are normally distributed about zero, by 1 m and 1 m/s along each axis, and each spring is
-    stretched or squeezed by up to a third: none is at its rest length. Gravity has any direction.
+    stretched or compressed by up to a third: none is at its rest length. Gravity has a random
+    direction.
 
     Args:
         seed: 0 or more.
         particles: 1 or more.
         pinned: how many of them.
-        damping: the largest of a spring, the least being a tenth of it [N s/m]; 0 means none.
+        damping: upper bound of the springs' dampings [N s/m], a tenth of it being the lower one.
         tension_only: the share of springs that go slack, from 0 to 1.
 
     Raises:
@@ -32,7 +33,7 @@ def random_network(
     """
     rng = np.random.default_rng(integer("seed", seed, least=0))
     n = integer("particles", particles, least=1)
-    held = rng.permutation(n)[: integer("pinned", pinned, least=0, below=n + 1)]
+    pins = rng.permutation(n)[: integer("pinned", pinned, least=0, below=n + 1)]
     springs = _connected(rng, n)
     s, x = len(springs), rng.standard_normal((n, 3))
     lengths = np.linalg.norm(np.subtract(*x[springs.T]), axis=-1)
@@ -43,7 +44,7 @@ def random_network(
         rest_lengths=lengths * (1.0 + strains),
         stiffnesses=10.0 ** rng.uniform(1.0, 3.0, s),
         dampings=number("damping", damping, least=0) * rng.uniform(0.1, 1.0, s),
-        pinned=held,
+        pinned=pins,
         gravity=5.0 * rng.standard_normal(3),
         tension_only=rng.uniform(size=s) < number("tension_only", tension_only, least=0),
     )
@@ -51,7 +52,7 @@ def random_network(
 
 
 def _connected(rng: np.random.Generator, n: int) -> IndexArray:
-    """Return a spanning tree and about as many springs again, ends in either order, (spring, 2)."""
+    """Return a spanning tree and about as many other springs, with shuffled ends, (spring, 2)."""
     later = np.arange(1, n)
     tree = np.stack([rng.integers(0, later), later], axis=1)
     others = rng.integers(0, n, (n, 2))

@@ -1,4 +1,4 @@
-"""Particles and springs at rest: every rest length is the length at the start, to the last bit."""
+"""Systems at rest: every rest length equals the initial length of its spring exactly."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,7 @@ def at_rest(
     gravity: float,
     tension_only: ArrayLike = False,
 ) -> tuple[MassSpring, State]:
-    """Return the system at rest where it is; all springs have one damping, gravity is downwards.
+    """Return a system at rest at its positions, with one damping and gravity downwards.
 
     Raises:
         ValueError: as `MassSpring` does, and if damping or gravity is not a number.
@@ -33,5 +33,5 @@ def at_rest(
         gravity=(0.0, -number("gravity", gravity), 0.0),
         tension_only=tension_only,
     )
-    still = State(positions, np.zeros_like(positions))
-    return system.replaced(rest_lengths=lengths(system, positions)), still
+    state = State(positions, np.zeros_like(positions))
+    return system.replaced(rest_lengths=lengths(system, positions)), state

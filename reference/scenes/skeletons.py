@@ -8,7 +8,7 @@ from ..skeleton import Skeleton
 
 
 def lab_arm() -> tuple[Skeleton, FloatArray]:
-    """Return the lab's arm, hanging straight down, and its rest pose of identity rotations (5, 4).
+    """Return the lab's vertical arm and its rest pose of identity rotations, shape (5, 4).
 
     Five joints at heights 1.7, 0.9, 0.5, 0.3 and -0.9: links of 0.8, 0.4, 0.2 and 1.2 m.
     """
@@ -23,7 +23,7 @@ def ball_chain(*, links: int = 10, link_length: float = 0.1) -> tuple[Skeleton, 
     """Return a straight chain of equal links along x from the origin, and its rest pose.
 
     Args:
-        links: how many, with a ball joint at the foot of each and the effector at the end.
+        links: number of links; each starts at a ball joint, and the last ends at the effector.
         link_length: of each [m].
 
     Raises:

@@ -1,4 +1,4 @@
-"""What can be said of P A P' = L L' from the pattern of A alone."""
+"""Symbolic analysis: the order P and the supernodes of P A P' = L L', from the pattern of A."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from .supernodes import amalgamate, fundamental, gather, structure
 def analyse(graph, order):
     """Return the order of elimination, its inverse, the supernodes and their family.
 
-    `order` lists all vertices of the graph and is worked in.
+    `order` lists all vertices of the graph; it is overwritten.
     """
     nested_dissection(graph, order)
     parents = elimination_tree(graph, order, inverse(order))

@@ -1,4 +1,4 @@
-"""Sums of springs' blocks into one sparse matrix, whose pattern and places are found once."""
+"""Assembly: the sum of all springs' 3 x 3 blocks as a sparse matrix, its pattern found once."""
 
 import copy
 import functools
@@ -16,7 +16,7 @@ class BlockSum:
     """Sums of (A_i A_i') x B_i over the springs, for any symmetric 3 x 3 blocks B_i.
 
     All sums have one pattern: every pair of particles that a spring joins, and the whole diagonal,
-    be their entries zero or not. So the factor of one serves to make that of the next.
+    whether their entries are zero or not. The analysis of one thus serves for all.
     """
 
     def __init__(self, A: Any) -> None:
@@ -59,7 +59,7 @@ def _pattern(starts: IndexArray, rows: IndexArray) -> Any:
 
 
 def _filled(pattern: Any, data: FloatArray) -> Any:
-    """Return a matrix of the same pattern, which it shares: ten times quicker than a new one."""
+    """Return a matrix that shares a pattern, ten times quicker than by its constructor."""
     matrix = copy.copy(pattern)
     matrix.data = data
     return matrix
@@ -86,7 +86,7 @@ def join_ends(ends, count):
 
 
 def push_row(rows, ends, column, row):
-    """Put a row at the end of a column, which is in `ends` one further than the column."""
+    """Append a row to a column, whose end is ends[column + 1]."""
     rows[ends[column + 1]] = row
     ends[column + 1] += 1
 

@@ -1,4 +1,4 @@
-"""The first columns of a dense symmetric positive definite matrix eliminated, by blocks.
+"""Eliminate the first columns of a dense symmetric positive definite matrix, by blocks.
 
 Row j holds column j of the lower triangle, from the diagonal on: elimination runs along rows.
 Indices are made unsigned (`at`) for the reason given in `triangular`.
@@ -49,7 +49,7 @@ def eliminate_panel(front, first, last):
 
 
 def subtract_from_one(front, first, last, k, begin, end):
-    """Take what rows `first` to `last` eliminate from row k, columns `begin` to `end`."""
+    """Subtract the products with rows `first` to `last` from row k, columns `begin` to `end`."""
     row, j = at(k), first
     while j + 4 <= last:
         A, B, C, D = at(j), at(j + 1), at(j + 2), at(j + 3)
@@ -67,7 +67,7 @@ def subtract_from_one(front, first, last, k, begin, end):
 
 
 def subtract_from_four(front, first, last, k, begin, end):
-    """Take what rows `first` to `last` eliminate from rows k to k + 3: a quarter of the loads."""
+    """Do what `subtract_from_one` does for rows k to k + 3, with a quarter of the loads."""
     k0, k1, k2, k3, j = at(k), at(k + 1), at(k + 2), at(k + 3), first
     while j + 4 <= last:
         A, B, C, D = at(j), at(j + 1), at(j + 2), at(j + 3)

@@ -1,4 +1,4 @@
-"""Nested dissection from the graph alone.
+"""Nested dissection: an order of elimination that leaves little fill, from the graph only.
 
 A separator is eliminated after both halves that it parts, and so on inside of the halves (George
 1973, "Nested Dissection of a Regular Finite Element Mesh"). Here separators are level sets of a
@@ -96,8 +96,8 @@ def postpone_hubs(graph, search, order):
     """Put vertices with very many neighbours last; return how many others there are."""
     n = len(order)
     most = max(16.0, 10.0 * math.sqrt(n))
-    others, hubs, given = 0, n, order.copy()
-    for v in given:
+    others, hubs = 0, n
+    for v in order.copy():
         if graph.indptr[v + 1] - graph.indptr[v] > most:
             hubs -= 1
             order[hubs] = v

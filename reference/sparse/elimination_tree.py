@@ -57,7 +57,7 @@ def column_counts(graph, order, place, parents):
 
     The nodes are in postorder. Row i of L is the subtree of the nodes k with a_ik not zero and
     their ancestors up to i; adding up over all rows, each leaf of a subtree counts one and each
-    meeting of two paths takes one away (Gilbert, Ng, Peyton 1994, "An Efficient Algorithm to
+    meeting of two paths subtracts one (Gilbert, Ng, Peyton 1994, "An Efficient Algorithm to
     Compute Row and Column Counts for Sparse Cholesky Factorization").
     """
     n = len(order)
@@ -97,7 +97,7 @@ def first_descendants(parents):
 
 
 def meeting(joined, leaf):
-    """Return the root that a node hangs from at present, and shorten the way there."""
+    """Return the present root of a node's tree, and let the path to it point there."""
     root = leaf
     while joined[root] != root:
         root = joined[root]

@@ -1,4 +1,4 @@
-"""The factor of a matrix as callers see it: made, solved with, and made again for new values."""
+"""Cholesky factors as callers see them: analyse, factorise, solve, factorise again."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from ..backend.compiled import TwoSpeeds
 from .analysis import analyse
 from .dissection import Graph
 from .multifrontal import factorize
-from .triangular import LANES, SIDES, solve
+from .triangular import REGISTER, RIGHT_HAND_SIDES, solve
 
 
 class NotPositiveDefiniteError(ValueError):
@@ -22,7 +22,7 @@ class Pattern:
     """The analysis of a symmetric pattern, shared by the factors of all matrices that have it."""
 
     def __init__(self, indptr: Any, indices: Any) -> None:
-        """Order the columns and find out which entries L has.
+        """Order the columns and find the pattern of L.
 
         Raises:
             ValueError: if the pattern is not symmetric.
@@ -64,7 +64,7 @@ class CholeskyFactor:
             pattern = Pattern(indptr, indices)
         self.pattern = pattern
         self._values = np.empty(pattern.family.entries)
-        self._spare: list[FloatArray] = []  # room for the unknowns, one a call
+        self._spare: list[FloatArray] = []  # workspaces for the unknowns, one a thread
         data = np.array(columns.data, dtype=np.float64)
         failed = _factorize(
             pattern.graph, data, pattern.order, pattern.place, pattern.blocks, pattern.family,
@@ -98,22 +98,22 @@ class CholeskyFactor:
         n, pattern = len(self.pattern.order), self.pattern
         if type(b) is not np.ndarray or b.dtype != FLOAT64 or not b.flags.carray:
             b = floats("b", b, "...")
-        if b.shape == (n, SIDES):
+        if b.shape == (n, RIGHT_HAND_SIDES):
             x = np.empty(b.shape)
             columns, starts, rows, _ = pattern.blocks
             try:
                 y = self._spare.pop()
-            except IndexError:  # none yet, or other threads have them all
-                y = np.empty((n, LANES))
+            except IndexError:  # none yet, or all are used by other threads
+                y = np.empty((n, REGISTER))
             _solve(pattern.order, columns, starts, rows, self._values, b, y, x)
             self._spare.append(y)
             return x
-        given = right_sides(b, n).reshape(n, -1)
-        x, some = np.empty(given.shape), np.zeros((n, SIDES))
-        for first in range(0, given.shape[1], SIDES):
-            sides = given[:, first : first + SIDES]
-            some[:, : sides.shape[1]] = sides
-            x[:, first : first + SIDES] = self.solve(some)[:, : sides.shape[1]]
+        columns = right_sides(b, n).reshape(n, -1)
+        x, padded = np.empty(columns.shape), np.zeros((n, RIGHT_HAND_SIDES))
+        for first in range(0, columns.shape[1], RIGHT_HAND_SIDES):
+            part = slice(first, min(first + RIGHT_HAND_SIDES, columns.shape[1]))
+            padded[:, : part.stop - first] = columns[:, part]
+            x[:, part] = self.solve(padded)[:, : part.stop - first]
         return x.reshape(b.shape)
 
     def lower(self) -> Any:
@@ -154,6 +154,6 @@ def right_sides(b: ArrayLike, n: int) -> FloatArray:
     return given
 
 
-_analyse = TwoSpeeds(analyse)
-_factorize = TwoSpeeds(factorize, relaxed=True)
-_solve = TwoSpeeds(solve, relaxed=True)
+_analyse = TwoSpeeds(analyse, label="the analysis of sparse matrices")
+_factorize = TwoSpeeds(factorize, relaxed=True, label="sparse Cholesky factors")
+_solve = TwoSpeeds(solve, relaxed=True, label="sparse triangular solves")

@@ -4,7 +4,7 @@ Eliminating a vertex joins all its neighbours; the vertex with the fewest goes f
 Walker 1967, "Direct Solutions of Sparse Network Equations by Optimally Ordered Triangular
 Factorization"). The neighbours outside of the piece are eliminated later but count: without this
 halo (Pellegrini, Roman, Amestoy 2000, "Hybridizing Nested Dissection and Halo Approximate Minimum
-Degree") a piece would be eaten from its rim.
+Degree") the vertices on a piece's rim would always seem to have the least degree.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""L L' = P A P', supernode by supernode.
+"""Compute L of P A P' = L L' by the multifrontal method, supernode by supernode.
 
 A supernode's columns of A and the updates that its children left are added into one dense front;
 its columns are eliminated there and what remains is the update for its parent (Duff and Reid 1983,

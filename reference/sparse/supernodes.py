@@ -170,7 +170,7 @@ def row_lists(graph, order, place, member, above, starts):
 
 
 def family(columns, starts, above):
-    """Return the children of each supernode, and the room that updates and L need."""
+    """Return the children of each supernode, and how many entries updates and L need."""
     count, total = len(above), 0
     eldest, children = np.zeros(count + 1, np.int64), np.empty(count, np.int32)
     waiting, top, highest = np.zeros(count, np.int64), 0, 0

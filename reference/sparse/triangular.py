@@ -1,4 +1,6 @@
-"""Forward and backward substitution: L is read once in the order it is stored, once in reverse.
+"""Solve L L' x = b by forward and backward substitution, three right-hand sides together.
+
+L is read once in the order in which it is stored, and once in reverse.
 
 Three right-hand sides go through together, in the lanes of a vector register, so that L comes from
 memory once for all of them; and four columns at a time, so that the unknowns come from the cache
@@ -13,19 +15,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy import uint64 as at
 
-from ..backend.simd.rows import ask_for, less, put_row, row_at, scaled
+from ..backend.simd.rows import load_row, prefetch, scale_row, store_row, subtract_scaled
 
-SIDES, LANES = 3, 4
-# A longer L does not stay in a near cache, and is asked for so many entries ahead.
+# Right-hand sides solved together, and the doubles of a register that holds one unknown of each.
+RIGHT_HAND_SIDES, REGISTER = 3, 4
+# An L of more entries than NEAR does not stay in a near cache: prefetch it AHEAD of its use.
 NEAR, AHEAD = 2**20, 1024
 LINE = 8  # entries that come from memory together
 
 
 def solve(order, columns, starts, rows, values, b, y, x):
-    """Set x to the solution of A x = b, three right-hand sides, shape (n, 3); y is room, (n, 4).
+    """Solve A x = b for three right-hand sides: fill x, (n, 3); y is workspace, (n, 4).
 
-    The arguments are those of `Supernodes`, one by one: a tuple takes longer to hand over than a
-    small system to solve.
+    The arguments are those of `Supernodes`, one by one: passing a tuple takes longer than solving a
+    small system.
     """
     p, ahead = starts[0], AHEAD if len(values) > NEAR else 0
     for j in range(len(order)):
@@ -56,7 +59,7 @@ def row_below(below, i):
 
 
 def eliminate(values, p, first, last, below, y, ahead):
-    """Solve for the unknowns of a supernode; take what follows from them off those below.
+    """Solve for the unknowns of a supernode and subtract their terms from the rows below.
 
     Its columns begin at p in `values`; return where they end.
     """
@@ -64,26 +67,26 @@ def eliminate(values, p, first, last, below, y, ahead):
     while j + 4 <= last:
         size = last - j + below.length
         if ahead > 0:
-            ask_for_columns(values, p + ahead, size)
+            prefetch_columns(values, p + ahead, size)
         p = eliminate_four(values, p, size, j, last, below, y)
         j += 4
     while j < last:
-        a = scaled(1.0 / values[at(p)], row_at(y, at(j)))
-        put_row(y, at(j), a)
+        a = scale_row(1.0 / values[at(p)], load_row(y, at(j)))
+        store_row(y, at(j), a)
         p += 1
         for i in range(j + 1, last):
-            put_row(y, at(i), less(row_at(y, at(i)), values[at(p)], a))
+            store_row(y, at(i), subtract_scaled(load_row(y, at(i)), values[at(p)], a))
             p += 1
         for i in range(below.length):
             row = row_below(below, i)
-            put_row(y, row, less(row_at(y, row), values[at(p)], a))
+            store_row(y, row, subtract_scaled(load_row(y, row), values[at(p)], a))
             p += 1
         j += 1
     return p
 
 
 def substitute(values, p, first, last, below, y, ahead):
-    """Solve for the unknowns of a supernode, all those below being known.
+    """Solve for the unknowns of a supernode when all unknowns below it are known.
 
     Its columns end at p in `values`; return where they begin.
     """
@@ -91,28 +94,28 @@ def substitute(values, p, first, last, below, y, ahead):
     while (j - first) % 4 > 0:
         j -= 1
         p -= last - j + below.length
-        a, q = row_at(y, at(j)), p + 1
+        a, q = load_row(y, at(j)), p + 1
         for i in range(j + 1, last):
-            a = less(a, values[at(q)], row_at(y, at(i)))
+            a = subtract_scaled(a, values[at(q)], load_row(y, at(i)))
             q += 1
         for i in range(below.length):
-            a = less(a, values[at(q)], row_at(y, row_below(below, i)))
+            a = subtract_scaled(a, values[at(q)], load_row(y, row_below(below, i)))
             q += 1
-        put_row(y, at(j), scaled(1.0 / values[at(p)], a))
+        store_row(y, at(j), scale_row(1.0 / values[at(p)], a))
     while j > first:
         j -= 4
         size = last - j + below.length
         p -= 4 * size - 6
         if ahead > 0:
-            ask_for_columns(values, p - ahead, size)
+            prefetch_columns(values, p - ahead, size)
         substitute_four(values, p, size, j, last, below, y)
     return p
 
 
-def ask_for_columns(values, p, size):
-    """Ask memory for four columns from p on."""
+def prefetch_columns(values, p, size):
+    """Prefetch four columns of `size` entries, which begin at p."""
     for i in range(0, 4 * size, LINE):
-        ask_for(values, p + i)
+        prefetch(values, p + i)
 
 
 def four_columns(p, size):
@@ -123,51 +126,84 @@ def four_columns(p, size):
 def eliminate_four(values, p, size, j, last, below, y):
     """Do what `eliminate` does for columns j to j + 3; return where they end."""
     p, q, r, s = four_columns(p, size)
-    a = row_at(y, at(j))
-    a = scaled(1.0 / values[at(p)], a)
-    b = less(row_at(y, at(j + 1)), values[at(p + 1)], a)
-    b = scaled(1.0 / values[at(q)], b)
-    c = less(less(row_at(y, at(j + 2)), values[at(p + 2)], a), values[at(q + 1)], b)
-    c = scaled(1.0 / values[at(r)], c)
-    d = less(less(row_at(y, at(j + 3)), values[at(p + 3)], a), values[at(q + 2)], b)
-    d = scaled(1.0 / values[at(s)], less(d, values[at(r + 1)], c))
-    put_row(y, at(j), a)
-    put_row(y, at(j + 1), b)
-    put_row(y, at(j + 2), c)
-    put_row(y, at(j + 3), d)
+    a = load_row(y, at(j))
+    a = scale_row(1.0 / values[at(p)], a)
+    b = subtract_scaled(load_row(y, at(j + 1)), values[at(p + 1)], a)
+    b = scale_row(1.0 / values[at(q)], b)
+    c = subtract_scaled(
+        subtract_scaled(load_row(y, at(j + 2)), values[at(p + 2)], a), values[at(q + 1)], b
+    )
+    c = scale_row(1.0 / values[at(r)], c)
+    d = subtract_scaled(
+        subtract_scaled(load_row(y, at(j + 3)), values[at(p + 3)], a), values[at(q + 2)], b
+    )
+    d = scale_row(1.0 / values[at(s)], subtract_scaled(d, values[at(r + 1)], c))
+    store_row(y, at(j), a)
+    store_row(y, at(j + 1), b)
+    store_row(y, at(j + 2), c)
+    store_row(y, at(j + 3), d)
     p, q, r, s = p + 4, q + 3, r + 2, s + 1
     for i in range(last - j - 4):
         row = at(j + 4 + i)
-        z = less(less(row_at(y, row), values[at(p + i)], a), values[at(q + i)], b)
-        put_row(y, row, less(less(z, values[at(r + i)], c), values[at(s + i)], d))
+        z = subtract_scaled(
+            subtract_scaled(load_row(y, row), values[at(p + i)], a), values[at(q + i)], b
+        )
+        store_row(
+            y, row, subtract_scaled(subtract_scaled(z, values[at(r + i)], c), values[at(s + i)], d)
+        )
     k = last - j - 4
     p, q, r, s = p + k, q + k, r + k, s + k
     for i in range(below.length):
         row = row_below(below, i)
-        z = less(less(row_at(y, row), values[at(p + i)], a), values[at(q + i)], b)
-        put_row(y, row, less(less(z, values[at(r + i)], c), values[at(s + i)], d))
+        z = subtract_scaled(
+            subtract_scaled(load_row(y, row), values[at(p + i)], a), values[at(q + i)], b
+        )
+        store_row(
+            y, row, subtract_scaled(subtract_scaled(z, values[at(r + i)], c), values[at(s + i)], d)
+        )
     return s + below.length
 
 
 def substitute_four(values, p, size, j, last, below, y):
     """Do what `substitute` does for columns j to j + 3."""
     p, q, r, s = four_columns(p, size)
-    a, b, c, d = row_at(y, at(j)), row_at(y, at(j + 1)), row_at(y, at(j + 2)), row_at(y, at(j + 3))
+    a, b, c, d = (
+        load_row(y, at(j)),
+        load_row(y, at(j + 1)),
+        load_row(y, at(j + 2)),
+        load_row(y, at(j + 3)),
+    )
     for i in range(last - j - 4):
-        z = row_at(y, at(j + 4 + i))
-        a, b = less(a, values[at(p + 4 + i)], z), less(b, values[at(q + 3 + i)], z)
-        c, d = less(c, values[at(r + 2 + i)], z), less(d, values[at(s + 1 + i)], z)
+        z = load_row(y, at(j + 4 + i))
+        a, b = (
+            subtract_scaled(a, values[at(p + 4 + i)], z),
+            subtract_scaled(b, values[at(q + 3 + i)], z),
+        )
+        c, d = (
+            subtract_scaled(c, values[at(r + 2 + i)], z),
+            subtract_scaled(d, values[at(s + 1 + i)], z),
+        )
     k = last - j
     for i in range(below.length):
-        z = row_at(y, row_below(below, i))
-        a, b = less(a, values[at(p + k + i)], z), less(b, values[at(q + k - 1 + i)], z)
-        c, d = less(c, values[at(r + k - 2 + i)], z), less(d, values[at(s + k - 3 + i)], z)
-    d = scaled(1.0 / values[at(s)], d)
-    c = scaled(1.0 / values[at(r)], less(c, values[at(r + 1)], d))
-    b = less(less(b, values[at(q + 1)], c), values[at(q + 2)], d)
-    b = scaled(1.0 / values[at(q)], b)
-    a = less(less(less(a, values[at(p + 1)], b), values[at(p + 2)], c), values[at(p + 3)], d)
-    put_row(y, at(j), scaled(1.0 / values[at(p)], a))
-    put_row(y, at(j + 1), b)
-    put_row(y, at(j + 2), c)
-    put_row(y, at(j + 3), d)
+        z = load_row(y, row_below(below, i))
+        a, b = (
+            subtract_scaled(a, values[at(p + k + i)], z),
+            subtract_scaled(b, values[at(q + k - 1 + i)], z),
+        )
+        c, d = (
+            subtract_scaled(c, values[at(r + k - 2 + i)], z),
+            subtract_scaled(d, values[at(s + k - 3 + i)], z),
+        )
+    d = scale_row(1.0 / values[at(s)], d)
+    c = scale_row(1.0 / values[at(r)], subtract_scaled(c, values[at(r + 1)], d))
+    b = subtract_scaled(subtract_scaled(b, values[at(q + 1)], c), values[at(q + 2)], d)
+    b = scale_row(1.0 / values[at(q)], b)
+    a = subtract_scaled(
+        subtract_scaled(subtract_scaled(a, values[at(p + 1)], b), values[at(p + 2)], c),
+        values[at(p + 3)],
+        d,
+    )
+    store_row(y, at(j), scale_row(1.0 / values[at(p)], a))
+    store_row(y, at(j + 1), b)
+    store_row(y, at(j + 2), c)
+    store_row(y, at(j + 3), d)

@@ -72,6 +72,11 @@ def test_markdown_cells_cannot_end_a_cell_or_a_row():
     assert not re.search(r"(?<!\\)[`*_\[\]<>]", row)
 
 
+@pytest.mark.parametrize("number", ["2.7e-15", "-3.0", "+1", "0.5"])
+def test_a_number_in_markdown_stays_as_it_is(number):
+    assert f"| {number} |" in tables.markdown(table((number, 1.0)))
+
+
 def test_latex_specials_are_escaped():
     lines = tables.latex(table((HOSTILE, 1.0))).splitlines()
     row = lines[lines.index(r"    \midrule") + 1].removesuffix(r" & 1.00 \\")

@@ -13,7 +13,7 @@ CASES = range(4)  # one pin and two, ropes in odd cases, and ends that coincide
 
 def stepped(case, damped, **settings):
     """A motion, and the end of a step of it."""
-    motion = samples.motion(case, damped=damped)
+    motion = samples.network(case, damped=damped)
     integrator = ImplicitEuler(motion.system, h=motion.h, **settings)
     x = integrator.step(motion.state, motion.external_forces).state.positions
     assert np.abs(x - motion.state.positions).max() > 1e-3
@@ -39,7 +39,7 @@ def test_external_forces_and_gauss_newtons_linearisation_are_seen():
 
 
 def test_moved_pins_are_where_the_step_took_them():
-    system, state, external, h = samples.motion(0, damped=False)
+    system, state, external, h = samples.network(0, damped=False)
     goal = state.positions[system.pinned] + 0.1
     settings = {"h": h, "tolerance": 1e-14}
     x = ImplicitEuler(system, **settings).step(state, external, goal).state.positions

@@ -5,7 +5,7 @@ import pytest
 
 from crosscheck import samples
 from crosscheck.mass_spring.energy import energy_series, mechanical_energy
-from crosscheck.mass_spring.motions import MOTIONS
+from crosscheck.mass_spring.integrators import SIMULATORS
 
 # Steps of an undamped spring, twelve to a radian.
 STEPS, SHARE = 600, 1 / 12
@@ -15,15 +15,15 @@ def swing(motion):
     """The energy of an undamped oscillator over its first value."""
     system, state, _ = samples.oscillator(0)
     h = SHARE / np.sqrt(system.stiffnesses[0] / system.masses[1])
-    energies = energy_series(MOTIONS[motion], system, state, h, steps=STEPS).energies
+    energies = energy_series(SIMULATORS[motion], system, state, h, steps=STEPS).energies
     return energies / energies[0]
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("motion", SIMULATORS)
 def test_series_begins_with_the_energy_of_the_start_and_ends_in_time(motion):
     system, state, _, h = samples.smooth(0)
-    series = energy_series(MOTIONS[motion], system, state, h, steps=6, every=3)
-    last = MOTIONS[motion](system, h)(state, None, 6)
+    series = energy_series(SIMULATORS[motion], system, state, h, steps=6, every=3)
+    last = SIMULATORS[motion](system, h)(state, None, 6)
     assert series.energies[0] == mechanical_energy(system, state)
     assert series.times == pytest.approx([0.0, 3 * h, 6 * h])
     assert series.energies[2] == pytest.approx(mechanical_energy(system, last))
@@ -54,4 +54,4 @@ def test_runge_kutta_loses_little():
 def test_steps_must_come_out_even():
     system, state, h = samples.oscillator(0)
     with pytest.raises(ValueError, match="steps: expected a multiple of 3, got 7"):
-        energy_series(MOTIONS["Runge-Kutta"], system, state, h, steps=7, every=3)
+        energy_series(SIMULATORS["Runge-Kutta"], system, state, h, steps=7, every=3)

@@ -35,7 +35,7 @@ def quarter_turn(axis):
     return rotation.exponential(np.eye(3)[axis] * np.pi / 2)
 
 
-def test_quaternions_turn_the_links_below(engine_of):
+def test_quaternions_rotate_the_links_below(engine_of):
     skeleton = Skeleton([-1, 0, 1], [[0.0, 0.0, 5.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     local = np.array([quarter_turn(2), quarter_turn(0), rotation.identity()])
     pose = forward_kinematics_by(engine_of(skeleton), local)
@@ -71,7 +71,7 @@ def test_jacobian_is_the_derivative_of_the_position(engine_of):
     joint = skeleton.joint_count - 1
 
     def position(v):
-        engine.place(engine.integrate(q, v))
+        engine.update_kinematics(engine.integrate(q, v))
         return engine.position(joint)
 
     steps = DIFFERENCE_STEP * np.eye(3 * skeleton.joint_count)
@@ -80,28 +80,28 @@ def test_jacobian_is_the_derivative_of_the_position(engine_of):
     assert np.allclose(engine.jacobian(q, joint), J, atol=DIFFERENCE_TOLERANCE)
 
 
-def test_jacobian_places_the_skeleton(engine_of):
+def test_jacobian_updates_the_kinematics(engine_of):
     skeleton = samples.skeleton(5)
     engine = engine_of(skeleton)
     q = coordinates(engine, samples.local_rotations(5, skeleton))
     engine.jacobian(q, 1)
     jacobian_left = engine.pose()
-    engine.place(q)
+    engine.update_kinematics(q)
     assert np.array_equal(jacobian_left.positions, engine.pose().positions)
 
 
-def test_integrate_turns_a_joint_in_its_own_frame(engine_of):
+def test_integrate_rotates_a_joint_in_its_own_frame(engine_of):
     skeleton = Skeleton([-1, 0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     engine = engine_of(skeleton)
     q = coordinates(engine, np.array([quarter_turn(2), rotation.identity()]))
-    turned = engine.integrate(q, np.array([np.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0]))
-    engine.place(turned)
+    rotated = engine.integrate(q, np.array([np.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    engine.update_kinematics(rotated)
     expected = rotation.multiply(quarter_turn(2), quarter_turn(0))
     assert rotation.angle(engine.pose().rotations[0], expected) < 1e-15
 
 
 def test_state_comes_back_as_written():
-    system, state, _, _ = samples.motion(3)
+    system, state, _, _ = samples.network(3)
     engine = MujocoMassSpring(system)
     engine.write(state)
     assert np.array_equal(engine.read().positions, state.positions)
@@ -110,9 +110,9 @@ def test_state_comes_back_as_written():
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "discrete"])
-def test_step_depends_on_its_arguments_alone(integrator):
-    system, state, external, h = samples.motion(4)
-    other = samples.motion(9).state.positions[: len(state.positions)]
+def test_step_depends_only_on_its_arguments(integrator):
+    system, state, external, h = samples.network(4)
+    other = samples.network(9).state.positions[: len(state.positions)]
     engine = MujocoMassSpring(system, h=h, integrator=integrator)
     first = engine.step(state, external)
     engine.step(State(other, state.velocities))
@@ -122,22 +122,22 @@ def test_step_depends_on_its_arguments_alone(integrator):
 
 
 def test_pins_hold_and_move_with_the_state():
-    system, state, external, h = samples.motion(4)
+    system, state, external, h = samples.network(4)
     engine = MujocoMassSpring(system, h=h)
-    moved = State(state.positions + 1.0, state.velocities)
-    for start in (state, moved):
+    displaced = State(state.positions + 1.0, state.velocities)
+    for start in (state, displaced):
         end = engine.step(start, external)
         assert np.array_equal(end.positions[system.pinned], start.positions[system.pinned])
-    engine.place(state)
+    engine.update_forces(state)
     at_home = engine.spring_forces()
-    engine.place(moved)
+    engine.update_forces(displaced)
     assert np.allclose(at_home, engine.spring_forces(), rtol=1e-9)
 
 
 def test_spring_of_no_length_pushes_along_x():
     system = MassSpring([1.0, 1.0], [[0, 1]], 0.5, 100.0)
     engine = MujocoMassSpring(system)
-    engine.place(State(np.ones((2, 3)), np.zeros((2, 3))))
+    engine.update_forces(State(np.ones((2, 3)), np.zeros((2, 3))))
     assert np.array_equal(engine.spring_forces(), [[50.0, 0.0, 0.0], [-50.0, 0.0, 0.0]])
 
 
@@ -177,7 +177,7 @@ def test_discrete_sees_no_stiffness_at_the_very_rest_length(shift, stiff):
 def test_integrator_must_be_known():
     known = "Euler, RK4, implicit, implicitfast, discrete"
     with pytest.raises(ValueError, match=f"integrator: expected one of {known}, got 'RK5'"):
-        MujocoMassSpring(samples.motion(0).system, integrator="RK5")
+        MujocoMassSpring(samples.network(0).system, integrator="RK5")
 
 
 def off_centre(*arguments):
@@ -188,7 +188,7 @@ def off_centre(*arguments):
 
 @pytest.mark.parametrize("simple", [True, False])
 def test_implicitfast_keeps_whole_blocks_only_where_the_mass_matrix_does(monkeypatch, simple):
-    system, state, external, h = samples.motion(4)
+    system, state, external, h = samples.network(4)
     if not simple:
         monkeypatch.setattr(mujoco_mass_spring, "add_point_mass", off_centre)
     fast, whole = (
@@ -217,12 +217,12 @@ def test_flex_wants_springs_alike(name):
         MujocoFlex(system)
 
 
-def test_flex_stores_nothing_between_two_pins():
+def test_flex_stores_no_energy_between_two_pins():
     system = MassSpring(np.ones(3), [[0, 1], [1, 2]], 1.0, 100.0, pinned=[0, 1], gravity=[0, 0, 0])
     flex, tendons = MujocoFlex(system), MujocoMassSpring(system)
     state = State([[0, 0, 0], [3, 0, 0], [3, 2, 0]], np.zeros((3, 3)))
     for engine in (flex, tendons):
-        engine.place(state)
+        engine.update_forces(state)
     assert tendons.potential_energy() == pytest.approx(50 * 2**2 + 50 * 1**2)
     assert flex.potential_energy() == pytest.approx(50 * 1**2)
 

@@ -1,4 +1,4 @@
-"""Files of anyone beside the engines: what is found, what is said of each, what a crash costs."""
+"""Laws of the comparison of files: which files are found, their outcomes, and crashes."""
 
 import os
 import signal
@@ -9,11 +9,11 @@ import pytest
 
 from crosscheck.child_process import ChildProcess, LostError
 from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
-from crosscheck.robots import files, second_bvh
-from crosscheck.robots.departures import INCLUDE
+from crosscheck.robots import files, independent_bvh
+from crosscheck.robots.deviations import INCLUDE
 from crosscheck.robots.files import (
     AGREES,
-    DEPARTS,
+    DEVIATES,
     DIFFERS,
     LOST,
     NEITHER,
@@ -113,7 +113,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_the_kind_of_a_file_is_told_by_its_name_and_first_element(name, tmp_path):
+def test_the_kind_of_a_file_follows_from_its_name_and_root_element(name, tmp_path):
     (tmp_path / name).write_text(KINDS[name][0])
     assert file_kind(tmp_path / name) == KINDS[name][1]
 
@@ -134,7 +134,7 @@ def test_files_are_found_below_folders_in_order_and_once(folder):
     assert find([root / "a.xml"]).files == (File(root / "a.xml", MJCF, root),)
 
 
-def test_nothing_to_read_is_said(folder):
+def test_folders_without_files_are_an_error(folder):
     root = folder(a_txt="")
     with pytest.raises(ValueError, match="expected URDF, MJCF or BVH files, got none"):
         find([root])
@@ -142,7 +142,7 @@ def test_nothing_to_read_is_said(folder):
         find([root / "nowhere"])
 
 
-def test_everyone_agrees_on_what_all_read(folder, here):
+def test_all_readers_agree_on_valid_files(folder, here):
     root = folder(a_urdf=ARM(-1), b_xml=character(TRUNK), c_bvh=motion())
     said = outcomes(root)
     assert [list(readings) for readings in said.values()] == [
@@ -155,7 +155,7 @@ def test_everyone_agrees_on_what_all_read(folder, here):
             assert (reading.why, reading.notes) == ("", ())
 
 
-def test_who_does_not_read_a_file_is_said_and_why(folder, here):
+def test_a_refused_file_names_the_reader_and_the_reason(folder, here):
     root = folder(
         a_urdf="<robot", b_xml=character('<body name="b"><composite/></body>'),
         c_xml=character(TRUNK + "<geom type='hfield'/>"), d_bvh="HIERARCHY", e_urdf=ARM(3),
@@ -171,7 +171,7 @@ def test_who_does_not_read_a_file_is_said_and_why(folder, here):
     assert all("\n" not in r.why + "".join(r.notes) for rs in said.values() for r in rs.values())
 
 
-def test_parts_that_others_include_are_told_from_models(folder, here):
+def test_included_files_are_not_models(folder, here):
     """One that a model includes and nobody reads by itself is a part, whatever its root says."""
     main = '<mujoco><default><default class="c"/></default><include file="hand.xml"/></mujoco>'
     root = folder(main_xml=main, hand_xml=character(BY_CLASS), part_xml=PART)
@@ -213,9 +213,9 @@ def test_a_difference_is_excused_only_by_a_known_cause_where_mujoco_agrees(
         part_xml='<x><joint name="k" type="slide" axis="1 0 0" range="0 1"/></x>',
     )
     reading = outcomes(root)["a.xml"]["Pinocchio"]
-    assert (reading.outcome, reading.why) == (DEPARTS, INCLUDE)
+    assert (reading.outcome, reading.why) == (DEVIATES, INCLUDE)
     assert reading.difference > 0.01
-    monkeypatch.setattr(files, "departures", lambda path: [])
+    monkeypatch.setattr(files, "known_deviations", lambda path: [])
     assert outcomes(root)["a.xml"]["Pinocchio"].outcome == DIFFERS
     file = find([root]).files[0]
     theirs = files.Reading("Pinocchio", DIFFERS, 0.5), files.Reading("MuJoCo", UNREAD)
@@ -232,7 +232,7 @@ BLIND = {
 
 
 @pytest.mark.parametrize("name", BLIND)
-def test_what_is_read_otherwise_differs(name, tmp_path, monkeypatch):
+def test_a_changed_file_differs(name, tmp_path, monkeypatch):
     """The reference is made to read another file than the engines."""
     path, text, pattern, instead = BLIND[name]
     assert pattern in text
@@ -265,28 +265,30 @@ def test_white_space_before_the_declaration_keeps_no_engine_from_reading(folder,
 
 
 @pytest.mark.parametrize("difference", [np.nan, np.inf, 2 * POSITION.value])
-def test_what_is_no_number_differs(difference, folder, monkeypatch):
-    monkeypatch.setattr(files, "_robots", lambda *_: difference)
+def test_a_difference_above_the_tolerance_or_nan_differs(difference, folder, monkeypatch):
+    monkeypatch.setattr(files, "_largest_difference", lambda *_: difference)
     file = find([folder(a_urdf=ARM(-1))]).files[0]
     assert compare("MuJoCo", file).outcome == DIFFERS
 
 
 def test_a_joint_that_the_second_reader_misses_differs(folder, monkeypatch):
     file = find([folder(a_bvh=motion())]).files[0]
-    monkeypatch.setattr(files, "placements", lambda text: list(second_bvh.placements(text))[:-2])
+    monkeypatch.setattr(
+        files, "global_poses", lambda text: list(independent_bvh.global_poses(text))[:-2]
+    )
     assert compare(SECOND_READER, file).outcome == DIFFERS
 
 
-def test_whatever_is_raised_is_said_of_that_file(folder, monkeypatch):
+def test_an_exception_is_reported_for_its_file(folder, monkeypatch):
     def broken(*_):
         raise KeyError("a")
 
-    monkeypatch.setattr(files, "_robots", broken)
+    monkeypatch.setattr(files, "_largest_difference", broken)
     reading = compare("MuJoCo", find([folder(a_urdf=ARM(-1))]).files[0])
     assert (reading.outcome, reading.why) == (LOST, "it ends in KeyError: 'a'")
 
 
-def test_a_file_that_ends_an_engine_costs_that_reading_alone(folder):
+def test_a_file_that_crashes_an_engine_loses_only_that_reading(folder):
     """So many bodies in each other are more than the stack that Pinocchio 4.1 reads on holds."""
     deep = '<body name="a">' * 60_000 + "</body>" * 60_000
     root = folder(a_urdf=ARM(-1), c_urdf=ARM(-2), b_xml=character(deep))
@@ -335,7 +337,7 @@ def test_the_second_reader_reads_what_the_first_wrote(rng):
     local[:, 2] = [1, 0, 0, 0]
     text = bvh.format(skeleton, local)
     pose = bvh.parse(text).pose()
-    found = {name: (x, R) for name, x, R in second_bvh.placements(text.lower().upper())}
+    found = {name: (x, R) for name, x, R in independent_bvh.global_poses(text.lower().upper())}
     assert set(found) >= {"A", "B C", "D"}
     for name, j in (("A", 0), ("B C", 1), ("D", 3)):
         np.testing.assert_allclose(found[name][0], pose.positions[:, j], atol=1e-14)

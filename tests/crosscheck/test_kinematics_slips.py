@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from crosscheck import kinematics
+from crosscheck.claims import CLAIMS, skeleton_claims
 from crosscheck.engines import SKELETON_ENGINES
-from crosscheck.identities import CLAIMS, skeleton_claims
-from crosscheck.verdict import judge
+from crosscheck.verdict import check_claim
 from reference import rotation
 from reference.inverse_kinematics import solve_ik
 from reference.kinematics import forward_kinematics
@@ -92,7 +92,7 @@ SLIPS = {
 def test_claim_goes_red_under_the_slip(monkeypatch, engine, quantity, slip):
     name, slipped, _ = SLIPS[quantity]
     monkeypatch.setattr(kinematics, name, partial(slipped, slip=slip))
-    assert judge(CLAIMS[f"{quantity}, {engine}"], FEW).missed == "they differ"
+    assert check_claim(CLAIMS[f"{quantity}, {engine}"], FEW).missed == "they differ"
 
 
 @pytest.mark.parametrize("engine", SKELETON_ENGINES)
@@ -100,7 +100,7 @@ def test_without_a_slip_the_copy_holds(monkeypatch, engine):
     monkeypatch.setattr(kinematics, "forward_kinematics", partial(slipped_forward, slip=None))
     monkeypatch.setattr(kinematics, "solve_ik", partial(slipped_ik, slip=None))
     for quantity in ("joint positions", "joint rotations", "IK answers"):
-        assert judge(CLAIMS[f"{quantity}, {engine}"], FEW).held
+        assert check_claim(CLAIMS[f"{quantity}, {engine}"], FEW).holds
 
 
 @pytest.mark.parametrize("engine", SKELETON_ENGINES)

@@ -6,12 +6,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from crosscheck.identities import CLAIMS
-from crosscheck.mass_spring import balances, equilibria, lines, motions, steps
+from crosscheck.claims import CLAIMS
+from crosscheck.mass_spring import balances, equilibria, integrators, lines, steps
 from crosscheck.mass_spring import forces as force_claims
 from crosscheck.mass_spring.claims import MASS_SPRING_CLAIMS
 from crosscheck.mass_spring.steps import damper_blocks, semi_implicit
-from crosscheck.verdict import judge
+from crosscheck.verdict import check_claim
 from reference.explicit import symplectic_euler
 from reference.implicit_euler import ImplicitEuler
 from reference.mass_spring import (
@@ -77,7 +77,7 @@ def all_round(system, state):
 
 
 def one_sided(system, state):
-    """What has to be added for the first spring to leave its second end alone."""
+    """The force that cancels the first spring's pull at its second end."""
     k = np.where(np.arange(len(system.springs)) == 0, system.stiffnesses, 0.0)
     pulls = spring_forces(altered(system, stiffnesses=k), state.positions)
     pulls[system.springs[0, 0]] = 0.0
@@ -190,12 +190,12 @@ def slipped_semi_implicit(system, state, h, external, D, *, slip):
         "D twice": 2.0 * D,
         "D with the wrong sign": -D,
         "the whole block": damper_blocks(system, state),
-        "the diagonal alone": np.eye(3) * D,
+        "only the diagonal": np.eye(3) * D,
     }.get(slip, D)
     end = semi_implicit(model, state, h, given, D)
     v = np.where(system.free[:, None], state.velocities, 0.0)
-    moved = state.positions + h * (v if slip == "old velocities move" else end.velocities)
-    return State(moved, end.velocities)
+    positions = state.positions + h * (v if slip == "old velocities move" else end.velocities)
+    return State(positions, end.velocities)
 
 
 def slipped_euler(system, *, h, slip, **settings):
@@ -229,7 +229,7 @@ class _SlippedEuler:
 
 
 def slipped_motion(step, *, slip):
-    """Stand in for an integrator of `MOTIONS`, slipping in every step."""
+    """Stand in for an integrator of `SIMULATORS`, slipping in every step."""
 
     def over(system, h):
         def move(state, external, count):
@@ -275,19 +275,19 @@ ENERGY_SLIPS = ["k (l - r)²", "gravity upwards", "gravity times mass twice"]
 SPRING_SLIPS = ["push", "twice", "rest lengths left out", "one spring forgotten"]
 REST_SLIPS = ["gravity times mass twice", "gravity left out", "rest lengths left out"]
 
-# What a claim uses, and what takes its place: (module or MOTIONS, name, stand-in).
+# What a claim uses, and what takes its place: (module or SIMULATORS, name, stand-in).
 SYMPLECTIC_MOTION = (
-    motions.MOTIONS,
+    integrators.SIMULATORS,
     "symplectic Euler",
     partial(slipped_motion, slipped_symplectic),
 )
 RUNGE_KUTTA_MOTION = (
-    motions.MOTIONS,
+    integrators.SIMULATORS,
     "Runge-Kutta",
     partial(slipped_motion, slipped_runge_kutta),
 )
 IMPLICIT_MOTION = (
-    motions.MOTIONS,
+    integrators.SIMULATORS,
     "implicit Euler",
     partial(slipped_motion, slipped_implicit_step),
 )
@@ -350,7 +350,7 @@ SLIPS = {
     ),
     "damper block step": (
         (steps, "semi_implicit", slipped_semi_implicit),
-        ["nothing implicit", "D twice", "D with the wrong sign", "the diagonal alone"],
+        ["nothing implicit", "D twice", "D with the wrong sign", "only the diagonal"],
     ),
     "Gauss-Newton step": (
         (steps, "ImplicitEuler", slipped_euler),
@@ -411,7 +411,7 @@ SLIPS = {
 
 def put(monkeypatch, claim, slip):
     (where, name, slipped), _ = SLIPS[claim]
-    if where is motions.MOTIONS:
+    if where is integrators.SIMULATORS:
         monkeypatch.setitem(where, name, slipped(slip=slip))
     else:
         monkeypatch.setattr(where, name, partial(slipped, slip=slip))
@@ -424,7 +424,7 @@ def long(claim):
 
 def few(claim):
     """Judge a few cases, or of many steps one."""
-    return judge(CLAIMS[claim], 1 if long(claim) else FEW)
+    return check_claim(CLAIMS[claim], 1 if long(claim) else FEW)
 
 
 def cases_of_slips():
@@ -449,7 +449,7 @@ def test_claim_goes_red_under_the_slip(monkeypatch, claim, slip):
 @pytest.mark.parametrize("claim", list(copies()))
 def test_without_a_slip_the_copy_holds(monkeypatch, claim):
     put(monkeypatch, claim, None)
-    assert few(claim).held
+    assert few(claim).holds
 
 
 def test_every_claim_has_a_slip():

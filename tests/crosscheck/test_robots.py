@@ -16,20 +16,20 @@ from crosscheck.engines.robot_engine import UnreadableError
 from crosscheck.robots import comparisons, models
 from crosscheck.robots.claims import ROBOT_CLAIMS, robot_claims
 from crosscheck.robots.comparisons import differences
-from crosscheck.robots.departures import (
+from crosscheck.robots.deviations import (
     CLASS_ANCHOR,
-    DEPARTURES,
+    DEVIATIONS,
     FRAME,
     INCLUDE,
     NAMELESS,
     OUTER_ROOT,
+    ROTATED_ROOT,
     SHARED_REF,
-    TURNED_ROOT,
-    departures,
+    known_deviations,
 )
-from crosscheck.robots.models import CAUSES, CHARACTERS, ROBOTS, STILL, UNREAD, Model
-from crosscheck.robots.sweep import ours, sweep
-from crosscheck.verdict import judge
+from crosscheck.robots.models import CAUSES, CHARACTERS, IMMOBILE, ROBOTS, UNREAD, Model
+from crosscheck.robots.sweep import reference_kinematics, sweep
+from crosscheck.verdict import check_claim
 from reference import Articulation
 from reference.formats import FormatWarning, mjcf, urdf
 
@@ -147,13 +147,13 @@ def turned_frames(robot, change):
 
 
 def slipped(robot, q, links, *, slip):
-    """Stand in for `ours`, with one slip in what was read, in q, or in the formulas."""
+    """Stand in for `reference_kinematics`, with a slip in the robot, in q or in the formulas."""
     a = robot.articulation
     if slip == "rpy in the other order":
         robot = turned_frames(robot, lambda rpy: Rotation.from_euler("XYZ", rpy))
     if slip == "rpy in degrees":
         robot = turned_frames(robot, lambda rpy: Rotation.from_euler("xyz", rpy, degrees=True))
-    if slip == "axis not turned by the frame":
+    if slip == "axis not rotated by the frame":
         frames = Rotation.from_quat(a.frames, scalar_first=True)
         robot = robot._replace(articulation=rebuilt(a, axes=frames.inv().apply(a.axes.copy())))
     if slip == "joints by their order in another tree":
@@ -163,11 +163,11 @@ def slipped(robot, q, links, *, slip):
     if slip == "degrees for radians":
         q = np.degrees(q)
     if slip == "mimic joints not in the Jacobian":
-        held = rebuilt(a, kinds=["fixed" if j in a.mimics else k for j, k in enumerate(a.kinds)],
-                       mimics={})  # fmt: skip
-        still = ours(robot._replace(articulation=held), q, links)
-        return ours(robot, q, links)._replace(jacobians=still.jacobians)
-    motion = ours(robot, q, links)
+        kinds = ["fixed" if j in a.mimics else k for j, k in enumerate(a.kinds)]
+        without_mimics = rebuilt(a, kinds=kinds, mimics={})
+        fixed = reference_kinematics(robot._replace(articulation=without_mimics), q, links)
+        return reference_kinematics(robot, q, links)._replace(jacobians=fixed.jacobians)
+    motion = reference_kinematics(robot, q, links)
     return motion._replace(jacobians=slipped_jacobians(motion, slip))
 
 
@@ -187,7 +187,7 @@ def slipped_jacobians(motion, slip):
 FORMULAS = {
     "rpy in the other order": QUANTITIES,
     "rpy in degrees": QUANTITIES,
-    "axis not turned by the frame": QUANTITIES,
+    "axis not rotated by the frame": QUANTITIES,
     "joints by their order in another tree": QUANTITIES,
     "degrees for radians": QUANTITIES,
     "Jacobian along the link's own axes": ("jacobians",),
@@ -213,14 +213,14 @@ def small(tmp_path, monkeypatch):
 def verdict(family, engine, quantity):
     names = {"positions": "positions", "rotations": "rotations", "jacobians": "Jacobians"}
     claims = {claim.name: claim for claim in robot_claims(family, engine)}
-    return judge(claims[f"{family[:-1]} {names[quantity]}, {engine}"])
+    return check_claim(claims[f"{family[:-1]} {names[quantity]}, {engine}"])
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
 @pytest.mark.parametrize("family", TEXTS)
 def test_one_of_everything_agrees(family, engine, quantity, small, speed):
-    assert verdict(family, engine, quantity).held, verdict(family, engine, quantity)
+    assert verdict(family, engine, quantity).holds, verdict(family, engine, quantity)
 
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
@@ -235,27 +235,29 @@ def test_claims_go_red_if_the_reader_is_blind(family, slip, engine, small, monke
 
     def blindly(robot, q, links):
         names = robot.articulation.names
-        return ours(blind, q, np.array([blind.articulation.index(names[j]) for j in links]))
+        return reference_kinematics(
+            blind, q, np.array([blind.articulation.index(names[j]) for j in links])
+        )
 
-    monkeypatch.setattr(comparisons, "ours", blindly)
+    monkeypatch.setattr(comparisons, "reference_kinematics", blindly)
     for quantity in QUANTITIES:
-        held = quantity == "rotations" and slip in KEEPS_ROTATIONS
-        expected = "" if held else "they differ"
+        holds = quantity == "rotations" and slip in KEEPS_ROTATIONS
+        expected = "" if holds else "they differ"
         assert verdict(family, engine, quantity).missed == expected, quantity
 
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
 @pytest.mark.parametrize("slip", FORMULAS)
 def test_claims_go_red_under_the_slip(slip, engine, small, monkeypatch):
-    monkeypatch.setattr(comparisons, "ours", partial(slipped, slip=slip))
+    monkeypatch.setattr(comparisons, "reference_kinematics", partial(slipped, slip=slip))
     for quantity in FORMULAS[slip]:
         assert verdict(ROBOTS, engine, quantity).missed == "they differ", quantity
 
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
 def test_without_a_slip_the_copy_holds(engine, small, monkeypatch):
-    monkeypatch.setattr(comparisons, "ours", partial(slipped, slip=None))
-    assert all(verdict(ROBOTS, engine, quantity).held for quantity in QUANTITIES)
+    monkeypatch.setattr(comparisons, "reference_kinematics", partial(slipped, slip=None))
+    assert all(verdict(ROBOTS, engine, quantity).holds for quantity in QUANTITIES)
 
 
 def written(folder, text, name="a.xml"):
@@ -269,10 +271,10 @@ BODY = '<geom size="0.1"/>'
 B = f'<body name="b" pos="1 0 0">{BODY}<joint name="j" axis="0 1 0" pos="0.1 0 0"/></body>'
 FREE = f"""<mujoco>{{}}<worldbody><body name="a">{BODY}<freejoint name="r"/>{{}}</body>
     </worldbody></mujoco>"""
-DEPARTS = {
+DEVIATES = {
     OUTER_ROOT: f"""<mujoco><worldbody><body name="a" pos="0 0 0.5">{BODY}{B}</body></worldbody>
         </mujoco>""",
-    TURNED_ROOT: f"""<mujoco><worldbody>
+    ROTATED_ROOT: f"""<mujoco><worldbody>
         <body name="a" pos="0 0 1" euler="90 0 0">{BODY}<freejoint name="r"/></body>
         </worldbody></mujoco>""",
     CLASS_ANCHOR: FREE.format(
@@ -286,26 +288,26 @@ DEPARTS = {
 }
 
 
-@pytest.mark.parametrize("cause", DEPARTURES)
+@pytest.mark.parametrize("cause", DEVIATIONS)
 def test_pinocchio_departs_from_mujoco_and_us_by_a_cause_that_is_named(cause, tmp_path):
     """If this fails, Pinocchio has learnt something: the cause and its entries in CAUSES can go."""
     (tmp_path / "j.xml").write_text('<x><joint name="k"/></x>')
-    model = written(tmp_path, DEPARTS[cause])
-    assert departures(model.path) == [cause]
+    model = written(tmp_path, DEVIATES[cause])
+    assert known_deviations(model.path) == [cause]
     assert max(differences(sweep("MuJoCo", model))) < 1e-14
     assert max(differences(sweep("Pinocchio", model))) > 0.01
 
 
 def test_no_cause_is_named_where_pinocchio_reads_as_mujoco_does(tmp_path):
     model = written(tmp_path, FREE.format("<option/>", B))
-    assert departures(model.path) == []
+    assert known_deviations(model.path) == []
     assert max(differences(sweep("Pinocchio", model))) < 1e-14
-    assert departures(written(tmp_path, MJCF[:300]).path) == []
-    assert departures(written(tmp_path, URDF, "a.urdf").path) == []
+    assert known_deviations(written(tmp_path, MJCF[:300]).path) == []
+    assert known_deviations(written(tmp_path, URDF, "a.urdf").path) == []
 
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
-def test_mimics_that_are_not_taken_are_left_free_for_both_and_said(engine, small):
+def test_refused_mimics_move_independently_for_both_with_a_reason(engine, small):
     """A leader that does not exist; one that Pinocchio, which goes by the alphabet, meets late."""
     unknown = small[ROBOTS].path.with_name("unknown.urdf")
     unknown.write_text(URDF.replace('mimic joint="shoulder"', 'mimic joint="elbow"'))
@@ -332,7 +334,7 @@ def test_mimics_that_are_not_taken_are_left_free_for_both_and_said(engine, small
         ("other.xml", "<html/>"),
     ],
 )
-def test_a_file_that_an_engine_refuses_is_said_in_a_line(engine, name, text, tmp_path):
+def test_the_reason_of_a_refusal_is_one_line(engine, name, text, tmp_path):
     (tmp_path / name).write_text(text)
     with pytest.raises(UnreadableError) as error:
         ROBOT_ENGINES[engine](tmp_path / name)
@@ -375,14 +377,14 @@ UNNAMED = {
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
 @pytest.mark.parametrize("joints", UNNAMED.values(), ids=UNNAMED)
-def test_joints_without_names_are_moved(joints, engine, tmp_path):
+def test_joints_without_names_are_found(joints, engine, tmp_path):
     swept = sweep(engine, written(tmp_path, NESTED.format(joints)))
     assert len(swept.links) == 2 + (engine == "MuJoCo")  # which also knows the world
-    assert np.ptp(swept.theirs.matrices[:, -1], axis=0).max() > 0.1  # it moved
+    assert np.ptp(swept.theirs.matrices[:, -1], axis=0).max() > 0.1  # not constant
     assert max(differences(swept)) < 1e-14
 
 
-def test_joints_of_bodies_without_names_are_moved(tmp_path):
+def test_joints_of_bodies_without_names_are_found(tmp_path):
     text = NESTED.format("<freejoint/>").replace(' name="a"', "").replace(' name="j"', "")
     swept = sweep("MuJoCo", written(tmp_path, text))
     assert len(swept.links) == 3
@@ -414,7 +416,9 @@ def test_a_mimic_of_a_mimic_moves_and_is_in_the_jacobian(order, tmp_path):
     assert not swept.free_mimics
     assert swept.robot.articulation.freedom_count == 1
     assert max(differences(swept)) < 1e-14
-    ahead, behind = (ours(swept.robot, swept.q + h, swept.links).positions for h in (1e-5, -1e-5))
+    ahead, behind = (
+        reference_kinematics(swept.robot, swept.q + h, swept.links).positions for h in (1e-5, -1e-5)
+    )
     rates = (ahead - behind) / 2e-5  # off by h² times the third derivative, and 1e-16 / h
     np.testing.assert_allclose(swept.theirs.jacobians[..., :3, 0], rates, atol=1e-9)
 
@@ -445,17 +449,17 @@ def as_the_file_has_them(model):
     return sorted(found_followers(model), key=lambda follower: follower.joint)
 
 
-def places_reversed(model, root):
-    names, places = zip(*found_places(model, root), strict=True)
+def indices_reversed(model, root):
+    names, places = zip(*found_indices(model, root), strict=True)
     return zip(names, places[::-1], strict=True)
 
 
-found_followers, found_places = mujoco_robot._followers, pinocchio_robot._places_by_body
+found_followers, found_indices = mujoco_robot._followers, pinocchio_robot._indices_by_body
 UNNAMED_TWO = ("a.xml", NESTED.format(JOINTS))
 CHAIN = ("a.urdf", chain_of_mimics(4, (0, 1, 2, 3)))
 # What an adapter may get wrong: (engine, what of it, what in its place, a file that shows it).
 ADAPTERS = {
-    "joints by name alone": (
+    "joints by name only": (
         "MuJoCo", "mujoco_robot._joint_name", by_name_alone, UNNAMED_TWO
     ),
     "followers before their leaders": (
@@ -468,7 +472,7 @@ ADAPTERS = {
         "Pinocchio", "pinocchio_robot._kind", lambda joint: "Joint_", UNNAMED_TWO
     ),
     "joints of bodies in another order": (
-        "Pinocchio", "pinocchio_robot._places_by_body", places_reversed, UNNAMED_TWO
+        "Pinocchio", "pinocchio_robot._indices_by_body", indices_reversed, UNNAMED_TWO
     ),
 }  # fmt: skip
 
@@ -508,7 +512,7 @@ REFUSED_BY_PINOCCHIO = {
 
 
 @pytest.mark.parametrize("name", REFUSED_BY_PINOCCHIO)
-def test_what_pinocchio_does_not_read_is_said_and_no_crash(name, tmp_path):
+def test_files_that_would_crash_pinocchio_are_refused(name, tmp_path):
     text, said = REFUSED_BY_PINOCCHIO[name]
     (tmp_path / "c.xml").write_text(CLASS_C)
     with pytest.raises(UnreadableError) as refused:
@@ -552,8 +556,8 @@ def some(family):
 def test_claim_holds_on_some_files(claim, monkeypatch):
     chosen = {family: some(family) for family in FEW}
     monkeypatch.setattr(models, "models", chosen.get)
-    verdict = judge(claim)
-    assert verdict.held, verdict
+    verdict = check_claim(claim)
+    assert verdict.holds, verdict
     assert verdict.cases == len(chosen[ROBOTS if claim.name.startswith("robot") else CHARACTERS])
     assert verdict.cases >= 2
 
@@ -561,8 +565,8 @@ def test_claim_holds_on_some_files(claim, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("claim", ROBOT_CLAIMS, ids=lambda claim: claim.name)
 def test_claim_holds_on_all_files(claim):
-    verdict = judge(claim)
-    assert verdict.held, verdict
+    verdict = check_claim(claim)
+    assert verdict.holds, verdict
     assert verdict.cases == claim.cases
 
 
@@ -587,11 +591,11 @@ def test_what_each_engine_does_not_read_or_reads_otherwise(engine):
 
 
 @pytest.mark.slow
-def test_the_files_said_to_stand_still_do():
+def test_immobile_models_have_no_freedoms():
     for model in models.models(ROBOTS):
         if model.path.stem != "ur3":
-            still = not model.read(mimic=False).articulation.freedom_count
-            assert still == (model.name in STILL)
+            immobile = not model.read(mimic=False).articulation.freedom_count
+            assert immobile == (model.name in IMMOBILE)
 
 
 @pytest.fixture

@@ -1,29 +1,29 @@
-"""The judge: what it lets pass and what it never does."""
+"""Laws of `check_claim`: which comparisons pass and which do not."""
 
 import numpy as np
 import pytest
 
 from crosscheck.tolerances import Tolerance
-from crosscheck.verdict import Claim, Comparison, judge
+from crosscheck.verdict import Claim, Comparison, check_claim
 
 TOLERANCE = Tolerance(1e-12, "made up")
 
 
-def comparison(ours=(1.0, 2.0), theirs=(1.0, 2.0), still=(0.0, 0.0), scale=2.0):
-    return Comparison(np.array(ours), np.array(theirs), np.array(still), scale)
+def comparison(ours=(1.0, 2.0), theirs=(1.0, 2.0), baseline=(0.0, 0.0), scale=2.0):
+    return Comparison(np.array(ours), np.array(theirs), np.array(baseline), scale)
 
 
 def verdict_of(*comparisons):
     claim = Claim("a", "b", "c", lambda cases: comparisons[:cases], TOLERANCE, cases=10)
-    return judge(claim)
+    return check_claim(claim)
 
 
-def test_equal_and_moved_holds():
+def test_equal_values_away_from_the_baseline_hold():
     verdict = verdict_of(comparison(), comparison(theirs=(1.0, 2.0 + 1e-12)))
-    assert verdict.held
+    assert verdict.holds
     assert verdict.cases == 2
     assert verdict.difference == pytest.approx(5e-13, rel=1e-3)
-    assert verdict.moved == 1.0
+    assert verdict.displacement == 1.0
 
 
 def test_no_cases_is_missed():
@@ -36,13 +36,13 @@ def test_one_bad_case_among_many_is_missed():
     assert verdict.difference == pytest.approx(0.05)
 
 
-def test_one_still_case_among_many_is_missed():
-    verdict = verdict_of(comparison(), comparison(still=(1.0, 2.0 + 1e-5)))
+def test_one_case_at_its_baseline_among_many_is_missed():
+    verdict = verdict_of(comparison(), comparison(baseline=(1.0, 2.0 + 1e-5)))
     assert verdict.missed == "nothing moved"
-    assert verdict.moved == pytest.approx(5e-6)
+    assert verdict.displacement == pytest.approx(5e-6)
 
 
-@pytest.mark.parametrize("field", ["ours", "theirs", "still"])
+@pytest.mark.parametrize("field", ["ours", "theirs", "baseline"])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_what_is_not_a_number_is_missed(field, bad):
     verdict = verdict_of(comparison(), comparison(**{field: (1.0, bad)}))

@@ -85,7 +85,7 @@ def relabelled(network, rng):
 
 @pytest.fixture
 def shuffled(network, rng):
-    """Return the network with its springs in another order, every second one turned round."""
+    """Return the network with its springs in another order, every second one reversed."""
     system, _ = network
     order = rng.permutation(len(system.springs))
     ends = system.springs[order].copy()

@@ -1,4 +1,4 @@
-"""Forces, energy and the implicit Euler step in 50 digits, from their definitions alone.
+"""Forces, energy and the implicit Euler step in 50 digits, directly from their definitions.
 
 Nothing here knows how the reference computes them: a damper is a spring beside its spring, and no
 rest length is blended. Arrays hold mpmath numbers, (particle, 3) and (3 particle, 3 particle).
@@ -127,13 +127,13 @@ class Step:
         return gradient
 
     def hessian(self, x, *, geometric=True):
-        """Over the free particles alone."""
+        """Over the free particles only."""
         free = np.flatnonzero(np.repeat(self.free, 3))
         H = self.h**2 * stiffness(self.springs, x, geometric=geometric)
         H[np.diag_indices(len(H))] += np.repeat(self.m[:, 0], 3)
         return H[np.ix_(free, free)]
 
-    def moved(self, x, gradient, hessian):
+    def newton_step(self, x, gradient, hessian):
         """x less the solution of `hessian` with `gradient`; None if that is not definite."""
         p = solve(hessian, gradient[self.free].ravel())
         if p is None:
@@ -148,7 +148,7 @@ class Step:
         for _ in range(most):
             gradient = self.gradient(x)
             done = norm(gradient) <= ZERO * max(self.m[:, 0])
-            x_next = self.moved(x, gradient, self.hessian(x))
+            x_next = self.newton_step(x, gradient, self.hessian(x))
             if x_next is None or done:
                 return None if x_next is None else x
             x = x_next
@@ -157,7 +157,7 @@ class Step:
     def gauss_newton(self):
         """One step with the springs linearised at x_n, pins at rest."""
         gradient = self.gradient(self.x_n)
-        return self.moved(self.x_n, gradient, self.hessian(self.x_n, geometric=False))
+        return self.newton_step(self.x_n, gradient, self.hessian(self.x_n, geometric=False))
 
 
 def solve(A, b):

@@ -12,7 +12,7 @@ from reference import rotation, scenes
 from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, certificate
 from reference.implicit_euler.certificate import (
     Coverage,
-    Rounding,
+    RoundingErrors,
     certify,
     hessian_change,
     kantorovich_distance,
@@ -39,9 +39,9 @@ def step_of(system, state, **settings):
 
 
 def beside(x, exponent, seed, free):
-    """A point at a distance of 10^exponent, nothing but free particles moved."""
-    way = np.random.default_rng(seed).standard_normal(x.shape) * free[:, None]
-    return x + 10.0**exponent * way / np.linalg.norm(way)
+    """A point at a distance of 10^exponent, only free particles displaced."""
+    direction = np.random.default_rng(seed).standard_normal(x.shape) * free[:, None]
+    return x + 10.0**exponent * direction / np.linalg.norm(direction)
 
 
 def free_hessian(objective, x):
@@ -93,7 +93,9 @@ class TestCurvature:
     def test_a_poor_estimate_costs_sharpness_only(self, swing, monkeypatch):
         objective, x = step_of(*swing, h=1 / 30)
         sharp = certify(objective, x).curvature
-        monkeypatch.setattr(certificate, "_estimate", lambda factor, n: 3.0 * sharp)
+        monkeypatch.setattr(
+            certificate, "_estimate_smallest_eigenvalue", lambda factor, n: 3.0 * sharp
+        )
         blunt = certify(objective, x)
         assert blunt.covered
         assert 0.3 * sharp < blunt.curvature < sharp
@@ -101,7 +103,7 @@ class TestCurvature:
     def test_ten_times_too_much_is_seen(self, network, monkeypatch):
         objective, x = step_of(*network)
         monkeypatch.setattr(
-            certificate, "least_curvature", lambda H, doubt: (10 * least(H)[0], least(H)[1])
+            certificate, "least_curvature", lambda H, error: (10 * least(H)[0], least(H)[1])
         )
         with pytest.raises(AssertionError):
             self.curvature_is_below_every_eigenvalue(objective, x)
@@ -116,10 +118,10 @@ class TestCurvature:
         assert 0.9e-12 < mu < 1e-12
         assert factor is not None
 
-    def test_doubt_about_the_matrix_is_subtracted(self):
+    def test_the_error_of_the_matrix_is_subtracted(self):
         H = scipy.sparse.csc_array(np.diag([1.0, 3.0, 2.0]))
         assert least_curvature(H, 0.25)[0] == pytest.approx(least(H)[0] - 0.25, rel=1e-12)
-        assert least(H)[0] < certificate.SHARE - EPS
+        assert least(H)[0] < certificate.FIRST_SHIFT - EPS
 
 
 def least(H):
@@ -134,8 +136,8 @@ class TestHessianChange:
         assert coverage == Coverage.COVERED
         steepest = 0.0
         for _ in range(pairs):
-            ways = rng.standard_normal((2, *x.shape)) * free[:, None]
-            a, b = (x + radius * rng.uniform(0.5, 1) * w / np.linalg.norm(w) for w in ways)
+            directions = rng.standard_normal((2, *x.shape)) * free[:, None]
+            a, b = (x + radius * rng.uniform(0.5, 1) * w / np.linalg.norm(w) for w in directions)
             change = free_hessian(objective, a) - free_hessian(objective, b)
             steepest = max(steepest, np.linalg.norm(change, 2) / np.linalg.norm(a - b))
         assert steepest <= L
@@ -152,14 +154,16 @@ class TestHessianChange:
 
     def steepest_way(self, objective, x, pinned):
         """Along (1, 2^1/2, 0) / 3^1/2 the length has its largest third derivative."""
-        way = np.zeros((2, 3))
-        way[1] = np.array([1.0, math.sqrt(2.0), 0.0]) / math.sqrt(3.0)
+        direction = np.zeros((2, 3))
+        direction[1] = np.array([1.0, math.sqrt(2.0), 0.0]) / math.sqrt(3.0)
         if not pinned:
-            way[0] = -way[1]
-        way /= np.linalg.norm(way)
-        nudge = 1e-6
-        change = free_hessian(objective, x + nudge * way) - free_hessian(objective, x - nudge * way)
-        return np.linalg.norm(change, 2) / (2 * nudge)
+            direction[0] = -direction[1]
+        direction /= np.linalg.norm(direction)
+        step = 1e-6
+        change = free_hessian(objective, x + step * direction) - free_hessian(
+            objective, x - step * direction
+        )
+        return np.linalg.norm(change, 2) / (2 * step)
 
     @pytest.mark.parametrize("pinned", [(0,), ()])
     @pytest.mark.parametrize("springs", [1, 3])
@@ -226,19 +230,19 @@ class TestNewtonStep:
     """H = 2 I and grad g = (2, 0, 0): the step is 1 m long."""
 
     @pytest.mark.parametrize(
-        ("doubts", "length"),
+        ("errors", "length"),
         [((0.0, 0.0), 1.0), ((0.5, 0.0), 1.25), ((0.0, 0.5), 1.25)],
         ids=["exactly known", "gradient in doubt", "Hessian in doubt"],
     )
-    def test_it_is_longer_by_what_is_in_doubt(self, doubts, length):
+    def test_it_grows_with_the_errors(self, errors, length):
         H = scipy.sparse.csc_array(2.0 * np.eye(3))
-        given = H, factorize(H), np.array([2.0, 0, 0]), 2.0, Rounding(*doubts)
+        given = H, factorize(H), np.array([2.0, 0, 0]), 2.0, RoundingErrors(*errors)
         assert newton_length(*given) == pytest.approx(length, rel=1e-7)
 
     @pytest.mark.parametrize("slip", [1.5, 0.5])
     def test_a_poor_solve_does_not_make_it_shorter(self, slip):
         H = scipy.sparse.csc_array(2.0 * np.eye(3))
-        given = factorize(slip * H), np.array([2.0, 0, 0]), 2.0, Rounding(0.0, 0.0)
+        given = factorize(slip * H), np.array([2.0, 0, 0]), 2.0, RoundingErrors(0.0, 0.0)
         assert newton_length(H, *given) >= 1.0
 
 
@@ -262,7 +266,7 @@ class TestDistance:
             assert error <= known.distance + ROUNDED
 
     @given(exponents, seeds)
-    def test_it_says_all_that_convexity_on_a_ball_does(self, exponent, seed):
+    def test_it_is_at_least_as_sharp_as_convexity_on_a_ball(self, exponent, seed):
         """rho = 2 |grad g| / mu, and L rho <= mu / 2 with the L of that ball."""
         system, state = scenes.random_network(particles=12, seed=seed % 5)
         objective, exact = step_of(system, state)
@@ -283,22 +287,22 @@ class TestDistance:
         assert known.lipschitz == 0
         assert 0 < known.distance < 1e-13
 
-    def test_of_pins_alone_it_is_nothing(self):
+    def test_it_is_zero_if_all_particles_are_pinned(self):
         system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
         known = certify(*step_of(system, State(np.eye(3)[:2], np.ones((2, 3)))))
         assert known.covered
-        assert (known.distance, known.alone_within) == (0.0, math.inf)
+        assert (known.distance, known.unique_within) == (0.0, math.inf)
 
-    def test_a_turned_world_and_other_labels_change_nothing(
+    def test_it_is_invariant_under_rotations_and_relabelling(
         self, network, relabelled, altered, rng
     ):
         system, state = network
         known = certify(*step_of(system, state, max_iterations=2))
         R = rotation.to_matrix(rotation.random(rng, 1))[0]
-        turned = altered(system, gravity=R @ system.gravity)
-        moved = State(state.positions @ R.T, state.velocities @ R.T)
+        rotated = altered(system, gravity=R @ system.gravity)
+        displaced = State(state.positions @ R.T, state.velocities @ R.T)
         renamed = relabelled[:2]
-        for other in ((turned, moved), renamed):
+        for other in ((rotated, displaced), renamed):
             again = certify(*step_of(*other, max_iterations=2))
             assert again.covered
             assert again.distance == pytest.approx(known.distance, rel=1e-3)
@@ -319,7 +323,7 @@ class TestDistance:
         assert other.distance == pytest.approx(one.distance, rel=1e-6)
         assert other.curvature == pytest.approx(factor * one.curvature, rel=1e-2)
 
-    def test_a_result_is_certified_by_what_its_step_was_given(self, network, rng):
+    def test_a_result_is_certified_with_the_arguments_of_its_step(self, network, rng):
         system, state = network
         integrator = ImplicitEuler(system, h=h)
         given = rng.standard_normal((7, 3)), state.positions[system.pinned] + 0.1
@@ -355,7 +359,7 @@ class TestMinimisers:
 
     @pytest.fixture
     def buckled(self):
-        """A mass pushed off the line between two pins, held to it across: up and down alike."""
+        """A compressed mass between two pins, with minima above and below the line."""
         pins = [[-0.5, 0, 0], [0.5, 0, 0], [0, 0, -2], [0, 0, 2]]
         system = MassSpring(
             np.ones(5), [[0, 1], [0, 2], [0, 3], [0, 4]], [1, 1, 0.5, 0.5], [100, 100, 60, 60],
@@ -371,7 +375,7 @@ class TestMinimisers:
             up[0] -= step
         return objective, up, up * [1, -1, 1]
 
-    def test_two_minima_are_told_apart(self, buckled):
+    def test_two_minima_are_distinguished(self, buckled):
         objective, up, down = buckled
         one, other = certify(objective, up), certify(objective, down)
         assert objective.value(up) == pytest.approx(objective.value(down), rel=1e-12)
@@ -430,13 +434,13 @@ class TestReasons:
         known = certify(self.long_step(1e75, huge), huge.positions)
         assert (known.coverage, known.residual) == (Coverage.OVERFLOWN, math.inf)
 
-    def test_a_gradient_that_overflows_here_alone(self):
+    def test_a_gradient_that_overflows_only_at_x(self):
         objective = self.long_step(1e75, one_spring()[1])
         x = objective.y * [1e75, 1, 1]
         assert objective.start.finite
         assert certify(objective, x).coverage == Coverage.OVERFLOWN
 
-    def test_a_gradient_that_overflows_at_the_start_alone(self):
+    def test_a_gradient_that_overflows_only_at_the_start(self):
         _, state = one_spring()
         fast = State(state.positions, [[0, 0, 0], [1e75, 0, 0]])
         objective = self.long_step(1e70, fast)
@@ -469,7 +473,7 @@ class TestReasons:
         known = self.start(system, State(0 * state.positions, np.zeros((2, 3))))
         assert known.coverage == Coverage.COINCIDENT
 
-    def test_ends_that_may_meet_on_the_way(self):
+    def test_ends_that_may_meet_along_the_step(self):
         """Stretched far, the spring will contract, and the bound cannot tell by how much."""
         system = MassSpring([1, 1], [[0, 1]], 0.01, 1 / h**2, pinned=[0], gravity=(0, 0, 0))
         state = State([[0, 0, 0], [0.8, 0, 0]], [[0, 0, 0], [-12.0, 0, 0]])
@@ -501,7 +505,7 @@ class TestReasons:
     def test_a_rope_exactly_taut(self):
         assert self.start(*self.rope(1.0)).coverage == Coverage.KINK
 
-    def test_a_rope_that_may_go_slack_on_the_way(self):
+    def test_a_rope_that_may_go_slack_along_the_step(self):
         known = self.start(*self.rope(1.2))
         assert known.coverage == Coverage.KINK
         assert known.newton_step > 0.05
@@ -521,7 +525,7 @@ class TestReasons:
         assert known.coverage == Coverage.TOO_FAR
         assert known.lipschitz * known.newton_step > 0.5 * known.curvature
         assert known.distance == math.inf
-        assert known.alone_within == 0
+        assert known.unique_within == 0
 
     def test_too_far_begins_where_kantorovichs_theorem_ends(self):
         system, state = one_spring()

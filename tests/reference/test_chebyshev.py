@@ -8,7 +8,7 @@ import pytest
 
 from reference import ImplicitEuler, scenes
 from reference.implicit_euler import chebyshev
-from reference.implicit_euler.chebyshev import PLAIN, Pace
+from reference.implicit_euler.chebyshev import PLAIN, Acceleration
 
 h = 1 / 30
 
@@ -20,13 +20,13 @@ def errors(rho, iterations):
     """
     share = np.linspace(0, rho, 200)
     x = before = np.ones(200)
-    pace, sizes = Pace(), []
+    acceleration, sizes = Acceleration(), []
     for _ in range(iterations):
         step = -(1 - share) * x
         sizes.append(math.sqrt(np.sum(step**2)))
-        weight, relaxation = pace.next(sizes[-1])
+        weight, relaxation = acceleration.next(sizes[-1])
         x, before = x + (weight - 1) * (x - before) + weight * relaxation * step, x
-    return np.array(sizes), pace._R
+    return np.array(sizes), acceleration._R
 
 
 @pytest.mark.parametrize("rho", [0.5, 0.9, 0.99, 0.999])
@@ -45,21 +45,21 @@ def test_accelerated_iterations_number_as_the_square_root_of_plain_ones(rho):
 
 
 def test_iterations_are_plain_first():
-    pace = Pace()
-    assert [pace.next(0.5**k) for k in range(PLAIN)] == [(1.0, 1.0)] * PLAIN
-    weight, relaxation = pace.next(0.5**PLAIN)
+    acceleration = Acceleration()
+    assert [acceleration.next(0.5**k) for k in range(PLAIN)] == [(1.0, 1.0)] * PLAIN
+    weight, relaxation = acceleration.next(0.5**PLAIN)
     assert (weight, relaxation) == (1.0, pytest.approx(4 / 3))
     R = relaxation - 1
-    second, _ = pace.next(0.01)
+    second, _ = acceleration.next(0.01)
     assert second == pytest.approx(2 / (2 - R**2))
-    assert pace.next(0.001)[0] == pytest.approx(4 / (4 - R**2 * second))
+    assert acceleration.next(0.001)[0] == pytest.approx(4 / (4 - R**2 * second))
 
 
 @pytest.mark.parametrize("sizes", [[0.0], [1.0, 0.0], [1e-300, 1e-320], [1.0], [1e-150, 1e150]])
 def test_whatever_the_steps_the_weights_are_finite(sizes):
-    pace = Pace()
+    acceleration = Acceleration()
     for size in itertools.islice(itertools.cycle(sizes), 3000):
-        weight, relaxation = pace.next(size)
+        weight, relaxation = acceleration.next(size)
         assert 1 <= weight <= 2
         assert 1 <= relaxation < 2
 
@@ -70,11 +70,11 @@ def test_g_does_not_grow_whatever_the_weights(monkeypatch):
     swinging = state.of(state.positions, np.cross(state.positions, [0.3, 0.5, 2.0]))
     leaps = []
 
-    def leaping(pace, size):
+    def leaping(acceleration, size):
         leaps.append(size)
         return (1.0, 10.0) if len(leaps) % 3 == 2 else (1.0, 1.0)
 
-    monkeypatch.setattr(chebyshev.Pace, "next", leaping)
+    monkeypatch.setattr(chebyshev.Acceleration, "next", leaping)
     integrator = ImplicitEuler(system, h=h, solver="chebyshev")
     iterates = list(itertools.islice(integrator.iterates(swinging), 31))
     for before, after in itertools.pairwise(iterates):

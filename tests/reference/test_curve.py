@@ -73,8 +73,8 @@ def test_the_triangle_starts_at_its_corner_at_the_origin():
 
 def test_the_star_visits_every_second_of_five_points():
     corners = curves["star"](5)
-    turns = np.unwrap(np.arctan2(corners[:, 2], corners[:, 0]))
-    np.testing.assert_allclose(np.diff(turns), 4 * np.pi / 5)
+    angles = np.unwrap(np.arctan2(corners[:, 2], corners[:, 0]))
+    np.testing.assert_allclose(np.diff(angles), 4 * np.pi / 5)
     np.testing.assert_allclose(np.linalg.norm(corners, axis=-1), 0.4)
 
 
@@ -129,7 +129,7 @@ def test_a_closed_curve_is_spaced_across_its_wrap_too(points, least):
     assert around.max() <= 2 * least + ROUNDING
 
 
-def test_points_are_given_up_until_the_end_fits(speed):
+def test_points_are_dropped_until_the_end_is_far_enough(speed):
     """The curve comes back to its end: the last two points kept lie within 1 of it."""
     points = np.array([[0.0, 0, 0], [1.5, 0, 0], [2.2, 0.8, 0], [2.2, -0.3, 0], [2.0, 0.2, 0]])
     even = resample(points, min_spacing=1.0, max_spacing=3.0)

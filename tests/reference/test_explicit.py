@@ -76,7 +76,7 @@ def test_symplectic_euler_keeps_its_shadow_energy():
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 class TestEveryIntegrator:
-    def test_momentum_changes_by_the_outer_forces_alone(
+    def test_momentum_changes_only_by_external_forces(
         self, network, altered, rng, speed, integrator
     ):
         system, state = altered(network[0], pinned=()), network[1]
@@ -96,7 +96,7 @@ class TestEveryIntegrator:
         np.testing.assert_array_equal(after.velocities[2], np.zeros(3))
         assert np.abs(after.positions - state.positions).max() > 0.01
 
-    def test_the_state_before_is_left_alone(self, network, integrator):
+    def test_the_initial_state_is_not_changed(self, network, integrator):
         system, state = network
         x, v = state.positions.copy(), state.velocities.copy()
         integrator(system, state, 0.01)

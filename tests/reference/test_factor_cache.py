@@ -1,12 +1,11 @@
-"""Laws of factors that are kept: found again where they fit, and never where they do not."""
+"""Laws of the cache of factors: a factor is shared where it is valid, and only there."""
 
 import gc
 
 import numpy as np
 import pytest
 
-from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
-from reference.implicit_euler import factor_cache as prefactored
+from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, factor_cache
 from reference.implicit_euler.objective import Objective, global_matrix
 from reference.mass_spring import State
 from reference.sparse import factor
@@ -18,7 +17,7 @@ h = 0.05
 @pytest.fixture(autouse=True)
 def nothing_alive():
     """Start without the factors that other tests may have left to the garbage collector."""
-    prefactored.forget()
+    factor_cache.clear()
 
 
 @pytest.fixture
@@ -53,7 +52,7 @@ def test_a_change_between_steps_gives_what_a_fresh_integrator_gives(network, cha
     state = before.step(network[1]).state
     system, step = change
     after = ImplicitEuler(system, h=step, solver=solver).step(state)
-    prefactored.forget()
+    factor_cache.clear()
     fresh = ImplicitEuler(system, h=step, solver=solver).step(state)
     np.testing.assert_array_equal(after.state.positions, fresh.state.positions)
     np.testing.assert_array_equal(after.history, fresh.history)
@@ -81,25 +80,25 @@ def test_solvers_share_what_is_alike(network, analyses):
 
 
 def test_the_same_matrix_is_factorised_once(network):
-    one = prefactored.global_factor(network[0], h)
-    assert prefactored.global_factor(network[0], h) is one
-    assert prefactored.global_factor(network[0], 2 * h) is not one
+    one = factor_cache.global_factor(network[0], h)
+    assert factor_cache.global_factor(network[0], h) is one
+    assert factor_cache.global_factor(network[0], 2 * h) is not one
 
 
-def test_a_factor_that_nobody_holds_is_let_go(network, analyses):
+def test_an_unused_factor_leaves_the_cache(network, analyses):
     for _ in range(2):
         ImplicitEuler(network[0], h=h, solver="local_global")
         gc.collect()
-        assert not prefactored._alike
-        assert not prefactored._same
+        assert not factor_cache._by_pattern
+        assert not factor_cache._by_matrix
     assert len(analyses) == 2
 
 
 def test_the_factor_is_that_of_the_matrix(network, rng, speed):
     system, b = network[0], rng.standard_normal((7, 3))
-    kept = prefactored.global_factor(system, h)
+    kept = factor_cache.global_factor(system, h)
     for step in (h, 2 * h):
-        x = prefactored.global_factor(system, step).solve(b)
+        x = factor_cache.global_factor(system, step).solve(b)
         np.testing.assert_allclose(global_matrix(system, step) @ x, b, rtol=0, atol=1e-13)
     np.testing.assert_allclose(global_matrix(system, h) @ kept.solve(b), b, rtol=0, atol=1e-13)
 
@@ -107,7 +106,7 @@ def test_the_factor_is_that_of_the_matrix(network, rng, speed):
 def test_every_hessian_has_the_pattern_that_was_analysed(network, altered, analyses):
     """Also where springs are slack, without stiffness, or all at rest length."""
     system, state = network
-    made = prefactored.hessian_factor(system)
+    made = factor_cache.hessian_factor(system)
     loose = altered(system, stiffnesses=np.arange(len(system.springs)) % 2 * 10.0)
     for model, x in ((system, state.positions), (loose, 0.5 * state.positions)):
         for geometric in (False, True):

@@ -1,4 +1,4 @@
-"""Laws of g, of the implicit Euler step and of every way to solve it."""
+"""Laws of g, of the implicit Euler step and of every solver."""
 
 import dataclasses
 import itertools
@@ -27,8 +27,8 @@ from reference.mass_spring import (
 from reference.outcome import Outcome
 
 h = 0.05
-# A central difference is off by NUDGE² times the third derivative and by precision / NUDGE.
-NUDGE = 6e-6
+# A central difference is off by DX² times the third derivative and by precision / DX.
+DX = 6e-6
 DIFFERENCE = 1e-8
 
 CONVERGING = ["local_global", "chebyshev", "lbfgs", "newton", "newton_cg"]
@@ -100,7 +100,7 @@ class TestObjective:
         energy = np.sum(k / 2 * stretch**2) - np.sum(objective.external * x)
         assert objective.value(x) == pytest.approx(inertia + h * h * energy, rel=1e-14, abs=0)
 
-    def test_external_forces_are_gravity_and_what_is_given(self, network, rng):
+    def test_external_forces_include_gravity(self, network, rng):
         system, state = network
         given = outer(rng)
         external = ImplicitEuler(system, h=h).objective(state, given).external
@@ -127,10 +127,10 @@ class TestObjective:
         objective, x = problem
         expected = np.zeros((7, 3))
         for where in itertools.product(np.flatnonzero(objective.system.free), range(3)):
-            nudge = np.zeros((7, 3))
-            nudge[where] = NUDGE
-            rise = objective.value(x + nudge) - objective.value(x - nudge)
-            expected[where] = rise / (2 * NUDGE)
+            step = np.zeros((7, 3))
+            step[where] = DX
+            rise = objective.value(x + step) - objective.value(x - step)
+            expected[where] = rise / (2 * DX)
         scale = np.abs(expected).max()
         np.testing.assert_allclose(objective.gradient(x), expected, atol=DIFFERENCE * scale)
 
@@ -138,11 +138,11 @@ class TestObjective:
         objective, x = problem
         expected = np.zeros((21, 21))
         for i in range(21):
-            nudge = np.zeros(21)
-            nudge[i] = NUDGE
-            nudge = nudge.reshape(7, 3)
-            rise = objective.gradient(x + nudge) - objective.gradient(x - nudge)
-            expected[i] = rise.ravel() / (2 * NUDGE)
+            step = np.zeros(21)
+            step[i] = DX
+            step = step.reshape(7, 3)
+            rise = objective.gradient(x + step) - objective.gradient(x - step)
+            expected[i] = rise.ravel() / (2 * DX)
         expected[6:9] = expected[:, 6:9] = 0
         expected[6:9, 6:9] = np.eye(3)
         scale = np.abs(expected).max()
@@ -196,7 +196,7 @@ class TestObjective:
         with pytest.raises(ValueError, match=r"^d: expected shape"):
             problem[0].quadratic_form(problem[1], np.zeros((2, 3)))
 
-    METHODS = ("evaluate", "value", "gradient", "hessian", "pull_of_pins", "rest_vectors")
+    METHODS = ("evaluate", "value", "gradient", "hessian", "pin_gradient", "rest_vectors")
 
     @pytest.mark.parametrize("method", METHODS)
     @pytest.mark.parametrize("shape", [(6, 3), (8, 3), (7, 2), (3, 7), (21,), (7, 3, 1), (0, 3)])
@@ -241,22 +241,22 @@ class TestStep:
         given = outer(rng)
         after = converged(system, state, name, external_forces=given)
         x_n, x = state.positions, after.positions
-        still = State(x, np.zeros((7, 3)))
+        resting = State(x, np.zeros((7, 3)))
         p = derivation(system).A.T @ x
         u = p / np.linalg.norm(p, axis=1)[:, None]
         rates = (lengths(system, x) - lengths(system, x_n)) / h
         dampers = -(derivation(system).A @ ((system.dampings * rates)[:, None] * u))
         gained = system.masses[:, None] * (after.velocities - state.velocities)
-        expected = h * (forces(system, still, given) + dampers)
+        expected = h * (forces(system, resting, given) + dampers)
         free = system.free
         scale = np.abs(expected).max()
         np.testing.assert_allclose(gained[free], expected[free], rtol=0, atol=1e-12 * scale)
 
-    def test_velocities_are_the_way_over_the_time(self, network, solver, speed):
+    def test_velocities_are_displacements_over_h(self, network, solver, speed):
         after = stepped(*network, solver, max_iterations=2).state
-        way = after.positions - network[1].positions
-        np.testing.assert_array_equal(after.velocities, way / h)
-        assert np.abs(way).max() > 0.01
+        displacement = after.positions - network[1].positions
+        np.testing.assert_array_equal(after.velocities, displacement / h)
+        assert np.abs(displacement).max() > 0.01
 
     def test_pins_hold_exactly(self, network, solver, speed):
         system, state = network
@@ -266,16 +266,16 @@ class TestStep:
 
     @pytest.mark.parametrize("name", CONVERGING)
     def test_the_pin_is_felt_within_the_solve(self, altered, speed, name):
-        """A still pin and one of a billion kilograms are alike, but for a billionth."""
+        """A pin and a particle of a billion kilograms are alike, but for a billionth."""
         system, state = scenes.hanging_rope(particles=5, stiffness=50.0)
         masses = np.where(system.free, system.masses, 1e9)
         heavy = altered(system, masses=masses, pinned=(), gravity=(0, 0, 0))
         pull = np.zeros((5, 3))
         pull[1:] = [1.0, -2.0, 0.5]
-        held = stepped(altered(system, gravity=(0, 0, 0)), state, name, pull, tolerance=1e-12)
+        pinned = stepped(altered(system, gravity=(0, 0, 0)), state, name, pull, tolerance=1e-12)
         loose = stepped(heavy, state, name, pull, tolerance=1e-12)
-        assert np.abs(held.state.velocities).max() > 0.5
-        np.testing.assert_allclose(held.state.positions, loose.state.positions, rtol=0, atol=1e-8)
+        assert np.abs(pinned.state.velocities).max() > 0.5
+        np.testing.assert_allclose(pinned.state.positions, loose.state.positions, rtol=0, atol=1e-8)
 
     @pytest.mark.parametrize("name", CONVERGING)
     def test_a_damper_is_a_spring_beside_as_long_as_last(self, network, altered, speed, name):
@@ -450,7 +450,7 @@ class TestStep:
         ends = [result.state.positions for result in results]
         np.testing.assert_allclose(*ends, rtol=0, atol=1e-9)  # both residuals are below 1e-10
 
-    def test_gauss_newton_starts_at_x_n_alone(self, cloth):
+    def test_gauss_newton_starts_only_at_x_n(self, cloth):
         assert ImplicitEuler(cloth[0], solver="gauss_newton").start == "x_n"
         with pytest.raises(ValueError, match="start: expected one of x_n, got 'y'"):
             ImplicitEuler(cloth[0], solver="gauss_newton", start="y")
@@ -515,7 +515,7 @@ class TestResidual:
         return gradient(x), max(gradient(y), floor), floor
 
     @pytest.mark.parametrize("iterations", [0, 1, 3])
-    def test_it_is_what_the_definition_says(self, network, rng, speed, solver, iterations):
+    def test_it_agrees_with_its_definition(self, network, rng, speed, solver, iterations):
         given = outer(rng)
         result = stepped(*network, solver, given, tolerance=0, max_iterations=iterations)
         norm, scale, floor = self.residual(*network, result.state.positions, given)
@@ -523,7 +523,7 @@ class TestResidual:
         assert abs(result.residual - norm / scale) <= floor / scale
         assert result.residual > 1e-12 or solver != "local_global"
 
-    def test_the_floor_is_what_the_definition_says(self, network, rng, speed):
+    def test_the_floor_agrees_with_its_definition(self, network, rng, speed):
         given = outer(rng)
         objective = ImplicitEuler(network[0], h=h).objective(network[1], given)
         x = network[1].positions + 0.1
@@ -534,7 +534,7 @@ class TestResidual:
         objective = ImplicitEuler(network[0], h=h).objective(network[1], outer(rng))
         for x in (objective.y, objective.x_n + 5.0, 1e-3 * objective.y, np.ones((7, 3))):
             iterate = objective.evaluate(x)
-            assert iterate.floor <= iterate.most <= 3 * iterate.floor
+            assert iterate.floor <= iterate.floor_bound <= 3 * iterate.floor
 
     def test_at_the_floor_the_gradient_is_rounding(self, network, rng):
         given = outer(rng)
@@ -584,9 +584,9 @@ class TestOutcome:
     def test_at_rounding_means_as_near_as_newton_comes(self, cloth, name, place):
         """10 km from the origin the floor is far above the tolerance, and what is attained is."""
         system, state = cloth
-        moved = State(state.positions + place, state.velocities)
+        displaced = State(state.positions + place, state.velocities)
         best, result = (
-            stepped(system, moved, solver, tolerance=1e-300, max_iterations=2000)
+            stepped(system, displaced, solver, tolerance=1e-300, max_iterations=2000)
             for solver in ("newton", name)
         )
         assert best.outcome == result.outcome == Outcome.AT_ROUNDING
@@ -678,7 +678,7 @@ class TestOutcome:
             def iterates(self, objective):
                 yield objective.start
                 yield objective.evaluate(objective.y + 0.01)
-                yield objective._evaluate(np.full_like(objective.y, bad))
+                yield objective.iterate_at(np.full_like(objective.y, bad))
 
         monkeypatch.setitem(STEP_SOLVERS, "bursting", Bursting)
         result = stepped(*cloth, "bursting")
@@ -788,7 +788,7 @@ class TestMotion:
         np.testing.assert_array_equal(again.state.positions, fresh.state.positions)
         np.testing.assert_array_equal(again.history, fresh.history)
 
-    def test_what_other_systems_and_steps_did_before_changes_nothing(
+    def test_results_do_not_depend_on_earlier_steps_of_other_systems(
         self, network, altered, solver
     ):
         system, state = network
@@ -815,10 +815,10 @@ class TestSymmetries:
         assert np.abs(result.state.positions - state.positions).max() > 0.01
         return result.state
 
-    def test_momentum_changes_by_the_outer_forces_alone(self, network, altered, rng, speed, solver):
+    def test_momentum_changes_only_by_external_forces(self, network, altered, rng, speed, solver):
         system, state = altered(network[0], pinned=()), network[1]
         given = outer(rng)
-        # Whole steps of M + h² L or more keep it all the way; shortened or truncated steps only
+        # Whole steps of M + h² L or more keep it exactly; shortened or truncated steps only
         # in the end.
         after = (
             converged(system, state, solver, external_forces=given)
@@ -830,23 +830,23 @@ class TestSymmetries:
         expected = h * np.sum(mass * system.gravity + given, axis=0)
         np.testing.assert_allclose(gained, expected, rtol=0, atol=self.ROUNDING / h)
 
-    def test_a_turned_and_moved_world(self, network, altered, rng, speed, solver):
+    def test_a_rotated_and_translated_world(self, network, altered, rng, speed, solver):
         system, state = network
         R = rotation.to_matrix(rotation.random(rng, 1))[0]
-        way = np.array([1.0, -2.0, 3.0])
+        shift = np.array([1.0, -2.0, 3.0])
         given = outer(rng)
-        turned = altered(system, gravity=R @ system.gravity)
-        moved = State(state.positions @ R.T + way, state.velocities @ R.T)
-        expected = self.after(system, state, solver, given).positions @ R.T + way
-        actual = self.after(turned, moved, solver, given @ R.T).positions
+        rotated = altered(system, gravity=R @ system.gravity)
+        displaced = State(state.positions @ R.T + shift, state.velocities @ R.T)
+        expected = self.after(system, state, solver, given).positions @ R.T + shift
+        actual = self.after(rotated, displaced, solver, given @ R.T).positions
         np.testing.assert_allclose(actual, expected, rtol=0, atol=self.ROUNDING)
 
     def test_relabelled_particles(self, network, relabelled, rng, speed, solver):
         system, state = network
-        renamed, moved, order = relabelled
+        renamed, displaced, order = relabelled
         given = outer(rng)
         expected = self.after(system, state, solver, given).positions[order]
-        actual = self.after(renamed, moved, solver, given[order]).positions
+        actual = self.after(renamed, displaced, solver, given[order]).positions
         np.testing.assert_allclose(actual, expected, rtol=0, atol=self.ROUNDING)
 
     def test_order_and_direction_of_springs(self, network, shuffled, speed, solver):
@@ -867,9 +867,9 @@ class TestSymmetries:
             dampings=system.dampings * kilogram / second,
             gravity=system.gravity * metre / second**2,
         )
-        moved = State(state.positions * metre, state.velocities * metre / second)
+        displaced = State(state.positions * metre, state.velocities * metre / second)
         one = stepped(system, state, solver, max_iterations=2, tolerance=0)
-        other = stepped(scaled, moved, solver, max_iterations=2, tolerance=0, h=h * second)
+        other = stepped(scaled, displaced, solver, max_iterations=2, tolerance=0, h=h * second)
         np.testing.assert_allclose(
             other.state.positions, one.state.positions * metre, rtol=0, atol=self.ROUNDING
         )
@@ -941,7 +941,7 @@ class TestInputs:
         with pytest.raises(dataclasses.FrozenInstanceError):
             integrator.h = 1.0
 
-    def test_the_state_before_is_left_alone(self, network, solver):
+    def test_the_initial_state_is_not_changed(self, network, solver):
         system, state = network
         x, v = state.positions.copy(), state.velocities.copy()
         stepped(system, state, solver, max_iterations=2)
@@ -997,7 +997,7 @@ class TestUnusualSystems:
         result = stepped(linear, state, name, tolerance=1e-12)
         assert (result.outcome, result.iterations) == (Outcome.CONVERGED, 1)
 
-    def test_a_slack_damper_alone_is_a_spring_at_the_last_length(self, speed):
+    def test_the_damper_of_a_slack_spring_is_a_spring_at_the_last_length(self, speed):
         system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 0.0, 2.0, gravity=(0, 0, 0))
         state = State([[0, 0, 0], [3.0, 0, 0]], [[0, 0, 0], [1.0, 0, 0]])
         after = stepped(system, state, tolerance=1e-14).state

@@ -26,9 +26,9 @@ from reference.mass_spring import (
 
 # Sums of a few dozen terms round by a few units in the last place of the largest.
 ROUNDING = 1e-14
-# A central difference with the step NUDGE, the cube root of the machine's precision, is off by
-# NUDGE² times the third derivative and by precision/NUDGE times the value: 1e-10 of either.
-NUDGE = 6e-6
+# A central difference with the step DX, the cube root of the machine's precision, is off by
+# DX² times the third derivative and by precision/DX times the value: 1e-10 of either.
+DX = 6e-6
 DIFFERENCE = 1e-8
 
 
@@ -36,10 +36,10 @@ def slope(function, x):
     """Return the derivatives of a function of positions by central differences, last axis x."""
     columns = []
     for i in range(x.size):
-        nudge = np.zeros(x.size)
-        nudge[i] = NUDGE
-        nudge = nudge.reshape(x.shape)
-        columns.append((function(x + nudge) - function(x - nudge)) / (2 * NUDGE))
+        step = np.zeros(x.size)
+        step[i] = DX
+        step = step.reshape(x.shape)
+        columns.append((function(x + step) - function(x - step)) / (2 * DX))
     return np.stack(columns, axis=-1)
 
 
@@ -76,7 +76,7 @@ class TestByHand:
         state = State(PAIR, [[2.0, 0, 0], [0, 0, 1.0]])
         assert kinetic_energy(pair(), state) == 0.5 * 1 * 4 + 0.5 * 3 * 1
 
-    def test_a_damper_resists_the_rate_of_its_length_alone(self, speed):
+    def test_a_damper_resists_only_the_rate_of_its_length(self, speed):
         state = State(PAIR, [[5.0, 3.0, 0.0], [0.0, 1.0, 7.0]])
         expected = [[0.0, -0.5 * 2.0, 0.0], [0.0, 0.5 * 2.0, 0.0]]
         np.testing.assert_array_equal(damper_forces(pair(dampings=0.5), state), expected)
@@ -91,9 +91,9 @@ class TestByHand:
 class TestDerivatives:
     def test_forces_are_the_negative_gradient_of_energy(self, network, speed):
         system, state = network
-        still = State(state.positions, np.zeros((7, 3)))
+        resting = State(state.positions, np.zeros((7, 3)))
         gradient = slope(lambda x: potential_energy(system, x), state.positions)
-        assert_close(-gradient.reshape(-1, 3), forces(system, still), DIFFERENCE)
+        assert_close(-gradient.reshape(-1, 3), forces(system, resting), DIFFERENCE)
 
     def test_stiffness_matrix_is_the_negative_derivative_of_the_spring_forces(self, network, speed):
         system, state = network
@@ -118,7 +118,7 @@ class TestDerivatives:
     def test_dampers_take_energy_at_the_rate_of_the_lengths(self, network, altered, speed):
         system, state = altered(network[0], pinned=()), network[1]
         x, v = state.positions, state.velocities
-        rates = (lengths(system, x + NUDGE * v) - lengths(system, x - NUDGE * v)) / (2 * NUDGE)
+        rates = (lengths(system, x + DX * v) - lengths(system, x - DX * v)) / (2 * DX)
         power = np.sum(v * damper_forces(system, state))
         assert power == pytest.approx(-np.sum(system.dampings * rates**2), rel=DIFFERENCE, abs=0)
         assert power < 0
@@ -138,8 +138,8 @@ class TestConservation:
 class TestSymmetries:
     def test_relabelled_particles_feel_the_same_forces(self, network, relabelled, speed):
         system, state = network
-        renamed, moved, order = relabelled
-        assert_close(forces(renamed, moved), forces(system, state)[order])
+        renamed, displaced, order = relabelled
+        assert_close(forces(renamed, displaced), forces(system, state)[order])
 
     def test_order_and_direction_of_springs_do_not_matter(self, network, shuffled, speed):
         system, state = network
@@ -148,17 +148,17 @@ class TestSymmetries:
         expected = stiffness_matrix(system, x).toarray()
         assert_close(stiffness_matrix(shuffled, x).toarray(), expected)
 
-    def test_a_turned_and_moved_world_turns_forces_and_stiffness(
-        self, network, altered, rng, speed
-    ):
+    def test_forces_and_stiffness_rotate_with_the_world(self, network, altered, rng, speed):
         system, state = network
         R = rotation.to_matrix(rotation.random(rng, 1))[0]
-        turned = altered(system, gravity=R @ system.gravity)
-        moved = State(state.positions @ R.T + [1.0, -2.0, 3.0], state.velocities @ R.T)
-        assert_close(forces(turned, moved), forces(system, state) @ R.T, 10 * ROUNDING)
+        rotated = altered(system, gravity=R @ system.gravity)
+        displaced = State(state.positions @ R.T + [1.0, -2.0, 3.0], state.velocities @ R.T)
+        assert_close(forces(rotated, displaced), forces(system, state) @ R.T, 10 * ROUNDING)
         R3 = np.kron(np.eye(7), R)
         expected = R3 @ stiffness_matrix(system, state.positions).toarray() @ R3.T
-        assert_close(stiffness_matrix(turned, moved.positions).toarray(), expected, 10 * ROUNDING)
+        assert_close(
+            stiffness_matrix(rotated, displaced.positions).toarray(), expected, 10 * ROUNDING
+        )
 
     def test_other_units_scale_energy_and_forces(self, network, altered, speed):
         system, state = network
@@ -171,12 +171,12 @@ class TestSymmetries:
             dampings=system.dampings * kilogram / second,
             gravity=system.gravity * metre / second**2,
         )
-        moved = State(state.positions * metre, state.velocities * metre / second)
+        displaced = State(state.positions * metre, state.velocities * metre / second)
         newton, joule = kilogram * metre / second**2, kilogram * metre**2 / second**2
-        np.testing.assert_array_equal(forces(scaled, moved), forces(system, state) * newton)
+        np.testing.assert_array_equal(forces(scaled, displaced), forces(system, state) * newton)
         for energy, now, then in (
-            (potential_energy, moved.positions, state.positions),
-            (kinetic_energy, moved, state),
+            (potential_energy, displaced.positions, state.positions),
+            (kinetic_energy, displaced, state),
         ):
             assert energy(scaled, now) == energy(system, then) * joule
 
@@ -278,7 +278,7 @@ class TestFewParticles:
         assert rest_vectors(system, state.positions).shape == (0, 3)
         assert [m.shape for m in derivation(system)] == [(1, 0), (0, 0), (1, 1), (1, 0)]
 
-    def test_a_particle_without_springs_feels_gravity_alone(self, speed):
+    def test_only_gravity_acts_on_a_particle_without_springs(self, speed):
         system = MassSpring([1.0, 3.0, 2.0], [[0, 1]], 1.5, 4.0, gravity=(0, -10, 0))
         x = np.vstack([PAIR, [[5.0, 5.0, 5.0]]])
         expected = [*forces(pair(), State(PAIR, np.zeros((2, 3)))), [0, -20.0, 0]]
@@ -286,18 +286,18 @@ class TestFewParticles:
 
 
 class TestPins:
-    def test_a_pin_has_no_velocity_whatever_the_state_says(self, speed):
-        held = pair(pinned=[1], dampings=0.5)
+    def test_the_velocity_of_a_pin_in_a_state_is_ignored(self, speed):
+        pinned = pair(pinned=[1], dampings=0.5)
         state = State(PAIR, [[0, 3.0, 0], [0, 1.0, 0]])
-        np.testing.assert_array_equal(damper_forces(held, state)[0], [0, -0.5 * 3.0, 0])
-        assert kinetic_energy(held, state) == 0.5 * 1 * 9
+        np.testing.assert_array_equal(damper_forces(pinned, state)[0], [0, -0.5 * 3.0, 0])
+        assert kinetic_energy(pinned, state) == 0.5 * 1 * 9
 
     def test_pins_are_kept_once_and_in_order(self):
         system = MassSpring(np.ones(4), [[0, 1]], 1.0, 1.0, pinned=[3, 0, 3])
         assert system.pinned.tolist() == [0, 3]
         assert system.free.tolist() == [False, True, True, False]
 
-    def test_a_pinned_particle_may_weigh_nothing(self):
+    def test_a_pinned_particle_may_have_no_mass(self):
         assert pair(masses=[1.0, 0.0], pinned=[1]).masses[1] == 0
 
 

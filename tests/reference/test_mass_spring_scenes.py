@@ -129,7 +129,7 @@ class TestGridCloth:
 
 
 class TestNet:
-    def test_it_is_of_ropes_to_the_next_knots_held_at_its_corners(self):
+    def test_it_joins_neighbours_by_ropes_and_is_pinned_at_its_corners(self):
         system, _ = scenes.net(3, 4)
         expected = {(a, a + 1) for a in range(12) if a % 4 < 3} | {(a, a + 4) for a in range(8)}
         assert pairs(system) == expected
@@ -139,7 +139,7 @@ class TestNet:
 
 class TestLattice:
     def test_springs_are_the_edges_of_tetrahedra_that_fill_each_cube(self):
-        """Six to a cube: each way from corner to opposite corner along x, y and z in any order."""
+        """Six to a cube: each path from corner to opposite corner along x, y and z in any order."""
         system, state = scenes.lattice((2, 2, 2), spacing=1.0)
         edges = set()
         volume = 0.0
@@ -160,9 +160,9 @@ class TestLattice:
 
     def test_it_is_clamped_at_x_0(self):
         system, state = scenes.lattice((3, 2, 2))
-        held = np.zeros(12, dtype=bool)
-        held[system.pinned] = True
-        np.testing.assert_array_equal(held, state.positions[:, 0] == 0)
+        clamped = np.zeros(12, dtype=bool)
+        clamped[system.pinned] = True
+        np.testing.assert_array_equal(clamped, state.positions[:, 0] == 0)
 
 
 class TestClothFromMesh:
@@ -209,7 +209,7 @@ class TestClothFromMesh:
         system, _ = scenes.cloth_from_mesh(x, triangles, density=1.0, bending_stiffness=1.0)
         assert len(pairs(system)) == 6
 
-    def test_order_and_turn_of_triangles_do_not_matter(self):
+    def test_order_and_orientation_of_triangles_do_not_matter(self):
         _, state = scenes.grid_cloth(4, 4)
         triangles = scenes.grid_triangles(4, 4)
         settings = {"density": 1.0, "bending_stiffness": 1.0}

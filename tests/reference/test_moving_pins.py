@@ -40,7 +40,7 @@ def hung(network, altered):
     return system, network[1], network[1].positions[[2, 5]] + [WAY, -2 * WAY]
 
 
-def test_pins_arrive_with_the_velocity_of_their_way(hung, step, speed):
+def test_pins_end_with_their_displacement_over_h(hung, step, speed):
     system, state, goal = hung
     after = step(system, state, h, None, goal)
     np.testing.assert_array_equal(after.positions[[2, 5]], goal)
@@ -51,8 +51,8 @@ def test_pins_arrive_with_the_velocity_of_their_way(hung, step, speed):
 def test_what_moves_is_felt(hung, step, speed):
     system, state, goal = hung
     free = system.free
-    still, moved = (step(system, state, h, None, pins) for pins in (None, goal))
-    assert np.abs(still.velocities - moved.velocities)[free].max() > 0.01
+    fixed, moving = (step(system, state, h, None, pins) for pins in (None, goal))
+    assert np.abs(fixed.velocities - moving.velocities)[free].max() > 0.01
 
 
 def test_pins_that_stay_need_no_path(hung, step):
@@ -63,7 +63,7 @@ def test_pins_that_stay_need_no_path(hung, step):
 
 
 def test_a_world_that_moves_evenly_is_like_one_at_rest(hung, rng, step, speed):
-    """Galileo's principle, with dampers, and of the pins the whole frame's way."""
+    """Galileo's principle, with dampers, with pins that move with the frame."""
     system, state, goal = hung
     drift, pull = np.array([2.0, 1.0, -3.0]), rng.standard_normal((7, 3))
     at_rest = step(system, state, h, pull, goal)
@@ -83,8 +83,8 @@ def test_a_moving_pin_is_a_huge_mass_in_motion(hung, altered, speed, name):
     heavy = altered(system, masses=masses, pinned=(), gravity=(0, 0, 0))
     v = state.velocities.copy()
     v[[2, 5]] = (goal - state.positions[[2, 5]]) / h
-    held = altered(system, gravity=(0, 0, 0))
-    pinned = STEPS[name](held, state, h, None, goal)
+    weightless = altered(system, gravity=(0, 0, 0))
+    pinned = STEPS[name](weightless, state, h, None, goal)
     loose = STEPS[name](heavy, State(state.positions, v), h)
     np.testing.assert_allclose(pinned.positions, loose.positions, rtol=0, atol=1e-8)
     np.testing.assert_allclose(pinned.velocities, loose.velocities, rtol=0, atol=1e-6)
@@ -101,9 +101,9 @@ def test_gauss_newton_linearises_where_the_pins_start(hung, rng, speed):
     K = J.T @ (np.where(slack, 0, system.stiffnesses)[:, None] * J)
     C = damping_matrix(system, state.positions).toarray()
     matrix = np.diag(np.repeat(system.masses, 3)) + h * C + h * h * K
-    still = State(state.positions, np.zeros((7, 3)))
+    resting = State(state.positions, np.zeros((7, 3)))
     right = np.repeat(system.masses, 3) * state.velocities.ravel()
-    right += h * forces(system, still, pull).ravel()
+    right += h * forces(system, resting, pull).ravel()
     expected = np.zeros((7, 3))
     expected[~free] = (goal - state.positions[~free]) / h
     rows, given = np.repeat(free, 3), expected.ravel()

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, certificate
 from reference.implicit_euler.certificate import (
-    Rounding,
+    RoundingErrors,
     certify,
     laplacian_norm,
-    rounding,
+    rounding_errors,
 )
 from reference.mass_spring import (
     MassSpring,
@@ -28,14 +28,14 @@ EPS = np.finfo(float).eps
 # A spring's or a damper's force is made by some twenty roundings of half an EPS.
 TERM = 16 * EPS
 # Nudge and error of a central difference in 50 digits.
-NUDGE, DIFFERENCE = 1e-16, 1e-28
+DX, DIFFERENCE = 1e-16, 1e-28
 CONVERGING = [name for name in STEP_SOLVERS if name != "gauss_newton"]
 
 # What a proof may forget: name and stand-in of a function of the certificate.
 FAULTS = {
     "half of Newton's step": ("kantorovich_distance", lambda eta, share: eta / 2),
     "the Hessian does not change": ("kantorovich_distance", lambda eta, share: eta),
-    "nothing is rounded": ("rounding", lambda objective, x: Rounding(0.0, 0.0)),
+    "nothing is rounded": ("rounding_errors", lambda objective, x: RoundingErrors(0.0, 0.0)),
     "L a hundredth": ("laplacian_norm", lambda *springs: laplacian_norm(*springs) / 100),
 }
 
@@ -81,10 +81,10 @@ def disturbed(seed, exponent):
     system, state, forces, goal, h = random_motion(seed)
     integrator = ImplicitEuler(system, h=h, tolerance=1e-14)
     x = integrator.step(state, forces, goal).state.positions
-    way = np.random.default_rng([8, seed]).standard_normal(x.shape)
-    way[system.pinned] = 0.0
+    direction = np.random.default_rng([8, seed]).standard_normal(x.shape)
+    direction[system.pinned] = 0.0
     objective = integrator.objective(state, forces, goal)
-    return objective, x + 10.0**exponent * way / np.linalg.norm(way)
+    return objective, x + 10.0**exponent * direction / np.linalg.norm(direction)
 
 
 class TestOracle:
@@ -99,12 +99,14 @@ class TestOracle:
         return step.x_n + np.where(step.free[:, None], wide(0.1 * rng.standard_normal((7, 3))), 0)
 
     def test_gradient_and_hessian_are_slopes(self, step, x, wide, rng):
-        way = np.where(step.free[:, None], wide(rng.standard_normal((7, 3))), wide(np.zeros(3)))
-        there, back = x + NUDGE * way, x - NUDGE * way
-        slope = (step.value(there) - step.value(back)) / (2 * NUDGE)
-        assert abs(slope - np.sum(step.gradient(x) * way)) < DIFFERENCE * abs(slope)
-        bend = (step.gradient(there) - step.gradient(back))[step.free].ravel() / (2 * NUDGE)
-        product = step.hessian(x) @ way[step.free].ravel()
+        direction = np.where(
+            step.free[:, None], wide(rng.standard_normal((7, 3))), wide(np.zeros(3))
+        )
+        there, back = x + DX * direction, x - DX * direction
+        slope = (step.value(there) - step.value(back)) / (2 * DX)
+        assert abs(slope - np.sum(step.gradient(x) * direction)) < DIFFERENCE * abs(slope)
+        bend = (step.gradient(there) - step.gradient(back))[step.free].ravel() / (2 * DX)
+        product = step.hessian(x) @ direction[step.free].ravel()
         assert max(abs(bend - product)) < DIFFERENCE * max(abs(bend))
 
     def test_a_linear_spring_in_closed_form(self, extended_precision, wide):
@@ -177,7 +179,7 @@ class TestForces:
 
     def within_what_is_allowed(self, oracle, objective, x):
         """Return by how much the gradient is off."""
-        allowed, there = rounding(objective, x), np.vectorize(mpmath.mpf, otypes=[object])(x)
+        allowed, there = rounding_errors(objective, x), np.vectorize(mpmath.mpf, otypes=[object])(x)
         error = objective.gradient(x) - oracle.gradient(there)
         off = float(mpmath.sqrt(np.sum(error * error)))
         assert off <= allowed.gradient
@@ -243,9 +245,9 @@ class TestCertificate:
             error = distance_to_minimiser(extended_precision, oracle, x)
             assert error <= known.distance
             # |p| <= t + L t² / (2 mu) <= 3/2 t for the true distance t, and d <= 2 eta.
-            allowed = rounding(objective, x).gradient / known.curvature
+            allowed = rounding_errors(objective, x).gradient / known.curvature
             assert known.distance <= 3.001 * error + 4 * allowed
-            assert known.newton_step <= known.distance <= known.alone_within
+            assert known.newton_step <= known.distance <= known.unique_within
 
     def test_it_is_no_idle_bound(self, beside_minimisers):
         """Half of the points are covered, most of them by hardly a fifth too much."""
@@ -286,9 +288,9 @@ def one_term(case, seed):
         "close ends": (1.0, 1e-7, 1.0, 0.0),
         "a blend": (1.0, 1.0, 1e7, 1e7),
     }[case]
-    way = rng.standard_normal(3)
+    direction = rng.standard_normal(3)
     x = np.zeros((2, 3))
-    x[1] = length * rng.uniform(1, 2) * way / np.linalg.norm(way)
+    x[1] = length * rng.uniform(1, 2) * direction / np.linalg.norm(direction)
     system = MassSpring([mass, mass], [[0, 1]], rest * rng.uniform(1, 2), 1e4, damping, pinned=[0])
     return system, State(x, np.zeros((2, 3))), 0.3
 

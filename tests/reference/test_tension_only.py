@@ -99,7 +99,7 @@ class TestKink:
 class TestDampersApart:
     def test_it_is_the_same_system(self, network, speed):
         system, state = network
-        apart = system.dampers_apart
+        apart = system.with_separate_dampers
         damped_ropes = apart.tension_only & (apart.dampings > 0)
         assert not damped_ropes.any()
         assert (apart is system) == (not system.tension_only.any())
@@ -107,7 +107,7 @@ class TestDampersApart:
         np.testing.assert_allclose(forces(apart, state), expected, rtol=0, atol=1e-13)
 
     def test_it_is_made_once(self, network):
-        assert network[0].dampers_apart is network[0].dampers_apart
+        assert network[0].with_separate_dampers is network[0].with_separate_dampers
 
 
 class TestStep:
@@ -166,7 +166,7 @@ def test_wrong_flags_are_named(value, message):
         rope(1.0, tension_only=value)
 
 
-def test_flags_are_copied_and_one_stands_for_all():
+def test_flags_are_copied_and_broadcast():
     given = np.array([True, False])
     system = MassSpring(np.ones(3), [[0, 1], [1, 2]], 1.0, 1.0, tension_only=given)
     given[:] = False

@@ -35,7 +35,7 @@ class TestByHand:
         expected = 0.5 * 1.2 * 1.5 * 3.0**2 * 2.0 / 3
         np.testing.assert_allclose(forces, [[0, expected, 0]] * 3, rtol=1e-15, atol=1e-15)
 
-    def test_a_plate_along_the_wind_feels_nothing(self, speed):
+    def test_there_is_no_force_on_a_plate_along_the_wind(self, speed):
         np.testing.assert_array_equal(
             wind_forces(*plate(), [3.0, 0, 4.0], **BOTH), np.zeros((3, 3))
         )
@@ -72,15 +72,15 @@ class TestLaws:
         one, other = wind_forces(*sail, WIND), wind_forces(moving, triangles, WIND + drift)
         np.testing.assert_allclose(one, other, rtol=0, atol=10 * ROUNDING)
 
-    def test_a_turned_world_turns_the_forces(self, sail, rng, speed):
+    def test_the_forces_rotate_with_the_world(self, sail, rng, speed):
         state, triangles = sail
         R = rotation.to_matrix(rotation.random(rng, 1))[0]
-        turned = State(state.positions @ R.T + [1.0, -2.0, 3.0], state.velocities @ R.T)
+        rotated = State(state.positions @ R.T + [1.0, -2.0, 3.0], state.velocities @ R.T)
         expected = wind_forces(state, triangles, WIND, **BOTH) @ R.T
-        actual = wind_forces(turned, triangles, R @ WIND, **BOTH)
+        actual = wind_forces(rotated, triangles, R @ WIND, **BOTH)
         np.testing.assert_allclose(actual, expected, rtol=0, atol=10 * ROUNDING)
 
-    def test_it_does_not_matter_how_triangles_turn_or_in_which_order_they_come(self, sail, speed):
+    def test_order_and_orientation_of_triangles_do_not_matter(self, sail, speed):
         state, triangles = sail
         other = triangles[::-1].copy()
         other[::2] = other[::2, ::-1]
@@ -91,8 +91,8 @@ class TestLaws:
     def test_relabelled_particles_feel_the_same(self, sail, rng, speed):
         state, triangles = sail
         order = rng.permutation(12)
-        moved = State(state.positions[order], state.velocities[order])
-        actual = wind_forces(moved, np.argsort(order)[triangles], WIND, **BOTH)
+        renumbered = State(state.positions[order], state.velocities[order])
+        actual = wind_forces(renumbered, np.argsort(order)[triangles], WIND, **BOTH)
         np.testing.assert_array_equal(actual, wind_forces(*sail, WIND, **BOTH)[order])
 
     def test_it_scales_with_density_area_and_the_square_of_the_speed(self, sail, speed):
@@ -121,13 +121,13 @@ class TestLaws:
         assert np.linalg.norm(rise) > 0.1
         assert abs(rise @ WIND) < 100 * ROUNDING
 
-    def test_wind_may_differ_from_place_to_place(self, sail, rng, speed):
+    def test_wind_may_differ_between_particles(self, sail, rng, speed):
         """A triangle feels the mean at its corners."""
         state, triangles = sail
         gusts = rng.standard_normal((12, 3))
         one = wind_forces(state, triangles, gusts, **BOTH)
-        calm = State(state.positions, state.velocities - gusts)
-        np.testing.assert_array_equal(one, wind_forces(calm, triangles, np.zeros(3), **BOTH))
+        windless = State(state.positions, state.velocities - gusts)
+        np.testing.assert_array_equal(one, wind_forces(windless, triangles, np.zeros(3), **BOTH))
         np.testing.assert_array_equal(
             wind_forces(state, triangles, np.tile(WIND, (12, 1))), wind_forces(*sail, WIND)
         )
@@ -140,7 +140,7 @@ class TestLaws:
         np.testing.assert_array_equal(*ends)
 
 
-def test_a_triangle_without_area_feels_nothing(speed):
+def test_there_is_no_force_on_a_triangle_without_area(speed):
     state = State([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [0, 0, 0]], np.zeros((4, 3)))
     forces = wind_forces(state, [[0, 1, 2], [0, 3, 1]], WIND, **BOTH)
     np.testing.assert_array_equal(forces, np.zeros((4, 3)))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from crosscheck.engines.file_kind import FRAGMENT
 from crosscheck.robots.files import (
     AGREES,
-    DEPARTS,
+    DEVIATES,
     DIFFERS,
     ENGINES,
     LOST,
@@ -21,7 +21,7 @@ from crosscheck.robots.files import (
 
 from ...presentation.tables import Answer, Column, Table
 
-OUTCOMES = (AGREES, DIFFERS, DEPARTS, UNREAD, REFUSED, NEITHER, LOST)
+OUTCOMES = (AGREES, DIFFERS, DEVIATES, UNREAD, REFUSED, NEITHER, LOST)
 NAMES = tuple(dict.fromkeys(engine for engines in ENGINES.values() for engine in engines))
 SHOWS = (
     "Differences are the largest in random configurations, or frames: of positions and linear "

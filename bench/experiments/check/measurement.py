@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
-from crosscheck.identities import CLAIMS, run_claims
+from crosscheck.claims import CLAIMS, run_claims
 
 from ...harness.block import Block, Measured, Scale
 
@@ -23,8 +23,8 @@ def verdict(name: str) -> Measured:
             "cases": verdict.cases,
             "difference": verdict.difference,
             "tolerance": claim.tolerance.value,
-            "moved": verdict.moved,
-            "held": verdict.held,
+            "moved": verdict.displacement,
+            "held": verdict.holds,
         },
         {"ours": claim.ours, "reason": claim.tolerance.reason, "missed": verdict.missed},
     )

@@ -16,7 +16,8 @@ import numpy as np
 
 from reference import ImplicitEuler, MassSpring, State, scenes
 from reference.backend.compiled import TwoSpeeds
-from reference.implicit_euler.factor_cache import forget, prefactored
+from reference.implicit_euler.factor_cache import clear as clear_factor_cache
+from reference.implicit_euler.factor_cache import prefactored
 from reference.implicit_euler.objective import global_matrix
 from reference.sparse import CholeskyFactor
 from reference.sparse.linear_solver import factorize
@@ -76,7 +77,7 @@ class LargeCloth(NamedTuple):
         """Yield what is measured, after a small cloth for which everything is compiled."""
         try:
             measure(min(SIZES), self.library)
-            forget()
+            clear_factor_cache()
             yield Found(measure(self.size, self.library))
             yield Done()
         except Exception as error:

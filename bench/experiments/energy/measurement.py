@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 from crosscheck.mass_spring.energy import energy_series
-from crosscheck.mass_spring.motions import MOTIONS, Motion, implicit
+from crosscheck.mass_spring.integrators import SIMULATORS, Simulation, implicit
 from reference import MassSpring
 
 from ...harness.block import Block, Measured, Scale
@@ -15,10 +15,13 @@ EVERY = 10
 TOLERANCE = 1e-10
 # Of two that are the same step for step, the faster. Local/global converges in a dozen iterations
 # at this stiffness, each a hundredth of one of Newton's.
-INTEGRATORS: dict[str, Callable[[MassSpring, float], Motion]] = {
-    "symplectic Euler": MOTIONS["symplectic Euler"],
+INTEGRATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
+    "symplectic Euler": SIMULATORS["symplectic Euler"],
     "implicit Euler": partial(implicit, "local_global", tolerance=TOLERANCE),
-    **{name: MOTIONS[f"MuJoCo {name}"] for name in ("implicit", "implicitfast", "discrete", "RK4")},
+    **{
+        name: SIMULATORS[f"MuJoCo {name}"]
+        for name in ("implicit", "implicitfast", "discrete", "RK4")
+    },
 }
 
 

@@ -74,7 +74,7 @@ def by_us(skeleton: Skeleton, *batch: int) -> Callable[[], Any]:
 def by_engine(name: str, skeleton: Skeleton) -> Callable[[], Any]:
     """Return an engine's forward kinematics of one random pose; the result stays in the engine."""
     engine = SKELETON_ENGINES[name](skeleton)
-    return partial(engine.place, coordinates(engine, _local_rotations(skeleton)))
+    return partial(engine.update_kinematics, coordinates(engine, _local_rotations(skeleton)))
 
 
 def _local_rotations(skeleton: Skeleton, *batch: int) -> np.ndarray:

@@ -24,7 +24,7 @@ def prepare(
 ) -> Mover:
     """Return MuJoCo, stepping so many times a frame."""
     engine = kept(MujocoMassSpring, system)
-    engine.choose(integrator)
+    engine.set_integrator(integrator)
     engine.model.tendon_stiffness[:] = system.stiffnesses
     engine.model.tendon_damping[:] = system.dampings
     engine.model.opt.iterations, engine.model.opt.tolerance = iterations, tolerance
@@ -47,7 +47,7 @@ class MujocoSteps:
 
     def advance(self) -> None:
         """Take the steps of one frame."""
-        self._engine.go_on(self._substeps)
+        self._engine.advance(self._substeps)
 
     def positions(self) -> FloatArray:
         """Return where the particles are [m], (particle, 3)."""

@@ -1,8 +1,8 @@
-"""What the functions of `lanes.py` are in compiled code: vectors of doubles in LLVM's terms.
+"""The compiled versions of the functions in `lanes.py`: vectors of doubles in LLVM's terms.
 
 LLVM makes of a vector what the processor has: one register of AVX-512, two of AVX, four of SSE.
-Floating point is as strict as for floats. Whatever reads or writes a row of a tile also asks for
-a share of the memory of the next tile: rows so far apart leave the processor nothing to guess by.
+Floating point is as strict as for floats. Whatever reads or writes a row of a tile also prefetches
+a share of the next tile: the processor does not foresee accesses so far apart.
 """
 
 import operator
@@ -27,7 +27,7 @@ HALF = LANES // 2
 MASK = ir.IntType(LANES)
 DOUBLE_BYTES, LINE_BYTES = 8, 64
 INSTRUCTIONS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul"}
-# What llvm.prefetch calls reading, writing, "keep it close" and "data".
+# The arguments of llvm.prefetch: read or write, keep in the nearest cache, data.
 READ, WRITE, NEAR, DATA = 0, 1, 3, 1
 
 
@@ -55,7 +55,7 @@ class LanesModel(models.PrimitiveModel):
 
 
 @lower_cast(types.Float, LanesType)
-def repeat(context, builder, kind, wanted, value):
+def repeat(context, builder, kind, target, value):
     """Put a float into every lane."""
     first = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), value, INT(0))
     return _shuffled(builder, first, first, [0] * LANES)
@@ -95,31 +95,31 @@ def negate(context, builder, signature, arguments):
 
 
 @intrinsic
-def vectors_at(typingctx, tile, j):
+def load_vectors(typingctx, tile, j):
     """Read three doubles of each pose and transpose them into three lanes."""
     return _reading(tile, 3)
 
 
 @intrinsic
-def quaternions_at(typingctx, tile, j):
+def load_quaternions(typingctx, tile, j):
     """Read four doubles of each pose and transpose them into four lanes."""
     return _reading(tile, 4)
 
 
 @intrinsic
-def put_vectors(typingctx, tile, j, value):
+def store_vectors(typingctx, tile, j, value):
     """Transpose three lanes and write three doubles into each pose."""
     return _writing(tile, 3)
 
 
 @intrinsic
-def put_quaternions(typingctx, tile, j, value):
+def store_quaternions(typingctx, tile, j, value):
     """Transpose four lanes and write four doubles into each pose."""
     return _writing(tile, 4)
 
 
 @intrinsic
-def lanes_at(typingctx, scratch, j):
+def load_lanes(typingctx, scratch, j):
     """Read four lanes."""
 
     def generate(context, builder, signature, arguments):
@@ -131,7 +131,7 @@ def lanes_at(typingctx, scratch, j):
 
 
 @intrinsic
-def put_lanes(typingctx, scratch, j, value):
+def store_lanes(typingctx, scratch, j, value):
     """Write four lanes."""
 
     def generate(context, builder, signature, arguments):
@@ -213,7 +213,7 @@ def _contiguous(array):
 
 
 def _tile_row(context, builder, signature, arguments, count, access):
-    """Return pointers to row j of each pose, and ask for the next tile's memory."""
+    """Return pointers to row j of each pose, and prefetch a share of the next tile."""
     begin, pose_bytes = _array(context, builder, signature, arguments)
     row_bytes = count * DOUBLE_BYTES
     first = _moved(builder, begin, arguments[1], row_bytes)
@@ -245,7 +245,7 @@ def _moved(builder, pointer, count, size):
 
 
 def _prefetch(builder, pointer, size, access):
-    """Ask for memory that will soon be read or written; memory that is not there does no harm."""
+    """Prefetch memory that will soon be read or written; any address is allowed."""
     kind = ir.FunctionType(ir.VoidType(), [POINTER, INT, INT, INT])
     fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
     for offset in range(0, size, LINE_BYTES):

@@ -1,4 +1,4 @@
-"""What the functions of `sides.py` are in compiled code: vectors of four doubles in LLVM's terms.
+"""The compiled versions of the functions in `rows.py`: vectors of four doubles in LLVM's terms.
 
 A product may be fused with the difference that it goes into, as everywhere in relaxed kernels.
 """
@@ -8,11 +8,11 @@ from numba.core import cgutils, types
 from numba.extending import intrinsic, models, register_model
 
 DOUBLE, INT, POINTER = ir.DoubleType(), ir.IntType(32), ir.IntType(8).as_pointer()
-SIDES = 4
-VECTOR = ir.VectorType(DOUBLE, SIDES)
+WIDTH = 4
+VECTOR = ir.VectorType(DOUBLE, WIDTH)
 DOUBLE_BYTES = 8
 FUSED = ("contract",)
-# What llvm.prefetch calls reading, "keep it close" and "data".
+# The arguments of llvm.prefetch: read, keep in the nearest cache, data.
 READ, NEAR, DATA = 0, 3, 1
 
 
@@ -32,7 +32,7 @@ class RowModel(models.PrimitiveModel):
 
 
 @intrinsic
-def row_at(typingctx, y, i):
+def load_row(typingctx, y, i):
     """Read four doubles."""
 
     def generate(context, builder, signature, arguments):
@@ -42,7 +42,7 @@ def row_at(typingctx, y, i):
 
 
 @intrinsic
-def put_row(typingctx, y, i, row):
+def store_row(typingctx, y, i, row):
     """Write four doubles."""
 
     def generate(context, builder, signature, arguments):
@@ -54,7 +54,7 @@ def put_row(typingctx, y, i, row):
 
 
 @intrinsic
-def scaled(typingctx, factor, row):
+def scale_row(typingctx, factor, row):
     """Multiply all four."""
 
     def generate(context, builder, signature, arguments):
@@ -65,7 +65,7 @@ def scaled(typingctx, factor, row):
 
 
 @intrinsic
-def less(typingctx, row, factor, other):
+def subtract_scaled(typingctx, row, factor, other):
     """Multiply and subtract all four."""
 
     def generate(context, builder, signature, arguments):
@@ -77,7 +77,7 @@ def less(typingctx, row, factor, other):
 
 
 @intrinsic
-def ask_for(typingctx, values, i):
+def prefetch(typingctx, values, i):
     """Prefetch; memory that is not there does no harm."""
 
     def generate(context, builder, signature, arguments):
@@ -100,7 +100,7 @@ def _contiguous(array, axes):
 
 def _row(context, builder, signature, arguments):
     """Return a pointer to a row of four."""
-    entry = builder.mul(arguments[1], arguments[1].type(SIDES))
+    entry = builder.mul(arguments[1], arguments[1].type(WIDTH))
     pointer = _pointer(context, builder, signature, arguments[0], entry)
     return builder.bitcast(pointer, VECTOR.as_pointer())
 
@@ -113,5 +113,5 @@ def _pointer(context, builder, signature, array, entry):
 def _repeated(builder, number):
     """Return a vector of equal numbers."""
     first = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), number, INT(0))
-    mask = ir.Constant(ir.VectorType(INT, SIDES), [INT(0)] * SIDES)
+    mask = ir.Constant(ir.VectorType(INT, WIDTH), [INT(0)] * WIDTH)
     return builder.shuffle_vector(first, first, mask)

@@ -1,7 +1,7 @@
-"""The right-hand sides of one unknown, side by side in a vector register.
+"""Four right-hand sides of one unknown, side by side in a vector register.
 
-A row of an array (unknown, 4) is read, changed and written whole. Here, for the plain speed, a row
-is an array; compiled it is a register of four doubles, and the functions are the instructions in
+A row of an array (unknown, 4) is loaded, changed and stored whole. In the interpreter a row is an
+array; compiled it is a register of four doubles, and these functions are the instructions in
 `row_instructions.py`. Three right-hand sides leave the fourth at zero.
 """
 
@@ -11,29 +11,32 @@ in_vector_registers = compiled_in("reference.backend.simd.row_instructions")
 
 
 @in_vector_registers
-def row_at(y, i):
+def load_row(y, i):
     """Return row i of an array (unknown, 4)."""
     return y[i].copy()
 
 
 @in_vector_registers
-def put_row(y, i, row):
+def store_row(y, i, row):
     """Write row i of an array (unknown, 4)."""
     y[i] = row
 
 
 @in_vector_registers
-def scaled(factor, row):
-    """Return a row times a number."""
+def scale_row(factor, row):
+    """Return factor * row."""
     return factor * row
 
 
 @in_vector_registers
-def less(row, factor, other):
-    """Return a row less a number times another one."""
+def subtract_scaled(row, factor, other):
+    """Return row - factor * other."""
     return row - factor * other
 
 
 @in_vector_registers
-def ask_for(values, i):
-    """Ask memory for an entry that will be read soon, there or not; this changes no result."""
+def prefetch(values, i):
+    """Bring an entry that will be read soon nearer to the processor; this changes no result.
+
+    The index may lie outside of the array.
+    """

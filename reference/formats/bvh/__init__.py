@@ -1,11 +1,11 @@
-"""BVH, the Biovision hierarchy: motions of a skeleton, which every animation program opens.
+"""BVH, the Biovision hierarchy: motions of a skeleton, a common format of animation programs.
 
-The joints come in the order of the file, depth first. An end site is a joint without channels that
-is named after its parent, with " end" added; one at its parent's very place adds nothing and is
-left out. Rotation channels turn in their own order, R = R_1 R_2 R_3, about axes that move along.
-Position channels take the place of the OFFSET, axis by axis, as animation programs write them (a
-program that adds the two reads the same from a file whose root has the OFFSET zero). Lengths are in
-the unit of the file, angles in degrees in it and in quaternions here.
+The joints follow the order of the file, depth first. An end site becomes a joint without channels,
+named after its parent with " end" added; one that coincides with its parent is left out. Rotation
+channels compose in their order, R = R_1 R_2 R_3, about moving axes. Position channels replace the
+OFFSET, axis by axis, as animation programs write them; a program that adds the two reads the same
+from a file whose root has OFFSET zero. Lengths are in the unit of the file; angles are in degrees
+in the file and become quaternions.
 """
 
 from .motion import Motion

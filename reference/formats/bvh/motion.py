@@ -1,4 +1,4 @@
-"""Motion: how a skeleton moves, frame by frame."""
+"""A recorded motion: a skeleton with its local rotations and offsets in every frame."""
 
 from typing import NamedTuple
 
@@ -12,14 +12,14 @@ from ...skeleton import Pose, Skeleton, checked_skeleton
 
 
 class Motion(NamedTuple):
-    """A skeleton and its poses; `bvh.write(path, *motion)` writes it.
+    """A skeleton and its poses over time; `bvh.write(path, *motion)` writes it to a file.
 
     Attributes:
-        skeleton: its root is where it is in the first frame.
+        skeleton: the offset of its root is the root's position in the first frame.
         local_rotations: (frame, joint, 4).
-        frame_time: from a frame to the next [s].
-        offsets: each joint's position in its parent's frame, the root's global one, (frame, joint,
-            3): the skeleton's offsets but for joints that shift.
+        frame_time: time between frames [s].
+        offsets: each joint's position in its parent's frame, for the root in the world, (frame,
+            joint, 3); equal to the skeleton's offsets for joints without position channels.
     """
 
     skeleton: Skeleton
@@ -28,9 +28,9 @@ class Motion(NamedTuple):
     offsets: FloatArray
 
     def pose(self) -> Pose:
-        """Return the global poses of all joints, shifts included; the frames are a leading axis.
+        """Return the global poses of all joints, with frames as the leading axis.
 
-        Where only rotations change, `forward_kinematics(skeleton, local_rotations)` is the same.
+        Without position channels it equals `forward_kinematics(skeleton, local_rotations)`.
 
         Raises:
             ValueError: if the skeleton is none, or the rotations or offsets are not its own.
@@ -39,6 +39,6 @@ class Motion(NamedTuple):
         count = skeleton.joint_count
         R = arguments.array("local_rotations", self.local_rotations, "frame", count, 4)
         x = arguments.array("offsets", self.offsets, len(R), count, 3)
-        here = Skeleton(skeleton.parents, np.zeros_like(skeleton.offsets))
+        centred = Skeleton(skeleton.parents, np.zeros_like(skeleton.offsets))
         q = np.concatenate([x, rotation.unit("local_rotations", R)], axis=-1)
-        return forward_kinematics(Articulation(here, "free"), q.reshape(len(q), -1))
+        return forward_kinematics(Articulation(centred, "free"), q.reshape(len(q), 7 * count))

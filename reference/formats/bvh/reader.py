@@ -1,4 +1,4 @@
-"""Reading BVH."""
+"""Read BVH files."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -15,7 +15,7 @@ from ..robot import MOST_JOINTS, ORIGIN
 from ..source import read_text, warn
 from .motion import Motion
 
-# Frames times joints: a motion then fits in about a gigabyte.
+# Frames times joints, so that a motion needs at most about a gigabyte.
 MOST_POSES = 20_000_000
 # In a line of the hierarchy.
 MOST_CHARACTERS = 100_000
@@ -28,10 +28,10 @@ BRACES = re.compile(r"([{}])")
 def read(path: str | Path) -> Motion:
     """Return the motion in a file.
 
-    One frame more than the file counts, as some programs write, is left out with a warning.
+    A single frame beyond the count in the file, as some programs write, is dropped with a warning.
 
     Raises:
-        ValueError: naming file and line, if it cannot be read or is not a BVH file.
+        ValueError: if it cannot be read or is not a BVH file; names the file and the line.
     """
     return _motion(read_text(path), str(path))
 
@@ -51,7 +51,7 @@ class _Joint:
     parent: int
     is_end: bool
     offset: tuple[float, ...] = ()
-    channels: tuple[tuple[int, bool], ...] | None = None  # each an axis, and whether it turns
+    channels: tuple[tuple[int, bool], ...] | None = None  # (axis, whether a rotation)
 
 
 def _motion(text: str, origin: str) -> Motion:
@@ -59,12 +59,12 @@ def _motion(text: str, origin: str) -> Motion:
     try:
         joints = _hierarchy(lines)
         frame_time, values = _frames(lines, joints, len(text))
-        extra = _frame_too_many(lines, values)
+        extra = _extra_frame(lines, values)
     except ValueError as error:
         raise ValueError(f"{origin}, line {lines.number}: {error}") from None
     if extra:
-        said = f"expected the end after {len(values):,} frames, got one more, which is left out"
-        warn(f"{origin}, line {extra}: {said}")
+        problem = f"expected the end after {len(values):,} frames, got one more, which is left out"
+        warn(f"{origin}, line {extra}: {problem}")
     offsets, rotations = _poses(joints, values)
     rest = np.array([joint.offset for joint in joints])
     if len(offsets):
@@ -74,25 +74,25 @@ def _motion(text: str, origin: str) -> Motion:
 
 
 class _Lines:
-    """The lines of a text that are not empty, and the number of the last one given."""
+    """An iterator over the non-empty lines of a text that knows the current line number."""
 
     def __init__(self, text: str) -> None:
         self.text = text
         self.found = LINE.finditer(text)
-        self.at = 0
+        self.position = 0
 
     def __iter__(self) -> Iterator[str]:
         for line in self.found:
-            self.at = line.start()
+            self.position = line.start()
             yield line[0].rstrip()
-        self.at = len(self.text)
+        self.position = len(self.text)
 
     @property
     def number(self) -> int:
-        return self.text.count("\n", 0, self.at) + 1
+        return self.text.count("\n", 0, self.position) + 1
 
     def next(self, expected: str) -> str:
-        """Return the next one.
+        """Return the next line.
 
         Raises:
             ValueError: if there is none.
@@ -103,7 +103,7 @@ class _Lines:
 
 
 def _hierarchy(lines: _Lines) -> list[_Joint]:
-    """Return the joints; the lines stand behind MOTION then."""
+    """Read the lines up to MOTION; return the joints."""
     first = lines.next("HIERARCHY")
     if first.upper() != "HIERARCHY":
         raise ValueError(f"expected HIERARCHY, got {first!r:.40}")
@@ -121,7 +121,7 @@ def _hierarchy(lines: _Lines) -> list[_Joint]:
 
 
 class _Tree:
-    """The joints so far, and those that are still open."""
+    """The joints read so far, and the path of those whose braces are open."""
 
     def __init__(self) -> None:
         self.joints: list[_Joint] = []
@@ -130,7 +130,7 @@ class _Tree:
         self.unopened = False
 
     def take(self, piece: str) -> None:
-        """Take the next statement: a brace, or a word and what belongs to it."""
+        """Process the next statement: a brace, or a keyword with its arguments."""
         word, *rest = piece.split(maxsplit=1)
         word = word.upper()
         if self.unopened != (word == "{"):
@@ -147,7 +147,7 @@ class _Tree:
             raise ValueError(f"expected a joint or what belongs to one, got {piece!r:.40}")
 
     def open(self, word: str, name: str = "") -> None:
-        """Begin a joint or an end site, whose opening brace must follow."""
+        """Start a joint or an end site, whose opening brace must follow."""
         if (word == "ROOT") == bool(self.joints) or (word != "ROOT" and not self.path):
             raise ValueError(f"expected one ROOT and all joints in it, got {word} {name!r:.40}")
         parent = self.path[-1] if self.path else -1
@@ -164,7 +164,7 @@ class _Tree:
         self.unopened = True
 
     def close(self, joint: _Joint) -> None:
-        """End a joint; an end site where its parent is adds nothing."""
+        """Finish a joint; drop an end site that coincides with its parent."""
         if not joint.offset:
             raise ValueError(f"expected an OFFSET in {joint.name!r:.40}, got none")
         self.path.pop()
@@ -174,8 +174,8 @@ class _Tree:
     def check_complete(self) -> None:
         """Raise a ValueError if there is no joint or one is still open."""
         if self.path or not self.joints:
-            came = f"{self.joints[self.path[-1]].name!r:.40} still open" if self.path else "none"
-            raise ValueError(f"expected complete joints before MOTION, got {came}")
+            got = f"{self.joints[self.path[-1]].name!r:.40} still open" if self.path else "none"
+            raise ValueError(f"expected complete joints before MOTION, got {got}")
 
 
 def _set_offset(joint: _Joint, rest: str = "") -> None:
@@ -196,11 +196,11 @@ def _set_channels(joint: _Joint, rest: str = "") -> None:
 
 
 def _numbers(text: str, count: int) -> list[float]:
-    """Return the numbers that a text writes."""
+    """Return the numbers in a text, separated by white space."""
     words = text.split(maxsplit=count)
     if len(words) != count:
-        came = "more" if len(words) > count else len(words)
-        raise ValueError(f"expected {count} numbers, got {came}")
+        got = "more" if len(words) > count else len(words)
+        raise ValueError(f"expected {count} numbers, got {got}")
     try:
         numbers = [float(word) for word in words]
     except ValueError as error:
@@ -211,7 +211,7 @@ def _numbers(text: str, count: int) -> list[float]:
 
 
 def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, FloatArray]:
-    """Return the time of a frame and the channels' values, (frame, channel)."""
+    """Return the time between frames and the values of the channels, (frame, channel)."""
     count_text = _after("Frames:", lines)
     (frame_time,) = _numbers(_after("Frame Time:", lines), 1)
     if not COUNT.fullmatch(count_text):
@@ -221,7 +221,7 @@ def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, Floa
     count, width = int(count_text), sum(len(joint.channels or ()) for joint in joints)
     if count * len(joints) > MOST_POSES:
         raise ValueError(f"expected at most {MOST_POSES:,} frames times joints, got more")
-    if count and (width == 0 or 2 * count * width > size):  # a number and a space each, at least
+    if count and (width == 0 or 2 * count * width > size):  # two characters a number
         raise ValueError(f"expected {count:,} frames of {width:,} numbers, got a shorter file")
     values = np.empty((count, width))
     for i in range(count):
@@ -229,8 +229,8 @@ def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, Floa
     return frame_time, values
 
 
-def _frame_too_many(lines: _Lines, values: FloatArray) -> int:
-    """Return the line of the one frame that follows the last one, 0 if the text ends there.
+def _extra_frame(lines: _Lines, values: FloatArray) -> int:
+    """Return the line number of a single extra frame after the last one, 0 if the text ends.
 
     Raises:
         ValueError: if anything else follows.
@@ -252,7 +252,7 @@ def _is_frame(line: str, width: int) -> bool:
 
 
 def _after(title: str, lines: _Lines) -> str:
-    """Return what the next line says after its title."""
+    """Return the rest of the next line, which must begin with the title."""
     line = lines.next(f"'{title}'")
     if not line.upper().startswith(title.upper()):
         raise ValueError(f"expected '{title}', got {line!r:.40}")
@@ -266,9 +266,9 @@ def _poses(joints: list[_Joint], values: FloatArray) -> tuple[FloatArray, FloatA
     columns = iter(values.T)
     for j, joint in enumerate(joints):
         R = IDENTITY
-        for axis, turns in joint.channels or ():
-            if turns:
-                R = multiply(R, _turn(axis, np.radians(next(columns))))
+        for axis, is_rotation in joint.channels or ():
+            if is_rotation:
+                R = multiply(R, _rotation_about(axis, np.radians(next(columns))))
             else:
                 offsets[:, j, axis] = next(columns)
         for part in range(4):
@@ -276,8 +276,8 @@ def _poses(joints: list[_Joint], values: FloatArray) -> tuple[FloatArray, FloatA
     return offsets, rotations
 
 
-def _turn(axis: int, angle: FloatArray) -> Sequence[FloatArray | float]:
-    """Return the rotations by angles about one of the axes x, y, z."""
+def _rotation_about(axis: int, angle: FloatArray) -> Sequence[FloatArray | float]:
+    """Return the rotations by angles [rad] about one of the axes x, y, z."""
     vector: list[FloatArray | float] = [0.0, 0.0, 0.0]
     vector[axis] = np.sin(0.5 * angle)
     return (np.cos(0.5 * angle), *vector)

@@ -1,4 +1,4 @@
-"""Writing BVH."""
+"""Write BVH files."""
 
 from pathlib import Path
 
@@ -12,10 +12,10 @@ from ...skeleton import Skeleton, checked_skeleton
 from ..source import checked_path
 
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
-EVEN = ("XYZ", "YZX", "ZXY")
+CYCLIC = ("XYZ", "YZX", "ZXY")
 DECIMALS = 6
 POSITIONS = "Xposition Yposition Zposition"
-# Deeper joints are not indented further, or the text of a long chain would grow with its square.
+# Deeper joints are not indented further, so that the text of a long chain stays linear in it.
 DEEPEST_INDENT = 40
 
 
@@ -28,26 +28,26 @@ def write(
     *,
     order: str = "ZXY",
 ) -> None:
-    """Write a motion to a file, over one that may be there.
+    """Write a motion to a file, replacing an existing one.
 
     Args:
         path: of the file.
-        skeleton: what moves.
-        local_rotations: (frame, joint, 4), or of one pose (joint, 4), as `solve_ik` and `track`
-            return them; of an Articulation its coordinates, (frame, coordinate).
-        frame_time: from a frame to the next [s].
-        offsets: where joints shift, each one's position in its parent's frame, (frame, joint, 3),
-            or the root's alone, (frame, 3); the skeleton's if None.
+        skeleton: a Skeleton or an Articulation.
+        local_rotations: (frame, joint, 4), or (joint, 4) for one pose, as `solve_ik` and `track`
+            return them; for an Articulation its coordinates, (frame, coordinate).
+        frame_time: time between frames [s].
+        offsets: each joint's position in its parent's frame, (frame, joint, 3), or the root's
+            position, (frame, 3); by default the skeleton's offsets.
         order: the axes of the rotation channels.
 
-    Numbers have six decimals: an offset is off by at most 5e-7 an axis, 9e-7 in all, and a joint's
-    rotation by 1.5e-6 degrees in three angles, 2.7e-8 rad. So a joint that is n joints below the
-    root, along links of length L in all, is off by at most (n + 1) 9e-7 + n L 2.7e-8. Angles run on
-    without jumps of a whole turn. Joints are written depth first, so that a reader finds them in
-    that order, by the same names.
+    Numbers have six decimals: the rounding error of an offset is at most 5e-7 per axis, 9e-7 in
+    all, and that of a rotation 1.5e-6 degrees in three angles, 2.7e-8 rad. The position of a joint
+    at depth n, along links of total length L, is off by at most (n + 1) 9e-7 + n L 2.7e-8. Angles
+    are continuous, without jumps of 360 degrees. Joints are written depth first, which is their
+    order when read back, and keep their names.
 
     Raises:
-        ValueError: naming the argument, if one is wrong or a name cannot be written.
+        ValueError: if an argument is invalid or a name cannot be written; names the argument.
         OSError: if the file cannot be written.
     """
     text = format(skeleton, local_rotations, frame_time, offsets, order=order)
@@ -90,13 +90,13 @@ def euler_angles(R: FloatArray, order: str) -> FloatArray:
     """Return angles [degrees], (frame, joint, 3), of R = R_1(a_1) R_2(a_2) R_3(a_3), (..., 4).
 
     Bernardes and Viollet 2022: with e the sign of the axes' order, (a_3 + e a_1)/2 and
-    (a_3 - e a_1)/2 are the angles of two points in the plane, made of sums of the quaternion's
-    parts, and the ratio of their distances from its origin gives a_2. At gimbal lock one of them is
-    at the origin: its angle has no meaning there, and no effect. Angles begin within half a turn
-    of zero and run on from frame to frame without jumps of a whole one.
+    (a_3 - e a_1)/2 are the polar angles of two points in the plane whose coordinates are sums of
+    the quaternion's components, and the ratio of their radii gives a_2. At gimbal lock one of them
+    is the origin, whose angle is arbitrary and has no effect. Angles start between -180 and 180 and
+    are continuous from frame to frame.
     """
     first, second, third = (R[..., 1 + "XYZ".index(axis)] for axis in order)
-    first = -first if order in EVEN else first
+    first = -first if order in CYCLIC else first
     w = R[..., 0]
     a, b, c, d = w - second, third + first, w + second, first - third
     half_sum, half_difference = np.arctan2(b, a), np.arctan2(d, c)
@@ -108,7 +108,7 @@ def euler_angles(R: FloatArray, order: str) -> FloatArray:
         ],
         axis=-1,
     )
-    angles[..., 0] *= -1.0 if order in EVEN else 1.0
+    angles[..., 0] *= -1.0 if order in CYCLIC else 1.0
     angles = np.degrees(np.unwrap(angles, axis=0))
     return angles - 360.0 * np.round(angles[:1] / 360.0)
 
@@ -129,8 +129,8 @@ def _rotated(
 ) -> tuple[FloatArray, FloatArray]:
     """Return offsets and local rotations of each frame."""
     count = skeleton.joint_count
-    given = arguments.floats("local_rotations", local_rotations, "...", count, 4)
-    R = _framed("local_rotations", rotation.unit("local_rotations", given), 3)
+    values = arguments.floats("local_rotations", local_rotations, "...", count, 4)
+    R = _framed("local_rotations", rotation.unit("local_rotations", values), 3)
     x = np.tile(skeleton.offsets, (len(R), 1, 1))
     if offsets is None:
         return x, R
@@ -142,7 +142,7 @@ def _rotated(
 
 
 def _framed(name: str, values: FloatArray, axes: int) -> FloatArray:
-    """Return an array that has the frames as its leading axis: one pose is one frame."""
+    """Return an array with frames as its leading axis, which is added to a single pose."""
     if values.ndim not in (axes - 1, axes):
         raise ValueError(f"{name}: expected one pose or a row of frames, got {values.shape}")
     return values if values.ndim == axes else values[None]
@@ -162,15 +162,15 @@ def _children(skeleton: Skeleton) -> list[list[int]]:
 
 
 def _end_sites(skeleton: Skeleton, R: FloatArray, shifts: np.ndarray) -> set[int]:
-    """Return the joints that read back as they are from an end site."""
+    """Return the joints that can be written as end sites without loss."""
     ends = set()
     children = _children(skeleton)
     for siblings in children:
         j = siblings[0] if len(siblings) == 1 else 0
         named = skeleton.names[j] == f"{skeleton.names[skeleton.parents[j]]} end"
-        apart = np.round(skeleton.offsets[j], DECIMALS).any()
-        leaf = not children[j]
-        if named and apart and leaf and not shifts[j] and (np.abs(R[:, j, 0]) == 1.0).all():
+        distinct = np.round(skeleton.offsets[j], DECIMALS).any()
+        fixed = not shifts[j] and (np.abs(R[:, j, 0]) == 1.0).all()
+        if named and distinct and fixed and not children[j]:
             ends.add(j)
     return ends
 
@@ -178,9 +178,9 @@ def _end_sites(skeleton: Skeleton, R: FloatArray, shifts: np.ndarray) -> set[int
 def _hierarchy(
     skeleton: Skeleton, shifts: np.ndarray, ends: set[int], order: str
 ) -> tuple[list[int], list[str]]:
-    """Return the joints that have channels, in the order of the file, and the lines."""
+    """Return the joints with channels, in the order of the file, and the lines of the hierarchy."""
     children = _children(skeleton)
-    turns = " ".join(f"{axis}rotation" for axis in order)
+    rotations = " ".join(f"{axis}rotation" for axis in order)
     joints: list[int] = []
     lines: list[str] = []
     depths = np.zeros(skeleton.joint_count, dtype=int)
@@ -197,7 +197,7 @@ def _hierarchy(
             lines += _block(pad, "End Site", offset)
             continue
         joints.append(j)
-        channels = f"6 {POSITIONS} {turns}" if shifts[j] else f"3 {turns}"
+        channels = f"6 {POSITIONS} {rotations}" if shifts[j] else f"3 {rotations}"
         title = f"{'JOINT' if j else 'ROOT'} {skeleton.names[j]}"
         lines += [*_block(pad, title, offset)[:-1], f"{pad}\tCHANNELS {channels}"]
         lines += [] if children[j] else _block(pad + "\t", "End Site", np.zeros(3))

@@ -1,19 +1,19 @@
 """The kinematic part of an MJCF file, MuJoCo's own format.
 
 Joint 0 of the articulation is the world. Bodies follow depth first in the order of the file, and
-the coordinates are those of MuJoCo's qpos, one for one. Every body gives a joint of its own name
-and pose. A body that has several joints gives one for each, named "body/joint", of which the last
-is the body's own; where the last anchor is not the body's origin, a fixed joint is added for that.
-A body without a name is called "body#3" after its number, and a joint without one "hinge1" after
-its type and its place among the body's.
+the coordinates equal those of MuJoCo's qpos. Every body becomes a joint with its name and pose. A
+body with several joints becomes one joint for each, named "body/joint", except that the last one
+has the name of the body; if its anchor is not the body's origin, a fixed joint with the name of the
+body follows. A body without a name is called "body#3" by its index, a joint without one "hinge1" by
+its type and its index in the body.
 
-`ref` is folded into the frames: `home` is where the file shows the robot, with each joint at its
-`ref`. A free joint moves in the world's frame. The limit of a ball, which MuJoCo sets on its whole
-angle, becomes one of the same size on its tilt and one on its twist about z: this allows all that
-MuJoCo does, and more. Frames, nested defaults, and includes from within one folder are followed.
-Sites, keyframes, equality constraints and all else that forward kinematics has no use for is passed
-over. What makes bodies by a rule (replicate, attach, composite, flexcomp) is refused, but for a
-replicate without bodies, which is passed over with a warning.
+`home` is the configuration in the file, with each joint at its `ref`. A free joint moves in the
+world's frame. MuJoCo limits the total angle of a ball; here its tilt and its twist about z are each
+limited by that angle, which allows all that MuJoCo does, and more. Frames, nested defaults and
+includes from one folder are supported. Elements that do not affect forward kinematics, such as
+sites, keyframes and equality constraints, are ignored. Elements that generate bodies (replicate,
+attach, composite, flexcomp) are refused, except for a replicate without bodies, which is ignored
+with a warning.
 """
 
 from pathlib import Path
@@ -31,11 +31,12 @@ def read(path: str | Path, *, root: str | Path | None = None) -> Robot:
 
     Args:
         path: of the file.
-        root: the folder that included files must be in, links followed; the file's own if None.
+        root: the folder that must contain all included files after symbolic links are resolved;
+            that of the file if None.
 
     Raises:
         ValueError: naming file, line and element, if it cannot be read, is not an MJCF file,
-            includes one from outside the root, or makes bodies by a rule.
+            includes one from outside the root, or has elements that generate bodies.
     """
     element = xml.read(path)
     include_files(element, Path(path), root)

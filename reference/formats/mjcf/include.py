@@ -1,4 +1,4 @@
-"""Files that an MJCF file includes: their content takes the place of the <include>."""
+"""Replace each <include> of an MJCF file by the content of the included file."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -8,27 +8,27 @@ from ..xml import Element
 
 
 class _Folders(NamedTuple):
-    """Where included files may be: beside the main one, and nowhere outside the top."""
+    """The folder of the main file, and the folder that must contain all included files."""
 
     main: Path
     top: Path
 
 
 def include_files(root: Element, path: Path, top: str | Path | None) -> None:
-    """Put the content of included files in its place, each file once.
+    """Replace all includes by the content of the files, each of which may be included once.
 
     Args:
         root: the main file's root element.
         path: of the main file.
-        top: the folder that no file may be outside of, links followed; that of the main file if
-            None.
+        top: the folder that must contain all files after symbolic links are resolved; that of the
+            main file if None.
 
     Raises:
-        ValueError: if a file is included twice, is not there or outside of that folder, or if that
-            is no folder that holds the main file.
+        ValueError: if a file is included twice, does not exist or is outside of that folder, or if
+            that folder does not contain the main file.
     """
     main = path.resolve()
-    folders = _Folders(main.parent, main.parent if top is None else _holding(main, top))
+    folders = _Folders(main.parent, main.parent if top is None else _checked_top(main, top))
     seen = {main}
     waiting = [(root, main)]
     while waiting:
@@ -50,15 +50,12 @@ def include_files(root: Element, path: Path, top: str | Path | None) -> None:
 
 def refuse_includes(root: Element) -> None:
     """Raise a ValueError if any file is included."""
-    waiting = [root]
-    while waiting:
-        element = waiting.pop()
+    for element in root.walk():
         if element.tag == "include":
             raise element.error("expected a text without includes; they need a file to be read")
-        waiting += element.children
 
 
-def _holding(main: Path, top: str | Path) -> Path:
+def _checked_top(main: Path, top: str | Path) -> Path:
     found = _resolved(Path(top)) if isinstance(top, str | Path) else None
     if found is None or not (found.is_dir() and main.is_relative_to(found)):
         raise ValueError(f"root: expected a folder that holds {main.name!r:.80}, got {top!r:.80}")
@@ -66,7 +63,7 @@ def _holding(main: Path, top: str | Path) -> Path:
 
 
 def _included(include: Element, file: Path, folders: _Folders) -> Path:
-    """Return the file meant: beside the main one, or else beside the one that includes it."""
+    """Return the included file, relative to the main file or else to the including one."""
     name = include.word("file")
     found = [_resolved(folder / name) for folder in (folders.main, file.parent)]
     possible = [path for path in found if path is not None]
@@ -82,9 +79,9 @@ def _included(include: Element, file: Path, folders: _Folders) -> Path:
 
 
 def _resolved(path: Path) -> Path | None:
-    """Return where a path leads, links followed; None if no file can have it."""
+    """Return a path with symbolic links resolved; None if it is not a valid path."""
     try:
-        path.exists()  # which says so of names too long and of rings of links
+        path.exists()  # raises for names that are too long and for cycles of links
         return path.resolve()
     except (OSError, RuntimeError):
         return None

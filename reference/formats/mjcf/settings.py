@@ -1,4 +1,4 @@
-"""What an MJCF file says once for all of it, and how poses and joints are read by it."""
+"""The compiler settings and default classes of an MJCF file, applied to poses and joints."""
 
 import math
 from collections.abc import Sequence
@@ -28,19 +28,19 @@ OF_JOINTS = ("type", "pos", "axis", "range", "limited", "ref")
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
 
-class Pose(NamedTuple):
+class Transform(NamedTuple):
     """A position and a rotation."""
 
     x: Vector = ORIGIN
     R: Quaternion = IDENTITY
 
-    def of(self, x: Vector) -> Vector:
-        """Return where the point x of this frame is."""
+    def apply(self, x: Vector) -> Vector:
+        """Return the outer coordinates of a point x of this frame."""
         return add(self.x, rotate(self.R, x))
 
-    def then(self, inner: "Pose") -> "Pose":
-        """Return the pose of what has the inner pose in this frame."""
-        return Pose(self.of(inner.x), multiply(self.R, inner.R))
+    def compose(self, inner: "Transform") -> "Transform":
+        """Return the product of this transform and an inner one."""
+        return Transform(self.apply(inner.x), multiply(self.R, inner.R))
 
 
 class Settings(NamedTuple):
@@ -48,10 +48,10 @@ class Settings(NamedTuple):
 
     Attributes:
         angle: the file's unit of angles [rad].
-        sequence: the axes of Euler angles; those in capitals are fixed ones.
-        autolimits: whether a range makes a limit.
-        alignfree: whether free bodies are turned along their inertia.
-        classes: what each default class says of joints.
+        sequence: the axes of Euler angles; capitals denote fixed axes.
+        autolimits: whether a range implies a limit.
+        alignfree: whether the frames of free bodies are aligned with their inertia.
+        classes: the joint attributes of each default class.
     """
 
     angle: float
@@ -60,13 +60,13 @@ class Settings(NamedTuple):
     alignfree: bool
     classes: dict[str, dict[str, str]]
 
-    def pose(self, element: Element) -> Pose:
-        """Return where a body or a frame is in what it stands in.
+    def transform(self, element: Element) -> Transform:
+        """Return the transform of a body or a frame in its parent.
 
         Raises:
-            ValueError: if a number is wrong, or there are several orientations.
+            ValueError: if a number is invalid, or there are several orientations.
         """
-        return Pose(element.numbers("pos", ORIGIN), self._orientation(element))
+        return Transform(element.numbers("pos", ORIGIN), self._orientation(element))
 
     def class_of(self, element: Element, attribute: str, inherited: str) -> str:
         """Return the default class that an element names, or the one it inherits.
@@ -80,7 +80,7 @@ class Settings(NamedTuple):
         return name
 
     def with_defaults(self, joint: Element, inherited: str) -> Element:
-        """Return a joint with the attributes of its class where it has none.
+        """Return a joint with missing attributes taken from its class.
 
         Raises:
             ValueError: if there is no such class.
@@ -89,28 +89,30 @@ class Settings(NamedTuple):
         return joint._replace(attributes=defaults | joint.attributes)
 
     def _orientation(self, element: Element) -> Quaternion:
-        given = [name for name in ORIENTATIONS if name in element.attributes]
-        if len(given) > 1:
-            raise element.error(f"expected one orientation, got {' and '.join(given)}")
-        if not given:
-            return IDENTITY
-        if given[0] == "quat":
-            return _normalised(element, "quat", element.numbers("quat", IDENTITY))
-        if given[0] == "axisangle":
-            x, y, z, angle = element.numbers("axisangle", (0.0, 0.0, 0.0, 0.0))
-            return exponential(scale(angle * self.angle, direction(element, given[0], (x, y, z))))
-        if given[0] == "euler":
-            return self._from_euler(element.numbers("euler", ORIGIN))
-        if given[0] == "zaxis":
-            return upright(direction(element, "zaxis", element.numbers("zaxis", ORIGIN)))
-        return _from_axes(element, element.numbers("xyaxes", (*ORIGIN, *ORIGIN)))
+        present = [name for name in ORIENTATIONS if name in element.attributes]
+        if len(present) > 1:
+            raise element.error(f"expected one orientation, got {' and '.join(present)}")
+        match present:
+            case ["quat"]:
+                return _normalised(element, "quat", element.numbers("quat", IDENTITY))
+            case ["axisangle"]:
+                x, y, z, angle = element.numbers("axisangle", (0.0, 0.0, 0.0, 0.0))
+                axis = direction(element, "axisangle", (x, y, z))
+                return exponential(scale(angle * self.angle, axis))
+            case ["euler"]:
+                return self._from_euler(element.numbers("euler", ORIGIN))
+            case ["zaxis"]:
+                return upright(direction(element, "zaxis", element.numbers("zaxis", ORIGIN)))
+            case ["xyaxes"]:
+                return _from_axes(element, element.numbers("xyaxes", (*ORIGIN, *ORIGIN)))
+        return IDENTITY
 
     def _from_euler(self, angles: Sequence[float]) -> Quaternion:
-        """Return the product of turns about axes that move along, or in capitals stay."""
+        """Return the product of rotations about moving axes, or about fixed ones for capitals."""
         R = IDENTITY
         for axis, angle in zip(self.sequence, angles, strict=True):
-            turn = exponential(scale(angle * self.angle, AXES[axis.lower()]))
-            R = multiply(R, turn) if axis.islower() else multiply(turn, R)
+            factor = exponential(scale(angle * self.angle, AXES[axis.lower()]))
+            R = multiply(R, factor) if axis.islower() else multiply(factor, R)
         return R
 
 
@@ -118,21 +120,21 @@ def settings(root: Element) -> Settings:
     """Return the settings of a file.
 
     Raises:
-        ValueError: if one has no such value, or a default class is wrong.
+        ValueError: if a value is not allowed, or a default class is invalid.
     """
-    given = Element("compiler", {}, [], root.place)
+    merged = Element("compiler", {}, [], root.location)
     for compiler in root.named("compiler"):
-        given = compiler._replace(attributes=given.attributes | compiler.attributes)
-    one_of(given, "coordinate", ("local",), "local")
-    sequence = given.word("eulerseq", "xyz")
+        merged = compiler._replace(attributes=merged.attributes | compiler.attributes)
+    one_of(merged, "coordinate", ("local",), "local")
+    sequence = merged.word("eulerseq", "xyz")
     if len(sequence) != 3 or not set(sequence.lower()) <= set(AXES):
-        raise given.error(f"expected three axes such as xyz for eulerseq, got {sequence!r:.80}")
-    unit = one_of(given, "angle", ("degree", "radian"), "degree")
+        raise merged.error(f"expected three axes such as xyz for eulerseq, got {sequence!r:.80}")
+    unit = one_of(merged, "angle", ("degree", "radian"), "degree")
     return Settings(
         math.radians(1.0) if unit == "degree" else 1.0,
         sequence,
-        one_of(given, "autolimits", ("true", "false"), "true") == "true",
-        one_of(given, "alignfree", ("true", "false"), "false") == "true",
+        one_of(merged, "autolimits", ("true", "false"), "true") == "true",
+        one_of(merged, "alignfree", ("true", "false"), "false") == "true",
         _classes(root),
     )
 
@@ -153,7 +155,7 @@ def direction(element: Element, name: str, vector: Vector) -> Vector:
     """Return the vector scaled to unit length.
 
     Raises:
-        ValueError: if it is zero; it speaks of the attribute named.
+        ValueError: if it is zero; names the attribute.
     """
     length = math.hypot(*vector)
     if length == 0.0:
@@ -162,7 +164,7 @@ def direction(element: Element, name: str, vector: Vector) -> Vector:
 
 
 def _from_axes(element: Element, axes: Sequence[float]) -> Quaternion:
-    """Return the rotation to x and to what of y is perpendicular to it."""
+    """Return the rotation to the frame of x and the component of y perpendicular to x."""
     x = direction(element, "xyaxes", (axes[0], axes[1], axes[2]))
     y = direction(element, "xyaxes", (axes[3], axes[4], axes[5]))
     y = direction(element, "xyaxes", subtract(y, scale(dot(x, y), x)))
@@ -177,7 +179,7 @@ def _normalised(element: Element, name: str, q: Quaternion) -> Quaternion:
 
 
 def _classes(root: Element) -> dict[str, dict[str, str]]:
-    """Return what each default class says of joints, what its outer classes say included."""
+    """Return the joint attributes of each default class, those of outer classes included."""
     classes: dict[str, dict[str, str]] = {"main": {}}
     waiting = [(element, "") for element in reversed(root.named("default"))]
     while waiting:
@@ -190,7 +192,7 @@ def _classes(root: Element) -> dict[str, dict[str, str]]:
         elif name != "main":
             raise element.error(f"expected the outermost class to be 'main', got {name!r:.80}")
         joint = element.single("joint")
-        given = joint.attributes if joint else {}
-        classes[name] = classes[name] | {key: given[key] for key in OF_JOINTS if key in given}
+        found = joint.attributes if joint else {}
+        classes[name] = classes[name] | {key: found[key] for key in OF_JOINTS if key in found}
         waiting += [(inner, name) for inner in reversed(element.named("default"))]
     return classes

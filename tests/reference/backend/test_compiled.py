@@ -248,11 +248,11 @@ CALLER = textwrap.dedent("""
     import numpy as np
     from callee import callee
     from reference.backend.compiled import TwoSpeeds
-    from reference.backend.simd.lanes import LANES, put_vectors, vectors_at
+    from reference.backend.simd.lanes import LANES, store_vectors, load_vectors
 
     def caller(tile):
-        a, b, c = vectors_at(tile, 0)
-        put_vectors(tile, 0, (b, b, c))
+        a, b, c = load_vectors(tile, 0)
+        store_vectors(tile, 0, (b, b, c))
         return callee(tile[0, 0, 0])
 
     run = TwoSpeeds(caller)

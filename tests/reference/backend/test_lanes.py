@@ -7,12 +7,12 @@ from reference.backend.simd import lanes
 from reference.backend.simd.lanes import (
     LANES,
     all_within,
-    lanes_at,
-    put_lanes,
-    put_quaternions,
-    put_vectors,
-    quaternions_at,
-    vectors_at,
+    load_lanes,
+    load_quaternions,
+    load_vectors,
+    store_lanes,
+    store_quaternions,
+    store_vectors,
 )
 from reference.quaternion import (
     IDENTITY,
@@ -32,35 +32,35 @@ JOINTS = 3
 
 
 def copy_vectors(tile, result):
-    put_vectors(result, 1, vectors_at(tile, 2))
+    store_vectors(result, 1, load_vectors(tile, 2))
 
 
 def copy_quaternions(tile, result):
-    put_quaternions(result, 1, quaternions_at(tile, 2))
+    store_quaternions(result, 1, load_quaternions(tile, 2))
 
 
 def spread_out(tile, scratch):
-    put_lanes(scratch, 1, quaternions_at(tile, 2))
+    store_lanes(scratch, 1, load_quaternions(tile, 2))
 
 
 def gather(scratch, tile):
-    put_quaternions(tile, 1, lanes_at(scratch, 2))
+    store_quaternions(tile, 1, load_lanes(scratch, 2))
 
 
 def put_the_same(tile, scratch):
-    put_quaternions(tile, 1, (1.0, 2.0, 3.0, 4.0))
-    put_lanes(scratch, 1, (1.0, 2.0, 3.0, 4.0))
+    store_quaternions(tile, 1, (1.0, 2.0, 3.0, 4.0))
+    store_lanes(scratch, 1, (1.0, 2.0, 3.0, 4.0))
 
 
 def put_one_or_other(scratch, tile, other):
     q = IDENTITY
     if other:
-        q = lanes_at(scratch, 2)
-    put_quaternions(tile, 1, q)
+        q = load_lanes(scratch, 2)
+    store_quaternions(tile, 1, q)
 
 
 def bounded(scratch, bound):
-    w, x, y, z = lanes_at(scratch, 0)
+    w, x, y, z = load_lanes(scratch, 0)
     return all_within(w, bound)
 
 
@@ -75,10 +75,10 @@ def algebra(a, b, v, vectors, quaternions):
 
 algebra_of_tiles = compiled.bind(
     algebra,
-    quaternion_at=quaternions_at,
-    vector_at=vectors_at,
-    put_quaternion=put_quaternions,
-    put_vector=put_vectors,
+    quaternion_at=load_quaternions,
+    vector_at=load_vectors,
+    put_quaternion=store_quaternions,
+    put_vector=store_vectors,
 )
 
 

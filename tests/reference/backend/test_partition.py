@@ -35,10 +35,10 @@ def moving(request, rng):
 def in_regions(moving, monkeypatch):
     """The same system and state, taken for a large one."""
     system, state = moving
-    assert system.dampers_apart.regions is None
+    assert system.with_separate_dampers.regions is None
     monkeypatch.setattr("reference.mass_spring.LARGE", 1)
     large = system.replaced()
-    assert large.dampers_apart.regions is not None
+    assert large.with_separate_dampers.regions is not None
     return large, state
 
 
@@ -63,7 +63,7 @@ def test_the_sum_over_regions_is_the_sum_over_all(moving, in_regions, rng, speed
     assert abs(found.gradient - expected.gradient).max() <= expected.floor / 64
     assert found.value == pytest.approx(expected.value, rel=0, abs=expected.value_floor)
     assert found.gradient_norm == pytest.approx(expected.gradient_norm, rel=32 * EPS)
-    assert found.most == pytest.approx(expected.most, rel=32 * EPS)
+    assert found.floor_bound == pytest.approx(expected.floor_bound, rel=32 * EPS)
 
 
 def test_the_bits_do_not_depend_on_the_cores(in_regions):

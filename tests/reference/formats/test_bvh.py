@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from crosscheck.robots.second_bvh import placements
+from crosscheck.robots.independent_bvh import global_poses
 from reference import (
     Articulation,
     Skeleton,
@@ -59,7 +59,7 @@ Frame Time: 0.04
 IDENTITY = [1.0, 0.0, 0.0, 0.0]
 
 
-def turn(axis, degrees):
+def rotation_about(axis, degrees):
     """The matrix of a rotation about X, Y or Z, from its definition."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     i, j = [(1, 2), (2, 0), (0, 1)]["XYZ".index(axis)]
@@ -69,8 +69,8 @@ def turn(axis, degrees):
 
 
 def positions_by_a_second_reader(text):
-    """The joints' global positions by name, frame by frame, read another way."""
-    return {name: positions for name, positions, _ in placements(text)}
+    """The joints' global positions by name, frame by frame, computed independently."""
+    return {name: positions for name, positions, _ in global_poses(text)}
 
 
 def bound(skeleton):
@@ -170,15 +170,15 @@ def test_joints_that_shift_read_back(rng):
 
 def test_a_root_that_moves_reads_back(rng):
     skeleton, _ = scenes.lab_arm()
-    local, way = rotation.random(rng, 4, 5), rng.uniform(-3, 3, (4, 3))
-    back = bvh.parse(bvh.format(skeleton, local, offsets=way))
-    np.testing.assert_allclose(back.offsets[:, 0], way, atol=5.1e-7)
-    np.testing.assert_allclose(back.pose().positions[:, 0], way, atol=5.1e-7)
-    np.testing.assert_allclose(back.skeleton.offsets[0], way[0], atol=5.1e-7)
+    local, path = rotation.random(rng, 4, 5), rng.uniform(-3, 3, (4, 3))
+    back = bvh.parse(bvh.format(skeleton, local, offsets=path))
+    np.testing.assert_allclose(back.offsets[:, 0], path, atol=5.1e-7)
+    np.testing.assert_allclose(back.pose().positions[:, 0], path, atol=5.1e-7)
+    np.testing.assert_allclose(back.skeleton.offsets[0], path[0], atol=5.1e-7)
     everything = np.tile(skeleton.offsets, (4, 1, 1))
-    everything[:, 0] = way
+    everything[:, 0] = path
     assert bvh.format(skeleton, local, offsets=everything) == bvh.format(
-        skeleton, local, offsets=way
+        skeleton, local, offsets=path
     )
 
 
@@ -186,7 +186,7 @@ CHANNELS = [*ORDERS, "X", "Y", "Z", "ZX", "YZ", "", "zxy"]
 
 
 @pytest.mark.parametrize("order", CHANNELS)
-def test_channels_turn_in_their_own_order(order):
+def test_channels_compose_in_their_own_order(order):
     angles = [10.0, -200.0, 75.0][: len(order)]
     names = " ".join(f"{axis}rotation" for axis in order)
     text = ONE_JOINT.format(
@@ -194,7 +194,7 @@ def test_channels_turn_in_their_own_order(order):
     )
     expected = np.eye(3)
     for axis, angle in zip(order.upper(), angles, strict=False):
-        expected = expected @ turn(axis, angle)
+        expected = expected @ rotation_about(axis, angle)
     motion = bvh.parse(text)
     np.testing.assert_allclose(
         rotation.to_matrix(motion.local_rotations[0, 0]), expected, atol=1e-15
@@ -205,7 +205,7 @@ def test_positions_and_rotations_may_alternate():
     names = "Zrotation Xposition Yrotation Zposition"
     motion = bvh.parse(ONE_JOINT.format(f"4 {names}", "90 7 90 8"))
     assert motion.offsets[0, 0].tolist() == [7, 2, 8]  # y has no channel: the OFFSET's
-    expected = turn("Z", 90) @ turn("Y", 90)
+    expected = rotation_about("Z", 90) @ rotation_about("Y", 90)
     np.testing.assert_allclose(
         rotation.to_matrix(motion.local_rotations[0, 0]), expected, atol=1e-15
     )
@@ -220,7 +220,7 @@ def test_a_file_of_many_manners_is_read():
     legs = positions_by_a_second_reader(WALK)
     for j, name in enumerate(motion.skeleton.names):
         np.testing.assert_allclose(motion.pose().positions[:, j], legs[name], atol=1e-14)
-    R = turn("Z", 10) @ turn("X", 20) @ turn("Y", 30)
+    R = rotation_about("Z", 10) @ rotation_about("X", 20) @ rotation_about("Y", 30)
     np.testing.assert_allclose(legs["left leg"][0], [1, 2, 3] + R @ [0.5, -1, 0], atol=1e-14)
 
 
@@ -263,7 +263,7 @@ def test_gimbal_lock_costs_no_accuracy(order, off, side):
     assert rotation.angle(again, q).max() <= 2.7e-8
 
 
-def test_angles_run_on_through_whole_turns():
+def test_angles_are_continuous_beyond_360_degrees():
     angle = np.radians(np.linspace(0, 1080, 100))
     skeleton = Skeleton([-1], [[0, 0, 0]])
     spins = rotation.exponential(angle[:, None, None] * np.array([0.0, 0.0, 1.0]))
@@ -279,7 +279,7 @@ LEAVES = {
     "an end": ([-1, 0], ["a", "a end"], TIP, IDENTITY, True),
     "the same, twice covered": ([-1, 0], ["a", "a end"], TIP, [-1.0, 0, 0, 0], True),
     "one of another name": ([-1, 0], ["a", "b"], TIP, IDENTITY, False),
-    "one that turns": ([-1, 0], ["a", "a end"], TIP, TURNED, False),
+    "one that rotates": ([-1, 0], ["a", "a end"], TIP, TURNED, False),
     "one at its parent": ([-1, 0], ["a", "a end"], [0.0, 4e-7, 0.0], IDENTITY, False),
     "one that has a brother": ([-1, 0, 0], ["a", "a end", "b"], TIP, IDENTITY, False),
     "one that has an elder son": ([-1, 0, 1], ["a", "a end", "b"], TIP, IDENTITY, False),
@@ -329,7 +329,7 @@ WRONG = {
     "no OFFSET's numbers": (WALK.replace("OFFSET 0 1 0", "OFFSET"), "expected 3 numbers, got 0"),
     "an OFFSET beyond": (WALK.replace("OFFSET 0 1 0", "OFFSET 0 1e80 0"), "at most 1e+75"),
     "no number": (WALK.replace("OFFSET 0 1 0", "OFFSET 0 1 up"), "expected numbers, got 'up'"),
-    "a number in Python's way": (WALK.replace("OFFSET 0 1 0", "OFFSET 0 1_0 0"), "numbers of at"),
+    "a Python number": (WALK.replace("OFFSET 0 1 0", "OFFSET 0 1_0 0"), "numbers of at"),
     "fewer channels": (WALK.replace("CHANNELS 1", "CHANNELS 2"), "a count and so many different"),
     "no channels": (WALK.replace("CHANNELS 1 Xrotation", "CHANNELS"), "a count and so many"),
     "fewer than none": (WALK.replace("CHANNELS 1", "CHANNELS -1"), "a count and so many"),

@@ -103,7 +103,7 @@ def any_character(rng):
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_any_character_stands_as_mujoco_says(seed):
+def test_any_character_has_mujocos_poses(seed):
     rng = np.random.default_rng(seed)
     text = any_character(rng)
     found = mjcf.parse(text)
@@ -135,7 +135,7 @@ def test_limits_and_names_are_mujocos(seed):
         np.testing.assert_allclose(ours, limits, atol=1e-15)  # one rounding of degrees
 
 
-def test_a_hinge_turns_about_its_anchor():
+def test_a_hinge_rotates_about_its_anchor():
     found = character(
         '<body name="door" pos="5 0 0"><joint name="hinge" pos="1 0 0" ref="0"/></body>'
     )
@@ -148,9 +148,9 @@ def test_a_hinge_turns_about_its_anchor():
 def test_the_last_joint_is_the_body_where_it_can_be():
     found = character(
         '<body name="a"><joint name="x" type="slide" pos="1 1 1"/><joint/><body/></body>'
-        '<body name="still"/><body name="b"><joint type="slide" pos="1 1 1"/></body>'
+        '<body name="fixed"/><body name="b"><joint type="slide" pos="1 1 1"/></body>'
     )
-    assert found.articulation.names == ("world", "a/x", "a", "body#2", "still", "b")
+    assert found.articulation.names == ("world", "a/x", "a", "body#2", "fixed", "b")
     assert found.joints == {"x": 1, "a/hinge2": 2, "b/slide1": 5}
 
 
@@ -178,7 +178,7 @@ SAME = [
 
 @pytest.mark.parametrize("form", SAME)
 @pytest.mark.parametrize("unit", ["degree", "radian"])
-def test_every_form_of_an_orientation_says_the_same(form, unit):
+def test_all_forms_of_an_orientation_agree(form, unit):
     if unit == "radian":
         form = form.replace("90", repr(np.pi / 2))
     found = character(f'<body name="a" {form}/>', f'<compiler angle="{unit}"/>')
@@ -186,7 +186,7 @@ def test_every_form_of_an_orientation_says_the_same(form, unit):
 
 
 @pytest.mark.parametrize("form", ['zaxis="0 0 -1"', 'zaxis="1e-12 0 -1"', 'zaxis="0 0 5"'])
-def test_an_axis_upside_down_turns_like_mujocos(form):
+def test_an_inverted_axis_rotates_like_mujocos(form):
     text = f"<mujoco><worldbody><body {form}/></worldbody></mujoco>"
     assert difference_from_mujoco(text) < 1e-11  # both take 1e-12 for none
 
@@ -194,9 +194,11 @@ def test_an_axis_upside_down_turns_like_mujocos(form):
 def test_balls_keep_within_what_mujoco_allows_and_allow_all_of_it(rng):
     ball = '<body name="a"><joint type="ball" range="0 50"/></body>'
     found = character(ball).articulation
-    turns = rng.standard_normal((200, 3))
-    turns *= np.radians(50) * rng.uniform(0, 1, (200, 1)) / np.linalg.norm(turns, axis=1)[:, None]
-    assert found.within_limits(rotation.exponential(turns)).all()
+    vectors = rng.standard_normal((200, 3))
+    vectors *= (
+        np.radians(50) * rng.uniform(0, 1, (200, 1)) / np.linalg.norm(vectors, axis=1)[:, None]
+    )
+    assert found.within_limits(rotation.exponential(vectors)).all()
     assert not found.within_limits(rotation.exponential([0.0, 0.0, np.radians(51)]))
     assert not found.within_limits(rotation.exponential([np.radians(51), 0.0, 0.0]))
 
@@ -220,7 +222,7 @@ def test_a_file_includes_others_of_its_folder(tmp_path):
     np.testing.assert_allclose(pose(found, "a")[1][2, 1], np.sin(1.0), atol=1e-15)
 
 
-def test_a_file_includes_nothing_twice_nor_from_elsewhere(tmp_path, refusal):
+def test_repeated_includes_and_files_outside_the_root_are_refused(tmp_path, refusal):
     folder = tmp_path / "model"
     folder.mkdir()
     (tmp_path / "secret.xml").write_text("<mujoco/>")
@@ -347,7 +349,7 @@ def test_a_long_chain_is_no_trouble():
 WRONG = {
     "two orientations": ('<body quat="1 0 0 0" euler="0 0 0"/>', "got quat and euler"),
     "no quaternion": ('<body quat="0 0 0 0"/>', "expected a quaternion in 'quat', got '0 0 0 0'"),
-    "no axis of a turn": ('<body axisangle="0 0 0 1"/>', "expected a direction in 'axisangle'"),
+    "no axis of a rotation": ('<body axisangle="0 0 0 1"/>', "expected a direction in 'axisangle'"),
     "no z axis": ('<body zaxis="0 0 0"/>', "expected a direction in 'zaxis'"),
     "parallel axes": ('<body xyaxes="1 0 0 2 0 0"/>', "expected a direction in 'xyaxes'"),
     "no axis": ('<body><joint axis="0 0 0"/></body>', "expected a direction in 'axis'"),

@@ -69,7 +69,7 @@ def test_what_is_no_file_is_refused(tmp_path):
         read_text("a\0b")
 
 
-def test_a_pipe_that_nobody_writes_to_is_not_waited_for(tmp_path):
+def test_a_pipe_is_refused_without_reading_it(tmp_path):
     path = tmp_path / "pipe"
     os.mkfifo(path)
     with pytest.raises(ValueError, match="expected a regular file"):

@@ -36,7 +36,7 @@ def pose(found, link, **coordinates):
     return all_of_them.positions[at], rotation.to_matrix(all_of_them.rotations[at])
 
 
-def turn(axis, angle):
+def rotation_about(axis, angle):
     """The matrix of a rotation about x, y or z, from its definition."""
     c, s = np.cos(angle), np.sin(angle)
     i, j = [(1, 2), (2, 0), (0, 1)]["xyz".index(axis)]
@@ -45,7 +45,7 @@ def turn(axis, angle):
     return matrix
 
 
-def test_a_planar_arm_reaches_where_trigonometry_says():
+def test_a_planar_arm_agrees_with_trigonometry():
     z = '<axis xyz="0 0 1"/>'
     found = robot(
         link("base", "upper", "lower", "hand"),
@@ -57,29 +57,29 @@ def test_a_planar_arm_reaches_where_trigonometry_says():
     x, R = pose(found, "hand", shoulder=a, elbow=b)
     expected = [2 * np.cos(a) + np.cos(a + b), 2 * np.sin(a) + np.sin(a + b), 0.0]
     np.testing.assert_allclose(x, expected, atol=1e-15)
-    np.testing.assert_allclose(R, turn("z", a + b), atol=1e-15)
+    np.testing.assert_allclose(R, rotation_about("z", a + b), atol=1e-15)
 
 
-def test_rpy_turns_about_fixed_axes():
+def test_rpy_are_rotations_about_fixed_axes():
     found = robot(link("a", "b"), joint("j", "a", "b", "fixed", '<origin rpy="0.3 0.5 -1.2"/>', ""))
-    expected = turn("z", -1.2) @ turn("y", 0.5) @ turn("x", 0.3)
+    expected = rotation_about("z", -1.2) @ rotation_about("y", 0.5) @ rotation_about("x", 0.3)
     np.testing.assert_allclose(pose(found, "b")[1], expected, atol=1e-15)
 
 
 ORIGIN = '<origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/>'  # x points along y, y along -x
 MOVES = {
-    "revolute": (0.5, (1, 2, 3), turn("z", PI / 2) @ turn("x", 0.5)),
-    "continuous": (0.5, (1, 2, 3), turn("z", PI / 2) @ turn("x", 0.5)),
-    "prismatic": (0.5, (1, 2.5, 3), turn("z", PI / 2)),
-    "fixed": ((), (1, 2, 3), turn("z", PI / 2)),
+    "revolute": (0.5, (1, 2, 3), rotation_about("z", PI / 2) @ rotation_about("x", 0.5)),
+    "continuous": (0.5, (1, 2, 3), rotation_about("z", PI / 2) @ rotation_about("x", 0.5)),
+    "prismatic": (0.5, (1, 2.5, 3), rotation_about("z", PI / 2)),
+    "fixed": ((), (1, 2, 3), rotation_about("z", PI / 2)),
     "floating": ((1, 0, 0, np.cos(0.25), 0, np.sin(0.25), 0), (1, 3, 3),
-                 turn("z", PI / 2) @ turn("y", 0.5)),
-    "planar": (0.5, (1, 2, 3), turn("z", PI / 2) @ turn("x", 0.5)),
+                 rotation_about("z", PI / 2) @ rotation_about("y", 0.5)),
+    "planar": (0.5, (1, 2, 3), rotation_about("z", PI / 2) @ rotation_about("x", 0.5)),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", MOVES)
-def test_a_joint_moves_as_its_type_says(kind, speed):
+def test_a_joint_moves_according_to_its_type(kind, speed):
     coordinates, x, R = MOVES[kind]
     found = robot(link("a", "b"), joint("j", "a", "b", kind, ORIGIN))
     positions, rotations = pose(found, "b", j=coordinates)
@@ -91,13 +91,11 @@ def test_a_planar_joint_shifts_within_its_plane():
     plane = joint("p", "a", "b", "planar", '<axis xyz="1 2 2"/>')
     found = robot(link("a", "b"), plane)
     assert found.articulation.names == ("a", "p x", "p y", "b")
-    x, y, turned = (
-        forward_kinematics(found.articulation, unit).positions[-1] for unit in np.eye(3)
-    )
+    x, y, angle = (forward_kinematics(found.articulation, unit).positions[-1] for unit in np.eye(3))
     normal = np.array([1, 2, 2]) / 3
     np.testing.assert_allclose([x @ normal, y @ normal, x @ y], 0.0, atol=1e-15)
     np.testing.assert_allclose(np.cross(x, y), normal, atol=1e-15)
-    np.testing.assert_allclose(turned, 0.0, atol=1e-15)
+    np.testing.assert_allclose(angle, 0.0, atol=1e-15)
 
 
 def test_links_keep_the_order_of_the_file_and_follow_their_parents():
@@ -162,7 +160,7 @@ def test_mimic_joints_follow_through_chains():
     q_b = 2 * 0.7 + 0.25
     x, R = pose(found, "c", d=0.7)
     np.testing.assert_allclose(x, [-3 * q_b + 0.5, 0, 0], atol=1e-15)
-    np.testing.assert_allclose(R, turn("x", q_b), atol=1e-15)
+    np.testing.assert_allclose(R, rotation_about("x", q_b), atol=1e-15)
 
 
 def test_mimic_joints_move_by_themselves_on_demand():
@@ -210,9 +208,9 @@ WRONG = {
     "a ring": (link("a", "b") + joint("j", "a", "b") + joint("k", "b", "a"), "the root, got none"),
     "a ring aside": (
         link("c", "a", "b") + joint("j", "a", "b") + joint("k", "b", "a"),
-        "expected a way to the root 'c', got a ring",
+        "expected a path to the root 'c', got a ring",
     ),
-    "itself": (link("a", "b") + joint("j", "b", "b"), "expected a way to the root 'a'"),
+    "itself": (link("a", "b") + joint("j", "b", "b"), "expected a path to the root 'a'"),
     "a missing link": (link("a") + joint("j", "a", "b"), "a <link> of that name, got none: 'b'"),
     "two parents": (
         link("a", "b") + joint("j", "a", "b") + joint("k", "a", "b"),

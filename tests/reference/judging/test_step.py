@@ -50,21 +50,21 @@ def test_the_converged_step_is_the_minimiser_to_rounding_and_proven_so(soft, sti
         assert found.distance == pytest.approx(found.error * found.displacement)
 
 
-def test_pins_half_a_metre_off_are_seen_where_the_residual_is_nothing(soft, stiff):
+def test_pins_half_a_metre_off_are_detected_where_the_residual_is_zero(soft, stiff):
     for system, state in (soft, stiff):
-        moved = state.positions[system.pinned] + [0.0, 0.5, 0.0]
-        astray = ImplicitEuler(system, h=h, tolerance=1e-11).step(state, pin_positions=moved)
+        targets = state.positions[system.pinned] + [0.0, 0.5, 0.0]
+        astray = ImplicitEuler(system, h=h, tolerance=1e-11).step(state, pin_positions=targets)
         found = judge_step(system, state, h, astray.state.positions)
         assert found.residual < 1e-9  # below 1e-11 of |grad g(y)| as it is with these pins
         assert found.pin_displacement == pytest.approx(0.5, abs=1e-15)
         assert found.error > 1
         assert found.summary.startswith("A pin is 0.5 m from where the step takes it.")
-        taken = judge_step(system, state, h, astray.state.positions, pin_positions=moved)
+        taken = judge_step(system, state, h, astray.state.positions, pin_positions=targets)
         assert taken.pin_displacement == 0
         assert taken.error < 1e-9
 
 
-def test_doing_nothing_on_a_stiff_cloth_is_no_answer_whatever_the_residual_says(stiff):
+def test_the_initial_state_of_a_stiff_cloth_has_a_large_error_but_a_small_residual(stiff):
     system, state = stiff
     nothing = judge_step(system, state, h, state.positions)
     assert nothing.residual < 0.05
@@ -74,7 +74,7 @@ def test_doing_nothing_on_a_stiff_cloth_is_no_answer_whatever_the_residual_says(
     assert slow.residual < 1e-3
 
 
-def test_of_a_cloth_at_rest_doing_nothing_scores_one(stiff):
+def test_the_initial_state_of_a_cloth_at_rest_has_error_one(stiff):
     """y is x_n there."""
     system, state = stiff
     state = State(state.positions, np.zeros_like(state.positions))
@@ -95,7 +95,7 @@ def test_the_step_rounded_to_single_precision_scores_at_its_rounding(soft, stiff
         assert found.same_minimiser is True
 
 
-def test_velocities_are_judged_by_the_positions_they_come_with(soft):
+def test_velocities_are_compared_with_their_positions(soft):
     system, state = soft
     end = ImplicitEuler(system, h=h).step(state).state
     old = judge_step(system, state, h, end.positions, state.velocities)
@@ -107,7 +107,7 @@ def test_velocities_are_judged_by_the_positions_they_come_with(soft):
 
 @pytest.fixture
 def buckled():
-    """A mass between two pins that are too near, held to them across; it leaves up or down."""
+    """A compressed mass between two pins, which buckles up or down."""
     pins = [[-0.5, 0, 0], [0.5, 0, 0], [0, 0, -2], [0, 0, 2]]
     system = MassSpring(
         np.ones(5), [[0, 1], [0, 2], [0, 3], [0, 4]], [1, 1, 0.5, 0.5], [100, 100, 60, 60],
@@ -124,7 +124,7 @@ def newton_from(system, state, x):
     return next(itertools.islice(iterates, 50, None)).positions
 
 
-def test_another_minimiser_is_said_to_be_as_right(buckled):
+def test_another_minimiser_is_recognised(buckled):
     system, state = buckled(0.1)
     other = newton_from(system, state, state.positions * [1, -4, 1])
     found = judge_step(system, state, 1.0, other)
@@ -156,7 +156,7 @@ def test_the_summary_claims_no_more_than_is_proven(soft):
     assert found.same_minimiser is None
 
 
-def test_where_there_is_no_minimiser_to_compare_with_it_is_said():
+def test_the_summary_names_a_missing_minimiser():
     system = MassSpring([1e75, 2e74], [[0, 1]], 1.0, 1e75)
     state = State(1e75 * np.eye(3)[:2], np.ones((2, 3)))
     found = judge_step(system, state, 1e5, state.positions)
@@ -171,7 +171,7 @@ def test_at_rest_only_the_rest_itself_is_without_error():
     assert judge_step(system, state, h, state.positions + 1e-6).error == math.inf
 
 
-def test_pins_alone_are_judged_too():
+def test_a_system_of_pins_can_be_judged():
     system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
     state = State(np.eye(3)[:2], np.zeros((2, 3)))
     found = judge_step(system, state, h, state.positions)

@@ -1,6 +1,6 @@
-"""What Pinocchio 4.1 is known to read otherwise than MuJoCo in an MJCF file, told from the file.
+"""Known deviations of Pinocchio 4.1 from MuJoCo in reading MJCF, detected from the file.
 
-Each is a test of its own, on a file that holds little else.
+A test reproduces each deviation with a minimal file.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ JOINTS = ("joint", "freejoint")
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
 OUTER_ROOT = "a first body without a joint is put at the world's origin"
-TURNED_ROOT = "a free body that the file shows at x, turned by R, is shifted by x - R x"
+ROTATED_ROOT = "a free body that the file shows at x, turned by R, is shifted by x - R x"
 CLASS_ANCHOR = "the anchor (pos) that a joint has from its default class is not read"
 SHARED_REF = "the ref of one of several joints of a body is not read"
 FRAME = "a <frame> is passed over with the joints and bodies in it"
@@ -21,13 +21,13 @@ INCLUDE = "included files are not read"
 NAMELESS = "bodies without a name are passed over, or taken for each other"
 
 
-def departures(path: Path) -> list[str]:
-    """Return what in a file Pinocchio is known to read otherwise, in sentences; none in a URDF."""
+def known_deviations(path: Path) -> list[str]:
+    """Return a sentence for each known deviation that affects a file; none for a URDF."""
     try:
         root = xml_root(path) if file_kind(path) == MJCF else Element("robot")
     except (ValueError, OSError):
         return []
-    return [said for said, holds in DEPARTURES.items() if holds(root)]
+    return [sentence for sentence, affects in DEVIATIONS.items() if affects(root)]
 
 
 def _outer_root(root: Element) -> bool:
@@ -35,7 +35,7 @@ def _outer_root(root: Element) -> bool:
     return body is not None and not _joints(body) and _has(body, "pos", *ORIENTATIONS)
 
 
-def _turned_root(root: Element) -> bool:
+def _rotated_root(root: Element) -> bool:
     return any(
         _has(body, *ORIENTATIONS)
         and any(joint.tag == "freejoint" or joint.get("type") == "free" for joint in _joints(body))
@@ -73,16 +73,16 @@ def _joints(body: Element) -> list[Element]:
 
 
 def _defaults(root: Element) -> list[Element]:
-    return [joint for grade in root.iter("default") for joint in grade.findall("joint")]
+    return [joint for default in root.iter("default") for joint in default.findall("joint")]
 
 
 def _has(element: Element, *attributes: str) -> bool:
     return any(name in element.attrib for name in attributes)
 
 
-DEPARTURES: dict[str, Callable[[Element], bool]] = {
+DEVIATIONS: dict[str, Callable[[Element], bool]] = {
     OUTER_ROOT: _outer_root,
-    TURNED_ROOT: _turned_root,
+    ROTATED_ROOT: _rotated_root,
     CLASS_ANCHOR: _class_anchor,
     SHARED_REF: _shared_ref,
     FRAME: _frame,

@@ -1,4 +1,4 @@
-"""How two mass-spring answers are compared, and the engines that the claims share."""
+"""Comparisons of two mass-spring results, and cached engines that the claims share."""
 
 import functools
 
@@ -14,44 +14,44 @@ from ..verdict import Comparison
 
 @functools.cache
 def engine_of(case: int, *, damped: bool = True) -> MujocoMassSpring:
-    """Return the engine of a random motion with its step, built once for all claims.
+    """Return the engine of a random network, cached for all claims.
 
-    Whoever takes it writes a state into it and chooses an integrator.
+    The caller sets its state and its integrator.
     """
-    system, _, _, h = samples.motion(case, damped=damped)
+    system, _, _, h = samples.network(case, damped=damped)
     return MujocoMassSpring(system, h=h)
 
 
-def placed(case: int) -> MujocoMassSpring:
-    """Return the engine of a random motion, all forces and energies computed at its start."""
+def engine_at_start(case: int) -> MujocoMassSpring:
+    """Return the engine of a random network, with forces and energies at its initial state."""
     engine = engine_of(case)
-    engine.place(samples.motion(case).state)
+    engine.update_forces(samples.network(case).state)
     return engine
 
 
 @functools.cache
 def flex(case: int) -> MujocoFlex:
-    """Return the flex of a motion with springs alike, all computed at its start."""
-    system, state, _, h = samples.alike(case)
+    """Return the flex of a uniform network, with forces and energies at its initial state."""
+    system, state, _, h = samples.uniform(case)
     engine = MujocoFlex(system, h=h)
-    engine.place(state)
+    engine.update_forces(state)
     return engine
 
 
 def forces(ours: FloatArray, theirs: FloatArray) -> Comparison:
-    """Compare forces over the largest of theirs."""
+    """Compare forces relative to the largest of theirs."""
     return Comparison(ours, theirs, np.zeros_like(theirs), scale=float(np.abs(theirs).max()))
 
 
 def numbers(ours: float, theirs: float, scale: float) -> Comparison:
-    """Compare two numbers that would be zero if nothing moved."""
+    """Compare two numbers whose baseline is zero."""
     return Comparison(np.array(ours), np.array(theirs), np.array(0.0), scale)
 
 
 def states(ours: State, theirs: State, start: State) -> Comparison:
-    """Compare positions over the largest coordinate and velocities over the largest velocity.
+    """Compare all positions and velocities, relative to the largest of theirs.
 
-    The pinned particles take part.
+    The baseline is the initial state.
     """
     length = np.abs(theirs.positions).max()
     speed = np.abs(theirs.velocities).max()

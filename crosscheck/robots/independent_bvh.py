@@ -1,4 +1,4 @@
-"""A second reader of BVH, written independently: words, a stack, matrices; nothing is checked."""
+"""An independent reader of valid BVH files, based on matrices, to check the reference's reader."""
 
 import re
 from collections.abc import Iterator
@@ -11,40 +11,48 @@ MOTION = re.compile(r"^\s*MOTION\s*$", re.IGNORECASE | re.MULTILINE)
 FRAMES = re.compile(r"Frames:\s*(\d+)\s*Frame Time:\s*\S+", re.IGNORECASE)
 
 
-def placements(text: str) -> Iterator[tuple[str, FloatArray, FloatArray]]:
+def global_poses(text: str) -> Iterator[tuple[str, FloatArray, FloatArray]]:
     """Yield each joint's name, positions, (frame, 3), and rotation matrices, (frame, 3, 3).
 
-    Rows behind those that `Frames:` counts are left out.
+    Rows beyond the count of `Frames:` are ignored.
     """
     head, tail = MOTION.split(text, maxsplit=1)
     words = re.sub(r"([{}])", r" \1 ", head).split()[1:]
     columns = _columns(tail)
-    above: list[tuple[str, FloatArray, FloatArray]] = []
+    path: list[tuple[str, FloatArray, FloatArray]] = []
     while words:
         if words[0] == "}":
-            above.pop()
+            path.pop()
             del words[0]
             continue
         name, x, channels = _joint(words)
-        if not name and above:
-            name = f"{above[-1][0]} end"
-        offset, turned = np.tile(x, (len(columns), 1)), np.tile(np.eye(3), (len(columns), 1, 1))
-        for channel in channels:
-            axis, values = "XYZ".index(channel[0].upper()), columns[:, 0]
-            columns = columns[:, 1:]
-            if channel[1:].upper() == "POSITION":
-                offset[:, axis] = values
-            else:
-                turned = turned @ _about(axis, np.radians(values))
-        if above:
-            _, x, R = above[-1]
-            offset, turned = x + np.einsum("nij,nj->ni", R, offset), R @ turned
-        above.append((name, offset, turned))
-        yield above[-1]
+        if not name and path:
+            name = f"{path[-1][0]} end"
+        offset, local = _local_pose(x, channels, columns)
+        columns = columns[:, len(channels) :]
+        if path:
+            _, x, R = path[-1]
+            offset, local = x + np.einsum("nij,nj->ni", R, offset), R @ local
+        path.append((name, offset, local))
+        yield path[-1]
+
+
+def _local_pose(
+    x: FloatArray, channels: list[str], columns: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the offsets and rotation matrices of a joint from its OFFSET and its channels."""
+    offset, local = np.tile(x, (len(columns), 1)), np.tile(np.eye(3), (len(columns), 1, 1))
+    for channel, values in zip(channels, columns.T, strict=False):
+        axis = "XYZ".index(channel[0].upper())
+        if channel[1:].upper() == "POSITION":
+            offset[:, axis] = values
+        else:
+            local = local @ _about(axis, np.radians(values))
+    return offset, local
 
 
 def _columns(motion: str) -> FloatArray:
-    """Return the numbers behind the head of a motion, (frame, channel)."""
+    """Return the numbers after the header of a motion, (frame, channel)."""
     found = FRAMES.search(motion)
     assert found is not None
     count = int(found[1])
@@ -54,7 +62,7 @@ def _columns(motion: str) -> FloatArray:
 
 
 def _joint(words: list[str]) -> tuple[str, FloatArray, list[str]]:
-    """Take a joint off the words up to its channels: its name, "" for an end, OFFSET, channels."""
+    """Remove a joint from the words; return its name, "" for an end, its OFFSET and channels."""
     begin = words.index("{")
     name = "" if words[0].upper() == "END" else " ".join(words[1:begin])
     offset = np.array(words[begin + 2 : begin + 5], dtype=float)

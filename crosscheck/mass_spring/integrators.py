@@ -1,4 +1,4 @@
-"""Whole motions by every integrator, ours and MuJoCo's, and where they agree at any length."""
+"""Simulations of many steps by our integrators and MuJoCo's, and comparisons of the results."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -12,50 +12,50 @@ from reference.mass_spring import MassSpring, State
 from .. import samples
 from ..engines import MujocoMassSpring
 from ..verdict import Comparison
-from .comparing import states
+from .comparison import states
 
-# A motion on: from a state, under constant external forces, by a number of steps.
-Motion = Callable[[State, ArrayLike | None, int], State]
+# Returns the state after a number of steps from a state under constant external forces.
+Simulation = Callable[[State, ArrayLike | None, int], State]
 
 
 def explicit(
     step: Callable[[MassSpring, State, float, ArrayLike | None], State],
     system: MassSpring,
     h: float,
-) -> Motion:
-    """Return the motion by an explicit integrator of ours."""
+) -> Simulation:
+    """Return the simulation by one of our explicit integrators."""
 
-    def move(state: State, external_forces: ArrayLike | None, steps: int) -> State:
+    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
         for _ in range(steps):
             state = step(system, state, h, external_forces)
         return state
 
-    return move
+    return simulate
 
 
-def implicit(solver: str, system: MassSpring, h: float, *, tolerance: float = 1e-13) -> Motion:
-    """Return the motion by implicit Euler, each step solved by one of its solvers."""
+def implicit(solver: str, system: MassSpring, h: float, *, tolerance: float = 1e-13) -> Simulation:
+    """Return the simulation by implicit Euler with one of its solvers."""
     integrator = ImplicitEuler(system, h=h, solver=solver, tolerance=tolerance)
 
-    def move(state: State, external_forces: ArrayLike | None, steps: int) -> State:
+    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
         for _ in range(steps):
             state = integrator.step(state, external_forces).state
         return state
 
-    return move
+    return simulate
 
 
-def mujoco(integrator: str, system: MassSpring, h: float) -> Motion:
-    """Return the motion by an integrator of MuJoCo's."""
+def mujoco(integrator: str, system: MassSpring, h: float) -> Simulation:
+    """Return the simulation by one of MuJoCo's integrators."""
     engine = MujocoMassSpring(system, h=h, integrator=integrator)
 
-    def move(state: State, external_forces: ArrayLike | None, steps: int) -> State:
+    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
         return engine.step(state, external_forces, steps=steps)
 
-    return move
+    return simulate
 
 
-MOTIONS: dict[str, Callable[[MassSpring, float], Motion]] = {
+SIMULATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
     "symplectic Euler": partial(explicit, symplectic_euler),
     "Runge-Kutta": partial(explicit, runge_kutta),
     "implicit Euler": partial(implicit, "newton"),
@@ -68,10 +68,11 @@ MOTIONS: dict[str, Callable[[MassSpring, float], Motion]] = {
 }
 
 
-def long_motions(ours: str, theirs: str, steps: int, cases: int) -> Iterator[Comparison]:
-    """Compare the states after many steps of two integrators that are said to be the same."""
+def long_simulations(ours: str, theirs: str, steps: int, cases: int) -> Iterator[Comparison]:
+    """Compare the states after many steps of two integrators of the same method."""
     for case in range(cases):
         system, state, external, h = samples.smooth(case)
-        our_end = MOTIONS[ours](system, h)(state, external, steps)
-        their_end = MOTIONS[theirs](system, h)(state, external, steps)
-        yield states(our_end, their_end, state)
+        one, other = (
+            SIMULATORS[name](system, h)(state, external, steps) for name in (ours, theirs)
+        )
+        yield states(one, other, state)

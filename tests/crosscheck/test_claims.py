@@ -6,11 +6,11 @@ import functools
 import numpy as np
 import pytest
 
+from crosscheck.claims import CLAIMS, MASS_SPRING_CLAIMS, run_claims, skeleton_claims
 from crosscheck.engines import SKELETON_ENGINES
-from crosscheck.identities import CLAIMS, MASS_SPRING_CLAIMS, run_claims, skeleton_claims
 from crosscheck.robots.claims import ROBOT_CLAIMS
 from crosscheck.tolerances import ORDER, STIFFNESS
-from crosscheck.verdict import judge
+from crosscheck.verdict import check_claim
 from reference.backend.compiled import speed
 
 # A chain and a tree, one pin and two.
@@ -60,8 +60,8 @@ def disturbed(claim, size):
 
 
 def test_claim_holds(known, claim):
-    verdict = judge(known)
-    assert verdict.held, verdict
+    verdict = check_claim(known)
+    assert verdict.holds, verdict
     assert verdict.cases == (FEW if claim.name in ON_FILES else claim.cases)
 
 
@@ -70,38 +70,38 @@ def test_claim_holds(known, claim):
 )
 def test_claim_holds_on_the_plain_sources(name):
     with speed("plain"):
-        assert judge(CLAIMS[name], FEW).held
+        assert check_claim(CLAIMS[name], FEW).holds
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LONG)
 def test_claim_about_long_motions_holds_in_more_cases(name):
-    verdict = judge(CLAIMS[name], 2 * CLAIMS[name].cases)
-    assert verdict.held, verdict
+    verdict = check_claim(CLAIMS[name], 2 * CLAIMS[name].cases)
+    assert verdict.holds, verdict
 
 
 def test_claim_goes_red_when_disturbed_by_ten_tolerances(known):
-    assert judge(disturbed(known, 0.0), FEW).held
-    assert judge(disturbed(known, 10.0), FEW).missed == "they differ"
+    assert check_claim(disturbed(known, 0.0), FEW).holds
+    assert check_claim(disturbed(known, 10.0), FEW).missed == "they differ"
 
 
 def test_claim_goes_red_where_ours_is_not_a_number(known):
-    assert judge(disturbed(known, np.nan), FEW).missed == "not a number"
+    assert check_claim(disturbed(known, np.nan), FEW).missed == "not a number"
 
 
 def test_claim_goes_red_without_cases(claim):
-    assert judge(claim, 0).missed == "no cases"
+    assert check_claim(claim, 0).missed == "no cases"
 
 
-def test_claim_goes_red_where_nothing_moved(known):
+def test_claim_goes_red_where_ours_equals_the_baseline(known):
     def compare(cases):
-        return [case._replace(still=case.ours) for case in known.compare(cases)]
+        return [case._replace(baseline=case.ours) for case in known.compare(cases)]
 
-    assert judge(dataclasses.replace(known, compare=compare), 1).missed == "nothing moved"
+    assert check_claim(dataclasses.replace(known, compare=compare), 1).missed == "nothing moved"
 
 
-def test_tolerance_leaves_room_for_rounding_but_for_little_else(known):
-    assert judge(known, FEW).difference < 0.5 * known.tolerance.value
+def test_tolerance_exceeds_rounding_errors_but_little_else(known):
+    assert check_claim(known, FEW).difference < 0.5 * known.tolerance.value
     assert known.tolerance.value <= LARGEST.get(known.tolerance, 1e-11)
 
 

@@ -1,0 +1,1 @@
+"""What the first call of each public function costs: compiled then, or read from disk."""

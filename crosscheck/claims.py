@@ -1,0 +1,67 @@
+"""All claims about the reference, each against an engine or a closed form."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from reference import arguments
+from reference.inverse_kinematics import IK_SOLVERS
+
+from . import kinematics
+from .engines import SKELETON_ENGINES
+from .mass_spring.claims import MASS_SPRING_CLAIMS
+from .robots.claims import ROBOT_CLAIMS
+from .tolerances import POSITION, ROTATION
+from .verdict import Claim, Verdict, check_claim
+
+
+def skeleton_claims(engine: str) -> list[Claim]:
+    """Return the claims about kinematics against one engine."""
+    poses = "forward_kinematics on random chains and trees of 2 to 50 joints"
+    joints = f"{engine}'s ball joints, matched by name"
+    derived = f"local_from_global of the rotations {engine} computes"
+    given = f"the local rotations given to {engine}"
+    solved = f"solve_ik by {', '.join(IK_SOLVERS)}: all joints' positions and the residual"
+    found = f"{engine}'s forward kinematics of the local rotations found"
+    return [
+        Claim(f"{name}, {engine}", ours, theirs, partial(compare, engine), tolerance, cases)
+        for name, ours, theirs, compare, tolerance, cases in (
+            ("joint positions", poses, joints, kinematics.joint_positions, POSITION, 100),
+            ("joint rotations", poses, joints, kinematics.joint_rotations, ROTATION, 100),
+            ("local rotations", derived, given, kinematics.back_to_local, ROTATION, 100),
+            ("IK answers", solved, found, kinematics.ik_answers, POSITION, 50 * len(IK_SOLVERS)),
+        )
+    ]
+
+
+CLAIMS: dict[str, Claim] = {
+    claim.name: claim
+    for claim in [
+        *(claim for engine in SKELETON_ENGINES for claim in skeleton_claims(engine)),
+        *MASS_SPRING_CLAIMS,
+        *ROBOT_CLAIMS,
+    ]
+}
+
+
+def run_claims(
+    names: Sequence[str] | None = None, progress: Callable[[Claim], None] | None = None
+) -> list[Verdict]:
+    """Check the named claims in their order, by default all.
+
+    Args:
+        names: of claims, or None for all.
+        progress: called with each claim before it is checked.
+
+    Raises:
+        ValueError: if a name is unknown or the list is empty.
+    """
+    wanted = CLAIMS if names is None else names
+    chosen = [arguments.choice("names", name, CLAIMS) for name in wanted]
+    if not chosen:
+        raise ValueError("names: expected at least one claim, got none")
+    verdicts = []
+    for name in chosen:
+        if progress is not None:
+            progress(CLAIMS[name])
+        verdicts.append(check_claim(CLAIMS[name]))
+    return verdicts

@@ -1,0 +1,117 @@
+"""What is told of a compilation, and what is compiled."""
+
+import gc
+
+import numpy as np
+import pytest
+from numba.core.errors import TypingError
+
+from reference import IK_SOLVERS
+from reference.backend import compiled, linking
+from reference.backend.compilation import on_compile
+
+
+def power(x, n):
+    result = 1.0
+    for _ in range(n):
+        result *= x
+    return result
+
+
+def polynomial(x):
+    return power(x, 2) + power(x, 3) + power(x, int(x))
+
+
+def fresh(kernel):
+    """A kernel of the same source that nobody has compiled in this process, and uncached."""
+    return compiled.bind(kernel, power=compiled.bind(power, range=range))
+
+
+@pytest.fixture(autouse=True)
+def empty_cache(tmp_path, monkeypatch):
+    from numba.core import config
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+
+
+def test_a_listener_hears_of_the_first_call_only():
+    heard, kernel = [], compiled.TwoSpeeds(fresh(polynomial), label="a polynomial")
+    with on_compile(lambda *told: heard.append(told)):
+        assert kernel(2.0) == 16.0
+        assert kernel(2.0) == 16.0
+    assert heard == [("a polynomial", True), ("a polynomial", False)]
+
+
+def test_nobody_hears_after_the_block_or_of_the_interpreter():
+    heard = []
+    with on_compile(lambda *told: heard.append(told)), compiled.speed("plain"):
+        compiled.TwoSpeeds(fresh(polynomial))(2.0)
+    compiled.TwoSpeeds(fresh(polynomial))(2.0)
+    assert heard == []
+
+
+def test_the_garbage_collector_rests_while_compiling():
+    seen = []
+    with on_compile(lambda _, begins: seen.append((begins, gc.isenabled()))):
+        compiled.TwoSpeeds(fresh(polynomial))(2.0)
+    assert seen == [(True, False), (False, True)]
+
+
+def test_a_collector_that_was_off_stays_off():
+    gc.disable()
+    try:
+        compiled.TwoSpeeds(fresh(polynomial))(2.0)
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
+
+
+def test_the_collector_works_again_after_a_kernel_that_cannot_be_compiled():
+    with pytest.raises(TypingError):
+        compiled.TwoSpeeds(fresh(polynomial))("two")
+    assert gc.isenabled()
+
+
+def test_kernels_are_called_what_the_user_calls_them():
+    assert IK_SOLVERS["ccd"].chain.label == "ccd for chains"
+    assert IK_SOLVERS["levenberg_marquardt"].mechanism.label == "levenberg_marquardt for mechanisms"
+
+
+def callee_of(kernel, name="power"):
+    dispatcher = compiled.compile_kernel(kernel)
+    dispatcher(2.0)
+    return dispatcher.py_func.__globals__[name]
+
+
+def test_a_callee_is_compiled_once_for_all_integers():
+    """Three calls with 2, 3 and a number only known later."""
+    assert len(callee_of(fresh(polynomial)).signatures) == 1
+
+
+def test_a_callee_is_not_made_machine_code_by_itself():
+    (result,) = callee_of(fresh(polynomial)).overloads.values()
+    assert isinstance(result.library, linking.LinkedLibrary)
+    assert result.library.get_pointer_to_function(result.fndesc.llvm_func_name) == 0
+
+
+@pytest.mark.parametrize(("large", "inlined"), [(10**6, True), (0, False)])
+def test_a_large_callee_in_several_places_is_not_copied(large, inlined, monkeypatch):
+    monkeypatch.setattr(compiled, "LARGE", large)
+    assert callee_of(fresh(polynomial)).targetoptions["forceinline"] == inlined
+
+
+def once(x):
+    return power(x, 2)
+
+
+def test_a_callee_in_one_place_is_inlined_whatever_its_size(monkeypatch):
+    monkeypatch.setattr(compiled, "LARGE", 0)
+    assert callee_of(fresh(once)).targetoptions["forceinline"]
+
+
+def test_numbers_are_the_same_however_it_is_compiled(monkeypatch):
+    x = np.pi
+    expected = polynomial(x)
+    for large in (0, 10**6):
+        monkeypatch.setattr(compiled, "LARGE", large)
+        assert compiled.compile_kernel(fresh(polynomial))(x) == expected
