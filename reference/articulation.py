@@ -1,8 +1,8 @@
 """Hinge, slide, ball, free and fixed joints with limits: coordinates q to local transforms.
 
 A joint's frame sits in its parent's at an offset and a rotation, its *frame*. Its coordinates move
-it from there: a hinge turns about its axis and a slide shifts along it, a ball turns by a unit
-quaternion, a free joint shifts and turns, a fixed one stays. A mimic joint is a hinge or a slide
+it from there: a hinge rotates about its axis and a slide moves along it, a ball rotates by a unit
+quaternion, a free joint does both, a fixed one stays. A mimic joint is a hinge or a slide
 whose coordinate is that of another one, times a multiplier, plus a shift.
 """
 
@@ -101,8 +101,8 @@ class Articulation:
 
     Its coordinates q, shape (..., coordinate), take the place of local rotations wherever a
     Skeleton's would be given. They hold, joint after joint, nothing for a fixed or mimic joint, an
-    angle [rad] for a hinge, a way [m] for a slide, a unit quaternion, w first, for a ball, and a
-    position [m] and a quaternion for a free joint.
+    angle [rad] for a hinge, a displacement [m] for a slide, a unit quaternion, w first, for a ball,
+    and a position [m] and a quaternion for a free joint.
 
     Attributes:
         skeleton: the tree: parents, offsets [m], names.
@@ -234,8 +234,8 @@ class Articulation:
     def zero(self) -> FloatArray:
         """Return the coordinates in which every joint is at zero, limits or not."""
         q = np.zeros(self.coordinate_count)
-        for turn in self._turns:
-            q[turn.start] = 1.0
+        for where in self._quaternions:
+            q[where.start] = 1.0
         return q
 
     def random(self, rng: np.random.Generator, *shape: int) -> FloatArray:
@@ -256,7 +256,7 @@ class Articulation:
         return q.reshape(*shape, self.coordinate_count)
 
     def clamp(self, q: ArrayLike) -> FloatArray:
-        """Return the coordinates with each joint brought within its limits the short way.
+        """Return the coordinates with each joint brought to the nearest that is within its limits.
 
         Raises:
             ValueError: if q has another shape, is not finite, or holds no unit quaternion where
@@ -312,15 +312,15 @@ class Articulation:
                 than 1e-6 from unit length.
         """
         given = arguments.coordinates(name, q, "...", self.coordinate_count)
-        if not self._turns:
+        if not self._quaternions:
             return given
         result = given.copy()
-        for turn in self._turns:
-            result[..., turn] = rotation.unit(name, given[..., turn])
+        for where in self._quaternions:
+            result[..., where] = rotation.unit(name, given[..., where])
         return result
 
     @functools.cached_property
-    def _turns(self) -> list[slice]:
+    def _quaternions(self) -> list[slice]:
         """Where in q quaternions are."""
         ends = [self.coordinates_of(int(j)).stop for j in self._leading if self._is_turning(j)]
         return [slice(end - 4, end) for end in ends]
@@ -350,10 +350,10 @@ def joint_transform(joints, j, q):
     kind, at = joints["kind"][j], joints["coordinate"][j]
     if kind == HINGE:
         angle = joints["multiplier"][j] * q[at] + joints["shift"][j]
-        R = between_turns(R, quaternion_at(joints["turned"], j), half_turn(angle))
+        R = rotated_by_half(R, quaternion_at(joints["turned"], j), half_turn(angle))
     elif kind == SLIDE:
-        way = joints["multiplier"][j] * q[at] + joints["shift"][j]
-        x = add(x, rotate(R, scale(way, vector_at(joints["axis"], j))))
+        distance = joints["multiplier"][j] * q[at] + joints["shift"][j]
+        x = add(x, rotate(R, scale(distance, vector_at(joints["axis"], j))))
     elif kind == BALL:
         R = multiply(R, (q[at], q[at + 1], q[at + 2], q[at + 3]))
     elif kind == FREE:
@@ -368,8 +368,8 @@ def half_turned(joints: RecordArray) -> FloatArray:
     return rotation.multiply(np.ascontiguousarray(joints["frame"]), half)
 
 
-def between_turns(R, turned, half):
-    """Return R turned about the axis about which `turned` is R turned by pi.
+def rotated_by_half(R, turned, half):
+    """Return R rotated about the axis about which `turned` is R rotated by pi.
 
     With c, s of half the angle, R (c + s axis) is c R + s (R axis).
     """
@@ -383,7 +383,7 @@ def between_turns(R, turned, half):
 
 
 def swing_twist(Q, axis):
-    """Return swing S and twist angle t [rad] of Q = S exp(t axis): t turns about the axis first."""
+    """Return swing S and twist angle t [rad] of Q = S exp(t axis): first t about the axis."""
     along = dot((Q[1], Q[2], Q[3]), axis)
     if Q[0] == 0.0 and along == 0.0:  # half a turn about an axis across: any twist would do
         return Q, 0.0

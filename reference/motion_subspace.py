@@ -1,7 +1,7 @@
 """What a unit of each degree of freedom does: the columns that every Jacobian is made of.
 
 A freedom rotates what lies below its joint about an axis through the joint's origin, or translates
-it: the motion subspace of the joint (Featherstone 2008, section 3.5), in the axes of the world.
+it: the motion subspace of the joint (Featherstone 2008), in the axes of the world.
 """
 
 from .articulation import FREE, HINGE, SLIDE

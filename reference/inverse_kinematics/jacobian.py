@@ -1,8 +1,9 @@
 """What the Jacobian methods share: J J^T of a chain of ball joints, and a step along J^T z.
 
-With r_k the arm from joint k to the effector, a rotation w_k of joint k moves the effector by w_k x
-r_k: J_k w = w x r_k and J_k^T z = r_k x z. For three coordinates J J^T is 3 x 3 however many
-joints there are: sum over k of |r_k|^2 1 - r_k r_k^T.
+With r_k the arm from joint k to the effector, a rotation w_k of joint k moves the effector by
+w_k x r_k: J_k w = w x r_k and J_k^T z = r_k x z. For three coordinates J J^T is 3 x 3 however many
+joints there are: sum over k of |r_k|^2 1 - r_k r_k^T. The general form (`task_jacobian.py`) makes
+the same iterations on a chain of ten balls, but a solve takes nine times as long.
 """
 
 from ..quaternion import (
