@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+RecordArray = NDArray[np.void]
 Kind = TypeVar("Kind")
 
 FLOAT64 = np.dtype(np.float64)

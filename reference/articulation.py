@@ -1,8 +1,8 @@
 """Hinge, slide, ball, free and fixed joints with limits: coordinates q to local transforms.
 
 A joint's frame sits in its parent's at an offset and a rotation, its *frame*. Its coordinates move
-it from there: a hinge turns about its axis and a slide shifts along it, a ball turns by a unit
-quaternion, a free joint shifts and turns, a fixed one stays. A mimic joint is a hinge or a slide
+it from there: a hinge rotates about its axis and a slide moves along it, a ball rotates by a unit
+quaternion, a free joint does both, a fixed one stays. A mimic joint is a hinge or a slide
 whose coordinate is that of another one, times a multiplier, plus a shift.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import arguments, rotation
-from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray, frozen
+from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray, RecordArray, frozen
 from .backend.compiled import TwoSpeeds
 from .quaternion import (
     IDENTITY,
@@ -58,25 +58,27 @@ WIDTHS = np.array([0, 1, 1, 4, 7])
 FREEDOMS = np.array([0, 1, 1, 3, 6])
 # A coordinate may be so far outside its limits [rad or m] and still count as within.
 LIMIT_TOLERANCE = 1e-9
-# Columns of JointArrays.integers: the parent, the kind, where the coordinates begin in q and the
-# degrees of freedom among all (a mimic joint's are its leader's), and the leader, or the joint.
-PARENT, KIND, AT, FREEDOM, LEADER = range(5)
-# Columns of JointArrays.numbers: where the three of the offset [m], the four of the frame and the
-# three of the axis begin; the limits [rad or m]; multiplier and shift of the coordinate; where the
-# four of the frame turned by pi about the axis begin.
-OFFSET, FRAME, AXIS, LOWER, UPPER, CONE, MULTIPLIER, SHIFT, TURNED = 0, 3, 7, 10, 11, 12, 13, 14, 15
-
-
-class JointArrays(NamedTuple):
-    """What the kernels read of an articulation, a row a joint.
-
-    Attributes:
-        integers: (joint, 5).
-        numbers: (joint, 19).
-    """
-
-    integers: IndexArray
-    numbers: FloatArray
+# What the kernels read of each joint, a record a joint.
+JOINT = np.dtype(
+    [
+        ("kind", np.int64),
+        ("parent", np.int64),  # -1 of a root
+        ("leader", np.int64),  # the joint whose coordinate it moves with, or the joint itself
+        ("followed", np.bool_),  # whether mimic joints move with it
+        ("coordinate", np.int64),  # where its coordinates begin in q, a mimic joint's: its leader's
+        ("freedom", np.int64),  # where its degrees of freedom begin in a velocity, likewise
+        ("offset", np.float64, 3),  # from the parent [m]
+        ("frame", np.float64, 4),  # rotation in the parent's frame where its coordinates are zero
+        ("turned", np.float64, 4),  # the frame rotated by pi about the axis
+        ("axis", np.float64, 3),
+        ("lower", np.float64),  # [rad or m]
+        ("upper", np.float64),
+        ("cone", np.float64),  # [rad]
+        ("multiplier", np.float64),  # of its leader's coordinate, 1 of its own
+        ("shift", np.float64),  # added to that [rad or m]
+    ],
+    align=True,
+)
 
 
 class Mimic(NamedTuple):
@@ -99,8 +101,8 @@ class Articulation:
 
     Its coordinates q, shape (..., coordinate), take the place of local rotations wherever a
     Skeleton's would be given. They hold, joint after joint, nothing for a fixed or mimic joint, an
-    angle [rad] for a hinge, a way [m] for a slide, a unit quaternion, w first, for a ball, and a
-    position [m] and a quaternion for a free joint.
+    angle [rad] for a hinge, a displacement [m] for a slide, a unit quaternion, w first, for a ball,
+    and a position [m] and a quaternion for a free joint.
 
     Attributes:
         skeleton: the tree: parents, offsets [m], names.
@@ -112,7 +114,7 @@ class Articulation:
         upper: greatest of the same.
         cones: how far the axis of a ball may tilt [rad], (joint,).
         mimics: the joints that move with others.
-        arrays: what the kernels read; never to be written to.
+        joints: what the kernels read, a record a joint (JOINT); never to be written to.
         mechanisms: what inverse kinematics has prepared, by effectors.
     """
 
@@ -124,7 +126,7 @@ class Articulation:
     upper: FloatArray
     cones: FloatArray
     mimics: dict[int, Mimic]
-    arrays: JointArrays
+    joints: RecordArray
     mechanisms: dict[Any, Any]
 
     def __init__(
@@ -160,22 +162,16 @@ class Articulation:
         names = _checked_kinds(kinds, count)
         lower, upper = _checked_limits(lower, upper, count)
         follows = _checked_mimics({} if mimics is None else mimics, skeleton, names)
-        number = np.array([KINDS.index(kind) for kind in names])
-        _check_twists(number, lower, upper)
-        frames = _checked_frames(frames, count)
-        axes, cones = _checked_axes(axes, count), _checked_cones(cones, count)
-        layout, linear = _layout(number, follows)
-        bounds = np.column_stack([lower, upper, cones])
-        arrays = JointArrays(
-            np.column_stack([skeleton.parents, *layout]).astype(np.int64),
-            np.column_stack(
-                [skeleton.offsets, frames, axes, bounds, *linear, half_turned(frames, axes)]
-            ),
-        )
+        joints = _records(skeleton, np.array([KINDS.index(kind) for kind in names]), follows)
+        joints["lower"], joints["upper"] = lower, upper
+        _check_twists(joints)
+        joints["frame"], joints["axis"] = _checked_frames(frames, count), _checked_axes(axes, count)
+        joints["turned"], joints["cone"] = half_turned(joints), _checked_cones(cones, count)
+        shown = {name: frozen(joints[name].copy()) for name in ("lower", "upper")}
         self.__dict__.update(
-            skeleton=skeleton, kinds=names, mimics=follows, arrays=arrays, mechanisms={},
-            frames=frozen(frames), axes=frozen(axes), cones=frozen(cones),
-            lower=frozen(lower), upper=frozen(upper),
+            skeleton=skeleton, kinds=names, mimics=follows, joints=joints, mechanisms={}, **shown,
+            frames=frozen(joints["frame"].copy()), axes=frozen(joints["axis"].copy()),
+            cones=frozen(joints["cone"].copy()),
         )  # fmt: skip
 
     @functools.cached_property
@@ -191,12 +187,12 @@ class Articulation:
     @functools.cached_property
     def coordinate_count(self) -> int:
         """How many coordinates q has."""
-        return int(WIDTHS[self.arrays.integers[self._leading, KIND]].sum())
+        return int(WIDTHS[self.joints["kind"][self._leading]].sum())
 
     @functools.cached_property
     def freedom_count(self) -> int:
         """How many degrees of freedom there are: what a velocity has."""
-        return int(FREEDOMS[self.arrays.integers[self._leading, KIND]].sum())
+        return int(FREEDOMS[self.joints["kind"][self._leading]].sum())
 
     @property
     def limited(self) -> bool:
@@ -218,8 +214,8 @@ class Articulation:
             ValueError: if there is no such joint.
         """
         j = self.index(joint)
-        begin = int(self.arrays.integers[j, AT])
-        return slice(begin, begin + int(WIDTHS[self.arrays.integers[j, KIND]]))
+        begin = int(self.joints["coordinate"][j])
+        return slice(begin, begin + int(WIDTHS[self.joints["kind"][j]]))
 
     def freedoms_of(self, joint: int | str) -> slice:
         """Return where a joint's degrees of freedom are in a velocity, likewise.
@@ -228,8 +224,8 @@ class Articulation:
             ValueError: if there is no such joint.
         """
         j = self.index(joint)
-        begin = int(self.arrays.integers[j, FREEDOM])
-        return slice(begin, begin + int(FREEDOMS[self.arrays.integers[j, KIND]]))
+        begin = int(self.joints["freedom"][j])
+        return slice(begin, begin + int(FREEDOMS[self.joints["kind"][j]]))
 
     def neutral(self) -> FloatArray:
         """Return the coordinates in which every joint is at zero, or at its nearest limit."""
@@ -238,8 +234,8 @@ class Articulation:
     def zero(self) -> FloatArray:
         """Return the coordinates in which every joint is at zero, limits or not."""
         q = np.zeros(self.coordinate_count)
-        for turn in self._turns:
-            q[turn.start] = 1.0
+        for where in self._quaternions:
+            q[where.start] = 1.0
         return q
 
     def random(self, rng: np.random.Generator, *shape: int) -> FloatArray:
@@ -260,7 +256,7 @@ class Articulation:
         return q.reshape(*shape, self.coordinate_count)
 
     def clamp(self, q: ArrayLike) -> FloatArray:
-        """Return the coordinates with each joint brought within its limits the short way.
+        """Return the coordinates with each joint brought to the nearest that is within its limits.
 
         Raises:
             ValueError: if q has another shape, is not finite, or holds no unit quaternion where
@@ -268,7 +264,7 @@ class Articulation:
         """
         given = self.checked("q", q)
         result = given.copy()
-        _clamp(self.arrays, one_batch(result))
+        _clamp(self.joints, one_batch(result))
         return result
 
     def within_limits(self, q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> np.ndarray:
@@ -279,7 +275,7 @@ class Articulation:
         """
         given = self.checked("q", q)
         excess = np.empty(given.shape[:-1])
-        _excess(self.arrays, one_batch(given), excess.reshape(-1))
+        _excess(self.joints, one_batch(given), excess.reshape(-1))
         return excess <= arguments.number("tolerance", tolerance, least=0.0)
 
     def local_transforms(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -293,7 +289,7 @@ class Articulation:
         given = self.checked("q", q)
         shape = (*given.shape[:-1], self.joint_count)
         offsets, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
-        _locals(self.arrays, one_batch(given), one_batch(offsets, 2), one_batch(rotations, 2))
+        _locals(self.joints, one_batch(given), one_batch(offsets, 2), one_batch(rotations, 2))
         return offsets, rotations
 
     def forward(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -305,7 +301,7 @@ class Articulation:
         given = self.checked("q", q)
         shape = (*given.shape[:-1], self.joint_count)
         positions, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
-        _forward(self.arrays, one_batch(given), one_batch(positions, 2), one_batch(rotations, 2))
+        _forward(self.joints, one_batch(given), one_batch(positions, 2), one_batch(rotations, 2))
         return positions, rotations
 
     def checked(self, name: str, q: ArrayLike) -> FloatArray:
@@ -316,15 +312,15 @@ class Articulation:
                 than 1e-6 from unit length.
         """
         given = arguments.coordinates(name, q, "...", self.coordinate_count)
-        if not self._turns:
+        if not self._quaternions:
             return given
         result = given.copy()
-        for turn in self._turns:
-            result[..., turn] = rotation.unit(name, given[..., turn])
+        for where in self._quaternions:
+            result[..., where] = rotation.unit(name, given[..., where])
         return result
 
     @functools.cached_property
-    def _turns(self) -> list[slice]:
+    def _quaternions(self) -> list[slice]:
         """Where in q quaternions are."""
         ends = [self.coordinates_of(int(j)).stop for j in self._leading if self._is_turning(j)]
         return [slice(end - 4, end) for end in ends]
@@ -335,7 +331,7 @@ class Articulation:
     @functools.cached_property
     def _leading(self) -> IndexArray:
         """Return the joints that have coordinates of their own."""
-        own = self.arrays.integers[:, KIND] != FIXED
+        own = self.joints["kind"] != FIXED
         own[list(self.mimics)] = False
         return np.flatnonzero(own)
 
@@ -350,14 +346,14 @@ def one_batch(values: np.ndarray, axes: int = 1) -> np.ndarray:
 
 def joint_transform(joints, j, q):
     """Return a joint's position and rotation in its parent's frame."""
-    x, R = vector_at(joints.numbers, j, OFFSET), quaternion_at(joints.numbers, j, FRAME)
-    kind, at = joints.integers[j, KIND], joints.integers[j, AT]
+    x, R = vector_at(joints["offset"], j), quaternion_at(joints["frame"], j)
+    kind, at = joints["kind"][j], joints["coordinate"][j]
     if kind == HINGE:
-        angle = joints.numbers[j, MULTIPLIER] * q[at] + joints.numbers[j, SHIFT]
-        R = between_turns(R, quaternion_at(joints.numbers, j, TURNED), half_turn(angle))
+        angle = joints["multiplier"][j] * q[at] + joints["shift"][j]
+        R = rotated_by_half(R, quaternion_at(joints["turned"], j), half_turn(angle))
     elif kind == SLIDE:
-        way = joints.numbers[j, MULTIPLIER] * q[at] + joints.numbers[j, SHIFT]
-        x = add(x, rotate(R, scale(way, vector_at(joints.numbers, j, AXIS))))
+        distance = joints["multiplier"][j] * q[at] + joints["shift"][j]
+        x = add(x, rotate(R, scale(distance, vector_at(joints["axis"], j))))
     elif kind == BALL:
         R = multiply(R, (q[at], q[at + 1], q[at + 2], q[at + 3]))
     elif kind == FREE:
@@ -366,13 +362,14 @@ def joint_transform(joints, j, q):
     return x, R
 
 
-def half_turned(frames: FloatArray, axes: FloatArray) -> FloatArray:
-    """Return each frame turned by pi about its axis, (joint, 4)."""
-    return rotation.multiply(frames, np.column_stack([np.zeros(len(axes)), axes]))
+def half_turned(joints: RecordArray) -> FloatArray:
+    """Return each joint's frame rotated by pi about its axis, (joint, 4)."""
+    half = np.column_stack([np.zeros(len(joints)), joints["axis"]])
+    return rotation.multiply(np.ascontiguousarray(joints["frame"]), half)
 
 
-def between_turns(R, turned, half):
-    """Return R turned about the axis about which `turned` is R turned by pi.
+def rotated_by_half(R, turned, half):
+    """Return R rotated about the axis about which `turned` is R rotated by pi.
 
     With c, s of half the angle, R (c + s axis) is c R + s (R axis).
     """
@@ -386,7 +383,7 @@ def between_turns(R, turned, half):
 
 
 def swing_twist(Q, axis):
-    """Return swing S and twist angle t [rad] of Q = S exp(t axis): t turns about the axis first."""
+    """Return swing S and twist angle t [rad] of Q = S exp(t axis): first t about the axis."""
     along = dot((Q[1], Q[2], Q[3]), axis)
     if Q[0] == 0.0 and along == 0.0:  # half a turn about an axis across: any twist would do
         return Q, 0.0
@@ -413,32 +410,32 @@ def clamp_ball(Q, axis, lower, upper, cone):
 
 def clamp_joint(joints, j, q):
     """Bring the coordinates of one joint within its limits."""
-    kind, at = joints.integers[j, KIND], joints.integers[j, AT]
-    if joints.integers[j, LEADER] != j:
+    kind, at = joints["kind"][j], joints["coordinate"][j]
+    if joints["leader"][j] != j:
         return
     if kind in (HINGE, SLIDE):
-        q[at] = min(max(q[at], joints.numbers[j, LOWER]), joints.numbers[j, UPPER])
+        q[at] = min(max(q[at], joints["lower"][j]), joints["upper"][j])
     elif kind == BALL:
         Q = (q[at], q[at + 1], q[at + 2], q[at + 3])
-        bounds = joints.numbers[j, LOWER], joints.numbers[j, UPPER], joints.numbers[j, CONE]
-        w, x, y, z = clamp_ball(Q, vector_at(joints.numbers, j, AXIS), *bounds)
+        bounds = joints["lower"][j], joints["upper"][j], joints["cone"][j]
+        w, x, y, z = clamp_ball(Q, vector_at(joints["axis"], j), *bounds)
         q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
 
 
 def joint_excess(joints, j, q):
     """Return by how much [rad or m] the coordinates of one joint are outside its limits."""
-    kind, at = joints.integers[j, KIND], joints.integers[j, AT]
-    if joints.integers[j, LEADER] != j:
+    kind, at = joints["kind"][j], joints["coordinate"][j]
+    if joints["leader"][j] != j:
         return 0.0
     if kind in (HINGE, SLIDE):
-        return max(joints.numbers[j, LOWER] - q[at], q[at] - joints.numbers[j, UPPER], 0.0)
+        return max(joints["lower"][j] - q[at], q[at] - joints["upper"][j], 0.0)
     if kind == BALL:
         swing, twist = swing_twist(
-            (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints.numbers, j, AXIS)
+            (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints["axis"], j)
         )
         tilt = logarithm(swing)
-        over = math.sqrt(dot(tilt, tilt)) - joints.numbers[j, CONE]
-        return max(joints.numbers[j, LOWER] - twist, twist - joints.numbers[j, UPPER], over, 0.0)
+        over = math.sqrt(dot(tilt, tilt)) - joints["cone"][j]
+        return max(joints["lower"][j] - twist, twist - joints["upper"][j], over, 0.0)
     return 0.0
 
 
@@ -450,10 +447,10 @@ def fit_start(joints, q):
     fine = True
     for k in range(len(q)):
         fine &= abs(q[k]) <= LARGEST_COORDINATE
-    for j in range(len(joints.integers)):
-        kind = joints.integers[j, KIND]
+    for j in range(len(joints)):
+        kind = joints["kind"][j]
         if kind in (BALL, FREE):
-            at = joints.integers[j, AT] + (3 if kind == FREE else 0)
+            at = joints["coordinate"][j] + (3 if kind == FREE else 0)
             Q, unit = made_unit((q[at], q[at + 1], q[at + 2], q[at + 3]))
             q[at], q[at + 1], q[at + 2], q[at + 3] = Q
             fine &= unit
@@ -462,11 +459,11 @@ def fit_start(joints, q):
 
 def articulated_pose(joints, q, positions, rotations):
     """Fill global positions (joint, 3) and rotations (joint, 4) of one q."""
-    for j in range(len(joints.integers)):
+    for j in range(len(joints)):
         x, R = joint_transform(joints, j, q)
-        if joints.integers[j, PARENT] >= 0:
-            R_parent = quaternion_at(rotations, joints.integers[j, PARENT])
-            x = add(vector_at(positions, joints.integers[j, PARENT]), rotate(R_parent, x))
+        if joints["parent"][j] >= 0:
+            R_parent = quaternion_at(rotations, joints["parent"][j])
+            x = add(vector_at(positions, joints["parent"][j]), rotate(R_parent, x))
             R = multiply(R_parent, R)
         put_vector(positions, j, x)
         put_quaternion(rotations, j, R)
@@ -474,20 +471,20 @@ def articulated_pose(joints, q, positions, rotations):
 
 def _clamp_batch(joints, q):
     for i in range(len(q)):
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             clamp_joint(joints, j, q[i])
 
 
 def _excess_batch(joints, q, excess):
     for i in range(len(q)):
         excess[i] = 0.0
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             excess[i] = max(excess[i], joint_excess(joints, j, q[i]))
 
 
 def _locals_batch(joints, q, offsets, rotations):
     for i in range(len(q)):
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             x, R = joint_transform(joints, j, q[i])
             put_vector(offsets[i], j, x)
             put_quaternion(rotations[i], j, R)
@@ -551,9 +548,10 @@ def _checked_bound(name: str, value: ArrayLike, count: int) -> FloatArray:
     return arguments.spread(given, (count,))
 
 
-def _check_twists(kinds: IndexArray, lower: FloatArray, upper: FloatArray) -> None:
+def _check_twists(joints: RecordArray) -> None:
     """Refuse limits of balls that no twist, from -pi to pi, could keep."""
-    beyond = np.flatnonzero((kinds == BALL) & ((lower > np.pi) | (upper < -np.pi)))
+    lower, upper = joints["lower"], joints["upper"]
+    beyond = np.flatnonzero((joints["kind"] == BALL) & ((lower > np.pi) | (upper < -np.pi)))
     if len(beyond):
         j = beyond[0]
         raise ValueError(
@@ -620,19 +618,25 @@ def _chain_to_leader(
     return list(chain)
 
 
-def _layout(
-    kinds: IndexArray, mimics: Mapping[int, Mimic]
-) -> tuple[tuple[IndexArray, ...], tuple[FloatArray, FloatArray]]:
-    """Return kinds, starts of coordinates and freedoms, and leaders; multipliers and shifts."""
-    widths, freedoms = WIDTHS[kinds], FREEDOMS[kinds]
-    followers = list(mimics)
-    widths[followers] = freedoms[followers] = 0
-    at, freedom = np.cumsum(widths) - widths, np.cumsum(freedoms) - freedoms
-    leaders = np.arange(len(kinds))
-    multipliers, shifts = np.ones(len(kinds)), np.zeros(len(kinds))
+def _records(skeleton: Skeleton, kinds: IndexArray, mimics: Mapping[int, Mimic]) -> RecordArray:
+    """Return the joints with offsets, kinds and mimics; the other fields are still to be filled."""
+    joints = np.zeros(len(kinds), JOINT)
+    joints["parent"], joints["offset"], joints["kind"] = skeleton.parents, skeleton.offsets, kinds
+    joints["leader"], joints["multiplier"] = np.arange(len(kinds)), 1.0
     for joint, (leader, multiplier, shift) in mimics.items():
-        leaders[joint], multipliers[joint], shifts[joint] = leader, multiplier, shift
-    return (kinds, at[leaders], freedom[leaders], leaders), (multipliers, shifts)
+        joints["leader"][joint], joints["followed"][leader] = leader, True
+        joints["multiplier"][joint], joints["shift"][joint] = multiplier, shift
+    number_coordinates(joints)
+    return joints
+
+
+def number_coordinates(joints: RecordArray) -> IndexArray:
+    """Fill where the coordinates and freedoms of joints begin; return the coordinates' counts."""
+    leads = joints["leader"] == np.arange(len(joints))
+    for field, counts in (("freedom", FREEDOMS), ("coordinate", WIDTHS)):
+        own = np.where(leads, counts[joints["kind"]], 0)
+        joints[field] = (np.cumsum(own) - own)[joints["leader"]]
+    return own
 
 
 def _drawn(rng: np.random.Generator, joints: Articulation, j: int, count: int) -> FloatArray:

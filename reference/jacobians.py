@@ -13,32 +13,22 @@ from numpy.typing import ArrayLike
 from . import arguments
 from .arguments import FloatArray
 from .articulation import (
-    AT,
-    AXIS,
     BALL,
     FIXED,
     FREE,
-    FREEDOM,
-    KIND,
-    LEADER,
-    MULTIPLIER,
-    PARENT,
-    SLIDE,
+    FREEDOMS,
     Articulation,
     articulated_pose,
     one_batch,
 )
 from .backend.compiled import TwoSpeeds
 from .model import Model, checked_model, effector_of
+from .motion_subspace import accumulate, motion, velocity_at
 from .quaternion import (
     conjugate,
-    cross,
     exponential,
     logarithm,
     multiply,
-    quaternion_at,
-    rotate,
-    scale,
     subtract,
     vector_at,
 )
@@ -93,7 +83,7 @@ def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
     step = arguments.coordinates("v", v, "...", model.freedom_count)
     start, step = _spread("v", start, step)
     moved = start.copy()
-    _integrate(model.arrays, one_batch(step), one_batch(moved))
+    _integrate(model.joints, one_batch(step), one_batch(moved))
     return moved.reshape(*moved.shape[:-1], -1, 4) if isinstance(articulation, Skeleton) else moved
 
 
@@ -109,130 +99,84 @@ def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
     _, end = _coordinates("q1", articulation, q1)
     start, end = _spread("q1", start, end)
     v = np.empty((*start.shape[:-1], model.freedom_count))
-    _difference(model.arrays, one_batch(end), one_batch(start), one_batch(v))
+    _difference(model.joints, one_batch(end), one_batch(start), one_batch(v))
     return v
 
 
-def fill_jacobian(joints, effector, q, positions, rotations, J):
+def fill_jacobian(joints, effector, positions, rotations, J):
     """Fill the Jacobian (6, freedom) of a joint, given every joint's pose; J must hold zeros."""
     x, j = vector_at(positions, effector), effector
     while j >= 0:
         arm = subtract(x, vector_at(positions, j))
-        add_joint(joints, j, q, quaternion_at(rotations, j), arm, J)
-        j = joints.integers[j, PARENT]
-
-
-def add_joint(joints, j, q, R, arm, J):
-    """Add what joint j of global rotation R does to a point at an arm [m] from its origin.
-
-    A joint does not turn its own axis: R takes the axis of a hinge or slide to the world, moved
-    or not.
-    """
-    kind, first = joints.integers[j, KIND], joints.integers[j, FREEDOM]
-    if kind == FIXED:
-        return
-    if kind == BALL:
-        add_turns(R, arm, J, first)
-    elif kind == FREE:
-        at = joints.integers[j, AT] + 3
-        unmoved = multiply(R, conjugate((q[at], q[at + 1], q[at + 2], q[at + 3])))
-        add_shift(rotate(unmoved, (1.0, 0.0, 0.0)), J, first)
-        add_shift(rotate(unmoved, (0.0, 1.0, 0.0)), J, first + 1)
-        add_shift(rotate(unmoved, (0.0, 0.0, 1.0)), J, first + 2)
-        add_turns(R, arm, J, first + 3)
-    else:
-        axis = scale(joints.numbers[j, MULTIPLIER], rotate(R, vector_at(joints.numbers, j, AXIS)))
-        if kind == SLIDE:
-            add_shift(axis, J, first)
-        else:
-            add_turn(axis, arm, J, first)
-
-
-def add_turns(R, arm, J, column):
-    """Add the turns about the three axes of a frame R."""
-    add_turn(rotate(R, (1.0, 0.0, 0.0)), arm, J, column)
-    add_turn(rotate(R, (0.0, 1.0, 0.0)), arm, J, column + 1)
-    add_turn(rotate(R, (0.0, 0.0, 1.0)), arm, J, column + 2)
-
-
-def add_turn(axis, arm, J, column):
-    """Add a turn about an axis: the linear velocity axis x arm, and the angular one."""
-    add_shift(cross(axis, arm), J, column)
-    x, y, z = axis
-    J[3, column] += x
-    J[4, column] += y
-    J[5, column] += z
-
-
-def add_shift(way, J, column):
-    """Add a shift along a way."""
-    x, y, z = way
-    J[0, column] += x
-    J[1, column] += y
-    J[2, column] += z
+        for i in range(FREEDOMS[joints["kind"][j]]):
+            angular, linear = motion(joints, j, i, rotations, 1.0)
+            column = J[:, joints["freedom"][j] + i]
+            accumulate(column, 0, velocity_at(angular, linear, arm))
+            accumulate(column, 3, angular)
+        j = joints["parent"][j]
 
 
 def move_joint(joints, j, v, q):
     """Move the coordinates of one joint by its velocity, for one second."""
-    kind, at, first = joints.integers[j, KIND], joints.integers[j, AT], joints.integers[j, FREEDOM]
-    if kind == FIXED or joints.integers[j, LEADER] != j:
+    kind, at, first = joints["kind"][j], joints["coordinate"][j], joints["freedom"][j]
+    if kind == FIXED or joints["leader"][j] != j:
         return
     if kind == BALL:
-        turn_right(q, at, (v[first], v[first + 1], v[first + 2]))
+        rotate_ball(q, at, (v[first], v[first + 1], v[first + 2]))
     elif kind == FREE:
         for k in range(3):
             q[at + k] += v[first + k]
-        turn_right(q, at + 3, (v[first + 3], v[first + 4], v[first + 5]))
+        rotate_ball(q, at + 3, (v[first + 3], v[first + 4], v[first + 5]))
     else:
         q[at] += v[first]
 
 
-def turn_right(q, at, turn):
-    """Turn the quaternion at a place in q, in its own frame, by a rotation vector."""
+def rotate_ball(q, at, v):
+    """Rotate the quaternion that begins at an index of q by a rotation vector in its own frame."""
     Q = (q[at], q[at + 1], q[at + 2], q[at + 3])
-    w, x, y, z = multiply(Q, exponential(turn))
+    w, x, y, z = multiply(Q, exponential(v))
     q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
 
 
 def joint_difference(joints, j, q1, q0, v):
     """Fill the velocity that takes one joint from q0 to q1."""
-    kind, at, first = joints.integers[j, KIND], joints.integers[j, AT], joints.integers[j, FREEDOM]
-    if kind == FIXED or joints.integers[j, LEADER] != j:
+    kind, at, first = joints["kind"][j], joints["coordinate"][j], joints["freedom"][j]
+    if kind == FIXED or joints["leader"][j] != j:
         return
     if kind == BALL:
-        v[first], v[first + 1], v[first + 2] = turn_between(q1, q0, at)
+        v[first], v[first + 1], v[first + 2] = rotation_between(q1, q0, at)
     elif kind == FREE:
         for k in range(3):
             v[first + k] = q1[at + k] - q0[at + k]
-        v[first + 3], v[first + 4], v[first + 5] = turn_between(q1, q0, at + 3)
+        v[first + 3], v[first + 4], v[first + 5] = rotation_between(q1, q0, at + 3)
     else:
         v[first] = q1[at] - q0[at]
 
 
-def turn_between(q1, q0, at):
-    """Return log(Q0* Q1), the turn of Q0 in its own frame that gives Q1, both at a place in q."""
+def rotation_between(q1, q0, at):
+    """Return log(Q0* Q1), the rotation vector in Q0's own frame from Q0 to Q1."""
     Q0 = (q0[at], q0[at + 1], q0[at + 2], q0[at + 3])
     return logarithm(multiply(conjugate(Q0), (q1[at], q1[at + 1], q1[at + 2], q1[at + 3])))
 
 
 def _jacobians_batch(joints, effectors, q, J):
-    count = len(joints.integers)
+    count = len(joints)
     positions, rotations = np.empty((count, 3)), np.empty((count, 4))
     for i in range(len(q)):
         articulated_pose(joints, q[i], positions, rotations)
         for k in range(len(effectors)):
-            fill_jacobian(joints, effectors[k], q[i], positions, rotations, J[i, k])
+            fill_jacobian(joints, effectors[k], positions, rotations, J[i, k])
 
 
 def _integrate_batch(joints, v, q):
     for i in range(len(q)):
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             move_joint(joints, j, v[i], q[i])
 
 
 def _difference_batch(joints, q1, q0, v):
     for i in range(len(v)):
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             joint_difference(joints, j, q1[i], q0[i], v[i])
 
 
@@ -243,7 +187,7 @@ _difference = TwoSpeeds(_difference_batch)
 
 def _jacobians(model: Articulation, effectors: np.ndarray, q: FloatArray) -> FloatArray:
     J = np.zeros((*q.shape[:-1], len(effectors), 6, model.freedom_count))
-    _fill(model.arrays, effectors, one_batch(q), one_batch(J, 3))
+    _fill(model.joints, effectors, one_batch(q), one_batch(J, 3))
     return J
 
 

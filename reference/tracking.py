@@ -21,7 +21,7 @@ from .inverse_kinematics import (
     goals_of,
     solve_targets,
 )
-from .inverse_kinematics.mechanism import Mechanism, take_coordinates
+from .inverse_kinematics.mechanism import Mechanism, gather
 from .inverse_kinematics.problem import Wanted, check_numbers, checked_targets
 from .inverse_kinematics.reduce import prepare
 from .model import Model, checked_model
@@ -184,7 +184,7 @@ def _smoothed(
 def _columns(mechanism: Mechanism, count: int) -> IndexArray:
     """Return which of the articulation's coordinates are the mechanism's own."""
     own = np.empty(mechanism.coordinates)
-    take_coordinates(mechanism, np.arange(count, dtype=np.float64), own)
+    gather(mechanism, np.arange(count, dtype=np.float64), own)
     return own.astype(np.int64)
 
 

@@ -147,7 +147,7 @@ def same(a, b):
     if isinstance(a, list | tuple):
         return len(a) == len(b) and all(same(x, y) for x, y in zip(a, b, strict=True))
     if isinstance(a, Articulation):
-        return same(a.arrays, b.arrays)
+        return same(a.joints, b.joints)
     if dataclasses.is_dataclass(a):
         names = [f.name for f in dataclasses.fields(a) if f.name[0] != "_"]
         return all(same(getattr(a, name), getattr(b, name)) for name in names)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
-from ..arguments import FloatArray, IndexArray, frozen
+from ..arguments import FloatArray, IndexArray, RecordArray, frozen
 from ..articulation import Articulation, one_batch
 from ..backend.compiled import TwoSpeeds, bind
 from ..backend.threads import in_slices
@@ -36,7 +36,7 @@ from .damped_least_squares import damped_least_squares_sweep, damped_least_squar
 from .fabrik import fabrik_sweep, fabrik_update
 from .jacobian_transpose import jacobian_transpose_sweep, jacobian_transpose_update
 from .levenberg_marquardt import levenberg_marquardt_sweep, levenberg_marquardt_update
-from .mechanism import ROTATION, WEIGHT
+from .mechanism import TARGET
 from .problem import (
     IKSolution,
     Target,
@@ -356,7 +356,7 @@ def _solve_mechanisms(
 def _run(
     kernel: TwoSpeeds,
     model: tuple[Any, ...],
-    given: tuple[FloatArray, FloatArray],
+    given: tuple[FloatArray, np.ndarray],
     rest: tuple[Any, ...],
     filled: Solved | Answers,
     least: int,
@@ -378,7 +378,7 @@ def _run(
     )  # fmt: skip
 
 
-def _part(rows: FloatArray, part: slice) -> FloatArray:
+def _part(rows: np.ndarray, part: slice) -> np.ndarray:
     """Return a part of the rows, or the only one, which serves all targets."""
     return rows if len(rows) == 1 else rows[part]
 
@@ -401,19 +401,18 @@ def balls(skeleton: Skeleton) -> Articulation:
     return kept["balls"]
 
 
-def goals_of(wanted: list[Wanted], batch: tuple[int, ...]) -> FloatArray:
-    """Return what the kernels want to know of the targets, (target, effector, 8).
+def goals_of(wanted: list[Wanted], batch: tuple[int, ...]) -> RecordArray:
+    """Return what the kernels want to know of the targets, records TARGET, (target, effector).
 
     Weights count beside one another, so that the largest may be one.
     """
     heaviest = max(one.weight for one in wanted)
-    goals = np.empty((*batch, len(wanted), 8))
+    goals = np.empty((*batch, len(wanted)), TARGET)
     for e, one in enumerate(wanted):
-        goal = goals[..., e, :]
-        goal[..., :ROTATION] = one.position
-        goal[..., ROTATION:WEIGHT] = IDENTITY if one.rotation is None else one.rotation
-        goal[..., WEIGHT] = one.weight / heaviest
-    return goals.reshape(-1, len(wanted), 8)
+        goals["position"][..., e, :] = one.position
+        goals["rotation"][..., e, :] = IDENTITY if one.rotation is None else one.rotation
+        goals["weight"][..., e] = one.weight / heaviest
+    return goals.reshape(-1, len(wanted))
 
 
 def _batch_shape(name: str, starts: tuple[int, ...], targets: tuple[int, ...]) -> tuple[int, ...]:

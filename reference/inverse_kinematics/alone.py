@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import FLOAT64, FloatArray, frozen
+from ..arguments import FLOAT64, FloatArray, RecordArray, frozen
 from ..articulation import Articulation
 from ..model import effector_of
 from ..outcome import Outcome
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
 from .batch import FIGURES
-from .mechanism import ROTATION, WEIGHT
+from .mechanism import TARGET
 from .problem import IKSolution, Target
 from .reduce import prepare
 
@@ -59,20 +59,19 @@ def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
     return type(values) is np.ndarray and values.dtype == FLOAT64 and values.shape == shape
 
 
-def new_goal(position: Any, turn: Any) -> FloatArray:
-    """Return what the kernels want to know of one target, (1, 1, 8)."""
-    goal = np.empty((1, 1, 8))
-    row = goal[0, 0]
-    row[:ROTATION] = position
-    row[ROTATION:WEIGHT] = IDENTITY if turn is None else turn
-    row[WEIGHT] = 1.0
+def new_goal(position: Any, turn: Any) -> RecordArray:
+    """Return what the kernels want to know of one target, a record TARGET, (1, 1)."""
+    goal = np.empty((1, 1), TARGET)
+    goal["position"] = position
+    goal["rotation"] = IDENTITY if turn is None else turn
+    goal["weight"] = 1.0
     return goal
 
 
 def solve_mechanism(
     model: Articulation,
     start: FloatArray,
-    goal: FloatArray,
+    goal: RecordArray,
     effector: int | str | None,
     oriented: bool,
     settings: Any,

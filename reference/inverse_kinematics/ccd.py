@@ -2,7 +2,8 @@
 
 import math
 
-from ..articulation import AT, BALL, FREE, FREEDOM, HINGE, KIND, LEADER, SLIDE
+from ..articulation import BALL, FREE, HINGE, SLIDE
+from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
     IDENTITY,
     add,
@@ -19,45 +20,38 @@ from ..quaternion import (
     turn_about,
     vector_at,
 )
+from .box_step import freedom_scale, inner, linearise_task, squared
 from .chain import place_joints
-from .joint_updates import ball_at, move_by, put_ball, shift_free, turn_ball
+from .joint_updates import ball_at, move_by, put_ball, rotate_to, translate_free
 from .mechanism import (
-    ORIENTED,
-    POSITION,
-    WEIGHT,
-    axis_of,
-    frame_of,
-    is_followed,
-    misfit,
-    moves,
-    place,
+    cost,
+    effector_position,
+    effector_rotation,
     position_error,
-    put_tip,
-    tip,
-    tip_rotation,
-    turn_weight,
-    wrong_turn,
+    put_effector,
+    rotation_error,
+    rotation_weight,
+    update_forward_kinematics,
 )
-from .stacked import freedom_worth, inner, linearise_all, squared
-from .wahba import NOTHING, add_outer, add_turn, best_angle, best_rotation, turn_value
+from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, best_rotation
 
 # A step of a joint that others follow is halved at most so often.
 HALVINGS = 20
 
 
 def ccd_sweep(chain, target):
-    """Turn each joint, from the effector's parent to the root, to point the effector at the target.
+    """Point each joint, from the effector's parent to the root, so that its effector is nearest.
 
-    A turn moves what lies below the joint. The joints still to come lie above and stay, so that of
-    all that moves only the effector is needed on the way up; the turns are then applied from the
-    root down, each to its joint and to all below it.
+    A joint moves what lies below it only. The joints still to come lie above and stay, so that on
+    the way up only the effector needs to be followed; the rotations are then applied from the root
+    down, each to its joint and to all below it.
     """
     n = len(chain.lengths)
     effector = vector_at(chain.positions, n)
     for k in range(n - 1, -1, -1):
         joint = vector_at(chain.positions, k)
-        turn, effector = ccd_turn(joint, effector, target)
-        put_quaternion(chain.turns, k, turn)
+        Q, effector = pointing(joint, effector, target)
+        put_quaternion(chain.turns, k, Q)
     above = IDENTITY
     for k in range(n):
         above = renormalised(multiply(above, quaternion_at(chain.turns, k)))
@@ -66,147 +60,146 @@ def ccd_sweep(chain, target):
     place_joints(chain)
 
 
-def ccd_turn(joint, effector, target):
-    """Return the shortest turn about a joint that brings the effector nearest, and where it goes.
+def pointing(joint, effector, target):
+    """Return the shortest rotation about a joint that brings the effector nearest to the target.
 
     The effector moves on a sphere about the joint, and the point nearest to the target lies on the
-    ray from the joint to the target: the distance cannot grow.
+    ray from the joint to the target: the distance cannot grow. Returns where it goes as well.
     """
-    arm, way = subtract(effector, joint), subtract(target, joint)
-    square = dot(way, way)
+    arm, direction = subtract(effector, joint), subtract(target, joint)
+    square = dot(direction, direction)
     if square == 0.0:
         return IDENTITY, effector
-    return between(arm, way), add(joint, scale(math.sqrt(dot(arm, arm) / square), way))
+    length = math.sqrt(dot(arm, arm) / square)
+    return between(arm, direction), add(joint, scale(length, direction))
 
 
-def ccd_update(mechanism, goal, posture, room):
+def ccd_update(mechanism, target, data, work):
     """Move each joint, from the effectors to the root, to bring all effectors below it nearest.
 
-    A joint turns what is below it as one body: Wahba's problem, for a hinge about its axis. A hinge
-    or slide stops at its limit on the way; a ball whose limits leave only worse stays.
+    A joint rotates what is below it as one body: Wahba's problem, for a hinge about its axis. A
+    hinge or slide stops at its limit; a ball whose limits leave only worse rotations stays.
     """
     joints = mechanism.joints
-    for j in range(len(joints.integers) - 1, -1, -1):
-        if is_followed(mechanism, j):
-            descend(mechanism, goal, posture, room, j)
-        elif joints.integers[j, LEADER] == j:
-            move_joint(mechanism, goal, posture, room, j)
-    place(mechanism, posture)
+    for j in range(len(joints) - 1, -1, -1):
+        if joints["followed"][j]:
+            descend(mechanism, target, data, work, j)
+        elif joints["leader"][j] == j:
+            update_joint(mechanism, target, data, work, j)
+    update_forward_kinematics(mechanism, data)
 
 
-def move_joint(mechanism, goal, posture, room, j):
+def update_joint(mechanism, target, data, work, j):
     """Give one joint its best coordinates; the effectors follow, the joints below do not yet."""
-    joints, q, kind = mechanism.joints, posture.q, mechanism.joints.integers[j, KIND]
-    R = quaternion_at(posture.rotations, j)
+    joints, q, kind = mechanism.joints, data.q, mechanism.joints["kind"][j]
+    axis = axis_of(joints, j, quaternion_at(data.rotations, j))
     if kind == SLIDE:
-        axis = axis_of(joints, j, R)
-        way = move_by(joints, q, j, dot(axis, mean_way(mechanism, goal, posture, j)))
-        shift_tips(mechanism, posture, j, scale(way, axis))
+        distance = move_by(joints, q, j, dot(axis, mean_error(mechanism, target, data, j)))
+        translate_effectors(mechanism, data, j, scale(distance, axis))
         return
-    M = arms_to_targets(mechanism, goal, posture, j)
+    M = attitude_profile(mechanism, target, data, j)
     if kind == HINGE:
-        axis = axis_of(joints, j, R)
-        turn = turn_about(axis, move_by(joints, q, j, best_angle(M, axis)))
+        Q = turn_about(axis, move_by(joints, q, j, best_angle(M, axis)))
     else:
-        turn = better_turn(mechanism, goal, posture, room, j, M)
-    turn_tips(mechanism, posture, j, turn)
+        Q = rotate_within_limits(mechanism, target, data, work, j, M)
+    rotate_effectors(mechanism, data, j, Q)
     if kind == FREE:
-        way = mean_way(mechanism, goal, posture, j)
-        shift_tips(mechanism, posture, j, way)
-        shift_free(joints, q, j, rotate(conjugate(frame_of(joints, j, posture)), way))
+        v = mean_error(mechanism, target, data, j)
+        translate_effectors(mechanism, data, j, v)
+        frame = frame_of(joints, j, data.rotations)
+        translate_free(joints, q, j, rotate(conjugate(frame), v))
 
 
-def arms_to_targets(mechanism, goal, posture, j):
-    """Return Wahba's M of the arms from joint j to the effectors below and of their rotations."""
-    M, x = NOTHING, vector_at(posture.positions, j)
+def attitude_profile(mechanism, target, data, j):
+    """Return Wahba's M of the arms from joint j to the effectors below, and of their rotations."""
+    M, x = ZERO_MATRIX, vector_at(data.positions, j)
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            weight = goal[e, WEIGHT]
-            arm = subtract(tip(mechanism, posture, e), x)
-            M = add_outer(M, weight, subtract(vector_at(goal, e, POSITION), x), arm)
-            if mechanism.effectors[e, ORIENTED]:
-                wanted = wrong_turn(mechanism, goal, posture, e)
-                M = add_turn(M, weight * turn_weight(mechanism), wanted)
+        if mechanism.moves[j, e]:
+            weight = target["weight"][e]
+            arm = subtract(effector_position(mechanism, data, e), x)
+            M = add_outer(M, weight, subtract(vector_at(target["position"], e), x), arm)
+            if mechanism.effectors["oriented"][e]:
+                error = rotation_error(mechanism, target, data, e)
+                M = add_rotation(M, weight * rotation_weight(mechanism), error)
     return M
 
 
-def mean_way(mechanism, goal, posture, j):
-    """Return the weighted mean of the ways from the effectors below joint j to their targets."""
-    total, way = 0.0, (0.0, 0.0, 0.0)
+def mean_error(mechanism, target, data, j):
+    """Return the weighted mean of the vectors from the effectors below joint j to their targets."""
+    total, error = 0.0, (0.0, 0.0, 0.0)
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            total += goal[e, WEIGHT]
-            way = add(way, scale(goal[e, WEIGHT], position_error(mechanism, goal, posture, e)))
-    return scale(1.0 / total, way) if total > 0.0 else way
+        if mechanism.moves[j, e]:
+            weight = target["weight"][e]
+            total += weight
+            error = add(error, scale(weight, position_error(mechanism, target, data, e)))
+    return scale(1.0 / total, error) if total > 0.0 else error
 
 
-def better_turn(mechanism, goal, posture, room, j, M):
-    """Turn a ball, or the ball of a free joint, as is best within its limits; return the turn."""
-    joints, R = mechanism.joints, quaternion_at(posture.rotations, j)
-    turn = best_turn(mechanism, goal, posture, room, j, M)
-    before = ball_at(joints, posture.q, j)
-    moved = turn_ball(joints, posture.q, j, frame_of(joints, j, posture), multiply(turn, R))
+def rotate_within_limits(mechanism, target, data, work, j, M):
+    """Rotate a ball or free joint as is best within its limits; return the rotation made."""
+    joints, R = mechanism.joints, quaternion_at(data.rotations, j)
+    Q = unlimited_rotation(mechanism, target, data, work, j, M)
+    before = ball_at(joints, data.q, j)
+    moved = rotate_to(joints, data.q, j, frame_of(joints, j, data.rotations), multiply(Q, R))
     allowed = renormalised(multiply(moved, conjugate(R)))
-    if joints.integers[j, KIND] == BALL and turn_value(M, allowed) < turn_value(M, IDENTITY):
-        put_ball(joints, posture.q, j, before)
+    if joints["kind"][j] == BALL and alignment(M, allowed) < alignment(M, IDENTITY):
+        put_ball(joints, data.q, j, before)
         return IDENTITY
     return allowed
 
 
-def best_turn(mechanism, goal, posture, room, j, M):
-    """Return the best turn of joint j without limits, for one position the shortest one."""
+def unlimited_rotation(mechanism, target, data, work, j, M):
+    """Return the best rotation of joint j without limits, for one position the shortest one."""
     e = only_position(mechanism, j)
     if e < 0:
-        return best_rotation(M, room.eigen[0], room.eigen[1])
-    x = vector_at(posture.positions, j)
-    arm = subtract(tip(mechanism, posture, e), x)
-    return between(arm, subtract(vector_at(goal, e, POSITION), x))
+        return best_rotation(M, work.eigen[0], work.eigen[1])
+    x = vector_at(data.positions, j)
+    arm = subtract(effector_position(mechanism, data, e), x)
+    return between(arm, subtract(vector_at(target["position"], e), x))
 
 
 def only_position(mechanism, j):
     """Return the effector below joint j if it is the only one and its rotation free, else -1."""
     only = -1
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            if only >= 0 or mechanism.effectors[e, ORIENTED]:
+        if mechanism.moves[j, e]:
+            if only >= 0 or mechanism.effectors["oriented"][e]:
                 return -1
             only = e
     return only
 
 
-def turn_tips(mechanism, posture, j, turn):
-    """Turn the effectors below joint j about it."""
-    x = vector_at(posture.positions, j)
+def rotate_effectors(mechanism, data, j, Q):
+    """Rotate the effectors below joint j about it."""
+    x = vector_at(data.positions, j)
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            arm = subtract(tip(mechanism, posture, e), x)
-            R = multiply(turn, tip_rotation(mechanism, posture, e))
-            put_tip(mechanism, posture, e, add(x, rotate(turn, arm)), R)
+        if mechanism.moves[j, e]:
+            arm = subtract(effector_position(mechanism, data, e), x)
+            R = multiply(Q, effector_rotation(mechanism, data, e))
+            put_effector(mechanism, data, e, add(x, rotate(Q, arm)), R)
 
 
-def shift_tips(mechanism, posture, j, way):
-    """Shift the effectors below joint j."""
+def translate_effectors(mechanism, data, j, v):
+    """Translate the effectors below joint j."""
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            moved = add(tip(mechanism, posture, e), way)
-            put_tip(mechanism, posture, e, moved, tip_rotation(mechanism, posture, e))
+        if mechanism.moves[j, e]:
+            moved = add(effector_position(mechanism, data, e), v)
+            put_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
 
 
-def descend(mechanism, goal, posture, room, j):
+def descend(mechanism, target, data, work, j):
     """Move a joint that others follow down the gradient, half as far until that is no worse."""
-    q, at, k = posture.q, mechanism.joints.integers[j, AT], mechanism.joints.integers[j, FREEDOM]
-    place(mechanism, posture)
-    linearise_all(mechanism, goal, posture, room.stack)
-    slope = inner(room.stack.J[k], room.stack.e)
-    square = squared(room.stack.J[k])
-    before, start = misfit(mechanism, goal, posture), q[at]
-    worth = freedom_worth(mechanism, j)
-    step = worth * slope / square if square > 0.0 else 0.0
+    q, at, k = data.q, mechanism.joints["coordinate"][j], mechanism.joints["freedom"][j]
+    update_forward_kinematics(mechanism, data)
+    linearise_task(mechanism, target, data, work.system)
+    slope, square = inner(work.system.J[k], work.system.e), squared(work.system.J[k])
+    before, start = cost(mechanism, target, data), q[at]
+    step = freedom_scale(mechanism, j) * slope / square if square > 0.0 else 0.0
     for _ in range(HALVINGS):
         move_by(mechanism.joints, q, j, step)
-        place(mechanism, posture)
-        if misfit(mechanism, goal, posture) <= before:
+        update_forward_kinematics(mechanism, data)
+        if cost(mechanism, target, data) <= before:
             return
         q[at] = start
         step *= 0.5
-    place(mechanism, posture)
+    update_forward_kinematics(mechanism, data)

@@ -4,8 +4,8 @@ Steps towards a target beyond reach die down on unlimited chains only, where the
 nearest point within reach; elsewhere they may swing about it.
 """
 
-from .jacobian import linearise, solve_damped, turn_joints
-from .stacked import damped_step, linearise_all, take_step
+from .box_step import damped_step, linearise_task, take_step
+from .jacobian import linearise, rotate_joints, solve_damped
 
 # The square of the damping factor, over the reach squared: a tenth of the reach.
 DAMPING = 0.01
@@ -15,14 +15,14 @@ BEYOND = 0.02
 
 
 def damped_least_squares_sweep(chain, target):
-    """Turn all joints by J^T (J J^T + (0.1 reach)^2 1)^-1 e."""
+    """Rotate all joints by J^T (J J^T + (0.1 reach)^2 1)^-1 e."""
     e, A = linearise(chain, target, BEYOND * chain.reach)
-    turn_joints(chain, solve_damped(A, DAMPING * chain.reach * chain.reach, e))
+    rotate_joints(chain, solve_damped(A, DAMPING * chain.reach * chain.reach, e))
 
 
-def damped_least_squares_update(mechanism, goal, posture, room):
+def damped_least_squares_update(mechanism, target, data, work):
     """Change the coordinates by J' (J J' + (0.1 reach)^2 1)^-1 e, within their limits."""
-    linearise_all(mechanism, goal, posture, room.stack)
+    linearise_task(mechanism, target, data, work.system)
     damping = DAMPING * mechanism.reach * mechanism.reach
-    damped_step(mechanism, posture, room.stack, damping)
-    take_step(mechanism, posture, room.stack)
+    damped_step(mechanism, data, work.system, damping)
+    take_step(mechanism, data, work.system)

@@ -1,12 +1,15 @@
 """Forward and backward reaching (Aristidou & Lasenby 2011, Algorithm 1).
 
-On mechanisms the way forward turns joints instead of moving points, each to bring its children
-nearest to where they were wished backward: a hinge about its axis, a ball within its limits, one
-rotation for all children of a branch, a free joint as one body. What cannot be had remains as the
-residual.
+The backward pass finds where each joint should be, its backward position. On mechanisms the forward
+pass rotates and translates joints instead of moving points, each to bring its children nearest to
+their backward positions: a hinge about its axis, a ball within its limits, one rotation for all
+children of a branch, a free joint as one body. What that cannot meet remains as the residual.
 """
 
-from ..articulation import BALL, FREE, HINGE, KIND, LEADER, PARENT, SLIDE, joint_transform
+import numpy as np
+
+from ..articulation import BALL, FREE, HINGE, SLIDE, joint_transform
+from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
     add,
     between,
@@ -25,33 +28,19 @@ from ..quaternion import (
     vector_at,
 )
 from .chain import in_hole, out_of_reach, root_distance
-from .joint_updates import move_by, shift_free, turn_ball
-from .mechanism import (
-    ARM,
-    HANGS,
-    ORIENTED,
-    POSITION,
-    ROTATION,
-    TURN,
-    WEIGHT,
-    axis_of,
-    frame_of,
-    moves,
-    place,
-    sees,
-    sees_tip,
-    turn_weight,
-)
-from .wahba import NOTHING, add_outer, add_turn, best_angle, best_rotation
+from .joint_updates import move_by, rotate_to, translate_free
+from .mechanism import rotation_weight, update_forward_kinematics
+from .wahba import ZERO_MATRIX, add_outer, add_rotation, best_angle, best_rotation
 
-# The column of wishes, (joint, 4), that holds the weight of a joint's wish; a position before it.
-WISHED = 3
+ZERO = (0.0, 0.0, 0.0)
+# Where the backward pass puts a joint [m], and the weight of that, 0 where it puts it nowhere.
+BACKWARD = np.dtype([("position", np.float64, 3), ("weight", np.float64)], align=True)
 
 
 def fabrik_sweep(chain, target):
     """Move the joints' positions: to the target and back to the root, or, beyond reach, on a line.
 
-    Only positions move; the links are turned after the last sweep.
+    Only positions move; the joints' rotations follow after the last sweep.
     """
     d = root_distance(chain, target)
     if out_of_reach(chain, d):
@@ -68,8 +57,8 @@ def reach_backward(chain, target):
     put_vector(chain.positions, len(chain.lengths), target)
     for k in range(len(chain.lengths) - 1, -1, -1):
         after = vector_at(chain.positions, k + 1)
-        pulled = place_towards(after, vector_at(chain.positions, k), chain.lengths[k])
-        put_vector(chain.positions, k, pulled)
+        point = point_towards(after, vector_at(chain.positions, k), chain.lengths[k])
+        put_vector(chain.positions, k, point)
 
 
 def reach_forward(chain):
@@ -77,244 +66,250 @@ def reach_forward(chain):
     put_vector(chain.positions, 0, vector_at(chain.offsets, 0))
     for k in range(len(chain.lengths)):
         before = vector_at(chain.positions, k)
-        pulled = place_towards(before, vector_at(chain.positions, k + 1), chain.lengths[k])
-        put_vector(chain.positions, k + 1, pulled)
+        point = point_towards(before, vector_at(chain.positions, k + 1), chain.lengths[k])
+        put_vector(chain.positions, k + 1, point)
 
 
 def lay_on_line(chain, target, others):
     """Lay the longest link towards the target and the others towards it (1) or back (-1).
 
-    Beyond reach all point at the target; inside the hole that the longest link leaves all others
-    fold back, and the effector comes to rest on the rim.
+    Beyond reach all point at the target; nearer than the longest link allows all others
+    fold back, and the effector comes to rest on the inner radius.
     """
     root = vector_at(chain.positions, 0)
-    towards = subtract(place_towards(root, target, 1.0), root)
+    direction = subtract(point_towards(root, target, 1.0), root)
     found = False
     for k in range(len(chain.lengths)):
         longest = chain.lengths[k] == chain.longest and not found
         found |= longest
-        step = scale(chain.lengths[k] if longest else others * chain.lengths[k], towards)
+        step = scale(chain.lengths[k] if longest else others * chain.lengths[k], direction)
         put_vector(chain.positions, k + 1, add(vector_at(chain.positions, k), step))
 
 
-def place_towards(start, end, length):
+def point_towards(start, end, length):
     """Return the point at a distance from start in the direction of end, of x if they coincide."""
-    way = subtract(end, start)
-    distance = norm(way)
+    direction = subtract(end, start)
+    distance = norm(direction)
     if distance == 0.0:
         return add(start, (length, 0.0, 0.0))
-    return add(start, scale(length / distance, way))
+    return add(start, scale(length / distance, direction))
 
 
-def fabrik_update(mechanism, goal, posture, room):
-    """Reach backward for where each joint should be, then forward, turning joints towards that."""
-    wish(mechanism, goal, posture, room)
+def fabrik_update(mechanism, target, data, work):
+    """Find the backward positions, then move joint after joint towards them."""
+    backward_pass(mechanism, target, data, work.backward)
     joints = mechanism.joints
-    for j in range(len(joints.integers)):
-        put_frame(joints, posture, room, j)
-        move_towards_wishes(mechanism, goal, posture, room, j)
-    place(mechanism, posture)
+    for j in range(len(joints)):
+        put_joint(joints, data, work.backward, j)
+        forward_joint(mechanism, target, data, work, j)
+    update_forward_kinematics(mechanism, data)
 
 
-def wish(mechanism, goal, posture, room):
+def backward_pass(mechanism, target, data, backward):
     """Fill where each joint would be if the effectors were on their targets, the lengths kept.
 
     A joint with several children takes the weighted mean of what each would pull it to.
     """
-    wishes = room.wishes
-    for j in range(len(wishes)):
-        put_quaternion(wishes, j, (0.0, 0.0, 0.0, 0.0))
+    parents = mechanism.joints["parent"]
+    for j in range(len(backward)):
+        put_vector(backward["position"], j, ZERO)
+        backward["weight"][j] = 0.0
     for e in range(len(mechanism.effectors)):
-        j = mechanism.effectors[e, HANGS]
+        j = mechanism.effectors["joint"][e]
         if j >= 0:
-            add_wish(room, j, goal[e, WEIGHT], wish_of_effector(mechanism, goal, posture, e, j))
-    for j in range(len(wishes) - 1, -1, -1):
-        if wishes[j, WISHED] > 0.0:
-            put_vector(wishes, j, scale(1.0 / wishes[j, WISHED], vector_at(wishes, j)))
-        parent = mechanism.joints.integers[j, PARENT]
-        if parent >= 0 and wishes[j, WISHED] > 0.0:
-            x, x_parent = vector_at(posture.positions, j), vector_at(posture.positions, parent)
-            length = norm(subtract(x, x_parent))
-            pulled = place_towards(vector_at(wishes, j), x_parent, length)
-            add_wish(room, parent, wishes[j, WISHED], pulled)
+            point = backward_from_target(mechanism, target, data, e, j)
+            add_backward(backward, j, target["weight"][e], point)
+    for j in range(len(backward) - 1, -1, -1):
+        weight = backward["weight"][j]
+        if weight > 0.0:
+            x = scale(1.0 / weight, vector_at(backward["position"], j))
+            put_vector(backward["position"], j, x)
+            if parents[j] >= 0:
+                x_parent = vector_at(data.positions, parents[j])
+                length = norm(subtract(vector_at(data.positions, j), x_parent))
+                add_backward(backward, parents[j], weight, point_towards(x, x_parent, length))
 
 
-def wish_of_effector(mechanism, goal, posture, e, j):
-    """Return where the joint that an effector hangs on would be with the effector on its target."""
-    target, arm = vector_at(goal, e, POSITION), vector_at(mechanism.tips, e, ARM)
-    if mechanism.effectors[e, ORIENTED]:
-        return subtract(target, rotate(wished_rotation(mechanism, goal, e), arm))
-    return place_towards(target, vector_at(posture.positions, j), norm(arm))
+def backward_from_target(mechanism, target, data, e, j):
+    """Return where the joint of an effector would be with the effector on its target [m]."""
+    x = vector_at(target["position"], e)
+    arm = vector_at(mechanism.effectors["position"], e)
+    if mechanism.effectors["oriented"][e]:
+        R = quaternion_at(mechanism.effectors["rotation"], e)
+        R_joint = multiply(quaternion_at(target["rotation"], e), conjugate(R))
+        return subtract(x, rotate(R_joint, arm))
+    return point_towards(x, vector_at(data.positions, j), norm(arm))
 
 
-def wished_rotation(mechanism, goal, e):
-    """Return the rotation that the joint needs for its effector to have the target's."""
-    frame = conjugate(quaternion_at(mechanism.tips, e, TURN))
-    return multiply(quaternion_at(goal, e, ROTATION), frame)
+def add_backward(backward, j, weight, x):
+    """Add a weighted position to the sum of those for a joint."""
+    put_vector(backward["position"], j, add(vector_at(backward["position"], j), scale(weight, x)))
+    backward["weight"][j] += weight
 
 
-def add_wish(room, j, weight, position):
-    """Add a weighted position to what is wished for a joint."""
-    put_vector(room.wishes, j, add(vector_at(room.wishes, j), scale(weight, position)))
-    room.wishes[j, WISHED] += weight
+def put_joint(joints, data, backward, j):
+    """Put a joint where its parent and its coordinates have it now.
 
-
-def put_frame(joints, posture, room, j):
-    """Put a joint where its parent now has it, moved by its coordinates; a ball keeps its turn."""
-    x, R = joint_transform(joints, j, posture.q)
-    parent = joints.integers[j, PARENT]
+    A ball with a backward position below keeps the rotation in the world that it had.
+    """
+    x, R = joint_transform(joints, j, data.q)
+    parent = joints["parent"][j]
     if parent >= 0:
-        R_parent = quaternion_at(posture.rotations, parent)
-        x = add(vector_at(posture.positions, parent), rotate(R_parent, x))
+        R_parent = quaternion_at(data.rotations, parent)
+        x = add(vector_at(data.positions, parent), rotate(R_parent, x))
         R = multiply(R_parent, R)
-    put_vector(posture.positions, j, x)
-    if joints.integers[j, KIND] != BALL or room.wishes[j, WISHED] == 0.0:
-        put_quaternion(posture.rotations, j, R)
+    put_vector(data.positions, j, x)
+    if joints["kind"][j] != BALL or backward["weight"][j] == 0.0:
+        put_quaternion(data.rotations, j, R)
 
 
-def move_towards_wishes(mechanism, goal, posture, room, j):
-    """Move one joint, its parent in place, to bring its children nearest to their wishes."""
-    joints, q, kind = mechanism.joints, posture.q, mechanism.joints.integers[j, KIND]
-    R, x = quaternion_at(posture.rotations, j), vector_at(posture.positions, j)
-    if kind == FREE and room.wishes[j, WISHED] > 0.0:
-        fit_free(mechanism, goal, posture, room, j)
+def forward_joint(mechanism, target, data, work, j):
+    """Move one joint, its parent in place, to bring its children nearest to backward positions."""
+    joints, q, kind = mechanism.joints, data.q, mechanism.joints["kind"][j]
+    R, x = quaternion_at(data.rotations, j), vector_at(data.positions, j)
+    if kind == FREE and work.backward["weight"][j] > 0.0:
+        forward_free(mechanism, target, data, work, j)
         return
-    if kind == SLIDE and joints.integers[j, LEADER] == j:
+    leads = joints["leader"][j] == j
+    if kind == SLIDE and leads:
         axis = axis_of(joints, j, R)
-        way = dot(axis, mean_wish(mechanism, goal, posture, room, j))
-        x = add(x, scale(move_by(joints, q, j, way), axis))
-    put_vector(posture.positions, j, x)
-    if kind == HINGE and joints.integers[j, LEADER] == j:
+        distance = dot(axis, mean_displacement(mechanism, target, data, work.backward, j))
+        x = add(x, scale(move_by(joints, q, j, distance), axis))
+    put_vector(data.positions, j, x)
+    if kind == HINGE and leads:
         axis = axis_of(joints, j, R)
-        angle = best_angle(arms_to_wishes(mechanism, goal, posture, room, j), axis)
+        angle = best_angle(attitude_profile(mechanism, target, data, work.backward, j), axis)
         R = multiply(turn_about(axis, move_by(joints, q, j, angle)), R)
-    elif kind == BALL and room.wishes[j, WISHED] > 0.0:
-        turn = turn_to_wishes(mechanism, goal, posture, room, j)
-        R = turn_ball(joints, q, j, frame_of(joints, j, posture), multiply(turn, R))
-    put_quaternion(posture.rotations, j, normalised(R))
+    elif kind == BALL and work.backward["weight"][j] > 0.0:
+        wanted = multiply(forward_rotation(mechanism, target, data, work, j), R)
+        R = rotate_to(joints, q, j, frame_of(joints, j, data.rotations), wanted)
+    put_quaternion(data.rotations, j, normalised(R))
 
 
-def fit_free(mechanism, goal, posture, room, j):
-    """Move a free joint as one body to bring what is below nearest to its wishes (Horn 1987).
+def forward_free(mechanism, target, data, work, j):
+    """Move a free joint as one body to bring what is below nearest to where it should be.
 
-    The centre of the arms goes to the centre of their wishes, the rotation is the best about it: a
-    joint that first went to its own wish and then turned about that would overshoot and oscillate.
+    The centre of the arms goes to the centre of their backward positions, and the rotation is the
+    best about it (Horn 1987): a joint that first went to its own backward position and then rotated
+    about that would overshoot and oscillate.
     """
-    joints, x = mechanism.joints, vector_at(posture.positions, j)
-    total, arm, way = mean_arm_and_wish(mechanism, goal, posture, room, j)
-    M = arms_to_wishes(mechanism, goal, posture, room, j)
-    M = add_outer(M, -total, way, arm)
-    turn = best_rotation(M, room.eigen[0], room.eigen[1])
-    shift, frame = subtract(way, rotate(turn, arm)), frame_of(joints, j, posture)
-    R = multiply(turn, quaternion_at(posture.rotations, j))
-    R = turn_ball(joints, posture.q, j, frame, R)
-    shift_free(joints, posture.q, j, rotate(conjugate(frame), shift))
-    put_vector(posture.positions, j, add(x, shift))
-    put_quaternion(posture.rotations, j, normalised(R))
+    joints, x = mechanism.joints, vector_at(data.positions, j)
+    total, arm, wanted = mean_arms(mechanism, target, data, work.backward, j)
+    M = attitude_profile(mechanism, target, data, work.backward, j)
+    M = add_outer(M, -total, wanted, arm)
+    Q = best_rotation(M, work.eigen[0], work.eigen[1])
+    v, frame = subtract(wanted, rotate(Q, arm)), frame_of(joints, j, data.rotations)
+    R = rotate_to(joints, data.q, j, frame, multiply(Q, quaternion_at(data.rotations, j)))
+    translate_free(joints, data.q, j, rotate(conjugate(frame), v))
+    put_vector(data.positions, j, add(x, v))
+    put_quaternion(data.rotations, j, normalised(R))
 
 
-def mean_arm_and_wish(mechanism, goal, posture, room, j):
-    """Return the weight of what `arms_to_wishes` counts, and the mean of arms and of wishes."""
-    total, arms, ways = 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+def mean_arms(mechanism, target, data, backward, j):
+    """Return the weight of what `attitude_profile` counts, and the means of its arms [m]."""
+    total, arms, wanted = 0.0, ZERO, ZERO
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
-            arms, ways = (
-                add(arms, scale(goal[e, WEIGHT], arm)),
-                add(ways, scale(goal[e, WEIGHT], way)),
-            )
-            total += goal[e, WEIGHT]
-    for c in range(j + 1, len(room.wishes)):
-        if sees(mechanism, j, c):
-            arm, way = joint_and_wish(mechanism, posture, room, c, j)
-            weight = room.wishes[c, WISHED]
-            arms, ways = add(arms, scale(weight, arm)), add(ways, scale(weight, way))
+        if mechanism.moves[j, e]:
+            arm, to = effector_arms(mechanism, target, data, e, j)
+            weight = target["weight"][e]
+            arms, wanted = add(arms, scale(weight, arm)), add(wanted, scale(weight, to))
             total += weight
-    return total, scale(1.0 / total, arms), scale(1.0 / total, ways)
+    for c in range(j + 1, len(backward)):
+        if mechanism.adjacent[j, c]:
+            arm, to = joint_arms(mechanism, data, backward, c, j)
+            weight = backward["weight"][c]
+            arms, wanted = add(arms, scale(weight, arm)), add(wanted, scale(weight, to))
+            total += weight
+    return total, scale(1.0 / total, arms), scale(1.0 / total, wanted)
 
 
-def turn_to_wishes(mechanism, goal, posture, room, j):
-    """Return the turn of joint j that brings what it sees nearest, the shortest if it is one."""
-    found, arm, way = 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+def forward_rotation(mechanism, target, data, work, j):
+    """Return the rotation of joint j that brings what is adjacent nearest, of one the shortest."""
+    backward, count = work.backward, len(mechanism.joints)
+    found, arm, to = 0, ZERO, ZERO
     for e in range(len(mechanism.effectors)):
-        if sees_tip(mechanism, j, e):
-            found += 2 if mechanism.effectors[e, ORIENTED] else 1
-            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
-    for c in range(j + 1, len(room.wishes)):
-        if sees(mechanism, j, c) and room.wishes[c, WISHED] > 0.0:
+        if mechanism.adjacent[j, count + e]:
+            found += 2 if mechanism.effectors["oriented"][e] else 1
+            arm, to = effector_arms(mechanism, target, data, e, j)
+    for c in range(j + 1, count):
+        if mechanism.adjacent[j, c] and backward["weight"][c] > 0.0:
             found += 1
-            arm, way = joint_and_wish(mechanism, posture, room, c, j)
+            arm, to = joint_arms(mechanism, data, backward, c, j)
     if found == 1:
-        return between(arm, way)
-    M = arms_to_wishes(mechanism, goal, posture, room, j)
-    return best_rotation(M, room.eigen[0], room.eigen[1])
+        return between(arm, to)
+    M = attitude_profile(mechanism, target, data, backward, j)
+    return best_rotation(M, work.eigen[0], work.eigen[1])
 
 
-def arms_to_wishes(mechanism, goal, posture, room, j):
-    """Return Wahba's M of the arms from joint j to what it sees below, and of the wishes.
+def attitude_profile(mechanism, target, data, backward, j):
+    """Return Wahba's M of the arms from joint j to adjacent joints and to all effectors below.
 
-    All effectors below count as well: a hinge often cannot meet its child's wish, and would else
-    never make up for what that leaves.
+    Effectors further below count as well: a hinge often cannot bring its child to its backward
+    position, and would else never make up for what that leaves.
     """
-    M = NOTHING
+    M = ZERO_MATRIX
     for e in range(len(mechanism.effectors)):
-        if moves(mechanism, j, e):
-            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
-            M = add_outer(M, goal[e, WEIGHT], way, arm)
-            if mechanism.effectors[e, ORIENTED]:
-                R = rotation_below(mechanism, posture, j, e)
-                wanted = multiply(quaternion_at(goal, e, ROTATION), conjugate(R))
-                M = add_turn(M, goal[e, WEIGHT] * turn_weight(mechanism), wanted)
-    for c in range(j + 1, len(room.wishes)):
-        if sees(mechanism, j, c):
-            arm, way = joint_and_wish(mechanism, posture, room, c, j)
-            M = add_outer(M, room.wishes[c, WISHED], way, arm)
+        if mechanism.moves[j, e]:
+            weight = target["weight"][e]
+            arm, to = effector_arms(mechanism, target, data, e, j)
+            M = add_outer(M, weight, to, arm)
+            if mechanism.effectors["oriented"][e]:
+                R = rotation_below(mechanism, data, j, e)
+                error = multiply(quaternion_at(target["rotation"], e), conjugate(R))
+                M = add_rotation(M, weight * rotation_weight(mechanism), error)
+    for c in range(j + 1, len(backward)):
+        if mechanism.adjacent[j, c]:
+            arm, to = joint_arms(mechanism, data, backward, c, j)
+            M = add_outer(M, backward["weight"][c], to, arm)
     return M
 
 
-def mean_wish(mechanism, goal, posture, room, j):
-    """Return the weighted mean of the ways from joint j's children to their wishes."""
-    total, mean = 0.0, (0.0, 0.0, 0.0)
+def mean_displacement(mechanism, target, data, backward, j):
+    """Return the weighted mean of the vectors from joint j's children to where they should be."""
+    total, mean = 0.0, ZERO
     for e in range(len(mechanism.effectors)):
-        if mechanism.effectors[e, HANGS] == j:
-            arm, way = arm_and_wish(mechanism, goal, posture, e, j)
-            mean = add(mean, scale(goal[e, WEIGHT], subtract(way, arm)))
-            total += goal[e, WEIGHT]
-    for c in range(j + 1, len(room.wishes)):
-        if mechanism.joints.integers[c, PARENT] == j and room.wishes[c, WISHED] > 0.0:
-            arm, way = joint_and_wish(mechanism, posture, room, c, j)
-            mean = add(mean, scale(room.wishes[c, WISHED], subtract(way, arm)))
-            total += room.wishes[c, WISHED]
+        if mechanism.effectors["joint"][e] == j:
+            arm, to = effector_arms(mechanism, target, data, e, j)
+            mean = add(mean, scale(target["weight"][e], subtract(to, arm)))
+            total += target["weight"][e]
+    for c in range(j + 1, len(backward)):
+        if mechanism.joints["parent"][c] == j and backward["weight"][c] > 0.0:
+            arm, to = joint_arms(mechanism, data, backward, c, j)
+            mean = add(mean, scale(backward["weight"][c], subtract(to, arm)))
+            total += backward["weight"][c]
     return scale(1.0 / total, mean) if total > 0.0 else mean
 
 
-def arm_and_wish(mechanism, goal, posture, e, j):
-    """Return where an effector is and should be, seen from joint j, in the world's axes [m]."""
-    x = vector_at(mechanism.tips, e, ARM)
-    arm = seen_from(mechanism.joints, posture, j, mechanism.effectors[e, HANGS], x)
-    return arm, subtract(vector_at(goal, e, POSITION), vector_at(posture.positions, j))
+def effector_arms(mechanism, target, data, e, j):
+    """Return the vectors from joint j to an effector and to its target, in the world [m]."""
+    x = vector_at(mechanism.effectors["position"], e)
+    arm = arm_to(mechanism.joints, data, j, mechanism.effectors["joint"][e], x)
+    return arm, subtract(vector_at(target["position"], e), vector_at(data.positions, j))
 
 
-def joint_and_wish(mechanism, posture, room, c, j):
-    """Return where a joint below is and should be, seen from joint j, in the world's axes [m]."""
-    x, _ = joint_transform(mechanism.joints, c, posture.q)
-    arm = seen_from(mechanism.joints, posture, j, mechanism.joints.integers[c, PARENT], x)
-    return arm, subtract(vector_at(room.wishes, c), vector_at(posture.positions, j))
+def joint_arms(mechanism, data, backward, c, j):
+    """Return the vectors from joint j to one below and to its backward position [m]."""
+    x, _ = joint_transform(mechanism.joints, c, data.q)
+    arm = arm_to(mechanism.joints, data, j, mechanism.joints["parent"][c], x)
+    return arm, subtract(vector_at(backward["position"], c), vector_at(data.positions, j))
 
 
-def seen_from(joints, posture, j, k, x):
-    """Return a point of the frame of joint k, below j or j itself, seen from j, in world axes."""
+def arm_to(joints, data, j, k, x):
+    """Return the vector from joint j, in the world, to a point x of the frame of k, at or below j.
+
+    The coordinates from j down count, since what lies below has not been put in place yet.
+    """
     while k != j:
-        way, R = joint_transform(joints, k, posture.q)
-        x = add(way, rotate(R, x))
-        k = joints.integers[k, PARENT]
-    return rotate(quaternion_at(posture.rotations, j), x)
+        offset, R = joint_transform(joints, k, data.q)
+        x = add(offset, rotate(R, x))
+        k = joints["parent"][k]
+    return rotate(quaternion_at(data.rotations, j), x)
 
 
-def rotation_below(mechanism, posture, j, e):
+def rotation_below(mechanism, data, j, e):
     """Return the rotation of an effector as the coordinates from joint j down have it."""
-    R, k = quaternion_at(mechanism.tips, e, TURN), mechanism.effectors[e, HANGS]
+    R, k = quaternion_at(mechanism.effectors["rotation"], e), mechanism.effectors["joint"][e]
     while k != j:
-        _, R_joint = joint_transform(mechanism.joints, k, posture.q)
-        R, k = multiply(R_joint, R), mechanism.joints.integers[k, PARENT]
-    return multiply(quaternion_at(posture.rotations, j), R)
+        _, R_joint = joint_transform(mechanism.joints, k, data.q)
+        R, k = multiply(R_joint, R), mechanism.joints["parent"][k]
+    return multiply(quaternion_at(data.rotations, j), R)

@@ -1,8 +1,9 @@
 """What the Jacobian methods share: J J^T of a chain of ball joints, and a step along J^T z.
 
-With r_k the arm from joint k to the effector, a turn w_k of joint k moves the effector by w_k x
-r_k: J_k w = w x r_k and J_k^T z = r_k x z. For three coordinates J J^T is 3 x 3 however many
-joints there are: sum over k of |r_k|^2 1 - r_k r_k^T.
+With r_k the arm from joint k to the effector, a rotation w_k of joint k moves the effector by
+w_k x r_k: J_k w = w x r_k and J_k^T z = r_k x z. For three coordinates J J^T is 3 x 3 however many
+joints there are: sum over k of |r_k|^2 1 - r_k r_k^T. The general form (`task_jacobian.py`) makes
+the same iterations on a chain of ten balls, but a solve takes nine times as long.
 """
 
 from ..quaternion import (
@@ -26,10 +27,10 @@ ROUNDING = 1e-14
 def task_matrix(chain):
     """Return J J^T as its six entries xx, yy, zz, xy, xz, yz [m²]."""
     n = len(chain.lengths)
-    tip = vector_at(chain.positions, n)
+    effector = vector_at(chain.positions, n)
     xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(n):
-        x, y, z = subtract(tip, vector_at(chain.positions, k))
+        x, y, z = subtract(effector, vector_at(chain.positions, k))
         xx += y * y + z * z
         yy += x * x + z * z
         zz += x * x + y * y
@@ -42,7 +43,7 @@ def task_matrix(chain):
 def linearise(chain, target, beyond):
     """Return e, from the effector to the target [m], and J J^T, the chain bent first if need be.
 
-    Where every arm lies along e no turn brings the effector nearer at first order. A target
+    Where every arm lies along e no rotation brings the effector nearer at first order. A target
     further than so much beyond reach [m] is drawn that near, which leaves the nearest pose what it
     is: else steps swing about it, or are damped ever more the further off the target is.
     """
@@ -80,14 +81,14 @@ def solve_damped(A, damping, b):
     return b[0] / d0 - l10 * z1 - l20 * z2, z1, z2
 
 
-def turn_joints(chain, z):
-    """Turn every joint k by the rotation vector r_k x z, J^T z, seen in the world."""
+def rotate_joints(chain, z):
+    """Rotate every joint k by the rotation vector r_k x z, J^T z, in the world."""
     n = len(chain.lengths)
-    tip = vector_at(chain.positions, n)
+    effector = vector_at(chain.positions, n)
     above = IDENTITY
     for k in range(n):
-        turn = exponential(cross(subtract(tip, vector_at(chain.positions, k)), z))
-        above = multiply(above, turn)
+        Q = exponential(cross(subtract(effector, vector_at(chain.positions, k)), z))
+        above = multiply(above, Q)
         R = quaternion_at(chain.rotations, k)
         put_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
     place_joints(chain)

@@ -5,8 +5,8 @@ nearest point within reach; elsewhere they may swing about it.
 """
 
 from ..quaternion import dot, scale
-from .jacobian import linearise, times, turn_joints
-from .stacked import linearise_all, take_step, transposed_step
+from .box_step import linearise_task, take_step, transposed_step
+from .jacobian import linearise, rotate_joints, times
 
 # A target on an unlimited chain is drawn to within so much of its reach, over the reach. From
 # further off steps would swing; at reach itself they would take the longer the nearer they are.
@@ -14,7 +14,7 @@ BEYOND = 0.2
 
 
 def jacobian_transpose_sweep(chain, target):
-    """Turn all joints by a J^T e, a = <e, J J^T e> / |J J^T e|^2.
+    """Rotate all joints by a J^T e, a = <e, J J^T e> / |J J^T e|^2.
 
     The step length is the one that brings the effector nearest if it moved by a J J^T e in a
     straight line (Buss 2004).
@@ -22,11 +22,11 @@ def jacobian_transpose_sweep(chain, target):
     e, A = linearise(chain, target, BEYOND * chain.reach)
     move = times(A, e)
     if dot(move, move) > 0.0:
-        turn_joints(chain, scale(dot(e, move) / dot(move, move), e))
+        rotate_joints(chain, scale(dot(e, move) / dot(move, move), e))
 
 
-def jacobian_transpose_update(mechanism, goal, posture, room):
+def jacobian_transpose_update(mechanism, target, data, work):
     """Change the coordinates by a J' e with the same a, within their limits."""
-    linearise_all(mechanism, goal, posture, room.stack)
-    transposed_step(mechanism, posture, room.stack)
-    take_step(mechanism, posture, room.stack)
+    linearise_task(mechanism, target, data, work.system)
+    transposed_step(mechanism, data, work.system)
+    take_step(mechanism, data, work.system)

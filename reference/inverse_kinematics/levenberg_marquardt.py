@@ -8,8 +8,8 @@ for mu is a tenth of |e|^2, the factor of Chan & Lawrence 1988, which needs fewe
 """
 
 from ..quaternion import dot
-from .jacobian import ROUNDING, linearise, solve_damped, turn_joints
-from .stacked import damped_step, linearise_all, squared, take_step
+from .box_step import damped_step, linearise_task, squared, take_step
+from .jacobian import ROUNDING, linearise, rotate_joints, solve_damped
 
 # Of the squared error: for positions, and for positions and rotations.
 DAMPING, DAMPING_OF_POSES = 0.5, 0.1
@@ -18,18 +18,18 @@ BIAS = 1e-24
 
 
 def levenberg_marquardt_sweep(chain, target):
-    """Turn all joints by J^T (J J^T + mu 1)^-1 e, mu = 1/2 |e|^2 + bias."""
+    """Rotate all joints by J^T (J J^T + mu 1)^-1 e, mu = 1/2 |e|^2 + bias."""
     e, A = linearise(chain, target, 0.0)
     damping = DAMPING * dot(e, e) + BIAS * chain.reach * chain.reach
     damping += ROUNDING * (A[0] + A[1] + A[2])
-    turn_joints(chain, solve_damped(A, damping, e))
+    rotate_joints(chain, solve_damped(A, damping, e))
 
 
-def levenberg_marquardt_update(mechanism, goal, posture, room):
+def levenberg_marquardt_update(mechanism, target, data, work):
     """Change the coordinates by J' (J J' + mu 1)^-1 e, within their limits."""
-    linearise_all(mechanism, goal, posture, room.stack)
+    linearise_task(mechanism, target, data, work.system)
     positions = 3 * len(mechanism.effectors) == mechanism.equations
     share = DAMPING if positions else DAMPING_OF_POSES
-    damping = share * squared(room.stack.e) + BIAS * mechanism.reach * mechanism.reach
-    damped_step(mechanism, posture, room.stack, damping)
-    take_step(mechanism, posture, room.stack)
+    damping = share * squared(work.system.e) + BIAS * mechanism.reach * mechanism.reach
+    damped_step(mechanism, data, work.system, damping)
+    take_step(mechanism, data, work.system)

@@ -10,18 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import FloatArray, IndexArray
-from ..articulation import (
-    AXIS,
-    FRAME,
-    KIND,
-    LEADER,
-    OFFSET,
-    PARENT,
-    WIDTHS,
-    JointArrays,
-    articulated_pose,
-)
+from ..arguments import BoolArray, FloatArray, IndexArray, RecordArray
+from ..articulation import WIDTHS, articulated_pose
 from ..quaternion import (
     add,
     conjugate,
@@ -38,56 +28,63 @@ from ..quaternion import (
 )
 from .chain import ROUNDING
 
-# A wrong rotation counts as much as a wrong position of its angle times this part of the reach.
+# An angle between rotations counts as much as a distance of the angle times this part of the reach.
 LEVER = 0.5
-# Columns of Mechanism.effectors: the joint an effector hangs on, -1 if none moves it; where its
-# equations begin; 1 where its rotation matters, else 0; the first joint on the way to it, or -1;
-# the effector among the joints of the articulation.
-HANGS, ROW, ORIENTED, TOP, EFFECTOR = range(5)
-# Columns of Mechanism.tips: where the three of the arm and the four of the rotation in the frame of
-# that joint begin [m]; how far the effector can be from the first joint [m].
-ARM, TURN, REACH = 0, 3, 7
-# Columns of a goal, (effector, 8): where the three of the position [m] and the four of the rotation
-# begin, and the weight.
-POSITION, ROTATION, WEIGHT = 0, 3, 7
+# What the kernels read of each effector, a record an effector.
+EFFECTOR = np.dtype(
+    [
+        ("joint", np.int64),  # the joint it is attached to, -1 if none moves it
+        ("first", np.int64),  # the first joint on the path to it, or -1
+        ("source", np.int64),  # its index among the joints of the articulation
+        ("row", np.int64),  # where its equations begin
+        ("oriented", np.bool_),  # whether its rotation matters
+        ("position", np.float64, 3),  # in the frame of the joint it is attached to [m]
+        ("rotation", np.float64, 4),  # likewise
+        ("reach", np.float64),  # how far it can be from the first joint [m]
+    ],
+    align=True,
+)
+# What the kernels read of the target of an effector.
+TARGET = np.dtype(
+    [("position", np.float64, 3), ("rotation", np.float64, 4), ("weight", np.float64)], align=True
+)
 
 
 class Mechanism(NamedTuple):
-    """Joints, and effectors that hang on them; parents precede children.
+    """Joints, and effectors attached to them; parents precede children.
 
     Attributes:
-        joints: the joints that move, fixed ones merged; coordinates are the mechanism's own.
+        joints: those that move, fixed ones merged; coordinates are the mechanism's own, (joint,).
         sources: where a joint's coordinates begin among the articulation's, (joint,).
-        effectors: (effector, 5), see above.
-        tips: (effector, 8), see above.
-        bonds: first for each effector 1 where a joint moves it, 2 where no joint does between, else
-            0; then for each joint below 1 where a turn moves it and no joint does between, else 0;
-            on the diagonal 1 where others follow a joint, (joint, effector + joint).
-        reach: the longest way from root to effector, slides left out unless there is nothing else
-            [m].
+        effectors: (effector,).
+        moves: whether a joint moves an effector, (joint, effector).
+        adjacent: whether a joint moves a joint below it, or an effector, and no joint between them
+            does, (joint, joint + effector).
+        reach: the length of the longest path from the root to an effector, slides left out unless
+            there is nothing else [m].
         coordinates: how many.
         freedoms: how many.
         equations: how many in all.
     """
 
-    joints: JointArrays
+    joints: RecordArray
     sources: IndexArray
-    effectors: IndexArray
-    tips: FloatArray
-    bonds: IndexArray
+    effectors: RecordArray
+    moves: BoolArray
+    adjacent: BoolArray
     reach: float
     coordinates: int
     freedoms: int
     equations: int
 
 
-class Posture(NamedTuple):
-    """A mechanism's coordinates, and where they put it; effectors come behind the joints.
+class ConfigurationData(NamedTuple):
+    """A mechanism's coordinates with their forward kinematics; effectors come behind the joints.
 
     Attributes:
         q: (coordinate,).
-        positions: [m], (joint + effector, 3).
-        rotations: of the joints as moved, (joint + effector, 4).
+        positions: in the world [m], (joint + effector, 3).
+        rotations: in the world, (joint + effector, 4).
     """
 
     q: FloatArray
@@ -95,13 +92,15 @@ class Posture(NamedTuple):
     rotations: FloatArray
 
 
-def new_posture(mechanism):
-    """Return a posture to be filled."""
-    count = len(mechanism.joints.integers) + len(mechanism.effectors)
-    return Posture(np.empty(mechanism.coordinates), np.empty((count, 3)), np.empty((count, 4)))
+def new_data(mechanism):
+    """Return the data of a configuration, to be filled."""
+    count = len(mechanism.joints) + len(mechanism.effectors)
+    return ConfigurationData(
+        np.empty(mechanism.coordinates), np.empty((count, 3)), np.empty((count, 4))
+    )
 
 
-def take_coordinates(mechanism, q, own):
+def gather(mechanism, q, own):
     """Copy the mechanism's own coordinates out of the articulation's."""
     at = 0
     for j in range(len(mechanism.sources)):
@@ -110,7 +109,7 @@ def take_coordinates(mechanism, q, own):
             at += 1
 
 
-def give_coordinates(mechanism, own, q):
+def scatter(mechanism, own, q):
     """Copy the mechanism's own coordinates back among the articulation's."""
     at = 0
     for j in range(len(mechanism.sources)):
@@ -121,127 +120,99 @@ def give_coordinates(mechanism, own, q):
 
 def width(joints, j):
     """Return how many coordinates a joint has of its own."""
-    return WIDTHS[joints.integers[j, KIND]] if joints.integers[j, LEADER] == j else 0
+    return WIDTHS[joints["kind"][j]] if joints["leader"][j] == j else 0
 
 
-def moves(mechanism, j, e):
-    """Return whether a joint moves an effector."""
-    return mechanism.bonds[j, e] > 0
-
-
-def sees_tip(mechanism, j, e):
-    """Return whether a joint moves an effector and no joint does between."""
-    return mechanism.bonds[j, e] == 2
-
-
-def sees(mechanism, j, c):
-    """Return whether a turn of a joint moves one below and no joint does between."""
-    return mechanism.bonds[j, len(mechanism.effectors) + c] > 0
-
-
-def is_followed(mechanism, j):
-    """Return whether mimic joints move with a joint."""
-    return mechanism.bonds[j, len(mechanism.effectors) + j] > 0
-
-
-def place(mechanism, posture):
+def update_forward_kinematics(mechanism, data):
     """Compute where the coordinates put the joints and the effectors."""
-    articulated_pose(mechanism.joints, posture.q, posture.positions, posture.rotations)
-    for e in range(len(mechanism.effectors)):
-        x, R = vector_at(mechanism.tips, e, ARM), quaternion_at(mechanism.tips, e, TURN)
-        j = mechanism.effectors[e, HANGS]
+    articulated_pose(mechanism.joints, data.q, data.positions, data.rotations)
+    effectors = mechanism.effectors
+    for e in range(len(effectors)):
+        x, R = vector_at(effectors["position"], e), quaternion_at(effectors["rotation"], e)
+        j = effectors["joint"][e]
         if j >= 0:
-            R_joint = quaternion_at(posture.rotations, j)
-            x = add(vector_at(posture.positions, j), rotate(R_joint, x))
+            R_joint = quaternion_at(data.rotations, j)
+            x = add(vector_at(data.positions, j), rotate(R_joint, x))
             R = multiply(R_joint, R)
-        put_tip(mechanism, posture, e, x, R)
+        put_effector(mechanism, data, e, x, R)
 
 
-def tip(mechanism, posture, e):
-    """Return the position of an effector."""
-    return vector_at(posture.positions, len(mechanism.joints.integers) + e)
+def effector_position(mechanism, data, e):
+    """Return the position of an effector in the world [m]."""
+    return vector_at(data.positions, len(mechanism.joints) + e)
 
 
-def tip_rotation(mechanism, posture, e):
-    """Return the rotation of an effector."""
-    return quaternion_at(posture.rotations, len(mechanism.joints.integers) + e)
+def effector_rotation(mechanism, data, e):
+    """Return the rotation of an effector in the world."""
+    return quaternion_at(data.rotations, len(mechanism.joints) + e)
 
 
-def put_tip(mechanism, posture, e, x, R):
-    """Write an effector's position and rotation."""
-    put_vector(posture.positions, len(mechanism.joints.integers) + e, x)
-    put_quaternion(posture.rotations, len(mechanism.joints.integers) + e, R)
+def put_effector(mechanism, data, e, x, R):
+    """Write an effector's position and rotation in the world."""
+    put_vector(data.positions, len(mechanism.joints) + e, x)
+    put_quaternion(data.rotations, len(mechanism.joints) + e, R)
 
 
-def axis_of(joints, j, R):
-    """Return a joint's axis in the world, R its rotation there."""
-    return rotate(R, vector_at(joints.numbers, j, AXIS))
+def position_error(mechanism, target, data, e):
+    """Return the vector from an effector to its target [m]."""
+    return subtract(vector_at(target["position"], e), effector_position(mechanism, data, e))
 
 
-def frame_of(joints, j, posture):
-    """Return the rotation of a joint's unmoved frame in the world."""
-    frame = quaternion_at(joints.numbers, j, FRAME)
-    if joints.integers[j, PARENT] < 0:
-        return frame
-    return multiply(quaternion_at(posture.rotations, joints.integers[j, PARENT]), frame)
+def rotation_error(mechanism, target, data, e):
+    """Return the rotation in the world that takes an effector's rotation to its target's."""
+    R = effector_rotation(mechanism, data, e)
+    return multiply(quaternion_at(target["rotation"], e), conjugate(R))
 
 
-def position_error(mechanism, goal, posture, e):
-    """Return the way from an effector to its target [m]."""
-    return subtract(vector_at(goal, e, POSITION), tip(mechanism, posture, e))
+def rotation_weight(mechanism):
+    """Return the weight of half the squared distance of two rotation matrices, lever²/2 [m²].
 
-
-def wrong_turn(mechanism, goal, posture, e):
-    """Return the rotation in the world that turns an effector into its target."""
-    R = tip_rotation(mechanism, posture, e)
-    return multiply(quaternion_at(goal, e, ROTATION), conjugate(R))
-
-
-def turn_weight(mechanism):
-    """Return what half the squared distance of two rotation matrices counts beside 1 m²: lever²/2.
-
-    For a small angle it is the square of the angle, 3 - tr R in general.
+    That is 3 - tr R for the rotation R between them, the square of the angle where it is small.
     """
     lever = LEVER * mechanism.reach
     return 0.5 * lever * lever
 
 
-def misfit(mechanism, goal, posture):
-    """Return what CCD makes smaller [m²]: weighted squared distances, and lever² (3 - tr R*' R)."""
+def cost(mechanism, target, data):
+    """Return what CCD lowers [m²]: the weighted sum of |error|² and of lever² (3 - tr R)."""
     total = 0.0
     for e in range(len(mechanism.effectors)):
-        way = position_error(mechanism, goal, posture, e)
-        total += goal[e, WEIGHT] * dot(way, way)
-        if mechanism.effectors[e, ORIENTED]:
-            w, _, _, _ = wrong_turn(mechanism, goal, posture, e)
-            total += goal[e, WEIGHT] * turn_weight(mechanism) * 8.0 * (1.0 - w * w)
+        error = position_error(mechanism, target, data, e)
+        total += target["weight"][e] * dot(error, error)
+        if mechanism.effectors["oriented"][e]:
+            w, _, _, _ = rotation_error(mechanism, target, data, e)
+            total += target["weight"][e] * rotation_weight(mechanism) * 8.0 * (1.0 - w * w)
     return total
 
 
-def residuals(mechanism, goal, posture):
-    """Return the largest distance [m] and angle [rad] from effector to target, and all in one [m].
+def errors(mechanism, target, data, e):
+    """Return the distance [m] and the angle [rad] from an effector to its target."""
+    distance = norm(position_error(mechanism, target, data, e))
+    if not mechanism.effectors["oriented"][e]:
+        return distance, 0.0
+    return distance, norm(logarithm(rotation_error(mechanism, target, data, e)))
 
-    The last is the sum of all distances, and of all angles times the lever: it shows the progress
-    of one effector while another, further from its target, stays.
+
+def residuals(mechanism, target, data):
+    """Return the largest distance [m] and angle [rad] from effector to target, and their sum [m].
+
+    The sum is of all distances, and of all angles times the lever: it shows the progress of one
+    effector while another, further from its target, stays.
     """
-    distance, angle, total = 0.0, 0.0, 0.0
+    largest, angle, total = 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
-        way = norm(position_error(mechanism, goal, posture, e))
-        distance, total = max(distance, way), total + way
-        if mechanism.effectors[e, ORIENTED]:
-            turn = norm(logarithm(wrong_turn(mechanism, goal, posture, e)))
-            angle, total = max(angle, turn), total + LEVER * mechanism.reach * turn
-    return distance, angle, total
+        apart, off = errors(mechanism, target, data, e)
+        largest, angle = max(largest, apart), max(angle, off)
+        total = total + apart + LEVER * mechanism.reach * off
+    return largest, angle, total
 
 
-def merit_of(mechanism, goal, posture):
+def merit_of(mechanism, target, data):
     """Return the root of the sum of weighted squares of distances and of lever times angles [m]."""
     total = 0.0
     for e in range(len(mechanism.effectors)):
-        way, angle = position_error(mechanism, goal, posture, e), 0.0
-        if mechanism.effectors[e, ORIENTED]:
-            angle = norm(logarithm(wrong_turn(mechanism, goal, posture, e)))
-        total += weighted_square(mechanism, goal[e, WEIGHT], norm(way), angle)
+        apart, off = errors(mechanism, target, data, e)
+        total += weighted_square(mechanism, target["weight"][e], apart, off)
     return math.sqrt(total)
 
 
@@ -251,23 +222,19 @@ def weighted_square(mechanism, weight, distance, angle):
     return weight * (distance * distance + lever * lever * angle * angle)
 
 
-def too_far(mechanism, goal, margin):
-    """Return whether a target is further than its effector can ever be, by a margin [m]."""
-    return least_residual(mechanism, goal) > margin
-
-
-def least_residual(mechanism, goal):
-    """Return what the largest distance from effector to target is at least, in any pose [m].
+def least_residual(mechanism, target):
+    """Return a lower bound of the largest distance from effector to target over all poses [m].
 
     Links and the travel of slides reach no further than their sum. Distances and sums of lengths
     are known to a few roundings for each joint.
     """
-    share, least = ROUNDING * (1 + len(mechanism.joints.integers)), 0.0
-    for e in range(len(mechanism.effectors)):
-        start, top = vector_at(mechanism.tips, e, ARM), mechanism.effectors[e, TOP]
-        if top >= 0:
-            start = vector_at(mechanism.joints.numbers, top, OFFSET)
-        target, reach = vector_at(goal, e, POSITION), mechanism.tips[e, REACH]
-        rounding = share * (reach + norm(start) + norm(target))
-        least = max(least, norm(subtract(target, start)) - reach - rounding)
+    effectors = mechanism.effectors
+    share, least = ROUNDING * (1 + len(mechanism.joints)), 0.0
+    for e in range(len(effectors)):
+        start, first = vector_at(effectors["position"], e), effectors["first"][e]
+        if first >= 0:
+            start = vector_at(mechanism.joints["offset"], first)
+        wanted, reach = vector_at(target["position"], e), effectors["reach"][e]
+        rounding = share * (reach + norm(start) + norm(wanted))
+        least = max(least, norm(subtract(wanted, start)) - reach - rounding)
     return least

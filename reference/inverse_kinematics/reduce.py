@@ -4,33 +4,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import FloatArray, IndexArray
+from ..arguments import BoolArray, FloatArray, IndexArray, RecordArray
 from ..articulation import (
-    AT,
-    AXIS,
     FIXED,
-    FRAME,
     FREE,
-    FREEDOM,
     FREEDOMS,
     HINGE,
-    KIND,
-    LEADER,
-    LOWER,
-    MULTIPLIER,
-    OFFSET,
-    PARENT,
-    SHIFT,
     SLIDE,
-    TURNED,
-    UPPER,
-    WIDTHS,
     Articulation,
-    JointArrays,
     half_turned,
+    number_coordinates,
 )
 from ..quaternion import IDENTITY, add, multiply, quaternion_at, rotate, vector_at
-from .mechanism import Mechanism
+from .mechanism import EFFECTOR, Mechanism
 
 # Points are in one spot if they are no further apart than this, over the reach.
 SPOT = 1e-9
@@ -72,7 +58,7 @@ def prepare(
             tips = np.concatenate([x, R], axis=-1)[:, list(effectors)]
         articulation.mechanisms[key] = Prepared(
             mechanism, np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(tips),
-            (*articulation.arrays, *mechanism.joints, *mechanism[1:]),
+            (articulation.joints, *mechanism),
         )  # fmt: skip
     return articulation.mechanisms[key]
 
@@ -87,152 +73,144 @@ def _random_poses(articulation: Articulation, count: int, seed: int) -> FloatArr
 def _prepared(
     articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
 ) -> tuple[Mechanism, IndexArray]:
-    whole = articulation.arrays
+    """Return the mechanism that moves some effectors, and which columns of q are its own."""
+    whole = articulation.joints
     active = _active(articulation, effectors, oriented)
     number = {int(j): k for k, j in enumerate(active)}
     joints, columns = _moving_joints(whole, active, number)
-    hanging = [_hanging(whole, j, number) for j in effectors]
-    hangs = np.array([k for k, _, _ in hanging], dtype=np.int64)
-    arms = np.array([x for _, x, _ in hanging])
-    moves = _moves(joints, hangs)
-    ways = _ways(joints, moves, hangs, arms)
-    furthest = ways + np.where(moves, _travel(joints)[:, None], 0.0).sum(axis=0)
-    most = furthest.max(where=np.isfinite(furthest), initial=0.0)
-    reach = float(ways.max() or most or 1.0)
-    sizes = np.where(oriented, 6, 3)
-    tops = [np.flatnonzero(column)[0] if column.any() else -1 for column in moves.T]
-    sees, sees_tip = _sight(joints, hangs, reach)
-    rows = np.cumsum(sizes) - sizes
+    ends = _attached(whole, effectors, oriented, number)
+    moves = _moves(joints, ends)
+    ends["first"] = np.where(moves.any(axis=0), moves.argmax(axis=0), -1) if len(joints) else -1
+    lengths = _path_lengths(joints, moves, ends)
+    travel = np.where(moves, _travel(joints)[:, None], 0.0).sum(axis=0)
+    ends["reach"] = lengths + travel
+    most = ends["reach"].max(where=np.isfinite(ends["reach"]), initial=0.0)
+    reach = float(lengths.max() or most or 1.0)
     mechanism = Mechanism(
-        joints,
-        whole.integers[active, AT].copy(),
-        np.column_stack([hangs, rows, oriented, tops, effectors]).astype(np.int64),
-        np.column_stack([arms, [R for _, _, R in hanging], furthest]),
-        np.hstack([moves + sees_tip, sees]),
-        reach,
-        len(columns),
-        _freedoms(joints),
-        int(sizes.sum()),
-    )
+        joints, whole["coordinate"][active].copy(), ends, moves, _adjacent(joints, ends, reach),
+        reach, len(columns), _freedoms(joints), int(np.where(oriented, 6, 3).sum()),
+    )  # fmt: skip
     return mechanism, columns
 
 
 def _active(
     articulation: Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...]
 ) -> IndexArray:
-    """Return the joints that move on the ways to the effectors, and those that they follow.
+    """Return the joints that move on the paths to the effectors, and those that they follow.
 
     An effector's own ball or hinge turns it, but does not move it.
     """
-    path, kinds = articulation.skeleton.path_array, articulation.arrays.integers[:, KIND]
+    path, kinds = articulation.skeleton.path_array, articulation.joints["kind"]
     needed: set[int] = set()
     for joint, turned in zip(effectors, oriented, strict=True):
         moving = turned or kinds[joint] in (SLIDE, FREE)
         needed.update(path(joint).tolist() if moving else path(joint).tolist()[:-1])
-    needed.update(articulation.arrays.integers[sorted(needed), LEADER].tolist())
+    needed.update(articulation.joints["leader"][sorted(needed)].tolist())
     return np.array([j for j in sorted(needed) if kinds[j] != FIXED], dtype=np.int64)
 
 
-def _merged(whole: JointArrays, joint: int, number: dict[int, int]):
+def _merged(whole: RecordArray, joint: int, number: dict[int, int]):
     """Return the nearest moving joint above, and this joint's frame in the frame of that one."""
-    x, R = vector_at(whole.numbers, joint, OFFSET), quaternion_at(whole.numbers, joint, FRAME)
-    j = int(whole.integers[joint, PARENT])
+    x, R = vector_at(whole["offset"], joint), quaternion_at(whole["frame"], joint)
+    j = int(whole["parent"][joint])
     while j >= 0 and j not in number:
-        frame = quaternion_at(whole.numbers, j, FRAME)
-        x = add(vector_at(whole.numbers, j, OFFSET), rotate(frame, x))
+        frame = quaternion_at(whole["frame"], j)
+        x = add(vector_at(whole["offset"], j), rotate(frame, x))
         R = multiply(frame, R)
-        j = int(whole.integers[j, PARENT])
+        j = int(whole["parent"][j])
     return number.get(j, -1), x, R
 
 
-def _hanging(whole: JointArrays, joint: int, number: dict[int, int]):
-    """Return the moving joint an effector hangs on, and its place in the frame of that one."""
-    if joint in number:
-        return number[joint], (0.0, 0.0, 0.0), IDENTITY
-    return _merged(whole, joint, number)
+def _attached(
+    whole: RecordArray,
+    effectors: tuple[int, ...],
+    oriented: tuple[bool, ...],
+    number: dict[int, int],
+) -> RecordArray:
+    """Return the effectors, each with the moving joint it is attached to and its place there."""
+    ends = np.zeros(len(effectors), EFFECTOR)
+    ends["source"], ends["oriented"] = effectors, oriented
+    sizes = np.where(oriented, 6, 3)
+    ends["row"] = np.cumsum(sizes) - sizes
+    for e, joint in enumerate(effectors):
+        own = (number.get(joint, -1), (0.0, 0.0, 0.0), IDENTITY)
+        found = own if joint in number else _merged(whole, joint, number)
+        ends["joint"][e], ends["position"][e], ends["rotation"][e] = found
+    return ends
 
 
 def _moving_joints(
-    whole: JointArrays, active: IndexArray, number: dict[int, int]
-) -> tuple[JointArrays, IndexArray]:
+    whole: RecordArray, active: IndexArray, number: dict[int, int]
+) -> tuple[RecordArray, IndexArray]:
     """Return the joints of the mechanism, and the columns of q that are theirs."""
-    leaders = np.array([number[int(i)] for i in whole.integers[active, LEADER]], dtype=np.int64)
-    own = leaders == np.arange(len(active))
-    kinds, at = whole.integers[active, KIND], whole.integers[active, AT]
-    widths, freedoms = np.where(own, WIDTHS[kinds], 0), np.where(own, FREEDOMS[kinds], 0)
-    integers, numbers = whole.integers[active], whole.numbers[active]
-    integers[:, AT] = (np.cumsum(widths) - widths)[leaders]
-    integers[:, FREEDOM] = (np.cumsum(freedoms) - freedoms)[leaders]
-    integers[:, LEADER] = leaders
+    joints, at = whole[active], whole["coordinate"][active]
+    joints["leader"] = [number[int(j)] for j in joints["leader"]]
+    followers = joints["leader"] != np.arange(len(joints))
+    joints["followed"] = False
+    joints["followed"][joints["leader"][followers]] = True
+    widths = number_coordinates(joints)
     for k, j in enumerate(active):
-        integers[k, PARENT], x, R = _merged(whole, int(j), number)
-        numbers[k, OFFSET : OFFSET + 3], numbers[k, FRAME : FRAME + 4] = x, R
-    frames, axes = numbers[:, FRAME : FRAME + 4], numbers[:, AXIS : AXIS + 3]
-    numbers[:, TURNED : TURNED + 4] = half_turned(frames, axes)
+        joints["parent"][k], joints["offset"][k], joints["frame"][k] = _merged(whole, j, number)
+    joints["turned"] = half_turned(joints)
     columns = [np.arange(a, a + w) for a, w in zip(at, widths, strict=True)]
-    return JointArrays(integers, numbers), np.concatenate([*columns, np.empty(0, dtype=np.int64)])
+    return joints, np.concatenate([*columns, np.empty(0, dtype=np.int64)])
 
 
-def _moves(joints: JointArrays, hangs: IndexArray) -> IndexArray:
-    moves = np.zeros((len(joints.integers), len(hangs)), dtype=np.int64)
-    for e, j in enumerate(hangs):
+def _moves(joints: RecordArray, ends: RecordArray) -> BoolArray:
+    moves = np.zeros((len(joints), len(ends)), dtype=bool)
+    for e, j in enumerate(ends["joint"]):
         while j >= 0:
-            moves[j, e] = 1
-            j = joints.integers[j, PARENT]
+            moves[j, e] = True
+            j = joints["parent"][j]
     return moves
 
 
-def _ways(
-    joints: JointArrays, moves: IndexArray, hangs: IndexArray, arms: FloatArray
-) -> FloatArray:
+def _path_lengths(joints: RecordArray, moves: BoolArray, ends: RecordArray) -> FloatArray:
     """Return the length of the links from the first joint to each effector [m], (effector,)."""
-    lengths = np.linalg.norm(joints.numbers[:, OFFSET : OFFSET + 3], axis=1)
-    lengths[joints.integers[:, PARENT] < 0] = 0.0
-    return moves.T @ lengths + np.where(hangs >= 0, np.linalg.norm(arms, axis=1), 0.0)
+    lengths = np.linalg.norm(joints["offset"], axis=1)
+    lengths[joints["parent"] < 0] = 0.0
+    last = np.where(ends["joint"] >= 0, np.linalg.norm(ends["position"], axis=1), 0.0)
+    return moves.astype(np.int64).T @ lengths + last
 
 
-def _sight(joints: JointArrays, hangs: IndexArray, reach: float) -> tuple[IndexArray, IndexArray]:
-    """Return `sees` and 1 where a joint sees an effector: the nearest that its turn can move.
+def _adjacent(joints: RecordArray, ends: RecordArray, reach: float) -> BoolArray:
+    """Return which joints and effectors each joint is the last above them to move.
 
     A point on a hinge's axis or in a ball's centre stays, so that the next ones down are looked at.
     """
-    parents, leaders = joints.integers[:, PARENT], joints.integers[:, LEADER]
-    count = len(parents)
-    sees = np.zeros((count, count), dtype=np.int64)
-    sees_tip = np.zeros((count, len(hangs)), dtype=np.int64)
+    count = len(joints)
+    adjacent = np.zeros((count, count + len(ends)), dtype=bool)
     for j in range(count):
-        still = {j}
+        fixed = {j}
         for c in range(j + 1, count):
-            if parents[c] in still:
+            if joints["parent"][c] in fixed:
                 if _stays(joints, j, c, SPOT * reach):
-                    still.add(c)
+                    fixed.add(c)
                 else:
-                    sees[j, c] = 1
-        sees_tip[j] = np.isin(hangs, list(still))
-        sees[j, j] = np.count_nonzero(leaders == j) > (leaders[j] == j)
-    return sees, sees_tip
+                    adjacent[j, c] = True
+        adjacent[j, count:] = np.isin(ends["joint"], list(fixed))
+    return adjacent
 
 
-def _stays(joints: JointArrays, j: int, c: int, margin: float) -> bool:
+def _stays(joints: RecordArray, j: int, c: int, margin: float) -> bool:
     """Return whether turning joint j leaves joint c in place, if it does so with c's parent."""
-    offset = joints.numbers[c, OFFSET : OFFSET + 3]
-    if joints.integers[c, KIND] in (SLIDE, FREE):
+    offset = joints["offset"][c]
+    if joints["kind"][c] in (SLIDE, FREE):
         return False
-    if joints.integers[c, PARENT] == j and joints.integers[j, KIND] == HINGE:
-        offset = np.cross(joints.numbers[j, AXIS : AXIS + 3], offset)
+    if joints["parent"][c] == j and joints["kind"][j] == HINGE:
+        offset = np.cross(joints["axis"][j], offset)
     return bool(np.linalg.norm(offset) <= margin)
 
 
-def _travel(joints: JointArrays) -> FloatArray:
+def _travel(joints: RecordArray) -> FloatArray:
     """Return how far each joint can carry things by itself [m], (joint,)."""
-    kinds, leaders = joints.integers[:, KIND], joints.integers[:, LEADER]
-    ends = np.abs(joints.numbers[leaders][:, [LOWER, UPPER]]).max(axis=1, initial=0.0)
-    factors = np.abs(joints.numbers[:, MULTIPLIER])
+    kinds, leaders, factors = joints["kind"], joints["leader"], np.abs(joints["multiplier"])
+    ends = np.maximum(np.abs(joints["lower"]), np.abs(joints["upper"]))[leaders]
     with np.errstate(invalid="ignore"):  # 0 times infinity: a follower that does not move
-        ways = np.where(factors > 0.0, factors * ends, 0.0) + np.abs(joints.numbers[:, SHIFT])
-    return np.where(kinds == SLIDE, ways, np.where(kinds == FREE, np.inf, 0.0))
+        travel = np.where(factors > 0.0, factors * ends, 0.0) + np.abs(joints["shift"])
+    return np.where(kinds == SLIDE, travel, np.where(kinds == FREE, np.inf, 0.0))
 
 
-def _freedoms(joints: JointArrays) -> int:
-    own = joints.integers[:, LEADER] == np.arange(len(joints.integers))
-    return int(FREEDOMS[joints.integers[own, KIND]].sum())
+def _freedoms(joints: RecordArray) -> int:
+    own = joints["leader"] == np.arange(len(joints))
+    return int(FREEDOMS[joints["kind"][own]].sum())

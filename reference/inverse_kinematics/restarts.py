@@ -5,14 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import LARGEST_COORDINATE, FloatArray
+from ..arguments import LARGEST_COORDINATE, FloatArray, RecordArray
 from ..articulation import (
     BALL,
     FREE,
     HINGE,
-    KIND,
-    LEADER,
-    JointArrays,
     articulated_pose,
     clamp_joint,
     fit_start,
@@ -40,27 +37,23 @@ from .batch import (
     RESIDUAL_ROTATION,
     put_if_room,
 )
+from .box_step import TaskSystem, new_task_system
 from .chain import BEND, ROUNDING
+from .fabrik import BACKWARD
 from .joint_updates import ball_at, move_by, put_ball
 from .levenberg_marquardt import levenberg_marquardt_update as update  # bound to each solver's
 from .mechanism import (
-    EFFECTOR,
     LEVER,
-    ORIENTED,
-    POSITION,
-    ROTATION,
-    WEIGHT,
     Mechanism,
-    give_coordinates,
+    gather,
     least_residual,
     merit_of,
-    new_posture,
-    place,
+    new_data,
     residuals,
-    take_coordinates,
+    scatter,
+    update_forward_kinematics,
     weighted_square,
 )
-from .stacked import Stack, new_stack
 
 # An attempt that others may follow is given up once this many iterations have not brought it this
 # much nearer. If none of the others reaches the target either it goes on, so many times as patient
@@ -88,16 +81,16 @@ class Room(NamedTuple):
     """Room for a solver.
 
     Attributes:
-        stack: of the Jacobian methods.
-        wishes: where FABRIK wishes joints to be [m], and by what weight, (joint, 4).
+        system: of the Jacobian methods.
+        backward: FABRIK's backward positions, records BACKWARD, (joint,).
         eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
         q: coordinates of the mechanism where each attempt is, the first from the start,
             and in the last row the best end of one, (1 + restart + 1, coordinate).
         progress: of each attempt and of all, see above, (1 + restart + 1, 6).
     """
 
-    stack: Stack
-    wishes: FloatArray
+    system: TaskSystem
+    backward: RecordArray
     eigen: FloatArray
     q: FloatArray
     progress: FloatArray
@@ -107,7 +100,7 @@ class Request(NamedTuple):
     """What is asked.
 
     Attributes:
-        goals: where the effectors shall be, (target, effector, 8), see `mechanism.py`.
+        goals: of the effectors, records TARGET, (target, effector).
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that does [rad].
         max_iterations: of each attempt.
@@ -146,22 +139,20 @@ class Answers(NamedTuple):
 
 
 def answer_given(
-    integers, numbers, own_integers, own_numbers, sources, effectors, tips, bonds, reach,
-    coordinates, freedoms, equations, starts, goals, tolerance, tolerance_rotation,
-    max_iterations, far_iterations, restarts, restart_tips, chained, q, local, positions, figures,
-    history,
+    joints, own_joints, sources, effectors, moves, adjacent, reach, coordinates, freedoms,
+    equations, starts, goals, tolerance, tolerance_rotation, max_iterations, far_iterations,
+    restarts, restart_tips, chained, q, local, positions, figures, history,
 ):  # fmt: skip
     """Do what `answer_batch` does, called from Python: single arrays come in faster than tuples."""
-    own = JointArrays(own_integers, own_numbers)
     mechanism = Mechanism(
-        own, sources, effectors, tips, bonds, reach, coordinates, freedoms, equations
+        own_joints, sources, effectors, moves, adjacent, reach, coordinates, freedoms, equations
     )
     request = Request(
         goals, tolerance, tolerance_rotation, max_iterations, far_iterations, restarts,
         restart_tips, chained,
     )  # fmt: skip
     answers = Answers(q, local, positions, figures, history)
-    return answer_batch(JointArrays(integers, numbers), mechanism, starts, request, answers)
+    return answer_batch(joints, mechanism, starts, request, answers)
 
 
 def answer_batch(joints, mechanism, starts, request, answers):
@@ -169,7 +160,7 @@ def answer_batch(joints, mechanism, starts, request, answers):
 
     `starts`, (start, coordinate), are used in turn.
     """
-    posture, rotations = new_posture(mechanism), np.empty((len(joints.integers), 4))
+    data, rotations = new_data(mechanism), np.empty((len(joints), 4))
     room = new_room(mechanism, len(request.restarts))
     for i in range(len(request.goals)):
         q, goal = answers.q[i], request.goals[i]
@@ -177,13 +168,13 @@ def answer_batch(joints, mechanism, starts, request, answers):
         copy_row(answers.q[i - 1] if chained else starts[i % len(starts)], q)
         if not (fit_start(joints, q) and fit_goal(goal)):
             return False
-        take_coordinates(mechanism, q, posture.q)
+        gather(mechanism, q, data.q)
         history = answers.history[i % len(answers.history)]
         least = least_residual(mechanism, goal)
-        iterations, settled = attempts(mechanism, goal, posture, room, request, history, least)
-        give_coordinates(mechanism, room.q[-1], q)
+        iterations, settled = attempts(mechanism, goal, data, room, request, history, least)
+        scatter(mechanism, room.q[-1], q)
         articulated_pose(joints, q, answers.positions[i], rotations)
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             _, Q = joint_transform(joints, j, q)
             put_quaternion(answers.local[i], j, Q)
         answers.figures[i, ITERATIONS] = iterations
@@ -195,25 +186,25 @@ def fit_goal(goal):
     """Make the rotations of a goal unit; return whether they and all other numbers were fit."""
     fine = True
     for e in range(len(goal)):
-        for k in range(ROTATION):
-            fine &= abs(goal[e, k]) <= LARGEST_COORDINATE
-        Q, unit = made_unit(quaternion_at(goal, e, ROTATION))
-        goal[e, ROTATION], goal[e, ROTATION + 1], goal[e, ROTATION + 2], goal[e, ROTATION + 3] = Q
+        for k in range(3):
+            fine &= abs(goal["position"][e, k]) <= LARGEST_COORDINATE
+        Q, unit = made_unit(quaternion_at(goal["rotation"], e))
+        put_quaternion(goal["rotation"], e, Q)
         fine &= unit
     return fine
 
 
 def new_room(mechanism, restarts):
     """Return room for a solver of a mechanism."""
-    n = len(mechanism.joints.integers)
+    n = len(mechanism.joints)
     return Room(
-        new_stack(mechanism), np.empty((n, 4)), np.empty((2, 4, 4)),
+        new_task_system(mechanism), np.empty(n, BACKWARD), np.empty((2, 4, 4)),
         np.empty((restarts + 2, mechanism.coordinates)), np.empty((restarts + 2, 6)),
     )  # fmt: skip
 
 
-def attempts(mechanism, goal, posture, room, request, history, least):
-    """Attempt from the posture, then from the restarts, until one reaches the goal.
+def attempts(mechanism, goal, data, room, request, history, least):
+    """Attempt from the data, then from the restarts, until one reaches the goal.
 
     While others may follow an attempt is given up early. If none reaches the goal, all are
     finished, and the first makes as many iterations as all of them may: its ends after one
@@ -226,23 +217,23 @@ def attempts(mechanism, goal, posture, room, request, history, least):
     Returns:
         The iterations of all attempts, and whether the best one settled.
     """
-    start_attempts(mechanism, posture, room)
+    start_attempts(mechanism, data, room)
     count = request.far_iterations if least > request.tolerance else request.max_iterations
-    single = len(goal) == 1 and not mechanism.effectors[0, ORIENTED]
+    single = len(goal) == 1 and not mechanism.effectors["oriented"][0]
     nearest = least if single else 0.0
     done, k, limit = 0, 0, count
     while k >= 0:
-        place(mechanism, posture)
-        done += attempt(mechanism, goal, posture, room, request, history, done, k, limit, nearest)
-        keep_better(mechanism, goal, posture, room, k)
-        k, limit = next_attempt(mechanism, goal, posture, room, request, k, count, limit)
+        update_forward_kinematics(mechanism, data)
+        done += attempt(mechanism, goal, data, room, request, history, done, k, limit, nearest)
+        keep_better(mechanism, goal, data, room, k)
+        k, limit = next_attempt(mechanism, goal, data, room, request, k, count, limit)
     return done, room.progress[-1, BEST_STATE] <= SETTLED
 
 
-def start_attempts(mechanism, posture, room):
+def start_attempts(mechanism, data, room):
     """Bring the start within its limits, and note that no attempt has been made."""
-    for joint in range(len(mechanism.joints.integers)):
-        clamp_joint(mechanism.joints, joint, posture.q)
+    for joint in range(len(mechanism.joints)):
+        clamp_joint(mechanism.joints, joint, data.q)
     plan, several = room.progress[-1], len(room.progress) > 2
     plan[BEST_COST], plan[BEST_STATE], plan[TAKEN], plan[PERIODS] = INFINITY, LIMITED, 0.0, 1.0
     for k in range(len(room.progress) - 1):
@@ -251,8 +242,8 @@ def start_attempts(mechanism, posture, room):
         row[WAIT] = PATIENCE if several else INFINITY
 
 
-def next_attempt(mechanism, goal, posture, room, request, k, count, limit):
-    """Give the posture the coordinates from which an attempt goes on, after one of k.
+def next_attempt(mechanism, goal, data, room, request, k, count, limit):
+    """Give the data the coordinates from which an attempt goes on, after one of k.
 
     Returns:
         Which attempt, -1 if none, and how many iterations it may have made in the end.
@@ -261,13 +252,13 @@ def next_attempt(mechanism, goal, posture, room, request, k, count, limit):
     if plan[BEST_STATE] == REACHED:
         return -1, limit
     if k == 0 and is_stuck(mechanism, first):
-        nudge(mechanism, posture)
+        nudge(mechanism, data)
         first[BENT] = 1.0
         return 0, limit
     if plan[TAKEN] < more:
         if plan[TAKEN] == 0.0:
             rank_restarts(mechanism, goal, request, room)
-        take_nearest(request, room, posture.q)
+        take_nearest(request, room, data.q)
         plan[TAKEN] += 1.0
         return int(plan[TAKEN]), count
     again = most_promising(room)
@@ -275,7 +266,7 @@ def next_attempt(mechanism, goal, posture, room, request, k, count, limit):
         again = 0
         plan[PERIODS] += 1.0
     if again >= 0:
-        copy_row(room.q[again], posture.q)
+        copy_row(room.q[again], data.q)
     return again, int(plan[PERIODS]) * count
 
 
@@ -300,16 +291,16 @@ def most_promising(room):
     return found
 
 
-def keep_better(mechanism, goal, posture, room, k):
+def keep_better(mechanism, goal, data, room, k):
     """Note where an attempt is, and keep it if it is finished and the best so far."""
-    row, plan, cost = room.progress[k], room.progress[-1], merit_of(mechanism, goal, posture)
+    row, plan, cost = room.progress[k], room.progress[-1], merit_of(mechanism, goal, data)
     row[COST] = cost
-    copy_row(posture.q, room.q[k])
+    copy_row(data.q, room.q[k])
     if row[STATE] == GIVEN_UP:
         row[WAIT] *= MORE_PATIENT
     elif row[STATE] == REACHED or cost < plan[BEST_COST]:
         plan[BEST_COST], plan[BEST_STATE] = cost, row[STATE]
-        copy_row(posture.q, room.q[-1])
+        copy_row(data.q, room.q[-1])
 
 
 def rank_restarts(mechanism, goal, request, room):
@@ -318,10 +309,10 @@ def rank_restarts(mechanism, goal, request, room):
     for r in range(len(request.restarts)):
         distance, angle = 0.0, 0.0
         for e in range(len(goal)):
-            way = subtract(vector_at(goal, e, POSITION), vector_at(request.tips[r], e))
+            way = subtract(vector_at(goal["position"], e), vector_at(request.tips[r], e))
             distance = max(distance, norm(way))
-            if mechanism.effectors[e, ORIENTED]:
-                wanted = quaternion_at(goal, e, ROTATION)
+            if mechanism.effectors["oriented"][e]:
+                wanted = quaternion_at(goal["rotation"], e)
                 angle = max(angle, rough_angle(quaternion_at(request.tips[r], e, 3), wanted))
         room.progress[1 + r, RANK] = distance + lever * angle
 
@@ -342,15 +333,15 @@ def take_nearest(request, room, q):
     copy_row(request.restarts[nearest], q)
 
 
-def attempt(mechanism, goal, posture, room, request, history, done, k, count, least):
-    """Update a placed posture until it reaches its goal, settles, or has had its iterations.
+def attempt(mechanism, goal, data, room, request, history, done, k, count, least):
+    """Update a placed data until it reaches its goal, settles, or has had its iterations.
 
     `done` iterations have been made by all attempts; how this one, k, ends is noted.
 
     Returns:
         The iterations made.
     """
-    distance, angle, total = residuals(mechanism, goal, posture)
+    distance, angle, total = residuals(mechanism, goal, data)
     if done == 0 and k == 0:
         put_if_room(history, 0, distance)
     milestone, since = total, 0
@@ -362,9 +353,9 @@ def attempt(mechanism, goal, posture, room, request, history, done, k, count, le
         if state == REACHED or made >= count:
             break
         before = total
-        update(mechanism, goal, posture, room)
+        update(mechanism, goal, data, room)
         made += 1
-        distance, angle, total = residuals(mechanism, goal, posture)
+        distance, angle, total = residuals(mechanism, goal, data)
         put_if_room(history, done + made - first, distance)
         since += 1
         if total < PROGRESS * milestone:
@@ -388,12 +379,12 @@ def within(mechanism, request, distance, angle, least):
     return near and angle <= request.tolerance_rotation - angular
 
 
-def nudge(mechanism, posture):
+def nudge(mechanism, data):
     """Bend a stuck mechanism, always in the same way: every joint by a share of one angle."""
-    joints, q, count = mechanism.joints, posture.q, len(mechanism.joints.integers)
+    joints, q, count = mechanism.joints, data.q, len(mechanism.joints)
     for j in range(count):
-        kind, angle = joints.integers[j, KIND], BEND / count
-        if joints.integers[j, LEADER] != j:
+        kind, angle = joints["kind"][j], BEND / count
+        if joints["leader"][j] != j:
             continue
         if kind == HINGE and move_by(joints, q, j, angle) == 0.0:
             move_by(joints, q, j, -angle)
@@ -407,12 +398,12 @@ def conclude(mechanism, goal, request, answers, i, rotations, least, settled):
     """Fill residuals, merit and outcome of a target from the pose of all joints."""
     distance, angle, total = 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
-        j, apart, off = mechanism.effectors[e, EFFECTOR], 0.0, 0.0
-        apart = norm(subtract(vector_at(goal, e, POSITION), vector_at(answers.positions[i], j)))
-        if mechanism.effectors[e, ORIENTED]:
-            off = angle_between(quaternion_at(rotations, j), quaternion_at(goal, e, ROTATION))
+        j, apart, off = mechanism.effectors["source"][e], 0.0, 0.0
+        apart = norm(subtract(vector_at(goal["position"], e), vector_at(answers.positions[i], j)))
+        if mechanism.effectors["oriented"][e]:
+            off = angle_between(quaternion_at(rotations, j), quaternion_at(goal["rotation"], e))
         distance, angle = max(distance, apart), max(angle, off)
-        total += weighted_square(mechanism, goal[e, WEIGHT], apart, off)
+        total += weighted_square(mechanism, goal["weight"][e], apart, off)
     figures = answers.figures[i]
     figures[RESIDUAL], figures[RESIDUAL_ROTATION], figures[MERIT] = (
         distance,

@@ -1,23 +1,23 @@
 """The rotation that brings several directions nearest to others (Wahba 1965).
 
-Turning arms a into b, weighted, means to maximise the sum of w b . S a = tr(S M'), where M is the
-sum of w b a'. For a quaternion q of S that is q' K q with Davenport's symmetric 4 x 4 matrix K
-(Horn 1987), so that q is its eigenvector of the largest eigenvalue; about one axis it is an angle.
+To rotate vectors a onto b, weighted, maximise the sum of w b . S a = tr(S M'), M the sum of w b a'.
+For a quaternion q of S that is q' K q with Davenport's symmetric 4 x 4 matrix K (Horn 1987), so
+that q is its eigenvector of the largest eigenvalue; about one axis it is an angle.
 """
 
 import math
 
 from ..quaternion import dot
 
-# Many rotations are best where the arms are all on one line: this share of M's size, given to the
-# identity, picks the least turn. It can bring no arm further away, and is nothing once all fit.
-LEAST_TURN = 1e-6
-# Below this share of M's size a turn changes nothing but rounding.
+# Where all vectors are on one line many rotations are best: the identity, added by this share of
+# M's norm, makes the smallest of them the best. It brings no vector further from its own.
+LEAST_ROTATION = 1e-6
+# Below this share of M's norm the angle that is best is known to no digit.
 ROUNDING = 1e-15
 SWEEPS = 12
 
 
-NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+ZERO_MATRIX = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def add_outer(M, weight, b, a):
@@ -30,8 +30,8 @@ def add_outer(M, weight, b, a):
     )  # fmt: skip
 
 
-def add_turn(M, weight, R):
-    """Return M + weight R, for the quaternion R of a rotation wanted."""
+def add_rotation(M, weight, R):
+    """Return M + weight R, R given as a quaternion."""
     w, x, y, z = R
     return (
         M[0] + weight * (1.0 - 2.0 * (y * y + z * z)),
@@ -64,9 +64,9 @@ def best_angle(M, axis):
     return math.atan2(sine, cosine)
 
 
-def turn_value(M, S):
-    """Return tr(S M'), which is the larger the better a turn S fits."""
-    R = add_turn(NOTHING, 1.0, S)
+def alignment(M, S):
+    """Return tr(S M'), which the best rotation S maximises."""
+    R = add_rotation(ZERO_MATRIX, 1.0, S)
     total = 0.0
     for i in range(9):
         total += R[i] * M[i]
@@ -74,7 +74,7 @@ def turn_value(M, S):
 
 
 def magnitude(M):
-    """Return the root of the sum of the entries' squares, the same however the world is turned."""
+    """Return the root of the sum of the entries' squares, the same in all frames."""
     total = 0.0
     for m in M:
         total += m * m
@@ -82,11 +82,11 @@ def magnitude(M):
 
 
 def best_rotation(M, K, V):
-    """Return the rotation S that maximises tr(S M'); K and V are room for 4 x 4 matrices.
+    """Return the rotation S that maximises tr(S M'); K and V are overwritten, (4, 4).
 
     Jacobi's rotations diagonalise K; V collects them, and the column of the largest is q.
     """
-    extra = LEAST_TURN * magnitude(M)
+    extra = LEAST_ROTATION * magnitude(M)
     trace = M[0] + M[4] + M[8] + 3.0 * extra
     K[0, 0], K[0, 1], K[0, 2], K[0, 3] = trace, M[7] - M[5], M[2] - M[6], M[3] - M[1]
     K[1, 1], K[1, 2], K[1, 3] = 2.0 * (M[0] + extra) - trace, M[1] + M[3], M[2] + M[6]
@@ -124,7 +124,7 @@ def diagonalise(K, V):
 
 
 def annihilate(K, V, i, j):
-    """Turn rows and columns i and j so that K[i, j] is zero (Jacobi 1846)."""
+    """Rotate rows and columns i and j so that K[i, j] is zero (Jacobi 1846)."""
     entry = K[i, j]
     if abs(entry) <= 1e-17 * (abs(K[i, i]) + abs(K[j, j])):
         K[i, j] = K[j, i] = 0.0

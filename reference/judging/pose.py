@@ -172,7 +172,7 @@ def _angle(wanted: Wanted, turn: FloatArray) -> float:
 def _limit_excess(model: Skeleton | Articulation, q: FloatArray) -> FloatArray:
     if isinstance(model, Skeleton):
         return np.zeros(model.joint_count)
-    return np.array([joint_excess(model.arrays, j, q) for j in range(model.joint_count)])
+    return np.array([joint_excess(model.joints, j, q) for j in range(model.joint_count)])
 
 
 def _compared(

@@ -13,7 +13,7 @@ grid is then refined by halves.
 
 import numpy as np
 
-from ..arguments import FloatArray, IndexArray
+from ..arguments import FloatArray, IndexArray, RecordArray
 from ..inverse_kinematics.mechanism import Mechanism
 from .problem import (
     TrajectoryProblem,
@@ -32,7 +32,7 @@ COARSEST_GRID = 64
 
 
 def smooth(
-    mechanism: Mechanism, targets: FloatArray, q: FloatArray, reached: np.ndarray, closed: bool
+    mechanism: Mechanism, targets: RecordArray, q: FloatArray, reached: np.ndarray, closed: bool
 ) -> tuple[FloatArray, int]:
     """Return a smooth trajectory near one that follows the targets, and the Newton steps taken.
 
@@ -40,7 +40,8 @@ def smooth(
 
     Args:
         mechanism: the joints.
-        targets: of each frame, (frame, effector, 8), see `inverse_kinematics/mechanism.py`.
+        targets: of each frame, records TARGET of `inverse_kinematics/mechanism.py`, (frame,
+            effector).
         q: the mechanism's coordinates to start from, (frame, coordinate).
         reached: in which frames q meets the targets: these keep to them, the others only approach
             theirs as far as a penalty draws them, (frame,).

@@ -14,52 +14,47 @@ import math
 
 import numpy as np
 
-from ..arguments import IndexArray
-from ..articulation import (
-    AT,
-    AXIS,
-    BALL,
-    CONE,
-    FREEDOM,
-    FREEDOMS,
-    HINGE,
-    KIND,
-    LEADER,
-    LOWER,
-    SLIDE,
-    UPPER,
-    JointArrays,
-    swing_twist,
-)
+from ..arguments import IndexArray, RecordArray
+from ..articulation import BALL, FREEDOMS, HINGE, SLIDE, swing_twist
 from ..quaternion import add, conjugate, cross, dot, norm, rotate, scale, vector_at
 
+# The bounds of a joint.
+LOWER, UPPER, CONE = range(3)
 # r: the penalty of exceeding a limit by 1 rad.
 PENALTY = 100.0
 # The swing has no gradient where its sine, the twist where w^2 + s^2 is below this (squared).
 DEGENERATE = 1e-9
 
 
-def joint_limits(joints: JointArrays) -> IndexArray:
+def joint_limits(joints: RecordArray) -> IndexArray:
     """Return the joint and the bound, LOWER, UPPER or CONE, of every finite limit, (limit, 2)."""
-    kinds = {LOWER: (HINGE, SLIDE, BALL), UPPER: (HINGE, SLIDE, BALL), CONE: (BALL,)}
     found = [
         (j, bound)
-        for j, row in enumerate(joints.integers)
-        for bound in kinds
-        if row[LEADER] == j and row[KIND] in kinds[bound] and np.isfinite(joints.numbers[j, bound])
+        for j, joint in enumerate(joints)
+        for bound in ((LOWER, UPPER, CONE) if joint["kind"] == BALL else (LOWER, UPPER))
+        if joint["leader"] == j
+        and joint["kind"] in (HINGE, SLIDE, BALL)
+        and np.isfinite(bound_of(joints, j, bound))
     ]
     return np.array(found, dtype=np.int64).reshape(-1, 2)
+
+
+def bound_of(joints, j, bound):
+    """Return the value of a bound of a joint [rad or m]."""
+    if bound == LOWER:
+        return joints["lower"][j]
+    return joints["upper"][j] if bound == UPPER else joints["cone"][j]
 
 
 def excess(problem, q, limit):
     """Return by how much a limit is exceeded, h [rad, or m over the reach], and its gradient."""
     joints, j, bound = problem.mechanism.joints, problem.limits[limit, 0], problem.limits[limit, 1]
-    value, sign = joints.numbers[j, bound], -1.0 if bound == LOWER else 1.0
-    at = joints.integers[j, AT]
-    if joints.integers[j, KIND] != BALL:
-        unit = problem.units[joints.integers[j, FREEDOM]]
+    value, sign = bound_of(joints, j, bound), -1.0 if bound == LOWER else 1.0
+    at = joints["coordinate"][j]
+    if joints["kind"][j] != BALL:
+        unit = problem.units[joints["freedom"][j]]
         return sign * (q[at] - value) / unit, (sign, 0.0, 0.0)
-    Q, u = (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints.numbers, j, AXIS)
+    Q, u = (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints["axis"], j)
     if bound == CONE:
         swing, gradient = swing_and_gradient(Q, u)
         return swing - value, gradient
@@ -127,15 +122,15 @@ def add_active_limits(problem, q, z, step, gradient, diagonal, active):
 
 def directional_derivative(joints, j, normal, step):
     """Return the change of h along a step, to first order."""
-    k, total = joints.integers[j, FREEDOM], 0.0
-    for a in range(FREEDOMS[joints.integers[j, KIND]]):
+    k, total = joints["freedom"][j], 0.0
+    for a in range(FREEDOMS[joints["kind"][j]]):
         total += normal[a] * step[k + a]
     return total
 
 
 def add_parabola(joints, j, force, normal, gradient, diagonal):
     """Add the derivatives of one active limit."""
-    k, n = joints.integers[j, FREEDOM], FREEDOMS[joints.integers[j, KIND]]
+    k, n = joints["freedom"][j], FREEDOMS[joints["kind"][j]]
     for a in range(n):
         gradient[k + a] += force * normal[a]
         for b in range(n):

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import FloatArray, IndexArray
-from ..articulation import FREE, FREEDOM, KIND, LEADER, SLIDE
+from ..arguments import FloatArray, IndexArray, RecordArray
+from ..articulation import FREE, SLIDE
 from ..backend.compiled import TwoSpeeds
 from ..inverse_kinematics.mechanism import Mechanism
 from .augmented_lagrangian import joint_limits
@@ -40,7 +40,7 @@ class TrajectoryProblem(NamedTuple):
         mechanism: the joints.
         units: the displacement that counts as 1: 1 rad, or the reach [m], (freedom,).
         limits: the joint and the bound of every finite limit, see `joint_limits`, (limit, 2).
-        targets: of each frame, (frame, effector, 8), see `inverse_kinematics/mechanism.py`.
+        targets: of each frame, records TARGET, (frame, effector).
         constrained: which frames have to meet their targets; a penalty draws the others, (frame,).
         closed: whether the first frame follows the last.
     """
@@ -48,7 +48,7 @@ class TrajectoryProblem(NamedTuple):
     mechanism: Mechanism
     units: FloatArray
     limits: IndexArray
-    targets: FloatArray
+    targets: RecordArray
     constrained: np.ndarray
     closed: bool
 
@@ -58,7 +58,7 @@ class TrajectoryProblem(NamedTuple):
 
 
 def new_problem(
-    mechanism: Mechanism, targets: FloatArray, constrained: np.ndarray, closed: bool
+    mechanism: Mechanism, targets: RecordArray, constrained: np.ndarray, closed: bool
 ) -> TrajectoryProblem:
     """Return the problem of a mechanism whose limits are those of its joints."""
     units, limits = displacement_units(mechanism), joint_limits(mechanism.joints)
@@ -68,9 +68,10 @@ def new_problem(
 def displacement_units(mechanism: Mechanism) -> FloatArray:
     """Return the displacement of each freedom that counts as 1: 1 rad, or the reach [m]."""
     units = np.ones(mechanism.freedoms)
-    for j, row in enumerate(mechanism.joints.integers):
-        if row[LEADER] == j and row[KIND] in (SLIDE, FREE):
-            units[row[FREEDOM] : row[FREEDOM] + (1 if row[KIND] == SLIDE else 3)] = mechanism.reach
+    for j, joint in enumerate(mechanism.joints):
+        if joint["leader"] == j and joint["kind"] in (SLIDE, FREE):
+            first, count = joint["freedom"], 1 if joint["kind"] == SLIDE else 3
+            units[first : first + count] = mechanism.reach
     return units
 
 

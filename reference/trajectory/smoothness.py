@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ..articulation import BALL, FREE, FREEDOM, HINGE, KIND, LEADER, LOWER, UPPER
+from ..articulation import BALL, FREE, HINGE
 from ..jacobians import joint_difference, move_joint
 
 # Below this angle [rad] the leading term of (1 - c)/|d|^2 is exact to rounding.
@@ -27,10 +27,10 @@ def fill_displacements(problem, q, d):
     joints, units = problem.mechanism.joints, problem.units
     for f in range(len(d)):
         g = (f + 1) % len(q)
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             joint_difference(joints, j, q[g], q[f], d[f])
             if g < f and is_continuous(joints, j):
-                k = joints.integers[j, FREEDOM]
+                k = joints["freedom"][j]
                 d[f, k] -= 2.0 * math.pi * round(d[f, k] / (2.0 * math.pi))
         for k in range(len(units)):
             d[f, k] /= units[k]
@@ -38,12 +38,9 @@ def fill_displacements(problem, q, d):
 
 def is_continuous(joints, j):
     """Return whether a joint is a hinge without limits that no mimic joint follows."""
-    if joints.integers[j, KIND] != HINGE or joints.integers[j, LEADER] != j:
+    if joints["kind"][j] != HINGE or joints["leader"][j] != j or joints["followed"][j]:
         return False
-    for follower in range(len(joints.integers)):
-        if follower != j and joints.integers[follower, LEADER] == j:
-            return False
-    return joints.numbers[j, LOWER] == -math.inf and joints.numbers[j, UPPER] == math.inf
+    return joints["lower"][j] == -math.inf and joints["upper"][j] == math.inf
 
 
 def integrate_frames(problem, step, q):
@@ -53,7 +50,7 @@ def integrate_frames(problem, step, q):
     for f in range(len(q)):
         for k in range(len(v)):
             v[k] = units[k] * step[f, k]
-        for j in range(len(joints.integers)):
+        for j in range(len(joints)):
             move_joint(joints, j, v, q[f])
 
 
@@ -76,8 +73,8 @@ def add_smoothness(joints, d, gradient, diagonal, coupling):
             diagonal[f, k, k] += 1.0
             diagonal[g, k, k] += 1.0
             coupling[f, k, k] -= 1.0
-        for j in range(len(joints.integers)):
-            k, kind = joints.integers[j, FREEDOM], joints.integers[j, KIND]
+        for j in range(len(joints)):
+            k, kind = joints["freedom"][j], joints["kind"][j]
             if kind == BALL:
                 add_curvature(d[f], k, diagonal[f], diagonal[g], coupling[f])
             elif kind == FREE:

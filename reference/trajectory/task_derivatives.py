@@ -13,40 +13,20 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import FloatArray, IndexArray
-from ..articulation import BALL, FREE, FREEDOM, FREEDOMS, HINGE, KIND, MULTIPLIER, SLIDE
+from ..articulation import FREEDOMS
 from ..inverse_kinematics.mechanism import (
     LEVER,
-    ORIENTED,
-    ROW,
-    WEIGHT,
-    Posture,
-    axis_of,
-    frame_of,
-    moves,
-    new_posture,
-    place,
-    position_error,
-    tip,
-    wrong_turn,
+    effector_position,
+    new_data,
+    update_forward_kinematics,
 )
-from ..quaternion import (
-    add,
-    cross,
-    dot,
-    logarithm,
-    put_vector,
-    quaternion_at,
-    rotate,
-    scale,
-    subtract,
-    vector_at,
-)
-
-ZERO = (0.0, 0.0, 0.0)
+from ..inverse_kinematics.task_jacobian import fill_errors, fill_jacobian
+from ..motion_subspace import motion, velocity_at
+from ..quaternion import add, cross, dot, put_vector, scale, subtract, vector_at
 
 
 class Motions(NamedTuple):
-    """The elementary motions of all joints, from the root on: each a rotation or a translation.
+    """The motions by all freedoms, from the root on: each a rotation or a translation.
 
     Attributes:
         owners: the joint and the freedom of each, (motion, 2).
@@ -62,152 +42,88 @@ class Motions(NamedTuple):
     moments: FloatArray
 
 
-class Workspace(NamedTuple):
-    """The pose of one frame, and the motions of its joints."""
-
-    pose: Posture
-    motions: Motions
-
-
-def new_workspace(mechanism):
-    """Return a workspace to be filled."""
+def new_motions(joints):
+    """Return motions to be filled."""
     count = 0
-    for j in range(len(mechanism.joints.integers)):
-        count += FREEDOMS[mechanism.joints.integers[j, KIND]]
+    for j in range(len(joints)):
+        count += FREEDOMS[joints["kind"][j]]
     owners = np.empty((count, 2), dtype=np.int64)
-    motions = Motions(owners, np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)))
-    return Workspace(new_posture(mechanism), motions)
+    return Motions(owners, np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)))
 
 
 def fill_errors_and_jacobians(problem, q, e, J):
     """Fill errors e [m], (frame, equation), and J = -de/dq, (frame, equation, freedom)."""
-    mechanism = problem.mechanism
-    work = new_workspace(mechanism)
+    mechanism, targets = problem.mechanism, problem.targets
+    data = new_data(mechanism)
     for f in range(len(q)):
-        set_frame(mechanism, q[f], work)
-        fill_errors(mechanism, problem.targets[f], work, e[f])
-        fill_motions(mechanism, problem.units, work)
-        fill_jacobian(mechanism, problem.targets[f], work, J[f])
+        set_frame(mechanism, q[f], data)
+        fill_errors(mechanism, targets[f], data, e[f])
+        fill_jacobian(mechanism, targets[f], data, J[f].T)
 
 
 def subtract_second_derivatives(problem, q, m, diagonal):
     """Subtract m, (frame, equation), times the second derivatives of the effectors."""
     mechanism = problem.mechanism
-    work = new_workspace(mechanism)
+    data, motions = new_data(mechanism), new_motions(mechanism.joints)
     for f in range(len(q)):
-        set_frame(mechanism, q[f], work)
-        fill_motions(mechanism, problem.units, work)
+        set_frame(mechanism, q[f], data)
+        fill_motions(mechanism, data, motions)
         for e in range(len(mechanism.effectors)):
-            fill_moments(mechanism, problem.targets[f], work, m[f], e)
-            subtract_effector(mechanism, work, e, diagonal[f])
+            fill_moments(mechanism, problem.targets[f], data, motions, m[f], e)
+            subtract_effector(mechanism, motions, e, diagonal[f])
 
 
-def set_frame(mechanism, q, work):
+def set_frame(mechanism, q, data):
     """Compute the forward kinematics of one frame."""
     for c in range(len(q)):
-        work.pose.q[c] = q[c]
-    place(mechanism, work.pose)
+        data.q[c] = q[c]
+    update_forward_kinematics(mechanism, data)
 
 
-def fill_errors(mechanism, target, work, errors):
-    """Fill the errors of a frame: displacements [m], and rotation vectors times the lever [m]."""
-    for e in range(len(mechanism.effectors)):
-        row, root = mechanism.effectors[e, ROW], np.sqrt(target[e, WEIGHT])
-        error = scale(root, position_error(mechanism, target, work.pose, e))
-        errors[row], errors[row + 1], errors[row + 2] = error
-        if mechanism.effectors[e, ORIENTED]:
-            lever = root * LEVER * mechanism.reach
-            error = scale(lever, logarithm(wrong_turn(mechanism, target, work.pose, e)))
-            errors[row + 3], errors[row + 4], errors[row + 5] = error
-
-
-def fill_motions(mechanism, units, work):
+def fill_motions(mechanism, data, motions):
     """Fill the motions of a frame, but for their moments."""
-    joints, motions, at = mechanism.joints, work.motions, 0
-    for j in range(len(joints.integers)):
-        R, k = quaternion_at(work.pose.rotations, j), joints.integers[j, FREEDOM]
-        kind, factor = joints.integers[j, KIND], joints.numbers[j, MULTIPLIER]
-        if kind == HINGE:
-            at = put_motion(motions, at, j, k, scale(factor, axis_of(joints, j, R)), ZERO)
-        elif kind == SLIDE:
-            linear = scale(units[k] * factor, axis_of(joints, j, R))
-            at = put_motion(motions, at, j, k, ZERO, linear)
-        elif kind == BALL:
-            at = put_rotations(motions, at, j, k, R)
-        elif kind == FREE:
-            at = put_translations(motions, at, j, k, frame_of(joints, j, work.pose), units[k])
-            at = put_rotations(motions, at, j, k + 3, R)
+    joints, at = mechanism.joints, 0
+    for j in range(len(joints)):
+        for i in range(FREEDOMS[joints["kind"][j]]):
+            angular, linear = motion(joints, j, i, data.rotations, mechanism.reach)
+            motions.owners[at, 0], motions.owners[at, 1] = j, joints["freedom"][j] + i
+            put_vector(motions.angular, at, angular)
+            put_vector(motions.linear, at, linear)
+            at += 1
 
 
-def put_rotations(motions, at, j, k, R):
-    """Write rotations about the axes of a frame from an entry on; return the next entry."""
-    at = put_motion(motions, at, j, k, rotate(R, (1.0, 0.0, 0.0)), ZERO)
-    at = put_motion(motions, at, j, k + 1, rotate(R, (0.0, 1.0, 0.0)), ZERO)
-    return put_motion(motions, at, j, k + 2, rotate(R, (0.0, 0.0, 1.0)), ZERO)
-
-
-def put_translations(motions, at, j, k, R, unit):
-    """Write translations along the axes of a frame from an entry on; return the next entry."""
-    at = put_motion(motions, at, j, k, ZERO, rotate(R, (unit, 0.0, 0.0)))
-    at = put_motion(motions, at, j, k + 1, ZERO, rotate(R, (0.0, unit, 0.0)))
-    return put_motion(motions, at, j, k + 2, ZERO, rotate(R, (0.0, 0.0, unit)))
-
-
-def put_motion(motions, at, j, k, angular, linear):
-    """Write a motion of joint j and freedom k into an entry; return the next one."""
-    motions.owners[at, 0], motions.owners[at, 1] = j, k
-    put_vector(motions.angular, at, angular)
-    put_vector(motions.linear, at, linear)
-    return at + 1
-
-
-def fill_jacobian(mechanism, target, work, J):
-    """Fill the derivatives of the effectors by the freedoms, (equation, freedom)."""
-    J[:] = 0.0
-    owners = work.motions.owners
-    for e in range(len(mechanism.effectors)):
-        row, root = mechanism.effectors[e, ROW], np.sqrt(target[e, WEIGHT])
-        for b in range(len(owners)):
-            if moves(mechanism, owners[b, 0], e):
-                add_to_column(J, row, owners[b, 1], scale(root, velocity(mechanism, work, e, b)))
-                if mechanism.effectors[e, ORIENTED]:
-                    lever = root * LEVER * mechanism.reach
-                    angular = scale(lever, vector_at(work.motions.angular, b))
-                    add_to_column(J, row + 3, owners[b, 1], angular)
-
-
-def velocity(mechanism, work, e, b):
-    """Return the linear velocity of an effector by a motion."""
-    x = vector_at(work.pose.positions, work.motions.owners[b, 0])
-    arm = subtract(tip(mechanism, work.pose, e), x)
-    return add(cross(vector_at(work.motions.angular, b), arm), vector_at(work.motions.linear, b))
-
-
-def fill_moments(mechanism, target, work, m, e):
+def fill_moments(mechanism, target, data, motions, m, e):
     """Fill the moments of all motions for an effector."""
-    row, root = mechanism.effectors[e, ROW], np.sqrt(target[e, WEIGHT])
-    force = scale(root, (m[row], m[row + 1], m[row + 2]))
-    for b in range(len(work.motions.owners)):
-        moment = cross(velocity(mechanism, work, e, b), force)
-        if mechanism.effectors[e, ORIENTED]:
+    effectors = mechanism.effectors
+    row, root = effectors["row"][e], np.sqrt(target["weight"][e])
+    force, x = scale(root, vector_from(m, row)), effector_position(mechanism, data, e)
+    for b in range(len(motions.owners)):
+        angular, linear = vector_at(motions.angular, b), vector_at(motions.linear, b)
+        arm = subtract(x, vector_at(data.positions, motions.owners[b, 0]))
+        moment = cross(velocity_at(angular, linear, arm), force)
+        if effectors["oriented"][e]:
             lever = 0.5 * root * LEVER * mechanism.reach
-            torque = scale(lever, (m[row + 3], m[row + 4], m[row + 5]))
-            moment = add(moment, cross(vector_at(work.motions.angular, b), torque))
-        put_vector(work.motions.moments, b, moment)
+            moment = add(moment, cross(angular, scale(lever, vector_from(m, row + 3))))
+        put_vector(motions.moments, b, moment)
 
 
-def subtract_effector(mechanism, work, e, diagonal):
+def vector_from(m, i):
+    """Return three entries from the i-th on."""
+    return m[i], m[i + 1], m[i + 2]
+
+
+def subtract_effector(mechanism, motions, e, diagonal):
     """Subtract m times the second derivatives of an effector."""
-    owners, angular, _, moments = work.motions
+    owners, angular, _, moments = motions
     for b in range(len(owners)):
         j, k = owners[b]
-        if not moves(mechanism, j, e):
+        if not mechanism.moves[j, e]:
             continue
         for a in range(b + 1):
             above, i = owners[a]
-            if moves(mechanism, above, e):
+            if mechanism.moves[above, e]:
                 second = dot(vector_at(angular, a), vector_at(moments, b))
-                if above == j and is_rotation(work.motions, a):
+                if above == j and is_rotation(motions, a):
                     second = 0.5 * (second + dot(vector_at(angular, b), vector_at(moments, a)))
                 diagonal[i, k] -= second
                 if a != b:
@@ -218,10 +134,3 @@ def is_rotation(motions, a):
     """Return whether a motion is a rotation."""
     x, y, z = vector_at(motions.angular, a)
     return x != 0.0 or y != 0.0 or z != 0.0
-
-
-def add_to_column(J, i, k, v):
-    """Add a vector to three entries of a column from the i-th on."""
-    J[i, k] += v[0]
-    J[i + 1, k] += v[1]
-    J[i + 2, k] += v[2]

@@ -21,8 +21,9 @@ from reference import (
     track,
     trajectory,
 )
-from reference.articulation import BALL, CONE, KIND, LOWER
+from reference.articulation import BALL
 from reference.inverse_kinematics import balls, goals_of
+from reference.inverse_kinematics.mechanism import TARGET
 from reference.inverse_kinematics.problem import checked_targets
 from reference.inverse_kinematics.reduce import prepare
 from reference.jacobians import difference, integrate, jacobian
@@ -362,6 +363,8 @@ MODELS = {
     "free": (["free", "hinge", "ball", "hinge", "fixed"], {}, [-1], True),
     "mimic": (["hinge", "slide", "hinge", "ball", "hinge"], {2: Mimic(0, -0.7, 0.1),
               1: Mimic(4, 0.3)}, [-1], False),
+    "hinge after slide": (["hinge", "slide", "hinge", "ball", "hinge"], {2: Mimic(1, -0.7, 0.1)},
+                          [-1], False),
     "two": (["ball", "hinge", "slide", "ball", "ball"], {}, [2, 4], True),
 }  # fmt: skip
 
@@ -383,7 +386,7 @@ def problem_of(name, closed, rng, drawn_to=()):
     ]
     goals = goals_of(checked_targets(model, targets, None), (4,))
     constrained = ~np.isin(np.arange(4), drawn_to)
-    goals[~constrained, :, :3] += 0.1
+    goals["position"][~constrained] += 0.1
     mechanism = prepared.mechanism
     columns = np.concatenate([
         np.arange(model.coordinate_count)[model.coordinates_of(j)] for j in range(5)
@@ -404,7 +407,8 @@ def test_the_second_order_model_is_that_of_the_cost_along_the_path(name, closed,
     """Balls are without limits here: the model leaves the curvature of those out."""
     problem, q = problem_of(name, closed, rng, drawn_to=[2])
     joints = problem.mechanism.joints
-    joints.numbers[joints.integers[:, KIND] == BALL, LOWER : CONE + 1] = [-np.inf, np.inf, np.inf]
+    for field, bound in (("lower", -np.inf), ("upper", np.inf), ("cone", np.inf)):
+        joints[field][joints["kind"] == BALL] = bound
     problem = problem._replace(limits=joint_limits(joints))
     z = rng.uniform(0.0, 0.1, (4, len(problem.limits)))
     model = quadratic_model(problem, q, z)
@@ -477,7 +481,7 @@ def null_spaces(problem, q):
 def test_the_limits_of_balls_push_as_the_cost_says(rng, speed):
     problem, q = problem_of("balls", False, rng)
     problem = problem._replace(constrained=np.zeros(4, dtype=bool))
-    problem.mechanism.joints.numbers[:, CONE] = 0.2
+    problem.mechanism.joints["cone"] = 0.2
     problem = problem._replace(limits=joint_limits(problem.mechanism.joints))
     z = rng.uniform(0.0, 0.1, (4, len(problem.limits)))
     gradient, _ = derivatives(problem, q, z, quadratic_model(problem, q, z))
@@ -512,7 +516,7 @@ def test_a_straight_arm_is_near_singular():
     q = np.array([[0.3, 0.0, 0.0], [0.3, 0.0, 0.5]])
     arm = hinges(3)
     mechanism = prepare(arm, (3,), (False,)).mechanism
-    goals = np.zeros((2, 1, 8))
-    goals[..., 7] = 1.0
+    goals = np.zeros((2, 1), TARGET)
+    goals["weight"] = 1.0
     problem = new_problem(mechanism, goals, np.ones(2, dtype=bool), False)
     assert near_singular(problem, q).tolist() == [True, False]

@@ -14,9 +14,15 @@ from reference import (
     forward_kinematics,
     rotation,
 )
-from reference.inverse_kinematics.mechanism import new_posture, place, take_coordinates
+from reference.inverse_kinematics.box_step import new_task_system
+from reference.inverse_kinematics.fabrik import BACKWARD
+from reference.inverse_kinematics.mechanism import (
+    TARGET,
+    gather,
+    new_data,
+    update_forward_kinematics,
+)
 from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.stacked import new_stack
 
 
 @pytest.fixture(params=IK_SOLVERS)
@@ -99,7 +105,7 @@ class Machine(NamedTuple):
 
     mechanism: Any
     goal: np.ndarray
-    posture: Any
+    data: Any
     room: Any
 
 
@@ -107,17 +113,19 @@ def machine_of(model, q, targets):
     """Return the mechanism that moves some effectors, placed, and room for solvers."""
     oriented = tuple(target.rotation is not None for target in targets)
     mechanism = prepare(model, tuple(target.effector for target in targets), oriented).mechanism
-    goal = np.zeros((len(targets), 8))
-    for row, (position, turn, _, weight) in zip(goal, targets, strict=True):
-        row[:] = [*position, *(rotation.identity() if turn is None else turn), weight]
-    posture = new_posture(mechanism)
-    take_coordinates(mechanism, np.array(q), posture.q)
-    place(mechanism, posture)
-    count = len(mechanism.joints.integers)
+    goal = np.zeros(len(targets), TARGET)
+    for e, (position, turn, _, weight) in enumerate(targets):
+        goal[e] = position, rotation.identity() if turn is None else turn, weight
+    data = new_data(mechanism)
+    gather(mechanism, np.array(q), data.q)
+    update_forward_kinematics(mechanism, data)
+    count = len(mechanism.joints)
     room = SimpleNamespace(
-        stack=new_stack(mechanism), wishes=np.empty((count, 4)), eigen=np.empty((2, 4, 4))
+        system=new_task_system(mechanism),
+        backward=np.empty(count, BACKWARD),
+        eigen=np.empty((2, 4, 4)),
     )
-    return Machine(mechanism, goal, posture, room)
+    return Machine(mechanism, goal, data, room)
 
 
 @pytest.fixture(scope="session")

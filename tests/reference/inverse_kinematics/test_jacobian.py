@@ -7,10 +7,10 @@ from reference import forward_kinematics, local_from_global, rotation, scenes, s
 from reference.inverse_kinematics.chain import new_chain, pose_chain
 from reference.inverse_kinematics.jacobian import (
     linearise,
+    rotate_joints,
     solve_damped,
     task_matrix,
     times,
-    turn_joints,
 )
 
 # A forward difference over 1e-7 rad is off by about that much, and rounding by 1e-9 of the reach.
@@ -59,7 +59,7 @@ def test_the_task_matrix_is_the_jacobian_times_its_transpose(skeleton, local, ch
 def test_joints_turn_along_the_transposed_jacobian(skeleton, local, chain, rng):
     z = rng.standard_normal(3)
     before = chain.positions[-1].copy()
-    turn_joints(chain, tuple(STEP * z))
+    rotate_joints(chain, tuple(STEP * z))
     moved = (chain.positions[-1] - before) / STEP
     J = jacobian(skeleton, local)
     np.testing.assert_allclose(moved, J @ (J.T @ z), atol=10 * DIFFERENCE)

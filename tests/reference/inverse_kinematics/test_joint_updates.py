@@ -15,16 +15,14 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.articulation import LEADER
-from reference.inverse_kinematics.ccd import descend, move_joint
+from reference.inverse_kinematics.ccd import descend, update_joint
 from reference.inverse_kinematics.fabrik import (
-    WISHED,
+    backward_pass,
     fabrik_update,
-    move_towards_wishes,
-    put_frame,
-    wish,
+    forward_joint,
+    put_joint,
 )
-from reference.inverse_kinematics.mechanism import is_followed, misfit, place
+from reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
 from reference.inverse_kinematics.reduce import prepare
 
 # Squared distances of a few metres, and quaternions normalised after a turn.
@@ -43,24 +41,24 @@ def planar(links, **limits):
 
 
 def updates(machine):
-    """Update joint after joint as CCD does; yield the joint and the misfit before and after."""
-    mechanism, goal, posture, room = machine
+    """Update joint after joint as CCD does; yield the joint and the cost before and after."""
+    mechanism, goal, data, room = machine
     joints = mechanism.joints
-    for j in range(len(joints.integers) - 1, -1, -1):
-        before = misfit(mechanism, goal, posture)
-        if is_followed(mechanism, j):
-            descend(mechanism, goal, posture, room, j)
-        elif joints.integers[j, LEADER] == j:
-            move_joint(mechanism, goal, posture, room, j)
-        tips = posture.positions.copy(), posture.rotations.copy()
-        yield j, before, misfit(mechanism, goal, posture), tips
-    place(mechanism, posture)
+    for j in range(len(joints) - 1, -1, -1):
+        before = cost(mechanism, goal, data)
+        if mechanism.joints["followed"][j]:
+            descend(mechanism, goal, data, room, j)
+        elif joints["leader"][j] == j:
+            update_joint(mechanism, goal, data, room, j)
+        tips = data.positions.copy(), data.rotations.copy()
+        yield j, before, cost(mechanism, goal, data), tips
+    update_forward_kinematics(mechanism, data)
 
 
 @shared
 @with_examples
 @given(**TREES)
-def test_no_update_of_a_joint_makes_the_misfit_larger(articulated, machine, reachable, kinds, seed):
+def test_no_update_of_a_joint_raises_the_cost(articulated, machine, reachable, kinds, seed):
     """Whatever the kind, whatever limits stop it, and whoever follows."""
     model, rng = articulated(kinds, seed), np.random.default_rng(seed)
     targets, _ = reachable(model, rng, 3)
@@ -80,12 +78,12 @@ def test_after_an_update_effectors_are_where_the_coordinates_put_them(
     model, rng = articulated(kinds, seed), np.random.default_rng(seed)
     targets, _ = reachable(model, rng, 2)
     ready = machine(model, model.random(rng), targets)
-    count = len(ready.mechanism.joints.integers)
+    count = len(ready.mechanism.joints)
     for _, _, _, (positions, rotations) in updates(ready):
         placed = machine(model, model.random(rng), targets)
-        placed.posture.q[:] = ready.posture.q
-        place(placed.mechanism, placed.posture)
-        tips = placed.posture.positions[count:], placed.posture.rotations[count:]
+        placed.data.q[:] = ready.data.q
+        update_forward_kinematics(placed.mechanism, placed.data)
+        tips = placed.data.positions[count:], placed.data.rotations[count:]
         np.testing.assert_allclose(positions[count:], tips[0], rtol=0, atol=ROUNDING)
         turned = rotation.angle(_units(rotations[count:]), _units(tips[1]))
         np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-9)
@@ -97,7 +95,7 @@ def _units(quaternions):
 
 @pytest.mark.parametrize("kind", ["hinge", "slide", "ball", "free"])
 def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, machine, rng):
-    """No small move of the joint alone, in any direction, makes the misfit smaller."""
+    """No small move of the joint alone, in any direction, lowers the cost."""
     model = chain_of_joints(kind, rng, links=3)
     pose = forward_kinematics(model, model.random(rng))
     targets = [
@@ -105,20 +103,20 @@ def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, mac
         Target(pose.positions[2] + rng.standard_normal(3), None, 2, 0.7),
     ]
     ready = machine(model, model.random(rng), targets)
-    move_joint(*ready, 1)
-    place(ready.mechanism, ready.posture)
-    least, q = misfit(*ready[:3]), ready.posture.q.copy()
+    update_joint(*ready, 1)
+    update_forward_kinematics(ready.mechanism, ready.data)
+    least, q = cost(*ready[:3]), ready.data.q.copy()
     width = {"hinge": 1, "slide": 1, "ball": 4, "free": 7}[kind]
     for _ in range(20):
-        ready.posture.q[:] = q
-        own = ready.posture.q[width : 2 * width]
+        ready.data.q[:] = q
+        own = ready.data.q[width : 2 * width]
         own += 1e-3 * rng.standard_normal(width)
         if width > 1:
             own[-4:] /= np.linalg.norm(own[-4:])
-        place(ready.mechanism, ready.posture)
+        update_forward_kinematics(ready.mechanism, ready.data)
         # A free joint turns first and then shifts, so that its optimum is one of each alone.
         if kind != "free":
-            assert misfit(*ready[:3]) >= least - 1e-9
+            assert cost(*ready[:3]) >= least - 1e-9
 
 
 def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, speed):
@@ -164,12 +162,12 @@ def test_inside_a_cone_an_update_that_would_be_worse_is_refused(machine, rng):
         )  # fmt: skip
         target = Target(rotation.rotate(rotation.random(rng), [1.0, 0.3, 0.2]), effector=1)
         ready = machine(ball, ball.random(rng), [target])
-        before, q = misfit(*ready[:3]), ready.posture.q.copy()
-        move_joint(*ready, 0)
-        assert misfit(*ready[:3]) <= before + ROUNDING
-        assert ball.within_limits(ready.posture.q, 1e-9)
-        refused += (ready.posture.q == q).all()
-        taken += misfit(*ready[:3]) < before - 1e-3
+        before, q = cost(*ready[:3]), ready.data.q.copy()
+        update_joint(*ready, 0)
+        assert cost(*ready[:3]) <= before + ROUNDING
+        assert ball.within_limits(ready.data.q, 1e-9)
+        refused += (ready.data.q == q).all()
+        taken += cost(*ready[:3]) < before - 1e-3
     assert refused > 3
     assert taken > 50
 
@@ -187,14 +185,14 @@ def test_a_leader_descends_by_all_that_its_followers_do(gears, machine, rng):
         position = forward_kinematics(finger, wanted).positions[3]
         target = [Target(position, effector=3)]
         ready = machine(finger, q, target)
-        before = misfit(*ready[:3])
+        before = cost(*ready[:3])
         steps = 0
-        while misfit(*ready[:3]) > 1e-9 and steps < 40:
-            last = misfit(*ready[:3])
+        while cost(*ready[:3]) > 1e-9 and steps < 40:
+            last = cost(*ready[:3])
             descend(*ready, 0)
-            assert misfit(*ready[:3]) <= last + ROUNDING
+            assert cost(*ready[:3]) <= last + ROUNDING
             steps += 1
-        assert misfit(*ready[:3]) < before
+        assert cost(*ready[:3]) < before
     assert steps > 0
 
 
@@ -210,10 +208,10 @@ def test_backward_a_branch_takes_the_weighted_mean_of_what_its_children_ask(mach
         Target([1.0, 1.2, 0.0], effector=3, weight=1.0),
     ]
     ready = machine(model, rotation.identity(4).ravel(), targets)
-    wish(*ready)
+    backward_pass(*ready[:3], ready.room.backward)
     expected = (3.0 * np.array([1.5, 0.0, 0.0]) + np.array([1.0, 0.2, 0.0])) / 4.0
-    np.testing.assert_allclose(ready.room.wishes[1, :3], expected, rtol=0, atol=1e-15)
-    assert ready.room.wishes[1, WISHED] == 4.0
+    np.testing.assert_allclose(ready.room.backward["position"][1], expected, rtol=0, atol=1e-15)
+    assert ready.room.backward["weight"][1] == 4.0
 
 
 def test_forward_a_branch_turns_all_its_children_alike(machine, rng):
@@ -229,7 +227,7 @@ def test_forward_a_branch_turns_all_its_children_alike(machine, rng):
     fabrik_update(*ready)
     U, _, Vt = np.linalg.svd(np.einsum("k,ki,kj->ij", weights, ends, arms))
     kabsch = rotation.from_matrix(U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt)
-    assert rotation.angle(ready.posture.q[:4], kabsch) < 1e-4
+    assert rotation.angle(ready.data.q[:4], kabsch) < 1e-4
 
 
 @pytest.mark.parametrize("kind", ["hinge", "slide", "ball", "free"])
@@ -248,9 +246,9 @@ def test_a_pose_that_reaches_all_targets_is_a_fixed_point(
         Target(pose.positions[j], pose.rotations[j] if oriented else None, j) for j in (4, 2)
     ]
     ready = machine(model, q, targets)
-    before = ready.posture.positions.copy()
+    before = ready.data.positions.copy()
     fabrik_update(*ready)
-    np.testing.assert_allclose(ready.posture.positions, before, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(ready.data.positions, before, rtol=0, atol=1e-9)
 
 
 @shared
@@ -266,20 +264,20 @@ def test_forward_each_joint_is_left_where_the_coordinates_put_it(
         lower=drawn.lower, upper=drawn.upper, cones=drawn.cones,
     )  # fmt: skip
     targets, _ = reachable(model, rng, 2)
-    mechanism, goal, posture, room = machine(model, model.random(rng), targets)
-    wish(mechanism, goal, posture, room)
-    count = len(mechanism.joints.integers)
+    mechanism, goal, data, room = machine(model, model.random(rng), targets)
+    backward_pass(mechanism, goal, data, room.backward)
+    count = len(mechanism.joints)
     for j in range(count):
-        put_frame(mechanism.joints, posture, room, j)
-        move_towards_wishes(mechanism, goal, posture, room, j)
-    positions, rotations = posture.positions[:count].copy(), posture.rotations[:count].copy()
-    place(mechanism, posture)
-    np.testing.assert_allclose(positions, posture.positions[:count], rtol=0, atol=ROUNDING)
-    turned = rotation.angle(_units(rotations), _units(posture.rotations[:count]))
+        put_joint(mechanism.joints, data, room.backward, j)
+        forward_joint(mechanism, goal, data, room, j)
+    positions, rotations = data.positions[:count].copy(), data.rotations[:count].copy()
+    update_forward_kinematics(mechanism, data)
+    np.testing.assert_allclose(positions, data.positions[:count], rtol=0, atol=ROUNDING)
+    turned = rotation.angle(_units(rotations), _units(data.rotations[:count]))
     np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-9)
 
 
-def test_fabrik_turns_a_hinge_to_its_child_s_wish_within_its_limits(speed):
+def test_fabrik_rotates_a_hinge_towards_its_child_s_backward_position_within_its_limits(speed):
     for upper, expected in ((2.0, 1.0), (0.4, 0.4)):
         arm = planar(1, lower=-2.0, upper=upper)
         target = [np.cos(1.0), np.sin(1.0), 0.0]
@@ -290,16 +288,17 @@ def test_fabrik_turns_a_hinge_to_its_child_s_wish_within_its_limits(speed):
 # ---- what is merged and seen
 
 
-def test_what_a_joint_leaves_in_place_it_does_not_see():
+def test_what_a_joint_leaves_in_place_is_not_adjacent_to_it():
     """A wrist of three hinges, the second on the first's axis, the third in the second's place."""
     offsets = [[0, 0, 0], [0, 0, 1.0], [0, 0, 0.2], [0, 0, 0], [0.5, 0, 0]]
     axes = [[1, 0, 0], [0, 0, 1], [0, 1, 0], [0, 0, 1], [0, 0, 1]]
     arm = Articulation(Skeleton(range(-1, 4), offsets), ["hinge"] * 4 + ["fixed"], axes)
     mechanism = prepare(arm, (4,), (False,)).mechanism
-    sees = mechanism.bonds[:, 1:]
-    assert sees[0, 1] == 1
-    assert not sees[1:, :].any()
-    assert mechanism.bonds[:, 0].tolist() == [1, 2, 2, 2]
+    joints, effector = mechanism.adjacent[:, :4], mechanism.adjacent[:, 4]
+    assert joints[0, 1]
+    assert not joints[1:].any()
+    assert mechanism.moves[:, 0].all()
+    assert effector.tolist() == [False, True, True, True]
 
 
 def test_the_reach_counts_links_and_not_the_root_s_offset(rng):
@@ -312,4 +311,4 @@ def test_the_reach_counts_links_and_not_the_root_s_offset(rng):
     mechanism = prepare(model, (3,), (False,)).mechanism
     merged = np.hypot(1.0, 2.0)
     assert mechanism.reach == pytest.approx(merged + 0.5, abs=1e-15)
-    assert mechanism.tips[0, 7] == pytest.approx(merged + 0.5 + 0.75, abs=1e-15)
+    assert mechanism.effectors["reach"][0] == pytest.approx(merged + 0.5 + 0.75, abs=1e-15)

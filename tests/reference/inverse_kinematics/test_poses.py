@@ -18,10 +18,10 @@ from reference.inverse_kinematics import checked_settings, solve_targets
 from reference.inverse_kinematics.alone import solve_alone
 from reference.inverse_kinematics.mechanism import (
     LEVER,
-    misfit,
+    cost,
     residuals,
-    turn_weight,
-    wrong_turn,
+    rotation_error,
+    rotation_weight,
 )
 
 # Of 20 targets that a pose reaches, from one start and then up to five more; limits as the models'.
@@ -128,8 +128,8 @@ def test_rotations_count_by_lever_and_reach(chain_of_joints, machine, rng):
         Target(pose.positions[2] + 1.0, pose.rotations[2], 2, 2.0),
     ]
     q = model.random(rng)
-    mechanism, goal, posture, _ = machine(model, q, targets)
-    goal[:, 7] = [t.weight for t in targets]
+    mechanism, goal, data, _ = machine(model, q, targets)
+    goal["weight"] = [t.weight for t in targets]
     here, lever = forward_kinematics(model, q), LEVER * mechanism.reach
     total = largest = furthest = nearness = 0.0
     for e, (position, turn, joint, weight) in enumerate(targets):
@@ -139,11 +139,11 @@ def test_rotations_count_by_lever_and_reach(chain_of_joints, machine, rng):
         total += weight * (way**2 + lever**2 * (3.0 - np.trace(matrices[0].T @ matrices[1])))
         largest, furthest = max(largest, angle), max(furthest, way)
         nearness += way + lever * angle
-        turned = rotation.multiply(wrong_turn(mechanism, goal, posture, e), here.rotations[joint])
+        turned = rotation.multiply(rotation_error(mechanism, goal, data, e), here.rotations[joint])
         assert rotation.angle(turned, turn) < 1e-13
-    assert misfit(mechanism, goal, posture) == pytest.approx(total, rel=1e-13)
-    assert turn_weight(mechanism) == pytest.approx(0.5 * lever**2, rel=1e-15)
-    found = residuals(mechanism, goal, posture)
+    assert cost(mechanism, goal, data) == pytest.approx(total, rel=1e-13)
+    assert rotation_weight(mechanism) == pytest.approx(0.5 * lever**2, rel=1e-15)
+    found = residuals(mechanism, goal, data)
     np.testing.assert_allclose(found, [furthest, largest, nearness], rtol=1e-13, atol=0)
 
 

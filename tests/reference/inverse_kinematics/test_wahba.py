@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 
 from reference import rotation
 from reference.inverse_kinematics.wahba import (
-    LEAST_TURN,
-    NOTHING,
+    LEAST_ROTATION,
+    ZERO_MATRIX,
     add_outer,
-    add_turn,
+    add_rotation,
+    alignment,
     best_angle,
     best_rotation,
     magnitude,
-    turn_value,
 )
 
 # Sums of nine products, an eigenvector of a 4 x 4 matrix: a few dozen roundings of M's size.
@@ -33,7 +33,7 @@ def best(M):
 
 def outer(weights, ends, arms):
     """Return M of weighted arms and ends, as the kernels add it up."""
-    M = NOTHING
+    M = ZERO_MATRIX
     for weight, b, a in zip(weights, ends, arms, strict=True):
         M = add_outer(M, weight, tuple(b), tuple(a))
     return M
@@ -51,7 +51,7 @@ def value(M, S):
 
 def test_outer_products_and_turns_are_added_by_weight(rng):
     b, a, R = rng.standard_normal(3), rng.standard_normal(3), rotation.random(rng)
-    M = add_turn(add_outer(NOTHING, 2.0, tuple(b), tuple(a)), 3.0, tuple(R))
+    M = add_rotation(add_outer(ZERO_MATRIX, 2.0, tuple(b), tuple(a)), 3.0, tuple(R))
     expected = 2.0 * np.outer(b, a) + 3.0 * rotation.to_matrix(R)
     np.testing.assert_allclose(np.reshape(M, (3, 3)), expected, rtol=0, atol=ROUNDING)
     assert magnitude(M) == pytest.approx(np.linalg.norm(expected), rel=ROUNDING)
@@ -59,7 +59,7 @@ def test_outer_products_and_turns_are_added_by_weight(rng):
 
 @given(M=matrices, S=turns)
 def test_the_value_of_a_turn_is_the_trace_with_its_matrix(M, S):
-    assert turn_value(M, tuple(S)) == pytest.approx(value(M, S), abs=ROUNDING)
+    assert alignment(M, tuple(S)) == pytest.approx(value(M, S), abs=ROUNDING)
 
 
 @given(M=matrices)
@@ -75,7 +75,7 @@ def test_no_rotation_is_better_than_the_best(M):
     assert np.linalg.norm(S) == pytest.approx(1.0, abs=ROUNDING)
     assert S[0] >= 0.0
     size = np.abs(M).sum()
-    assert value(M, S) >= largest_value(M) - (4.0 * LEAST_TURN + ROUNDING) * size
+    assert value(M, S) >= largest_value(M) - (4.0 * LEAST_ROTATION + ROUNDING) * size
 
 
 @given(M=matrices)
@@ -94,7 +94,7 @@ def test_noisy_arms_are_fitted_as_by_singular_values(seed, count):
     sign = np.sign(np.linalg.det(U @ Vt))
     kabsch = rotation.from_matrix(U @ np.diag([1.0, 1.0, sign]) @ Vt)
     # The least turn shifts the optimum by its share of M over the curvature there.
-    allowed = 10.0 * LEAST_TURN * np.abs(M).sum() / (s[1] + sign * s[2])
+    allowed = 10.0 * LEAST_ROTATION * np.abs(M).sum() / (s[1] + sign * s[2])
     assert rotation.angle(best(M), kabsch) <= allowed + ROUNDING
 
 
@@ -115,7 +115,7 @@ def test_arms_on_one_line_take_the_least_turn(a, b, lengths):
 
 
 def test_nothing_to_fit_is_no_turn():
-    assert (best(NOTHING) == rotation.identity()).all()
+    assert (best(ZERO_MATRIX) == rotation.identity()).all()
 
 
 @given(M=matrices, axis=axes)

@@ -16,18 +16,18 @@ from reference import (
     rotation,
     solve_ik,
 )
+from reference.inverse_kinematics.box_step import (
+    damped_step,
+    linearise_task,
+    solve_damped,
+    take_step,
+    transposed_step,
+    wrap,
+)
 from reference.inverse_kinematics.damped_least_squares import DAMPING
 from reference.inverse_kinematics.levenberg_marquardt import DAMPING as OF_POSITIONS
 from reference.inverse_kinematics.levenberg_marquardt import DAMPING_OF_POSES
 from reference.inverse_kinematics.mechanism import LEVER
-from reference.inverse_kinematics.stacked import (
-    damped_step,
-    linearise_all,
-    same_turn,
-    solve_damped,
-    take_step,
-    transposed_step,
-)
 from reference.jacobians import integrate, jacobian
 
 # A dozen products and sums of numbers of order one to ten.
@@ -83,12 +83,12 @@ def freedoms_on_the_way(model, joints):
 @given(**TREES)
 def test_errors_and_rows_are_those_of_the_jacobians(problem, machine, on_the_way, kinds, seed):
     model, q, targets = problem(kinds, seed)
-    mechanism, goal, posture, room = machine(model, q, targets)
-    linearise_all(mechanism, goal, posture, room.stack)
+    mechanism, goal, data, room = machine(model, q, targets)
+    linearise_task(mechanism, goal, data, room.system)
     e, J = stacked(model, q, targets, mechanism.reach)
     own = freedoms_on_the_way(model, on_the_way(model, targets))
-    np.testing.assert_allclose(room.stack.e, e, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(room.stack.J, J[:, own].T, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(room.system.e, e, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(room.system.J, J[:, own].T, rtol=0, atol=ROUNDING)
     others = np.setdiff1d(np.arange(model.freedom_count), own)
     assert not J[:, others].any()  # whoever is left out moves no effector
 
@@ -101,10 +101,10 @@ def test_a_follower_of_another_kind_adds_to_its_leader_s_row(machine):
         mimics={1: Mimic(0, 0.3, 0.1), 3: Mimic(2, -2.0)},
     )  # fmt: skip
     q, targets = np.array([0.4, -0.3]), [Target([1.0, 2.0, 0.5], rotation.identity(), 4)]
-    mechanism, goal, posture, room = machine(model, q, targets)
-    linearise_all(mechanism, goal, posture, room.stack)
+    mechanism, goal, data, room = machine(model, q, targets)
+    linearise_task(mechanism, goal, data, room.system)
     _, J = stacked(model, q, targets, mechanism.reach)
-    np.testing.assert_allclose(room.stack.J, J.T, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(room.system.J, J.T, rtol=0, atol=ROUNDING)
 
 
 def damped(J, e, damping):
@@ -186,50 +186,50 @@ def bounds(model, q, reach):
 
 
 def test_a_held_step_is_the_least_squares_solution_within_the_limits(rng, machine, chain_of_joints):
-    held = 0
+    active = 0
     for _ in range(60):
-        model, _, _, (mechanism, goal, posture, room) = limited(rng, machine, chain_of_joints)
-        own = posture.q.copy()
-        linearise_all(mechanism, goal, posture, room.stack)
-        J, e = room.stack.J.T.copy(), room.stack.e.copy()
+        model, _, _, (mechanism, goal, data, room) = limited(rng, machine, chain_of_joints)
+        own = data.q.copy()
+        linearise_task(mechanism, goal, data, room.system)
+        J, e = room.system.J.T.copy(), room.system.e.copy()
         damping = 0.1 * mechanism.reach**2
-        damped_step(mechanism, posture, room.stack, damping)
+        damped_step(mechanism, data, room.system, damping)
         lower, upper = bounds(model, own, mechanism.reach)
         system = np.vstack([J, np.sqrt(damping) * np.eye(len(own))])
         wanted = np.concatenate([e, np.zeros(len(own))])
         best = lsq_linear(system, wanted, (lower, upper + 1e-15), tol=1e-14)
-        step = room.stack.step
+        step = room.system.step
         assert (step >= lower - ROUNDING).all()
         assert (step <= upper + ROUNDING).all()
         cost = 0.5 * np.sum((system @ step - wanted) ** 2)
         assert cost == pytest.approx(best.cost, rel=1e-9)
-        held += np.count_nonzero(room.stack.held)
-    assert held > 100
+        active += np.count_nonzero(room.system.active)
+    assert active > 100
 
 
 def test_a_transposed_step_leaves_out_what_limits_stop(rng, machine, chain_of_joints):
     for _ in range(20):
-        _, _, _, (mechanism, goal, posture, room) = limited(rng, machine, chain_of_joints)
-        joints = mechanism.joints.numbers
-        posture.q[:] = np.where(rng.random(len(posture.q)) < 0.5, joints[:, 10], joints[:, 11])
-        linearise_all(mechanism, goal, posture, room.stack)
-        J, e = room.stack.J.T.copy(), room.stack.e.copy()
-        transposed_step(mechanism, posture, room.stack)
+        _, _, _, (mechanism, goal, data, room) = limited(rng, machine, chain_of_joints)
+        joints = mechanism.joints
+        data.q[:] = np.where(rng.random(len(data.q)) < 0.5, joints["lower"], joints["upper"])
+        linearise_task(mechanism, goal, data, room.system)
+        J, e = room.system.J.T.copy(), room.system.e.copy()
+        transposed_step(mechanism, data, room.system)
         g = J.T @ e
-        free = np.where(posture.q == joints[:, 10], g > 0.0, g < 0.0)
+        free = np.where(data.q == joints["lower"], g > 0.0, g < 0.0)
         expected = np.zeros(len(g))
         expected[free] = transposed(J[:, free], e, None, None)
-        np.testing.assert_allclose(room.stack.step, expected, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(room.system.step, expected, rtol=0, atol=ROUNDING)
 
 
 def test_steps_end_within_the_limits(rng, machine, chain_of_joints):
     for _ in range(20):
-        model, _, _, (mechanism, goal, posture, room) = limited(rng, machine, chain_of_joints)
-        linearise_all(mechanism, goal, posture, room.stack)
-        damped_step(mechanism, posture, room.stack, 1e-6)
-        take_step(mechanism, posture, room.stack)
-        assert (posture.q >= mechanism.joints.numbers[:, 10]).all()
-        assert (posture.q <= mechanism.joints.numbers[:, 11]).all()
+        model, _, _, (mechanism, goal, data, room) = limited(rng, machine, chain_of_joints)
+        linearise_task(mechanism, goal, data, room.system)
+        damped_step(mechanism, data, room.system, 1e-6)
+        take_step(mechanism, data, room.system)
+        assert (data.q >= mechanism.joints["lower"]).all()
+        assert (data.q <= mechanism.joints["upper"]).all()
 
 
 @pytest.mark.parametrize("solver", STEPS)
@@ -254,7 +254,9 @@ def test_beyond_its_limits_a_hinge_takes_the_nearest_angle_of_the_same_turn(lowe
     )
     joints = machine(arm, arm.neutral(), [Target(np.ones(3), effector=1)]).mechanism.joints
     for angle in np.linspace(-20.0, 20.0, 101):
-        same = same_turn(joints, 0, angle)
+        q = np.array([angle])
+        wrap(joints, 0, q)
+        same = q[0]
         rounds = (same - angle) / (2.0 * np.pi)
         assert rounds == pytest.approx(np.round(rounds), abs=1e-12)
         assert lower <= same <= upper
@@ -274,18 +276,18 @@ def test_a_singular_system_has_a_finite_answer(chain_of_joints, machine, rng, ra
     for _ in range(20):
         model = chain_of_joints("ball", rng, links=3)
         target = Target([1.0, 2.0, 3.0], rotation.identity(), 3)
-        stack = machine(model, model.random(rng), [target]).room.stack
+        system = machine(model, model.random(rng), [target]).room.system
         span = rng.standard_normal((rank, 6))
-        stack.J[:] = rng.standard_normal((len(stack.J), rank)) @ span
-        stack.e[:] = rng.standard_normal(rank) @ span
-        stack.held[:] = 0.0
+        system.J[:] = rng.standard_normal((len(system.J), rank)) @ span
+        system.e[:] = rng.standard_normal(rank) @ span
+        system.active[:] = 0.0
         if rank == 0 and damping == 0.0:
             continue
-        solve_damped(stack, damping)
-        assert np.isfinite(stack.z).all()
+        solve_damped(system, damping)
+        assert np.isfinite(system.z).all()
         if rank and damping < 1e-11:
-            moved = stack.J.T @ (stack.J @ stack.z)
-            np.testing.assert_allclose(moved, stack.e, rtol=0, atol=1e-5)
+            moved = system.J.T @ (system.J @ system.z)
+            np.testing.assert_allclose(moved, system.e, rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])

@@ -1,0 +1,266 @@
+"""Steps of the Jacobian methods within the limits of hinges and slides, by an active set.
+
+The damped step J' (J J' + damping 1)^-1 e needs a matrix of the size of e only, however many joints
+there are. A freedom that a limit stops is active: the others are asked again without it.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arguments import FloatArray
+from ..articulation import BALL, FREE, HINGE, SLIDE, clamp_joint
+from ..jacobians import move_joint
+from ..quaternion import normalised
+from .jacobian import ROUNDING
+from .joint_updates import ball_at, put_ball
+from .mechanism import update_forward_kinematics
+from .task_jacobian import clear, fill_errors, fill_jacobian
+
+WHOLE_TURN = 2.0 * math.pi
+
+
+class TaskSystem(NamedTuple):
+    """The linear system of a task, and a step.
+
+    Attributes:
+        e: errors [m], (equation,).
+        J: the Jacobian transposed, see `task_jacobian.py`, (freedom, equation).
+        A: J J' + damping and then its factors, (equation, equation).
+        z: A^-1 e, (equation,).
+        step: of the freedoms, lengths over the reach, (freedom,).
+        active: 1 where the upper limit stops a freedom, -1 where the lower does, else 0,
+            (freedom,).
+    """
+
+    e: FloatArray
+    J: FloatArray
+    A: FloatArray
+    z: FloatArray
+    step: FloatArray
+    active: FloatArray
+
+
+def new_task_system(mechanism):
+    """Return a system to be filled."""
+    m, n = mechanism.equations, mechanism.freedoms
+    return TaskSystem(
+        np.empty(m), np.empty((n, m)), np.empty((m, m)), np.empty(m), np.empty(n), np.empty(n)
+    )
+
+
+def linearise_task(mechanism, target, data, system):
+    """Fill errors and Jacobian of a configuration."""
+    fill_errors(mechanism, target, data, system.e)
+    fill_jacobian(mechanism, target, data, system.J)
+
+
+def damped_step(mechanism, data, system, damping):
+    """Fill the step that minimises |e - J q|^2 + damping |q|^2 within the limits.
+
+    A freedom that the step would take beyond its limit becomes active: it goes to the limit, what
+    that does is taken from e, and the others are asked again. One that would then rather step back
+    is released.
+    """
+    clear(system.active)
+    clear(system.step)
+    any_active = False
+    for _ in range(2 * len(system.step) + 1):
+        solve_damped(system, damping)
+        for k in range(len(system.step)):
+            if system.active[k] == 0.0:
+                system.step[k] = inner(system.J[k], system.z)
+        if activate_limits(mechanism, data, system):
+            any_active = True
+        elif not (any_active and release(system)):
+            return
+
+
+def activate_limits(mechanism, data, system):
+    """Make the freedoms active that the step takes beyond a limit; return whether there are any."""
+    joints, any_active = mechanism.joints, False
+    for j in range(len(joints)):
+        k = joints["freedom"][j]
+        if not has_bounds(joints, j) or system.active[k] != 0.0:
+            continue
+        q, scale = data.q[joints["coordinate"][j]], freedom_scale(mechanism, j)
+        wanted = q + scale * system.step[k]
+        bounded = min(max(wanted, joints["lower"][j]), joints["upper"][j])
+        if bounded != wanted and not turns_round(joints, j):
+            system.active[k] = 1.0 if wanted > bounded else -1.0
+            system.step[k] = (bounded - q) / scale
+            for i in range(len(system.e)):
+                system.e[i] -= system.step[k] * system.J[k, i]
+            any_active = True
+    return any_active
+
+
+def release(system):
+    """Release the active freedom that would most step back from its limit; return whether any.
+
+    With z = (e - J q) / damping, a freedom k that is free steps J_k z.
+    """
+    worst, most = -1, 0.0
+    for k in range(len(system.step)):
+        if system.active[k] != 0.0:
+            back = system.active[k] * (system.step[k] - inner(system.J[k], system.z))
+            if back > most:
+                worst, most = k, back
+    if worst < 0:
+        return False
+    system.active[worst] = 0.0
+    for i in range(len(system.e)):
+        system.e[i] += system.step[worst] * system.J[worst, i]
+    return True
+
+
+def transposed_step(mechanism, data, system):
+    """Fill the step a J' e, a = <e, J J' e> / |J J' e|^2, without what limits stop."""
+    clear(system.active)
+    for _ in range(len(system.step) + 1):
+        square, moved = along_gradient(system)
+        for k in range(len(system.step)):
+            if system.active[k] == 0.0 and moved > 0.0:
+                system.step[k] *= square / moved
+            else:
+                system.step[k] = 0.0
+        if not stop_at_limits(mechanism, data, system):
+            return
+
+
+def along_gradient(system):
+    """Fill the step J' e and z = J J' e over the freedoms not active; return <e, z> and |z|^2."""
+    clear(system.z)
+    for k in range(len(system.step)):
+        if system.active[k] == 0.0:
+            system.step[k] = inner(system.J[k], system.e)
+            for i in range(len(system.z)):
+                system.z[i] += system.step[k] * system.J[k, i]
+    return inner(system.e, system.z), squared(system.z)
+
+
+def stop_at_limits(mechanism, data, system):
+    """Make the freedoms active that the step takes away from a limit; return whether any are."""
+    joints, any_active = mechanism.joints, False
+    for j in range(len(joints)):
+        k = joints["freedom"][j]
+        if has_bounds(joints, j) and system.active[k] == 0.0:
+            q, step = data.q[joints["coordinate"][j]], system.step[k]
+            beyond = q >= joints["upper"][j] if step > 0.0 else q <= joints["lower"][j]
+            if beyond and step != 0.0:
+                system.active[k] = 1.0
+                any_active = True
+    return any_active
+
+
+def freedom_scale(mechanism, j):
+    """Return what a unit of a hinge's or slide's freedom stands for: 1 rad, or the reach [m]."""
+    return mechanism.reach if mechanism.joints["kind"][j] == SLIDE else 1.0
+
+
+def has_bounds(joints, j):
+    """Return whether a joint is a hinge or slide that moves by itself."""
+    return joints["kind"][j] in (HINGE, SLIDE) and joints["leader"][j] == j
+
+
+def solve_damped(system, damping):
+    """Fill z of (J J' + damping 1) z = e over the freedoms that are not active."""
+    m = len(system.e)
+    if m == 6:  # the compiler lays out what is of known size
+        fill_matrix(system, damping, 6)
+        solve(system, 6)
+    elif m == 3:
+        fill_matrix(system, damping, 3)
+        solve(system, 3)
+    else:
+        fill_matrix(system, damping, m)
+        solve(system, m)
+
+
+def fill_matrix(system, damping, m):
+    """Fill the lower triangle of A = J J' + damping 1, (m, m), over the freedoms not active.
+
+    The damping is held above rounding, so that A has factors even where J J' is singular.
+    """
+    A, J = system.A, system.J
+    for i in range(m):
+        for j in range(i + 1):
+            A[i, j] = 0.0
+    for k in range(len(J)):
+        if system.active[k] == 0.0:
+            for i in range(m):
+                for j in range(i + 1):
+                    A[i, j] += J[k, i] * J[k, j]
+    for i in range(m):
+        damping += ROUNDING * A[i, i]
+    for i in range(m):
+        A[i, i] += damping
+
+
+def solve(system, m):
+    """Fill z of A z = e by the factors L D L', which overwrite A; 1/D comes on the diagonal."""
+    A, z = system.A, system.z
+    for i in range(m):
+        z[i] = system.e[i]
+        for j in range(i):
+            s = A[i, j]
+            for k in range(j):
+                s -= A[i, k] * A[j, k]
+            A[i, j] = s
+        for j in range(i):
+            s = A[i, j] * A[j, j]
+            A[i, i] -= s * A[i, j]
+            A[i, j] = s
+            z[i] -= s * z[j]
+        A[i, i] = 1.0 / A[i, i]
+    for i in range(m - 1, -1, -1):
+        z[i] *= A[i, i]
+        for j in range(i + 1, m):
+            z[i] -= A[j, i] * z[j]
+
+
+def squared(v):
+    """Return the sum of the squares of an array's entries."""
+    return inner(v, v)
+
+
+def inner(a, b):
+    """Return the scalar product of two rows."""
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+def take_step(mechanism, data, system):
+    """Change the coordinates by the step, within the limits; the step is left in rad and m."""
+    joints, q, step = mechanism.joints, data.q, system.step
+    for j in range(len(joints)):
+        kind, k = joints["kind"][j], joints["freedom"][j]
+        if joints["leader"][j] == j:
+            for i in range(3 if kind == FREE else 1 if kind == SLIDE else 0):
+                step[k + i] *= mechanism.reach
+            move_joint(joints, j, step, q)
+            if kind in (BALL, FREE):
+                put_ball(joints, q, j, normalised(ball_at(joints, q, j)))
+            elif turns_round(joints, j):
+                wrap(joints, j, q)
+            clamp_joint(joints, j, q)
+    update_forward_kinematics(mechanism, data)
+
+
+def turns_round(joints, j):
+    """Return whether a hinge's limits leave a whole turn, so that none of them need stop it."""
+    span = joints["upper"][j] - joints["lower"][j]
+    return joints["kind"][j] == HINGE and span >= WHOLE_TURN and not joints["followed"][j]
+
+
+def wrap(joints, j, q):
+    """Bring a hinge's coordinate within its limits by whole turns, as few as do."""
+    at = joints["coordinate"][j]
+    lower, upper = joints["lower"][j], joints["upper"][j]
+    if q[at] > upper:
+        q[at] -= WHOLE_TURN * math.ceil((q[at] - upper) / WHOLE_TURN)
+    elif q[at] < lower:
+        q[at] += WHOLE_TURN * math.ceil((lower - q[at]) / WHOLE_TURN)
