@@ -83,16 +83,65 @@ def compile_kernel(kernel: Kernel, relaxed: bool = False) -> Kernel:
     return _jit(kernel, True, relaxed)
 
 
+class Slot:
+    """A name that a kernel calls and that `bind` gives a kernel: `update = Slot("update")`."""
+
+    def __init__(self, name: str):
+        self.name = name
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Raise a ValueError, for nothing has been bound."""
+        raise ValueError(f"{self.name}: expected a kernel bound to this slot, got none")
+
+    def __repr__(self) -> str:
+        return f"Slot({self.name!r})"
+
+
 def bind(kernel: Kernel, **callees: Kernel) -> Kernel:
     """Return a kernel that calls other kernels under the given names: one loop, many solvers.
 
+    A slot of a given name is filled wherever the kernel, or one that it calls, has it.
+
     Raises:
-        ValueError: if the kernel does not name one of them, or has a closure.
+        ValueError: if the kernel names one of them nowhere, or has a closure.
     """
+    slots = _slots(kernel, set())
     for name in callees:
-        if name not in kernel.__code__.co_names:
+        if name not in slots and name not in kernel.__code__.co_names:
             raise ValueError(f"callees: expected names that {kernel.__name__} calls, got {name!r}")
-    return _rebuild(kernel, kernel.__globals__ | callees)
+    filled = _fill_slots(kernel, callees, {})
+    return _rebuild(filled, filled.__globals__ | callees)
+
+
+def _callees(kernel: Kernel) -> list[tuple[str, Kernel]]:
+    """Return the plain functions that a kernel calls, itself left out."""
+    return [
+        (name, value)
+        for name, value in _named_globals(kernel)
+        if isinstance(value, types.FunctionType) and value is not kernel
+    ]
+
+
+def _slots(kernel: Kernel, seen: set[Kernel]) -> set[str]:
+    """Return the names of the slots of a kernel and of all that it calls."""
+    seen.add(kernel)
+    found = {name for name, value in _named_globals(kernel) if isinstance(value, Slot)}
+    for _, callee in _callees(kernel):
+        if callee not in seen:
+            found |= _slots(callee, seen)
+    return found
+
+
+def _fill_slots(kernel: Kernel, callees: dict[str, Kernel], made: dict[Kernel, Kernel]) -> Kernel:
+    """Return a kernel rebuilt if it, or one that it calls, has slots of these names."""
+    if kernel not in made:
+        changed = {name: _fill_slots(value, callees, made) for name, value in _callees(kernel)}
+        changed = {k: v for k, v in changed.items() if v is not kernel.__globals__[k]}
+        for name, value in _named_globals(kernel):
+            if isinstance(value, Slot) and name in callees:
+                changed[name] = callees[name]
+        made[kernel] = _rebuild(kernel, kernel.__globals__ | changed) if changed else kernel
+    return made[kernel]
 
 
 def compiled_in(module: str) -> Callable[[Kernel], Kernel]:
@@ -125,11 +174,10 @@ def _jit(kernel: Kernel, cache: bool, relaxed: bool) -> Kernel:
     """
     import numba
 
-    callees = {
-        name: _callee(value, relaxed)
-        for name, value in _named_globals(kernel)
-        if isinstance(value, types.FunctionType) and value is not kernel
-    }
+    for _, value in _named_globals(kernel):
+        if isinstance(value, Slot):
+            value()
+    callees = {name: _callee(value, relaxed) for name, value in _callees(kernel)}
     rebuilt = _rebuild(kernel, kernel.__globals__ | callees)
     rebuilt.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{'_relaxed' * relaxed}"
     options: dict[str, Any] = {
@@ -158,11 +206,7 @@ def allocates(kernel: Kernel) -> bool:
     """
     names = {name for code in _codes(kernel.__code__) for name in code.co_names}
     return bool(ALLOCATING & names) or any(
-        allocates(value)
-        for _, value in _named_globals(kernel)
-        if isinstance(value, types.FunctionType)
-        and value is not kernel
-        and not hasattr(value, "compiled_in")
+        allocates(value) for _, value in _callees(kernel) if not hasattr(value, "compiled_in")
     )
 
 
