@@ -45,7 +45,8 @@ class Prepared(NamedTuple):
         mechanism: what moves the effectors.
         restarts: the mechanism's coordinates in random poses, (restart, coordinate).
         tips: where these put the effectors, positions [m] and rotations, (restart, effector, 7).
-        flat: joints of the articulation and mechanism, one array or number after the other.
+        flat: joints of the articulation and mechanism, one array or number after the other, and
+            the two above.
     """
 
     mechanism: Mechanism
@@ -68,10 +69,9 @@ def prepare(
         poses = _random_poses(articulation, restarts, seed)
         x, R = articulation.forward(poses)
         tips = np.concatenate([x, R], axis=-1)[:, list(effectors)]
-        articulation.mechanisms[key] = Prepared(
-            mechanism, np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(tips),
-            (*articulation.arrays, *mechanism.joints, *mechanism[1:]),
-        )  # fmt: skip
+        drawn = np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(tips)
+        flat = (*articulation.arrays, *mechanism.joints, *mechanism[1:], *drawn)
+        articulation.mechanisms[key] = Prepared(mechanism, *drawn, flat)
     return articulation.mechanisms[key]
 
 

@@ -1,6 +1,5 @@
 """Solvers, mechanisms and targets for the inverse kinematics tests."""
 
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from reference import (
 )
 from reference.inverse_kinematics.mechanism import new_posture, place, take_coordinates
 from reference.inverse_kinematics.reduce import prepare
+from reference.inverse_kinematics.solve_mechanism import Workspace
 from reference.inverse_kinematics.stacked import new_stack
 
 
@@ -114,9 +114,7 @@ def machine_of(model, q, targets):
     take_coordinates(mechanism, np.array(q), posture.q)
     place(mechanism, posture)
     count = len(mechanism.joints.integers)
-    room = SimpleNamespace(
-        stack=new_stack(mechanism), wishes=np.empty((count, 4)), eigen=np.empty((2, 4, 4))
-    )
+    room = Workspace(new_stack(mechanism), np.empty((count, 4)), np.empty((2, 4, 4)))
     return Machine(mechanism, goal, posture, room)
 
 
