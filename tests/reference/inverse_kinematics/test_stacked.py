@@ -307,7 +307,7 @@ def test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly(rng, size, spee
 def test_huge_and_tiny_weights_do_no_harm(chain_of_joints, rng, solver, speed):
     model = chain_of_joints("ball", rng)
     goal, q = forward_kinematics(model, model.random(rng)), model.random(rng)
-    for weights in ((1e-20, 1e20), (1e20, 1e20), (1e-20, 1e-20), (1e-150, 1e150)):
+    for weights in ((1e-20, 1e20), (1e20, 1e20), (1e-20, 1e-20), (1e-75, 1e75)):
         targets = [
             Target(goal.positions[j], effector=j, weight=weight)
             for j, weight in zip((2, 4), weights, strict=True)
