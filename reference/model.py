@@ -17,7 +17,7 @@ def checked_model(model: Any, argument: str = "skeleton") -> Skeleton | Articula
     Raises:
         ValueError: if it is anything else; it speaks of the argument named.
     """
-    if isinstance(model, Skeleton | Articulation):
+    if isinstance(model, Skeleton) or isinstance(model, Articulation):  # noqa: SIM101, a union is slow
         return model
     from .formats.robot import Robot  # the readers are loaded by whoever has read a robot
 
@@ -50,8 +50,11 @@ def effector_of(model: Skeleton | Articulation, effector: int | str | None) -> i
         return model.index(effector, "effector")
     if isinstance(model, Skeleton):
         return model.joint_count - 1
-    ends = tips(model)
-    if len(ends) > 1:
-        names = ", ".join(model.names[j] for j in ends)
-        raise ValueError(f"effector: expected one of the tips {names}, got none")
-    return ends[0]
+    kept = model.__dict__
+    if "only_tip" not in kept:
+        ends = tips(model)
+        if len(ends) > 1:
+            names = ", ".join(model.names[j] for j in ends)
+            raise ValueError(f"effector: expected one of the tips {names}, got none")
+        kept["only_tip"] = ends[0]
+    return kept["only_tip"]

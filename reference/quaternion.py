@@ -123,12 +123,13 @@ def made_unit(q):
     """Return a quaternion made unit, and whether it was so within 1e-6.
 
     1/|q| is the series of (1 + e)^-1/2 in e = |q|^2 - 1, which for so small an e is exact to
-    rounding with three terms, and needs neither a root nor a division.
+    rounding with three terms, and needs neither a root nor a division. Lengths within t of one
+    have e within 2 t of t^2.
     """
     w, x, y, z = q
-    e = (w * w + x * x) + (y * y + z * z) - 1.0
+    t, e = UNIT_TOLERANCE, (w * w + x * x) + (y * y + z * z) - 1.0
     s = 1.0 - e * (0.5 - e * 0.375)
-    return (s * w, s * x, s * y, s * z), within(e, 2.0 * UNIT_TOLERANCE)
+    return (s * w, s * x, s * y, s * z), within(e - t * t, 2.0 * t)
 
 
 def within(value, bound):

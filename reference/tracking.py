@@ -1,7 +1,8 @@
 """Following a curve: frame by frame, or by a smooth trajectory over all frames."""
 
 from collections.abc import Sequence
-from typing import Any, TypeGuard, cast
+from dataclasses import replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,22 +10,25 @@ from numpy.typing import ArrayLike
 from . import arguments, rotation, trajectory
 from .arguments import FloatArray, IndexArray
 from .articulation import Articulation
-from .inverse_kinematics import (
-    IKSolution,
-    Outcome,
-    Settings,
-    Target,
-    balls,
-    batch_of,
-    checked_settings,
-    default_solver,
-    goals_of,
-    solve_targets,
-)
 from .inverse_kinematics.mechanism import Mechanism, gather
-from .inverse_kinematics.problem import Wanted, check_numbers, checked_targets
+from .inverse_kinematics.problem import (
+    CheckedTarget,
+    IKSolution,
+    Target,
+    are_targets,
+    check_numbers,
+    checked_targets,
+)
 from .inverse_kinematics.reduce import prepare
+from .inverse_kinematics.settings import Settings, checked_settings, default_solver
+from .inverse_kinematics.solve import (
+    balls,
+    batch_shape,
+    solve_checked,
+    target_rows,
+)
 from .model import Model, checked_model
+from .outcome import Outcome
 from .skeleton import Skeleton
 
 # A frame that is nearer to its target than this, over the reach, or than this angle [rad], has met
@@ -88,7 +92,7 @@ def track(
     if arguments.boolean("closed", closed) and not arguments.boolean("coherent", coherent):
         raise ValueError("closed: expected False where coherent is False, got True")
     model = checked_model(skeleton)
-    wanted = _along(model, curve, effector)
+    targets = _along(model, curve, effector)
     if solver is None:
         solver, _ = default_solver(model, curve)
         solver = "ccd" if solver == "fabrik" else solver
@@ -102,39 +106,35 @@ def track(
         record,
         arguments.boolean("warm", warm),
     )
-    motion = _solved(model, _start(model, start), wanted, settings)
+    motion = solve_checked(model, _start(model, start), targets, settings)
     if not coherent:
         return motion
-    q, reached, steps = _smoothed(model, motion, wanted, closed)
-    return _settled(model, motion, wanted, q, reached, steps, settings)
+    q, reached, steps = _smoothed(model, motion, targets, closed)
+    return _settled(model, motion, targets, q, reached, steps, settings)
 
 
 def _along(
     skeleton: Skeleton | Articulation,
     curve: ArrayLike | Target | Sequence[Target],
     effector: int | str | None,
-) -> list[Wanted]:
-    """Return what is wanted of each effector, in so many frames."""
-    if not _has_targets(curve):
+) -> list[CheckedTarget]:
+    """Return the targets of all effectors, in so many frames."""
+    if not (isinstance(curve, Target) or are_targets(curve)):
         curve = arguments.coordinates("curve", cast(ArrayLike, curve), "frame", 3)
-    wanted = checked_targets(skeleton, curve, effector)
-    batch = batch_of((), wanted, "start")
+    targets = checked_targets(skeleton, curve, effector)
+    batch = batch_shape((), targets, "start")
     if len(batch) != 1:
         came = arguments.shape((*batch, 3))
         raise ValueError(f"curve: expected shape (frame, 3), got {came}")
     if batch[0] == 0:
         raise ValueError("curve: expected at least one point, got none")
-    return [_spread(one, *batch) for one in check_numbers(wanted)]
+    return [_spread(one, *batch) for one in check_numbers(targets)]
 
 
-def _has_targets(curve: Any) -> TypeGuard[Target | Sequence[Target]]:
-    several = isinstance(curve, list | tuple) and any(isinstance(one, Target) for one in curve)
-    return isinstance(curve, Target) or several
-
-
-def _spread(one: Wanted, frames: int) -> Wanted:
-    turn = one.rotation if one.rotation is None else arguments.spread(one.rotation, (frames, 4))
-    return one._replace(position=arguments.spread(one.position, (frames, 3)), rotation=turn)
+def _spread(one: CheckedTarget, frames: int) -> CheckedTarget:
+    if one.rotation is not None:
+        one = one._replace(rotation=arguments.spread(one.rotation, (frames, 4)))
+    return one._replace(position=arguments.spread(one.position, (frames, 3)))
 
 
 def _start(skeleton: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
@@ -152,23 +152,16 @@ def _start(skeleton: Skeleton | Articulation, start: ArrayLike | None) -> FloatA
     return given
 
 
-def _solved(
-    skeleton: Skeleton | Articulation,
-    start: FloatArray,
-    wanted: list[Wanted],
-    settings: Settings,
-) -> IKSolution:
-    targets = [Target(one.position, one.rotation, one.joint, one.weight) for one in wanted]
-    return solve_targets(skeleton, start, targets, None, settings)
-
-
 def _smoothed(
-    skeleton: Skeleton | Articulation, motion: IKSolution, wanted: list[Wanted], closed: bool
+    skeleton: Skeleton | Articulation,
+    motion: IKSolution,
+    targets: list[CheckedTarget],
+    closed: bool,
 ) -> tuple[FloatArray, np.ndarray, int]:
     """Return the smooth trajectory, which frames meet their targets, and its Newton steps."""
     articulation = skeleton if isinstance(skeleton, Articulation) else balls(skeleton)
-    effectors = tuple(one.joint for one in wanted)
-    oriented = tuple(one.rotation is not None for one in wanted)
+    effectors = tuple(one.joint for one in targets)
+    oriented = tuple(one.rotation is not None for one in targets)
     mechanism = prepare(articulation, effectors, oriented).mechanism
     columns = _columns(mechanism, articulation.coordinate_count)
     near = np.asarray(motion.residual) <= MET * mechanism.reach
@@ -176,8 +169,8 @@ def _smoothed(
     reached, steps = met | (np.asarray(motion.outcome) == Outcome.CONVERGED), 0
     q = motion.coordinates.reshape(-1, articulation.coordinate_count).copy()
     if mechanism.freedoms:
-        own, goals = np.ascontiguousarray(q[:, columns]), goals_of(wanted, (len(q),))
-        q[:, columns], steps = trajectory.smooth(mechanism, goals, own, reached, closed)
+        own, rows = np.ascontiguousarray(q[:, columns]), target_rows(targets, (len(q),))
+        q[:, columns], steps = trajectory.smooth(mechanism, rows, own, reached, closed)
     return q.reshape(motion.coordinates.shape), reached, steps
 
 
@@ -191,23 +184,24 @@ def _columns(mechanism: Mechanism, count: int) -> IndexArray:
 def _settled(
     skeleton: Skeleton | Articulation,
     motion: IKSolution,
-    wanted: list[Wanted],
+    targets: list[CheckedTarget],
     q: FloatArray,
     reached: np.ndarray,
     steps: int,
     settings: Settings,
 ) -> IKSolution:
     """Return the motion q with its residuals, those of its frames solved again that need it."""
-    alone = settings._replace(chained=False, record=False)
-    still = alone._replace(max_iterations=0, far_iterations=0)
-    last = _solved(skeleton, q, wanted, still)
+    limits = settings.limits._replace(chained=False)
+    unchained = replace(settings, limits=limits, record=False)
+    still = replace(unchained, limits=limits._replace(max_iterations=0, far_iterations=0))
+    last = solve_checked(skeleton, q, targets, still)
     off = np.flatnonzero(reached & (last.outcome != Outcome.CONVERGED))
     iterations = np.asarray(motion.iterations) + steps
     if len(off):
-        again = _solved(skeleton, q[off], [_part(one, off) for one in wanted], alone)
+        again = solve_checked(skeleton, q[off], [_part(one, off) for one in targets], unchained)
         q[off] = again.coordinates
         iterations[off] += again.iterations
-        last = _solved(skeleton, q, wanted, still)
+        last = solve_checked(skeleton, q, targets, still)
     outcome = np.where(reached | (last.outcome == Outcome.CONVERGED), last.outcome, motion.outcome)
     return last._replace(
         iterations=arguments.frozen(iterations),
@@ -216,6 +210,7 @@ def _settled(
     )
 
 
-def _part(one: Wanted, frames: IndexArray) -> Wanted:
-    turn = one.rotation if one.rotation is None else one.rotation[frames]
-    return one._replace(position=one.position[frames], rotation=turn)
+def _part(one: CheckedTarget, frames: IndexArray) -> CheckedTarget:
+    if one.rotation is not None:
+        one = one._replace(rotation=one.rotation[frames])
+    return one._replace(position=one.position[frames])

@@ -22,7 +22,7 @@ from typing import Any
 
 from .. import arguments
 from . import compilation
-from .digest import Kernel, callees, code_objects, digest
+from .digest import Kernel, callees, code_objects, digest, named_globals
 
 SPEEDS = ("compiled", "plain")
 # What a relaxed kernel's compiler may do; infinities and NaN keep their meaning.
@@ -89,16 +89,56 @@ def compile_kernel(kernel: Kernel, relaxed: bool = False, label: str | None = No
     return _entry(kernel, relaxed, label)
 
 
-def bind(kernel: Kernel, **callees: Kernel) -> Kernel:
+class Slot:
+    """A name that a kernel calls and that `bind` gives a kernel: `update = Slot("update")`."""
+
+    def __init__(self, name: str):
+        self.name = name
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Raise a ValueError, for nothing has been bound."""
+        raise ValueError(f"{self.name}: expected a kernel bound to this slot, got none")
+
+    def __repr__(self) -> str:
+        return f"Slot({self.name!r})"
+
+
+def bind(kernel: Kernel, **bound: Kernel) -> Kernel:
     """Return a kernel that calls other kernels under these names, so that solvers share a loop.
 
+    A slot of a given name is filled wherever the kernel, or one that it calls, has it.
+
     Raises:
-        ValueError: if the kernel does not name one of them, or has a closure.
+        ValueError: if the kernel names one of them nowhere, or has a closure.
     """
-    for name in callees:
-        if name not in kernel.__code__.co_names:
+    slots = _slots(kernel, set())
+    for name in bound:
+        if name not in slots and name not in kernel.__code__.co_names:
             raise ValueError(f"callees: expected names that {kernel.__name__} calls, got {name!r}")
-    return _rebuild(kernel, kernel.__globals__ | callees)
+    filled = _fill_slots(kernel, bound, {})
+    return _rebuild(filled, filled.__globals__ | bound)
+
+
+def _slots(kernel: Kernel, seen: set[Kernel]) -> set[str]:
+    """Return the names of the slots of a kernel and of all that it calls."""
+    seen.add(kernel)
+    found = {name for name, value in named_globals(kernel) if isinstance(value, Slot)}
+    for _, callee in callees(kernel):
+        if callee not in seen:
+            found |= _slots(callee, seen)
+    return found
+
+
+def _fill_slots(kernel: Kernel, bound: dict[str, Kernel], made: dict[Kernel, Kernel]) -> Kernel:
+    """Return a kernel rebuilt if it, or one that it calls, has slots of these names."""
+    if kernel not in made:
+        filled = {name: _fill_slots(callee, bound, made) for name, callee in callees(kernel)}
+        changed = {k: v for k, v in filled.items() if v is not kernel.__globals__[k]}
+        for name, value in named_globals(kernel):
+            if isinstance(value, Slot) and name in bound:
+                changed[name] = bound[name]
+        made[kernel] = _rebuild(kernel, kernel.__globals__ | changed) if changed else kernel
+    return made[kernel]
 
 
 def compiled_in(module: str) -> Callable[[Kernel], Kernel]:
@@ -145,6 +185,9 @@ def _callee(kernel: Kernel, relaxed: bool, inline: bool) -> Kernel:
 def _jit(kernel: Kernel, relaxed: bool, **options: Any) -> Kernel:
     import numba
 
+    for _, value in named_globals(kernel):
+        if isinstance(value, Slot):
+            value()
     calls = _calls(kernel)
     compiled_callees = {
         name: _callee(callee, relaxed, calls[name] == 1 or _inlined_size(callee) <= LARGE)

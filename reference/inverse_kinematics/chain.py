@@ -110,13 +110,6 @@ def put_local(chain, path, local):
         put_quaternion(local, path[k], renormalised(q))
 
 
-def copy_pose(chain, other):
-    """Give another chain of the same links the pose of this one."""
-    for k in range(len(chain.positions)):
-        put_vector(other.positions, k, vector_at(chain.positions, k))
-        put_quaternion(other.rotations, k, quaternion_at(chain.rotations, k))
-
-
 def tip_error(chain, target):
     """Return the distance from the effector to the target [m]."""
     return norm(subtract(vector_at(chain.positions, len(chain.lengths)), target))

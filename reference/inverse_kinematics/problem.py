@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeGuard
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
@@ -65,8 +66,8 @@ class IKSolution(NamedTuple):
     excess: float | FloatArray
 
 
-class Wanted(NamedTuple):
-    """A target, checked but for its numbers, which the kernels look at.
+class CheckedTarget(NamedTuple):
+    """A target, checked but for its numbers, which the kernels check.
 
     Attributes:
         joint: the effector's index.
@@ -82,11 +83,9 @@ class Wanted(NamedTuple):
 
 
 def checked_targets(
-    model: Skeleton | Articulation,
-    target: ArrayLike | Target | Sequence[Target],
-    effector: int | str | None,
-) -> list[Wanted]:
-    """Return what is wanted of each effector.
+    model: Skeleton | Articulation, target: Any, effector: int | str | None
+) -> list[CheckedTarget]:
+    """Return the targets of all effectors.
 
     Raises:
         ValueError: if it is no position or target; if there is no such joint, two targets are for
@@ -94,15 +93,15 @@ def checked_targets(
     """
     if isinstance(target, Target):
         return [_checked(model, target, effector)]
-    if not are_targets(target):
-        joint = effector_of(model, effector)
-        return [Wanted(joint, _position(target), None, 1.0)]
-    wanted = [_checked(model, one, effector) for one in target]
-    joints = [one.joint for one in wanted]
+    if isinstance(target, np.ndarray) or not are_targets(target):
+        joint, position = effector_of(model, effector), arguments.floats("target", target, "...", 3)
+        return [CheckedTarget(joint, position, None, 1.0)]
+    targets = [_checked(model, one, effector) for one in target]
+    joints = [one.joint for one in targets]
     if len(set(joints)) < len(joints):
         twice = next(joint for joint in joints if joints.count(joint) > 1)
         raise ValueError(f"target: expected one an effector, got two for joint {twice}")
-    return wanted
+    return targets
 
 
 def are_targets(target: Any) -> TypeGuard[Sequence[Target]]:
@@ -110,7 +109,9 @@ def are_targets(target: Any) -> TypeGuard[Sequence[Target]]:
     return isinstance(target, list | tuple) and any(isinstance(one, Target) for one in target)
 
 
-def _checked(model: Skeleton | Articulation, target: Any, effector: int | str | None) -> Wanted:
+def _checked(
+    model: Skeleton | Articulation, target: Any, effector: int | str | None
+) -> CheckedTarget:
     if not isinstance(target, Target):
         raise ValueError(f"target: expected only Targets beside others, got {target!r:.80}")
     joint = effector_of(model, effector if target.effector is None else target.effector)
@@ -118,28 +119,24 @@ def _checked(model: Skeleton | Articulation, target: Any, effector: int | str | 
         raise ValueError(
             f"effector: expected that of the target, {target.effector!r}, got {effector!r}"
         )
-    turn = target.rotation
-    if turn is not None:
-        turn = arguments.floats("rotation", turn, "...", 4)
+    position = arguments.floats("target", target.position, "...", 3)
+    turned = target.rotation
+    if turned is not None:
+        turned = arguments.floats("rotation", turned, "...", 4)
     weight = arguments.number("weight", target.weight, above=0.0)
-    return Wanted(joint, _position(target.position), turn, weight)
+    return CheckedTarget(joint, position, turned, weight)
 
 
-def _position(value: Any) -> FloatArray:
-    return arguments.floats("target", value, "...", 3)
-
-
-def check_numbers(wanted: list[Wanted]) -> list[Wanted]:
-    """Look at the numbers of what is wanted, where the kernels have found that something is amiss.
-
-    Return the same with unit rotations: their lengths may have been on the edge of the tolerance.
+def check_numbers(targets: list[CheckedTarget]) -> list[CheckedTarget]:
+    """Return the targets with unit rotations, their numbers checked as well.
 
     Raises:
         ValueError: if a position is not finite or too large, or a rotation no unit quaternion.
     """
     checked = []
-    for one in wanted:
+    for one in targets:
         arguments.coordinates("target", one.position, "...", 3)
-        turn = one.rotation if one.rotation is None else rotation.unit("rotation", one.rotation)
-        checked.append(one._replace(rotation=turn))
+        if one.rotation is not None:
+            one = one._replace(rotation=rotation.unit("rotation", one.rotation))
+        checked.append(one)
     return checked

@@ -31,7 +31,8 @@ class Prepared(NamedTuple):
         mechanism: what moves the effectors.
         restarts: the mechanism's coordinates in random poses, (restart, coordinate).
         tips: where these put the effectors, positions [m] and rotations, (restart, effector, 7).
-        flat: joints of the articulation and mechanism, one array or number after the other.
+        flat: joints of the articulation and mechanism, one array or number after the other, and
+            the two above.
     """
 
     mechanism: Mechanism
@@ -56,10 +57,9 @@ def prepare(
         if restarts:  # without, forward kinematics need not be compiled
             x, R = articulation.forward(poses)
             tips = np.concatenate([x, R], axis=-1)[:, list(effectors)]
-        articulation.mechanisms[key] = Prepared(
-            mechanism, np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(tips),
-            (articulation.joints, *mechanism),
-        )  # fmt: skip
+        drawn = np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(tips)
+        flat = (articulation.joints, *mechanism, *drawn)
+        articulation.mechanisms[key] = Prepared(mechanism, *drawn, flat)
     return articulation.mechanisms[key]
 
 

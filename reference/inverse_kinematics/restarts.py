@@ -1,426 +1,210 @@
-"""The loops around a solver's update of a mechanism: one attempt, restarts, and many targets."""
+"""The two loops of every solver: the iterations of one attempt, and attempts from further starts.
+
+A target is solved on a chain of unlimited balls (`solve_chain.py`) or a mechanism
+(`solve_mechanism.py`). What these do differently stands in slots, which one `bind` fills. Their
+`state` holds, beside what they work on:
+
+    saved: configurations, a row an attempt and in the last row the best end of one.
+    progress: (attempt + 1, 6), see the columns below; the last row is not used.
+"""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import LARGEST_COORDINATE, FloatArray, RecordArray
-from ..articulation import (
-    BALL,
-    FREE,
-    HINGE,
-    articulated_pose,
-    clamp_joint,
-    fit_start,
-    joint_transform,
-)
-from ..outcome import Outcome
-from ..quaternion import (
-    angle_between,
-    made_unit,
-    multiply,
-    norm,
-    normalised,
-    put_quaternion,
-    quaternion_at,
-    subtract,
-    turn_about,
-    vector_at,
-)
-from .batch import (
-    EXCESS,
-    ITERATIONS,
-    MERIT,
-    OUTCOME,
-    RESIDUAL,
-    RESIDUAL_ROTATION,
-    put_if_room,
-)
-from .box_step import TaskSystem, new_task_system
-from .chain import BEND, ROUNDING
-from .fabrik import BACKWARD
-from .joint_updates import ball_at, move_by, put_ball
-from .levenberg_marquardt import levenberg_marquardt_update as update  # bound to each solver's
-from .mechanism import (
-    LEVER,
-    Mechanism,
-    gather,
-    least_residual,
-    merit_of,
-    new_data,
-    residuals,
-    scatter,
-    update_forward_kinematics,
-    weighted_square,
-)
+from ..backend.compiled import Slot
+from .result import store_if_inside
 
-# An attempt that others may follow is given up once this many iterations have not brought it this
-# much nearer. If none of the others reaches the target either it goes on, so many times as patient
-# whenever it does.
+# One iteration of a solver: update(state, target).
+update = Slot("update")
+# error(state, target): the largest distance [m] and angle [rad] from effector to target, and the
+# sum of all distances and levered angles [m], which shows progress.
+error = Slot("error")
+# merit(state, target): what says which attempt is better, the less the better [m].
+merit = Slot("merit")
+# perturb(state, target, criteria, first): move the first attempt if it is stuck, and return whether
+# it was; `first` is its row of progress.
+perturb = Slot("perturb")
+# save(state, k) and restore(state, k): the configuration to row k of `saved`, and back.
+save, restore = Slot("save"), Slot("restore")
+# draw(state, target, n): take the configuration of random restart n = 1, 2, ...
+draw = Slot("draw")
+
+# An attempt that others may follow is given up once PATIENCE iterations have not brought the error
+# to this share of what it was. If no other reaches the target it goes on, MORE_PATIENT times as
+# patient each time.
 PATIENCE, PROGRESS, MORE_PATIENT = 3, 0.5, 4
-# One that settles within so few is stuck, such as a straight chain, perhaps folded since, whose
-# target lies on its own line.
-STUCK = 6
 # How an attempt ended: within the tolerances, or of the nearest point that geometry allows; with no
 # more progress; with its iterations used; given up early.
 REACHED, SETTLED, LIMITED, GIVEN_UP = range(4)
-# Columns of Room.progress, (attempt, 6): iterations made, how it ended, its merit [m], 1 where its
-# stuck start has been bent, its patience, and how far the pose it starts from is from the goal [m].
-MADE, STATE, COST, BENT, WAIT, RANK = range(6)
-# Entries of the last row of Room.progress: merit [m] and ending of the best attempt that is
-# finished; how many poses to restart from have been taken; how many attempts' iterations the first
-# one may make.
-BEST_COST, BEST_STATE, TAKEN, PERIODS = range(4)
+# Columns of progress: iterations made, how the attempt ended, its merit [m], its patience, and how
+# far the configuration it starts from is from the target [m].
+MADE, STATE, COST, WAIT, RANK = range(5)
 INFINITY = math.inf
-# A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
-NUDGE_AXIS = (0.48, 0.6, 0.64)
 
 
-class Room(NamedTuple):
-    """Room for a solver.
+class Limits(NamedTuple):
+    """What a solve may leave and take.
 
     Attributes:
-        system: of the Jacobian methods.
-        backward: FABRIK's backward positions, records BACKWARD, (joint,).
-        eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
-        q: coordinates of the mechanism where each attempt is, the first from the start,
-            and in the last row the best end of one, (1 + restart + 1, coordinate).
-        progress: of each attempt and of all, see above, (1 + restart + 1, 6).
-    """
-
-    system: TaskSystem
-    backward: RecordArray
-    eigen: FloatArray
-    q: FloatArray
-    progress: FloatArray
-
-
-class Request(NamedTuple):
-    """What is asked.
-
-    Attributes:
-        goals: of the effectors, records TARGET, (target, effector).
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that does [rad].
         max_iterations: of each attempt.
         far_iterations: the same where geometry proves a target out of reach.
-        restarts: coordinates of the mechanism for further attempts, (restart, coordinate).
-        tips: where they put the effectors, positions [m] and rotations, (restart, effector, 7).
+        restarts: further attempts.
         chained: whether each target but the first starts from the solution before it.
     """
 
-    goals: FloatArray
     tolerance: float
     tolerance_rotation: float
     max_iterations: int
     far_iterations: int
-    restarts: FloatArray
-    tips: FloatArray
+    restarts: int
     chained: bool
 
 
-class Answers(NamedTuple):
-    """What the kernel fills in, a row a target.
+class Criteria(NamedTuple):
+    """When an attempt at one target ends.
 
     Attributes:
-        q: coordinates of the articulation, (target, coordinate).
-        local: local rotations, (target, joint, 4).
-        positions: of all joints [m], (target, joint, 3).
-        figures: see `batch.py`, (target, 6).
-        history: distances before and after each iteration [m], (target, iteration), or (1, 1).
+        distance: at most this far from the target counts as reached [m], some room left for the
+            rounding of the final pose.
+        angle: the same for rotations [rad].
+        margin: an error that changes by no more has settled [m].
+        max_iterations: of each attempt.
     """
 
-    q: FloatArray
-    local: FloatArray
-    positions: FloatArray
-    figures: FloatArray
-    history: FloatArray
+    distance: float
+    angle: float
+    margin: float
+    max_iterations: int
 
 
-def answer_given(
-    joints, own_joints, sources, effectors, moves, adjacent, reach, coordinates, freedoms,
-    equations, starts, goals, tolerance, tolerance_rotation, max_iterations, far_iterations,
-    restarts, restart_tips, chained, q, local, positions, figures, history,
-):  # fmt: skip
-    """Do what `answer_batch` does, called from Python: single arrays come in faster than tuples."""
-    mechanism = Mechanism(
-        own_joints, sources, effectors, moves, adjacent, reach, coordinates, freedoms, equations
+def limits_of(numbers):
+    """Return Limits from their numbers in one array, which comes in faster from Python."""
+    return Limits(
+        numbers[0], numbers[1], int(numbers[2]), int(numbers[3]), int(numbers[4]), numbers[5] > 0.0
     )
-    request = Request(
-        goals, tolerance, tolerance_rotation, max_iterations, far_iterations, restarts,
-        restart_tips, chained,
-    )  # fmt: skip
-    answers = Answers(q, local, positions, figures, history)
-    return answer_batch(joints, mechanism, starts, request, answers)
 
 
-def answer_batch(joints, mechanism, starts, request, answers):
-    """Answer target after target; return whether all starts and goals were fit to compute with.
+def solve_with_restarts(state, target, limits, criteria, history):
+    """Attempt from the start, then from random configurations, until one reaches the target.
 
-    `starts`, (start, coordinate), are used in turn.
-    """
-    data, rotations = new_data(mechanism), np.empty((len(joints), 4))
-    room = new_room(mechanism, len(request.restarts))
-    for i in range(len(request.goals)):
-        q, goal = answers.q[i], request.goals[i]
-        chained = request.chained and i > 0
-        copy_row(answers.q[i - 1] if chained else starts[i % len(starts)], q)
-        if not (fit_start(joints, q) and fit_goal(goal)):
-            return False
-        gather(mechanism, q, data.q)
-        history = answers.history[i % len(answers.history)]
-        least = least_residual(mechanism, goal)
-        iterations, settled = attempts(mechanism, goal, data, room, request, history, least)
-        scatter(mechanism, room.q[-1], q)
-        articulated_pose(joints, q, answers.positions[i], rotations)
-        for j in range(len(joints)):
-            _, Q = joint_transform(joints, j, q)
-            put_quaternion(answers.local[i], j, Q)
-        answers.figures[i, ITERATIONS] = iterations
-        conclude(mechanism, goal, request, answers, i, rotations, least, settled)
-    return True
-
-
-def fit_goal(goal):
-    """Make the rotations of a goal unit; return whether they and all other numbers were fit."""
-    fine = True
-    for e in range(len(goal)):
-        for k in range(3):
-            fine &= abs(goal["position"][e, k]) <= LARGEST_COORDINATE
-        Q, unit = made_unit(quaternion_at(goal["rotation"], e))
-        put_quaternion(goal["rotation"], e, Q)
-        fine &= unit
-    return fine
-
-
-def new_room(mechanism, restarts):
-    """Return room for a solver of a mechanism."""
-    n = len(mechanism.joints)
-    return Room(
-        new_task_system(mechanism), np.empty(n, BACKWARD), np.empty((2, 4, 4)),
-        np.empty((restarts + 2, mechanism.coordinates)), np.empty((restarts + 2, 6)),
-    )  # fmt: skip
-
-
-def attempts(mechanism, goal, data, room, request, history, least):
-    """Attempt from the data, then from the restarts, until one reaches the goal.
-
-    While others may follow an attempt is given up early. If none reaches the goal, all are
+    While others may follow an attempt is given up early. If none reaches the target, all are
     finished, and the first makes as many iterations as all of them may: its ends after one
     attempt's iterations, two and so on count as attempts too. So what restarts give is the best
     of more than one start gives, or fewer restarts, and can be no worse.
 
-    Fills the last row of `room.q` with the coordinates of the best attempt; no pose has a lesser
-    residual than `least` [m].
+    Saves the best attempt in the last row of `state.saved`.
 
     Returns:
         The iterations of all attempts, and whether the best one settled.
     """
-    start_attempts(mechanism, data, room)
-    count = request.far_iterations if least > request.tolerance else request.max_iterations
-    single = len(goal) == 1 and not mechanism.effectors["oriented"][0]
-    nearest = least if single else 0.0
-    done, k, limit = 0, 0, count
+    progress, random = state.progress, len(state.progress) - 2
+    reset(progress)
+    distance, _, _ = error(state, target)
+    store_if_inside(history, 0, distance)
+    perturbed = perturb(state, target, criteria, progress[0])
+    best, ending, done, drawn, periods = INFINITY, LIMITED, 0, 0, 1
+    k, most = 0, criteria.max_iterations
     while k >= 0:
-        update_forward_kinematics(mechanism, data)
-        done += attempt(mechanism, goal, data, room, request, history, done, k, limit, nearest)
-        keep_better(mechanism, goal, data, room, k)
-        k, limit = next_attempt(mechanism, goal, data, room, request, k, count, limit)
-    return done, room.progress[-1, BEST_STATE] <= SETTLED
+        done += solve_once(state, target, criteria, progress[k], most, history, done)
+        if rate(state, target, progress[k], k, best):
+            best, ending = progress[k, COST], int(progress[k, STATE])
+            save(state, len(progress) - 1)
+        if ending == REACHED:
+            break
+        if k == 0 and not perturbed:
+            perturbed = perturb(state, target, criteria, progress[0])
+            if perturbed:
+                continue
+        if drawn < random:
+            drawn += 1
+            k, most = drawn, criteria.max_iterations
+            draw(state, target, drawn)
+            continue
+        k = most_promising(progress)
+        if k < 0 and periods <= limits.restarts and progress[0, STATE] == LIMITED:
+            k, periods = 0, periods + 1
+        if k >= 0:
+            most = periods * criteria.max_iterations
+            restore(state, k)
+    return done, ending <= SETTLED
 
 
-def start_attempts(mechanism, data, room):
-    """Bring the start within its limits, and note that no attempt has been made."""
-    for joint in range(len(mechanism.joints)):
-        clamp_joint(mechanism.joints, joint, data.q)
-    plan, several = room.progress[-1], len(room.progress) > 2
-    plan[BEST_COST], plan[BEST_STATE], plan[TAKEN], plan[PERIODS] = INFINITY, LIMITED, 0.0, 1.0
-    for k in range(len(room.progress) - 1):
-        row = room.progress[k]
-        row[MADE], row[STATE], row[COST], row[BENT] = 0.0, LIMITED, INFINITY, 0.0
-        row[WAIT] = PATIENCE if several else INFINITY
+def new_progress(attempts):
+    """Return rows for the progress of attempts, not filled."""
+    return np.empty((attempts + 1, RANK + 1))
 
 
-def next_attempt(mechanism, goal, data, room, request, k, count, limit):
-    """Give the data the coordinates from which an attempt goes on, after one of k.
+def reset(progress):
+    """Note that no attempt has been made."""
+    for k in range(len(progress) - 1):
+        row = progress[k]
+        row[MADE], row[STATE], row[COST] = 0.0, LIMITED, INFINITY
+        row[WAIT] = PATIENCE if len(progress) > 2 else INFINITY
+
+
+def solve_once(state, target, criteria, attempt, most, history, done):
+    """Update until the target is reached, the error settles, or `most` iterations are made.
+
+    `attempt` is the row of progress, where it is noted how the attempt ends; `done` iterations
+    have been made by all attempts.
 
     Returns:
-        Which attempt, -1 if none, and how many iterations it may have made in the end.
+        The iterations made.
     """
-    plan, first, more = room.progress[-1], room.progress[0], len(request.restarts)
-    if plan[BEST_STATE] == REACHED:
-        return -1, limit
-    if k == 0 and is_stuck(mechanism, first):
-        nudge(mechanism, data)
-        first[BENT] = 1.0
-        return 0, limit
-    if plan[TAKEN] < more:
-        if plan[TAKEN] == 0.0:
-            rank_restarts(mechanism, goal, request, room)
-        take_nearest(request, room, data.q)
-        plan[TAKEN] += 1.0
-        return int(plan[TAKEN]), count
-    again = most_promising(room)
-    if again < 0 and plan[PERIODS] <= more and first[STATE] == LIMITED:
-        again = 0
-        plan[PERIODS] += 1.0
-    if again >= 0:
-        copy_row(room.q[again], data.q)
-    return again, int(plan[PERIODS]) * count
+    distance, angle, total = error(state, target)
+    milestone, since = total, 0
+    first, ending = int(attempt[MADE]), LIMITED
+    made = first
+    while ending == LIMITED:
+        if distance <= criteria.distance and angle <= criteria.angle:
+            ending = REACHED
+        if ending == REACHED or made >= most:
+            break
+        before = total
+        update(state, target)
+        made += 1
+        distance, angle, total = error(state, target)
+        store_if_inside(history, done + made - first, distance)
+        since += 1
+        if total < PROGRESS * milestone:
+            milestone, since = total, 0
+        if abs(before - total) <= criteria.margin:
+            ending = SETTLED
+        elif since >= attempt[WAIT]:
+            ending = GIVEN_UP
+    if ending != LIMITED and distance <= criteria.distance and angle <= criteria.angle:
+        ending = REACHED
+    attempt[MADE], attempt[STATE] = made, ending
+    return made - first
 
 
-def is_stuck(mechanism, row):
-    """Return whether an attempt settled at once, away from its goal, and has not been bent yet."""
-    away = row[COST] > ROUNDING * mechanism.reach
-    return row[STATE] == SETTLED and row[MADE] < STUCK and row[BENT] == 0.0 and away
+def rate(state, target, attempt, k, best):
+    """Save where attempt k is; return whether it is finished and better than the best [m]."""
+    attempt[COST] = merit(state, target)
+    save(state, k)
+    if attempt[STATE] == GIVEN_UP:
+        attempt[WAIT] *= MORE_PATIENT
+        return False
+    return attempt[STATE] == REACHED or attempt[COST] < best
 
 
-def most_promising(room):
+def most_promising(progress):
     """Return the attempt to go on with of those given up, -1 if there is none.
 
     The least patient come first, and among them the one of the least merit.
     """
-    found, row = -1, room.progress[-1]
-    for k in range(len(room.progress) - 1):
-        other = room.progress[k]
+    found, row = -1, progress[-1]
+    for k in range(len(progress) - 1):
+        other = progress[k]
         if other[STATE] == GIVEN_UP:
             sooner = found < 0 or other[WAIT] < row[WAIT]
             if sooner or (other[WAIT] == row[WAIT] and other[COST] < row[COST]):
                 found, row = k, other
     return found
-
-
-def keep_better(mechanism, goal, data, room, k):
-    """Note where an attempt is, and keep it if it is finished and the best so far."""
-    row, plan, cost = room.progress[k], room.progress[-1], merit_of(mechanism, goal, data)
-    row[COST] = cost
-    copy_row(data.q, room.q[k])
-    if row[STATE] == GIVEN_UP:
-        row[WAIT] *= MORE_PATIENT
-    elif row[STATE] == REACHED or cost < plan[BEST_COST]:
-        plan[BEST_COST], plan[BEST_STATE] = cost, row[STATE]
-        copy_row(data.q, room.q[-1])
-
-
-def rank_restarts(mechanism, goal, request, room):
-    """Fill how far the effectors are from the goal [m] in each of the poses to restart from."""
-    lever = LEVER * mechanism.reach
-    for r in range(len(request.restarts)):
-        distance, angle = 0.0, 0.0
-        for e in range(len(goal)):
-            way = subtract(vector_at(goal["position"], e), vector_at(request.tips[r], e))
-            distance = max(distance, norm(way))
-            if mechanism.effectors["oriented"][e]:
-                wanted = quaternion_at(goal["rotation"], e)
-                angle = max(angle, rough_angle(quaternion_at(request.tips[r], e, 3), wanted))
-        room.progress[1 + r, RANK] = distance + lever * angle
-
-
-def rough_angle(a, b):
-    """Return the angle from a to b [rad] by its quarter's sine, at most a tenth too small."""
-    w = abs(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3])
-    return 4.0 * math.sqrt(max(0.5 - 0.5 * w, 0.0))
-
-
-def take_nearest(request, room, q):
-    """Copy the nearest of the poses to restart from that has not yet been taken."""
-    nearest = 0
-    for r in range(1, len(request.restarts)):
-        if room.progress[1 + r, RANK] < room.progress[1 + nearest, RANK]:
-            nearest = r
-    room.progress[1 + nearest, RANK] = INFINITY
-    copy_row(request.restarts[nearest], q)
-
-
-def attempt(mechanism, goal, data, room, request, history, done, k, count, least):
-    """Update a placed data until it reaches its goal, settles, or has had its iterations.
-
-    `done` iterations have been made by all attempts; how this one, k, ends is noted.
-
-    Returns:
-        The iterations made.
-    """
-    distance, angle, total = residuals(mechanism, goal, data)
-    if done == 0 and k == 0:
-        put_if_room(history, 0, distance)
-    milestone, since = total, 0
-    first, state = int(room.progress[k, MADE]), LIMITED
-    made = first
-    while state == LIMITED:
-        if within(mechanism, request, distance, angle, least):
-            state = REACHED
-        if state == REACHED or made >= count:
-            break
-        before = total
-        update(mechanism, goal, data, room)
-        made += 1
-        distance, angle, total = residuals(mechanism, goal, data)
-        put_if_room(history, done + made - first, distance)
-        since += 1
-        if total < PROGRESS * milestone:
-            milestone, since = total, 0
-        if abs(before - total) <= ROUNDING * mechanism.reach:
-            state = REACHED if within(mechanism, request, distance, angle, least) else SETTLED
-        elif since >= room.progress[k, WAIT]:
-            state = REACHED if within(mechanism, request, distance, angle, least) else GIVEN_UP
-    room.progress[k, MADE], room.progress[k, STATE] = made, state
-    return made - first
-
-
-def within(mechanism, request, distance, angle, least):
-    """Return whether the tolerances are kept, with some room for the rounding of another pose.
-
-    A single target out of reach counts as kept within the tolerance of the least distance.
-    """
-    room = min(ROUNDING * mechanism.reach, 0.5 * request.tolerance)
-    angular = min(ROUNDING, 0.5 * request.tolerance_rotation)
-    near = distance <= least + request.tolerance - room
-    return near and angle <= request.tolerance_rotation - angular
-
-
-def nudge(mechanism, data):
-    """Bend a stuck mechanism, always in the same way: every joint by a share of one angle."""
-    joints, q, count = mechanism.joints, data.q, len(mechanism.joints)
-    for j in range(count):
-        kind, angle = joints["kind"][j], BEND / count
-        if joints["leader"][j] != j:
-            continue
-        if kind == HINGE and move_by(joints, q, j, angle) == 0.0:
-            move_by(joints, q, j, -angle)
-        elif kind in (BALL, FREE):
-            turn = turn_about(NUDGE_AXIS, angle)
-            put_ball(joints, q, j, normalised(multiply(ball_at(joints, q, j), turn)))
-            clamp_joint(joints, j, q)
-
-
-def conclude(mechanism, goal, request, answers, i, rotations, least, settled):
-    """Fill residuals, merit and outcome of a target from the pose of all joints."""
-    distance, angle, total = 0.0, 0.0, 0.0
-    for e in range(len(mechanism.effectors)):
-        j, apart, off = mechanism.effectors["source"][e], 0.0, 0.0
-        apart = norm(subtract(vector_at(goal["position"], e), vector_at(answers.positions[i], j)))
-        if mechanism.effectors["oriented"][e]:
-            off = angle_between(quaternion_at(rotations, j), quaternion_at(goal["rotation"], e))
-        distance, angle = max(distance, apart), max(angle, off)
-        total += weighted_square(mechanism, goal["weight"][e], apart, off)
-    figures = answers.figures[i]
-    figures[RESIDUAL], figures[RESIDUAL_ROTATION], figures[MERIT] = (
-        distance,
-        angle,
-        math.sqrt(total),
-    )
-    figures[EXCESS] = max(0.0, distance - least)
-    figures[OUTCOME] = outcome_of(request, distance, angle, least, settled).value
-
-
-def outcome_of(request, distance, angle, least, settled):
-    """Return how a solve ended: UNREACHABLE only where geometry proves it."""
-    if distance <= request.tolerance and angle <= request.tolerance_rotation:
-        return Outcome.CONVERGED
-    if least > request.tolerance:
-        return Outcome.UNREACHABLE if settled else Outcome.UNREACHABLE_UNSETTLED
-    return Outcome.STALLED if settled else Outcome.ITERATION_LIMIT
 
 
 def copy_row(source, target):

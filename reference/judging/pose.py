@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from .. import arguments, rotation
 from ..arguments import FloatArray, frozen
 from ..articulation import Articulation, joint_excess
-from ..inverse_kinematics.problem import Target, Wanted, check_numbers, checked_targets
+from ..inverse_kinematics.problem import CheckedTarget, Target, check_numbers, checked_targets
 from ..kinematics import forward_kinematics
 from ..model import Model, checked_model, coordinates_name
 from ..skeleton import Skeleton
@@ -151,7 +151,7 @@ def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatA
     return unit, worst
 
 
-def _distance(wanted: Wanted, position: FloatArray) -> float:
+def _distance(wanted: CheckedTarget, position: FloatArray) -> float:
     if wanted.position.ndim != 1:
         raise ValueError(
             f"target: expected shape (3,), got {arguments.shape(wanted.position.shape)}"
@@ -159,7 +159,7 @@ def _distance(wanted: Wanted, position: FloatArray) -> float:
     return float(np.linalg.norm(position - wanted.position))
 
 
-def _angle(wanted: Wanted, turn: FloatArray) -> float:
+def _angle(wanted: CheckedTarget, turn: FloatArray) -> float:
     if wanted.rotation is None:
         return 0.0
     if wanted.rotation.ndim != 1:

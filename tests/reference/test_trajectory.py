@@ -22,10 +22,10 @@ from reference import (
     trajectory,
 )
 from reference.articulation import BALL
-from reference.inverse_kinematics import balls, goals_of
 from reference.inverse_kinematics.mechanism import TARGET
 from reference.inverse_kinematics.problem import checked_targets
 from reference.inverse_kinematics.reduce import prepare
+from reference.inverse_kinematics.solve import balls, target_rows
 from reference.jacobians import difference, integrate, jacobian
 from reference.trajectory import riemannian_newton
 from reference.trajectory.augmented_lagrangian import joint_limits
@@ -384,7 +384,7 @@ def problem_of(name, closed, rng, drawn_to=()):
         Target(pose.positions[:, e], pose.rotations[:, e] if oriented else None, e, 1.0 + k)
         for k, e in enumerate(effectors)
     ]
-    goals = goals_of(checked_targets(model, targets, None), (4,))
+    goals = target_rows(checked_targets(model, targets, None), (4,))
     constrained = ~np.isin(np.arange(4), drawn_to)
     goals["position"][~constrained] += 0.1
     mechanism = prepared.mechanism
@@ -446,7 +446,7 @@ def test_no_step_raises_the_cost(monkeypatch, seed):
     """Even from poses that have nothing to do with one another; whole Newton steps would here."""
     curve, frames = curves["heart"](5), 5
     mechanism = prepare(balls(ARM), (4,), (False,)).mechanism
-    goals = goals_of(checked_targets(ARM, curve, -1), (frames,))
+    goals = target_rows(checked_targets(ARM, curve, -1), (frames,))
     problem = new_problem(mechanism, goals, np.ones(frames, dtype=bool), True)
     start = rotation.random(np.random.default_rng(seed), frames, 5)
     q = solve_ik(ARM, start, curve, LM).local_rotations

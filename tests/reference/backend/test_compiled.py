@@ -66,6 +66,38 @@ def test_only_a_name_that_the_kernel_calls_can_be_bound():
         compiled.bind(total, sphere=cube)
 
 
+operation = compiled.Slot("operation")
+
+
+def applied(x):
+    return operation(x)
+
+
+def applied_to_all(x):
+    result = 0.0
+    for i in range(len(x)):
+        result += applied(x[i])
+    return result
+
+
+def test_a_slot_is_filled_in_all_that_a_kernel_calls(speed):
+    cubes = compiled.TwoSpeeds(compiled.bind(applied_to_all, operation=cube))
+    assert cubes(np.arange(3.0)) == 1 + 8
+
+
+def test_slots_are_filled_with_one_kernel_and_with_another(speed):
+    cubes = compiled.TwoSpeeds(compiled.bind(applied_to_all, operation=cube))
+    squares = compiled.TwoSpeeds(compiled.bind(applied_to_all, operation=square))
+    assert (cubes(np.arange(3.0)), squares(np.arange(3.0))) == (9.0, 15.0)
+
+
+def test_an_empty_slot_is_refused():
+    with pytest.raises(ValueError, match="operation: expected a kernel bound to this slot"):
+        applied(1.0)
+    with pytest.raises(ValueError, match="operation: expected a kernel bound to this slot"):
+        compiled.compile_kernel(applied)
+
+
 def test_a_closure_is_refused():
     inner = math.tau
 

@@ -1,6 +1,5 @@
 """Solvers, mechanisms and targets for the inverse kinematics tests."""
 
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from reference.inverse_kinematics.mechanism import (
     update_forward_kinematics,
 )
 from reference.inverse_kinematics.reduce import prepare
+from reference.inverse_kinematics.solve_mechanism import Workspace
 
 
 @pytest.fixture(params=IK_SOLVERS)
@@ -120,11 +120,7 @@ def machine_of(model, q, targets):
     gather(mechanism, np.array(q), data.q)
     update_forward_kinematics(mechanism, data)
     count = len(mechanism.joints)
-    room = SimpleNamespace(
-        system=new_task_system(mechanism),
-        backward=np.empty(count, BACKWARD),
-        eigen=np.empty((2, 4, 4)),
-    )
+    room = Workspace(new_task_system(mechanism), np.empty(count, BACKWARD), np.empty((2, 4, 4)))
     return Machine(mechanism, goal, data, room)
 
 

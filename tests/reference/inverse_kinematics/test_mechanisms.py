@@ -21,7 +21,9 @@ from reference import (
 )
 from reference.arguments import frozen
 from reference.backend.threads import cores
-from reference.inverse_kinematics import checked_settings, solve_targets
+from reference.inverse_kinematics.problem import checked_targets
+from reference.inverse_kinematics.settings import checked_settings
+from reference.inverse_kinematics.solve import solve_checked
 
 # Distances of a few metres over six joints, positions recomputed.
 ROUNDING = 1e-13
@@ -284,8 +286,9 @@ def test_a_batch_on_all_cores_is_the_same_as_on_one(many, rng, solver):
 
 def test_chained_each_target_starts_from_the_last_solution(many, solver, speed):
     model, starts, (near, far) = many
-    chained = checked_settings(solver, 1e-4, 1e-4, 4, 0, 0, False)._replace(chained=True)
-    motion = solve_targets(model, starts[0, 0], [near, far], None, chained)
+    chained = checked_settings(solver, 1e-4, 1e-4, 4, 0, 0, False, True)
+    targets = checked_targets(model, [near, far], None)
+    motion = solve_checked(model, starts[0, 0], targets, chained)
     q = starts[0, 0]
     for i in range(3):
         target = [near._replace(position=near.position[i]), far]

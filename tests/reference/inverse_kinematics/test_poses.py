@@ -14,8 +14,6 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.inverse_kinematics import checked_settings, solve_targets
-from reference.inverse_kinematics.alone import solve_alone
 from reference.inverse_kinematics.mechanism import (
     LEVER,
     cost,
@@ -148,14 +146,20 @@ def test_rotations_count_by_lever_and_reach(chain_of_joints, machine, rng):
 
 
 @pytest.mark.parametrize("change", [lambda x: x, np.array, lambda x: pickle.loads(pickle.dumps(x))])
-def test_a_solve_alone_takes_the_short_way_wherever_its_arrays_come_from(change, articulated):
+def test_a_solve_is_the_same_wherever_its_arrays_come_from(change, articulated):
     """A pickled array has a type of its own, equal to that of others."""
     arm = articulated(["hinge"] * 6, 3)
     pose = forward_kinematics(arm, arm.random(np.random.default_rng(5)))
     target = Target(change(pose.positions[-1]), change(pose.rotations[-1]), arm.names[-1])
-    settings = checked_settings("levenberg_marquardt", 1e-6, 1e-6, 100, 3, 0, False)
+    expected = solve_ik(arm, arm.neutral().tolist(), target, "levenberg_marquardt", restarts=3)
     for one in (target, [target], target._replace(effector=5)):
-        alone = solve_alone(arm, change(arm.neutral()), one, None, settings)
-        usual = solve_targets(arm, arm.neutral(), target, None, settings)
-        assert alone is not None
-        np.testing.assert_array_equal(alone.coordinates, usual.coordinates)
+        found = solve_ik(arm, change(arm.neutral()), one, "levenberg_marquardt", restarts=3)
+        np.testing.assert_array_equal(found.coordinates, expected.coordinates)
+
+
+@pytest.mark.parametrize("weight", [1e80, 0.0, -1.0, np.inf, np.nan])
+def test_one_target_s_weight_is_checked_as_those_of_several(weight, skeleton, local):
+    """Alone it counts for nothing, but it is an argument all the same."""
+    for model, start in ((skeleton, local), (Articulation(skeleton, "hinge"), np.zeros(6))):
+        with pytest.raises(ValueError, match="weight: expected"):
+            solve_ik(model, start, Target(np.ones(3), None, 5, weight), max_iterations=1)

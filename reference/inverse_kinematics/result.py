@@ -1,0 +1,45 @@
+"""What the kernels of inverse kinematics fill, a row a target."""
+
+from typing import NamedTuple
+
+from ..arguments import FloatArray
+from ..outcome import Outcome
+
+# Columns of Result.figures: the largest distance from effector to target [m], the largest angle
+# between them [rad], the number of iterations, the value of the outcome, the merit [m], and the
+# distance above what geometry proves to be the least [m].
+RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME, MERIT, EXCESS = FIGURES = range(6)
+
+
+class Result(NamedTuple):
+    """Poses found and how good they are.
+
+    Attributes:
+        local: local rotations, (target, joint, 4).
+        positions: global positions [m], (target, joint, 3).
+        figures: (target, 6), see above.
+        history: distances before and after each iteration [m], (target, iteration); (1, 1) if they
+            are not to be recorded. Entries after the last iteration are not filled.
+        coordinates: of an articulation, (target, coordinate); of a skeleton its local rotations.
+    """
+
+    local: FloatArray
+    positions: FloatArray
+    figures: FloatArray
+    history: FloatArray
+    coordinates: FloatArray
+
+
+def outcome_of(reached, unreachable, settled):
+    """Return how a solve ended; `unreachable` is whether geometry proves the target to be so."""
+    if reached:
+        return Outcome.CONVERGED
+    if unreachable:
+        return Outcome.UNREACHABLE if settled else Outcome.UNREACHABLE_UNSETTLED
+    return Outcome.STALLED if settled else Outcome.ITERATION_LIMIT
+
+
+def store_if_inside(row, i, value):
+    """Write entry i of a row that has one."""
+    if i < len(row):
+        row[i] = value

@@ -1,0 +1,120 @@
+"""The solvers by name, and the settings of a solve, checked."""
+
+import functools
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import arguments
+from ..arguments import FloatArray
+from ..backend.compiled import TwoSpeeds
+from ..skeleton import Skeleton
+from .ccd import ccd_sweep, ccd_update
+from .damped_least_squares import damped_least_squares_sweep, damped_least_squares_update
+from .fabrik import fabrik_sweep, fabrik_update
+from .jacobian_transpose import jacobian_transpose_sweep, jacobian_transpose_update
+from .levenberg_marquardt import levenberg_marquardt_sweep, levenberg_marquardt_update
+from .problem import Target, are_targets
+from .restarts import Limits
+from .solve_chain import on_chains
+from .solve_mechanism import on_mechanisms
+
+
+class IKSolver(NamedTuple):
+    """A solver's two kernels.
+
+    Attributes:
+        chain: for one position to reach by a chain of unlimited balls.
+        mechanism: for all else.
+    """
+
+    chain: TwoSpeeds
+    mechanism: TwoSpeeds
+
+
+_KERNELS = {
+    "ccd": (ccd_sweep, ccd_update),
+    "fabrik": (fabrik_sweep, fabrik_update),
+    "levenberg_marquardt": (levenberg_marquardt_sweep, levenberg_marquardt_update),
+    "damped_least_squares": (damped_least_squares_sweep, damped_least_squares_update),
+    "jacobian_transpose": (jacobian_transpose_sweep, jacobian_transpose_update),
+}
+IK_SOLVERS = {
+    name: IKSolver(on_chains(name, sweep), on_mechanisms(name, update))
+    for name, (sweep, update) in _KERNELS.items()
+}
+
+# The defaults of `solve_ik`: iterations of an attempt, the same towards a target out of reach, and
+# restarts where the solver is left to us and is not FABRIK.
+MAX_ITERATIONS, FAR_ITERATIONS, RESTARTS = 100, 2000, 20
+# All integers up to this are floats.
+LARGEST_COUNT = 2**53
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a solve, checked.
+
+    Attributes:
+        solver: its kernels.
+        limits: what the solve may leave and take.
+        seed: of the restarts.
+        record: whether to keep the residuals of all iterations.
+    """
+
+    solver: IKSolver
+    limits: Limits
+    seed: int
+    record: bool
+
+    @functools.cached_property
+    def numbers(self) -> FloatArray:
+        """The limits in one array, as kernels take them."""
+        return np.array(self.limits, dtype=np.float64)
+
+
+def default_solver(model: Any, target: Any) -> tuple[str, int]:
+    """Return the solver and the restarts that suit a model and its target."""
+    one = target[0] if are_targets(target) and len(target) == 1 else target
+    several = are_targets(one)
+    posed = isinstance(one, Target) and one.rotation is not None
+    if isinstance(model, Skeleton) and not (several or posed):
+        return "fabrik", 0
+    return "levenberg_marquardt", RESTARTS
+
+
+def checked_settings(*given: Any) -> Settings:
+    """Return the settings, of which the same are often asked for again.
+
+    Raises:
+        ValueError: if one is out of range or unknown.
+    """
+    try:
+        return _known_settings(*given)
+    except TypeError:  # one has no hash, and so is no number or name
+        return _settings(*given)
+
+
+def _settings(
+    solver: Any, tolerance: Any, tolerance_rotation: Any, max_iterations: Any,
+    restarts: Any, seed: Any, record: bool, chained: bool = False,
+) -> Settings:  # fmt: skip
+    near, far = MAX_ITERATIONS, FAR_ITERATIONS
+    if max_iterations is not None:
+        most = arguments.integer("max_iterations", max_iterations, least=0)
+        near = far = min(most, LARGEST_COUNT)
+    kernels = IK_SOLVERS[arguments.choice("solver", solver, IK_SOLVERS)]
+    limits = Limits(
+        arguments.number("tolerance", tolerance, least=0.0),
+        arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
+        near,
+        far,
+        arguments.integer("restarts", restarts, least=0),
+        chained,
+    )
+    seed = arguments.integer("seed", seed, least=0)
+    return Settings(kernels, limits, seed, arguments.boolean("record", record))
+
+
+_known_settings = functools.lru_cache(maxsize=64, typed=True)(_settings)
