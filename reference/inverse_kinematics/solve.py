@@ -158,13 +158,10 @@ def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> FloatAr
     count, heaviest = len(targets), max([one.weight for one in targets])
     rows = np.empty((*batch, count, 8))
     for e, one in enumerate(targets):
-        row = rows[..., e, :] if batch else rows[e]
-        if one.rotation is None:
-            row[..., ROTATION:WEIGHT] = IDENTITY
-        else:
-            row[..., ROTATION:WEIGHT] = one.rotation
-        row[..., :ROTATION] = one.position
-        row[..., WEIGHT] = one.weight / heaviest
+        turned = IDENTITY if one.rotation is None else one.rotation
+        rows[..., e, :ROTATION] = one.position
+        rows[..., e, ROTATION:WEIGHT] = turned
+        rows[..., e, WEIGHT] = one.weight / heaviest
     return rows.reshape(-1, count, 8)
 
 
