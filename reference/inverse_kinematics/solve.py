@@ -212,6 +212,18 @@ def _solution(result: Result, batch: tuple[int, ...], settings: Settings) -> IKS
         history = _repeated(history, figures[:, ITERATIONS].astype(np.int64))
     if batch:
         return _solutions(result._replace(history=history), batch, settings)
+    shown = frozen(history[0]) if settings.record else NO_HISTORY
+    return single_solution(local, positions, figures, shown, coordinates)
+
+
+def single_solution(
+    local: FloatArray,
+    positions: FloatArray,
+    figures: FloatArray,
+    history: FloatArray,
+    coordinates: FloatArray,
+) -> IKSolution:
+    """Return the solution of one target from the rows of one that a kernel has filled in."""
     shown, shown_positions = local[0], positions[0]
     shown.setflags(False)  # by its name it takes twice as long
     shown_positions.setflags(False)
@@ -221,9 +233,8 @@ def _solution(result: Result, batch: tuple[int, ...], settings: Settings) -> IKS
         shown_coordinates.setflags(False)
     residual, angle, iterations, outcome, merit, excess = figures.tolist()[0]
     return IKSolution(
-        shown, shown_positions, residual, int(iterations), OUTCOMES[outcome],
-        frozen(history[0]) if settings.record else NO_HISTORY, angle, shown_coordinates, merit,
-        excess,
+        shown, shown_positions, residual, int(iterations), OUTCOMES[outcome], history, angle,
+        shown_coordinates, merit, excess,
     )  # fmt: skip
 
 
@@ -287,7 +298,7 @@ def _restarted(
 def _chosen(better: np.ndarray, one: Any, other: Any) -> Any:
     """Return rows of the other where it is better, read-only; a history is joined elsewhere."""
     one, other = np.asarray(one), np.asarray(other)
-    if one.shape != other.shape:
+    if one.shape != other.shape or not one.size:
         return one
     where = better.reshape(better.shape + (1,) * (one.ndim - better.ndim))
     return frozen(np.where(where, other, one))
