@@ -18,25 +18,25 @@ from numpy.typing import ArrayLike
 
 from . import arguments, rotation
 from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray, RecordArray, frozen
-from .backend.compiled import TwoSpeeds
+from .backend.compiled import Kernel
 from .quaternion import (
     IDENTITY,
     add,
     dot,
     exponential,
     half_turn,
+    load_quaternion,
+    load_vector,
     logarithm,
     made_unit,
     multiply,
     normalised,
     perpendicular,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
     rotate,
     scale,
+    store_quaternion,
+    store_vector,
     turn_about,
-    vector_at,
 )
 from .skeleton import Skeleton, checked_skeleton
 
@@ -346,14 +346,14 @@ def one_batch(values: np.ndarray, axes: int = 1) -> np.ndarray:
 
 def joint_transform(joints, j, q):
     """Return a joint's position and rotation in its parent's frame."""
-    x, R = vector_at(joints["offset"], j), quaternion_at(joints["frame"], j)
+    x, R = load_vector(joints["offset"], j), load_quaternion(joints["frame"], j)
     kind, at = joints["kind"][j], joints["coordinate"][j]
     if kind == HINGE:
         angle = joints["multiplier"][j] * q[at] + joints["shift"][j]
-        R = rotated_by_half(R, quaternion_at(joints["turned"], j), half_turn(angle))
+        R = rotated_by_half(R, load_quaternion(joints["turned"], j), half_turn(angle))
     elif kind == SLIDE:
         distance = joints["multiplier"][j] * q[at] + joints["shift"][j]
-        x = add(x, rotate(R, scale(distance, vector_at(joints["axis"], j))))
+        x = add(x, rotate(R, scale(distance, load_vector(joints["axis"], j))))
     elif kind == BALL:
         R = multiply(R, (q[at], q[at + 1], q[at + 2], q[at + 3]))
     elif kind == FREE:
@@ -418,7 +418,7 @@ def clamp_joint(joints, j, q):
     elif kind == BALL:
         Q = (q[at], q[at + 1], q[at + 2], q[at + 3])
         bounds = joints["lower"][j], joints["upper"][j], joints["cone"][j]
-        w, x, y, z = clamp_ball(Q, vector_at(joints["axis"], j), *bounds)
+        w, x, y, z = clamp_ball(Q, load_vector(joints["axis"], j), *bounds)
         q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
 
 
@@ -431,7 +431,7 @@ def joint_excess(joints, j, q):
         return max(joints["lower"][j] - q[at], q[at] - joints["upper"][j], 0.0)
     if kind == BALL:
         swing, twist = swing_twist(
-            (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints["axis"], j)
+            (q[at], q[at + 1], q[at + 2], q[at + 3]), load_vector(joints["axis"], j)
         )
         tilt = logarithm(swing)
         over = math.sqrt(dot(tilt, tilt)) - joints["cone"][j]
@@ -462,11 +462,11 @@ def articulated_pose(joints, q, positions, rotations):
     for j in range(len(joints)):
         x, R = joint_transform(joints, j, q)
         if joints["parent"][j] >= 0:
-            R_parent = quaternion_at(rotations, joints["parent"][j])
-            x = add(vector_at(positions, joints["parent"][j]), rotate(R_parent, x))
+            R_parent = load_quaternion(rotations, joints["parent"][j])
+            x = add(load_vector(positions, joints["parent"][j]), rotate(R_parent, x))
             R = multiply(R_parent, R)
-        put_vector(positions, j, x)
-        put_quaternion(rotations, j, R)
+        store_vector(positions, j, x)
+        store_quaternion(rotations, j, R)
 
 
 def _clamp_batch(joints, q):
@@ -486,8 +486,8 @@ def _locals_batch(joints, q, offsets, rotations):
     for i in range(len(q)):
         for j in range(len(joints)):
             x, R = joint_transform(joints, j, q[i])
-            put_vector(offsets[i], j, x)
-            put_quaternion(rotations[i], j, R)
+            store_vector(offsets[i], j, x)
+            store_quaternion(rotations[i], j, R)
 
 
 def _forward_batch(joints, q, positions, rotations):
@@ -495,10 +495,10 @@ def _forward_batch(joints, q, positions, rotations):
         articulated_pose(joints, q[i], positions[i], rotations[i])
 
 
-_clamp = TwoSpeeds(_clamp_batch)
-_excess = TwoSpeeds(_excess_batch)
-_locals = TwoSpeeds(_locals_batch)
-_forward = TwoSpeeds(_forward_batch, label="forward_kinematics of articulations")
+_clamp = Kernel(_clamp_batch)
+_excess = Kernel(_excess_batch)
+_locals = Kernel(_locals_batch)
+_forward = Kernel(_forward_batch, label="forward_kinematics of articulations")
 
 
 def _checked_kinds(kinds: str | Sequence[str], count: int) -> tuple[str, ...]:

@@ -21,16 +21,16 @@ from .articulation import (
     articulated_pose,
     one_batch,
 )
-from .backend.compiled import TwoSpeeds
+from .backend.compiled import Kernel
 from .model import Model, checked_model, effector_of
 from .motion_subspace import accumulate, motion, velocity_at
 from .quaternion import (
     conjugate,
     exponential,
+    load_vector,
     logarithm,
     multiply,
     subtract,
-    vector_at,
 )
 from .skeleton import Skeleton
 
@@ -105,9 +105,9 @@ def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
 
 def fill_jacobian(joints, effector, positions, rotations, J):
     """Fill the Jacobian (6, freedom) of a joint, given every joint's pose; J must hold zeros."""
-    x, j = vector_at(positions, effector), effector
+    x, j = load_vector(positions, effector), effector
     while j >= 0:
-        arm = subtract(x, vector_at(positions, j))
+        arm = subtract(x, load_vector(positions, j))
         for i in range(FREEDOMS[joints["kind"][j]]):
             angular, linear = motion(joints, j, i, rotations, 1.0)
             column = J[:, joints["freedom"][j] + i]
@@ -180,9 +180,9 @@ def _difference_batch(joints, q1, q0, v):
             joint_difference(joints, j, q1[i], q0[i], v[i])
 
 
-_fill = TwoSpeeds(_jacobians_batch, label="jacobian")
-_integrate = TwoSpeeds(_integrate_batch)
-_difference = TwoSpeeds(_difference_batch)
+_fill = Kernel(_jacobians_batch, label="jacobian")
+_integrate = Kernel(_integrate_batch)
+_difference = Kernel(_difference_batch)
 
 
 def _jacobians(model: Articulation, effectors: np.ndarray, q: FloatArray) -> FloatArray:

@@ -5,22 +5,22 @@ it: the motion subspace of the joint (Featherstone 2008), in the axes of the wor
 """
 
 from .articulation import FREE, HINGE, SLIDE
-from .quaternion import add, cross, multiply, quaternion_at, rotate, scale, vector_at
+from .quaternion import add, cross, load_quaternion, load_vector, multiply, rotate, scale
 
 ZERO = (0.0, 0.0, 0.0)
 
 
 def axis_of(joints, j, R):
     """Return a joint's axis in the world, R its rotation there."""
-    return rotate(R, vector_at(joints["axis"], j))
+    return rotate(R, load_vector(joints["axis"], j))
 
 
 def frame_of(joints, j, rotations):
     """Return the rotation in the world that a joint has where its coordinates are zero."""
-    frame = quaternion_at(joints["frame"], j)
+    frame = load_quaternion(joints["frame"], j)
     if joints["parent"][j] < 0:
         return frame
-    return multiply(quaternion_at(rotations, joints["parent"][j]), frame)
+    return multiply(load_quaternion(rotations, joints["parent"][j]), frame)
 
 
 def motion(joints, j, i, rotations, length):
@@ -33,7 +33,7 @@ def motion(joints, j, i, rotations, length):
         rotations: of all joints in the world, (joint, 4).
         length: that a translation's unit stands for [m].
     """
-    kind, R = joints["kind"][j], quaternion_at(rotations, j)
+    kind, R = joints["kind"][j], load_quaternion(rotations, j)
     if kind in (HINGE, SLIDE):
         unit = length if joints["kind"][joints["leader"][j]] == SLIDE else 1.0
         axis = scale(joints["multiplier"][j] * unit, axis_of(joints, j, R))

@@ -26,7 +26,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, boolean, choice, coordinates, instance, number
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 from ..backend.partition import Regions
 from ..backend.threads import in_slices
 from ..mass_spring import (
@@ -41,7 +41,7 @@ from ..mass_spring import (
 from ..springs import blocks
 from .terms import (
     EPS,
-    ROUNDING,
+    SUM_ROUNDING,
     blend_dampers,
     evaluate_objective,
     evaluate_regions,
@@ -98,7 +98,7 @@ class Iterate:
     @property
     def finite(self) -> bool:
         """Whether g, its gradient and the terms of the floor are finite."""
-        terms = self.floor_bound / ROUNDING
+        terms = self.floor_bound / SUM_ROUNDING
         return math.isfinite(self.value + self.gradient_norm + terms * terms)
 
     @property
@@ -109,7 +109,7 @@ class Iterate:
     @property
     def at_rest(self) -> bool:
         """Whether the gradient is within EPS of its terms, as at the floats next to a minimiser."""
-        return self.within(EPS / ROUNDING)
+        return self.within(EPS / SUM_ROUNDING)
 
     def within(self, share: float) -> bool:
         """Return whether the norm of the gradient is at most `share` times the floor."""
@@ -343,9 +343,9 @@ def _evaluate_in_parallel(
     return gradient, *_join(x, h, constant, *elastic, pinned, regions, gradient, sums)
 
 
-_evaluate = TwoSpeeds(evaluate_objective, label="the objective of implicit Euler")
-_regions = TwoSpeeds(evaluate_regions)
-_join = TwoSpeeds(join_regions)
-_rounding_bounds = TwoSpeeds(rounding_bounds)
-_rounding_coefficients = TwoSpeeds(rounding_coefficients)
-_blend = TwoSpeeds(blend_dampers)
+_evaluate = Kernel(evaluate_objective, label="the objective of implicit Euler")
+_regions = Kernel(evaluate_regions)
+_join = Kernel(join_regions)
+_rounding_bounds = Kernel(rounding_bounds)
+_rounding_coefficients = Kernel(rounding_coefficients)
+_blend = Kernel(blend_dampers)

@@ -8,12 +8,12 @@ import math
 import numpy as np
 from numpy import uint64 as at
 
-from ..quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
+from ..quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 from ..springs import spring_frame, spring_stretch
 
 # Bound on the rounding error of the gradient, relative to the norm of the terms that it sums.
 EPS = float(np.finfo(float).eps)
-ROUNDING = 64 * EPS
+SUM_ROUNDING = 64 * EPS
 # Covers the rounding error of the upper bound of the floor itself.
 MARGIN = 1.000001
 
@@ -100,10 +100,10 @@ def add_particles(x, y, external, hh, masses, first, last, gradient):
     """
     value, largest = 0.0, 0.0
     for i in range(first, last):
-        x_i, f = vector_at(x, i), scale(hh, vector_at(external, i))
-        away = subtract(x_i, vector_at(y, i))
+        x_i, f = load_vector(x, i), scale(hh, load_vector(external, i))
+        away = subtract(x_i, load_vector(y, i))
         inertia = scale(masses[i], away)
-        put_vector(gradient, i, subtract(inertia, f))
+        store_vector(gradient, i, subtract(inertia, f))
         value += 0.5 * dot(inertia, away) - dot(f, x_i)
         largest = max(largest, dot(x_i, x_i))
     return value, largest
@@ -114,8 +114,8 @@ def add_spring(x, i, j, k, rest_length, tension_only, gradient):
     length, u = spring_frame(x, i, j)
     stretch = spring_stretch(length, rest_length, tension_only)
     pull = scale(k * stretch, u)
-    put_vector(gradient, i, add(vector_at(gradient, i), pull))
-    put_vector(gradient, j, subtract(vector_at(gradient, j), pull))
+    store_vector(gradient, i, add(load_vector(gradient, i), pull))
+    store_vector(gradient, j, subtract(load_vector(gradient, j), pull))
     return 0.5 * k * stretch * stretch
 
 
@@ -123,9 +123,9 @@ def zero_pins(pinned, gradient):
     """Set the gradient at the pins to zero; return its norm."""
     squares = 0.0
     for p in pinned:
-        put_vector(gradient, p, (0.0, 0.0, 0.0))
+        store_vector(gradient, p, (0.0, 0.0, 0.0))
     for i in range(len(gradient)):
-        squares += dot(vector_at(gradient, i), vector_at(gradient, i))
+        squares += dot(load_vector(gradient, i), load_vector(gradient, i))
     return math.sqrt(squares)
 
 
@@ -135,7 +135,11 @@ def rounding_bounds(
     """Return upper bounds of the rounding errors of |grad g| and of g."""
     size, reach, value_size, squares = np.empty(len(x)), np.empty(len(x)), 0.0, 0.0
     for i in range(len(x)):
-        x_i, y_i, pull = vector_at(x, i), vector_at(y, i), h * h * norm(vector_at(external, i))
+        x_i, y_i, pull = (
+            load_vector(x, i),
+            load_vector(y, i),
+            h * h * norm(load_vector(external, i)),
+        )
         away = subtract(x_i, y_i)
         reach[i] = norm(x_i)
         size[i] = masses[i] * (reach[i] + norm(y_i)) + pull
@@ -152,7 +156,7 @@ def rounding_bounds(
         size[p] = 0.0
     for i in range(len(x)):
         squares += size[i] * size[i]
-    return ROUNDING * math.sqrt(squares), ROUNDING * value_size
+    return SUM_ROUNDING * math.sqrt(squares), SUM_ROUNDING * value_size
 
 
 def rounding_coefficients(y, external, h, masses, spring_sums, free):
@@ -163,9 +167,9 @@ def rounding_coefficients(y, external, h, masses, spring_sums, free):
     a, b = 0.0, 0.0
     for i in range(len(y)):
         if free[i]:
-            pull = norm(vector_at(external, i)) + spring_sums[i, 0]
-            constant = masses[i] * norm(vector_at(y, i)) + h * h * pull
+            pull = norm(load_vector(external, i)) + spring_sums[i, 0]
+            constant = masses[i] * norm(load_vector(y, i)) + h * h * pull
             slope = masses[i] + h * h * spring_sums[i, 1]
             a += constant * constant
             b += slope * slope
-    return MARGIN * ROUNDING * math.sqrt(a), MARGIN * ROUNDING * math.sqrt(b)
+    return MARGIN * SUM_ROUNDING * math.sqrt(a), MARGIN * SUM_ROUNDING * math.sqrt(b)

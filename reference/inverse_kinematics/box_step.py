@@ -13,7 +13,7 @@ from ..arguments import FloatArray
 from ..articulation import BALL, FREE, HINGE, SLIDE, clamp_joint
 from ..jacobians import move_joint
 from ..quaternion import normalised
-from .jacobian import ROUNDING
+from .jacobian import LEAST_DAMPING
 from .joint_updates import ball_at, put_ball
 from .mechanism import update_forward_kinematics
 from .task_jacobian import clear, fill_errors, fill_jacobian
@@ -193,7 +193,7 @@ def fill_matrix(system, damping, m):
                 for j in range(i + 1):
                     A[i, j] += J[k, i] * J[k, j]
     for i in range(m):
-        damping += ROUNDING * A[i, i]
+        damping += LEAST_DAMPING * A[i, i]
     for i in range(m):
         A[i, i] += damping
 

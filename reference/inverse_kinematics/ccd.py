@@ -10,15 +10,15 @@ from ..quaternion import (
     between,
     conjugate,
     dot,
+    load_quaternion,
+    load_vector,
     multiply,
-    put_quaternion,
-    quaternion_at,
     renormalised,
     rotate,
     scale,
+    store_quaternion,
     subtract,
     turn_about,
-    vector_at,
 )
 from .box_step import freedom_scale, inner, linearise_task, squared
 from .chain import place_joints
@@ -47,16 +47,16 @@ def ccd_sweep(chain, target):
     down, each to its joint and to all below it.
     """
     n = len(chain.lengths)
-    effector = vector_at(chain.positions, n)
+    effector = load_vector(chain.positions, n)
     for k in range(n - 1, -1, -1):
-        joint = vector_at(chain.positions, k)
+        joint = load_vector(chain.positions, k)
         Q, effector = pointing(joint, effector, target)
-        put_quaternion(chain.turns, k, Q)
+        store_quaternion(chain.turns, k, Q)
     above = IDENTITY
     for k in range(n):
-        above = renormalised(multiply(above, quaternion_at(chain.turns, k)))
-        R = quaternion_at(chain.rotations, k)
-        put_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
+        above = renormalised(multiply(above, load_quaternion(chain.turns, k)))
+        R = load_quaternion(chain.rotations, k)
+        store_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
     place_joints(chain)
 
 
@@ -92,7 +92,7 @@ def ccd_update(mechanism, target, data, work):
 def update_joint(mechanism, target, data, work, j):
     """Give one joint its best coordinates; the effectors follow, the joints below do not yet."""
     joints, q, kind = mechanism.joints, data.q, mechanism.joints["kind"][j]
-    axis = axis_of(joints, j, quaternion_at(data.rotations, j))
+    axis = axis_of(joints, j, load_quaternion(data.rotations, j))
     if kind == SLIDE:
         distance = move_by(joints, q, j, dot(axis, mean_error(mechanism, target, data, j)))
         translate_effectors(mechanism, data, j, scale(distance, axis))
@@ -112,12 +112,12 @@ def update_joint(mechanism, target, data, work, j):
 
 def attitude_profile(mechanism, target, data, j):
     """Return Wahba's M of the arms from joint j to the effectors below, and of their rotations."""
-    M, x = ZERO_MATRIX, vector_at(data.positions, j)
+    M, x = ZERO_MATRIX, load_vector(data.positions, j)
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
             weight = target["weight"][e]
             arm = subtract(effector_position(mechanism, data, e), x)
-            M = add_outer(M, weight, subtract(vector_at(target["position"], e), x), arm)
+            M = add_outer(M, weight, subtract(load_vector(target["position"], e), x), arm)
             if mechanism.effectors["oriented"][e]:
                 error = rotation_error(mechanism, target, data, e)
                 M = add_rotation(M, weight * rotation_weight(mechanism), error)
@@ -137,7 +137,7 @@ def mean_error(mechanism, target, data, j):
 
 def rotate_within_limits(mechanism, target, data, work, j, M):
     """Rotate a ball or free joint as is best within its limits; return the rotation made."""
-    joints, R = mechanism.joints, quaternion_at(data.rotations, j)
+    joints, R = mechanism.joints, load_quaternion(data.rotations, j)
     Q = unlimited_rotation(mechanism, target, data, work, j, M)
     before = ball_at(joints, data.q, j)
     moved = rotate_to(joints, data.q, j, frame_of(joints, j, data.rotations), multiply(Q, R))
@@ -153,9 +153,9 @@ def unlimited_rotation(mechanism, target, data, work, j, M):
     e = only_position(mechanism, j)
     if e < 0:
         return best_rotation(M, work.eigen[0], work.eigen[1])
-    x = vector_at(data.positions, j)
+    x = load_vector(data.positions, j)
     arm = subtract(effector_position(mechanism, data, e), x)
-    return between(arm, subtract(vector_at(target["position"], e), x))
+    return between(arm, subtract(load_vector(target["position"], e), x))
 
 
 def only_position(mechanism, j):
@@ -171,7 +171,7 @@ def only_position(mechanism, j):
 
 def rotate_effectors(mechanism, data, j, Q):
     """Rotate the effectors below joint j about it."""
-    x = vector_at(data.positions, j)
+    x = load_vector(data.positions, j)
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
             arm = subtract(effector_position(mechanism, data, e), x)

@@ -15,17 +15,17 @@ from ..quaternion import (
     between,
     conjugate,
     dot,
+    load_quaternion,
+    load_vector,
     multiply,
     norm,
     normalised,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
     rotate,
     scale,
+    store_quaternion,
+    store_vector,
     subtract,
     turn_about,
-    vector_at,
 )
 from .chain import in_hole, out_of_reach, root_distance
 from .joint_updates import move_by, rotate_to, translate_free
@@ -54,20 +54,20 @@ def fabrik_sweep(chain, target):
 
 def reach_backward(chain, target):
     """Put the effector on the target and pull the joints after it, up to the root."""
-    put_vector(chain.positions, len(chain.lengths), target)
+    store_vector(chain.positions, len(chain.lengths), target)
     for k in range(len(chain.lengths) - 1, -1, -1):
-        after = vector_at(chain.positions, k + 1)
-        point = point_towards(after, vector_at(chain.positions, k), chain.lengths[k])
-        put_vector(chain.positions, k, point)
+        after = load_vector(chain.positions, k + 1)
+        point = point_towards(after, load_vector(chain.positions, k), chain.lengths[k])
+        store_vector(chain.positions, k, point)
 
 
 def reach_forward(chain):
     """Put the root back and pull the joints after it, down to the effector."""
-    put_vector(chain.positions, 0, vector_at(chain.offsets, 0))
+    store_vector(chain.positions, 0, load_vector(chain.offsets, 0))
     for k in range(len(chain.lengths)):
-        before = vector_at(chain.positions, k)
-        point = point_towards(before, vector_at(chain.positions, k + 1), chain.lengths[k])
-        put_vector(chain.positions, k + 1, point)
+        before = load_vector(chain.positions, k)
+        point = point_towards(before, load_vector(chain.positions, k + 1), chain.lengths[k])
+        store_vector(chain.positions, k + 1, point)
 
 
 def lay_on_line(chain, target, others):
@@ -76,14 +76,14 @@ def lay_on_line(chain, target, others):
     Beyond reach all point at the target; nearer than the longest link allows all others
     fold back, and the effector comes to rest on the inner radius.
     """
-    root = vector_at(chain.positions, 0)
+    root = load_vector(chain.positions, 0)
     direction = subtract(point_towards(root, target, 1.0), root)
     found = False
     for k in range(len(chain.lengths)):
         longest = chain.lengths[k] == chain.longest and not found
         found |= longest
         step = scale(chain.lengths[k] if longest else others * chain.lengths[k], direction)
-        put_vector(chain.positions, k + 1, add(vector_at(chain.positions, k), step))
+        store_vector(chain.positions, k + 1, add(load_vector(chain.positions, k), step))
 
 
 def point_towards(start, end, length):
@@ -112,7 +112,7 @@ def backward_pass(mechanism, target, data, backward):
     """
     parents = mechanism.joints["parent"]
     for j in range(len(backward)):
-        put_vector(backward["position"], j, ZERO)
+        store_vector(backward["position"], j, ZERO)
         backward["weight"][j] = 0.0
     for e in range(len(mechanism.effectors)):
         j = mechanism.effectors["joint"][e]
@@ -122,28 +122,30 @@ def backward_pass(mechanism, target, data, backward):
     for j in range(len(backward) - 1, -1, -1):
         weight = backward["weight"][j]
         if weight > 0.0:
-            x = scale(1.0 / weight, vector_at(backward["position"], j))
-            put_vector(backward["position"], j, x)
+            x = scale(1.0 / weight, load_vector(backward["position"], j))
+            store_vector(backward["position"], j, x)
             if parents[j] >= 0:
-                x_parent = vector_at(data.positions, parents[j])
-                length = norm(subtract(vector_at(data.positions, j), x_parent))
+                x_parent = load_vector(data.positions, parents[j])
+                length = norm(subtract(load_vector(data.positions, j), x_parent))
                 add_backward(backward, parents[j], weight, point_towards(x, x_parent, length))
 
 
 def backward_from_target(mechanism, target, data, e, j):
     """Return where the joint of an effector would be with the effector on its target [m]."""
-    x = vector_at(target["position"], e)
-    arm = vector_at(mechanism.effectors["position"], e)
+    x = load_vector(target["position"], e)
+    arm = load_vector(mechanism.effectors["position"], e)
     if mechanism.effectors["oriented"][e]:
-        R = quaternion_at(mechanism.effectors["rotation"], e)
-        R_joint = multiply(quaternion_at(target["rotation"], e), conjugate(R))
+        R = load_quaternion(mechanism.effectors["rotation"], e)
+        R_joint = multiply(load_quaternion(target["rotation"], e), conjugate(R))
         return subtract(x, rotate(R_joint, arm))
-    return point_towards(x, vector_at(data.positions, j), norm(arm))
+    return point_towards(x, load_vector(data.positions, j), norm(arm))
 
 
 def add_backward(backward, j, weight, x):
     """Add a weighted position to the sum of those for a joint."""
-    put_vector(backward["position"], j, add(vector_at(backward["position"], j), scale(weight, x)))
+    store_vector(
+        backward["position"], j, add(load_vector(backward["position"], j), scale(weight, x))
+    )
     backward["weight"][j] += weight
 
 
@@ -155,18 +157,18 @@ def put_joint(joints, data, backward, j):
     x, R = joint_transform(joints, j, data.q)
     parent = joints["parent"][j]
     if parent >= 0:
-        R_parent = quaternion_at(data.rotations, parent)
-        x = add(vector_at(data.positions, parent), rotate(R_parent, x))
+        R_parent = load_quaternion(data.rotations, parent)
+        x = add(load_vector(data.positions, parent), rotate(R_parent, x))
         R = multiply(R_parent, R)
-    put_vector(data.positions, j, x)
+    store_vector(data.positions, j, x)
     if joints["kind"][j] != BALL or backward["weight"][j] == 0.0:
-        put_quaternion(data.rotations, j, R)
+        store_quaternion(data.rotations, j, R)
 
 
 def forward_joint(mechanism, target, data, work, j):
     """Move one joint, its parent in place, to bring its children nearest to backward positions."""
     joints, q, kind = mechanism.joints, data.q, mechanism.joints["kind"][j]
-    R, x = quaternion_at(data.rotations, j), vector_at(data.positions, j)
+    R, x = load_quaternion(data.rotations, j), load_vector(data.positions, j)
     if kind == FREE and work.backward["weight"][j] > 0.0:
         forward_free(mechanism, target, data, work, j)
         return
@@ -175,7 +177,7 @@ def forward_joint(mechanism, target, data, work, j):
         axis = axis_of(joints, j, R)
         distance = dot(axis, mean_displacement(mechanism, target, data, work.backward, j))
         x = add(x, scale(move_by(joints, q, j, distance), axis))
-    put_vector(data.positions, j, x)
+    store_vector(data.positions, j, x)
     if kind == HINGE and leads:
         axis = axis_of(joints, j, R)
         angle = best_angle(attitude_profile(mechanism, target, data, work.backward, j), axis)
@@ -183,7 +185,7 @@ def forward_joint(mechanism, target, data, work, j):
     elif kind == BALL and work.backward["weight"][j] > 0.0:
         wanted = multiply(forward_rotation(mechanism, target, data, work, j), R)
         R = rotate_to(joints, q, j, frame_of(joints, j, data.rotations), wanted)
-    put_quaternion(data.rotations, j, normalised(R))
+    store_quaternion(data.rotations, j, normalised(R))
 
 
 def forward_free(mechanism, target, data, work, j):
@@ -193,16 +195,16 @@ def forward_free(mechanism, target, data, work, j):
     best about it (Horn 1987): a joint that first went to its own backward position and then rotated
     about that would overshoot and oscillate.
     """
-    joints, x = mechanism.joints, vector_at(data.positions, j)
+    joints, x = mechanism.joints, load_vector(data.positions, j)
     total, arm, wanted = mean_arms(mechanism, target, data, work.backward, j)
     M = attitude_profile(mechanism, target, data, work.backward, j)
     M = add_outer(M, -total, wanted, arm)
     Q = best_rotation(M, work.eigen[0], work.eigen[1])
     v, frame = subtract(wanted, rotate(Q, arm)), frame_of(joints, j, data.rotations)
-    R = rotate_to(joints, data.q, j, frame, multiply(Q, quaternion_at(data.rotations, j)))
+    R = rotate_to(joints, data.q, j, frame, multiply(Q, load_quaternion(data.rotations, j)))
     translate_free(joints, data.q, j, rotate(conjugate(frame), v))
-    put_vector(data.positions, j, add(x, v))
-    put_quaternion(data.rotations, j, normalised(R))
+    store_vector(data.positions, j, add(x, v))
+    store_quaternion(data.rotations, j, normalised(R))
 
 
 def mean_arms(mechanism, target, data, backward, j):
@@ -255,7 +257,7 @@ def attitude_profile(mechanism, target, data, backward, j):
             M = add_outer(M, weight, to, arm)
             if mechanism.effectors["oriented"][e]:
                 R = rotation_below(mechanism, data, j, e)
-                error = multiply(quaternion_at(target["rotation"], e), conjugate(R))
+                error = multiply(load_quaternion(target["rotation"], e), conjugate(R))
                 M = add_rotation(M, weight * rotation_weight(mechanism), error)
     for c in range(j + 1, len(backward)):
         if mechanism.adjacent[j, c]:
@@ -282,16 +284,16 @@ def mean_displacement(mechanism, target, data, backward, j):
 
 def effector_arms(mechanism, target, data, e, j):
     """Return the vectors from joint j to an effector and to its target, in the world [m]."""
-    x = vector_at(mechanism.effectors["position"], e)
+    x = load_vector(mechanism.effectors["position"], e)
     arm = arm_to(mechanism.joints, data, j, mechanism.effectors["joint"][e], x)
-    return arm, subtract(vector_at(target["position"], e), vector_at(data.positions, j))
+    return arm, subtract(load_vector(target["position"], e), load_vector(data.positions, j))
 
 
 def joint_arms(mechanism, data, backward, c, j):
     """Return the vectors from joint j to one below and to its backward position [m]."""
     x, _ = joint_transform(mechanism.joints, c, data.q)
     arm = arm_to(mechanism.joints, data, j, mechanism.joints["parent"][c], x)
-    return arm, subtract(vector_at(backward["position"], c), vector_at(data.positions, j))
+    return arm, subtract(load_vector(backward["position"], c), load_vector(data.positions, j))
 
 
 def arm_to(joints, data, j, k, x):
@@ -303,13 +305,13 @@ def arm_to(joints, data, j, k, x):
         offset, R = joint_transform(joints, k, data.q)
         x = add(offset, rotate(R, x))
         k = joints["parent"][k]
-    return rotate(quaternion_at(data.rotations, j), x)
+    return rotate(load_quaternion(data.rotations, j), x)
 
 
 def rotation_below(mechanism, data, j, e):
     """Return the rotation of an effector as the coordinates from joint j down have it."""
-    R, k = quaternion_at(mechanism.effectors["rotation"], e), mechanism.effectors["joint"][e]
+    R, k = load_quaternion(mechanism.effectors["rotation"], e), mechanism.effectors["joint"][e]
     while k != j:
         _, R_joint = joint_transform(mechanism.joints, k, data.q)
         R, k = multiply(R_joint, R), mechanism.joints["parent"][k]
-    return multiply(quaternion_at(data.rotations, j), R)
+    return multiply(load_quaternion(data.rotations, j), R)

@@ -1,7 +1,7 @@
 """Changes of one joint's coordinates within its limits."""
 
 from ..articulation import FREE, clamp_ball
-from ..quaternion import conjugate, multiply, normalised, vector_at
+from ..quaternion import conjugate, load_vector, multiply, normalised
 
 
 def move_by(joints, q, j, wanted):
@@ -31,7 +31,7 @@ def rotate_to(joints, q, j, frame, R):
     """
     Q = normalised(multiply(conjugate(frame), R))
     if joints["kind"][j] != FREE:
-        axis, cone = vector_at(joints["axis"], j), joints["cone"][j]
+        axis, cone = load_vector(joints["axis"], j), joints["cone"][j]
         Q = clamp_ball(Q, axis, joints["lower"][j], joints["upper"][j], cone)
     put_ball(joints, q, j, Q)
     return multiply(frame, Q)

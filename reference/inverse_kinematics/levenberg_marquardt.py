@@ -9,7 +9,7 @@ for mu is a tenth of |e|^2, the factor of Chan & Lawrence 1988, which needs fewe
 
 from ..quaternion import dot
 from .box_step import damped_step, linearise_task, squared, take_step
-from .jacobian import ROUNDING, linearise, rotate_joints, solve_damped
+from .jacobian import LEAST_DAMPING, linearise, rotate_joints, solve_damped
 
 # Of the squared error: for positions, and for positions and rotations.
 DAMPING, DAMPING_OF_POSES = 0.5, 0.1
@@ -21,7 +21,7 @@ def levenberg_marquardt_sweep(chain, target):
     """Rotate all joints by J^T (J J^T + mu 1)^-1 e, mu = 1/2 |e|^2 + bias."""
     e, A = linearise(chain, target, 0.0)
     damping = DAMPING * dot(e, e) + BIAS * chain.reach * chain.reach
-    damping += ROUNDING * (A[0] + A[1] + A[2])
+    damping += LEAST_DAMPING * (A[0] + A[1] + A[2])
     rotate_joints(chain, solve_damped(A, damping, e))
 
 

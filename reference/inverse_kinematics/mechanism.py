@@ -16,17 +16,17 @@ from ..quaternion import (
     add,
     conjugate,
     dot,
+    load_quaternion,
+    load_vector,
     logarithm,
     multiply,
     norm,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
     rotate,
+    store_quaternion,
+    store_vector,
     subtract,
-    vector_at,
 )
-from .chain import ROUNDING
+from .chain import POSITION_ROUNDING
 
 # An angle between rotations counts as much as a distance of the angle times this part of the reach.
 LEVER = 0.5
@@ -128,40 +128,40 @@ def update_forward_kinematics(mechanism, data):
     articulated_pose(mechanism.joints, data.q, data.positions, data.rotations)
     effectors = mechanism.effectors
     for e in range(len(effectors)):
-        x, R = vector_at(effectors["position"], e), quaternion_at(effectors["rotation"], e)
+        x, R = load_vector(effectors["position"], e), load_quaternion(effectors["rotation"], e)
         j = effectors["joint"][e]
         if j >= 0:
-            R_joint = quaternion_at(data.rotations, j)
-            x = add(vector_at(data.positions, j), rotate(R_joint, x))
+            R_joint = load_quaternion(data.rotations, j)
+            x = add(load_vector(data.positions, j), rotate(R_joint, x))
             R = multiply(R_joint, R)
         put_effector(mechanism, data, e, x, R)
 
 
 def effector_position(mechanism, data, e):
     """Return the position of an effector in the world [m]."""
-    return vector_at(data.positions, len(mechanism.joints) + e)
+    return load_vector(data.positions, len(mechanism.joints) + e)
 
 
 def effector_rotation(mechanism, data, e):
     """Return the rotation of an effector in the world."""
-    return quaternion_at(data.rotations, len(mechanism.joints) + e)
+    return load_quaternion(data.rotations, len(mechanism.joints) + e)
 
 
 def put_effector(mechanism, data, e, x, R):
     """Write an effector's position and rotation in the world."""
-    put_vector(data.positions, len(mechanism.joints) + e, x)
-    put_quaternion(data.rotations, len(mechanism.joints) + e, R)
+    store_vector(data.positions, len(mechanism.joints) + e, x)
+    store_quaternion(data.rotations, len(mechanism.joints) + e, R)
 
 
 def position_error(mechanism, target, data, e):
     """Return the vector from an effector to its target [m]."""
-    return subtract(vector_at(target["position"], e), effector_position(mechanism, data, e))
+    return subtract(load_vector(target["position"], e), effector_position(mechanism, data, e))
 
 
 def rotation_error(mechanism, target, data, e):
     """Return the rotation in the world that takes an effector's rotation to its target's."""
     R = effector_rotation(mechanism, data, e)
-    return multiply(quaternion_at(target["rotation"], e), conjugate(R))
+    return multiply(load_quaternion(target["rotation"], e), conjugate(R))
 
 
 def rotation_weight(mechanism):
@@ -229,12 +229,12 @@ def least_residual(mechanism, target):
     are known to a few roundings for each joint.
     """
     effectors = mechanism.effectors
-    share, least = ROUNDING * (1 + len(mechanism.joints)), 0.0
+    share, least = POSITION_ROUNDING * (1 + len(mechanism.joints)), 0.0
     for e in range(len(effectors)):
-        start, first = vector_at(effectors["position"], e), effectors["first"][e]
+        start, first = load_vector(effectors["position"], e), effectors["first"][e]
         if first >= 0:
-            start = vector_at(mechanism.joints["offset"], first)
-        wanted, reach = vector_at(target["position"], e), effectors["reach"][e]
+            start = load_vector(mechanism.joints["offset"], first)
+        wanted, reach = load_vector(target["position"], e), effectors["reach"][e]
         rounding = share * (reach + norm(start) + norm(wanted))
         least = max(least, norm(subtract(wanted, start)) - reach - rounding)
     return least

@@ -15,7 +15,7 @@ from ..articulation import (
     half_turned,
     number_coordinates,
 )
-from ..quaternion import IDENTITY, add, multiply, quaternion_at, rotate, vector_at
+from ..quaternion import IDENTITY, add, load_quaternion, load_vector, multiply, rotate
 from .mechanism import EFFECTOR, Mechanism
 
 # Points are in one spot if they are no further apart than this, over the reach.
@@ -111,11 +111,11 @@ def _active(
 
 def _merged(whole: RecordArray, joint: int, number: dict[int, int]):
     """Return the nearest moving joint above, and this joint's frame in the frame of that one."""
-    x, R = vector_at(whole["offset"], joint), quaternion_at(whole["frame"], joint)
+    x, R = load_vector(whole["offset"], joint), load_quaternion(whole["frame"], joint)
     j = int(whole["parent"][joint])
     while j >= 0 and j not in number:
-        frame = quaternion_at(whole["frame"], j)
-        x = add(vector_at(whole["offset"], j), rotate(frame, x))
+        frame = load_quaternion(whole["frame"], j)
+        x = add(load_vector(whole["offset"], j), rotate(frame, x))
         R = multiply(frame, R)
         j = int(whole["parent"][j])
     return number.get(j, -1), x, R

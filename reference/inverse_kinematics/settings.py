@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import arguments
 from ..arguments import FloatArray
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 from ..skeleton import Skeleton
 from .ccd import ccd_sweep, ccd_update
 from .damped_least_squares import damped_least_squares_sweep, damped_least_squares_update
@@ -29,8 +29,8 @@ class IKSolver(NamedTuple):
         mechanism: for all else.
     """
 
-    chain: TwoSpeeds
-    mechanism: TwoSpeeds
+    chain: Kernel
+    mechanism: Kernel
 
 
 _KERNELS = {

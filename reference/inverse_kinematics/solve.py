@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from .. import arguments, rotation
 from ..arguments import FloatArray, IndexArray, RecordArray, frozen
 from ..articulation import Articulation, one_batch
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 from ..backend.threads import in_slices
 from ..model import coordinates_name
 from ..outcome import Outcome
@@ -102,7 +102,7 @@ def solve_on_mechanism(
 
 
 def _run(
-    kernel: TwoSpeeds,
+    kernel: Kernel,
     model: tuple[Any, ...],
     settings: Settings,
     rows: tuple[np.ndarray, ...],

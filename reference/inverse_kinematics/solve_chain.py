@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import LARGEST_COORDINATE, FloatArray
-from ..backend.compiled import Slot, TwoSpeeds, bind
+from ..backend.compiled import Kernel, Slot, bind
 from ..kinematics import forward_pose, normalise
 from ..quaternion import (
+    load_quaternion,
+    load_vector,
     norm,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
+    store_quaternion,
+    store_vector,
     subtract,
-    vector_at,
 )
 from .chain import (
     Chain,
@@ -76,7 +76,7 @@ def solve_chains(
     state = ChainState(chain, np.empty((2, len(path), 7)), new_progress(1))
     rotations = np.empty((len(parents), 4))
     for i in range(len(targets)):
-        pose, target = local[i], vector_at(targets, i)
+        pose, target = local[i], load_vector(targets, i)
         start = local[i - 1] if limits.chained and i > 0 else starts[i % len(starts)]
         if not (normalise(start, pose) and largest(target) <= LARGEST_COORDINATE):
             return False
@@ -90,7 +90,7 @@ def solve_chains(
             turn_links(chain)
             put_local(chain, path, pose)
         forward_pose(parents, offsets, pose, positions[i], rotations)
-        distance = norm(subtract(vector_at(positions[i], path[-1]), target))
+        distance = norm(subtract(load_vector(positions[i], path[-1]), target))
         figures[i, ITERATIONS] = iterations
         rate_pose(chain, d, limits, distance, settled, figures[i])
     return True
@@ -151,15 +151,15 @@ def save_chain(state, k):
     """Save where the chain is."""
     for j in range(len(state.chain.positions)):
         row = state.saved[k, j]
-        row[0], row[1], row[2] = vector_at(state.chain.positions, j)
-        row[3], row[4], row[5], row[6] = quaternion_at(state.chain.rotations, j)
+        row[0], row[1], row[2] = load_vector(state.chain.positions, j)
+        row[3], row[4], row[5], row[6] = load_quaternion(state.chain.rotations, j)
 
 
 def restore_chain(state, k):
     """Bring the chain back to where it was."""
     for j in range(len(state.chain.positions)):
-        put_vector(state.chain.positions, j, vector_at(state.saved[k], j))
-        put_quaternion(state.chain.rotations, j, quaternion_at(state.saved[k], j, 3))
+        store_vector(state.chain.positions, j, load_vector(state.saved[k], j))
+        store_quaternion(state.chain.rotations, j, load_quaternion(state.saved[k], j, 3))
 
 
 def draw_chain(_state, _target, _n):
@@ -168,7 +168,7 @@ def draw_chain(_state, _target, _n):
 
 def on_chains(name, sweep):
     """Return the kernel that solves chains by the sweep of a named solver."""
-    return TwoSpeeds(
+    return Kernel(
         bind(
             solve_chains, update=bind(update_chain, sweep=sweep), error=chain_error,
             merit=chain_merit, perturb=perturb_chain, save=save_chain, restore=restore_chain,

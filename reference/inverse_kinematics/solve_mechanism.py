@@ -15,21 +15,21 @@ from ..articulation import (
     fit_start,
     joint_transform,
 )
-from ..backend.compiled import Slot, TwoSpeeds, bind
+from ..backend.compiled import Kernel, Slot, bind
 from ..quaternion import (
     angle_between,
+    load_quaternion,
+    load_vector,
     made_unit,
     multiply,
     norm,
     normalised,
-    put_quaternion,
-    quaternion_at,
+    store_quaternion,
     subtract,
     turn_about,
-    vector_at,
 )
 from .box_step import TaskSystem, new_task_system
-from .chain import BEND, ROUNDING
+from .chain import BEND, POSITION_ROUNDING
 from .fabrik import BACKWARD
 from .joint_updates import ball_at, move_by, put_ball
 from .mechanism import (
@@ -149,7 +149,7 @@ def solve_mechanisms(
         articulated_pose(joints, q, positions[i], rotations)
         for j in range(len(joints)):
             _, Q = joint_transform(joints, j, q)
-            put_quaternion(local[i], j, Q)
+            store_quaternion(local[i], j, Q)
         rate_pose(mechanism, target, limits, positions[i], rotations, least, settled, figures[i])
     return True
 
@@ -171,8 +171,8 @@ def normalise_target(target):
     for e in range(len(target)):
         for k in range(3):
             valid &= abs(target["position"][e, k]) <= LARGEST_COORDINATE
-        Q, unit = made_unit(quaternion_at(target["rotation"], e))
-        put_quaternion(target["rotation"], e, Q)
+        Q, unit = made_unit(load_quaternion(target["rotation"], e))
+        store_quaternion(target["rotation"], e, Q)
         valid &= unit
     return valid
 
@@ -190,10 +190,10 @@ def mechanism_criteria(mechanism, least, limits):
 
     A single position out of reach counts as reached within the tolerance of the least distance.
     """
-    margin = ROUNDING * mechanism.reach
+    margin = POSITION_ROUNDING * mechanism.reach
     slack, slack_rotation = (
         min(margin, 0.5 * limits.tolerance),
-        min(ROUNDING, 0.5 * limits.tolerance_rotation),
+        min(POSITION_ROUNDING, 0.5 * limits.tolerance_rotation),
     )
     single = len(mechanism.effectors) == 1 and not mechanism.effectors["oriented"][0]
     nearest = least if single else 0.0
@@ -211,9 +211,11 @@ def rate_pose(mechanism, target, limits, positions, rotations, least, settled, f
     distance, angle, total = 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
         j, apart, off = mechanism.effectors["source"][e], 0.0, 0.0
-        apart = norm(subtract(vector_at(target["position"], e), vector_at(positions, j)))
+        apart = norm(subtract(load_vector(target["position"], e), load_vector(positions, j)))
         if mechanism.effectors["oriented"][e]:
-            off = angle_between(quaternion_at(rotations, j), quaternion_at(target["rotation"], e))
+            off = angle_between(
+                load_quaternion(rotations, j), load_quaternion(target["rotation"], e)
+            )
         distance, angle = max(distance, apart), max(angle, off)
         total += weighted_square(mechanism, target["weight"][e], apart, off)
     reached = distance <= limits.tolerance and angle <= limits.tolerance_rotation
@@ -241,7 +243,7 @@ def mechanism_merit(state, target):
 def perturb_mechanism(state, _target, _criteria, first):
     """Bend a mechanism that settled at once, away from its target: all joints share one angle."""
     mechanism, q, count = state.mechanism, state.data.q, len(state.mechanism.joints)
-    away = first[COST] > ROUNDING * mechanism.reach
+    away = first[COST] > POSITION_ROUNDING * mechanism.reach
     if not (first[STATE] == SETTLED and first[MADE] < STUCK and away):
         return False
     for j in range(count):
@@ -287,11 +289,11 @@ def rank_restarts(state, target):
     for r in range(len(state.restarts)):
         distance, angle = 0.0, 0.0
         for e in range(len(target)):
-            offset = subtract(vector_at(target["position"], e), vector_at(state.tips[r], e))
+            offset = subtract(load_vector(target["position"], e), load_vector(state.tips[r], e))
             distance = max(distance, norm(offset))
             if state.mechanism.effectors["oriented"][e]:
-                there = quaternion_at(state.tips[r], e, 3)
-                angle = max(angle, rough_angle(there, quaternion_at(target["rotation"], e)))
+                there = load_quaternion(state.tips[r], e, 3)
+                angle = max(angle, rough_angle(there, load_quaternion(target["rotation"], e)))
         state.progress[1 + r, RANK] = distance + lever * angle
 
 
@@ -313,7 +315,7 @@ def take_nearest(state, q):
 
 def on_mechanisms(name, step):
     """Return the kernel that solves mechanisms by the step of a named solver."""
-    return TwoSpeeds(
+    return Kernel(
         bind(
             solve_mechanisms, update=bind(update_mechanism, step=step), error=mechanism_error,
             merit=mechanism_merit, perturb=perturb_mechanism, save=save_mechanism,

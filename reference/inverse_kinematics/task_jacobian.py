@@ -9,7 +9,7 @@ import math
 
 from ..articulation import FREEDOMS
 from ..motion_subspace import accumulate, motion, velocity_at
-from ..quaternion import logarithm, scale, subtract, vector_at
+from ..quaternion import load_vector, logarithm, scale, subtract
 from .mechanism import LEVER, effector_position, position_error, rotation_error
 
 
@@ -39,7 +39,7 @@ def fill_jacobian(mechanism, target, data, J):
 def add_motion(mechanism, target, data, j, angular, linear, row):
     """Add to a row what a motion of joint j does to the effectors below."""
     effectors, lever = mechanism.effectors, LEVER * mechanism.reach
-    x = vector_at(data.positions, j)
+    x = load_vector(data.positions, j)
     for e in range(len(effectors)):
         if mechanism.moves[j, e]:
             at, root = effectors["row"][e], math.sqrt(target["weight"][e])

@@ -13,7 +13,7 @@ from ..quaternion import dot
 # M's norm, makes the smallest of them the best. It brings no vector further from its own.
 LEAST_ROTATION = 1e-6
 # Below this share of M's norm the angle that is best is known to no digit.
-ROUNDING = 1e-15
+ANGLE_ROUNDING = 1e-15
 SWEEPS = 12
 
 
@@ -59,7 +59,7 @@ def best_angle(M, axis):
     )
     cosine = M[0] + M[4] + M[8] - along
     sine = dot(axis, (M[7] - M[5], M[2] - M[6], M[3] - M[1]))
-    if abs(sine) + abs(cosine) <= ROUNDING * magnitude(M):
+    if abs(sine) + abs(cosine) <= ANGLE_ROUNDING * magnitude(M):
         return 0.0
     return math.atan2(sine, cosine)
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arguments import IndexArray, RecordArray
 from ..articulation import BALL, FREEDOMS, HINGE, SLIDE, swing_twist
-from ..quaternion import add, conjugate, cross, dot, norm, rotate, scale, vector_at
+from ..quaternion import add, conjugate, cross, dot, load_vector, norm, rotate, scale
 
 # The bounds of a joint.
 LOWER, UPPER, CONE = range(3)
@@ -54,7 +54,7 @@ def excess(problem, q, limit):
     if joints["kind"][j] != BALL:
         unit = problem.units[joints["freedom"][j]]
         return sign * (q[at] - value) / unit, (sign, 0.0, 0.0)
-    Q, u = (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints["axis"], j)
+    Q, u = (q[at], q[at + 1], q[at + 2], q[at + 3]), load_vector(joints["axis"], j)
     if bound == CONE:
         swing, gradient = swing_and_gradient(Q, u)
         return swing - value, gradient

@@ -22,7 +22,7 @@ from ..inverse_kinematics.mechanism import (
 )
 from ..inverse_kinematics.task_jacobian import fill_errors, fill_jacobian
 from ..motion_subspace import motion, velocity_at
-from ..quaternion import add, cross, dot, put_vector, scale, subtract, vector_at
+from ..quaternion import add, cross, dot, load_vector, scale, store_vector, subtract
 
 
 class Motions(NamedTuple):
@@ -87,8 +87,8 @@ def fill_motions(mechanism, data, motions):
         for i in range(FREEDOMS[joints["kind"][j]]):
             angular, linear = motion(joints, j, i, data.rotations, mechanism.reach)
             motions.owners[at, 0], motions.owners[at, 1] = j, joints["freedom"][j] + i
-            put_vector(motions.angular, at, angular)
-            put_vector(motions.linear, at, linear)
+            store_vector(motions.angular, at, angular)
+            store_vector(motions.linear, at, linear)
             at += 1
 
 
@@ -98,13 +98,13 @@ def fill_moments(mechanism, target, data, motions, m, e):
     row, root = effectors["row"][e], np.sqrt(target["weight"][e])
     force, x = scale(root, vector_from(m, row)), effector_position(mechanism, data, e)
     for b in range(len(motions.owners)):
-        angular, linear = vector_at(motions.angular, b), vector_at(motions.linear, b)
-        arm = subtract(x, vector_at(data.positions, motions.owners[b, 0]))
+        angular, linear = load_vector(motions.angular, b), load_vector(motions.linear, b)
+        arm = subtract(x, load_vector(data.positions, motions.owners[b, 0]))
         moment = cross(velocity_at(angular, linear, arm), force)
         if effectors["oriented"][e]:
             lever = 0.5 * root * LEVER * mechanism.reach
             moment = add(moment, cross(angular, scale(lever, vector_from(m, row + 3))))
-        put_vector(motions.moments, b, moment)
+        store_vector(motions.moments, b, moment)
 
 
 def vector_from(m, i):
@@ -122,9 +122,9 @@ def subtract_effector(mechanism, motions, e, diagonal):
         for a in range(b + 1):
             above, i = owners[a]
             if mechanism.moves[above, e]:
-                second = dot(vector_at(angular, a), vector_at(moments, b))
+                second = dot(load_vector(angular, a), load_vector(moments, b))
                 if above == j and is_rotation(motions, a):
-                    second = 0.5 * (second + dot(vector_at(angular, b), vector_at(moments, a)))
+                    second = 0.5 * (second + dot(load_vector(angular, b), load_vector(moments, a)))
                 diagonal[i, k] -= second
                 if a != b:
                     diagonal[k, i] -= second
@@ -132,5 +132,5 @@ def subtract_effector(mechanism, motions, e, diagonal):
 
 def is_rotation(motions, a):
     """Return whether a motion is a rotation."""
-    x, y, z = vector_at(motions.angular, a)
+    x, y, z = load_vector(motions.angular, a)
     return x != 0.0 or y != 0.0 or z != 0.0

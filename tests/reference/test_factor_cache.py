@@ -94,7 +94,7 @@ def test_an_unused_factor_leaves_the_cache(network, analyses):
     assert len(analyses) == 2
 
 
-def test_the_factor_is_that_of_the_matrix(network, rng, speed):
+def test_the_factor_is_that_of_the_matrix(network, rng, backend):
     system, b = network[0], rng.standard_normal((7, 3))
     kept = factor_cache.global_factor(system, h)
     for step in (h, 2 * h):

@@ -33,7 +33,7 @@ def cases() -> Iterator[Case]:
         for title, (ours, theirs) in WORKS.items():
             work = Work(f"cloth/x{factor:g}/{title}", "cloth", written, title)
             yield Case(work, COMPILED, partial(ours, problem))
-            yield Case(work, PLAIN, partial(ours, problem), speed="plain")
+            yield Case(work, PLAIN, partial(ours, problem), backend="python")
             if theirs:
                 yield Case(work, MUJOCO, partial(theirs, problem))
         work = Work(f"cloth/x{factor:g}/{LOCAL_GLOBAL}", "cloth", written, LOCAL_GLOBAL)

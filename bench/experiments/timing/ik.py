@@ -32,7 +32,7 @@ def cases() -> Iterator[Case]:
             yield Case(work, COMPILED, partial(one_by_one, stratum, solver, TARGETS), TARGETS)
             yield Case(
                 work, PLAIN, partial(one_by_one, stratum, solver, FEW_TARGETS), FEW_TARGETS,
-                speed="plain",
+                backend="python",
             )  # fmt: skip
             calls = f"{TARGETS} targets a call"
             batch = work._replace(problem=f"{work.problem}/{calls}", title=f"{work.title}, {calls}")

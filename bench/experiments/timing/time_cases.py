@@ -1,11 +1,11 @@
 """The one benchmark, which pytest runs on the case that `job.Timed` holds."""
 
-from reference import cores, speed
+from reference import set_backend, set_num_threads
 
 
 def test_speed(benchmark, timed):
     """Time a case; the first call, which may compile, is not counted."""
-    with speed(timed.case.speed), cores(timed.case.cores):
+    with set_backend(timed.case.backend), set_num_threads(timed.case.cores):
         call = timed.case.prepare()
         call()
         benchmark(call)
