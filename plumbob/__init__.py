@@ -1,10 +1,16 @@
-"""The front door: the public names of the reference; `python -m plumbob` is the command line."""
+"""The front door: the public names of the reference; `python -m plumbob` is the command line.
+
+On a terminal a line on stderr says what is compiled, once it takes more than a second.
+"""
 
 from importlib.metadata import version
 
+from bench import compile_notice
 from reference import *
 from reference import __all__ as _names
 from reference import formats, jacobians, mass_spring
+
+compile_notice.install()
 
 __version__ = version("plumbob")
 __all__ = ["__version__", "formats", "jacobians", "mass_spring"]

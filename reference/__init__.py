@@ -2,8 +2,8 @@
 
 from . import rotation, scenes
 from .articulation import Articulation, Mimic
-from .backend.compiled import speed
-from .backend.threads import cores
+from .backend.compiled import set_backend, speed
+from .backend.threads import cores, set_num_threads
 from .curve import curves, resample
 from .explicit import runge_kutta, symplectic_euler
 from .implicit_euler import STEP_SOLVERS, ImplicitEuler, StepResult
@@ -45,6 +45,8 @@ __all__ = [
     "rotation",
     "runge_kutta",
     "scenes",
+    "set_backend",
+    "set_num_threads",
     "solve_ik",
     "speed",
     "symplectic_euler",

@@ -18,25 +18,25 @@ from numpy.typing import ArrayLike
 
 from . import arguments, rotation
 from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray, frozen
-from .backend.compiled import TwoSpeeds
+from .backend.compiled import Kernel
 from .quaternion import (
     IDENTITY,
     add,
     dot,
     exponential,
     half_turn,
+    load_quaternion,
+    load_vector,
     logarithm,
     made_unit,
     multiply,
     normalised,
     perpendicular,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
     rotate,
     scale,
+    store_quaternion,
+    store_vector,
     turn_about,
-    vector_at,
 )
 from .skeleton import Skeleton, checked_skeleton
 
@@ -350,14 +350,14 @@ def one_batch(values: np.ndarray, axes: int = 1) -> np.ndarray:
 
 def joint_transform(joints, j, q):
     """Return a joint's position and rotation in its parent's frame."""
-    x, R = vector_at(joints.numbers, j, OFFSET), quaternion_at(joints.numbers, j, FRAME)
+    x, R = load_vector(joints.numbers, j, OFFSET), load_quaternion(joints.numbers, j, FRAME)
     kind, at = joints.integers[j, KIND], joints.integers[j, AT]
     if kind == HINGE:
         angle = joints.numbers[j, MULTIPLIER] * q[at] + joints.numbers[j, SHIFT]
-        R = between_turns(R, quaternion_at(joints.numbers, j, TURNED), half_turn(angle))
+        R = between_turns(R, load_quaternion(joints.numbers, j, TURNED), half_turn(angle))
     elif kind == SLIDE:
         way = joints.numbers[j, MULTIPLIER] * q[at] + joints.numbers[j, SHIFT]
-        x = add(x, rotate(R, scale(way, vector_at(joints.numbers, j, AXIS))))
+        x = add(x, rotate(R, scale(way, load_vector(joints.numbers, j, AXIS))))
     elif kind == BALL:
         R = multiply(R, (q[at], q[at + 1], q[at + 2], q[at + 3]))
     elif kind == FREE:
@@ -421,7 +421,7 @@ def clamp_joint(joints, j, q):
     elif kind == BALL:
         Q = (q[at], q[at + 1], q[at + 2], q[at + 3])
         bounds = joints.numbers[j, LOWER], joints.numbers[j, UPPER], joints.numbers[j, CONE]
-        w, x, y, z = clamp_ball(Q, vector_at(joints.numbers, j, AXIS), *bounds)
+        w, x, y, z = clamp_ball(Q, load_vector(joints.numbers, j, AXIS), *bounds)
         q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
 
 
@@ -434,7 +434,7 @@ def joint_excess(joints, j, q):
         return max(joints.numbers[j, LOWER] - q[at], q[at] - joints.numbers[j, UPPER], 0.0)
     if kind == BALL:
         swing, twist = swing_twist(
-            (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints.numbers, j, AXIS)
+            (q[at], q[at + 1], q[at + 2], q[at + 3]), load_vector(joints.numbers, j, AXIS)
         )
         tilt = logarithm(swing)
         over = math.sqrt(dot(tilt, tilt)) - joints.numbers[j, CONE]
@@ -465,11 +465,11 @@ def articulated_pose(joints, q, positions, rotations):
     for j in range(len(joints.integers)):
         x, R = joint_transform(joints, j, q)
         if joints.integers[j, PARENT] >= 0:
-            R_parent = quaternion_at(rotations, joints.integers[j, PARENT])
-            x = add(vector_at(positions, joints.integers[j, PARENT]), rotate(R_parent, x))
+            R_parent = load_quaternion(rotations, joints.integers[j, PARENT])
+            x = add(load_vector(positions, joints.integers[j, PARENT]), rotate(R_parent, x))
             R = multiply(R_parent, R)
-        put_vector(positions, j, x)
-        put_quaternion(rotations, j, R)
+        store_vector(positions, j, x)
+        store_quaternion(rotations, j, R)
 
 
 def _clamp_batch(joints, q):
@@ -489,8 +489,8 @@ def _locals_batch(joints, q, offsets, rotations):
     for i in range(len(q)):
         for j in range(len(joints.integers)):
             x, R = joint_transform(joints, j, q[i])
-            put_vector(offsets[i], j, x)
-            put_quaternion(rotations[i], j, R)
+            store_vector(offsets[i], j, x)
+            store_quaternion(rotations[i], j, R)
 
 
 def _forward_batch(joints, q, positions, rotations):
@@ -498,10 +498,10 @@ def _forward_batch(joints, q, positions, rotations):
         articulated_pose(joints, q[i], positions[i], rotations[i])
 
 
-_clamp = TwoSpeeds(_clamp_batch)
-_excess = TwoSpeeds(_excess_batch)
-_locals = TwoSpeeds(_locals_batch)
-_forward = TwoSpeeds(_forward_batch, label="forward_kinematics of articulations")
+_clamp = Kernel(_clamp_batch)
+_excess = Kernel(_excess_batch)
+_locals = Kernel(_locals_batch)
+_forward = Kernel(_forward_batch, label="forward_kinematics of articulations")
 
 
 def _checked_kinds(kinds: str | Sequence[str], count: int) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from . import arguments
 from .arguments import FloatArray
-from .backend.compiled import TwoSpeeds
+from .backend.compiled import Kernel
 
 # A finer curve would not fit into memory.
 MOST_POINTS = 10_000_000
@@ -168,7 +168,7 @@ def spacing(points, i, j):
     return np.sqrt(x * x + y * y + z * z)
 
 
-_keep = TwoSpeeds(keep_spaced)
+_keep = Kernel(keep_spaced)
 
 
 def _check_count(points: FloatArray, max_spacing: float) -> None:

@@ -28,19 +28,19 @@ from .articulation import (
     articulated_pose,
     one_batch,
 )
-from .backend.compiled import TwoSpeeds
+from .backend.compiled import Kernel
 from .model import Model, checked_model, effector_of
 from .quaternion import (
     conjugate,
     cross,
     exponential,
+    load_quaternion,
+    load_vector,
     logarithm,
     multiply,
-    quaternion_at,
     rotate,
     scale,
     subtract,
-    vector_at,
 )
 from .skeleton import Skeleton
 
@@ -115,10 +115,10 @@ def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
 
 def fill_jacobian(joints, effector, q, positions, rotations, J):
     """Fill the Jacobian (6, freedom) of a joint, given every joint's pose; J must hold zeros."""
-    x, j = vector_at(positions, effector), effector
+    x, j = load_vector(positions, effector), effector
     while j >= 0:
-        arm = subtract(x, vector_at(positions, j))
-        add_joint(joints, j, q, quaternion_at(rotations, j), arm, J)
+        arm = subtract(x, load_vector(positions, j))
+        add_joint(joints, j, q, load_quaternion(rotations, j), arm, J)
         j = joints.integers[j, PARENT]
 
 
@@ -141,7 +141,7 @@ def add_joint(joints, j, q, R, arm, J):
         add_shift(rotate(unmoved, (0.0, 0.0, 1.0)), J, first + 2)
         add_turns(R, arm, J, first + 3)
     else:
-        axis = scale(joints.numbers[j, MULTIPLIER], rotate(R, vector_at(joints.numbers, j, AXIS)))
+        axis = scale(joints.numbers[j, MULTIPLIER], rotate(R, load_vector(joints.numbers, j, AXIS)))
         if kind == SLIDE:
             add_shift(axis, J, first)
         else:
@@ -236,9 +236,9 @@ def _difference_batch(joints, q1, q0, v):
             joint_difference(joints, j, q1[i], q0[i], v[i])
 
 
-_fill = TwoSpeeds(_jacobians_batch, label="jacobian")
-_integrate = TwoSpeeds(_integrate_batch)
-_difference = TwoSpeeds(_difference_batch)
+_fill = Kernel(_jacobians_batch, label="jacobian")
+_integrate = Kernel(_integrate_batch)
+_difference = Kernel(_difference_batch)
 
 
 def _jacobians(model: Articulation, effectors: np.ndarray, q: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from . import arguments, rotation
 from .arguments import FloatArray, frozen
 from .articulation import Articulation
-from .backend.compiled import TwoSpeeds
+from .backend.compiled import Kernel
 from .backend.simd.poses import (
     LANES,
     in_lanes,
@@ -21,7 +21,7 @@ from .backend.simd.poses import (
 )
 from .backend.threads import in_slices
 from .model import Model, checked_model
-from .quaternion import add, conjugate, made_unit, multiply, rotate, vector_at
+from .quaternion import add, conjugate, load_vector, made_unit, multiply, rotate
 from .skeleton import Pose, Skeleton, SkeletonArrays, checked_skeleton
 
 # A slice of a batch with fewer joints than this is done before another thread has begun.
@@ -83,7 +83,7 @@ def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
     return local
 
 
-def _in_slices(kernel: TwoSpeeds, tree: SkeletonArrays, *poses: FloatArray) -> bool:
+def _in_slices(kernel: Kernel, tree: SkeletonArrays, *poses: FloatArray) -> bool:
     """Run a kernel on slices of arrays (..., joint, 3 or 4); return whether all were valid."""
     flat = [values.reshape(-1, *values.shape[-2:]) for values in poses]
     least = math.ceil(THREAD_JOINTS / len(tree.parents))
@@ -95,13 +95,13 @@ def _in_slices(kernel: TwoSpeeds, tree: SkeletonArrays, *poses: FloatArray) -> b
 
 def forward_pose(parents, offsets, local, positions, rotations):
     """Fill positions (joint, 3) and rotations (joint, 4) of one pose from unit quaternions."""
-    x, R = vector_at(offsets, 0), load_unit(local, 0)
+    x, R = load_vector(offsets, 0), load_unit(local, 0)
     store_position(positions, 0, x)
     store_rotation(rotations, 0, R)
     for j in range(1, len(parents)):
         if parents[j] != j - 1:  # along a chain x and R are the parent's already
             x, R = load_position(positions, parents[j]), load_rotation(rotations, parents[j])
-        x = add(x, rotate(R, vector_at(offsets, j)))
+        x = add(x, rotate(R, load_vector(offsets, j)))
         R = multiply(R, load_unit(local, j))
         store_position(positions, j, x)
         store_rotation(rotations, j, R)
@@ -178,6 +178,6 @@ def _local_many(parents, offsets, poses, local):
     return True
 
 
-_forward = TwoSpeeds(_forward_one, label="forward_kinematics")
-_forward_batch = TwoSpeeds(_forward_many, label="forward_kinematics of a batch")
-_local_batch = TwoSpeeds(_local_many, label="local_from_global")
+_forward = Kernel(_forward_one, label="forward_kinematics")
+_forward_batch = Kernel(_forward_many, label="forward_kinematics of a batch")
+_local_batch = Kernel(_local_many, label="local_from_global")

@@ -34,7 +34,7 @@ from .arguments import (
     indices,
     instance,
 )
-from .backend.compiled import TwoSpeeds
+from .backend.compiled import Kernel
 from .backend.partition import LARGE, Regions, cut
 from .sparse.assembly import BlockSum
 from .springs import (
@@ -458,12 +458,12 @@ def pin_goal(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
     return coordinates("pin_positions", pin_positions, len(system.pinned), 3)
 
 
-_pulls = TwoSpeeds(spring_pulls)
-_blocks = TwoSpeeds(stiffness_blocks)
-_lengths = TwoSpeeds(spring_lengths)
-_sums = TwoSpeeds(sum_springs)
-_stretches = TwoSpeeds(spring_stretches)
-_rest_vectors = TwoSpeeds(spring_rest_vectors)
+_pulls = Kernel(spring_pulls)
+_blocks = Kernel(stiffness_blocks)
+_lengths = Kernel(spring_lengths)
+_sums = Kernel(sum_springs)
+_stretches = Kernel(spring_stretches)
+_rest_vectors = Kernel(spring_rest_vectors)
 
 
 def _system(system: MassSpring) -> MassSpring:

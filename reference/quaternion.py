@@ -23,22 +23,22 @@ TINY = 1e-140
 UNIT_TOLERANCE = 1e-6
 
 
-def quaternion_at(q, j, k=0):
+def load_quaternion(q, j, k=0):
     """Return row j of an array (joint, 4), or four entries from the k-th on, as a tuple."""
     return q[j, k], q[j, k + 1], q[j, k + 2], q[j, k + 3]
 
 
-def vector_at(p, j, k=0):
+def load_vector(p, j, k=0):
     """Return row j of an array (joint, 3), or three entries from the k-th on, as a tuple."""
     return p[j, k], p[j, k + 1], p[j, k + 2]
 
 
-def put_quaternion(q, j, value):
+def store_quaternion(q, j, value):
     """Write a tuple into row j of an array (joint, 4)."""
     q[j, 0], q[j, 1], q[j, 2], q[j, 3] = value
 
 
-def put_vector(p, j, value):
+def store_vector(p, j, value):
     """Write a tuple into row j of an array (joint, 3)."""
     p[j, 0], p[j, 1], p[j, 2] = value
 

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 
 from . import arguments, quaternion
 from .arguments import FloatArray
-from .backend.compiled import TwoSpeeds
-from .quaternion import UNIT_TOLERANCE, put_quaternion, put_vector, quaternion_at, vector_at
+from .backend.compiled import Kernel
+from .quaternion import UNIT_TOLERANCE, load_quaternion, load_vector, store_quaternion, store_vector
 from .quaternion import between as between_two
 from .quaternion import exponential as exponential_of
 from .quaternion import logarithm as logarithm_of
@@ -231,19 +231,19 @@ def _rows(values: FloatArray) -> FloatArray:
 
 def _between_rows(a, b, result):
     for i in range(a.shape[0]):
-        put_quaternion(result, i, between_two(vector_at(a, i), vector_at(b, i)))
+        store_quaternion(result, i, between_two(load_vector(a, i), load_vector(b, i)))
 
 
 def _exponential_rows(v, result):
     for i in range(v.shape[0]):
-        put_quaternion(result, i, exponential_of(vector_at(v, i)))
+        store_quaternion(result, i, exponential_of(load_vector(v, i)))
 
 
 def _logarithm_rows(q, result):
     for i in range(q.shape[0]):
-        put_vector(result, i, logarithm_of(quaternion_at(q, i)))
+        store_vector(result, i, logarithm_of(load_quaternion(q, i)))
 
 
-_between = TwoSpeeds(_between_rows)
-_exponential = TwoSpeeds(_exponential_rows)
-_logarithm = TwoSpeeds(_logarithm_rows)
+_between = Kernel(_between_rows)
+_exponential = Kernel(_exponential_rows)
+_logarithm = Kernel(_logarithm_rows)

@@ -6,7 +6,7 @@ See `mass_spring` for what a spring is.
 import numpy as np
 from numpy import uint64 as at
 
-from .quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
+from .quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 
 # Ends closer than this [m] coincide: the square of their distance is no normal number.
 COINCIDENT = 1e-150
@@ -18,11 +18,11 @@ def spring_pulls(x, v, system):
     for s in range(len(system.springs)):
         i, j = system.springs[s, 0], system.springs[s, 1]
         length, u = spring_frame(x, i, j)
-        rate = dot(subtract(vector_at(v, i), vector_at(v, j)), u)
+        rate = dot(subtract(load_vector(v, i), load_vector(v, j)), u)
         stretch = spring_stretch(length, system.rest_lengths[s], system.tension_only[s])
         pull = scale(system.stiffnesses[s] * stretch + system.dampings[s] * rate, u)
-        put_vector(total, i, subtract(vector_at(total, i), pull))
-        put_vector(total, j, add(vector_at(total, j), pull))
+        store_vector(total, i, subtract(load_vector(total, i), pull))
+        store_vector(total, j, add(load_vector(total, j), pull))
     return total
 
 
@@ -86,7 +86,7 @@ def spring_rest_vectors(x, system):
         rest_length = system.rest_lengths[s]
         if is_slack(length, rest_length, system.tension_only[s]):
             rest_length = length
-        put_vector(vectors, s, scale(rest_length, u))
+        store_vector(vectors, s, scale(rest_length, u))
     return vectors
 
 
@@ -103,7 +103,7 @@ def is_slack(length, rest_length, tension_only):
 
 def spring_frame(x, i, j):
     """Return the length and the direction from particle j to i; (1, 0, 0) where they coincide."""
-    p = subtract(vector_at(x, i), vector_at(x, j))
+    p = subtract(load_vector(x, i), load_vector(x, j))
     length = norm(p)
     s = 1.0 / max(length, COINCIDENT)
     if length < COINCIDENT:

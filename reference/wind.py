@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import FloatArray, array, indices, instance, number
-from .backend.compiled import TwoSpeeds
+from .backend.compiled import Kernel
 from .mass_spring import State
-from .quaternion import add, cross, dot, norm, put_vector, scale, subtract, vector_at
+from .quaternion import add, cross, dot, load_vector, norm, scale, store_vector, subtract
 
 
 def wind_forces(
@@ -69,12 +69,12 @@ def triangle_forces(x, w, triangles, drag, lift):
     total = np.zeros(x.shape)
     for t in range(len(triangles)):
         i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        first = vector_at(x, i)
-        normal = cross(subtract(vector_at(x, j), first), subtract(vector_at(x, k), first))
-        past = scale(1.0 / 3.0, add(add(vector_at(w, i), vector_at(w, j)), vector_at(w, k)))
+        first = load_vector(x, i)
+        normal = cross(subtract(load_vector(x, j), first), subtract(load_vector(x, k), first))
+        past = scale(1.0 / 3.0, add(add(load_vector(w, i), load_vector(w, j)), load_vector(w, k)))
         share = scale(1.0 / 3.0, plate_force(normal, past, drag, lift))
         for corner in (i, j, k):
-            put_vector(total, corner, add(vector_at(total, corner), share))
+            store_vector(total, corner, add(load_vector(total, corner), share))
     return total
 
 
@@ -93,4 +93,4 @@ def plate_force(normal, w, drag, lift):
     )
 
 
-_forces = TwoSpeeds(triangle_forces)
+_forces = Kernel(triangle_forces)

@@ -11,10 +11,10 @@ settings.register_profile("plumbob", max_examples=20, deadline=None, derandomize
 settings.load_profile("plumbob")
 
 
-@pytest.fixture(params=compiled.SPEEDS)
-def speed(request):
-    """Run the test once compiled and once in the interpreter; yields the speed's name."""
-    with compiled.speed(request.param):
+@pytest.fixture(params=compiled.BACKENDS)
+def backend(request):
+    """Run the test once by numba and once in the interpreter; yields the backend's name."""
+    with compiled.set_backend(request.param):
         yield request.param
 
 

@@ -84,12 +84,10 @@ INTERNAL = {
     "reference.implicit_euler.certificate.rounding": "a part of the proof",
     "reference.sparse.linear_solver.Factor.solve": "a protocol",
     "reference.sparse.linear_solver.Factor.refactorize": "a protocol",
-    "reference.backend.compiled.TwoSpeeds": "for kernels",
+    "reference.backend.compiled.Kernel": "for kernels",
     "reference.backend.compiled.compile_kernel": "for kernels",
     "reference.backend.compiled.bind": "for kernels",
     "reference.backend.compiled.compiled_in": "for kernels",
-    "reference.backend.compiled.digest": "for kernels",
-    "reference.backend.compiled.allocates": "for kernels",
     "reference.backend.threads.in_slices": "for kernels",
     "crosscheck.verdict.Verdict": "made by judge alone",
     "crosscheck.verdict.Claim": "made by claims",
@@ -582,17 +580,24 @@ def _cholespy_calls(A, b):
 
 
 def _settings():
-    def at_speed(name):
-        with reference.speed(name):
-            return 1.0
+    def within(setting):
+        def call(**arguments):
+            with setting(**arguments):
+                return 1.0
 
-    def on_cores(count):
-        with reference.cores(count):
-            return 1.0
+        return call
 
-    return {
-        "reference.backend.compiled.speed": Call(at_speed, {"name": "plain"}, names="speed"),
-        "reference.backend.threads.cores": Call(on_cores, {"count": 1}),
+    compiled, threads = "reference.backend.compiled.", "reference.backend.threads."
+    backends = {
+        "set_backend": Call(within(reference.set_backend), {"name": "python"}, names="backend"),
+        "speed": Call(within(reference.speed), {"name": "plain"}, names="speed"),
+    }
+    counts = {
+        "set_num_threads": Call(within(reference.set_num_threads), {"count": 1}),
+        "cores": Call(within(reference.cores), {"count": 1}),
+    }
+    return {compiled + name: call for name, call in backends.items()} | {
+        threads + name: call for name, call in counts.items()
     }
 
 

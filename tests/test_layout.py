@@ -123,7 +123,7 @@ SLIPS = [
 ]
 
 FINE = [
-    ("reference/a.py", "import math\nimport numpy as np\nfrom .compiled import TwoSpeeds"),
+    ("reference/a.py", "import math\nimport numpy as np\nfrom .compiled import Kernel"),
     ("reference/formats/a.py", "from pathlib import Path\nopen(Path('a'))"),
     ("crosscheck/a.py", "import mujoco\nfrom reference import Skeleton\nfrom . import samples"),
     ("plumbob/__init__.py", "from reference import *\nfrom bench.cli import main"),

@@ -1,7 +1,7 @@
-"""One source, two speeds.
+"""One source, two backends: every kernel runs compiled by numba, or in the Python interpreter.
 
-A kernel is a plain Python function on floats, arrays and tuples of them. `TwoSpeeds(kernel)` runs
-it compiled; inside `with speed("plain"):` the very same source runs in the interpreter.
+A kernel is written as a plain Python function on floats, arrays and tuples of them. `Kernel(plain)`
+runs it compiled; inside `with set_backend("python"):` the interpreter runs the very same source.
 
 The compiled version is *rebuilt* from the plain one with every kernel it calls replaced by that
 kernel's own compiled version, so the plain functions never reach compiled code and can serve as
@@ -17,14 +17,17 @@ import importlib
 import types
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from typing import Any
 
 from .. import arguments
 from . import compilation
-from .digest import Kernel, callees, code_objects, digest
+from .digest import PythonKernel, callees, code_objects, digest
 
-SPEEDS = ("compiled", "plain")
+BACKENDS = ("numba", "python")
+# What `speed` takes: the backends' former names.
+SPEEDS = {"compiled": "numba", "plain": "python"}
 # What a relaxed kernel's compiler may do; infinities and NaN keep their meaning.
 RELAXATIONS = {"reassoc", "contract", "nsz"}
 # What a kernel mentions if it makes arrays.
@@ -34,53 +37,66 @@ LARGE = 5000
 # The interpreter's instructions that read a global.
 GLOBAL_LOADS = {"LOAD_GLOBAL", "LOAD_NAME"}
 
-_speed: ContextVar[str] = ContextVar("speed", default="compiled")
+_backend: ContextVar[str] = ContextVar("backend", default="numba")
 
 
 @contextlib.contextmanager
-def speed(name: str) -> Iterator[None]:
-    """Run every kernel at the named speed, "compiled" (the default) or "plain".
+def set_backend(name: str) -> Iterator[None]:
+    """Run every kernel, inside the block, by "numba" (the default) or "python", its interpreter.
+
+        with set_backend("python"):
 
     Raises:
         ValueError: if the name is neither.
     """
-    token = _speed.set(arguments.choice("speed", name, SPEEDS))
+    token = _backend.set(arguments.choice("backend", name, BACKENDS))
     try:
         yield
     finally:
-        _speed.reset(token)
+        _backend.reset(token)
 
 
-class TwoSpeeds:
-    """A kernel that runs compiled or plain, as `speed` says; compiled at its first call.
+def speed(name: str) -> AbstractContextManager[None]:
+    """Do what `set_backend` does, by the names "compiled" and "plain"; goes with the next release.
 
-    `relaxed` lets the compiler reorder sums and fuse products with them: both speeds then agree
+    Raises:
+        ValueError: if the name is neither.
+    """
+    return set_backend(SPEEDS[arguments.choice("speed", name, SPEEDS)])
+
+
+class Kernel:
+    """A kernel that runs on the backend in force; compiled at its first call.
+
+    `relaxed` lets the compiler reorder sums and fuse products with them: the backends then agree
     only to rounding, and dense loops run up to four times faster. `label` is what a user calls it.
     """
 
-    def __init__(self, plain: Kernel, *, relaxed: bool = False, label: str | None = None):
+    def __init__(self, plain: PythonKernel, *, relaxed: bool = False, label: str | None = None):
         self.plain = plain
         self.relaxed = relaxed
         self.label = label
         functools.update_wrapper(self, plain)
 
     @functools.cached_property
-    def compiled(self) -> Kernel:
+    def compiled(self) -> PythonKernel:
         """The version compiled by numba, on the same arguments."""
         return compile_kernel(self.plain, self.relaxed, self.label)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run the kernel at the speed in force."""
-        if _speed.get() == "plain":
+        """Run the kernel on the backend in force."""
+        if _backend.get() == "python":
             return self.plain(*arguments)
         return self.compiled(*arguments)
 
 
-def compile_kernel(kernel: Kernel, relaxed: bool = False, label: str | None = None) -> Kernel:
+def compile_kernel(
+    kernel: PythonKernel, relaxed: bool = False, label: str | None = None
+) -> PythonKernel:
     """Compile a kernel and all kernels it calls, from their plain sources; cached on disk.
 
     Division by zero gives infinity or NaN, as in NumPy. Unless it is relaxed, floating point is
-    strict: no reordering and no fused operations, so that both speeds round alike.
+    strict: no reordering and no fused operations, so that both backends round alike.
 
     Callees are inlined: a call would hand over every number of every array in its tuples, a hundred
     and more, and cost more than most kernels do. The exception is a LARGE one that its caller
@@ -89,7 +105,7 @@ def compile_kernel(kernel: Kernel, relaxed: bool = False, label: str | None = No
     return _entry(kernel, relaxed, label)
 
 
-def bind(kernel: Kernel, **callees: Kernel) -> Kernel:
+def bind(kernel: PythonKernel, **callees: PythonKernel) -> PythonKernel:
     """Return a kernel that calls other kernels under these names, so that solvers share a loop.
 
     Raises:
@@ -101,14 +117,14 @@ def bind(kernel: Kernel, **callees: Kernel) -> Kernel:
     return _rebuild(kernel, kernel.__globals__ | callees)
 
 
-def compiled_in(module: str) -> Callable[[Kernel], Kernel]:
+def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
     """Return a decorator: the compiled version is the function of that name in another module.
 
     It is for what no plain source can say, such as vector instructions. The module is imported
     when a caller is compiled.
     """
 
-    def mark(plain: Kernel) -> Kernel:
+    def mark(plain: PythonKernel) -> PythonKernel:
         plain.compiled_in = module
         return plain
 
@@ -116,7 +132,7 @@ def compiled_in(module: str) -> Callable[[Kernel], Kernel]:
 
 
 @functools.cache
-def _entry(kernel: Kernel, relaxed: bool, label: str | None) -> Kernel:
+def _entry(kernel: PythonKernel, relaxed: bool, label: str | None) -> PythonKernel:
     """Compile what Python calls; cached on disk together with all that it calls."""
     from . import disk_cache
 
@@ -128,7 +144,7 @@ def _entry(kernel: Kernel, relaxed: bool, label: str | None) -> Kernel:
 
 
 @functools.cache
-def _callee(kernel: Kernel, relaxed: bool, inline: bool) -> Kernel:
+def _callee(kernel: PythonKernel, relaxed: bool, inline: bool) -> PythonKernel:
     """Compile what another kernel calls: a part of that one's code, with no door for Python."""
     module = getattr(kernel, "compiled_in", None)
     if module is not None:
@@ -142,7 +158,7 @@ def _callee(kernel: Kernel, relaxed: bool, inline: bool) -> Kernel:
     return linking.ignore_literals(compiled)
 
 
-def _jit(kernel: Kernel, relaxed: bool, **options: Any) -> Kernel:
+def _jit(kernel: PythonKernel, relaxed: bool, **options: Any) -> PythonKernel:
     import numba
 
     calls = _calls(kernel)
@@ -156,14 +172,14 @@ def _jit(kernel: Kernel, relaxed: bool, **options: Any) -> Kernel:
     return numba.njit(fastmath=RELAXATIONS if relaxed else False, **options)(rebuilt)
 
 
-def _calls(kernel: Kernel) -> Counter[str]:
+def _calls(kernel: PythonKernel) -> Counter[str]:
     """Return how many times a kernel mentions each of its globals."""
     found = (dis.get_instructions(code) for code in code_objects(kernel.__code__))
     return Counter(i.argval for code in found for i in code if i.opname in GLOBAL_LOADS)
 
 
 @functools.cache
-def _inlined_size(kernel: Kernel) -> int:
+def _inlined_size(kernel: PythonKernel) -> int:
     """Return the number of instructions of the interpreter, all callees inlined."""
     own = sum(len(list(dis.get_instructions(code))) for code in code_objects(kernel.__code__))
     calls = _calls(kernel)
@@ -171,7 +187,7 @@ def _inlined_size(kernel: Kernel) -> int:
 
 
 @functools.cache
-def allocates(kernel: Kernel) -> bool:
+def allocates(kernel: PythonKernel) -> bool:
     """Return whether a kernel, or one that it calls, may make arrays.
 
     One that makes none is compiled without counting references to its arguments, which is half of
@@ -183,7 +199,7 @@ def allocates(kernel: Kernel) -> bool:
     )
 
 
-def _rebuild(kernel: Kernel, new_globals: dict[str, Any]) -> Kernel:
+def _rebuild(kernel: PythonKernel, new_globals: dict[str, Any]) -> PythonKernel:
     if kernel.__closure__:
         raise ValueError(f"kernel: {kernel.__qualname__} has a closure; pass what it needs instead")
     rebuilt = types.FunctionType(kernel.__code__, new_globals, kernel.__name__, kernel.__defaults__)

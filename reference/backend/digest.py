@@ -11,23 +11,23 @@ from typing import Any
 import numpy as np
 
 # A plain function at module level: it has __code__ and __globals__, which Callable cannot say.
-Kernel = Any
+PythonKernel = Any
 
 
-def digest(kernel: Kernel) -> str:
+def digest(kernel: PythonKernel) -> str:
     """Return 16 hex digits of the code, constants and globals of a kernel and all its callees."""
     parts: list[bytes] = []
     _collect(kernel, parts, seen=set())
     return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
 
 
-def named_globals(kernel: Kernel) -> list[tuple[str, Any]]:
+def named_globals(kernel: PythonKernel) -> list[tuple[str, Any]]:
     """Return the globals that a kernel mentions, with their values, in the order of their names."""
     names = sorted({name for code in code_objects(kernel.__code__) for name in code.co_names})
     return [(name, kernel.__globals__[name]) for name in names if name in kernel.__globals__]
 
 
-def callees(kernel: Kernel) -> list[tuple[str, Kernel]]:
+def callees(kernel: PythonKernel) -> list[tuple[str, PythonKernel]]:
     """Return the other kernels that a kernel calls, by the names under which it does."""
     return [
         (name, value)
@@ -44,7 +44,7 @@ def code_objects(code: types.CodeType) -> Iterator[types.CodeType]:
             yield from code_objects(constant)
 
 
-def _collect(kernel: Kernel, parts: list[bytes], seen: set[Any]) -> None:
+def _collect(kernel: PythonKernel, parts: list[bytes], seen: set[Any]) -> None:
     if kernel in seen:
         return
     seen.add(kernel)

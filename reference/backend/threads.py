@@ -7,6 +7,7 @@ import contextlib
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from contextvars import ContextVar, copy_context
 from itertools import pairwise
 from typing import Any
@@ -20,23 +21,34 @@ POLL = 0.1
 
 # Pools by their size, each with its threads.
 _pools: dict[int, tuple[ThreadPoolExecutor, list[threading.Thread]]] = {}
-_cores: ContextVar[int | None] = ContextVar("cores", default=None)
+_num_threads: ContextVar[int | None] = ContextVar("num_threads", default=None)
 
 
 @contextlib.contextmanager
-def cores(count: int | None) -> Iterator[None]:
-    """Spread batches over so many cores; None, the default, is all that the process may use.
+def set_num_threads(count: int | None) -> Iterator[None]:
+    """Compute batches, inside the block, in so many threads; None, the default: one for each core.
+
+        with set_num_threads(1):
 
     Results are the same bits whatever the count.
 
     Raises:
         ValueError: if the count is not a positive integer.
     """
-    token = _cores.set(None if count is None else arguments.integer("count", count, least=1))
+    token = _num_threads.set(None if count is None else arguments.integer("count", count, least=1))
     try:
         yield
     finally:
-        _cores.reset(token)
+        _num_threads.reset(token)
+
+
+def cores(count: int | None) -> AbstractContextManager[None]:
+    """Do what `set_num_threads` does, under its old name; goes with the next release.
+
+    Raises:
+        ValueError: if the count is not a positive integer.
+    """
+    return set_num_threads(count)
 
 
 def in_slices(
@@ -55,20 +67,20 @@ def in_slices(
         in_slices(kernel, len(x), lambda part: (model, x[part], result[part]), least=100)
 
     Args:
-        kernel: fills its part of the results, most often a TwoSpeeds.
+        kernel: fills its part of the results, most often a Kernel.
         count: the length of the batch.
         arguments_of: returns the kernel's arguments for a slice.
         least: items in a slice; fewer would not be worth a thread.
     """
-    threads = (_cores.get() or _all_cores()) if count >= 2 * least else 1
+    threads = (_num_threads.get() or _all_cores()) if count >= 2 * least else 1
     if threads == 1:
         return [kernel(*arguments_of(slice(0, count)))]
     slices = min(count // least, SLICES_PER_CORE * threads)
     pool, parts = _pool(threads), []
     try:
         for begin, end in pairwise(count * i // slices for i in range(slices + 1)):
-            context = copy_context()  # so that each thread sees the speed in force
-            context.run(_cores.set, 1)
+            context = copy_context()  # so that each thread sees the backend in force
+            context.run(_num_threads.set, 1)
             parts.append(pool.submit(context.run, kernel, *arguments_of(slice(begin, end))))
         return [_result(part) for part in parts]
     finally:

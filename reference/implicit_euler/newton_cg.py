@@ -15,9 +15,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arguments import FloatArray
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 from ..mass_spring import MassSpring, _spring_blocks
-from ..quaternion import add, put_vector, scale, subtract, vector_at
+from ..quaternion import add, load_vector, scale, store_vector, subtract
 from .factor_cache import global_factor
 from .line_search import line_search
 from .objective import Iterate, Objective
@@ -75,20 +75,20 @@ def hessian_product(blocks, p, masses, springs, pinned):
     """Return M p plus the sum of (A_i A_i') x B_i p, zero at the pins, where p is as well."""
     product = np.empty(p.shape)
     for i in range(len(p)):
-        put_vector(product, i, scale(masses[i], vector_at(p, i)))
+        store_vector(product, i, scale(masses[i], load_vector(p, i)))
     for s in range(len(springs)):
         i, j, B = springs[s, 0], springs[s, 1], blocks[s]
-        a, b, c = subtract(vector_at(p, i), vector_at(p, j))
+        a, b, c = subtract(load_vector(p, i), load_vector(p, j))
         pull = (
             B[0, 0] * a + B[0, 1] * b + B[0, 2] * c,
             B[1, 0] * a + B[1, 1] * b + B[1, 2] * c,
             B[2, 0] * a + B[2, 1] * b + B[2, 2] * c,
         )
-        put_vector(product, i, add(vector_at(product, i), pull))
-        put_vector(product, j, subtract(vector_at(product, j), pull))
+        store_vector(product, i, add(load_vector(product, i), pull))
+        store_vector(product, j, subtract(load_vector(product, j), pull))
     for i in pinned:
-        put_vector(product, i, (0.0, 0.0, 0.0))
+        store_vector(product, i, (0.0, 0.0, 0.0))
     return product
 
 
-_product = TwoSpeeds(hessian_product)
+_product = Kernel(hessian_product)

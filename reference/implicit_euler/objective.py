@@ -26,7 +26,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ..arguments import FloatArray, boolean, choice, coordinates, instance, number
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 from ..backend.threads import in_slices
 from ..mass_spring import (
     MassSpring,
@@ -40,7 +40,7 @@ from ..mass_spring import (
 )
 from .terms import (
     EPS,
-    ROUNDING,
+    SUM_ROUNDING,
     blend_dampers,
     evaluate_objective,
     evaluate_regions,
@@ -97,7 +97,7 @@ class Iterate:
     @property
     def finite(self) -> bool:
         """Whether neither g nor its gradient, nor what is needed for the floor, overflows."""
-        terms = self.most / ROUNDING
+        terms = self.most / SUM_ROUNDING
         return math.isfinite(self.value + self.gradient_norm + terms * terms)
 
     @property
@@ -108,7 +108,7 @@ class Iterate:
     @property
     def at_rest(self) -> bool:
         """Whether the floats nearest to a minimiser may have this gradient: an EPS of its terms."""
-        return self.within(EPS / ROUNDING)
+        return self.within(EPS / SUM_ROUNDING)
 
     def within(self, share: float) -> bool:
         """Return whether the gradient is within a share of the floor."""
@@ -347,9 +347,9 @@ def _side_by_side(
     return gradient, *joined
 
 
-_evaluate = TwoSpeeds(evaluate_objective, label="the objective of implicit Euler")
-_regions = TwoSpeeds(evaluate_regions)
-_join = TwoSpeeds(join_regions)
-_rounding = TwoSpeeds(measure_rounding)
-_most_rounding = TwoSpeeds(most_rounding)
-_blend = TwoSpeeds(blend_dampers)
+_evaluate = Kernel(evaluate_objective, label="the objective of implicit Euler")
+_regions = Kernel(evaluate_regions)
+_join = Kernel(join_regions)
+_rounding = Kernel(measure_rounding)
+_most_rounding = Kernel(most_rounding)
+_blend = Kernel(blend_dampers)

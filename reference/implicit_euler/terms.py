@@ -8,12 +8,12 @@ import math
 import numpy as np
 from numpy import uint64 as at
 
-from ..quaternion import add, dot, norm, put_vector, scale, subtract, vector_at
+from ..quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 from ..springs import spring_frame, spring_stretch
 
 # Rounding errors in the gradient are a few units in the last place of the terms that it sums.
 EPS = float(np.finfo(float).eps)
-ROUNDING = 64 * EPS
+SUM_ROUNDING = 64 * EPS
 # What is said to be no less than the floor is rounded itself.
 MARGIN = 1.000001
 
@@ -99,10 +99,10 @@ def add_particles(x, y, external, hh, masses, first, last, gradient):
     """
     value, farthest = 0.0, 0.0
     for i in range(first, last):
-        x_i, f = vector_at(x, i), scale(hh, vector_at(external, i))
-        away = subtract(x_i, vector_at(y, i))
+        x_i, f = load_vector(x, i), scale(hh, load_vector(external, i))
+        away = subtract(x_i, load_vector(y, i))
         inertia = scale(masses[i], away)
-        put_vector(gradient, i, subtract(inertia, f))
+        store_vector(gradient, i, subtract(inertia, f))
         value += 0.5 * dot(inertia, away) - dot(f, x_i)
         farthest = max(farthest, dot(x_i, x_i))
     return value, farthest
@@ -113,8 +113,8 @@ def add_spring(x, i, j, k, rest_length, tension_only, gradient):
     length, u = spring_frame(x, i, j)
     stretch = spring_stretch(length, rest_length, tension_only)
     pull = scale(k * stretch, u)
-    put_vector(gradient, i, add(vector_at(gradient, i), pull))
-    put_vector(gradient, j, subtract(vector_at(gradient, j), pull))
+    store_vector(gradient, i, add(load_vector(gradient, i), pull))
+    store_vector(gradient, j, subtract(load_vector(gradient, j), pull))
     return 0.5 * k * stretch * stretch
 
 
@@ -122,9 +122,9 @@ def settle(pinned, gradient):
     """Set the gradient of the pins to zero; return its norm."""
     squares = 0.0
     for p in pinned:
-        put_vector(gradient, p, (0.0, 0.0, 0.0))
+        store_vector(gradient, p, (0.0, 0.0, 0.0))
     for i in range(len(gradient)):
-        squares += dot(vector_at(gradient, i), vector_at(gradient, i))
+        squares += dot(load_vector(gradient, i), load_vector(gradient, i))
     return math.sqrt(squares)
 
 
@@ -134,7 +134,11 @@ def measure_rounding(
     """Return what rounding can leave of |grad g| and move of g."""
     size, reach, value_size, squares = np.empty(len(x)), np.empty(len(x)), 0.0, 0.0
     for i in range(len(x)):
-        x_i, y_i, pull = vector_at(x, i), vector_at(y, i), h * h * norm(vector_at(external, i))
+        x_i, y_i, pull = (
+            load_vector(x, i),
+            load_vector(y, i),
+            h * h * norm(load_vector(external, i)),
+        )
         away = subtract(x_i, y_i)
         reach[i] = norm(x_i)
         size[i] = masses[i] * (reach[i] + norm(y_i)) + pull
@@ -151,7 +155,7 @@ def measure_rounding(
         size[p] = 0.0
     for i in range(len(x)):
         squares += size[i] * size[i]
-    return ROUNDING * math.sqrt(squares), ROUNDING * value_size
+    return SUM_ROUNDING * math.sqrt(squares), SUM_ROUNDING * value_size
 
 
 def most_rounding(y, external, h, masses, spring_sums, free):
@@ -163,9 +167,9 @@ def most_rounding(y, external, h, masses, spring_sums, free):
     a, b = 0.0, 0.0
     for i in range(len(y)):
         if free[i]:
-            pull = norm(vector_at(external, i)) + spring_sums[i, 0]
-            still = masses[i] * norm(vector_at(y, i)) + h * h * pull
+            pull = norm(load_vector(external, i)) + spring_sums[i, 0]
+            still = masses[i] * norm(load_vector(y, i)) + h * h * pull
             moving = masses[i] + h * h * spring_sums[i, 1]
             a += still * still
             b += moving * moving
-    return MARGIN * ROUNDING * math.sqrt(a), MARGIN * ROUNDING * math.sqrt(b)
+    return MARGIN * SUM_ROUNDING * math.sqrt(a), MARGIN * SUM_ROUNDING * math.sqrt(b)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .. import arguments, rotation
 from ..arguments import FloatArray, IndexArray, frozen
 from ..articulation import Articulation, one_batch
-from ..backend.compiled import TwoSpeeds, bind
+from ..backend.compiled import Kernel, bind
 from ..backend.threads import in_slices
 from ..model import Model, checked_model, coordinates_name
 from ..outcome import Outcome
@@ -59,8 +59,8 @@ class IKSolver(NamedTuple):
         mechanism: for all else.
     """
 
-    chain: TwoSpeeds
-    mechanism: TwoSpeeds
+    chain: Kernel
+    mechanism: Kernel
 
 
 def _solver(name, sweep, update) -> IKSolver:
@@ -69,8 +69,8 @@ def _solver(name, sweep, update) -> IKSolver:
     many = bind(attempts, attempt=bind(attempt, update=update))
     mechanisms = bind(answer_batch, attempts=many)
     return IKSolver(
-        TwoSpeeds(bind(solve_given, solve_batch=chains), label=f"{name} for chains"),
-        TwoSpeeds(bind(answer_given, answer_batch=mechanisms), label=f"{name} for mechanisms"),
+        Kernel(bind(solve_given, solve_batch=chains), label=f"{name} for chains"),
+        Kernel(bind(answer_given, answer_batch=mechanisms), label=f"{name} for mechanisms"),
     )
 
 
@@ -354,7 +354,7 @@ def _solve_mechanisms(
 
 
 def _run(
-    kernel: TwoSpeeds,
+    kernel: Kernel,
     model: tuple[Any, ...],
     given: tuple[FloatArray, FloatArray],
     rest: tuple[Any, ...],

@@ -7,7 +7,7 @@ import numpy as np
 from ..arguments import LARGEST_COORDINATE, FloatArray
 from ..kinematics import forward_pose, normalise
 from ..outcome import Outcome
-from ..quaternion import norm, subtract, vector_at
+from ..quaternion import load_vector, norm, subtract
 from ..skeleton import SkeletonArrays
 from .ccd import ccd_sweep as sweep  # the one that is bound to each solver's
 from .chain import (
@@ -90,7 +90,7 @@ def solve_batch(tree, path, starts, targets, limits, chained, solved):
     kept = new_chain(tree.offsets, path) if limits.periods > 1 else chain
     rotations = np.empty((len(tree.parents), 4))
     for i in range(len(targets)):
-        local, target, figures = solved.local[i], vector_at(targets, i), solved.figures[i]
+        local, target, figures = solved.local[i], load_vector(targets, i), solved.figures[i]
         start = solved.local[i - 1] if chained and i > 0 else starts[i % len(starts)]
         if not (normalise(start, local) and largest(target) <= LARGEST_COORDINATE):
             return False
@@ -102,7 +102,7 @@ def solve_batch(tree, path, starts, targets, limits, chained, solved):
             turn_links(chain)
             put_local(chain, path, local)
         forward_pose(tree.parents, tree.offsets, local, solved.positions[i], rotations)
-        residual = norm(subtract(vector_at(solved.positions[i], path[-1]), target))
+        residual = norm(subtract(load_vector(solved.positions[i], path[-1]), target))
         least = least_distance(chain, d)
         figures[RESIDUAL], figures[RESIDUAL_ROTATION] = residual, 0.0
         figures[ITERATIONS] = iterations

@@ -9,15 +9,15 @@ from ..quaternion import (
     between,
     conjugate,
     dot,
+    load_quaternion,
+    load_vector,
     multiply,
-    put_quaternion,
-    quaternion_at,
     renormalised,
     rotate,
     scale,
+    store_quaternion,
     subtract,
     turn_about,
-    vector_at,
 )
 from .chain import place_joints
 from .joint_updates import ball_at, move_by, put_ball, shift_free, turn_ball
@@ -53,16 +53,16 @@ def ccd_sweep(chain, target):
     root down, each to its joint and to all below it.
     """
     n = len(chain.lengths)
-    effector = vector_at(chain.positions, n)
+    effector = load_vector(chain.positions, n)
     for k in range(n - 1, -1, -1):
-        joint = vector_at(chain.positions, k)
+        joint = load_vector(chain.positions, k)
         turn, effector = ccd_turn(joint, effector, target)
-        put_quaternion(chain.turns, k, turn)
+        store_quaternion(chain.turns, k, turn)
     above = IDENTITY
     for k in range(n):
-        above = renormalised(multiply(above, quaternion_at(chain.turns, k)))
-        R = quaternion_at(chain.rotations, k)
-        put_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
+        above = renormalised(multiply(above, load_quaternion(chain.turns, k)))
+        R = load_quaternion(chain.rotations, k)
+        store_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
     place_joints(chain)
 
 
@@ -97,7 +97,7 @@ def ccd_update(mechanism, goal, posture, room):
 def move_joint(mechanism, goal, posture, room, j):
     """Give one joint its best coordinates; the effectors follow, the joints below do not yet."""
     joints, q, kind = mechanism.joints, posture.q, mechanism.joints.integers[j, KIND]
-    R = quaternion_at(posture.rotations, j)
+    R = load_quaternion(posture.rotations, j)
     if kind == SLIDE:
         axis = axis_of(joints, j, R)
         way = move_by(joints, q, j, dot(axis, mean_way(mechanism, goal, posture, j)))
@@ -118,12 +118,12 @@ def move_joint(mechanism, goal, posture, room, j):
 
 def arms_to_targets(mechanism, goal, posture, j):
     """Return Wahba's M of the arms from joint j to the effectors below and of their rotations."""
-    M, x = NOTHING, vector_at(posture.positions, j)
+    M, x = NOTHING, load_vector(posture.positions, j)
     for e in range(len(mechanism.effectors)):
         if moves(mechanism, j, e):
             weight = goal[e, WEIGHT]
             arm = subtract(tip(mechanism, posture, e), x)
-            M = add_outer(M, weight, subtract(vector_at(goal, e, POSITION), x), arm)
+            M = add_outer(M, weight, subtract(load_vector(goal, e, POSITION), x), arm)
             if mechanism.effectors[e, ORIENTED]:
                 wanted = wrong_turn(mechanism, goal, posture, e)
                 M = add_turn(M, weight * turn_weight(mechanism), wanted)
@@ -142,7 +142,7 @@ def mean_way(mechanism, goal, posture, j):
 
 def better_turn(mechanism, goal, posture, room, j, M):
     """Turn a ball, or the ball of a free joint, as is best within its limits; return the turn."""
-    joints, R = mechanism.joints, quaternion_at(posture.rotations, j)
+    joints, R = mechanism.joints, load_quaternion(posture.rotations, j)
     turn = best_turn(mechanism, goal, posture, room, j, M)
     before = ball_at(joints, posture.q, j)
     moved = turn_ball(joints, posture.q, j, frame_of(joints, j, posture), multiply(turn, R))
@@ -158,9 +158,9 @@ def best_turn(mechanism, goal, posture, room, j, M):
     e = only_position(mechanism, j)
     if e < 0:
         return best_rotation(M, room.eigen[0], room.eigen[1])
-    x = vector_at(posture.positions, j)
+    x = load_vector(posture.positions, j)
     arm = subtract(tip(mechanism, posture, e), x)
-    return between(arm, subtract(vector_at(goal, e, POSITION), x))
+    return between(arm, subtract(load_vector(goal, e, POSITION), x))
 
 
 def only_position(mechanism, j):
@@ -176,7 +176,7 @@ def only_position(mechanism, j):
 
 def turn_tips(mechanism, posture, j, turn):
     """Turn the effectors below joint j about it."""
-    x = vector_at(posture.positions, j)
+    x = load_vector(posture.positions, j)
     for e in range(len(mechanism.effectors)):
         if moves(mechanism, j, e):
             arm = subtract(tip(mechanism, posture, e), x)

@@ -11,17 +11,17 @@ from ..quaternion import (
     conjugate,
     cross,
     exponential,
+    load_quaternion,
+    load_vector,
     multiply,
     norm,
     perpendicular,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
     renormalised,
     rotate,
     scale,
+    store_quaternion,
+    store_vector,
     subtract,
-    vector_at,
 )
 
 # A chain and target are on one line if no joint is further off it than this, over the reach.
@@ -29,7 +29,7 @@ LINE_TOLERANCE = 1e-9
 # Such a chain is bent by this angle [rad] in all, shared evenly by its joints.
 BEND = 2.0
 # Distances are computed to a few of these, over the reach plus the target's distance.
-ROUNDING = 8 * 2.220446049250313e-16
+POSITION_ROUNDING = 8 * 2.220446049250313e-16
 
 
 class Chain(NamedTuple):
@@ -60,10 +60,10 @@ def new_chain(offsets, path):
     along = np.empty((n + 1, 3))
     lengths = np.empty(n)
     reach, longest = 0.0, 0.0
-    put_vector(along, 0, vector_at(offsets, path[0]))
+    store_vector(along, 0, load_vector(offsets, path[0]))
     for k in range(n):
-        link = vector_at(offsets, path[k + 1])
-        put_vector(along, k + 1, link)
+        link = load_vector(offsets, path[k + 1])
+        store_vector(along, k + 1, link)
         lengths[k] = norm(link)
         reach += lengths[k]
         longest = max(longest, lengths[k])
@@ -73,19 +73,19 @@ def new_chain(offsets, path):
 
 def pose_chain(chain, path, local):
     """Give the chain the pose of local rotations (joint, 4)."""
-    put_vector(chain.positions, 0, vector_at(chain.offsets, 0))
-    put_quaternion(chain.rotations, 0, quaternion_at(local, path[0]))
+    store_vector(chain.positions, 0, load_vector(chain.offsets, 0))
+    store_quaternion(chain.rotations, 0, load_quaternion(local, path[0]))
     for k in range(1, len(path)):
-        R_parent = quaternion_at(chain.rotations, k - 1)
-        put_quaternion(chain.rotations, k, multiply(R_parent, quaternion_at(local, path[k])))
+        R_parent = load_quaternion(chain.rotations, k - 1)
+        store_quaternion(chain.rotations, k, multiply(R_parent, load_quaternion(local, path[k])))
     place_joints(chain)
 
 
 def place_joints(chain):
     """Compute the positions from the rotations, the root fixed."""
     for k in range(len(chain.lengths)):
-        link = rotate(quaternion_at(chain.rotations, k), vector_at(chain.offsets, k + 1))
-        put_vector(chain.positions, k + 1, add(vector_at(chain.positions, k), link))
+        link = rotate(load_quaternion(chain.rotations, k), load_vector(chain.offsets, k + 1))
+        store_vector(chain.positions, k + 1, add(load_vector(chain.positions, k), link))
 
 
 def turn_links(chain):
@@ -95,36 +95,36 @@ def turn_links(chain):
     the left, so that the joint keeps its twist about the link.
     """
     for k in range(len(chain.lengths)):
-        R = quaternion_at(chain.rotations, k)
-        link = rotate(R, vector_at(chain.offsets, k + 1))
-        way = subtract(vector_at(chain.positions, k + 1), vector_at(chain.positions, k))
-        put_quaternion(chain.rotations, k, renormalised(multiply(between(link, way), R)))
+        R = load_quaternion(chain.rotations, k)
+        link = rotate(R, load_vector(chain.offsets, k + 1))
+        way = subtract(load_vector(chain.positions, k + 1), load_vector(chain.positions, k))
+        store_quaternion(chain.rotations, k, renormalised(multiply(between(link, way), R)))
 
 
 def put_local(chain, path, local):
     """Write the chain's local rotations over those of (joint, 4); the effector keeps its own."""
-    put_quaternion(local, path[0], quaternion_at(chain.rotations, 0))
+    store_quaternion(local, path[0], load_quaternion(chain.rotations, 0))
     for k in range(1, len(chain.lengths)):
-        R_parent = quaternion_at(chain.rotations, k - 1)
-        q = multiply(conjugate(R_parent), quaternion_at(chain.rotations, k))
-        put_quaternion(local, path[k], renormalised(q))
+        R_parent = load_quaternion(chain.rotations, k - 1)
+        q = multiply(conjugate(R_parent), load_quaternion(chain.rotations, k))
+        store_quaternion(local, path[k], renormalised(q))
 
 
 def copy_pose(chain, other):
     """Give another chain of the same links the pose of this one."""
     for k in range(len(chain.positions)):
-        put_vector(other.positions, k, vector_at(chain.positions, k))
-        put_quaternion(other.rotations, k, quaternion_at(chain.rotations, k))
+        store_vector(other.positions, k, load_vector(chain.positions, k))
+        store_quaternion(other.rotations, k, load_quaternion(chain.rotations, k))
 
 
 def tip_error(chain, target):
     """Return the distance from the effector to the target [m]."""
-    return norm(subtract(vector_at(chain.positions, len(chain.lengths)), target))
+    return norm(subtract(load_vector(chain.positions, len(chain.lengths)), target))
 
 
 def root_distance(chain, target):
     """Return the distance from the root to the target [m]."""
-    return norm(subtract(target, vector_at(chain.positions, 0)))
+    return norm(subtract(target, load_vector(chain.positions, 0)))
 
 
 def least_distance(chain, d):
@@ -138,7 +138,7 @@ def least_distance(chain, d):
 
 def rounding(chain, d):
     """Return how exactly a distance to a target at distance d is known [m]."""
-    return ROUNDING * (chain.reach + d)
+    return POSITION_ROUNDING * (chain.reach + d)
 
 
 def out_of_reach(chain, d):
@@ -153,14 +153,14 @@ def in_hole(chain, d):
 
 def drawn_near(chain, target, beyond):
     """Return the target, drawn to within a distance of what the effector can reach [m]."""
-    root = vector_at(chain.positions, 0)
+    root = load_vector(chain.positions, 0)
     way = subtract(target, root)
     d = norm(way)
     least = least_distance(chain, d) - beyond
     if least <= 0.0:
         return target
     if d <= rounding(chain, d):  # all directions are as near: the effector keeps its own
-        way = subtract(vector_at(chain.positions, len(chain.lengths)), root)
+        way = subtract(load_vector(chain.positions, len(chain.lengths)), root)
         d = norm(way)
         return add(root, scale(least / d, way)) if d > 0.0 else target
     return add(root, scale((d - least if d > chain.reach else d + least) / d, way))
@@ -172,10 +172,10 @@ def on_one_line(chain, target):
     On it every solver that turns links towards the target in their common plane has no plane to
     turn them in, and stays there.
     """
-    root = vector_at(chain.positions, 0)
+    root = load_vector(chain.positions, 0)
     way = subtract(target, root)
     for k in range(1, len(chain.positions)):
-        arm = subtract(vector_at(chain.positions, k), root)
+        arm = subtract(load_vector(chain.positions, k), root)
         if norm(way) <= LINE_TOLERANCE * chain.reach:
             way = arm
         elif norm(cross(way, arm)) > LINE_TOLERANCE * chain.reach * norm(way):
@@ -189,11 +189,13 @@ def bend(chain):
     direction = (0.0, 0.0, 0.0)
     for k in range(n):
         if norm(direction) == 0.0:
-            direction = rotate(quaternion_at(chain.rotations, k), vector_at(chain.offsets, k + 1))
+            direction = rotate(
+                load_quaternion(chain.rotations, k), load_vector(chain.offsets, k + 1)
+            )
     axis = perpendicular(direction)
     for k in range(n):
         turn = exponential(scale(BEND * (k + 1) / n, axis))
-        put_quaternion(
-            chain.rotations, k, renormalised(multiply(turn, quaternion_at(chain.rotations, k)))
+        store_quaternion(
+            chain.rotations, k, renormalised(multiply(turn, load_quaternion(chain.rotations, k)))
         )
     place_joints(chain)

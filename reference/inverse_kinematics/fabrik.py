@@ -12,17 +12,17 @@ from ..quaternion import (
     between,
     conjugate,
     dot,
+    load_quaternion,
+    load_vector,
     multiply,
     norm,
     normalised,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
     rotate,
     scale,
+    store_quaternion,
+    store_vector,
     subtract,
     turn_about,
-    vector_at,
 )
 from .chain import in_hole, out_of_reach, root_distance
 from .joint_updates import move_by, shift_free, turn_ball
@@ -65,20 +65,20 @@ def fabrik_sweep(chain, target):
 
 def reach_backward(chain, target):
     """Put the effector on the target and pull the joints after it, up to the root."""
-    put_vector(chain.positions, len(chain.lengths), target)
+    store_vector(chain.positions, len(chain.lengths), target)
     for k in range(len(chain.lengths) - 1, -1, -1):
-        after = vector_at(chain.positions, k + 1)
-        pulled = place_towards(after, vector_at(chain.positions, k), chain.lengths[k])
-        put_vector(chain.positions, k, pulled)
+        after = load_vector(chain.positions, k + 1)
+        pulled = place_towards(after, load_vector(chain.positions, k), chain.lengths[k])
+        store_vector(chain.positions, k, pulled)
 
 
 def reach_forward(chain):
     """Put the root back and pull the joints after it, down to the effector."""
-    put_vector(chain.positions, 0, vector_at(chain.offsets, 0))
+    store_vector(chain.positions, 0, load_vector(chain.offsets, 0))
     for k in range(len(chain.lengths)):
-        before = vector_at(chain.positions, k)
-        pulled = place_towards(before, vector_at(chain.positions, k + 1), chain.lengths[k])
-        put_vector(chain.positions, k + 1, pulled)
+        before = load_vector(chain.positions, k)
+        pulled = place_towards(before, load_vector(chain.positions, k + 1), chain.lengths[k])
+        store_vector(chain.positions, k + 1, pulled)
 
 
 def lay_on_line(chain, target, others):
@@ -87,14 +87,14 @@ def lay_on_line(chain, target, others):
     Beyond reach all point at the target; inside the hole that the longest link leaves all others
     fold back, and the effector comes to rest on the rim.
     """
-    root = vector_at(chain.positions, 0)
+    root = load_vector(chain.positions, 0)
     towards = subtract(place_towards(root, target, 1.0), root)
     found = False
     for k in range(len(chain.lengths)):
         longest = chain.lengths[k] == chain.longest and not found
         found |= longest
         step = scale(chain.lengths[k] if longest else others * chain.lengths[k], towards)
-        put_vector(chain.positions, k + 1, add(vector_at(chain.positions, k), step))
+        store_vector(chain.positions, k + 1, add(load_vector(chain.positions, k), step))
 
 
 def place_towards(start, end, length):
@@ -123,39 +123,39 @@ def wish(mechanism, goal, posture, room):
     """
     wishes = room.wishes
     for j in range(len(wishes)):
-        put_quaternion(wishes, j, (0.0, 0.0, 0.0, 0.0))
+        store_quaternion(wishes, j, (0.0, 0.0, 0.0, 0.0))
     for e in range(len(mechanism.effectors)):
         j = mechanism.effectors[e, HANGS]
         if j >= 0:
             add_wish(room, j, goal[e, WEIGHT], wish_of_effector(mechanism, goal, posture, e, j))
     for j in range(len(wishes) - 1, -1, -1):
         if wishes[j, WISHED] > 0.0:
-            put_vector(wishes, j, scale(1.0 / wishes[j, WISHED], vector_at(wishes, j)))
+            store_vector(wishes, j, scale(1.0 / wishes[j, WISHED], load_vector(wishes, j)))
         parent = mechanism.joints.integers[j, PARENT]
         if parent >= 0 and wishes[j, WISHED] > 0.0:
-            x, x_parent = vector_at(posture.positions, j), vector_at(posture.positions, parent)
+            x, x_parent = load_vector(posture.positions, j), load_vector(posture.positions, parent)
             length = norm(subtract(x, x_parent))
-            pulled = place_towards(vector_at(wishes, j), x_parent, length)
+            pulled = place_towards(load_vector(wishes, j), x_parent, length)
             add_wish(room, parent, wishes[j, WISHED], pulled)
 
 
 def wish_of_effector(mechanism, goal, posture, e, j):
     """Return where the joint that an effector hangs on would be with the effector on its target."""
-    target, arm = vector_at(goal, e, POSITION), vector_at(mechanism.tips, e, ARM)
+    target, arm = load_vector(goal, e, POSITION), load_vector(mechanism.tips, e, ARM)
     if mechanism.effectors[e, ORIENTED]:
         return subtract(target, rotate(wished_rotation(mechanism, goal, e), arm))
-    return place_towards(target, vector_at(posture.positions, j), norm(arm))
+    return place_towards(target, load_vector(posture.positions, j), norm(arm))
 
 
 def wished_rotation(mechanism, goal, e):
     """Return the rotation that the joint needs for its effector to have the target's."""
-    frame = conjugate(quaternion_at(mechanism.tips, e, TURN))
-    return multiply(quaternion_at(goal, e, ROTATION), frame)
+    frame = conjugate(load_quaternion(mechanism.tips, e, TURN))
+    return multiply(load_quaternion(goal, e, ROTATION), frame)
 
 
 def add_wish(room, j, weight, position):
     """Add a weighted position to what is wished for a joint."""
-    put_vector(room.wishes, j, add(vector_at(room.wishes, j), scale(weight, position)))
+    store_vector(room.wishes, j, add(load_vector(room.wishes, j), scale(weight, position)))
     room.wishes[j, WISHED] += weight
 
 
@@ -164,18 +164,18 @@ def put_frame(joints, posture, room, j):
     x, R = joint_transform(joints, j, posture.q)
     parent = joints.integers[j, PARENT]
     if parent >= 0:
-        R_parent = quaternion_at(posture.rotations, parent)
-        x = add(vector_at(posture.positions, parent), rotate(R_parent, x))
+        R_parent = load_quaternion(posture.rotations, parent)
+        x = add(load_vector(posture.positions, parent), rotate(R_parent, x))
         R = multiply(R_parent, R)
-    put_vector(posture.positions, j, x)
+    store_vector(posture.positions, j, x)
     if joints.integers[j, KIND] != BALL or room.wishes[j, WISHED] == 0.0:
-        put_quaternion(posture.rotations, j, R)
+        store_quaternion(posture.rotations, j, R)
 
 
 def move_towards_wishes(mechanism, goal, posture, room, j):
     """Move one joint, its parent in place, to bring its children nearest to their wishes."""
     joints, q, kind = mechanism.joints, posture.q, mechanism.joints.integers[j, KIND]
-    R, x = quaternion_at(posture.rotations, j), vector_at(posture.positions, j)
+    R, x = load_quaternion(posture.rotations, j), load_vector(posture.positions, j)
     if kind == FREE and room.wishes[j, WISHED] > 0.0:
         fit_free(mechanism, goal, posture, room, j)
         return
@@ -183,7 +183,7 @@ def move_towards_wishes(mechanism, goal, posture, room, j):
         axis = axis_of(joints, j, R)
         way = dot(axis, mean_wish(mechanism, goal, posture, room, j))
         x = add(x, scale(move_by(joints, q, j, way), axis))
-    put_vector(posture.positions, j, x)
+    store_vector(posture.positions, j, x)
     if kind == HINGE and joints.integers[j, LEADER] == j:
         axis = axis_of(joints, j, R)
         angle = best_angle(arms_to_wishes(mechanism, goal, posture, room, j), axis)
@@ -191,7 +191,7 @@ def move_towards_wishes(mechanism, goal, posture, room, j):
     elif kind == BALL and room.wishes[j, WISHED] > 0.0:
         turn = turn_to_wishes(mechanism, goal, posture, room, j)
         R = turn_ball(joints, q, j, frame_of(joints, j, posture), multiply(turn, R))
-    put_quaternion(posture.rotations, j, normalised(R))
+    store_quaternion(posture.rotations, j, normalised(R))
 
 
 def fit_free(mechanism, goal, posture, room, j):
@@ -200,17 +200,17 @@ def fit_free(mechanism, goal, posture, room, j):
     The centre of the arms goes to the centre of their wishes, the rotation is the best about it: a
     joint that first went to its own wish and then turned about that would overshoot and oscillate.
     """
-    joints, x = mechanism.joints, vector_at(posture.positions, j)
+    joints, x = mechanism.joints, load_vector(posture.positions, j)
     total, arm, way = mean_arm_and_wish(mechanism, goal, posture, room, j)
     M = arms_to_wishes(mechanism, goal, posture, room, j)
     M = add_outer(M, -total, way, arm)
     turn = best_rotation(M, room.eigen[0], room.eigen[1])
     shift, frame = subtract(way, rotate(turn, arm)), frame_of(joints, j, posture)
-    R = multiply(turn, quaternion_at(posture.rotations, j))
+    R = multiply(turn, load_quaternion(posture.rotations, j))
     R = turn_ball(joints, posture.q, j, frame, R)
     shift_free(joints, posture.q, j, rotate(conjugate(frame), shift))
-    put_vector(posture.positions, j, add(x, shift))
-    put_quaternion(posture.rotations, j, normalised(R))
+    store_vector(posture.positions, j, add(x, shift))
+    store_quaternion(posture.rotations, j, normalised(R))
 
 
 def mean_arm_and_wish(mechanism, goal, posture, room, j):
@@ -263,7 +263,7 @@ def arms_to_wishes(mechanism, goal, posture, room, j):
             M = add_outer(M, goal[e, WEIGHT], way, arm)
             if mechanism.effectors[e, ORIENTED]:
                 R = rotation_below(mechanism, posture, j, e)
-                wanted = multiply(quaternion_at(goal, e, ROTATION), conjugate(R))
+                wanted = multiply(load_quaternion(goal, e, ROTATION), conjugate(R))
                 M = add_turn(M, goal[e, WEIGHT] * turn_weight(mechanism), wanted)
     for c in range(j + 1, len(room.wishes)):
         if sees(mechanism, j, c):
@@ -290,16 +290,16 @@ def mean_wish(mechanism, goal, posture, room, j):
 
 def arm_and_wish(mechanism, goal, posture, e, j):
     """Return where an effector is and should be, seen from joint j, in the world's axes [m]."""
-    x = vector_at(mechanism.tips, e, ARM)
+    x = load_vector(mechanism.tips, e, ARM)
     arm = seen_from(mechanism.joints, posture, j, mechanism.effectors[e, HANGS], x)
-    return arm, subtract(vector_at(goal, e, POSITION), vector_at(posture.positions, j))
+    return arm, subtract(load_vector(goal, e, POSITION), load_vector(posture.positions, j))
 
 
 def joint_and_wish(mechanism, posture, room, c, j):
     """Return where a joint below is and should be, seen from joint j, in the world's axes [m]."""
     x, _ = joint_transform(mechanism.joints, c, posture.q)
     arm = seen_from(mechanism.joints, posture, j, mechanism.joints.integers[c, PARENT], x)
-    return arm, subtract(vector_at(room.wishes, c), vector_at(posture.positions, j))
+    return arm, subtract(load_vector(room.wishes, c), load_vector(posture.positions, j))
 
 
 def seen_from(joints, posture, j, k, x):
@@ -308,13 +308,13 @@ def seen_from(joints, posture, j, k, x):
         way, R = joint_transform(joints, k, posture.q)
         x = add(way, rotate(R, x))
         k = joints.integers[k, PARENT]
-    return rotate(quaternion_at(posture.rotations, j), x)
+    return rotate(load_quaternion(posture.rotations, j), x)
 
 
 def rotation_below(mechanism, posture, j, e):
     """Return the rotation of an effector as the coordinates from joint j down have it."""
-    R, k = quaternion_at(mechanism.tips, e, TURN), mechanism.effectors[e, HANGS]
+    R, k = load_quaternion(mechanism.tips, e, TURN), mechanism.effectors[e, HANGS]
     while k != j:
         _, R_joint = joint_transform(mechanism.joints, k, posture.q)
         R, k = multiply(R_joint, R), mechanism.joints.integers[k, PARENT]
-    return multiply(quaternion_at(posture.rotations, j), R)
+    return multiply(load_quaternion(posture.rotations, j), R)

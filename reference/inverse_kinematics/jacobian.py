@@ -9,27 +9,27 @@ from ..quaternion import (
     IDENTITY,
     cross,
     exponential,
+    load_quaternion,
+    load_vector,
     multiply,
     norm,
-    put_quaternion,
-    quaternion_at,
     renormalised,
+    store_quaternion,
     subtract,
-    vector_at,
 )
 from .chain import LINE_TOLERANCE, bend, drawn_near, place_joints
 
 # Where J J^T is singular, a damping of so much of its trace keeps its factors above rounding.
-ROUNDING = 1e-14
+LEAST_DAMPING = 1e-14
 
 
 def task_matrix(chain):
     """Return J J^T as its six entries xx, yy, zz, xy, xz, yz [m²]."""
     n = len(chain.lengths)
-    tip = vector_at(chain.positions, n)
+    tip = load_vector(chain.positions, n)
     xx, yy, zz, xy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(n):
-        x, y, z = subtract(tip, vector_at(chain.positions, k))
+        x, y, z = subtract(tip, load_vector(chain.positions, k))
         xx += y * y + z * z
         yy += x * x + z * z
         zz += x * x + y * y
@@ -48,7 +48,7 @@ def linearise(chain, target, beyond):
     """
     wanted = drawn_near(chain, target, beyond)
     for _ in range(2):
-        e = subtract(wanted, vector_at(chain.positions, len(chain.lengths)))
+        e = subtract(wanted, load_vector(chain.positions, len(chain.lengths)))
         A = task_matrix(chain)
         near = norm(e) <= LINE_TOLERANCE * chain.reach
         if near or norm(times(A, e)) > LINE_TOLERANCE * chain.reach * chain.reach * norm(e):
@@ -83,11 +83,11 @@ def solve_damped(A, damping, b):
 def turn_joints(chain, z):
     """Turn every joint k by the rotation vector r_k x z, J^T z, seen in the world."""
     n = len(chain.lengths)
-    tip = vector_at(chain.positions, n)
+    tip = load_vector(chain.positions, n)
     above = IDENTITY
     for k in range(n):
-        turn = exponential(cross(subtract(tip, vector_at(chain.positions, k)), z))
+        turn = exponential(cross(subtract(tip, load_vector(chain.positions, k)), z))
         above = multiply(above, turn)
-        R = quaternion_at(chain.rotations, k)
-        put_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
+        R = load_quaternion(chain.rotations, k)
+        store_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
     place_joints(chain)

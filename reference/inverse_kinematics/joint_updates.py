@@ -1,7 +1,7 @@
 """Changes of one joint's coordinates within its limits."""
 
 from ..articulation import AT, AXIS, CONE, FREE, KIND, LOWER, UPPER, clamp_ball
-from ..quaternion import conjugate, multiply, normalised, vector_at
+from ..quaternion import conjugate, load_vector, multiply, normalised
 
 
 def move_by(joints, q, j, wanted):
@@ -32,7 +32,9 @@ def turn_ball(joints, q, j, frame, R):
     Q = normalised(multiply(conjugate(frame), R))
     if joints.integers[j, KIND] != FREE:
         lower, upper = joints.numbers[j, LOWER], joints.numbers[j, UPPER]
-        Q = clamp_ball(Q, vector_at(joints.numbers, j, AXIS), lower, upper, joints.numbers[j, CONE])
+        Q = clamp_ball(
+            Q, load_vector(joints.numbers, j, AXIS), lower, upper, joints.numbers[j, CONE]
+        )
     put_ball(joints, q, j, Q)
     return multiply(frame, Q)
 

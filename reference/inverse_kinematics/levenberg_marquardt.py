@@ -8,7 +8,7 @@ for mu is a tenth of |e|^2, the factor of Chan & Lawrence 1988, which needs fewe
 """
 
 from ..quaternion import dot
-from .jacobian import ROUNDING, linearise, solve_damped, turn_joints
+from .jacobian import LEAST_DAMPING, linearise, solve_damped, turn_joints
 from .stacked import damped_step, linearise_all, squared, take_step
 
 # Of the squared error: for positions, and for positions and rotations.
@@ -21,7 +21,7 @@ def levenberg_marquardt_sweep(chain, target):
     """Turn all joints by J^T (J J^T + mu 1)^-1 e, mu = 1/2 |e|^2 + bias."""
     e, A = linearise(chain, target, 0.0)
     damping = DAMPING * dot(e, e) + BIAS * chain.reach * chain.reach
-    damping += ROUNDING * (A[0] + A[1] + A[2])
+    damping += LEAST_DAMPING * (A[0] + A[1] + A[2])
     turn_joints(chain, solve_damped(A, damping, e))
 
 

@@ -26,17 +26,17 @@ from ..quaternion import (
     add,
     conjugate,
     dot,
+    load_quaternion,
+    load_vector,
     logarithm,
     multiply,
     norm,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
     rotate,
+    store_quaternion,
+    store_vector,
     subtract,
-    vector_at,
 )
-from .chain import ROUNDING
+from .chain import POSITION_ROUNDING
 
 # A wrong rotation counts as much as a wrong position of its angle times this part of the reach.
 LEVER = 0.5
@@ -148,53 +148,53 @@ def place(mechanism, posture):
     """Compute where the coordinates put the joints and the effectors."""
     articulated_pose(mechanism.joints, posture.q, posture.positions, posture.rotations)
     for e in range(len(mechanism.effectors)):
-        x, R = vector_at(mechanism.tips, e, ARM), quaternion_at(mechanism.tips, e, TURN)
+        x, R = load_vector(mechanism.tips, e, ARM), load_quaternion(mechanism.tips, e, TURN)
         j = mechanism.effectors[e, HANGS]
         if j >= 0:
-            R_joint = quaternion_at(posture.rotations, j)
-            x = add(vector_at(posture.positions, j), rotate(R_joint, x))
+            R_joint = load_quaternion(posture.rotations, j)
+            x = add(load_vector(posture.positions, j), rotate(R_joint, x))
             R = multiply(R_joint, R)
         put_tip(mechanism, posture, e, x, R)
 
 
 def tip(mechanism, posture, e):
     """Return the position of an effector."""
-    return vector_at(posture.positions, len(mechanism.joints.integers) + e)
+    return load_vector(posture.positions, len(mechanism.joints.integers) + e)
 
 
 def tip_rotation(mechanism, posture, e):
     """Return the rotation of an effector."""
-    return quaternion_at(posture.rotations, len(mechanism.joints.integers) + e)
+    return load_quaternion(posture.rotations, len(mechanism.joints.integers) + e)
 
 
 def put_tip(mechanism, posture, e, x, R):
     """Write an effector's position and rotation."""
-    put_vector(posture.positions, len(mechanism.joints.integers) + e, x)
-    put_quaternion(posture.rotations, len(mechanism.joints.integers) + e, R)
+    store_vector(posture.positions, len(mechanism.joints.integers) + e, x)
+    store_quaternion(posture.rotations, len(mechanism.joints.integers) + e, R)
 
 
 def axis_of(joints, j, R):
     """Return a joint's axis in the world, R its rotation there."""
-    return rotate(R, vector_at(joints.numbers, j, AXIS))
+    return rotate(R, load_vector(joints.numbers, j, AXIS))
 
 
 def frame_of(joints, j, posture):
     """Return the rotation of a joint's unmoved frame in the world."""
-    frame = quaternion_at(joints.numbers, j, FRAME)
+    frame = load_quaternion(joints.numbers, j, FRAME)
     if joints.integers[j, PARENT] < 0:
         return frame
-    return multiply(quaternion_at(posture.rotations, joints.integers[j, PARENT]), frame)
+    return multiply(load_quaternion(posture.rotations, joints.integers[j, PARENT]), frame)
 
 
 def position_error(mechanism, goal, posture, e):
     """Return the way from an effector to its target [m]."""
-    return subtract(vector_at(goal, e, POSITION), tip(mechanism, posture, e))
+    return subtract(load_vector(goal, e, POSITION), tip(mechanism, posture, e))
 
 
 def wrong_turn(mechanism, goal, posture, e):
     """Return the rotation in the world that turns an effector into its target."""
     R = tip_rotation(mechanism, posture, e)
-    return multiply(quaternion_at(goal, e, ROTATION), conjugate(R))
+    return multiply(load_quaternion(goal, e, ROTATION), conjugate(R))
 
 
 def turn_weight(mechanism):
@@ -262,12 +262,12 @@ def least_residual(mechanism, goal):
     Links and the travel of slides reach no further than their sum. Distances and sums of lengths
     are known to a few roundings for each joint.
     """
-    share, least = ROUNDING * (1 + len(mechanism.joints.integers)), 0.0
+    share, least = POSITION_ROUNDING * (1 + len(mechanism.joints.integers)), 0.0
     for e in range(len(mechanism.effectors)):
-        start, top = vector_at(mechanism.tips, e, ARM), mechanism.effectors[e, TOP]
+        start, top = load_vector(mechanism.tips, e, ARM), mechanism.effectors[e, TOP]
         if top >= 0:
-            start = vector_at(mechanism.joints.numbers, top, OFFSET)
-        target, reach = vector_at(goal, e, POSITION), mechanism.tips[e, REACH]
+            start = load_vector(mechanism.joints.numbers, top, OFFSET)
+        target, reach = load_vector(goal, e, POSITION), mechanism.tips[e, REACH]
         rounding = share * (reach + norm(start) + norm(target))
         least = max(least, norm(subtract(target, start)) - reach - rounding)
     return least

@@ -29,7 +29,7 @@ from ..articulation import (
     JointArrays,
     half_turned,
 )
-from ..quaternion import IDENTITY, add, multiply, quaternion_at, rotate, vector_at
+from ..quaternion import IDENTITY, add, load_quaternion, load_vector, multiply, rotate
 from .mechanism import Mechanism
 
 # Points are in one spot if they are no further apart than this, over the reach.
@@ -135,11 +135,11 @@ def _active(
 
 def _merged(whole: JointArrays, joint: int, number: dict[int, int]):
     """Return the nearest moving joint above, and this joint's frame in the frame of that one."""
-    x, R = vector_at(whole.numbers, joint, OFFSET), quaternion_at(whole.numbers, joint, FRAME)
+    x, R = load_vector(whole.numbers, joint, OFFSET), load_quaternion(whole.numbers, joint, FRAME)
     j = int(whole.integers[joint, PARENT])
     while j >= 0 and j not in number:
-        frame = quaternion_at(whole.numbers, j, FRAME)
-        x = add(vector_at(whole.numbers, j, OFFSET), rotate(frame, x))
+        frame = load_quaternion(whole.numbers, j, FRAME)
+        x = add(load_vector(whole.numbers, j, OFFSET), rotate(frame, x))
         R = multiply(frame, R)
         j = int(whole.integers[j, PARENT])
     return number.get(j, -1), x, R

@@ -21,15 +21,15 @@ from ..articulation import (
 from ..outcome import Outcome
 from ..quaternion import (
     angle_between,
+    load_quaternion,
+    load_vector,
     made_unit,
     multiply,
     norm,
     normalised,
-    put_quaternion,
-    quaternion_at,
+    store_quaternion,
     subtract,
     turn_about,
-    vector_at,
 )
 from .batch import (
     EXCESS,
@@ -40,7 +40,7 @@ from .batch import (
     RESIDUAL_ROTATION,
     put_if_room,
 )
-from .chain import BEND, ROUNDING
+from .chain import BEND, POSITION_ROUNDING
 from .joint_updates import ball_at, move_by, put_ball
 from .levenberg_marquardt import levenberg_marquardt_update as update  # bound to each solver's
 from .mechanism import (
@@ -185,7 +185,7 @@ def answer_batch(joints, mechanism, starts, request, answers):
         articulated_pose(joints, q, answers.positions[i], rotations)
         for j in range(len(joints.integers)):
             _, Q = joint_transform(joints, j, q)
-            put_quaternion(answers.local[i], j, Q)
+            store_quaternion(answers.local[i], j, Q)
         answers.figures[i, ITERATIONS] = iterations
         conclude(mechanism, goal, request, answers, i, rotations, least, settled)
     return True
@@ -197,7 +197,7 @@ def fit_goal(goal):
     for e in range(len(goal)):
         for k in range(ROTATION):
             fine &= abs(goal[e, k]) <= LARGEST_COORDINATE
-        Q, unit = made_unit(quaternion_at(goal, e, ROTATION))
+        Q, unit = made_unit(load_quaternion(goal, e, ROTATION))
         goal[e, ROTATION], goal[e, ROTATION + 1], goal[e, ROTATION + 2], goal[e, ROTATION + 3] = Q
         fine &= unit
     return fine
@@ -281,7 +281,7 @@ def next_attempt(mechanism, goal, posture, room, request, k, count, limit):
 
 def is_stuck(mechanism, row):
     """Return whether an attempt settled at once, away from its goal, and has not been bent yet."""
-    away = row[COST] > ROUNDING * mechanism.reach
+    away = row[COST] > POSITION_ROUNDING * mechanism.reach
     return row[STATE] == SETTLED and row[MADE] < STUCK and row[BENT] == 0.0 and away
 
 
@@ -318,11 +318,11 @@ def rank_restarts(mechanism, goal, request, room):
     for r in range(len(request.restarts)):
         distance, angle = 0.0, 0.0
         for e in range(len(goal)):
-            way = subtract(vector_at(goal, e, POSITION), vector_at(request.tips[r], e))
+            way = subtract(load_vector(goal, e, POSITION), load_vector(request.tips[r], e))
             distance = max(distance, norm(way))
             if mechanism.effectors[e, ORIENTED]:
-                wanted = quaternion_at(goal, e, ROTATION)
-                angle = max(angle, rough_angle(quaternion_at(request.tips[r], e, 3), wanted))
+                wanted = load_quaternion(goal, e, ROTATION)
+                angle = max(angle, rough_angle(load_quaternion(request.tips[r], e, 3), wanted))
         room.progress[1 + r, RANK] = distance + lever * angle
 
 
@@ -369,7 +369,7 @@ def attempt(mechanism, goal, posture, room, request, history, done, k, count, le
         since += 1
         if total < PROGRESS * milestone:
             milestone, since = total, 0
-        if abs(before - total) <= ROUNDING * mechanism.reach:
+        if abs(before - total) <= POSITION_ROUNDING * mechanism.reach:
             state = REACHED if within(mechanism, request, distance, angle, least) else SETTLED
         elif since >= room.progress[k, WAIT]:
             state = REACHED if within(mechanism, request, distance, angle, least) else GIVEN_UP
@@ -382,8 +382,8 @@ def within(mechanism, request, distance, angle, least):
 
     A single target out of reach counts as kept within the tolerance of the least distance.
     """
-    room = min(ROUNDING * mechanism.reach, 0.5 * request.tolerance)
-    angular = min(ROUNDING, 0.5 * request.tolerance_rotation)
+    room = min(POSITION_ROUNDING * mechanism.reach, 0.5 * request.tolerance)
+    angular = min(POSITION_ROUNDING, 0.5 * request.tolerance_rotation)
     near = distance <= least + request.tolerance - room
     return near and angle <= request.tolerance_rotation - angular
 
@@ -408,9 +408,9 @@ def conclude(mechanism, goal, request, answers, i, rotations, least, settled):
     distance, angle, total = 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
         j, apart, off = mechanism.effectors[e, EFFECTOR], 0.0, 0.0
-        apart = norm(subtract(vector_at(goal, e, POSITION), vector_at(answers.positions[i], j)))
+        apart = norm(subtract(load_vector(goal, e, POSITION), load_vector(answers.positions[i], j)))
         if mechanism.effectors[e, ORIENTED]:
-            off = angle_between(quaternion_at(rotations, j), quaternion_at(goal, e, ROTATION))
+            off = angle_between(load_quaternion(rotations, j), load_quaternion(goal, e, ROTATION))
         distance, angle = max(distance, apart), max(angle, off)
         total += weighted_square(mechanism, goal[e, WEIGHT], apart, off)
     figures = answers.figures[i]

@@ -29,16 +29,16 @@ from ..articulation import (
 from ..quaternion import (
     cross,
     exponential,
+    load_quaternion,
+    load_vector,
     logarithm,
     multiply,
     normalised,
-    quaternion_at,
     rotate,
     scale,
     subtract,
-    vector_at,
 )
-from .jacobian import ROUNDING
+from .jacobian import LEAST_DAMPING
 from .mechanism import (
     LEVER,
     ORIENTED,
@@ -102,7 +102,7 @@ def linearise_all(mechanism, goal, posture, stack):
     for k in range(len(stack.J)):
         clear(stack.J[k])
     for j in range(len(joints.integers)):
-        R = quaternion_at(posture.rotations, j)
+        R = load_quaternion(posture.rotations, j)
         kind, k = joints.integers[j, KIND], joints.integers[j, FREEDOM]
         leader = joints.integers[j, LEADER]
         factor = joints.numbers[j, MULTIPLIER] * freedom_worth(mechanism, leader)
@@ -136,7 +136,7 @@ def add_shift_rows(mechanism, goal, stack, j, k, R):
 def add_turn_row(mechanism, goal, posture, stack, j, k, axis):
     """Add to row k what a turn of joint j about a world axis does to the effectors below."""
     lever = LEVER * mechanism.reach
-    x = vector_at(posture.positions, j)
+    x = load_vector(posture.positions, j)
     for e in range(len(mechanism.effectors)):
         if moves(mechanism, j, e):
             row, root = mechanism.effectors[e, ROW], math.sqrt(goal[e, WEIGHT])
@@ -298,7 +298,7 @@ def fill_matrix(stack, damping, m):
                 for j in range(i + 1):
                     A[i, j] += J[k, i] * J[k, j]
     for i in range(m):
-        damping += ROUNDING * A[i, i]
+        damping += LEAST_DAMPING * A[i, i]
     for i in range(m):
         A[i, i] += damping
 

@@ -13,7 +13,7 @@ from ..quaternion import dot
 # identity, picks the least turn. It can bring no arm further away, and is nothing once all fit.
 LEAST_TURN = 1e-6
 # Below this share of M's size a turn changes nothing but rounding.
-ROUNDING = 1e-15
+ANGLE_ROUNDING = 1e-15
 SWEEPS = 12
 
 
@@ -59,7 +59,7 @@ def best_angle(M, axis):
     )
     cosine = M[0] + M[4] + M[8] - along
     sine = dot(axis, (M[7] - M[5], M[2] - M[6], M[3] - M[1]))
-    if abs(sine) + abs(cosine) <= ROUNDING * magnitude(M):
+    if abs(sine) + abs(cosine) <= ANGLE_ROUNDING * magnitude(M):
         return 0.0
     return math.atan2(sine, cosine)
 

@@ -9,7 +9,7 @@ import scipy
 from numpy import uint64 as at
 
 from ..arguments import FloatArray, IndexArray, frozen
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 
 
 class BlockSum:
@@ -181,8 +181,8 @@ def sum_weights(weights, diagonal, places, starts, rows):
     return data
 
 
-_joined = TwoSpeeds(join_ends)
-_block_places = TwoSpeeds(block_places)
-_widened = TwoSpeeds(widen_pattern)
-_summed_blocks = TwoSpeeds(sum_blocks)
-_summed_weights = TwoSpeeds(sum_weights)
+_joined = Kernel(join_ends)
+_block_places = Kernel(block_places)
+_widened = Kernel(widen_pattern)
+_summed_blocks = Kernel(sum_blocks)
+_summed_weights = Kernel(sum_weights)

@@ -7,7 +7,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ..arguments import FLOAT64, FloatArray, floats, instance, shape, shown
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 from .analysis import analyse
 from .dissection import Graph
 from .multifrontal import factorize
@@ -154,6 +154,6 @@ def right_sides(b: ArrayLike, n: int) -> FloatArray:
     return given
 
 
-_analyse = TwoSpeeds(analyse, label="the analysis of sparse matrices")
-_factorize = TwoSpeeds(factorize, relaxed=True, label="sparse Cholesky factors")
-_solve = TwoSpeeds(solve, relaxed=True, label="sparse triangular solves")
+_analyse = Kernel(analyse, label="the analysis of sparse matrices")
+_factorize = Kernel(factorize, relaxed=True, label="sparse Cholesky factors")
+_solve = Kernel(solve, relaxed=True, label="sparse triangular solves")

@@ -31,7 +31,7 @@ from ..articulation import (
     JointArrays,
     swing_twist,
 )
-from ..quaternion import add, conjugate, cross, dot, norm, rotate, scale, vector_at
+from ..quaternion import add, conjugate, cross, dot, load_vector, norm, rotate, scale
 
 # r: the penalty of exceeding a limit by 1 rad.
 PENALTY = 100.0
@@ -59,7 +59,7 @@ def excess(problem, q, limit):
     if joints.integers[j, KIND] != BALL:
         unit = problem.units[joints.integers[j, FREEDOM]]
         return sign * (q[at] - value) / unit, (sign, 0.0, 0.0)
-    Q, u = (q[at], q[at + 1], q[at + 2], q[at + 3]), vector_at(joints.numbers, j, AXIS)
+    Q, u = (q[at], q[at + 1], q[at + 2], q[at + 3]), load_vector(joints.numbers, j, AXIS)
     if bound == CONE:
         swing, gradient = swing_and_gradient(Q, u)
         return swing - value, gradient

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from ..arguments import FloatArray
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 
 
 class CyclicBandedSystem:
@@ -61,4 +61,4 @@ def fill_band(diagonal, coupling, number, band):
                     band[there * n + a, (here - there) * n + b - a] = coupling[f, a, b]
 
 
-_fill = TwoSpeeds(fill_band)
+_fill = Kernel(fill_band)

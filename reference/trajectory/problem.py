@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arguments import FloatArray, IndexArray
 from ..articulation import FREE, FREEDOM, KIND, LEADER, SLIDE
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 from ..inverse_kinematics.mechanism import Mechanism
 from .augmented_lagrangian import joint_limits
 from .smoothness import fill_displacements, integrate_frames
@@ -28,9 +28,9 @@ RIDGE = 1e-14
 # every freedom of which has moved by up to PROBE [rad]; values below the last are always zero.
 SINGULAR_RATIO, PROBE, ALWAYS_ZERO = 1e-3, 0.3, 1e-9
 
-_displacements = TwoSpeeds(fill_displacements)
-_integrate = TwoSpeeds(integrate_frames)
-_errors_and_jacobians = TwoSpeeds(fill_errors_and_jacobians)
+_displacements = Kernel(fill_displacements)
+_integrate = Kernel(integrate_frames)
+_errors_and_jacobians = Kernel(fill_errors_and_jacobians)
 
 
 class TrajectoryProblem(NamedTuple):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import FloatArray
-from ..backend.compiled import TwoSpeeds
+from ..backend.compiled import Kernel
 from .augmented_lagrangian import add_active_limits, limit_cost, update_multipliers
 from .cyclic_banded import CyclicBandedSystem
 from .problem import (
@@ -42,11 +42,11 @@ FIRST_SHIFT, LEAST_SHIFT, LEAST_RAISED_SHIFT, MAX_SHIFT = 1e-6, 1e-12, 1e-7, 1e4
 # Least ratios of the actual to the predicted decrease: to take a step, and to lower the shift.
 ACCEPTED, TRUSTED = 1e-4, 0.75
 
-_add_smoothness = TwoSpeeds(add_smoothness)
-_add_active_limits = TwoSpeeds(add_active_limits)
-_limit_cost = TwoSpeeds(limit_cost)
-_update_multipliers = TwoSpeeds(update_multipliers)
-_subtract_second_derivatives = TwoSpeeds(subtract_second_derivatives)
+_add_smoothness = Kernel(add_smoothness)
+_add_active_limits = Kernel(add_active_limits)
+_limit_cost = Kernel(limit_cost)
+_update_multipliers = Kernel(update_multipliers)
+_subtract_second_derivatives = Kernel(subtract_second_derivatives)
 
 
 class QuadraticModel(NamedTuple):

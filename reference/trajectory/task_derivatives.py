@@ -33,13 +33,13 @@ from ..quaternion import (
     add,
     cross,
     dot,
+    load_quaternion,
+    load_vector,
     logarithm,
-    put_vector,
-    quaternion_at,
     rotate,
     scale,
+    store_vector,
     subtract,
-    vector_at,
 )
 
 ZERO = (0.0, 0.0, 0.0)
@@ -125,7 +125,7 @@ def fill_motions(mechanism, units, work):
     """Fill the motions of a frame, but for their moments."""
     joints, motions, at = mechanism.joints, work.motions, 0
     for j in range(len(joints.integers)):
-        R, k = quaternion_at(work.pose.rotations, j), joints.integers[j, FREEDOM]
+        R, k = load_quaternion(work.pose.rotations, j), joints.integers[j, FREEDOM]
         kind, factor = joints.integers[j, KIND], joints.numbers[j, MULTIPLIER]
         if kind == HINGE:
             at = put_motion(motions, at, j, k, scale(factor, axis_of(joints, j, R)), ZERO)
@@ -156,8 +156,8 @@ def put_translations(motions, at, j, k, R, unit):
 def put_motion(motions, at, j, k, angular, linear):
     """Write a motion of joint j and freedom k into an entry; return the next one."""
     motions.owners[at, 0], motions.owners[at, 1] = j, k
-    put_vector(motions.angular, at, angular)
-    put_vector(motions.linear, at, linear)
+    store_vector(motions.angular, at, angular)
+    store_vector(motions.linear, at, linear)
     return at + 1
 
 
@@ -172,15 +172,17 @@ def fill_jacobian(mechanism, target, work, J):
                 add_to_column(J, row, owners[b, 1], scale(root, velocity(mechanism, work, e, b)))
                 if mechanism.effectors[e, ORIENTED]:
                     lever = root * LEVER * mechanism.reach
-                    angular = scale(lever, vector_at(work.motions.angular, b))
+                    angular = scale(lever, load_vector(work.motions.angular, b))
                     add_to_column(J, row + 3, owners[b, 1], angular)
 
 
 def velocity(mechanism, work, e, b):
     """Return the linear velocity of an effector by a motion."""
-    x = vector_at(work.pose.positions, work.motions.owners[b, 0])
+    x = load_vector(work.pose.positions, work.motions.owners[b, 0])
     arm = subtract(tip(mechanism, work.pose, e), x)
-    return add(cross(vector_at(work.motions.angular, b), arm), vector_at(work.motions.linear, b))
+    return add(
+        cross(load_vector(work.motions.angular, b), arm), load_vector(work.motions.linear, b)
+    )
 
 
 def fill_moments(mechanism, target, work, m, e):
@@ -192,8 +194,8 @@ def fill_moments(mechanism, target, work, m, e):
         if mechanism.effectors[e, ORIENTED]:
             lever = 0.5 * root * LEVER * mechanism.reach
             torque = scale(lever, (m[row + 3], m[row + 4], m[row + 5]))
-            moment = add(moment, cross(vector_at(work.motions.angular, b), torque))
-        put_vector(work.motions.moments, b, moment)
+            moment = add(moment, cross(load_vector(work.motions.angular, b), torque))
+        store_vector(work.motions.moments, b, moment)
 
 
 def subtract_effector(mechanism, work, e, diagonal):
@@ -206,9 +208,9 @@ def subtract_effector(mechanism, work, e, diagonal):
         for a in range(b + 1):
             above, i = owners[a]
             if moves(mechanism, above, e):
-                second = dot(vector_at(angular, a), vector_at(moments, b))
+                second = dot(load_vector(angular, a), load_vector(moments, b))
                 if above == j and is_rotation(work.motions, a):
-                    second = 0.5 * (second + dot(vector_at(angular, b), vector_at(moments, a)))
+                    second = 0.5 * (second + dot(load_vector(angular, b), load_vector(moments, a)))
                 diagonal[i, k] -= second
                 if a != b:
                     diagonal[k, i] -= second
@@ -216,7 +218,7 @@ def subtract_effector(mechanism, work, e, diagonal):
 
 def is_rotation(motions, a):
     """Return whether a motion is a rotation."""
-    x, y, z = vector_at(motions.angular, a)
+    x, y, z = load_vector(motions.angular, a)
     return x != 0.0 or y != 0.0 or z != 0.0
 
 

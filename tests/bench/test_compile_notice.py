@@ -8,13 +8,11 @@ import sys
 import pytest
 
 PROGRAM = """
-import numpy as np
+import plumbob
 from bench import compile_notice
-compile_notice.install()
-compile_notice.install()
+compile_notice.install()  # once more does not say it twice
 compile_notice.DELAY = {delay}
-from reference import forward_kinematics, scenes
-forward_kinematics(*scenes.lab_arm())
+plumbob.forward_kinematics(*plumbob.scenes.lab_arm())
 """
 LINE = "compiling forward_kinematics, once"
 

@@ -9,7 +9,7 @@ from bench.experiments.timing.case import LIMIT, copying, stream, streaming
 from bench.harness import run
 from bench.harness.machine import stamp
 from bench.harness.record import RecordFile
-from reference import cores, forward_kinematics
+from reference import forward_kinematics, set_num_threads
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def test_the_limit_of_batches_reads_and_writes_all_that_it_says(many, monkeypatc
 
     monkeypatch.setattr(timing_case, "_stream", watched)
     case = streaming("p", 320, 560, cores=many, least=0 if many == 1 else 8)
-    with cores(many):
+    with set_num_threads(many):
         case.prepare()()
     assert len(moved) == (1 if many == 1 else 3 * 4)
     assert [sum(column) for column in zip(*moved, strict=True)] == [320, 560]

@@ -219,7 +219,7 @@ def verdict(family, engine, quantity):
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
 @pytest.mark.parametrize("family", TEXTS)
-def test_one_of_everything_agrees(family, engine, quantity, small, speed):
+def test_one_of_everything_agrees(family, engine, quantity, small, backend):
     assert verdict(family, engine, quantity).held, verdict(family, engine, quantity)
 
 

@@ -80,7 +80,7 @@ def q(arm, rng):
 
 @at_both_speeds
 @given(**TREES)
-def test_forward_kinematics_is_a_product_of_transforms(articulated, speed, kinds, seed):
+def test_forward_kinematics_is_a_product_of_transforms(articulated, backend, kinds, seed):
     model = articulated(kinds, seed)
     q = model.random(np.random.default_rng(seed))
     pose, world = forward_kinematics(model, q), by_matrices(model, q)
@@ -91,7 +91,7 @@ def test_forward_kinematics_is_a_product_of_transforms(articulated, speed, kinds
 
 @at_both_speeds
 @given(**TREES)
-def test_global_poses_are_products_of_local_transforms(articulated, speed, kinds, seed):
+def test_global_poses_are_products_of_local_transforms(articulated, backend, kinds, seed):
     model = articulated(kinds, seed)
     q = model.random(np.random.default_rng(seed))
     pose, (offsets, local) = forward_kinematics(model, q), model.local_transforms(q)
@@ -101,14 +101,14 @@ def test_global_poses_are_products_of_local_transforms(articulated, speed, kinds
         np.testing.assert_allclose(pose.rotations[j], rotation.multiply(R, local[j]))
 
 
-def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, speed):
+def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, backend):
     balls = forward_kinematics(Articulation(skeleton), local.ravel())
     pose = forward_kinematics(skeleton, local)
     np.testing.assert_allclose(balls.positions, pose.positions, rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(balls.rotations, pose.rotations, rtol=0, atol=ROUNDING)
 
 
-def test_a_hinge_is_a_ball_that_turns_about_its_axis(skeleton, rng, speed):
+def test_a_hinge_is_a_ball_that_turns_about_its_axis(skeleton, rng, backend):
     axes = rng.standard_normal((6, 3))
     q = rng.uniform(-7.0, 7.0, 6)
     turns = rotation.exponential(q[:, None] * axes / np.linalg.norm(axes, axis=1, keepdims=True))
@@ -118,7 +118,7 @@ def test_a_hinge_is_a_ball_that_turns_about_its_axis(skeleton, rng, speed):
     np.testing.assert_allclose(hinges.rotations, balls.rotations, rtol=0, atol=ROUNDING)
 
 
-def test_a_slide_shifts_along_its_axis_in_its_frame_and_does_not_turn(speed):
+def test_a_slide_shifts_along_its_axis_in_its_frame_and_does_not_turn(backend):
     turn = rotation.exponential([0.0, 0.0, np.pi / 2])
     slide = one("slide", axis=(2.0, 0.0, 0.0), offset=(1.0, 2.0, 3.0), frames=turn)
     pose = forward_kinematics(slide, [0.5])
@@ -126,14 +126,14 @@ def test_a_slide_shifts_along_its_axis_in_its_frame_and_does_not_turn(speed):
     np.testing.assert_allclose(pose.rotations, [turn], rtol=0, atol=1e-15)
 
 
-def test_a_free_joint_is_where_its_coordinates_say(rng, speed):
+def test_a_free_joint_is_where_its_coordinates_say(rng, backend):
     Q = rotation.random(rng)
     pose = forward_kinematics(one("free", offset=(1.0, 2.0, 3.0)), [4.0, 5.0, 6.0, *Q])
     assert (pose.positions == [[5.0, 7.0, 9.0]]).all()
     np.testing.assert_allclose(pose.rotations, [Q], rtol=0, atol=1e-15)
 
 
-def test_fixed_joints_have_no_coordinates(skeleton, speed):
+def test_fixed_joints_have_no_coordinates(skeleton, backend):
     fixed = Articulation(skeleton, "fixed")
     assert fixed.coordinate_count == fixed.freedom_count == 0
     rest = forward_kinematics(skeleton, rotation.identity(6)).positions
@@ -162,13 +162,13 @@ def test_joints_are_found_by_name(arm):
     assert arm.coordinates_of("joint3") == slice(2, 6)
 
 
-def test_a_mimic_joint_moves_with_its_leader(arm, q, speed):
+def test_a_mimic_joint_moves_with_its_leader(arm, q, backend):
     offsets, _ = arm.local_transforms(q)
     way = rotation.rotate(arm.frames[5], (-0.5 * q[1] + 0.3) * arm.axes[5])
     np.testing.assert_allclose(offsets[5], arm.skeleton.offsets[5] + way, rtol=0, atol=1e-15)
 
 
-def test_a_mimic_of_a_mimic_moves_with_the_first(speed):
+def test_a_mimic_of_a_mimic_moves_with_the_first(backend):
     chain = Skeleton([-1, 0, 1], np.zeros((3, 3)), ["a", "b", "c"])
     model = Articulation(
         chain, "hinge", mimics={"a": Mimic("b", 2.0, 0.5), "b": Mimic("c", 3.0, -0.25)}
@@ -182,7 +182,7 @@ def test_a_mimic_of_a_mimic_moves_with_the_first(speed):
 
 @at_both_speeds
 @given(**TREES)
-def test_clamping_brings_within_limits_and_again_changes_nothing(articulated, speed, kinds, seed):
+def test_clamping_brings_within_limits_and_again_changes_nothing(articulated, backend, kinds, seed):
     model = articulated(kinds, seed)
     free = Articulation(model.skeleton, model.kinds, mimics=model.mimics)
     q = 2.0 * free.random(np.random.default_rng(seed), 5)
@@ -198,7 +198,7 @@ def test_clamping_brings_within_limits_and_again_changes_nothing(articulated, sp
 
 @at_both_speeds
 @given(**TREES)
-def test_random_coordinates_keep_all_limits(articulated, speed, kinds, seed):
+def test_random_coordinates_keep_all_limits(articulated, backend, kinds, seed):
     model = articulated(kinds, seed)
     q = model.random(np.random.default_rng(seed), 20)
     assert model.within_limits(q, ANGLE).all()
@@ -278,7 +278,7 @@ def test_a_clamped_ball_keeps_the_direction_of_its_tilt_and_the_nearer_twist(
     np.testing.assert_allclose(kept, shortened, rtol=0, atol=ANGLE)
 
 
-def test_limits_are_felt_by_their_excess(speed):
+def test_limits_are_felt_by_their_excess(backend):
     slide = one("slide", lower=-1.0, upper=2.0)
     np.testing.assert_array_equal(
         slide.within_limits([[-1.25], [-1.0], [2.0], [2.25]], 0.25), [True] * 4
@@ -290,7 +290,7 @@ def test_limits_are_felt_by_their_excess(speed):
 
 
 @pytest.mark.parametrize(("limit", "over"), [("cones", 0), ("upper", 2), ("lower", 2)])
-def test_a_ball_beyond_its_cone_or_its_twist_is_outside(limit, over, speed):
+def test_a_ball_beyond_its_cone_or_its_twist_is_outside(limit, over, backend):
     ball = one("ball", **{limit: -0.4 if limit == "lower" else 0.4})
     sign = -1.0 if limit == "lower" else 1.0
     for angle, within in ((0.39, True), (0.41, False)):
@@ -313,7 +313,7 @@ def test_neutral_is_zero_or_the_nearest_limit():
     assert not one("hinge").limited
 
 
-def test_a_batch_is_its_poses(arm, rng, speed):
+def test_a_batch_is_its_poses(arm, rng, backend):
     q = arm.random(rng, 2, 3)
     for of in (arm.forward, arm.local_transforms, lambda q: (arm.clamp(q), arm.within_limits(q))):
         for all_at_once, single in zip(of(q), of(q[1, 2]), strict=True):
@@ -322,7 +322,7 @@ def test_a_batch_is_its_poses(arm, rng, speed):
     assert forward_kinematics(arm, np.empty((0, 13))).positions.shape == (0, 6, 3)
 
 
-def test_a_model_owns_what_it_shows_and_inputs_stay_as_they_were(rng, speed):
+def test_a_model_owns_what_it_shows_and_inputs_stay_as_they_were(rng, backend):
     axes, given = np.array([[0.0, 0.0, 2.0]]), np.array([[0.1, 0.2, 0.3, 1.0 + 5e-7, 0, 0, 0]])
     model = Articulation(Skeleton([-1], [[0.0, 0.0, 0.0]]), "free", axes)
     for values in (model.frames, model.axes, model.lower, model.upper, model.cones):
@@ -335,7 +335,7 @@ def test_a_model_owns_what_it_shows_and_inputs_stay_as_they_were(rng, speed):
     assert (given == before).all()
 
 
-def test_slightly_long_quaternions_are_normalised_once(arm, q, speed):
+def test_slightly_long_quaternions_are_normalised_once(arm, q, backend):
     long = q.copy()
     long[2:6] *= 1.0 + 5e-7
     expected = forward_kinematics(arm, q)
@@ -356,7 +356,7 @@ def test_slightly_long_quaternions_are_normalised_once(arm, q, speed):
     ],
 )
 @pytest.mark.parametrize("use", ["clamp", "within_limits", "local_transforms", "forward"])
-def test_bad_coordinates_are_named(use, change, message, arm, q, speed):
+def test_bad_coordinates_are_named(use, change, message, arm, q, backend):
     with pytest.raises(ValueError, match=f"q: {message}"):
         getattr(arm, use)(change(q))
 

@@ -526,8 +526,8 @@ class TestReasons:
     def test_too_far_begins_where_kantorovichs_theorem_ends(self):
         system, state = one_spring()
         shares = []
-        for speed in np.linspace(0.5, 5.0, 19):
-            known = self.start(system, State(state.positions, [[0, 0, 0], [0, speed, 0]]))
+        for backend in np.linspace(0.5, 5.0, 19):
+            known = self.start(system, State(state.positions, [[0, 0, 0], [0, backend, 0]]))
             shares.append(known.lipschitz * known.newton_step / known.curvature)
             assert known.covered == (shares[-1] < 0.5)
         assert any(0.25 < share < 0.5 for share in shares)

@@ -129,33 +129,33 @@ def test_a_closed_curve_is_spaced_across_its_wrap_too(points, least):
     assert around.max() <= 2 * least + ROUNDING
 
 
-def test_points_are_given_up_until_the_end_fits(speed):
+def test_points_are_given_up_until_the_end_fits(backend):
     """The curve comes back to its end: the last two points kept lie within 1 of it."""
     points = np.array([[0.0, 0, 0], [1.5, 0, 0], [2.2, 0.8, 0], [2.2, -0.3, 0], [2.0, 0.2, 0]])
     even = resample(points, min_spacing=1.0, max_spacing=3.0)
     assert even.tolist() == points[[0, -1]].tolist()
 
 
-def test_where_the_ends_meet_a_point_far_from_both_is_found(speed):
+def test_where_the_ends_meet_a_point_far_from_both_is_found(backend):
     points = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.99, 0, 0], [0.95, 0, 0]])
     even = resample(points, min_spacing=1.0, max_spacing=2.0)
     assert even.tolist() == points[[0, 2, 3]].tolist()
 
 
-def test_points_already_well_spaced_stay(speed):
+def test_points_already_well_spaced_stay(backend):
     points = curves["circle"](50)
     even = resample(points, min_spacing=0.05, max_spacing=0.1)
     assert (even == points).all()
 
 
-def test_resampled_points_lie_on_the_curve(speed):
+def test_resampled_points_lie_on_the_curve(backend):
     even = resample([[0, 0, 0], [1, 0, 0], [1, 2, 0]], min_spacing=0.1, max_spacing=0.3)
     x, y, _ = even.T
     assert (((y == 0) & (x <= 1)) | ((x == 1) & (y <= 2))).all()
     assert len(even) == 12
 
 
-def test_resampling_is_indifferent_to_scale(speed):
+def test_resampling_is_indifferent_to_scale(backend):
     points = curves["plumb_bob"]()
     even = resample(points, min_spacing=0.01, max_spacing=0.03)
     large = resample(1024 * points, min_spacing=10.24, max_spacing=30.72)

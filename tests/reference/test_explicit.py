@@ -31,7 +31,7 @@ def observed_orders(integrator, system, state, exact, time, counts):
     return np.log2(errors[:-1] / errors[1:])
 
 
-def test_symplectic_euler_moves_with_the_new_velocity(network, speed):
+def test_symplectic_euler_moves_with_the_new_velocity(network, backend):
     system, state = network
     h, free = 0.01, system.free
     after = symplectic_euler(system, state, h)
@@ -77,7 +77,7 @@ def test_symplectic_euler_keeps_its_shadow_energy():
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 class TestEveryIntegrator:
     def test_momentum_changes_by_the_outer_forces_alone(
-        self, network, altered, rng, speed, integrator
+        self, network, altered, rng, backend, integrator
     ):
         system, state = altered(network[0], pinned=()), network[1]
         h, outer = 0.01, rng.standard_normal((7, 3))
@@ -89,7 +89,7 @@ class TestEveryIntegrator:
         # Each velocity rounds to a unit in the last place, 1e-16 of about 3 m/s.
         np.testing.assert_allclose(gained, expected, rtol=0, atol=1e-14)
 
-    def test_pins_hold_exactly(self, network, speed, integrator):
+    def test_pins_hold_exactly(self, network, backend, integrator):
         system, state = network
         after = integrator(system, state, 0.01)
         np.testing.assert_array_equal(after.positions[2], state.positions[2])
@@ -105,8 +105,8 @@ class TestEveryIntegrator:
 
     def test_both_speeds_round_alike(self, network, integrator):
         ends = []
-        for speed in compiled.SPEEDS:
-            with compiled.speed(speed):
+        for backend in compiled.BACKENDS:
+            with compiled.set_backend(backend):
                 ends.append(run(integrator, *network, 0.01, 3))
         np.testing.assert_array_equal(ends[0].positions, ends[1].positions)
         np.testing.assert_array_equal(ends[0].velocities, ends[1].velocities)

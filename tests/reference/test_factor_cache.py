@@ -95,7 +95,7 @@ def test_a_factor_that_nobody_holds_is_let_go(network, analyses):
     assert len(analyses) == 2
 
 
-def test_the_factor_is_that_of_the_matrix(network, rng, speed):
+def test_the_factor_is_that_of_the_matrix(network, rng, backend):
     system, b = network[0], rng.standard_normal((7, 3))
     kept = prefactored.global_factor(system, h)
     for step in (h, 2 * h):

@@ -87,7 +87,7 @@ class TestObjective:
         objective = ImplicitEuler(network[0], h=h).objective(network[1], outer(rng))
         return objective, objective.y + 0.1 * outer(rng)
 
-    def test_value_is_the_derivations_with_dampers_in_e(self, problem, network, rng, speed):
+    def test_value_is_the_derivations_with_dampers_in_e(self, problem, network, rng, backend):
         objective, x = problem
         system, state = network
         y = state.positions + h * state.velocities
@@ -108,7 +108,7 @@ class TestObjective:
         np.testing.assert_array_equal(external, expected)
 
     def test_the_effective_springs_are_undamped_and_blend_spring_and_damper(
-        self, problem, network, speed
+        self, problem, network, backend
     ):
         system, state = network
         effective = problem[0].effective
@@ -123,7 +123,7 @@ class TestObjective:
         assert not effective.tension_only[len(k) :].any()
         np.testing.assert_array_equal(effective.tension_only[: len(k)], rope)
 
-    def test_gradient_is_the_slope_of_the_value(self, problem, speed):
+    def test_gradient_is_the_slope_of_the_value(self, problem, backend):
         objective, x = problem
         expected = np.zeros((7, 3))
         for where in itertools.product(np.flatnonzero(objective.system.free), range(3)):
@@ -134,7 +134,7 @@ class TestObjective:
         scale = np.abs(expected).max()
         np.testing.assert_allclose(objective.gradient(x), expected, atol=DIFFERENCE * scale)
 
-    def test_hessian_is_the_slope_of_the_gradient_and_the_identity_at_pins(self, problem, speed):
+    def test_hessian_is_the_slope_of_the_gradient_and_the_identity_at_pins(self, problem, backend):
         objective, x = problem
         expected = np.zeros((21, 21))
         for i in range(21):
@@ -151,7 +151,7 @@ class TestObjective:
         )
 
     def test_without_geometric_terms_the_hessian_is_that_of_linearised_lengths(
-        self, problem, network, speed
+        self, problem, network, backend
     ):
         objective, x = problem
         system, state = network
@@ -168,12 +168,12 @@ class TestObjective:
         actual = objective.hessian(x, geometric=False).toarray()
         np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-14 * expected.max())
 
-    def test_quadratic_form_is_g_where_d_is_optimal(self, problem, speed):
+    def test_quadratic_form_is_g_where_d_is_optimal(self, problem, backend):
         objective, x = problem
         form = objective.quadratic_form(x, objective.rest_vectors(x))
         assert form == pytest.approx(objective.value(x), rel=1e-13, abs=0)
 
-    def test_quadratic_form_is_above_g_for_any_other_d_of_rest_length(self, problem, rng, speed):
+    def test_quadratic_form_is_above_g_for_any_other_d_of_rest_length(self, problem, rng, backend):
         objective, x = problem
         for _ in range(10):
             d = objective.rest_vectors(x + 0.1 * outer(rng))
@@ -235,7 +235,7 @@ class TestObjective:
 
 class TestStep:
     @pytest.mark.parametrize("name", CONVERGING)
-    def test_momentum_balances_the_forces_at_the_end_of_the_step(self, network, rng, speed, name):
+    def test_momentum_balances_the_forces_at_the_end_of_the_step(self, network, rng, backend, name):
         """M (v' - v) = h f(x'), the dampers pulling with c (l' - l_n) / h."""
         system, state = network
         given = outer(rng)
@@ -252,20 +252,20 @@ class TestStep:
         scale = np.abs(expected).max()
         np.testing.assert_allclose(gained[free], expected[free], rtol=0, atol=1e-12 * scale)
 
-    def test_velocities_are_the_way_over_the_time(self, network, solver, speed):
+    def test_velocities_are_the_way_over_the_time(self, network, solver, backend):
         after = stepped(*network, solver, max_iterations=2).state
         way = after.positions - network[1].positions
         np.testing.assert_array_equal(after.velocities, way / h)
         assert np.abs(way).max() > 0.01
 
-    def test_pins_hold_exactly(self, network, solver, speed):
+    def test_pins_hold_exactly(self, network, solver, backend):
         system, state = network
         after = stepped(system, state, solver, max_iterations=2).state
         np.testing.assert_array_equal(after.positions[2], state.positions[2])
         np.testing.assert_array_equal(after.velocities[2], np.zeros(3))
 
     @pytest.mark.parametrize("name", CONVERGING)
-    def test_the_pin_is_felt_within_the_solve(self, altered, speed, name):
+    def test_the_pin_is_felt_within_the_solve(self, altered, backend, name):
         """A still pin and one of a billion kilograms are alike, but for a billionth."""
         system, state = scenes.hanging_rope(particles=5, stiffness=50.0)
         masses = np.where(system.free, system.masses, 1e9)
@@ -278,7 +278,7 @@ class TestStep:
         np.testing.assert_allclose(held.state.positions, loose.state.positions, rtol=0, atol=1e-8)
 
     @pytest.mark.parametrize("name", CONVERGING)
-    def test_a_damper_is_a_spring_beside_as_long_as_last(self, network, altered, speed, name):
+    def test_a_damper_is_a_spring_beside_as_long_as_last(self, network, altered, backend, name):
         system, state = network
         springs, k, r, rope = beside(system, state.positions)
         stiff = altered(
@@ -289,7 +289,7 @@ class TestStep:
         undamped = converged(altered(system, dampings=0.0), state, name).positions
         assert np.abs(one - undamped).max() > 1e-3
 
-    def test_gauss_newton_is_one_linearised_step(self, network, rng, speed):
+    def test_gauss_newton_is_one_linearised_step(self, network, rng, backend):
         """(M + h C + h² J'kJ) dv = h (f - h J'kJ v), J the Jacobian of the lengths."""
         system, state = network
         given = outer(rng)
@@ -312,7 +312,7 @@ class TestStep:
         expected = (v + dv).reshape(7, 3)
         np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-13)
 
-    def test_one_local_global_iteration_is_the_labs_linear_solve(self, network, rng, speed):
+    def test_one_local_global_iteration_is_the_labs_linear_solve(self, network, rng, backend):
         """(M + h² L) x = h² J d + M y + h² f_ext over the free particles, d fitted to y."""
         system, state = network
         integrator = ImplicitEuler(system, h=h, solver="local_global", max_iterations=1)
@@ -339,7 +339,7 @@ class TestStep:
             np.testing.assert_allclose(one.positions, other.positions, rtol=0, atol=1e-12)
 
     @pytest.mark.parametrize(("name", "iterations"), [("lbfgs", 1), ("chebyshev", PLAIN)])
-    def test_without_a_past_they_step_as_local_global(self, cloth, speed, name, iterations):
+    def test_without_a_past_they_step_as_local_global(self, cloth, backend, name, iterations):
         one, other = (
             stepped(*cloth, solver, max_iterations=iterations) for solver in (name, "local_global")
         )
@@ -355,7 +355,7 @@ class TestStep:
         assert one.iterations < 0.5 * other.iterations
 
     @pytest.mark.parametrize("name", ["local_global", "chebyshev", "lbfgs", "newton_cg"])
-    def test_g_never_grows_in_an_iteration(self, cloth, speed, name):
+    def test_g_never_grows_in_an_iteration(self, cloth, backend, name):
         integrator = ImplicitEuler(*cloth[:1], h=h, solver=name)
         iterates = list(itertools.islice(integrator.iterates(cloth[1]), 60))
         for before, after in itertools.pairwise(iterates):
@@ -367,7 +367,7 @@ class TestStep:
         values = stepped(*cloth).objectives
         assert (np.diff(values) <= 1e-13).all()
 
-    def test_the_line_search_shortens_a_step_that_is_too_long(self, cloth, speed):
+    def test_the_line_search_shortens_a_step_that_is_too_long(self, cloth, backend):
         objective = ImplicitEuler(cloth[0], h=h).objective(cloth[1])
         start = objective.start
         step = -100 * start.gradient
@@ -393,7 +393,7 @@ class TestStep:
         assert len(residuals) <= 8
         assert residuals[-2] < residuals[-3] ** 1.3
 
-    def test_the_hessian_product_is_that_of_the_hessian(self, network, rng, speed):
+    def test_the_hessian_product_is_that_of_the_hessian(self, network, rng, backend):
         objective = ImplicitEuler(network[0], h=h).objective(network[1])
         x, p = objective.y + 0.1 * outer(rng), outer(rng)
         p[network[0].pinned] = 0
@@ -404,7 +404,7 @@ class TestStep:
         np.testing.assert_allclose(product, expected, rtol=0, atol=1e-14)
 
     @pytest.mark.parametrize("name", ["newton", "newton_cg"])
-    def test_newton_descends_from_a_point_where_g_is_not_convex(self, speed, name):
+    def test_newton_descends_from_a_point_where_g_is_not_convex(self, backend, name):
         """A flat cloth squeezed within its plane: the Hessian at y has negative eigenvalues."""
         system, state = scenes.lab_cloth(size=4, stiffness=1000.0)
         inwards = State(state.positions, 10 * (state.positions.mean(axis=0) - state.positions))
@@ -427,7 +427,7 @@ class TestStep:
         assert np.isfinite(objective.hessian(state.positions).data).all()
 
     @pytest.mark.parametrize("name", ["local_global", "chebyshev"])
-    def test_an_iteration_from_x_n_is_that_of_liu_et_al(self, network, rng, speed, name):
+    def test_an_iteration_from_x_n_is_that_of_liu_et_al(self, network, rng, backend, name):
         """(M + h² L) x = h² J d + M y + h² f_ext with d from x_n, the pins eliminated."""
         system, state = network
         given = outer(rng)
@@ -456,7 +456,9 @@ class TestStep:
             ImplicitEuler(cloth[0], solver="gauss_newton", start="y")
 
     @pytest.mark.parametrize("stiffness", [1e15, 1e16, 1e17, 1e19])
-    def test_gauss_newton_answers_where_its_matrix_is_singular_to_rounding(self, stiffness, speed):
+    def test_gauss_newton_answers_where_its_matrix_is_singular_to_rounding(
+        self, stiffness, backend
+    ):
         """Nothing holds the two masses but each other: h² k / m is up to 1e17."""
         system = MassSpring([1.0, 1.0, 1.0], [[0, 1], [1, 2]], 1.0, stiffness)
         state = State(np.arange(9.0).reshape(3, 3), np.ones((3, 3)))
@@ -515,7 +517,7 @@ class TestResidual:
         return gradient(x), max(gradient(y), floor), floor
 
     @pytest.mark.parametrize("iterations", [0, 1, 3])
-    def test_it_is_what_the_definition_says(self, network, rng, speed, solver, iterations):
+    def test_it_is_what_the_definition_says(self, network, rng, backend, solver, iterations):
         given = outer(rng)
         result = stepped(*network, solver, given, tolerance=0, max_iterations=iterations)
         norm, scale, floor = self.residual(*network, result.state.positions, given)
@@ -523,14 +525,14 @@ class TestResidual:
         assert abs(result.residual - norm / scale) <= floor / scale
         assert result.residual > 1e-12 or solver != "local_global"
 
-    def test_the_floor_is_what_the_definition_says(self, network, rng, speed):
+    def test_the_floor_is_what_the_definition_says(self, network, rng, backend):
         given = outer(rng)
         objective = ImplicitEuler(network[0], h=h).objective(network[1], given)
         x = network[1].positions + 0.1
         _, _, floor = self.residual(*network, x, given)
         assert objective.evaluate(x).floor == pytest.approx(float(floor), rel=1e-14, abs=0)
 
-    def test_the_most_is_no_less_than_the_floor_and_not_far_above(self, network, rng, speed):
+    def test_the_most_is_no_less_than_the_floor_and_not_far_above(self, network, rng, backend):
         objective = ImplicitEuler(network[0], h=h).objective(network[1], outer(rng))
         for x in (objective.y, objective.x_n + 5.0, 1e-3 * objective.y, np.ones((7, 3))):
             iterate = objective.evaluate(x)
@@ -556,14 +558,14 @@ class TestResidual:
 
 
 class TestOutcome:
-    def test_a_start_at_rest_is_converged_after_no_iteration(self, solver, speed):
+    def test_a_start_at_rest_is_converged_after_no_iteration(self, solver, backend):
         system, state = scenes.hanging_rope(particles=5, gravity=0.0)
         result = stepped(system, state, solver)
         assert (result.outcome, result.iterations) == (Outcome.CONVERGED, 0)
         assert result.residual == 0
         np.testing.assert_array_equal(result.state.positions, state.positions)
 
-    def test_a_start_at_equilibrium_is_at_rounding_after_no_iteration(self, solver, speed):
+    def test_a_start_at_equilibrium_is_at_rounding_after_no_iteration(self, solver, backend):
         """Rounding leaves a gradient there, which is all the gradient there is."""
         system, state = hanging(6)
         result = stepped(system, state, solver)
@@ -690,7 +692,9 @@ class TestOutcome:
     @pytest.mark.parametrize(
         ("positions", "velocities"), [(1e75, 1.0), (1.0, 1e75)], ids=["positions", "velocities"]
     )
-    def test_a_start_that_overflows_is_returned_unmoved(self, solver, speed, positions, velocities):
+    def test_a_start_that_overflows_is_returned_unmoved(
+        self, solver, backend, positions, velocities
+    ):
         system = MassSpring([1e75, 2e74], [[0, 1]], 1.0, 1e75)
         state = State(positions * np.eye(3)[:2], velocities * np.ones((2, 3)))
         result = stepped(system, state, solver, h=1e5)
@@ -815,7 +819,9 @@ class TestSymmetries:
         assert np.abs(result.state.positions - state.positions).max() > 0.01
         return result.state
 
-    def test_momentum_changes_by_the_outer_forces_alone(self, network, altered, rng, speed, solver):
+    def test_momentum_changes_by_the_outer_forces_alone(
+        self, network, altered, rng, backend, solver
+    ):
         system, state = altered(network[0], pinned=()), network[1]
         given = outer(rng)
         # Whole steps of M + h² L or more keep it all the way; shortened or truncated steps only
@@ -830,7 +836,7 @@ class TestSymmetries:
         expected = h * np.sum(mass * system.gravity + given, axis=0)
         np.testing.assert_allclose(gained, expected, rtol=0, atol=self.ROUNDING / h)
 
-    def test_a_turned_and_moved_world(self, network, altered, rng, speed, solver):
+    def test_a_turned_and_moved_world(self, network, altered, rng, backend, solver):
         system, state = network
         R = rotation.to_matrix(rotation.random(rng, 1))[0]
         way = np.array([1.0, -2.0, 3.0])
@@ -841,7 +847,7 @@ class TestSymmetries:
         actual = self.after(turned, moved, solver, given @ R.T).positions
         np.testing.assert_allclose(actual, expected, rtol=0, atol=self.ROUNDING)
 
-    def test_relabelled_particles(self, network, relabelled, rng, speed, solver):
+    def test_relabelled_particles(self, network, relabelled, rng, backend, solver):
         system, state = network
         renamed, moved, order = relabelled
         given = outer(rng)
@@ -849,13 +855,13 @@ class TestSymmetries:
         actual = self.after(renamed, moved, solver, given[order]).positions
         np.testing.assert_allclose(actual, expected, rtol=0, atol=self.ROUNDING)
 
-    def test_order_and_direction_of_springs(self, network, shuffled, speed, solver):
+    def test_order_and_direction_of_springs(self, network, shuffled, backend, solver):
         system, state = network
         expected = self.after(system, state, solver).positions
         actual = self.after(shuffled, state, solver).positions
         np.testing.assert_allclose(actual, expected, rtol=0, atol=self.ROUNDING)
 
-    def test_other_units(self, network, altered, speed, solver):
+    def test_other_units(self, network, altered, backend, solver):
         """Powers of two change no digit, but under the square roots of a Cholesky factor."""
         system, state = network
         metre, kilogram, second = 4.0, 0.5, 8.0
@@ -877,16 +883,16 @@ class TestSymmetries:
 
     def test_both_speeds_agree_to_the_rounding_of_their_factors(self, network, solver):
         ends = []
-        for name in compiled.SPEEDS:
-            with compiled.speed(name):
+        for name in compiled.BACKENDS:
+            with compiled.set_backend(name):
                 ends.append(self.after(*network, solver).positions)
         np.testing.assert_allclose(*ends, rtol=0, atol=self.ROUNDING)
 
     def test_both_speeds_round_g_and_its_derivatives_alike(self, network):
         objective = ImplicitEuler(network[0], h=h).objective(network[1])
         ends = []
-        for name in compiled.SPEEDS:
-            with compiled.speed(name):
+        for name in compiled.BACKENDS:
+            with compiled.set_backend(name):
                 iterate, hessian = objective.evaluate(objective.y), objective.hessian(objective.y)
                 floors = iterate.value, iterate.gradient_norm, iterate.floor, iterate.value_floor
                 ends.append(np.concatenate([iterate.gradient.ravel(), floors, hessian.data]))
@@ -956,14 +962,14 @@ class TestInputs:
 
 
 class TestUnusualSystems:
-    def test_particles_without_springs_fall_freely(self, solver, speed):
+    def test_particles_without_springs_fall_freely(self, solver, backend):
         system = MassSpring([1.0, 2.0], np.empty((0, 2)), 1.0, 1.0, gravity=(0, -10, 0))
         state = State(np.zeros((2, 3)), [[1.0, 0, 0], [0, 0, 0]])
         after = stepped(system, state, solver).state
         expected = [[1.0, -0.5, 0], [0, -0.5, 0]]
         np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-15)
 
-    def test_a_single_particle_falls(self, solver, speed):
+    def test_a_single_particle_falls(self, solver, backend):
         system = MassSpring([2.0], [], 1.0, 1.0, gravity=(0, -10, 0))
         result = stepped(system, State([[1.0, 0, 0]], [[1.0, 0, 0]]), solver)
         assert result.outcome == Outcome.CONVERGED
@@ -971,7 +977,7 @@ class TestUnusualSystems:
         expected = [[1.0, -0.5, 0]]
         np.testing.assert_allclose(result.state.velocities, expected, rtol=0, atol=1e-14)
 
-    def test_a_system_that_is_all_pins_stays(self, solver, speed):
+    def test_a_system_that_is_all_pins_stays(self, solver, backend):
         system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
         state = State(np.eye(3)[:2], np.ones((2, 3)))
         result = stepped(system, state, solver)
@@ -980,7 +986,7 @@ class TestUnusualSystems:
         np.testing.assert_array_equal(result.state.velocities, np.zeros((2, 3)))
 
     @pytest.mark.parametrize("name", CONVERGING)
-    def test_coincident_particles_are_driven_apart(self, name, speed):
+    def test_coincident_particles_are_driven_apart(self, name, backend):
         system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 100.0, gravity=(0, 0, 0))
         result = stepped(system, State(np.zeros((2, 3)), np.zeros((2, 3))), name)
         assert result.outcome == Outcome.CONVERGED
@@ -989,7 +995,7 @@ class TestUnusualSystems:
     @pytest.mark.parametrize("tension_only", [False, True])
     @pytest.mark.parametrize("name", CONVERGING)
     def test_springs_without_rest_length_are_solved_at_once(
-        self, name, speed, tension_only, network, altered
+        self, name, backend, tension_only, network, altered
     ):
         """g is quadratic, and M + h² L is its Hessian."""
         system, state = network
@@ -997,7 +1003,7 @@ class TestUnusualSystems:
         result = stepped(linear, state, name, tolerance=1e-12)
         assert (result.outcome, result.iterations) == (Outcome.CONVERGED, 1)
 
-    def test_a_slack_damper_alone_is_a_spring_at_the_last_length(self, speed):
+    def test_a_slack_damper_alone_is_a_spring_at_the_last_length(self, backend):
         system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 0.0, 2.0, gravity=(0, 0, 0))
         state = State([[0, 0, 0], [3.0, 0, 0]], [[0, 0, 0], [1.0, 0, 0]])
         after = stepped(system, state, tolerance=1e-14).state

@@ -46,7 +46,7 @@ def q(arm, rng):
 
 @at_both_speeds
 @given(**TREES)
-def test_jacobians_are_derivatives_along_steps(articulated, speed, kinds, seed):
+def test_jacobians_are_derivatives_along_steps(articulated, backend, kinds, seed):
     model = articulated(kinds, seed)
     q = model.random(np.random.default_rng(seed))
     J = jacobians(model, q)
@@ -58,7 +58,7 @@ def test_jacobians_are_derivatives_along_steps(articulated, speed, kinds, seed):
 
 @at_both_speeds
 @given(**TREES)
-def test_difference_undoes_a_step(articulated, speed, kinds, seed):
+def test_difference_undoes_a_step(articulated, backend, kinds, seed):
     model = articulated(kinds, seed)
     rng = np.random.default_rng(seed)
     q, v = model.random(rng), rng.uniform(-1.8, 1.8, model.freedom_count)
@@ -67,7 +67,7 @@ def test_difference_undoes_a_step(articulated, speed, kinds, seed):
 
 @at_both_speeds
 @given(**TREES)
-def test_a_step_by_the_difference_arrives(articulated, speed, kinds, seed):
+def test_a_step_by_the_difference_arrives(articulated, backend, kinds, seed):
     model = articulated(kinds, seed)
     q0, q1 = model.random(np.random.default_rng(seed), 2)
     arrived = forward_kinematics(model, integrate(model, q0, difference(model, q1, q0)))
@@ -77,7 +77,7 @@ def test_a_step_by_the_difference_arrives(articulated, speed, kinds, seed):
     np.testing.assert_allclose(turned, 0.0, rtol=0, atol=ROUNDING)
 
 
-def test_rotations_differ_by_the_shorter_way_round(speed):
+def test_rotations_differ_by_the_shorter_way_round(backend):
     ball = Articulation(Skeleton([-1], np.zeros((1, 3))))
     end = rotation.exponential([0.0, 0.0, 4.0])
     v = difference(ball, end, rotation.identity())
@@ -85,7 +85,7 @@ def test_rotations_differ_by_the_shorter_way_round(speed):
     assert (difference(ball, -end, rotation.identity()) == v).all()
 
 
-def test_steps_turn_a_ball_in_its_own_frame_and_shift_a_free_joint_in_its_unmoved_one(speed):
+def test_steps_turn_a_ball_in_its_own_frame_and_shift_a_free_joint_in_its_unmoved_one(backend):
     quarter = rotation.exponential([0.0, 0.0, np.pi / 2])
     free = Articulation(Skeleton([-1], np.zeros((1, 3))), "free")
     moved = integrate(free, [1.0, 2.0, 3.0, *quarter], [1.0, 0.0, 0.0, np.pi / 2, 0.0, 0.0])
@@ -98,7 +98,7 @@ def test_steps_turn_a_ball_in_its_own_frame_and_shift_a_free_joint_in_its_unmove
     np.testing.assert_allclose(J[:, 3], [0, 0, 0, 0, 1, 0], rtol=0, atol=1e-15)
 
 
-def test_a_hinge_moves_a_point_across_its_arm_along_the_axes_of_the_world(speed):
+def test_a_hinge_moves_a_point_across_its_arm_along_the_axes_of_the_world(backend):
     quarter = rotation.exponential([0.0, 0.0, np.pi / 2])
     model = Articulation(
         Skeleton([-1, 0], [[0, 0, 5.0], [2.0, 0, 0]]), ["hinge", "fixed"], frames=quarter
@@ -108,7 +108,7 @@ def test_a_hinge_moves_a_point_across_its_arm_along_the_axes_of_the_world(speed)
     )
 
 
-def test_the_jacobian_of_a_joint_is_its_row_of_all(arm, q, speed):
+def test_the_jacobian_of_a_joint_is_its_row_of_all(arm, q, backend):
     everything = jacobians(arm, q)
     for j, name in enumerate(arm.names):
         assert (jacobian(arm, q, name) == everything[j]).all()
@@ -116,7 +116,7 @@ def test_the_jacobian_of_a_joint_is_its_row_of_all(arm, q, speed):
     assert (jacobian(arm, q, -1) == everything[-1]).all()
 
 
-def test_joints_off_the_path_have_columns_of_zero(arm, q, speed):
+def test_joints_off_the_path_have_columns_of_zero(arm, q, backend):
     for effector in range(arm.joint_count):
         moved_by = {5: 2, 6: 1}
         leaders = {moved_by.get(int(j), int(j)) for j in arm.skeleton.path(effector)}
@@ -125,7 +125,7 @@ def test_joints_off_the_path_have_columns_of_zero(arm, q, speed):
             assert J[:, arm.freedoms_of(j)].any() == (j in leaders)
 
 
-def test_a_mimic_adds_to_its_leaders_column_by_the_chain_rule(arm, q, speed):
+def test_a_mimic_adds_to_its_leaders_column_by_the_chain_rule(arm, q, backend):
     """The joints released: every column of a mimic joint times its multiplier."""
     released = Articulation(arm.skeleton, arm.kinds, arm.axes, frames=arm.frames)
     single = np.array([-0.5 * q[1] + 0.3, 2.0 * q[0] + 0.1])
@@ -137,7 +137,7 @@ def test_a_mimic_adds_to_its_leaders_column_by_the_chain_rule(arm, q, speed):
     assert J[..., -2:].any(axis=(0, 1)).all()
 
 
-def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, rng, speed):
+def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, rng, backend):
     balls, v = Articulation(skeleton), rng.standard_normal(18)
     assert (jacobians(skeleton, local) == jacobians(balls, local.ravel())).all()
     assert (jacobian(skeleton, local, 2) == jacobian(balls, local.ravel(), 2)).all()
@@ -148,7 +148,7 @@ def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, rng, speed):
     assert (between == difference(balls, moved.ravel(), local.ravel())).all()
 
 
-def test_leading_axes_broadcast(arm, q, rng, speed):
+def test_leading_axes_broadcast(arm, q, rng, backend):
     v = rng.uniform(-0.5, 0.5, (2, 3, arm.freedom_count))
     moved = integrate(arm, q, v)
     assert moved.shape == (2, 3, arm.coordinate_count)
@@ -163,7 +163,7 @@ def test_leading_axes_broadcast(arm, q, rng, speed):
     assert jacobian(arm, none, -1).shape == (0, 6, arm.freedom_count)
 
 
-def test_inputs_stay_as_they_were(arm, q, speed):
+def test_inputs_stay_as_they_were(arm, q, backend):
     before, v = q.copy(), np.ones(arm.freedom_count)
     moved = integrate(arm, q, v)
     difference(arm, moved, q)

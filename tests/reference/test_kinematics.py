@@ -3,12 +3,12 @@ import pytest
 
 from reference import (
     Skeleton,
-    cores,
     forward_kinematics,
     kinematics,
     local_from_global,
     rotation,
     scenes,
+    set_num_threads,
 )
 from reference.backend import compiled
 from reference.backend.simd.lanes import LANES
@@ -28,7 +28,7 @@ def by_matrices(skeleton, local):
     return world[:, :3, 3], world[:, :3, :3]
 
 
-def test_forward_kinematics_equals_a_product_of_transforms(skeleton, local, speed):
+def test_forward_kinematics_equals_a_product_of_transforms(skeleton, local, backend):
     pose = forward_kinematics(skeleton, local)
     positions, matrices = by_matrices(skeleton, local)
     np.testing.assert_allclose(pose.positions, positions, rtol=0, atol=ROUNDING)
@@ -41,11 +41,11 @@ BATCHES = [1, LANES - 1, LANES, LANES + 1, 3 * LANES - 2]
 
 
 @pytest.mark.parametrize("count", BATCHES)
-def test_a_pose_has_the_same_bits_in_every_batch_and_at_both_speeds(skeleton, rng, count, speed):
+def test_a_pose_has_the_same_bits_in_every_batch_and_at_both_speeds(skeleton, rng, count, backend):
     local = rotation.random(rng, count, skeleton.joint_count) * (1.0 + 5e-7)
     batch = forward_kinematics(skeleton, local)
     back = local_from_global(skeleton, batch.rotations)
-    with compiled.speed("plain"):
+    with compiled.set_backend("python"):
         poses = [forward_kinematics(skeleton, q) for q in local]
         locals_ = [local_from_global(skeleton, pose.rotations) for pose in poses]
     assert (batch.positions == [pose.positions for pose in poses]).all()
@@ -56,11 +56,11 @@ def test_a_pose_has_the_same_bits_in_every_batch_and_at_both_speeds(skeleton, rn
 @pytest.mark.parametrize("count", [2, 3])
 def test_a_pose_has_the_same_bits_on_any_number_of_cores(skeleton, rng, count, monkeypatch):
     local = rotation.random(rng, 50, skeleton.joint_count)
-    with cores(1):
+    with set_num_threads(1):
         one = forward_kinematics(skeleton, local)
         back = local_from_global(skeleton, one.rotations)
     monkeypatch.setattr(kinematics, "THREAD_JOINTS", 1)
-    with cores(count):
+    with set_num_threads(count):
         several = forward_kinematics(skeleton, local)
         assert (several.positions == one.positions).all()
         assert (several.rotations == one.rotations).all()
@@ -74,22 +74,25 @@ def test_a_pose_has_the_same_bits_on_any_number_of_cores(skeleton, rng, count, m
     [(LANES - 1, 0), *((2 * LANES + 3, pose) for pose in (0, LANES - 1, LANES, 2 * LANES + 2))],
 )
 def test_one_bad_quaternion_in_a_batch_is_found(
-    convert, value, count, pose, skeleton, rng, monkeypatch, speed
+    convert, value, count, pose, skeleton, rng, monkeypatch, backend
 ):
     monkeypatch.setattr(kinematics, "THREAD_JOINTS", LANES * skeleton.joint_count)
     rotations = rotation.random(rng, count, skeleton.joint_count)
     rotations[pose, 3, 2] = value
-    with cores(2), pytest.raises(ValueError, match=rf"rotations: .* at index \({pose}, 3"):
+    with (
+        set_num_threads(2),
+        pytest.raises(ValueError, match=rf"rotations: .* at index \({pose}, 3"),
+    ):
         convert(skeleton, rotations)
 
 
-def test_the_lab_arm_hangs_at_its_heights(speed):
+def test_the_lab_arm_hangs_at_its_heights(backend):
     arm, rest = scenes.lab_arm()
     heights = forward_kinematics(arm, rest).positions[:, 1]
     np.testing.assert_allclose(heights, [1.7, 0.9, 0.5, 0.3, -0.9], rtol=0, atol=1e-15)
 
 
-def test_a_joint_moves_only_what_hangs_below_it(skeleton, local, rng, speed):
+def test_a_joint_moves_only_what_hangs_below_it(skeleton, local, rng, backend):
     before = forward_kinematics(skeleton, local)
     for j in range(skeleton.joint_count):
         turned = local.copy()
@@ -100,13 +103,13 @@ def test_a_joint_moves_only_what_hangs_below_it(skeleton, local, rng, speed):
         assert (after.positions[below] != before.positions[below]).any(axis=-1).all()
 
 
-def test_links_keep_their_lengths(skeleton, local, speed):
+def test_links_keep_their_lengths(skeleton, local, backend):
     positions = forward_kinematics(skeleton, local).positions
     links = np.linalg.norm(positions[1:] - positions[skeleton.parents[1:]], axis=-1)
     np.testing.assert_allclose(links, skeleton.link_lengths[1:], rtol=ROUNDING)
 
 
-def test_turning_the_root_turns_the_body_about_it(skeleton, local, rng, speed):
+def test_turning_the_root_turns_the_body_about_it(skeleton, local, rng, backend):
     turn = rotation.random(rng)
     before = forward_kinematics(skeleton, local).positions
     local[0] = rotation.multiply(turn, local[0])
@@ -117,7 +120,7 @@ def test_turning_the_root_turns_the_body_about_it(skeleton, local, rng, speed):
     )
 
 
-def test_scaling_the_offsets_scales_the_positions(skeleton, local, speed):
+def test_scaling_the_offsets_scales_the_positions(skeleton, local, backend):
     larger = Skeleton(skeleton.parents, 1000.0 * skeleton.offsets)
     np.testing.assert_allclose(
         forward_kinematics(larger, local).positions,
@@ -127,12 +130,12 @@ def test_scaling_the_offsets_scales_the_positions(skeleton, local, speed):
     )
 
 
-def test_local_rotations_come_back_from_global_ones(skeleton, local, speed):
+def test_local_rotations_come_back_from_global_ones(skeleton, local, backend):
     rotations = forward_kinematics(skeleton, local).rotations
     np.testing.assert_allclose(local_from_global(skeleton, rotations), local, rtol=0, atol=ROUNDING)
 
 
-def test_a_batch_is_its_poses(skeleton, rng, speed):
+def test_a_batch_is_its_poses(skeleton, rng, backend):
     local = rotation.random(rng, 2, 3, skeleton.joint_count)
     batch = forward_kinematics(skeleton, local)
     assert batch.positions.shape == (2, 3, 6, 3)
@@ -143,11 +146,11 @@ def test_a_batch_is_its_poses(skeleton, rng, speed):
             == local_from_global(skeleton, one.rotations)).all()  # fmt: skip
 
 
-def test_an_empty_batch_gives_an_empty_pose(skeleton, speed):
+def test_an_empty_batch_gives_an_empty_pose(skeleton, backend):
     assert forward_kinematics(skeleton, np.empty((0, 6, 4))).positions.shape == (0, 6, 3)
 
 
-def test_a_pose_is_read_only_and_the_input_unchanged(skeleton, local, speed):
+def test_a_pose_is_read_only_and_the_input_unchanged(skeleton, local, backend):
     given = local * (1.0 + 5e-7)
     before = given.copy()
     pose = forward_kinematics(skeleton, given)
@@ -157,7 +160,7 @@ def test_a_pose_is_read_only_and_the_input_unchanged(skeleton, local, speed):
             values[0] = 0.0
 
 
-def test_slightly_long_quaternions_are_normalised_once(skeleton, local, speed):
+def test_slightly_long_quaternions_are_normalised_once(skeleton, local, backend):
     long = forward_kinematics(skeleton, local * (1.0 + 5e-7))
     np.testing.assert_allclose(
         long.positions, forward_kinematics(skeleton, local).positions, rtol=0, atol=ROUNDING
@@ -165,7 +168,7 @@ def test_slightly_long_quaternions_are_normalised_once(skeleton, local, speed):
 
 
 @pytest.mark.parametrize("excess", [1e-6 - 1e-13, -1e-6 + 1e-13])
-def test_lengths_on_the_edge_of_the_tolerance_are_normalised_too(skeleton, local, excess, speed):
+def test_lengths_on_the_edge_of_the_tolerance_are_normalised_too(skeleton, local, excess, backend):
     exact = forward_kinematics(skeleton, local)
     edge = forward_kinematics(skeleton, local * (1.0 + excess))
     np.testing.assert_allclose(edge.positions, exact.positions, rtol=0, atol=ROUNDING)
@@ -192,6 +195,6 @@ def test_a_scene_not_unpacked_is_named(convert):
         (lambda q: "pose", "expected an array of numbers"),
     ],
 )
-def test_bad_rotations_are_named(convert, change, message, skeleton, local, speed):
+def test_bad_rotations_are_named(convert, change, message, skeleton, local, backend):
     with pytest.raises(ValueError, match=f"rotations: {message}"):
         convert(skeleton, change(local))

@@ -60,14 +60,14 @@ PAIR = np.array([[0.0, 2.0, 0.0], [0.0, 0.0, 0.0]])
 
 
 class TestByHand:
-    def test_a_stretched_spring_pulls_its_ends_together(self, speed):
+    def test_a_stretched_spring_pulls_its_ends_together(self, backend):
         expected = [[0.0, -2.0, 0.0], [0.0, 2.0, 0.0]]
         np.testing.assert_array_equal(spring_forces(pair(), PAIR), expected)
 
-    def test_energy_is_half_the_stiffness_times_the_stretch_squared(self, speed):
+    def test_energy_is_half_the_stiffness_times_the_stretch_squared(self, backend):
         assert spring_energy(pair(), PAIR) == 0.5
 
-    def test_potential_energy_grows_upwards(self, speed):
+    def test_potential_energy_grows_upwards(self, backend):
         assert potential_energy(pair(), PAIR) == 0.5 + 1.0 * 10 * 2.0
         lifted = PAIR + np.array([0, 1, 0])
         assert potential_energy(pair(), lifted) == 0.5 + 10 * 3.0 + 3 * 10 * 1.0
@@ -76,12 +76,12 @@ class TestByHand:
         state = State(PAIR, [[2.0, 0, 0], [0, 0, 1.0]])
         assert kinetic_energy(pair(), state) == 0.5 * 1 * 4 + 0.5 * 3 * 1
 
-    def test_a_damper_resists_the_rate_of_its_length_alone(self, speed):
+    def test_a_damper_resists_the_rate_of_its_length_alone(self, backend):
         state = State(PAIR, [[5.0, 3.0, 0.0], [0.0, 1.0, 7.0]])
         expected = [[0.0, -0.5 * 2.0, 0.0], [0.0, 0.5 * 2.0, 0.0]]
         np.testing.assert_array_equal(damper_forces(pair(dampings=0.5), state), expected)
 
-    def test_all_forces_together(self, speed):
+    def test_all_forces_together(self, backend):
         state = State(PAIR, [[0.0, 3.0, 0.0], [0.0, 1.0, 0.0]])
         external = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
         expected = [[1.0, -2.0 - 1.0 - 10.0, 0.0], [0.0, 2.0 + 1.0 - 30.0, 2.0]]
@@ -89,18 +89,20 @@ class TestByHand:
 
 
 class TestDerivatives:
-    def test_forces_are_the_negative_gradient_of_energy(self, network, speed):
+    def test_forces_are_the_negative_gradient_of_energy(self, network, backend):
         system, state = network
         still = State(state.positions, np.zeros((7, 3)))
         gradient = slope(lambda x: potential_energy(system, x), state.positions)
         assert_close(-gradient.reshape(-1, 3), forces(system, still), DIFFERENCE)
 
-    def test_stiffness_matrix_is_the_negative_derivative_of_the_spring_forces(self, network, speed):
+    def test_stiffness_matrix_is_the_negative_derivative_of_the_spring_forces(
+        self, network, backend
+    ):
         system, state = network
         jacobian = slope(lambda x: spring_forces(system, x), state.positions).reshape(21, 21)
         assert_close(-jacobian, stiffness_matrix(system, state.positions).toarray(), DIFFERENCE)
 
-    def test_stiffness_matrix_is_symmetric_to_the_last_bit(self, network, speed):
+    def test_stiffness_matrix_is_symmetric_to_the_last_bit(self, network, backend):
         matrix = stiffness_matrix(network[0], network[1].positions)
         assert abs(matrix - matrix.T).max() == 0
 
@@ -109,13 +111,13 @@ class TestDerivatives:
         assert ratios.min() < 0.8
         assert ratios.max() > 1.2
 
-    def test_damping_matrix_gives_the_damper_forces(self, network, altered, speed):
+    def test_damping_matrix_gives_the_damper_forces(self, network, altered, backend):
         system, state = altered(network[0], pinned=()), network[1]
         matrix = damping_matrix(system, state.positions)
         expected = damper_forces(system, state)
         assert_close(-(matrix @ state.velocities.ravel()).reshape(-1, 3), expected)
 
-    def test_dampers_take_energy_at_the_rate_of_the_lengths(self, network, altered, speed):
+    def test_dampers_take_energy_at_the_rate_of_the_lengths(self, network, altered, backend):
         system, state = altered(network[0], pinned=()), network[1]
         x, v = state.positions, state.velocities
         rates = (lengths(system, x + NUDGE * v) - lengths(system, x - NUDGE * v)) / (2 * NUDGE)
@@ -126,7 +128,7 @@ class TestDerivatives:
 
 class TestConservation:
     @pytest.mark.parametrize("part", [spring_forces, damper_forces])
-    def test_internal_forces_have_no_sum_and_no_torque(self, network, altered, speed, part):
+    def test_internal_forces_have_no_sum_and_no_torque(self, network, altered, backend, part):
         system, state = altered(network[0], pinned=()), network[1]
         f = part(system, state.positions if part is spring_forces else state)
         scale = ROUNDING * np.abs(f).sum()
@@ -136,12 +138,12 @@ class TestConservation:
 
 
 class TestSymmetries:
-    def test_relabelled_particles_feel_the_same_forces(self, network, relabelled, speed):
+    def test_relabelled_particles_feel_the_same_forces(self, network, relabelled, backend):
         system, state = network
         renamed, moved, order = relabelled
         assert_close(forces(renamed, moved), forces(system, state)[order])
 
-    def test_order_and_direction_of_springs_do_not_matter(self, network, shuffled, speed):
+    def test_order_and_direction_of_springs_do_not_matter(self, network, shuffled, backend):
         system, state = network
         x = state.positions
         assert_close(forces(shuffled, state), forces(system, state))
@@ -149,7 +151,7 @@ class TestSymmetries:
         assert_close(stiffness_matrix(shuffled, x).toarray(), expected)
 
     def test_a_turned_and_moved_world_turns_forces_and_stiffness(
-        self, network, altered, rng, speed
+        self, network, altered, rng, backend
     ):
         system, state = network
         R = rotation.to_matrix(rotation.random(rng, 1))[0]
@@ -160,7 +162,7 @@ class TestSymmetries:
         expected = R3 @ stiffness_matrix(system, state.positions).toarray() @ R3.T
         assert_close(stiffness_matrix(turned, moved.positions).toarray(), expected, 10 * ROUNDING)
 
-    def test_other_units_scale_energy_and_forces(self, network, altered, speed):
+    def test_other_units_scale_energy_and_forces(self, network, altered, backend):
         system, state = network
         metre, kilogram, second = 4.0, 0.5, 8.0  # powers of two: not even the rounding changes
         scaled = altered(
@@ -199,13 +201,13 @@ class TestDerivation:
         assert_close(J, sum(k[i] * np.outer(A[:, i], S[:, i]) for i in terms))
         np.testing.assert_array_equal(S, np.eye(len(k)))
 
-    def test_l_x_minus_j_d_is_the_gradient_of_the_spring_energy(self, network, speed):
+    def test_l_x_minus_j_d_is_the_gradient_of_the_spring_energy(self, network, backend):
         system, state = network
         _, _, L, J = derivation(system)
         x = state.positions
         assert_close(L @ x - J @ rest_vectors(system, x), -spring_forces(system, x))
 
-    def test_d_is_the_nearest_vector_of_rest_length(self, network, rng, speed):
+    def test_d_is_the_nearest_vector_of_rest_length(self, network, rng, backend):
         system, state = network
         p = derivation(system).A.T @ state.positions
         d = rest_vectors(system, state.positions)
@@ -226,27 +228,27 @@ class TestCoincidentEnds:
 
     HERE = np.full((2, 3), 0.7)
 
-    def test_a_spring_with_a_rest_length_pushes_along_x(self, speed):
+    def test_a_spring_with_a_rest_length_pushes_along_x(self, backend):
         expected = [[6.0, 0, 0], [-6.0, 0, 0]]
         np.testing.assert_array_equal(spring_forces(pair(), self.HERE), expected)
         np.testing.assert_array_equal(rest_vectors(pair(), self.HERE), [[1.5, 0, 0]])
         block = stiffness_matrix(pair(), self.HERE).toarray()[:3, :3]
         np.testing.assert_array_equal(block, np.diag([4.0, 0, 0]))
 
-    def test_a_spring_without_rest_length_is_linear(self, speed):
+    def test_a_spring_without_rest_length_is_linear(self, backend):
         system = pair(rest_lengths=0.0)
         np.testing.assert_array_equal(spring_forces(system, self.HERE), np.zeros((2, 3)))
         here, there = (stiffness_matrix(system, x).toarray() for x in (self.HERE, PAIR))
         np.testing.assert_array_equal(here, there)
         np.testing.assert_array_equal(here[:3, :3], 4.0 * np.eye(3))
 
-    def test_a_slack_rope_between_them_has_no_direction_to_push(self, speed):
+    def test_a_slack_rope_between_them_has_no_direction_to_push(self, backend):
         system = pair(tension_only=True)
         np.testing.assert_array_equal(spring_forces(system, self.HERE), np.zeros((2, 3)))
         np.testing.assert_array_equal(rest_vectors(system, self.HERE), np.zeros((1, 3)))
 
     @pytest.mark.parametrize("rest_length", [0.0, 1.5])
-    def test_forces_balance_and_matrices_are_symmetric_there(self, speed, rest_length):
+    def test_forces_balance_and_matrices_are_symmetric_there(self, backend, rest_length):
         springs = [[0, 1], [1, 2], [2, 0], [2, 1]]
         system = MassSpring(np.ones(3), springs, rest_length, [1.0, 2, 3, 4], 0.5)
         x = np.ones((3, 3))
@@ -258,7 +260,7 @@ class TestCoincidentEnds:
             assert abs(matrix - matrix.T).max() == 0
 
     @pytest.mark.parametrize("gap", [1e-140, 1e-149, 1e-155, 1e-161, 5e-324])
-    def test_directions_are_of_length_one_however_close_the_ends(self, speed, gap):
+    def test_directions_are_of_length_one_however_close_the_ends(self, backend, gap):
         """Squares of less than 1e-308 lose digits: ends as close as that coincide."""
         x = np.array([[gap, gap, 0.0], [0.0, 0.0, 0.0]])
         d = rest_vectors(pair(), x)
@@ -267,7 +269,7 @@ class TestCoincidentEnds:
 
 class TestFewParticles:
     @pytest.mark.parametrize("springs", [[], (), np.empty((0, 2)), np.empty((0, 2), dtype=int)])
-    def test_a_single_particle_needs_no_springs(self, speed, springs):
+    def test_a_single_particle_needs_no_springs(self, backend, springs):
         system = MassSpring([2.0], springs, 1.0, 1.0, gravity=(0, -10, 0))
         state = State([[1.0, 2.0, 3.0]], [[3.0, 0, 0]])
         np.testing.assert_array_equal(forces(system, state), [[0, -20.0, 0]])
@@ -278,7 +280,7 @@ class TestFewParticles:
         assert rest_vectors(system, state.positions).shape == (0, 3)
         assert [m.shape for m in derivation(system)] == [(1, 0), (0, 0), (1, 1), (1, 0)]
 
-    def test_a_particle_without_springs_feels_gravity_alone(self, speed):
+    def test_a_particle_without_springs_feels_gravity_alone(self, backend):
         system = MassSpring([1.0, 3.0, 2.0], [[0, 1]], 1.5, 4.0, gravity=(0, -10, 0))
         x = np.vstack([PAIR, [[5.0, 5.0, 5.0]]])
         expected = [*forces(pair(), State(PAIR, np.zeros((2, 3)))), [0, -20.0, 0]]
@@ -286,7 +288,7 @@ class TestFewParticles:
 
 
 class TestPins:
-    def test_a_pin_has_no_velocity_whatever_the_state_says(self, speed):
+    def test_a_pin_has_no_velocity_whatever_the_state_says(self, backend):
         held = pair(pinned=[1], dampings=0.5)
         state = State(PAIR, [[0, 3.0, 0], [0, 1.0, 0]])
         np.testing.assert_array_equal(damper_forces(held, state)[0], [0, -0.5 * 3.0, 0])
@@ -304,8 +306,8 @@ class TestPins:
 def test_both_speeds_round_alike(network):
     system, state = network
     results = []
-    for speed in compiled.SPEEDS:
-        with compiled.speed(speed):
+    for backend in compiled.BACKENDS:
+        with compiled.set_backend(backend):
             x = state.positions
             matrix = stiffness_matrix(system, x).toarray()
             results.append((forces(system, state), matrix, lengths(system, x)))
@@ -456,7 +458,7 @@ class TestInputs:
 
     @pytest.mark.parametrize("gap", [0.0, 1e-151, 1e-149, 1e-75, 1.0, 1e75])
     @pytest.mark.parametrize("tension_only", [False, True])
-    def test_nothing_overflows_up_to_the_largest_magnitude(self, gap, tension_only, speed):
+    def test_nothing_overflows_up_to_the_largest_magnitude(self, gap, tension_only, backend):
         """One law for all that is given: no NaN and no infinity, without a word or with one."""
         largest = {"rest_lengths": 1e75, "stiffnesses": 1e75, "dampings": 1e75}
         for rest_length in (0.0, 1e75):

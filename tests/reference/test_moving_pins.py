@@ -40,7 +40,7 @@ def hung(network, altered):
     return system, network[1], network[1].positions[[2, 5]] + [WAY, -2 * WAY]
 
 
-def test_pins_arrive_with_the_velocity_of_their_way(hung, step, speed):
+def test_pins_arrive_with_the_velocity_of_their_way(hung, step, backend):
     system, state, goal = hung
     after = step(system, state, h, None, goal)
     np.testing.assert_array_equal(after.positions[[2, 5]], goal)
@@ -48,7 +48,7 @@ def test_pins_arrive_with_the_velocity_of_their_way(hung, step, speed):
     np.testing.assert_allclose(after.velocities[[2, 5]], expected, rtol=1e-15)
 
 
-def test_what_moves_is_felt(hung, step, speed):
+def test_what_moves_is_felt(hung, step, backend):
     system, state, goal = hung
     free = system.free
     still, moved = (step(system, state, h, None, pins) for pins in (None, goal))
@@ -62,7 +62,7 @@ def test_pins_that_stay_need_no_path(hung, step):
     np.testing.assert_array_equal(one.velocities, other.velocities)
 
 
-def test_a_world_that_moves_evenly_is_like_one_at_rest(hung, rng, step, speed):
+def test_a_world_that_moves_evenly_is_like_one_at_rest(hung, rng, step, backend):
     """Galileo's principle, with dampers, and of the pins the whole frame's way."""
     system, state, goal = hung
     drift, pull = np.array([2.0, 1.0, -3.0]), rng.standard_normal((7, 3))
@@ -75,7 +75,7 @@ def test_a_world_that_moves_evenly_is_like_one_at_rest(hung, rng, step, speed):
 
 
 @pytest.mark.parametrize("name", ["newton", "symplectic_euler", "runge_kutta"])
-def test_a_moving_pin_is_a_huge_mass_in_motion(hung, altered, speed, name):
+def test_a_moving_pin_is_a_huge_mass_in_motion(hung, altered, backend, name):
     """Alike but for what springs of some 10 N do to a billion kilograms."""
     system, state, goal = hung
     masses = system.masses.copy()
@@ -90,7 +90,7 @@ def test_a_moving_pin_is_a_huge_mass_in_motion(hung, altered, speed, name):
     np.testing.assert_allclose(pinned.velocities, loose.velocities, rtol=0, atol=1e-6)
 
 
-def test_gauss_newton_linearises_where_the_pins_start(hung, rng, speed):
+def test_gauss_newton_linearises_where_the_pins_start(hung, rng, backend):
     """M (v' - v) = h (f(x_n) - C v' - h K v') at the free particles, v' at the pins given."""
     system, state, goal = hung
     pull, free = rng.standard_normal((7, 3)), system.free
@@ -114,7 +114,7 @@ def test_gauss_newton_linearises_where_the_pins_start(hung, rng, speed):
     np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-12)
 
 
-def test_a_damper_drags_by_the_velocity_of_its_pin(speed):
+def test_a_damper_drags_by_the_velocity_of_its_pin(backend):
     """Without a spring, m v' = h c (w - v') along it, w being the pin's velocity."""
     system = MassSpring([1.0, 2.0], [[0, 1]], 1.0, 0.0, 3.0, pinned=[0], gravity=(0, 0, 0))
     state = State([[0.0, 0, 0], [1.0, 0, 0]], np.zeros((2, 3)))
@@ -137,7 +137,7 @@ def test_a_used_integrator_takes_pins_like_a_fresh_one(hung, name):
         np.testing.assert_array_equal(again.history, fresh.history)
 
 
-def test_the_objective_holds_the_pins_at_their_goal(hung, speed):
+def test_the_objective_holds_the_pins_at_their_goal(hung, backend):
     system, state, goal = hung
     objective = ImplicitEuler(system, h=h).objective(state, None, goal)
     np.testing.assert_array_equal(objective.y[[2, 5]], goal)
@@ -159,7 +159,7 @@ def test_a_rope_follows_the_hand_that_swings_it(step):
     assert lengths(system, state.positions).max() < 1.0
 
 
-def test_a_system_that_is_all_pins_goes_where_it_is_taken(step, speed):
+def test_a_system_that_is_all_pins_goes_where_it_is_taken(step, backend):
     system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
     goal = 2 * np.eye(3)[:2]
     after = step(system, State(np.eye(3)[:2], np.ones((2, 3))), h, None, goal)

@@ -91,7 +91,7 @@ def test_what_is_no_rotation_matrix_is_refused(matrix):
         rotation.from_matrix(matrix)
 
 
-def test_between_takes_one_direction_to_the_other_by_the_shortest_arc(v, speed):
+def test_between_takes_one_direction_to_the_other_by_the_shortest_arc(v, backend):
     w = v[::-1] * 3.0
     q = rotation.between(v, w)
     u = v / np.linalg.norm(v, axis=-1, keepdims=True)
@@ -101,7 +101,7 @@ def test_between_takes_one_direction_to_the_other_by_the_shortest_arc(v, speed):
 
 
 @pytest.mark.parametrize("direction", [*np.eye(3), [1.0, 2.0, 3.0], [1e-9, 1.0, 0.0]])
-def test_between_opposites_is_a_half_turn_about_a_fixed_axis(direction, speed):
+def test_between_opposites_is_a_half_turn_about_a_fixed_axis(direction, backend):
     direction = np.asarray(direction)
     q = rotation.between(direction, -direction)
     assert_close(q[0], 0.0)
@@ -125,14 +125,14 @@ def test_the_fixed_axis_lies_across_the_coordinate_axis_the_direction_is_least_a
     assert_close(perpendicular(tuple(map(float, direction))), expected)
 
 
-def test_between_near_opposites_is_of_unit_length(v, rng, speed):
+def test_between_near_opposites_is_of_unit_length(v, rng, backend):
     """There the vector part is a quotient of small numbers, and rounding shows in its length."""
     almost = -v + 1e-7 * rng.standard_normal(v.shape)
     assert_close(np.linalg.norm(rotation.between(v, almost), axis=-1), np.ones(50))
 
 
 @pytest.mark.parametrize("angle", [1e-12, 1e-8, 1e-4, 3.0, np.pi - 1e-4, np.pi - 1e-7])
-def test_between_is_accurate_near_zero_and_near_opposite(angle, speed):
+def test_between_is_accurate_near_zero_and_near_opposite(angle, backend):
     end = [np.cos(angle), np.sin(angle), 0.0]
     q = rotation.between([1.0, 0.0, 0.0], end)
     assert q[3] == pytest.approx(np.sin(angle / 2), rel=1e-8)
@@ -140,12 +140,12 @@ def test_between_is_accurate_near_zero_and_near_opposite(angle, speed):
 
 
 @pytest.mark.parametrize(("short", "long"), [(1e-200, 1.0), (1e-300, 1e74), (1e-308, 1e-308)])
-def test_between_needs_directions_of_any_length(short, long, rng, speed):
+def test_between_needs_directions_of_any_length(short, long, rng, backend):
     a, b = rng.standard_normal((2, 20, 3))
     assert_close(rotation.between(short * a, long * b), rotation.between(a, b), 1e-14)
 
 
-def test_between_without_a_direction_is_the_identity(speed):
+def test_between_without_a_direction_is_the_identity(backend):
     zero, x = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]
     assert_close(rotation.between([zero, x, zero], [x, zero, zero]), rotation.identity(3))
 
@@ -165,7 +165,7 @@ def test_the_logarithm_undoes_the_exponential(v):
 
 # The last two of each lie beside the end of its series.
 @pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 0.1, 3.1, 6.2, 50.0, 1.5748, 1.5749])
-def test_the_exponential_agrees_with_extended_precision(angle, speed):
+def test_the_exponential_agrees_with_extended_precision(angle, backend):
     with mpmath.workdps(40):
         w, x = float(mpmath.cos(mpmath.mpf(angle) / 2)), float(mpmath.sin(mpmath.mpf(angle) / 2))
     turn = rotation.exponential([angle, 0.0, 0.0])
@@ -183,7 +183,7 @@ def test_half_a_turn_agrees_with_extended_precision(angle):
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 1e-8, 1e-7, 0.1, 3.1, np.pi - 1e-7])
-def test_the_logarithm_is_accurate_near_zero_and_near_half_a_turn(angle, speed):
+def test_the_logarithm_is_accurate_near_zero_and_near_half_a_turn(angle, backend):
     q = [np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0]
     np.testing.assert_allclose(rotation.logarithm(q), [angle, 0.0, 0.0], rtol=ROUNDING)
 

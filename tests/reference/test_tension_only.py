@@ -36,7 +36,7 @@ def rope(length, **changes):
 
 class TestSlack:
     @pytest.mark.parametrize("length", [0.0, 0.3, 1.5])
-    def test_a_slack_rope_is_not_there(self, speed, length):
+    def test_a_slack_rope_is_not_there(self, backend, length):
         system, x = rope(length)
         assert stretches(system, x).tolist() == [0.0]
         assert spring_energy(system, x) == 0
@@ -44,7 +44,7 @@ class TestSlack:
         np.testing.assert_array_equal(stiffness_matrix(system, x).toarray(), np.zeros((6, 6)))
         np.testing.assert_array_equal(rest_vectors(system, x), [[length, 0.0, 0.0]])
 
-    def test_a_taut_rope_is_a_spring(self, speed):
+    def test_a_taut_rope_is_a_spring(self, backend):
         system, x = rope(2.0)
         spring, _ = rope(2.0, tension_only=False)
         assert spring_energy(system, x) == spring_energy(spring, x) == 0.5
@@ -53,7 +53,7 @@ class TestSlack:
         one, other = (stiffness_matrix(model, x).toarray() for model in (system, spring))
         np.testing.assert_array_equal(one, other)
 
-    def test_a_rope_without_length_is_a_linear_spring_even_at_length_zero(self, speed):
+    def test_a_rope_without_length_is_a_linear_spring_even_at_length_zero(self, backend):
         for length in (0.0, 0.7):
             system, x = rope(length, rest_lengths=0.0)
             expected = np.kron([[4.0, -4.0], [-4.0, 4.0]], np.eye(3))
@@ -61,7 +61,7 @@ class TestSlack:
             np.testing.assert_allclose(stiffness_matrix(system, x).toarray(), expected, rtol=1e-15)
             np.testing.assert_array_equal(spring_forces(system, x)[0], [-4.0 * length, 0, 0])
 
-    def test_the_damper_of_a_slack_rope_acts(self, speed):
+    def test_the_damper_of_a_slack_rope_acts(self, backend):
         system, x = rope(0.5, dampings=2.0)
         state = State(x, [[3.0, 5.0, 0.0], [1.0, 0.0, 0.0]])
         expected = [[-4.0, 0, 0], [4.0, 0, 0]]
@@ -81,23 +81,23 @@ class TestKink:
         energies = [spring_energy(*rope(1.5 + sign * i * self.STEP)) for i in range(3)]
         return np.diff(energies, 2)[0] / self.STEP**2
 
-    def test_the_second_derivative_differs_from_side_to_side(self, speed):
+    def test_the_second_derivative_differs_from_side_to_side(self, backend):
         assert self.side(-1) == 0
         # Lengths near 1.5 m round by 2e-16, their differences of 1e-6 by 2e-10 of themselves.
         assert self.side(+1) == pytest.approx(4.0, rel=1e-8)
 
-    def test_the_stiffness_there_is_that_of_the_slack_side(self, speed):
+    def test_the_stiffness_there_is_that_of_the_slack_side(self, backend):
         assert not stiffness_matrix(*rope(1.5)).toarray().any()
         just_taut = stiffness_matrix(*rope(np.nextafter(1.5, 2))).toarray()
         assert just_taut[0, 0] == pytest.approx(4.0, rel=1e-15)
 
-    def test_the_force_is_continuous(self, speed):
+    def test_the_force_is_continuous(self, backend):
         pulls = [spring_forces(*rope(1.5 + d))[0, 0] for d in (-1e-9, 0.0, 1e-9)]
         np.testing.assert_allclose(pulls, [0, 0, -4e-9], rtol=0, atol=1e-15)
 
 
 class TestDampersApart:
-    def test_it_is_the_same_system(self, network, speed):
+    def test_it_is_the_same_system(self, network, backend):
         system, state = network
         apart = system.dampers_apart
         damped_ropes = apart.tension_only & (apart.dampings > 0)
@@ -111,7 +111,7 @@ class TestDampersApart:
 
 
 class TestStep:
-    def test_a_slack_net_falls_freely(self, speed):
+    def test_a_slack_net_falls_freely(self, backend):
         """Folded to three quarters of its size, so that no rope becomes taut in the step."""
         system, state = scenes.net(4, 4)
         folded = State(0.75 * state.positions, state.velocities)

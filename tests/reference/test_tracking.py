@@ -21,7 +21,7 @@ def test_the_arm_draws_every_curve_to_a_tenth_of_a_millimetre(arm, name, solver,
 
 
 @pytest.mark.parametrize("solver", IK_SOLVERS)
-def test_a_warm_frame_starts_from_the_last_one_s_solution(arm, solver, speed):
+def test_a_warm_frame_starts_from_the_last_one_s_solution(arm, solver, backend):
     curve = curves["circle"](5)
     motion = track(arm, curve, solver, record=True)
     for i in range(1, 5):
@@ -33,7 +33,7 @@ def test_a_warm_frame_starts_from_the_last_one_s_solution(arm, solver, speed):
 
 
 @pytest.mark.parametrize("solver", IK_SOLVERS)
-def test_a_cold_frame_starts_from_the_given_pose(arm, solver, rng, speed):
+def test_a_cold_frame_starts_from_the_given_pose(arm, solver, rng, backend):
     curve, start = curves["circle"](5), rotation.random(rng, 5)
     motion = track(arm, curve, solver, start, warm=False)
     assert (motion.local_rotations == solve_ik(arm, start, curve, solver).local_rotations).all()
@@ -44,7 +44,7 @@ def test_a_cold_frame_starts_from_the_given_pose(arm, solver, rng, speed):
     [{"effector": "palm"}, {"tolerance": 1e-9}, {"max_iterations": 1}, {"record": True}],
     ids=lambda options: next(iter(options)),
 )
-def test_a_cold_motion_is_a_batch_solved_with_the_same_options(arm, options, rng, speed):
+def test_a_cold_motion_is_a_batch_solved_with_the_same_options(arm, options, rng, backend):
     curve, start = curves["circle"](5), rotation.random(rng, 5)
     motion = track(arm, curve, "fabrik", start, warm=False, **options)
     batch = solve_ik(arm, start, curve, "fabrik", **options)

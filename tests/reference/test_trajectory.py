@@ -201,7 +201,7 @@ def test_a_finer_drawing_gives_the_same_motion():
 
 
 @pytest.mark.parametrize("elbow", [1.0, -1.0])
-def test_two_hinges_follow_a_line_as_trigonometry_says(elbow, speed):
+def test_two_hinges_follow_a_line_as_trigonometry_says(elbow, backend):
     arm, curve = hinges(), line([0.5, -0.8, 0.0], [0.9, 0.9, 0.0], 9)
     motion = track(arm, curve, LM, [0.0, elbow], coherent=True, tolerance=1e-9)
     x, y = curve[:, 0], curve[:, 1]
@@ -210,13 +210,13 @@ def test_two_hinges_follow_a_line_as_trigonometry_says(elbow, speed):
     np.testing.assert_allclose(motion.coordinates, expected, rtol=0, atol=1e-8)
 
 
-def test_slides_share_a_distance_evenly(speed):
+def test_slides_share_a_distance_evenly(backend):
     motion = track(slides(), line([0, 0, 1], [3, 0, 1], 7), LM, coherent=True)
     steps = np.diff(motion.coordinates, axis=0)
     np.testing.assert_allclose(steps, 0.25, rtol=0, atol=1e-9)
 
 
-def test_a_slide_with_limits_goes_as_far_as_they_let_it(speed):
+def test_a_slide_with_limits_goes_as_far_as_they_let_it(backend):
     """Of 3 m the second slide may go 0.6: all of it, evenly, and the first one the rest."""
     gantry = slides(lower=[-9, -0.1, 0], upper=[9, 0.5, 0])
     motion = track(gantry, line([0, 0, 1], [3, 0, 1], 7), LM, coherent=True)
@@ -323,7 +323,7 @@ def test_a_trajectory_is_never_less_smooth_than_the_one_it_is_made_from(monkeypa
 
 @pytest.mark.parametrize("frames", [1, 2, 3])
 @pytest.mark.parametrize("closed", [False, True])
-def test_few_frames_are_a_motion_too(frames, closed, speed):
+def test_few_frames_are_a_motion_too(frames, closed, backend):
     curve = curves["circle"](FRAMES)[:frames]
     motion = track(ARM, curve, "fabrik", coherent=True, closed=closed)
     assert (motion.outcome == Outcome.CONVERGED).all()
@@ -400,7 +400,7 @@ def joints_of(mechanism, model):
 
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("name", MODELS)
-def test_the_second_order_model_is_that_of_the_cost_along_the_path(name, closed, rng, speed):
+def test_the_second_order_model_is_that_of_the_cost_along_the_path(name, closed, rng, backend):
     """Balls are without limits here: the model leaves the curvature of those out."""
     problem, q = problem_of(name, closed, rng, drawn_to=[2])
     joints = problem.mechanism.joints
@@ -474,7 +474,7 @@ def null_spaces(problem, q):
     return P
 
 
-def test_the_limits_of_balls_push_as_the_cost_says(rng, speed):
+def test_the_limits_of_balls_push_as_the_cost_says(rng, backend):
     problem, q = problem_of("balls", False, rng)
     problem = problem._replace(constrained=np.zeros(4, dtype=bool))
     problem.mechanism.joints.numbers[:, CONE] = 0.2
@@ -488,7 +488,7 @@ def test_the_limits_of_balls_push_as_the_cost_says(rng, speed):
 
 @pytest.mark.parametrize("closed", [False, True])
 @pytest.mark.parametrize("frames", [3, 4, 7, 8])
-def test_a_cycle_of_frames_is_solved_like_a_dense_system(frames, closed, rng, speed):
+def test_a_cycle_of_frames_is_solved_like_a_dense_system(frames, closed, rng, backend):
     n = 2
     diagonal = np.eye(n) * 8.0 + np.ones((frames, n, n))
     coupling = rng.standard_normal((frames if closed else frames - 1, n, n))

@@ -30,18 +30,18 @@ def plate():
 
 
 class TestByHand:
-    def test_a_plate_square_to_the_wind_feels_its_whole_dynamic_pressure(self, speed):
+    def test_a_plate_square_to_the_wind_feels_its_whole_dynamic_pressure(self, backend):
         forces = wind_forces(*plate(), [0, 3.0, 0], density=1.2, drag=1.5, lift=0.7)
         expected = 0.5 * 1.2 * 1.5 * 3.0**2 * 2.0 / 3
         np.testing.assert_allclose(forces, [[0, expected, 0]] * 3, rtol=1e-15, atol=1e-15)
 
-    def test_a_plate_along_the_wind_feels_nothing(self, speed):
+    def test_a_plate_along_the_wind_feels_nothing(self, backend):
         np.testing.assert_array_equal(
             wind_forces(*plate(), [3.0, 0, 4.0], **BOTH), np.zeros((3, 3))
         )
 
     @pytest.mark.parametrize("degrees", [20, 45, 70])
-    def test_drag_and_lift_go_with_the_angle_of_attack(self, speed, degrees):
+    def test_drag_and_lift_go_with_the_angle_of_attack(self, backend, degrees):
         """Drag like its sine, lift like its sine times its cosine."""
         angle = np.radians(degrees)
         e, across = np.array([np.cos(angle), np.sin(angle), 0]), [-np.sin(angle), np.cos(angle), 0]
@@ -52,7 +52,7 @@ class TestByHand:
         assert total @ across == pytest.approx(lift, rel=1e-14)
         assert total[2] == 0
 
-    def test_each_corner_gets_a_third(self, speed):
+    def test_each_corner_gets_a_third(self, backend):
         forces = wind_forces(*plate(), WIND, **BOTH)
         np.testing.assert_array_equal(forces[0], forces[1])
         np.testing.assert_array_equal(forces[0], forces[2])
@@ -60,19 +60,19 @@ class TestByHand:
 
 
 class TestLaws:
-    def test_what_moves_with_the_wind_feels_none(self, sail, speed):
+    def test_what_moves_with_the_wind_feels_none(self, sail, backend):
         state, triangles = sail
         drifting = State(state.positions, np.tile(WIND, (12, 1)))
         np.testing.assert_array_equal(wind_forces(drifting, triangles, WIND, **BOTH), 0)
 
-    def test_only_the_relative_velocity_counts(self, sail, speed):
+    def test_only_the_relative_velocity_counts(self, sail, backend):
         state, triangles = sail
         drift = np.array([1.0, 2.0, -4.0])
         moving = State(state.positions, state.velocities + drift)
         one, other = wind_forces(*sail, WIND), wind_forces(moving, triangles, WIND + drift)
         np.testing.assert_allclose(one, other, rtol=0, atol=10 * ROUNDING)
 
-    def test_a_turned_world_turns_the_forces(self, sail, rng, speed):
+    def test_a_turned_world_turns_the_forces(self, sail, rng, backend):
         state, triangles = sail
         R = rotation.to_matrix(rotation.random(rng, 1))[0]
         turned = State(state.positions @ R.T + [1.0, -2.0, 3.0], state.velocities @ R.T)
@@ -80,7 +80,7 @@ class TestLaws:
         actual = wind_forces(turned, triangles, R @ WIND, **BOTH)
         np.testing.assert_allclose(actual, expected, rtol=0, atol=10 * ROUNDING)
 
-    def test_it_does_not_matter_how_triangles_turn_or_in_which_order_they_come(self, sail, speed):
+    def test_it_does_not_matter_how_triangles_turn_or_in_which_order_they_come(self, sail, backend):
         state, triangles = sail
         other = triangles[::-1].copy()
         other[::2] = other[::2, ::-1]
@@ -88,14 +88,14 @@ class TestLaws:
         actual = wind_forces(state, other, WIND, **BOTH)
         np.testing.assert_allclose(actual, expected, rtol=0, atol=10 * ROUNDING)
 
-    def test_relabelled_particles_feel_the_same(self, sail, rng, speed):
+    def test_relabelled_particles_feel_the_same(self, sail, rng, backend):
         state, triangles = sail
         order = rng.permutation(12)
         moved = State(state.positions[order], state.velocities[order])
         actual = wind_forces(moved, np.argsort(order)[triangles], WIND, **BOTH)
         np.testing.assert_array_equal(actual, wind_forces(*sail, WIND, **BOTH)[order])
 
-    def test_it_scales_with_density_area_and_the_square_of_the_speed(self, sail, speed):
+    def test_it_scales_with_density_area_and_the_square_of_the_speed(self, sail, backend):
         state, triangles = sail
         forces = wind_forces(*sail, WIND, **BOTH)
         np.testing.assert_array_equal(wind_forces(*sail, WIND, density=4.8, **BOTH), 4 * forces)
@@ -106,13 +106,13 @@ class TestLaws:
             wind_forces(fast, triangles, 2 * WIND, **BOTH), 4 * forces, 1e-13
         )
 
-    def test_the_opposite_wind_does_the_opposite(self, sail, speed):
+    def test_the_opposite_wind_does_the_opposite(self, sail, backend):
         state, triangles = sail
         opposite = State(state.positions, -state.velocities)
         forces = wind_forces(*sail, WIND, **BOTH)
         np.testing.assert_array_equal(wind_forces(opposite, triangles, -WIND, **BOTH), -forces)
 
-    def test_still_air_takes_energy_from_a_rigid_motion_and_lift_none(self, sail, speed):
+    def test_still_air_takes_energy_from_a_rigid_motion_and_lift_none(self, sail, backend):
         state, triangles = sail
         gliding = State(state.positions, np.tile(WIND, (12, 1)))
         total = wind_forces(gliding, triangles, np.zeros(3)).sum(axis=0)
@@ -121,7 +121,7 @@ class TestLaws:
         assert np.linalg.norm(rise) > 0.1
         assert abs(rise @ WIND) < 100 * ROUNDING
 
-    def test_wind_may_differ_from_place_to_place(self, sail, rng, speed):
+    def test_wind_may_differ_from_place_to_place(self, sail, rng, backend):
         """A triangle feels the mean at its corners."""
         state, triangles = sail
         gusts = rng.standard_normal((12, 3))
@@ -134,13 +134,13 @@ class TestLaws:
 
     def test_both_speeds_round_alike(self, sail):
         ends = []
-        for name in compiled.SPEEDS:
-            with compiled.speed(name):
+        for name in compiled.BACKENDS:
+            with compiled.set_backend(name):
                 ends.append(wind_forces(*sail, WIND, **BOTH))
         np.testing.assert_array_equal(*ends)
 
 
-def test_a_triangle_without_area_feels_nothing(speed):
+def test_a_triangle_without_area_feels_nothing(backend):
     state = State([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [0, 0, 0]], np.zeros((4, 3)))
     forces = wind_forces(state, [[0, 1, 2], [0, 3, 1]], WIND, **BOTH)
     np.testing.assert_array_equal(forces, np.zeros((4, 3)))
@@ -181,7 +181,7 @@ def test_wrong_arguments_are_named(change, message):
         wind_forces(**arguments)
 
 
-def test_a_force_that_overflows_is_an_error(speed):
+def test_a_force_that_overflows_is_an_error(backend):
     state, triangles = plate()
     vast = State(1e74 * state.positions, state.velocities)
     with np.errstate(over="ignore"), pytest.raises(FloatingPointError, match=r"^wind_forces: "):

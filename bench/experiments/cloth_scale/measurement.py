@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from reference import ImplicitEuler, MassSpring, State, scenes
-from reference.backend.compiled import TwoSpeeds
+from reference.backend.compiled import Kernel
 from reference.implicit_euler.factor_cache import forget, prefactored
 from reference.implicit_euler.objective import global_matrix
 from reference.sparse import CholeskyFactor
@@ -187,7 +187,7 @@ def total(numbers):
     return result
 
 
-_total = TwoSpeeds(total, relaxed=True)
+_total = Kernel(total, relaxed=True)
 
 
 def memory() -> int:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from reference.backend.compiled import TwoSpeeds
+from reference.backend.compiled import Kernel
 from reference.backend.threads import in_slices
 
 from ...harness.record import Key, key
@@ -30,7 +30,7 @@ class Case:
         prepare: sets everything up and returns the call to be timed.
         operations: how many poses, solves or steps one call makes; times are for one.
         moved: bytes that one call reads and writes, where it is a limit of memory.
-        speed: at which of the reference's speeds it runs.
+        backend: by which of the reference's backends it runs.
         cores: on how many of them; None is all that there are.
     """
 
@@ -39,7 +39,7 @@ class Case:
     prepare: Callable[[], Callable[[], Any]]
     operations: int = 1
     moved: int = 0
-    speed: str = "compiled"
+    backend: str = "numba"
     cores: int | None = 1
 
     @property
@@ -88,7 +88,7 @@ def stream(source, sink):
         sink[i] = 1.0
 
 
-_stream = TwoSpeeds(stream)
+_stream = Kernel(stream)
 
 
 def _streams(read: int, written: int, least: int) -> Callable[[], Any]:

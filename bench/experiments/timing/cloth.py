@@ -32,7 +32,7 @@ def cases() -> Iterator[Case]:
         for work, (ours, theirs) in WORKS.items():
             name = f"cloth/x{factor:g}/{work}"
             yield Case(name, COMPILED, partial(ours, problem))
-            yield Case(name, PLAIN, partial(ours, problem), speed="plain")
+            yield Case(name, PLAIN, partial(ours, problem), backend="python")
             if theirs:
                 yield Case(name, MUJOCO, partial(theirs, problem))
         yield solving(f"cloth/x{factor:g}/{LOCAL_GLOBAL}", problem)

@@ -31,7 +31,7 @@ def cases() -> Iterator[Case]:
             yield Case(problem, COMPILED, partial(one_by_one, stratum, solver, TARGETS), TARGETS)
             yield Case(
                 problem, PLAIN, partial(one_by_one, stratum, solver, FEW_TARGETS), FEW_TARGETS,
-                speed="plain",
+                backend="python",
             )  # fmt: skip
             batch = f"{problem}/{TARGETS} targets a call"
             yield Case(batch, COMPILED, partial(at_once, stratum, solver), TARGETS)

@@ -34,7 +34,7 @@ def cases() -> Iterator[Case]:
         bytes_moved = np.array([READ, WRITTEN]) * skeleton.joint_count
         one = f"kinematics/{name}/one pose a call"
         yield Case(one, COMPILED, partial(by_us, skeleton))
-        yield Case(one, PLAIN, partial(by_us, skeleton), speed="plain")
+        yield Case(one, PLAIN, partial(by_us, skeleton), backend="python")
         for engine in SKELETON_ENGINES:
             yield Case(one, engine, partial(by_engine, engine, skeleton))
         yield streaming(one, *bytes_moved)

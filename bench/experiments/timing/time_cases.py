@@ -1,14 +1,14 @@
 """The one benchmark, run on every case by `pytest -p bench.experiments.timing.plugin`."""
 
 from bench.harness.progress import tell
-from reference import cores, speed
+from reference import set_backend, set_num_threads
 
 
 def test_speed(benchmark, case, keep):
     """Time a case; the first call, which may compile, is not counted."""
     tell(case.name, "measuring")
     try:
-        with speed(case.speed), cores(case.cores):
+        with set_backend(case.backend), set_num_threads(case.cores):
             call = case.prepare()
             call()
             benchmark(call)

@@ -4,8 +4,8 @@ A kernel that is to run on tiles reads and writes poses through the functions be
 share, such as a skeleton's offsets, it reads as ever.
 """
 
-from ...quaternion import made_unit, put_quaternion, put_vector, quaternion_at, vector_at
-from ..compiled import Kernel, bind
+from ...quaternion import load_quaternion, load_vector, made_unit, store_quaternion, store_vector
+from ..compiled import PythonKernel, bind
 from .lanes import (
     LANES,
     all_within,
@@ -21,9 +21,9 @@ __all__ = ["LANES", "in_lanes"]
 
 # Rows of a pose's positions (joint, 3) and rotations (joint, 4); of unit quaternions (joint, 4),
 # which on tiles are in a scratch array (joint, 4, LANES).
-load_position, store_position = vector_at, put_vector
-load_rotation, store_rotation = quaternion_at, put_quaternion
-load_unit, store_unit = quaternion_at, put_quaternion
+load_position, store_position = load_vector, store_vector
+load_rotation, store_rotation = load_quaternion, store_quaternion
+load_unit, store_unit = load_quaternion, store_quaternion
 
 _ON_TILES = {
     "load_position": load_vectors,
@@ -36,7 +36,7 @@ _ON_TILES = {
 }
 
 
-def in_lanes(kernel: Kernel) -> Kernel:
+def in_lanes(kernel: PythonKernel) -> PythonKernel:
     """Return a kernel on one pose as a kernel on a tile of LANES poses; every pose the same bits.
 
     Positions and rotations get a leading axis, (LANES, joint, ...); unit quaternions lie in a

@@ -35,7 +35,7 @@ def empty_cache(tmp_path, monkeypatch):
 
 
 def test_a_listener_hears_of_the_first_call_only():
-    heard, kernel = [], compiled.TwoSpeeds(fresh(polynomial), label="a polynomial")
+    heard, kernel = [], compiled.Kernel(fresh(polynomial), label="a polynomial")
     with on_compile(lambda *told: heard.append(told)):
         assert kernel(2.0) == 16.0
         assert kernel(2.0) == 16.0
@@ -44,23 +44,23 @@ def test_a_listener_hears_of_the_first_call_only():
 
 def test_nobody_hears_after_the_block_or_of_the_interpreter():
     heard = []
-    with on_compile(lambda *told: heard.append(told)), compiled.speed("plain"):
-        compiled.TwoSpeeds(fresh(polynomial))(2.0)
-    compiled.TwoSpeeds(fresh(polynomial))(2.0)
+    with on_compile(lambda *told: heard.append(told)), compiled.set_backend("python"):
+        compiled.Kernel(fresh(polynomial))(2.0)
+    compiled.Kernel(fresh(polynomial))(2.0)
     assert heard == []
 
 
 def test_the_garbage_collector_rests_while_compiling():
     seen = []
     with on_compile(lambda _, begins: seen.append((begins, gc.isenabled()))):
-        compiled.TwoSpeeds(fresh(polynomial))(2.0)
+        compiled.Kernel(fresh(polynomial))(2.0)
     assert seen == [(True, False), (False, True)]
 
 
 def test_a_collector_that_was_off_stays_off():
     gc.disable()
     try:
-        compiled.TwoSpeeds(fresh(polynomial))(2.0)
+        compiled.Kernel(fresh(polynomial))(2.0)
         assert not gc.isenabled()
     finally:
         gc.enable()
@@ -68,7 +68,7 @@ def test_a_collector_that_was_off_stays_off():
 
 def test_the_collector_works_again_after_a_kernel_that_cannot_be_compiled():
     with pytest.raises(TypingError):
-        compiled.TwoSpeeds(fresh(polynomial))("two")
+        compiled.Kernel(fresh(polynomial))("two")
     assert gc.isenabled()
 
 

@@ -11,12 +11,12 @@ import pytest
 CALLER = textwrap.dedent("""
     import numpy as np
     from shapes import Disc
-    from reference.backend.compiled import TwoSpeeds
+    from reference.backend.compiled import Kernel
 
     def area(disc):
         return 3.0 * disc.radius[0] * disc.radius[0]
 
-    run = TwoSpeeds(area)
+    run = Kernel(area)
     print(run(Disc(np.array([2.0]))), sum(run.compiled.stats.cache_hits.values()))
 """)
 SHAPES = textwrap.dedent("""

@@ -18,14 +18,14 @@ from reference.quaternion import (
     IDENTITY,
     add,
     conjugate,
+    load_quaternion,
+    load_vector,
     multiply,
-    put_quaternion,
-    put_vector,
-    quaternion_at,
     rotate,
     scale,
+    store_quaternion,
+    store_vector,
     subtract,
-    vector_at,
 )
 
 JOINTS = 3
@@ -66,24 +66,24 @@ def bounded(scratch, bound):
 
 def algebra(a, b, v, vectors, quaternions):
     """Use every operation that lanes have, between lanes and with floats on either side."""
-    p, q, x = quaternion_at(a, 0), quaternion_at(b, 0), vector_at(v, 0)
-    put_quaternion(quaternions, 0, multiply(p, conjugate(q)))
-    put_quaternion(quaternions, 1, multiply(p, (0.5, -0.5, 0.1, 0.7)))
-    put_vector(vectors, 0, subtract(add(rotate(p, x), scale(3.0, x)), rotate(q, (0.1, 0.2, 0.3))))
-    put_vector(vectors, 1, subtract((1.0, 2.0, 3.0), x))
+    p, q, x = load_quaternion(a, 0), load_quaternion(b, 0), load_vector(v, 0)
+    store_quaternion(quaternions, 0, multiply(p, conjugate(q)))
+    store_quaternion(quaternions, 1, multiply(p, (0.5, -0.5, 0.1, 0.7)))
+    store_vector(vectors, 0, subtract(add(rotate(p, x), scale(3.0, x)), rotate(q, (0.1, 0.2, 0.3))))
+    store_vector(vectors, 1, subtract((1.0, 2.0, 3.0), x))
 
 
 algebra_of_tiles = compiled.bind(
     algebra,
-    quaternion_at=load_quaternions,
-    vector_at=load_vectors,
-    put_quaternion=store_quaternions,
-    put_vector=store_vectors,
+    load_quaternion=load_quaternions,
+    load_vector=load_vectors,
+    store_quaternion=store_quaternions,
+    store_vector=store_vectors,
 )
 
 
 def run(kernel, *arguments):
-    return compiled.TwoSpeeds(kernel)(*arguments)
+    return compiled.Kernel(kernel)(*arguments)
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def numbers(rng):
 
 
 @pytest.mark.parametrize(("copy", "count"), [(copy_vectors, 3), (copy_quaternions, 4)])
-def test_a_row_of_a_tile_is_read_and_written_whole_and_no_other(copy, count, numbers, speed):
+def test_a_row_of_a_tile_is_read_and_written_whole_and_no_other(copy, count, numbers, backend):
     tile, result = numbers(LANES, JOINTS, count), numbers(LANES, JOINTS, count)
     expected = result.copy()
     expected[:, 1] = tile[:, 2]
@@ -103,7 +103,7 @@ def test_a_row_of_a_tile_is_read_and_written_whole_and_no_other(copy, count, num
     assert (tile == before).all()
 
 
-def test_a_tile_in_the_middle_of_a_batch_leaves_its_neighbours_alone(numbers, speed):
+def test_a_tile_in_the_middle_of_a_batch_leaves_its_neighbours_alone(numbers, backend):
     batch, given = numbers(3 * LANES, JOINTS, 3), numbers(LANES, JOINTS, 3)
     expected = batch.copy()
     expected[LANES : 2 * LANES, 1] = given[:, 2]
@@ -111,7 +111,7 @@ def test_a_tile_in_the_middle_of_a_batch_leaves_its_neighbours_alone(numbers, sp
     assert (batch == expected).all()
 
 
-def test_scratch_holds_a_component_of_all_poses_side_by_side(numbers, speed):
+def test_scratch_holds_a_component_of_all_poses_side_by_side(numbers, backend):
     tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
     expected = scratch.copy()
     expected[1] = tile[:, 2].T
@@ -123,7 +123,7 @@ def test_scratch_holds_a_component_of_all_poses_side_by_side(numbers, speed):
     assert (tile == back).all()
 
 
-def test_a_float_stands_for_itself_in_every_lane(numbers, speed):
+def test_a_float_stands_for_itself_in_every_lane(numbers, backend):
     tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
     run(put_the_same, tile, scratch)
     assert (tile[:, 1] == [1.0, 2.0, 3.0, 4.0]).all()
@@ -131,19 +131,19 @@ def test_a_float_stands_for_itself_in_every_lane(numbers, speed):
 
 
 @pytest.mark.parametrize("other", [False, True])
-def test_a_variable_may_be_floats_here_and_lanes_there(other, numbers, speed):
+def test_a_variable_may_be_floats_here_and_lanes_there(other, numbers, backend):
     tile, scratch = numbers(LANES, JOINTS, 4), numbers(JOINTS, 4, LANES)
     run(put_one_or_other, scratch, tile, other)
     assert (tile[:, 1] == (scratch[2].T if other else quaternion.IDENTITY)).all()
 
 
-def test_lanes_compute_the_bits_of_floats(numbers, speed):
+def test_lanes_compute_the_bits_of_floats(numbers, backend):
     a, b, v = numbers(LANES, JOINTS, 4), numbers(LANES, JOINTS, 4), numbers(LANES, JOINTS, 3)
     vectors, quaternions = np.zeros_like(v), np.zeros_like(a)
     run(algebra_of_tiles, a, b, v, vectors, quaternions)
     for i in range(LANES):
         x, q = np.zeros((JOINTS, 3)), np.zeros((JOINTS, 4))
-        with compiled.speed("plain"):
+        with compiled.set_backend("python"):
             run(algebra, a[i], b[i], v[i], x, q)
         assert (x[:2] != 0.0).all()
         assert (vectors[i] == x).all()
@@ -152,7 +152,7 @@ def test_lanes_compute_the_bits_of_floats(numbers, speed):
 
 @pytest.mark.parametrize("lane", range(LANES))
 @pytest.mark.parametrize("value", [0.5, -0.5, np.nan, np.inf, -np.inf])
-def test_one_lane_out_of_bounds_is_out_of_bounds(lane, value, numbers, speed):
+def test_one_lane_out_of_bounds_is_out_of_bounds(lane, value, numbers, backend):
     scratch = numbers(JOINTS, 4, LANES).clip(-0.25, 0.25)
     assert run(bounded, scratch, 0.25)
     scratch[0, 0, lane] = value

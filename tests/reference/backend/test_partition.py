@@ -5,7 +5,7 @@ import pytest
 
 from reference import ImplicitEuler, State, scenes
 from reference.backend.partition import cut
-from reference.backend.threads import cores
+from reference.backend.threads import set_num_threads
 from reference.implicit_euler.objective import Objective
 
 H = 1 / 30
@@ -55,7 +55,7 @@ def test_every_spring_is_in_its_region_once(moving, count):
     assert (region[regions.starts[-1] :, 0] != region[regions.starts[-1] :, 1]).all()
 
 
-def test_the_sum_over_regions_is_the_sum_over_all(moving, in_regions, rng, speed):
+def test_the_sum_over_regions_is_the_sum_over_all(moving, in_regions, rng, backend):
     whole, parts = Objective(*moving, H), Objective(*in_regions, H)
     x = moving[1].positions + 0.1 * rng.standard_normal(moving[1].positions.shape)
     x[1] += 5.0  # the farthest one is not in the last region
@@ -69,7 +69,7 @@ def test_the_sum_over_regions_is_the_sum_over_all(moving, in_regions, rng, speed
 def test_the_bits_do_not_depend_on_the_cores(in_regions):
     results = []
     for count in (1, 2, 3):
-        with cores(count):
+        with set_num_threads(count):
             integrator = ImplicitEuler(in_regions[0], h=H, solver="local_global", max_iterations=5)
             results.append(integrator.step(in_regions[1]))
     for result in results[1:]:

@@ -4,7 +4,7 @@ import threading
 import numpy as np
 import pytest
 
-from reference import cores
+from reference import set_num_threads
 from reference.backend import compiled
 from reference.backend import threads as parallel
 from reference.backend.threads import SLICES_PER_CORE, in_slices
@@ -26,7 +26,7 @@ def total(values):
 @pytest.mark.parametrize("many", CORES)
 @pytest.mark.parametrize("count", [0, 1, 7, 100, 101])
 def test_slices_follow_one_another_from_end_to_end(many, count):
-    with cores(many):
+    with set_num_threads(many):
         parts = slices_of(count, least=5)
     covered = [i for part in parts for i in range(part.start, part.stop)]
     assert covered == list(range(count))
@@ -34,18 +34,18 @@ def test_slices_follow_one_another_from_end_to_end(many, count):
 
 
 def test_slices_are_as_many_as_the_cores_want_and_no_shorter_than_worth_while():
-    with cores(2):
+    with set_num_threads(2):
         assert len(slices_of(1000, least=10)) == 2 * SLICES_PER_CORE
         assert len(slices_of(35, least=10)) == 3
         assert len(slices_of(19, least=10)) == 1
-    with cores(1):
+    with set_num_threads(1):
         assert len(slices_of(1000, least=10)) == 1
 
 
 def test_what_slices_return_comes_in_their_order():
     values = np.arange(24.0)
-    with cores(3):
-        sums = in_slices(compiled.TwoSpeeds(total), 24, lambda part: (values[part],), least=1)
+    with set_num_threads(3):
+        sums = in_slices(compiled.Kernel(total), 24, lambda part: (values[part],), least=1)
     assert sums == [a + b for a, b in values.reshape(3 * SLICES_PER_CORE, 2)]
 
 
@@ -53,7 +53,7 @@ def test_threads_are_kept_and_only_used_for_more_than_one_slice():
     def who():
         return threading.get_ident()
 
-    with cores(2):
+    with set_num_threads(2):
         several = set(in_slices(who, 100, lambda part: (), least=1))
         again = set(in_slices(who, 100, lambda part: (), least=1))
         (alone,) = in_slices(who, 100, lambda part: (), least=100)
@@ -63,15 +63,15 @@ def test_threads_are_kept_and_only_used_for_more_than_one_slice():
 
 
 def test_threads_run_at_the_speed_in_force():
-    kernel = compiled.TwoSpeeds(total)
-    with cores(2), compiled.speed("plain"):
+    kernel = compiled.Kernel(total)
+    with set_num_threads(2), compiled.set_backend("python"):
         in_slices(kernel, 100, lambda part: (np.ones(3),), least=1)
     assert "compiled" not in vars(kernel)
 
 
 def test_a_slice_is_not_cut_again():
-    with cores(2):
-        counts = in_slices(parallel._cores.get, 100, lambda part: (), least=1)
+    with set_num_threads(2):
+        counts = in_slices(parallel._num_threads.get, 100, lambda part: (), least=1)
         assert counts == [1] * 2 * SLICES_PER_CORE
         assert len(slices_of(100, least=1)) == 2 * SLICES_PER_CORE
 
@@ -81,7 +81,7 @@ def test_an_error_in_one_slice_is_the_caller_s():
         if part.start == 50:
             raise ZeroDivisionError("in the middle")
 
-    with cores(2), pytest.raises(ZeroDivisionError, match="in the middle"):
+    with set_num_threads(2), pytest.raises(ZeroDivisionError, match="in the middle"):
         in_slices(fail, 100, lambda part: (part,), least=10)
 
 
@@ -102,30 +102,30 @@ def test_an_interrupt_reaches_the_caller_and_drops_what_has_not_begun(interrupti
             signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
         assert go_on.wait(60)
 
-    with cores(2), pytest.raises(KeyboardInterrupt):
+    with set_num_threads(2), pytest.raises(KeyboardInterrupt):
         in_slices(wait, 100, lambda part: (part,), least=1)
     go_on.set()
-    with cores(2):  # all that was begun is over when the same threads have done this
+    with set_num_threads(2):  # all that was begun is over when the same threads have done this
         in_slices(lambda: None, 100, lambda part: (), least=1)
     assert len(begun) == 2
 
 
 def test_threads_that_are_gone_are_replaced():
     """As in a process that was forked from ours."""
-    with cores(2):
+    with set_num_threads(2):
         slices_of(100, least=1)
         parallel._pools[2][0].shutdown()
         assert len(slices_of(100, least=1)) == 2 * SLICES_PER_CORE
 
 
 def test_the_count_in_force_ends_with_its_block():
-    with cores(2), cores(1):
+    with set_num_threads(2), set_num_threads(1):
         pass
-    with cores(1):
-        with cores(2):
+    with set_num_threads(1):
+        with set_num_threads(2):
             assert len(slices_of(100, least=1)) == 2 * SLICES_PER_CORE
         assert len(slices_of(100, least=1)) == 1
-        with cores(None):
+        with set_num_threads(None):
             assert len(slices_of(100, least=1)) == slices_wanted()
 
 
@@ -137,4 +137,4 @@ def slices_wanted():
 @pytest.mark.parametrize("count", [0, -1, 1.5, True, "two"])
 def test_a_count_that_is_none_is_refused(count):
     with pytest.raises(ValueError, match="count: expected an integer"):
-        cores(count).__enter__()
+        set_num_threads(count).__enter__()

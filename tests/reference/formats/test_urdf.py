@@ -79,7 +79,7 @@ MOVES = {
 
 
 @pytest.mark.parametrize("kind", MOVES)
-def test_a_joint_moves_as_its_type_says(kind, speed):
+def test_a_joint_moves_as_its_type_says(kind, backend):
     coordinates, x, R = MOVES[kind]
     found = robot(link("a", "b"), joint("j", "a", "b", kind, ORIGIN))
     positions, rotations = pose(found, "b", j=coordinates)

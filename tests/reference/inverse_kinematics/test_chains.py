@@ -38,14 +38,16 @@ def target(rng, skeleton):
 # ---- what every solver promises
 
 
-def test_a_reachable_target_is_reached(skeleton, local, target, solver, speed):
+def test_a_reachable_target_is_reached(skeleton, local, target, solver, backend):
     solution = solve_ik(skeleton, local, target, solver, max_iterations=500)
     assert solution.outcome is Outcome.CONVERGED
     assert solution.residual <= 1e-4
     assert solution.iterations > 0
 
 
-def test_the_residual_is_the_distance_by_forward_kinematics(skeleton, local, target, solver, speed):
+def test_the_residual_is_the_distance_by_forward_kinematics(
+    skeleton, local, target, solver, backend
+):
     solution = solve_ik(skeleton, local, target, solver, max_iterations=2)
     pose = forward_kinematics(skeleton, solution.local_rotations)
     np.testing.assert_allclose(solution.positions, pose.positions, rtol=0, atol=ROUNDING)
@@ -53,19 +55,19 @@ def test_the_residual_is_the_distance_by_forward_kinematics(skeleton, local, tar
     assert solution.residual == pytest.approx(distance, abs=ROUNDING)
 
 
-def test_links_keep_their_lengths(skeleton, local, target, solver, speed):
+def test_links_keep_their_lengths(skeleton, local, target, solver, backend):
     positions = solve_ik(skeleton, local, target, solver).positions
     links = np.linalg.norm(positions[1:] - positions[skeleton.parents[1:]], axis=-1)
     np.testing.assert_allclose(links, skeleton.link_lengths[1:], rtol=ROUNDING)
 
 
-def test_the_root_stays(skeleton, local, target, solver, speed):
+def test_the_root_stays(skeleton, local, target, solver, backend):
     solution = solve_ik(skeleton, local, target, solver)
     assert (solution.positions[0] == skeleton.offsets[0]).all()
 
 
 def test_joints_off_the_path_and_the_effector_keep_their_local_rotations(
-    skeleton, local, solver, speed
+    skeleton, local, solver, backend
 ):
     effector = 4
     point = forward_kinematics(skeleton, local[::-1]).positions[effector]
@@ -75,7 +77,7 @@ def test_joints_off_the_path_and_the_effector_keep_their_local_rotations(
     assert not np.allclose(solution.local_rotations, local)
 
 
-def test_solving_in_a_turned_world_turns_the_answer(skeleton, local, target, solver, rng, speed):
+def test_solving_in_a_turned_world_turns_the_answer(skeleton, local, target, solver, rng, backend):
     turn, root = rotation.random(rng), skeleton.offsets[0]
     turned = local.copy()
     turned[0] = rotation.multiply(turn, local[0])
@@ -88,7 +90,7 @@ def test_solving_in_a_turned_world_turns_the_answer(skeleton, local, target, sol
     )
 
 
-def test_solving_at_another_scale_scales_the_answer(skeleton, local, target, solver, speed):
+def test_solving_at_another_scale_scales_the_answer(skeleton, local, target, solver, backend):
     large = Skeleton(skeleton.parents, 1024.0 * skeleton.offsets)
     there = solve_ik(large, local, 1024.0 * target, solver, tolerance=1024.0 * 1e-4)
     here = solve_ik(skeleton, local, target, solver)
@@ -97,10 +99,10 @@ def test_solving_at_another_scale_scales_the_answer(skeleton, local, target, sol
 
 
 def test_both_speeds_take_the_same_path(skeleton, local, target, solver):
-    from reference import speed
+    from reference import set_backend
 
     fast = solve_ik(skeleton, local, target, solver, record=True)
-    with speed("plain"):
+    with set_backend("python"):
         plain = solve_ik(skeleton, local, target, solver, record=True)
     assert plain.iterations == fast.iterations
     np.testing.assert_allclose(plain.history, fast.history, rtol=1e-9, atol=ROUNDING)
@@ -108,7 +110,7 @@ def test_both_speeds_take_the_same_path(skeleton, local, target, solver):
 
 
 def test_the_history_holds_the_residual_before_and_after_each_iteration(
-    skeleton, local, target, solver, speed
+    skeleton, local, target, solver, backend
 ):
     solution = solve_ik(skeleton, local, target, solver, record=True)
     assert solution.history.shape == (solution.iterations + 1,)
@@ -120,24 +122,26 @@ def test_the_history_holds_the_residual_before_and_after_each_iteration(
     assert solve_ik(skeleton, local, target, solver).history.shape == (0,)
 
 
-def test_a_target_already_reached_takes_no_iteration(skeleton, local, solver, speed):
+def test_a_target_already_reached_takes_no_iteration(skeleton, local, solver, backend):
     tip = forward_kinematics(skeleton, local).positions[-1]
     solution = solve_ik(skeleton, local, tip, solver)
     assert (solution.iterations, solution.outcome) == (0, Outcome.CONVERGED)
     np.testing.assert_allclose(solution.local_rotations, local, rtol=0, atol=ROUNDING)
 
 
-def test_all_iterations_used_is_said(skeleton, local, target, solver, speed):
+def test_all_iterations_used_is_said(skeleton, local, target, solver, backend):
     solution = solve_ik(skeleton, local, target, solver, tolerance=0.0, max_iterations=1)
     assert (solution.iterations, solution.outcome) == (1, Outcome.ITERATION_LIMIT)
 
 
-def test_no_iterations_are_allowed_to_be_asked_for(skeleton, local, target, solver, speed):
+def test_no_iterations_are_allowed_to_be_asked_for(skeleton, local, target, solver, backend):
     solution = solve_ik(skeleton, local, target, solver, max_iterations=0)
     np.testing.assert_allclose(solution.local_rotations, local, rtol=0, atol=ROUNDING)
 
 
-def test_the_inputs_are_unchanged_and_the_answer_read_only(skeleton, local, target, solver, speed):
+def test_the_inputs_are_unchanged_and_the_answer_read_only(
+    skeleton, local, target, solver, backend
+):
     before = local.copy(), target.copy()
     solution = solve_ik(skeleton, local, target, solver)
     assert (local == before[0]).all()
@@ -146,20 +150,20 @@ def test_the_inputs_are_unchanged_and_the_answer_read_only(skeleton, local, targ
         solution.local_rotations[0] = 0.0
 
 
-def test_the_residual_is_exactly_that_of_the_positions(skeleton, local, target, solver, speed):
+def test_the_residual_is_exactly_that_of_the_positions(skeleton, local, target, solver, backend):
     solution = solve_ik(skeleton, local, target, solver)
     x, y, z = solution.positions[-1] - target
     assert solution.residual == pytest.approx(np.sqrt(x * x + y * y + z * z), rel=1e-15, abs=0)
 
 
-def test_an_effector_exactly_on_its_target_is_left_there_even_at_tolerance_zero(solver, speed):
+def test_an_effector_exactly_on_its_target_is_left_there_even_at_tolerance_zero(solver, backend):
     arm, rest = scenes.lab_arm()
     tip = forward_kinematics(arm, rest).positions[-1]
     assert solve_ik(arm, rest, tip, solver, tolerance=0.0).iterations == 0
 
 
 @pytest.mark.parametrize("solver", ["levenberg_marquardt"], indirect=True)
-def test_where_rounding_bars_the_way_the_solve_ends_stalled(skeleton, rng, solver, speed):
+def test_where_rounding_bars_the_way_the_solve_ends_stalled(skeleton, rng, solver, backend):
     """Targets that some pose reaches, asked for exactly; a few happen to be met to the last bit."""
     local, poses = rotation.random(rng, 6), rotation.random(rng, 10, 6)
     targets = forward_kinematics(skeleton, poses).positions[:, -1]
@@ -192,7 +196,7 @@ def test_the_iteration_limit_is_said_only_when_all_are_used(skeleton, rng):
 
 @pytest.mark.parametrize("distance", [1.0, 1.5, 100.0])
 def test_fabrik_lays_the_chain_straight_to_a_target_beyond_reach_at_once(
-    skeleton, local, distance, rng, speed
+    skeleton, local, distance, rng, backend
 ):
     root, reach = skeleton.offsets[0], skeleton.reach()
     way = np.array([0.6, 0.0, -0.8])
@@ -207,7 +211,7 @@ def test_fabrik_lays_the_chain_straight_to_a_target_beyond_reach_at_once(
 
 
 @pytest.mark.parametrize("solver", ["fabrik", "levenberg_marquardt"], indirect=True)
-def test_a_target_just_within_reach_is_reached(skeleton, local, solver, speed):
+def test_a_target_just_within_reach_is_reached(skeleton, local, solver, backend):
     root, reach = skeleton.offsets[0], skeleton.reach()
     target = root + 0.995 * reach * np.array([0.6, 0.0, -0.8])
     solution = solve_ik(skeleton, local, target, solver, max_iterations=1000)
@@ -215,7 +219,7 @@ def test_a_target_just_within_reach_is_reached(skeleton, local, solver, speed):
 
 
 @pytest.mark.parametrize("depth", [0.3, 0.9])
-def test_fabrik_folds_the_chain_back_from_a_target_in_the_hole_at_once(depth, rng, speed):
+def test_fabrik_folds_the_chain_back_from_a_target_in_the_hole_at_once(depth, rng, backend):
     claw = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [0.5, 0, 0], [0, 3.0, 0], [0, 0, 0.5]])
     target = [0.0, 0.0, 2.0 * (1.0 - depth)]
     solution = solve_ik(claw, rotation.random(rng, 4), target, "fabrik")
@@ -226,7 +230,7 @@ def test_fabrik_folds_the_chain_back_from_a_target_in_the_hole_at_once(depth, rn
 
 
 @pytest.mark.parametrize("solver", SETTLING, indirect=True)
-def test_beyond_reach_the_residual_tends_to_the_distance_less_the_reach(solver, speed):
+def test_beyond_reach_the_residual_tends_to_the_distance_less_the_reach(solver, backend):
     arm, rest = scenes.lab_arm()
     solution = solve_ik(arm, rest, [3.0, 1.7, 4.0], solver, max_iterations=1000)
     assert solution.outcome is Outcome.UNREACHABLE
@@ -235,7 +239,7 @@ def test_beyond_reach_the_residual_tends_to_the_distance_less_the_reach(solver, 
 
 @pytest.mark.parametrize("solver", SETTLING, indirect=True)
 @pytest.mark.parametrize("depth", [0.0, 0.3, 1.0])
-def test_in_the_hole_of_the_longest_link_the_rim_is_the_nearest(solver, depth, speed):
+def test_in_the_hole_of_the_longest_link_the_rim_is_the_nearest(solver, depth, backend):
     """Links of 3, 0.5 and 0.5 leave a hole of radius 2 about the root."""
     claw = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [0.5, 0, 0], [0, 3.0, 0], [0, 0, 0.5]])
     target = np.array([0.0, 0.0, 2.0 * (1.0 - depth)])
@@ -245,7 +249,7 @@ def test_in_the_hole_of_the_longest_link_the_rim_is_the_nearest(solver, depth, s
         assert solution.outcome is Outcome.UNREACHABLE
 
 
-def test_the_root_itself_as_effector_cannot_move(skeleton, local, solver, speed):
+def test_the_root_itself_as_effector_cannot_move(skeleton, local, solver, backend):
     off = skeleton.offsets[0] + [0.0, 3.0, 4.0]
     solution = solve_ik(skeleton, local, off, solver, effector=0)
     assert (solution.residual, solution.iterations) == (5.0, 0)
@@ -258,7 +262,7 @@ def test_the_root_itself_as_effector_cannot_move(skeleton, local, solver, speed)
 
 
 @pytest.mark.parametrize("height", [1.7, 0.9, 0.0, -0.5, 2.0, 3.0])
-def test_a_straight_chain_is_freed_from_a_target_on_its_own_line(height, solver, speed):
+def test_a_straight_chain_is_freed_from_a_target_on_its_own_line(height, solver, backend):
     arm, rest = scenes.lab_arm()
     solution = solve_ik(arm, rest, [0.0, height, 0.0], solver, max_iterations=1000)
     assert solution.outcome is Outcome.CONVERGED
@@ -282,13 +286,13 @@ def test_a_straight_chain_is_bent_in_one_plane_however_its_joints_are_twisted(rn
     np.testing.assert_allclose(normals, normals[[0] * 4], rtol=0, atol=ROUNDING)
 
 
-def test_a_straight_chain_of_two_links_is_freed_too(solver, speed):
+def test_a_straight_chain_of_two_links_is_freed_too(solver, backend):
     chain, rest = scenes.ball_chain(links=2)
     solution = solve_ik(chain, rest, [0.1, 0.0, 0.0], solver)  # at the middle joint
     assert solution.outcome is Outcome.CONVERGED
 
 
-def test_two_equal_links_fold_onto_the_root(speed):
+def test_two_equal_links_fold_onto_the_root(backend):
     chain, rest = scenes.ball_chain(links=2)
     solution = solve_ik(chain, rest, [0.0, 0.0, 0.0], "fabrik")
     assert solution.outcome is Outcome.CONVERGED
@@ -296,7 +300,7 @@ def test_two_equal_links_fold_onto_the_root(speed):
 
 
 @pytest.mark.parametrize("target", [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-def test_one_link_turns_even_to_its_opposite(target, solver, speed):
+def test_one_link_turns_even_to_its_opposite(target, solver, backend):
     chain, rest = scenes.ball_chain(links=1, link_length=1.0)
     solution = solve_ik(chain, rest, target, solver, tolerance=1e-9)
     assert solution.outcome is Outcome.CONVERGED
@@ -304,7 +308,7 @@ def test_one_link_turns_even_to_its_opposite(target, solver, speed):
         assert solution.iterations == 1
 
 
-def test_a_straight_chain_turns_round_to_a_target_behind_it(solver, speed):
+def test_a_straight_chain_turns_round_to_a_target_behind_it(solver, backend):
     chain, rest = scenes.ball_chain(links=3)
     for distance, outcome in ((0.25, Outcome.CONVERGED), (0.5, Outcome.UNREACHABLE)):
         solution = solve_ik(chain, rest, [-distance, 0.0, 0.0], solver, max_iterations=1000)
@@ -312,14 +316,14 @@ def test_a_straight_chain_turns_round_to_a_target_behind_it(solver, speed):
         assert solution.residual < distance
 
 
-def test_links_of_no_length_do_no_harm(solver, speed):
+def test_links_of_no_length_do_no_harm(solver, backend):
     offsets = [[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 0]]
     chain = Skeleton(range(-1, 5), offsets)
     solution = solve_ik(chain, rotation.identity(6), [0.5, 0.9, 0.0], solver)
     assert solution.outcome is Outcome.CONVERGED
 
 
-def test_a_skeleton_of_nothing_but_a_point_answers(solver, speed):
+def test_a_skeleton_of_nothing_but_a_point_answers(solver, backend):
     point = Skeleton([-1, 0], np.zeros((2, 3)))
     solution = solve_ik(point, rotation.identity(2), [1.0, 0.0, 0.0], solver)
     assert (solution.residual, solution.outcome) == (1.0, Outcome.UNREACHABLE)
@@ -382,7 +386,7 @@ def textbook_sweep(skeleton, local, target):
     return local, np.array(distances)
 
 
-def test_one_ccd_iteration_is_the_textbook_s(skeleton, local, target, speed):
+def test_one_ccd_iteration_is_the_textbook_s(skeleton, local, target, backend):
     expected, _ = textbook_sweep(skeleton, local, target)
     solution = solve_ik(skeleton, local, target, "ccd", tolerance=0.0, max_iterations=1)
     np.testing.assert_allclose(
@@ -391,7 +395,7 @@ def test_one_ccd_iteration_is_the_textbook_s(skeleton, local, target, speed):
 
 
 @pytest.mark.parametrize("angle", [1.0, 1e-4])
-def test_a_chain_off_its_target_s_line_in_the_last_link_alone_is_not_bent(angle, speed):
+def test_a_chain_off_its_target_s_line_in_the_last_link_alone_is_not_bent(angle, backend):
     arm, local = scenes.lab_arm()
     local[-2] = rotation.exponential([angle, 0.0, 0.0])
     target = np.array([0.0, 0.0, 0.0])
@@ -436,7 +440,7 @@ def textbook_fabrik(positions, lengths, target):
     return p
 
 
-def test_one_fabrik_iteration_is_the_paper_s(skeleton, local, target, speed):
+def test_one_fabrik_iteration_is_the_paper_s(skeleton, local, target, backend):
     path = skeleton.path()
     start = forward_kinematics(skeleton, local).positions[path]
     expected = textbook_fabrik(start, skeleton.link_lengths[path[1:]], target)
@@ -445,7 +449,7 @@ def test_one_fabrik_iteration_is_the_paper_s(skeleton, local, target, speed):
 
 
 def test_fabrik_turns_links_by_the_shortest_arc_so_that_twist_is_kept(
-    skeleton, local, target, speed
+    skeleton, local, target, backend
 ):
     solution = solve_ik(skeleton, local, target, "fabrik")
     before = forward_kinematics(skeleton, local)
@@ -471,7 +475,7 @@ def test_every_point_of_every_lab_curve_is_reached_from_rest(curve, solver):
 # ---- batches and targets
 
 
-def test_a_batch_is_its_solves(skeleton, rng, solver, speed):
+def test_a_batch_is_its_solves(skeleton, rng, solver, backend):
     starts = rotation.random(rng, 2, 1, 6)
     targets = forward_kinematics(skeleton, rotation.random(rng, 3, 6)).positions[:, -1]
     batch = solve_ik(skeleton, starts, targets, solver, record=True)
@@ -500,18 +504,18 @@ def test_whatever_comes_in_the_kernel_is_compiled_once(skeleton, local, target, 
 
 @pytest.mark.parametrize("excess", [1e-6 - 1e-13, -1e-6 + 1e-13])
 def test_a_start_on_the_edge_of_the_unit_tolerance_is_a_start(
-    skeleton, local, target, solver, excess, speed
+    skeleton, local, target, solver, excess, backend
 ):
     exact = solve_ik(skeleton, local, target, solver, max_iterations=2)
     edge = solve_ik(skeleton, local * (1.0 + excess), target, solver, max_iterations=2)
     np.testing.assert_allclose(edge.positions, exact.positions, rtol=0, atol=1e-13)
 
 
-def test_no_targets_give_no_solutions(skeleton, local, solver, speed):
+def test_no_targets_give_no_solutions(skeleton, local, solver, backend):
     assert solve_ik(skeleton, local, np.empty((0, 3)), solver).residual.shape == (0,)
 
 
-def test_a_target_names_its_effector(skeleton, local, target, solver, speed):
+def test_a_target_names_its_effector(skeleton, local, target, solver, backend):
     plain = solve_ik(skeleton, local, target, solver, effector=3)
     for named_target in (Target(target, effector=3), [Target(target, effector="joint3")]):
         named = solve_ik(skeleton, local, named_target, solver)
@@ -546,7 +550,7 @@ def test_a_target_names_its_effector(skeleton, local, target, solver, speed):
         ({"local_rotations": np.ones((5, 4))}, r"local_rotations: expected shape \(..., 6, 4\)"),
     ],
 )
-def test_bad_input_is_named(change, message, skeleton, rng, speed):
+def test_bad_input_is_named(change, message, skeleton, rng, backend):
     arguments = {
         "skeleton": skeleton,
         "local_rotations": rotation.random(rng, 3, 6),

@@ -51,7 +51,7 @@ def test_a_straight_chain_is_freed_from_a_target_on_its_own_line(direction, kind
     assert (again.coordinates == solution.coordinates).all()
 
 
-def test_a_hinge_at_its_limit_is_bent_the_other_way(solver, speed):
+def test_a_hinge_at_its_limit_is_bent_the_other_way(solver, backend):
     """The target is straight behind, half a turn in the one direction that the limits leave."""
     arm = Articulation(
         Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"], lower=-3.2, upper=0.0
@@ -61,7 +61,7 @@ def test_a_hinge_at_its_limit_is_bent_the_other_way(solver, speed):
     assert solution.coordinates[0] == pytest.approx(-np.pi, abs=1e-3)
 
 
-def test_a_stuck_start_is_not_given_up_for_something_worse(solver, speed):
+def test_a_stuck_start_is_not_given_up_for_something_worse(solver, backend):
     """A limit keeps the hinge from its target; bent away from it, one iteration may not return."""
     arm = Articulation(
         Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"], lower=-3.0, upper=0.5
@@ -98,7 +98,7 @@ def test_special_targets_are_answered(where, kind, oriented, solver, chain_of_jo
         assert solution.residual >= reach * (1.0 - 1e-12)
 
 
-def test_without_freedom_the_start_is_the_answer(solver, speed):
+def test_without_freedom_the_start_is_the_answer(solver, backend):
     statue = Articulation(Skeleton([-1, 0], [[1.0, 0, 0], [0, 1.0, 0]]), "fixed")
     at = solve_ik(statue, [], [1.0, 1.0, 0.0], solver)
     assert (at.outcome, at.iterations, at.residual) == (Outcome.CONVERGED, 0, 0.0)
@@ -113,7 +113,7 @@ def test_without_freedom_the_start_is_the_answer(solver, speed):
 
 
 @pytest.mark.parametrize("kind", ["hinge", "ball"])
-def test_the_root_as_effector_can_turn_but_not_move(kind, solver, speed):
+def test_the_root_as_effector_can_turn_but_not_move(kind, solver, backend):
     model = Articulation(Skeleton([-1, 0], [[1.0, 0, 0], [0, 1.0, 0]]), kind)
     off = solve_ik(model, model.zero(), [1.0, 3.0, 4.0], solver, effector=0)
     assert (off.residual, off.outcome) == (5.0, Outcome.UNREACHABLE)
@@ -122,7 +122,7 @@ def test_the_root_as_effector_can_turn_but_not_move(kind, solver, speed):
     assert posed.outcome is Outcome.CONVERGED
 
 
-def test_limits_without_width_hold_fast(solver, speed, rng, beyond_limits):
+def test_limits_without_width_hold_fast(solver, backend, rng, beyond_limits):
     model = Articulation(
         Skeleton(range(-1, 4), rng.standard_normal((5, 3))),
         ["hinge", "ball", "slide", "hinge", "fixed"],
@@ -142,7 +142,7 @@ def test_limits_without_width_hold_fast(solver, speed, rng, beyond_limits):
 
 
 def test_no_iterations_leave_the_start_within_its_limits(
-    articulated, reachable, beyond_limits, on_the_way, rng, solver, speed
+    articulated, reachable, beyond_limits, on_the_way, rng, solver, backend
 ):
     model = articulated(["hinge", "ball", "slide", "ball"], 3)
     targets, _ = reachable(model, rng, 2)
@@ -188,7 +188,7 @@ def test_what_rounding_alone_keeps_from_its_target_is_stalled(rng):
     assert (solution.outcome[off] == Outcome.STALLED).all()
 
 
-def test_the_lab_s_arm_of_hinges_draws_in_its_plane(solver, speed):
+def test_the_lab_s_arm_of_hinges_draws_in_its_plane(solver, backend):
     arm, _ = scenes.lab_arm()
     model = Articulation(arm, "hinge", [0.0, 0.0, 1.0], lower=-2.8, upper=2.8)
     angles = np.linspace(0.0, 2.0 * np.pi, 5)

@@ -65,7 +65,7 @@ def test_pairs_of_targets_that_a_pose_reaches_are_reached(solver, kind, limits, 
     assert reached >= REACHED[solver, kind, limits]
 
 
-def test_an_effector_above_another_has_its_own_target(solver, speed, rng):
+def test_an_effector_above_another_has_its_own_target(solver, backend, rng):
     chain = Articulation(Skeleton(range(-1, 6), np.outer([0.0] + [0.3] * 6, [1.0, 0, 0])))
     goal = forward_kinematics(chain, chain.random(rng)).positions
     targets = [Target(goal[3], effector=3), Target(goal[6], effector=6)]
@@ -74,7 +74,7 @@ def test_an_effector_above_another_has_its_own_target(solver, speed, rng):
     np.testing.assert_allclose(solution.positions[[3, 6]], goal[[3, 6]], rtol=0, atol=1e-4)
 
 
-def test_targets_in_another_order_give_the_same_answer(solver, speed, rng):
+def test_targets_in_another_order_give_the_same_answer(solver, backend, rng):
     model = figure("hinge", lower=-2.0, upper=2.0)
     targets, q = hands(model, rng), model.random(rng)
     targets[0] = targets[0]._replace(rotation=rotation.random(rng), weight=2.0)
@@ -86,7 +86,7 @@ def test_targets_in_another_order_give_the_same_answer(solver, speed, rng):
 
 
 @pytest.mark.parametrize("solver", ["ccd", "fabrik", "levenberg_marquardt"], indirect=True)
-def test_the_heavier_target_is_missed_by_less(solver, speed):
+def test_the_heavier_target_is_missed_by_less(solver, backend):
     """Both ends of a T are wanted up, where one turn cannot bring both."""
     tee = Articulation(Skeleton([-1, 0, 0], [[0, 0, 0], [1.0, 0, 0], [-1.0, 0.5, 0]]))
     misses = []
@@ -101,7 +101,7 @@ def test_the_heavier_target_is_missed_by_less(solver, speed):
     assert second[0] < second[1] - 0.05 < second[2] - 0.1
 
 
-def test_only_the_ratio_of_weights_counts(solver, speed, rng):
+def test_only_the_ratio_of_weights_counts(solver, backend, rng):
     model = figure()
     targets, q = hands(model, rng), model.random(rng)
     here = solve_ik(model, q, targets, solver, max_iterations=5)
@@ -116,7 +116,7 @@ def test_only_the_ratio_of_weights_counts(solver, speed, rng):
 
 @pytest.mark.parametrize("solver", ["ccd", "fabrik", "damped_least_squares"], indirect=True)
 @pytest.mark.parametrize("order", [1, -1])
-def test_a_target_out_of_reach_does_not_keep_another_arm_from_its_own(solver, order, speed):
+def test_a_target_out_of_reach_does_not_keep_another_arm_from_its_own(solver, order, backend):
     """The arms part at the root; the one that cannot arrive is soon as near as it can be."""
     parents = [-1, 0, 1, 2, 0, 4, 5]
     offsets = [[0, 0, 0], [0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 0], [0, 1, 0], [0, 1, 0]]
@@ -128,7 +128,7 @@ def test_a_target_out_of_reach_does_not_keep_another_arm_from_its_own(solver, or
     np.testing.assert_allclose(solution.positions[6], [0.5, 0.7, 0.6], rtol=0, atol=1e-4)
 
 
-def test_targets_that_exclude_each_other_are_not_called_unreachable(solver, speed):
+def test_targets_that_exclude_each_other_are_not_called_unreachable(solver, backend):
     """Each could be reached alone: geometry proves nothing about one."""
     model = figure()
     targets = [Target([1.2, 0.8, 0.0], effector=5), Target([-1.2, 0.8, 0.0], effector=8)]
@@ -187,7 +187,7 @@ def test_full_reach_is_not_too_far_however_long_or_far_off(links, away, machine,
         (["fixed", "fixed", "fixed"], {}, 0.0),
     ],
 )  # fmt: skip
-def test_beyond_all_links_and_slides_a_target_is_unreachable(kinds, limits, reach, solver, speed):
+def test_beyond_all_links_and_slides_a_target_is_unreachable(kinds, limits, reach, solver, backend):
     """Links of one and two metres along x from a root at (5, 0, 0)."""
     chain = Skeleton([-1, 0, 1], [[5.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
     model = Articulation(chain, kinds, [0.0, 0.0, 1.0], **limits)
@@ -204,13 +204,13 @@ def test_beyond_all_links_and_slides_a_target_is_unreachable(kinds, limits, reac
 
 
 @pytest.mark.parametrize("kind", ["slide", "free"])
-def test_without_an_end_nothing_is_too_far(kind, solver, speed):
+def test_without_an_end_nothing_is_too_far(kind, solver, backend):
     model = Articulation(Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), [kind, "fixed"])
     solution = solve_ik(model, model.zero(), [1e3, 1e3, 0.0], solver, max_iterations=5)
     assert not solution.outcome.unreachable
 
 
-def test_a_leader_off_the_way_is_moved_and_all_above_it_is_not(solver, speed):
+def test_a_leader_off_the_way_is_moved_and_all_above_it_is_not(solver, backend):
     """The finger's hinge follows a motor in another branch, below a joint that moves no effector.
 
     That joint mimics another one yet.

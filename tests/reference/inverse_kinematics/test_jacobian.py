@@ -87,7 +87,7 @@ STEPS = {
 
 
 @pytest.mark.parametrize("solver", STEPS)
-def test_one_iteration_is_the_textbook_s(skeleton, local, solver, rng, speed):
+def test_one_iteration_is_the_textbook_s(skeleton, local, solver, rng, backend):
     """J is dense here, by the arms; a joint turns by its part of J^T z, seen from its parent."""
     pose, path = forward_kinematics(skeleton, local), skeleton.path()
     target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
@@ -116,7 +116,7 @@ def test_a_chain_that_had_to_be_bent_is_linearised_where_it_then_is():
     assert task_matrix(chain) == A
 
 
-def test_levenberg_marquardt_converges_quadratically(skeleton, local, rng, speed):
+def test_levenberg_marquardt_converges_quadratically(skeleton, local, rng, backend):
     target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
     history = solve_ik(
         skeleton, local, target, "levenberg_marquardt", tolerance=1e-12, record=True

@@ -121,7 +121,7 @@ def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, mac
             assert misfit(*ready[:3]) >= least - 1e-9
 
 
-def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, speed):
+def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, backend):
     """By turns and shifts in alternation."""
     body = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0.3, 0.4, 0.5]]), ["free", "fixed"])
     goal, q = forward_kinematics(body, body.random(rng)), body.random(rng)
@@ -139,7 +139,7 @@ def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, speed):
         (-3.0, 0.5, 2.9, -3.0),  # the short way leads through half a turn, where the lower limit is
     ],
 )
-def test_a_hinge_stops_at_its_limit_along_the_arc(start, upper, wanted, expected, speed):
+def test_a_hinge_stops_at_its_limit_along_the_arc(start, upper, wanted, expected, backend):
     arm = planar(1, lower=-3.0, upper=upper)
     target = [np.cos(wanted), np.sin(wanted), 0.0]
     solution = solve_ik(arm, [start], target, "ccd", tolerance=0.0, max_iterations=1)
@@ -147,7 +147,7 @@ def test_a_hinge_stops_at_its_limit_along_the_arc(start, upper, wanted, expected
 
 
 @pytest.mark.parametrize(("upper", "expected"), [(5.0, 2.0), (1.5, 1.5)])
-def test_a_slide_goes_as_far_as_its_limit_allows(upper, expected, speed):
+def test_a_slide_goes_as_far_as_its_limit_allows(upper, expected, backend):
     rail = Articulation(Skeleton([-1], [[1.0, 0, 0]]), "slide", [0, 0, 2.0], upper=upper)
     solution = solve_ik(rail, [0.5], [4.0, 3.0, 2.0], "ccd", max_iterations=1)
     assert solution.coordinates[0] == pytest.approx(expected, abs=1e-15)
@@ -279,7 +279,7 @@ def test_forward_each_joint_is_left_where_the_coordinates_put_it(
     np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-9)
 
 
-def test_fabrik_turns_a_hinge_to_its_child_s_wish_within_its_limits(speed):
+def test_fabrik_turns_a_hinge_to_its_child_s_wish_within_its_limits(backend):
     for upper, expected in ((2.0, 1.0), (0.4, 0.4)):
         arm = planar(1, lower=-2.0, upper=upper)
         target = [np.cos(1.0), np.sin(1.0), 0.0]

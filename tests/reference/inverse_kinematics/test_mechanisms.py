@@ -20,7 +20,7 @@ from reference import (
     solve_ik,
 )
 from reference.arguments import frozen
-from reference.backend.threads import cores
+from reference.backend.threads import set_num_threads
 from reference.inverse_kinematics import checked_settings, solve_targets
 
 # Distances of a few metres over six joints, positions recomputed.
@@ -60,7 +60,7 @@ def residuals(model, q, targets):
 # ---- the same as chains
 
 
-def test_on_balls_without_limits_the_path_is_that_of_chains(skeleton, local, rng, solver, speed):
+def test_on_balls_without_limits_the_path_is_that_of_chains(skeleton, local, rng, solver, backend):
     target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
     balls = Articulation(skeleton)
     chain = solve_ik(skeleton, local, target, solver, max_iterations=40, record=True)
@@ -79,7 +79,7 @@ def test_on_balls_without_limits_the_path_is_that_of_chains(skeleton, local, rng
 
 
 def test_one_iteration_on_balls_turns_them_as_it_does_a_chain_s(
-    skeleton, local, rng, solver, speed
+    skeleton, local, rng, solver, backend
 ):
     """FABRIK's twist included: of each link the shortest arc."""
     target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
@@ -89,7 +89,7 @@ def test_one_iteration_on_balls_turns_them_as_it_does_a_chain_s(
     np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-12)
 
 
-def test_fixed_joints_are_parts_of_their_links(rng, solver, speed):
+def test_fixed_joints_are_parts_of_their_links(rng, solver, backend):
     """Every second joint of a chain fixed, or left out and its offset and frame merged by hand."""
     offsets, frames = rng.standard_normal((7, 3)), rotation.random(rng, 7)
     kinds = ["ball", "fixed", "hinge", "fixed", "ball", "fixed", "fixed"]
@@ -117,7 +117,7 @@ def test_fixed_joints_are_parts_of_their_links(rng, solver, speed):
 @at_both_speeds
 @with_examples
 @given(**TREES)
-def test_the_answer_is_forward_kinematics_of_its_coordinates(problem, solver, speed, kinds, seed):
+def test_the_answer_is_forward_kinematics_of_its_coordinates(problem, solver, backend, kinds, seed):
     model, q, targets = problem(kinds, seed)
     solution = solve_ik(model, q, targets, solver, max_iterations=5)
     pose = forward_kinematics(model, solution.coordinates)
@@ -136,7 +136,7 @@ def test_the_answer_is_forward_kinematics_of_its_coordinates(problem, solver, sp
 @with_examples
 @given(**TREES)
 def test_limits_are_kept_and_joints_off_the_way_left_alone(
-    problem, on_the_way, solver, speed, kinds, seed
+    problem, on_the_way, solver, backend, kinds, seed
 ):
     model, q, targets = problem(kinds, seed)
     found = solve_ik(model, q, targets, solver, max_iterations=5).coordinates
@@ -151,7 +151,7 @@ def test_limits_are_kept_and_joints_off_the_way_left_alone(
 @with_examples
 @given(**TREES)
 def test_the_history_holds_the_distance_before_and_after_each_iteration(
-    articulated, reachable, solver, speed, kinds, seed
+    articulated, reachable, solver, backend, kinds, seed
 ):
     model, rng = articulated(kinds, seed), np.random.default_rng(seed)
     targets, _ = reachable(model, rng, 2)
@@ -168,19 +168,19 @@ def test_the_history_holds_the_distance_before_and_after_each_iteration(
 
 
 def test_both_speeds_take_the_same_path(problem, solver):
-    from reference import speed
+    from reference import set_backend
 
     for seed in range(5):
         model, q, targets = problem(["ball", "hinge", "slide", "free", "hinge", "ball"], seed)
         fast = solve_ik(model, q, targets, solver, max_iterations=10, record=True)
-        with speed("plain"):
+        with set_backend("python"):
             plain = solve_ik(model, q, targets, solver, max_iterations=10, record=True)
         assert plain.iterations == fast.iterations
         np.testing.assert_allclose(plain.history, fast.history, rtol=0, atol=PATH)
         np.testing.assert_allclose(plain.coordinates, fast.coordinates, rtol=0, atol=PATH)
 
 
-def test_inputs_are_unchanged_and_answers_read_only(problem, solver, speed):
+def test_inputs_are_unchanged_and_answers_read_only(problem, solver, backend):
     model, q, targets = problem(["ball", "hinge", "ball"], 1)
     targets = [t._replace(rotation=(1.0 + 1e-7) * rotation.identity()) for t in targets]
     q = q * (1.0 + 1e-7)
@@ -195,7 +195,7 @@ def test_inputs_are_unchanged_and_answers_read_only(problem, solver, speed):
         assert not values.flags.writeable
 
 
-def test_a_skeleton_s_coordinates_are_its_local_rotations(skeleton, local, solver, speed):
+def test_a_skeleton_s_coordinates_are_its_local_rotations(skeleton, local, solver, backend):
     goal = forward_kinematics(skeleton, local[::-1])
     target = Target(goal.positions[-1], goal.rotations[-1], -1)
     pose = solve_ik(skeleton, local, target, solver, max_iterations=5)
@@ -226,7 +226,7 @@ def many(articulated, rng):
     return model, model.random(rng, 2, 1), [near, Target(goal.positions[0, 2], effector=2)]
 
 
-def test_a_batch_is_its_solves(many, solver, speed):
+def test_a_batch_is_its_solves(many, solver, backend):
     model, starts, (near, far) = many
     options = {"max_iterations": 6, "record": True, "restarts": 1}
     batch = solve_ik(model, starts, [near, far], solver, **options)
@@ -246,7 +246,7 @@ def test_a_batch_is_its_solves(many, solver, speed):
             assert (batch.history[i, j, one.iterations :] == one.history[-1]).all()
 
 
-def test_rotations_alone_make_a_batch_too(many, solver, speed):
+def test_rotations_alone_make_a_batch_too(many, solver, backend):
     model, starts, (near, _) = many
     turns = rotation.random(np.random.default_rng(4), 4)
     batch = solve_ik(
@@ -274,15 +274,15 @@ def test_a_batch_on_all_cores_is_the_same_as_on_one(many, rng, solver):
     model, _, (near, _) = many
     starts = model.random(rng, 100)
     target = Target(near.position[0], near.rotation, -1)
-    with cores(1):
+    with set_num_threads(1):
         here = solve_ik(model, starts, target, solver, max_iterations=2)
-    with cores(3):
+    with set_num_threads(3):
         there = solve_ik(model, starts, target, solver, max_iterations=2)
     assert (here.coordinates == there.coordinates).all()
     assert (here.residual_rotation == there.residual_rotation).all()
 
 
-def test_chained_each_target_starts_from_the_last_solution(many, solver, speed):
+def test_chained_each_target_starts_from_the_last_solution(many, solver, backend):
     model, starts, (near, far) = many
     chained = checked_settings(solver, 1e-4, 1e-4, 4, 0, 0, False)._replace(chained=True)
     motion = solve_targets(model, starts[0, 0], [near, far], None, chained)
@@ -304,7 +304,7 @@ def test_whatever_comes_in_the_kernel_is_compiled_once(many, solver):
     assert len(IK_SOLVERS[solver].mechanism.compiled.signatures) == 1
 
 
-def test_however_arguments_come_the_answer_is_the_same(many, skeleton, local, solver, speed):
+def test_however_arguments_come_the_answer_is_the_same(many, skeleton, local, solver, backend):
     """Plain arrays take a shorter way to the kernel than lists, arrays to convert, or batches."""
     model, starts, (near, far) = many
     chain_target = far.position
@@ -337,7 +337,7 @@ def test_however_arguments_come_the_answer_is_the_same(many, skeleton, local, so
         assert isinstance(plain.outcome, Outcome)
 
 
-def test_no_targets_give_no_solutions(many, solver, speed):
+def test_no_targets_give_no_solutions(many, solver, backend):
     model, starts, _ = many
     none = Target(np.empty((0, 3)), rotation.identity(), -1)
     solution = solve_ik(model, starts[0, 0], none, solver)
@@ -369,7 +369,7 @@ def moved(model, targets, turn, shift):
 @at_both_speeds
 @with_examples
 @given(**TREES)
-def test_a_moved_world_changes_nothing(problem, solver, speed, kinds, seed):
+def test_a_moved_world_changes_nothing(problem, solver, backend, kinds, seed):
     model, q, targets = problem(kinds, seed)
     rng = np.random.default_rng(seed)
     there, goals = moved(model, targets, rotation.random(rng), rng.standard_normal(3))
@@ -406,7 +406,7 @@ def to_scale(model, q, s):
 @at_both_speeds
 @with_examples
 @given(**TREES)
-def test_another_unit_of_length_changes_nothing(problem, solver, speed, kinds, seed):
+def test_another_unit_of_length_changes_nothing(problem, solver, backend, kinds, seed):
     """The unit is a power of two, so that nothing is rounded otherwise."""
     model, q, targets = problem(kinds, seed)
     large, start, goals = scaled(model, q, targets, 1024.0)
@@ -419,7 +419,7 @@ def test_another_unit_of_length_changes_nothing(problem, solver, speed, kinds, s
         assert there.residual_rotation == pytest.approx(here.residual_rotation, abs=1e-9)
 
 
-def test_another_unit_changes_nothing_where_all_length_is_in_the_slides(solver, speed):
+def test_another_unit_changes_nothing_where_all_length_is_in_the_slides(solver, backend):
     """A gantry: three slides across one another, no links."""
     gantry = Articulation(
         Skeleton([-1, 0, 1, 2], np.zeros((4, 3))), ["slide"] * 3 + ["fixed"],
@@ -503,7 +503,7 @@ def as_arrays(value):
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("plain", [False, True])
-def test_bad_input_is_named(change, message, plain, speed):
+def test_bad_input_is_named(change, message, plain, backend):
     kinds = ["hinge", "ball", "slide", "fixed"]
     if plain:  # what is a float64 array already takes a shorter way
         change = {name: as_arrays(value) for name, value in change.items()}
@@ -518,7 +518,9 @@ def test_bad_input_is_named(change, message, plain, speed):
 
 
 @pytest.mark.parametrize("excess", [1e-6 - 1e-13, -1e-6 + 1e-13])
-def test_lengths_on_the_edge_of_the_unit_tolerance_are_unit(skeleton, local, solver, excess, speed):
+def test_lengths_on_the_edge_of_the_unit_tolerance_are_unit(
+    skeleton, local, solver, excess, backend
+):
     goal = forward_kinematics(skeleton, local[::-1])
     target, long = Target(goal.positions[-1], goal.rotations[-1]), 1.0 + excess
     edge = target._replace(rotation=long * goal.rotations[-1])

@@ -56,7 +56,7 @@ def test_poses_that_can_be_reached_are(solver, kind, starts, chain_of_joints, rn
 
 
 def test_a_skeleton_s_effector_turns_where_its_rotation_is_asked_for(
-    skeleton, local, solver, rng, speed
+    skeleton, local, solver, rng, backend
 ):
     goal = forward_kinematics(skeleton, rotation.random(rng, 6))
     alone = solve_ik(skeleton, local, Target(goal.positions[-1]), solver, max_iterations=3)
@@ -70,7 +70,7 @@ def test_a_skeleton_s_effector_turns_where_its_rotation_is_asked_for(
     assert alone.residual_rotation == 0.0
 
 
-def test_the_sign_of_the_target_s_quaternion_does_not_matter(solver, speed, articulated, rng):
+def test_the_sign_of_the_target_s_quaternion_does_not_matter(solver, backend, articulated, rng):
     model = articulated(["ball", "hinge", "ball", "slide", "hinge", "ball"], 5)
     goal, q = forward_kinematics(model, model.random(rng)), model.random(rng)
     target = Target(goal.positions[-1], goal.rotations[-1], -1)
@@ -80,7 +80,7 @@ def test_the_sign_of_the_target_s_quaternion_does_not_matter(solver, speed, arti
     assert there.residual_rotation == here.residual_rotation
 
 
-def test_the_sign_of_the_start_s_quaternions_does_not_matter(solver, speed, skeleton, local, rng):
+def test_the_sign_of_the_start_s_quaternions_does_not_matter(solver, backend, skeleton, local, rng):
     goal = forward_kinematics(skeleton, rotation.random(rng, 6))
     target = Target(goal.positions[-1], goal.rotations[-1])
     here = solve_ik(skeleton, local, target, solver, max_iterations=5)
@@ -89,7 +89,7 @@ def test_the_sign_of_the_start_s_quaternions_does_not_matter(solver, speed, skel
 
 
 @pytest.mark.parametrize("angle", [np.pi, np.pi - 1e-9, 3.0])
-def test_half_a_turn_is_made_good(solver, angle, speed):
+def test_half_a_turn_is_made_good(solver, angle, backend):
     """Where both ways round are as long, one is taken."""
     joint = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0.5, 0, 0]]), ["ball", "fixed"])
     turn = rotation.exponential([0.0, 0.0, angle])
@@ -99,7 +99,7 @@ def test_half_a_turn_is_made_good(solver, angle, speed):
     assert solution.residual_rotation <= 1e-4
 
 
-def test_both_tolerances_must_be_kept(solver, speed):
+def test_both_tolerances_must_be_kept(solver, backend):
     """A hinge far off the axis: position and rotation are met together, at different pace."""
     arm = Articulation(Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"])
     turn = rotation.exponential([0.0, 0.0, 1e-3])
@@ -112,7 +112,7 @@ def test_both_tolerances_must_be_kept(solver, speed):
         assert solution.outcome is Outcome.CONVERGED
 
 
-def test_a_rotation_that_no_joint_can_make_is_not_reached(solver, speed):
+def test_a_rotation_that_no_joint_can_make_is_not_reached(solver, backend):
     arm = Articulation(Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"])
     target = Target([1.0, 0.0, 0.0], rotation.exponential([0.5, 0.0, 0.0]))
     solution = solve_ik(arm, [0.2], target, solver, max_iterations=300)

@@ -199,7 +199,7 @@ def merits(model, pose, targets, reach):
 
 
 @pytest.mark.parametrize("name", [name for name in MODELS if name not in ("arm", "ten links")])
-def test_the_chosen_attempt_is_that_of_least_merit(name, speed):
+def test_the_chosen_attempt_is_that_of_least_merit(name, backend):
     """With no iterations the attempts are the start and the random poses as they are."""
     for seed in range(5):
         model, q, targets = problem(name, 3 * seed + 1)

@@ -37,7 +37,7 @@ def test_more_restarts_reach_more_targets(arm, poses, rng, solver):
     assert counts[0] < counts[1] < counts[2]
 
 
-def test_what_one_start_reaches_soon_takes_no_restart(arm, rng, solver, speed):
+def test_what_one_start_reaches_soon_takes_no_restart(arm, rng, solver, backend):
     """A start near the target: the very same answer."""
     q = 0.9 * arm.random(rng)
     goal = forward_kinematics(arm, q + 1e-3)
@@ -52,7 +52,7 @@ def test_what_one_start_reaches_soon_takes_no_restart(arm, rng, solver, speed):
         assert solver in ("fabrik", "ccd", "jacobian_transpose")
 
 
-def test_one_restart_from_the_very_goal_arrives(arm, solver, speed, rng):
+def test_one_restart_from_the_very_goal_arrives(arm, solver, backend, rng):
     """The start is bent the wrong way and given no iterations, so that restarts alone count."""
     random = prepare(arm, (7,), (True,), 3, 11).restarts
     assert random.shape == (3, 8)
@@ -88,7 +88,7 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
     assert (taken == prepared.restarts[np.argsort(expected)]).all()
 
 
-def test_the_best_of_all_attempts_is_returned(arm, poses, rng, solver, speed):
+def test_the_best_of_all_attempts_is_returned(arm, poses, rng, solver, backend):
     """With no iterations the attempts are the start and the random poses as they are."""
     q, wanted = arm.random(rng), Target(poses.position[0])
     random = prepare(arm, (7,), (False,), 6, 5).restarts
@@ -121,7 +121,7 @@ def test_restarts_are_the_same_alone_and_in_a_batch(arm, poses, rng, solver):
 
 
 def test_restarts_keep_limits_and_leave_joints_off_the_way(
-    articulated, reachable, on_the_way, rng, solver, speed
+    articulated, reachable, on_the_way, rng, solver, backend
 ):
     for seed in range(4):
         model = articulated(["ball", "hinge", "ball", "slide", "hinge", "ball", "hinge"], seed)
@@ -134,7 +134,7 @@ def test_restarts_keep_limits_and_leave_joints_off_the_way(
             np.testing.assert_allclose(solution.coordinates[own], q[own], rtol=0, atol=1e-15)
 
 
-def test_the_iterations_of_all_attempts_are_counted_and_recorded(arm, rng, solver, speed):
+def test_the_iterations_of_all_attempts_are_counted_and_recorded(arm, rng, solver, backend):
     far = Target([100.0, 0.0, 0.0])
     q = arm.random(rng)
     solution = solve_ik(arm, q, far, solver, restarts=2, max_iterations=4, record=True)
@@ -145,7 +145,7 @@ def test_the_iterations_of_all_attempts_are_counted_and_recorded(arm, rng, solve
     assert (solution.history >= 90.0).all()
 
 
-def test_a_skeleton_may_be_restarted_too(skeleton, local, rng, solver, speed):
+def test_a_skeleton_may_be_restarted_too(skeleton, local, rng, solver, backend):
     target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
     solution = solve_ik(skeleton, local, target, solver, restarts=2, max_iterations=300)
     assert solution.outcome is Outcome.CONVERGED

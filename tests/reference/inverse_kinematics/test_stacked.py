@@ -133,7 +133,7 @@ STEPS = {
 @at_both_speeds
 @with_examples
 @given(**TREES)
-def test_one_iteration_is_the_textbook_s(problem, machine, solver, speed, kinds, seed):
+def test_one_iteration_is_the_textbook_s(problem, machine, solver, backend, kinds, seed):
     model, q, targets = problem(kinds, seed)
     targets = [target._replace(weight=target.weight / 2.0) for target in targets]
     reach = machine(model, q, targets).mechanism.reach
@@ -152,7 +152,9 @@ def test_one_iteration_is_the_textbook_s(problem, machine, solver, speed, kinds,
 
 
 @pytest.mark.parametrize("solver", ["levenberg_marquardt"])
-def test_levenberg_marquardt_converges_quadratically_to_poses(chain_of_joints, rng, solver, speed):
+def test_levenberg_marquardt_converges_quadratically_to_poses(
+    chain_of_joints, rng, solver, backend
+):
     model = chain_of_joints("hinge", rng, links=7)
     q = model.random(rng)
     goal = forward_kinematics(model, q + 0.3)
@@ -233,7 +235,7 @@ def test_steps_end_within_the_limits(rng, machine, chain_of_joints):
 
 
 @pytest.mark.parametrize("solver", STEPS)
-def test_a_hinge_of_whole_turns_goes_round_where_it_must(solver, speed):
+def test_a_hinge_of_whole_turns_goes_round_where_it_must(solver, backend):
     """From near its upper limit the short way to the target leads beyond it."""
     arm = Articulation(
         Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"], lower=-4.0, upper=4.0
@@ -289,7 +291,7 @@ def test_a_singular_system_has_a_finite_answer(chain_of_joints, machine, rng, ra
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
-def test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly(rng, size, speed):
+def test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly(rng, size, backend):
     """J J' is singular, and the damping falls below rounding with the error."""
     for _ in range(10):
         axis = rotation.rotate(rotation.random(rng), [0.0, 0.0, 1.0])
@@ -304,7 +306,7 @@ def test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly(rng, size, spee
 
 
 @pytest.mark.parametrize("solver", STEPS)
-def test_huge_and_tiny_weights_do_no_harm(chain_of_joints, rng, solver, speed):
+def test_huge_and_tiny_weights_do_no_harm(chain_of_joints, rng, solver, backend):
     model = chain_of_joints("ball", rng)
     goal, q = forward_kinematics(model, model.random(rng)), model.random(rng)
     for weights in ((1e-20, 1e20), (1e20, 1e20), (1e-20, 1e-20), (1e-150, 1e150)):

@@ -107,7 +107,7 @@ def check_factor(matrix):
     np.testing.assert_allclose(product, permuted, rtol=0, atol=rounding(matrix))
 
 
-def test_the_factor_times_its_transpose_is_the_permuted_matrix(speed, matrix):
+def test_the_factor_times_its_transpose_is_the_permuted_matrix(backend, matrix):
     check_factor(matrix)
 
 
@@ -119,7 +119,7 @@ def test_the_solution_solves_where_graphs_are_split_again_and_again(larger, rng)
     np.testing.assert_allclose(larger @ factor.solve(b), b, rtol=0, atol=1e-11)
 
 
-def test_the_stored_pattern_is_that_of_elimination_and_a_few_zeros(speed, matrix):
+def test_the_stored_pattern_is_that_of_elimination_and_a_few_zeros(backend, matrix):
     # A row missing from a block would lose an entry; a block that is merged too often wastes time.
     factor = CholeskyFactor(matrix)
     order = factor.pattern.order
@@ -132,7 +132,7 @@ def test_the_stored_pattern_is_that_of_elimination_and_a_few_zeros(speed, matrix
     assert factor.entries <= needed.sum() / 0.5
 
 
-def test_the_residual_is_of_the_size_of_rounding(speed, matrix, rng):
+def test_the_residual_is_of_the_size_of_rounding(backend, matrix, rng):
     b = rng.standard_normal((matrix.shape[0], 3))
     x = CholeskyFactor(matrix).solve(b)
     bound = rounding(matrix) * np.abs(x).sum()
@@ -178,7 +178,7 @@ def test_nothing_is_computed_from_memory_that_was_never_written(matrix, monkeypa
 
     fresh = SimpleNamespace(empty=unwritten, int32=np.int32)
     monkeypatch.setattr("reference.sparse.multifrontal.np", fresh)
-    with compiled.speed("plain"), np.errstate(all="raise"):
+    with compiled.set_backend("python"), np.errstate(all="raise"):
         factor = CholeskyFactor(matrix)
     assert np.isfinite(factor._values).all()
 
@@ -186,8 +186,8 @@ def test_nothing_is_computed_from_memory_that_was_never_written(matrix, monkeypa
 def test_both_speeds_agree(matrix, rng):
     b = rng.standard_normal((matrix.shape[0], 3))
     solutions = []
-    for name in compiled.SPEEDS:
-        with compiled.speed(name):
+    for name in compiled.BACKENDS:
+        with compiled.set_backend(name):
             solutions.append(CholeskyFactor(matrix).solve(b))
     # The compiler may fuse and reorder: a few roundings, times the condition number below 200.
     np.testing.assert_allclose(solutions[0], solutions[1], rtol=0, atol=1e-12)
@@ -245,7 +245,7 @@ def test_a_factor_outlives_the_matrix_it_was_made_from(rng):
     assert factor.refactorize(kept).pattern is factor.pattern
 
 
-def test_an_indefinite_matrix_is_refused_wherever_it_is(speed, matrix):
+def test_an_indefinite_matrix_is_refused_wherever_it_is(backend, matrix):
     for row in {0, matrix.shape[0] // 2, matrix.shape[0] - 1}:
         spoiled = matrix.tolil()
         spoiled[row, row] = -spoiled[row, row]
@@ -264,7 +264,7 @@ def test_definite_is_told_from_indefinite_by_the_least_eigenvalue():
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("diagonal", [True, False])
-def test_what_is_not_finite_is_refused(speed, value, diagonal):
+def test_what_is_not_finite_is_refused(backend, value, diagonal):
     matrix = definite(PATTERNS["pair"]).tolil()
     matrix[1, 0] = matrix[0, 1] = value
     if diagonal:
@@ -305,4 +305,4 @@ def test_any_symmetric_pattern_is_solved(n, density, seed, hubs):
     np.testing.assert_allclose(solved, x, rtol=0, atol=1e-11)
 
 
-_eliminate = compiled.TwoSpeeds(eliminate, relaxed=True)
+_eliminate = compiled.Kernel(eliminate, relaxed=True)
