@@ -39,13 +39,29 @@ class LinkedLibrary(JITCodeLibrary):
         """Do nothing: without machine code no environment is read."""
 
 
+# Passes for what no kernel has: closures, `with` blocks, overloads to inline, arguments of None.
+NEEDLESS = {
+    "WithLifting",
+    "InlineClosureLikes",
+    "MakeFunctionToJitFunction",
+    "InlineInlinables",
+    "InlineOverloads",
+    "FindLiterallyCalls",
+    "LiteralUnroll",
+    "DeadBranchPrune",
+}
+
+
 class LinkedCompiler(Compiler):
-    """Numba's compiler, writing into a LinkedLibrary."""
+    """Numba's compiler, writing into a LinkedLibrary, without passes for what no kernel has."""
 
     def define_pipelines(self):
-        """Return numba's own passes."""
+        """Return numba's passes without the needless ones."""
         self.state.library = LinkedLibrary(self.state.targetctx.codegen(), "callee")
-        return super().define_pipelines()
+        pipelines = super().define_pipelines()
+        for pipeline in pipelines:
+            pipeline.passes = [p for p in pipeline.passes if p[0].__name__ not in NEEDLESS]
+        return pipelines
 
 
 def ignore_literals(dispatcher: Any) -> Any:
