@@ -91,6 +91,7 @@ INTERNAL = {
     "reference.backend.compiled.Kernel": "for kernels",
     "reference.backend.compiled.compile_kernel": "for kernels",
     "reference.backend.compiled.bind": "for kernels",
+    "reference.backend.compiled.Slot": "for kernels",
     "reference.backend.compiled.compiled_in": "for kernels",
     "reference.backend.threads.in_slices": "for kernels",
     "crosscheck.verdict.Verdict": "made by check_claim alone",

@@ -11,6 +11,7 @@ import numpy as np
 from ..articulation import BALL, FREE, HINGE, SLIDE, joint_transform
 from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
+    IDENTITY,
     add,
     between,
     conjugate,
@@ -33,6 +34,9 @@ from .mechanism import rotation_weight, update_forward_kinematics
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, best_angle, best_rotation
 
 ZERO = (0.0, 0.0, 0.0)
+# The weight of no rotation at all, beside that of one arm as long as the reach, in fitting a free
+# joint: the fit is unique up to rounding, and unchanged where the arms are where they should be.
+LEAST_ROTATION = 1e-6
 # Where the backward pass puts a joint [m], and the weight of that, 0 where it puts it nowhere.
 BACKWARD = np.dtype([("position", np.float64, 3), ("weight", np.float64)], align=True)
 
@@ -193,12 +197,15 @@ def forward_free(mechanism, target, data, work, j):
 
     The centre of the arms goes to the centre of their backward positions, and the rotation is the
     best about it (Horn 1987): a joint that first went to its own backward position and then rotated
-    about that would overshoot and oscillate.
+    about that would overshoot and oscillate. Where all arms point along one line, or there is but
+    one, the least of the best rotations is taken.
     """
     joints, x = mechanism.joints, load_vector(data.positions, j)
     total, arm, wanted = mean_arms(mechanism, target, data, work.backward, j)
     M = attitude_profile(mechanism, target, data, work.backward, j)
     M = add_outer(M, -total, wanted, arm)
+    stay = LEAST_ROTATION * total * mechanism.reach * mechanism.reach
+    M = add_rotation(M, stay, IDENTITY)
     Q = best_rotation(M, work.eigen[0], work.eigen[1])
     v, frame = subtract(wanted, rotate(Q, arm)), frame_of(joints, j, data.rotations)
     R = rotate_to(joints, data.q, j, frame, multiply(Q, load_quaternion(data.rotations, j)))

@@ -51,8 +51,8 @@ def test_the_speed_in_force_ends_with_its_block():
     assert "compiled" in vars(kernel)
 
 
-def test_an_unknown_speed_is_refused():
-    with pytest.raises(ValueError, match="speed: expected one of compiled, plain, got 'fast'"):
+def test_an_unknown_backend_is_refused():
+    with pytest.raises(ValueError, match="backend: expected one of numba, python, got 'fast'"):
         compiled.set_backend("fast").__enter__()
 
 
