@@ -275,19 +275,3 @@ def test_with_a_free_root_and_five_effectors_the_merit_does_not_grow():
         ]
         assert merits[-1] < 0.9 * merits[0]
         assert (np.diff(merits) <= 1e-12).all()  # some roundings of a metre
-
-
-def test_fabrik_does_not_spin_a_free_body_about_the_line_of_its_effectors(rng, backend):
-    tree = Skeleton([-1, 0, 0], [[0.0, 0.0, 0.0], [0.3, 0.4, 0.0], [-0.3, -0.4, 0.0]])
-    body = Articulation(tree, ["free", "fixed", "fixed"])
-    for _ in range(10):
-        start, goal = body.random(rng), forward_kinematics(body, body.random(rng)).positions
-        targets = [Target(goal[e], effector=e) for e in (1, 2)]
-        solution = solve_ik(body, start, targets, "fabrik", tolerance=1e-9)
-        assert solution.outcome is Outcome.CONVERGED
-        before, after = (
-            rotation.rotate(q[3:], [0.6, 0.8, 0.0]) for q in (start, solution.coordinates)
-        )
-        shortest = rotation.multiply(rotation.between(before, after), start[3:])
-        # What is left of a spin: rounding, 1e-16, over the weight of no rotation, 1e-6.
-        assert rotation.angle(shortest, solution.coordinates[3:]) < 1e-7

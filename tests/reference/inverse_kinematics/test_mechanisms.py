@@ -6,7 +6,7 @@ import weakref
 import numpy as np
 import pytest
 from drawn_trees import TREES, drawn, with_examples
-from hypothesis import given
+from hypothesis import example, given
 
 from reference import (
     IK_SOLVERS,
@@ -372,6 +372,8 @@ def moved(model, targets, turn, shift):
 @at_both_speeds
 @with_examples
 @given(**TREES)
+# Arms almost on one line below a free joint: FABRIK takes the least of the best rotations.
+@example(kinds=["free", "slide", "free", "fixed", "fixed", "hinge"], seed=237332365)
 def test_a_moved_world_changes_nothing(problem, solver, backend, kinds, seed):
     model, q, targets = problem(kinds, seed)
     rng = np.random.default_rng(seed)
