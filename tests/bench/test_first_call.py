@@ -30,7 +30,7 @@ def test_a_short_bench_measures_few_and_a_long_one_every_solver():
     for name, solvers in [
         ("solve_ik/chain", IK_SOLVERS),
         ("solve_ik/robot", IK_SOLVERS),
-        ("ImplicitEuler.step/cloth", STEP_SOLVERS),
+        ("ImplicitEuler(...).step/cloth", STEP_SOLVERS),
     ]:
         assert {solver for problem, solver in full if problem == name} == set(solvers)
 
