@@ -157,6 +157,13 @@ def stepping():
     return record("cloth", "cloth/x1", "newton", settings, arrays | {"at_floor": [True] * 3})
 
 
+def called_first(name, solver, cold=0.6, warm=0.3):
+    """A call in a process that compiled two kernels, and in the next one."""
+    arrays = {"cold compiled": 2, "cold processor": cold, "cold wall": 2 * cold}
+    arrays |= {"warm compiled": 0, "warm processor": warm, "warm wall": 2 * warm}
+    return record("first_call", name, solver, {}, arrays)
+
+
 def raced(solver, kind, family="robots", robot="arm", **changed):
     """Four targets in two strata: one solved, one not, one denied, one beyond the limits."""
     arrays = {
@@ -277,6 +284,7 @@ def make():
         two_dampers=two_dampers,
         stepping=stepping,
         certified=certified,
+        called_first=called_first,
         raced=raced,
         lacking=lacking,
         republished=republished,
@@ -322,6 +330,7 @@ def records():
         needed("newton", [1, 2, 3, 4, 5, 6, 7, np.nan]),
         bounded("MuJoCo Euler", 0.02),
         as_liu("local_global", 0.03),
+        called_first("forward_kinematics/skeleton", "Plumbob"),
         *pictured(),
         timed("Plumbob, compiled", 1e-6),
         timed("Pinocchio", 5e-7),

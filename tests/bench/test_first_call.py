@@ -12,12 +12,6 @@ from bench.presentation.results import Results
 from reference import IK_SOLVERS, STEP_SOLVERS
 
 
-def measured(make, name, solver, cold, warm=0.3):
-    arrays = {"cold compiled": 2, "cold processor": cold, "cold wall": 2 * cold}
-    arrays |= {"warm compiled": 0, "warm processor": warm, "warm wall": 2 * warm}
-    return make.record("first_call", name, solver, {}, arrays)
-
-
 def test_the_first_process_compiles_and_the_next_one_does_not():
     (block,) = [b for b in blocks("first_call", SCALES["quick"]) if b.solver == suite.OURS]
     arrays = block.measure().arrays
@@ -36,7 +30,7 @@ def test_a_short_bench_measures_few_and_a_long_one_every_solver():
     for name, solvers in [
         ("solve_ik/chain", IK_SOLVERS),
         ("solve_ik/robot", IK_SOLVERS),
-        ("ImplicitEuler.step/cloth", STEP_SOLVERS),
+        ("ImplicitEuler(...).step/cloth", STEP_SOLVERS),
     ]:
         assert {solver for problem, solver in full if problem == name} == set(solvers)
 
@@ -67,8 +61,8 @@ def test_importing_the_suite_does_not_import_the_compiler():
 
 def test_the_table_gives_both_and_names_the_dearest(make):
     records = [
-        measured(make, "forward_kinematics/skeleton", suite.OURS, 0.6),
-        measured(make, "solve_ik/robot", "ccd", 8.0, warm=0.4),
+        make.called_first("forward_kinematics/skeleton", suite.OURS),
+        make.called_first("solve_ik/robot", "ccd", cold=8.0, warm=0.4),
     ]
     table = first_call.first_calls(Results(records))
     assert [row[:3] for row in table.rows] == [

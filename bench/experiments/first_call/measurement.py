@@ -148,10 +148,9 @@ def evened(solver: str) -> Call:
 
 
 def stepped(solver: str) -> Call:
-    """Step a cloth implicitly."""
+    """Make an integrator and step a cloth by it."""
     system, state = scenes.lab_cloth()
-    integrator = reference.ImplicitEuler(system, h=H, solver=solver)
-    return lambda: integrator.step(state)
+    return lambda: reference.ImplicitEuler(system, h=H, solver=solver).step(state)
 
 
 def stepped_explicitly(solver: str) -> Call:
@@ -170,6 +169,6 @@ CALLS: dict[str, tuple[tuple[str, ...], Callable[[str], Call]]] = {
     "solve_ik/robot": (tuple(IK_SOLVERS), on_the_robot),
     "track/chain": (("fabrik",), along_a_curve),
     "resample": ((OURS,), evened),
-    "ImplicitEuler.step/cloth": (tuple(STEP_SOLVERS), stepped),
+    "ImplicitEuler(...).step/cloth": (tuple(STEP_SOLVERS), stepped),
     "symplectic_euler/cloth": ((OURS,), stepped_explicitly),
 }
