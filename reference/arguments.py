@@ -18,6 +18,8 @@ FLOAT64 = np.dtype(np.float64)
 LARGEST_COORDINATE = 1e75
 # Nor is a number that has to be positive below this.
 SMALLEST_POSITIVE = 1e-75
+# The most particles, joints, points, poses or restarts: arrays of more fit no memory.
+LARGEST_COUNT = 10**8
 # What arrays are counted in.
 LARGEST_INTEGER = 2**63 - 1
 
@@ -104,6 +106,15 @@ def integer(name: str, value: Any, *, least: int, below: int = LARGEST_INTEGER +
         got = shown(int(value))
         raise ValueError(f"{name}: expected an integer of at least {least}{upper}, got {got}")
     return int(value)
+
+
+def count(name: str, value: Any, *, least: int) -> int:
+    """Return an int, at least `least` and at most LARGEST_COUNT: of what arrays will be made.
+
+    Raises:
+        ValueError: if it is not an integer (a boolean is none) in that range.
+    """
+    return integer(name, value, least=least, below=LARGEST_COUNT + 1)
 
 
 def indices(

@@ -77,7 +77,7 @@ def plumb_bob(count: int = 1200) -> FloatArray:
     Raises:
         ValueError: if count is not a positive integer.
     """
-    count = arguments.integer("count", count, least=1)
+    count = arguments.count("count", count, least=1)
     parts = np.array_split(np.arange(count), len(_BOB_STROKES))
     return np.concatenate(
         [stroke(_uneven(len(part))) for stroke, part in zip(_BOB_STROKES, parts, strict=True)]
@@ -194,7 +194,7 @@ def _divide_gaps(points: FloatArray, max_spacing: float) -> FloatArray:
 
 
 def _angles(count: int) -> FloatArray:
-    return 2.0 * np.pi * np.arange(arguments.integer("count", count, least=1)) / count
+    return 2.0 * np.pi * np.arange(arguments.count("count", count, least=1)) / count
 
 
 def _in_plane(x: ArrayLike, z: ArrayLike) -> FloatArray:
@@ -203,7 +203,7 @@ def _in_plane(x: ArrayLike, z: ArrayLike) -> FloatArray:
 
 def _polygon(corners: ArrayLike, count: int) -> FloatArray:
     """Return samples, evenly spaced along the closed polygon of corners (corner, 2)."""
-    count = arguments.integer("count", count, least=1)
+    count = arguments.count("count", count, least=1)
     closed = np.concatenate([corners, np.asarray(corners)[:1]])
     return _stroke(closed)(np.arange(count) / count)
 

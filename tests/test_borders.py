@@ -12,7 +12,7 @@ import numpy as np
 import public_calls
 import pytest
 
-from reference import arguments
+from reference import arguments, curves, scenes, solve_ik
 from reference.arguments import array, integer, shown
 
 PROGRAM = Path(border_walk.__file__)
@@ -165,3 +165,23 @@ def test_walks_let_the_right_one_pass(law):
 def test_what_cannot_be_shown_is_named_by_its_type():
     assert shown(border_walk.Unspeakable()) == "Unspeakable"
     assert shown(10**5000) == "int"
+
+
+ARM, REST = scenes.lab_arm()
+TOO_MANY = {
+    "size": lambda: scenes.lab_cloth(size=10**5),
+    "rows, columns": lambda: scenes.grid_cloth(10**5, 10**5),
+    "counts": lambda: scenes.lattice([10**4, 10**4, 10**4]),
+    "count": lambda: curves["circle"](10**15),
+    "links": lambda: scenes.ball_chain(links=10**12),
+    "restarts": lambda: solve_ik(ARM, REST, [0.3, 0.0, 0.4], restarts=10**12),
+    "max_iterations": lambda: solve_ik(
+        ARM, REST, [0.3, 0.0, 0.4], max_iterations=10**12, record=True
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TOO_MANY)
+def test_counts_beyond_any_memory_are_refused_before_arrays_are_made(name):
+    with pytest.raises(ValueError, match=rf"^{name}: expected .*at most 1"):
+        TOO_MANY[name]()

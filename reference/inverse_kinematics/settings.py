@@ -110,7 +110,7 @@ def _settings(
         arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
         near,
         far,
-        arguments.integer("restarts", restarts, least=0),
+        arguments.count("restarts", restarts, least=0),
         chained,
     )
     seed = arguments.integer("seed", seed, least=0)

@@ -23,6 +23,7 @@ from .settings import Settings
 # Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.
 LEAST_ON_CHAINS, LEAST = 128, 16
 OUTCOMES = {outcome.value: outcome for outcome in Outcome}
+LARGEST_HISTORY = 10**9  # residuals; more fit no memory
 NO_HISTORY = frozen(np.empty(0))
 UNRECORDED = np.empty((1, 1))  # where kernels may write a history that nobody reads
 
@@ -202,6 +203,11 @@ def _new_history(targets: int, attempts: int, settings: Settings) -> FloatArray:
     if not settings.record:
         return UNRECORDED
     most = attempts * max(settings.limits.max_iterations, settings.limits.far_iterations)
+    if targets * most > LARGEST_HISTORY:
+        raise ValueError(
+            f"max_iterations: expected at most {LARGEST_HISTORY:,} residuals to record, got "
+            f"{targets} times {most}"
+        )
     return np.empty((targets, most + 1))
 
 

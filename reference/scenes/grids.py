@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, IndexArray, boolean, integer, number, sequence
+from ..arguments import FloatArray, IndexArray, boolean, count, number, sequence
 from ..mass_spring import MassSpring, State
 from .rest import at_rest
 
@@ -46,7 +46,8 @@ def lab_cloth(
         ValueError: if the size is less than 2, the side not positive, or a number is negative or
             not finite.
     """
-    size = integer("size", size, least=2)
+    size = count("size", size, least=2)
+    count("size", size * size, least=1)
     return grid_cloth(
         size,
         size,
@@ -98,7 +99,7 @@ def grid_cloth(
         ValueError: if a count is less than 1, spacing or mass not positive, a pinned index out of
             range, or a number negative or not finite.
     """
-    rows, columns = integer("rows", rows, least=1), integer("columns", columns, least=1)
+    rows, columns = _shape(rows, columns)
     stiffness = number("stiffness", stiffness, least=0)
     parts = [
         (NEIGHBOURS, stiffness),
@@ -127,7 +128,7 @@ def grid_triangles(rows: int, columns: int) -> IndexArray:
     Raises:
         ValueError: if a count is less than 1.
     """
-    rows, columns = integer("rows", rows, least=1), integer("columns", columns, least=1)
+    rows, columns = _shape(rows, columns)
     corner = np.arange(rows * columns).reshape(rows, columns)
     a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
     c, d = corner[1:, 1:].ravel(), corner[1:, :-1].ravel()
@@ -151,8 +152,8 @@ def net(
 
     It is a `grid_cloth` without shear and bending springs, with the same arguments and errors.
     """
-    rows, columns = integer("rows", rows, least=1), integer("columns", columns, least=1)
-    count = rows * columns
+    rows, columns = _shape(rows, columns)
+    particles = rows * columns
     return grid_cloth(
         rows,
         columns,
@@ -164,7 +165,7 @@ def net(
         bending_stiffness=0.0,
         damping=damping,
         tension_only=True,
-        pinned=[0, columns - 1, count - columns, count - 1],
+        pinned=[0, columns - 1, particles - columns, particles - 1],
         gravity=gravity,
     )
 
@@ -196,7 +197,8 @@ def lattice(
             a number is negative or not finite.
     """
     along = sequence("counts", counts, 3, "an axis")
-    nx, ny, nz = (integer("counts", count, least=1) for count in along)
+    nx, ny, nz = (count("counts", number_of, least=1) for number_of in along)
+    count("counts", nx * ny * nz, least=1)
     cells = np.indices((nx, ny, nz)).reshape(3, -1).T.astype(np.float64)
     return at_rest(
         number("spacing", spacing, above=0) * cells,
@@ -237,7 +239,7 @@ def hanging_rope(
         ValueError: if there are fewer than 2 particles, the length is not positive, or a number is
             negative or not finite.
     """
-    particles = integer("particles", particles, least=2)
+    particles = count("particles", particles, least=2)
     positions = np.zeros((particles, 3))
     positions[:, 1] = -np.linspace(0, number("length", length, above=0), particles)
     return at_rest(
@@ -263,6 +265,13 @@ def _level(rows: int, columns: int, spacing: float, height: float) -> FloatArray
     positions[..., 1] = height
     positions[..., 2] = spacing * (np.arange(columns) - (columns - 1) / 2)
     return positions.reshape(-1, 3)
+
+
+def _shape(rows: int, columns: int) -> tuple[int, int]:
+    """Return the numbers of rows and columns, checked, and their product with them."""
+    rows, columns = count("rows", rows, least=1), count("columns", columns, least=1)
+    count("rows, columns", rows * columns, least=1)
+    return rows, columns
 
 
 def _springs(counts: tuple[int, ...], steps: Sequence[tuple[int, ...]]) -> IndexArray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..arguments import IndexArray, integer, number
+from ..arguments import IndexArray, count, integer, number
 from ..mass_spring import MassSpring, State
 
 
@@ -32,7 +32,7 @@ def random_network(
         ValueError: if a number is out of range.
     """
     rng = np.random.default_rng(integer("seed", seed, least=0))
-    n = integer("particles", particles, least=1)
+    n = count("particles", particles, least=1)
     pins = rng.permutation(n)[: integer("pinned", pinned, least=0, below=n + 1)]
     springs = _connected(rng, n)
     s, x = len(springs), rng.standard_normal((n, 3))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from .. import rotation
-from ..arguments import FloatArray, integer, number
+from ..arguments import FloatArray, count, number
 from ..skeleton import Skeleton
 
 
@@ -29,7 +29,7 @@ def ball_chain(*, links: int = 10, link_length: float = 0.1) -> tuple[Skeleton, 
     Raises:
         ValueError: if links is not a positive integer or link_length not a positive number.
     """
-    links = integer("links", links, least=1)
+    links = count("links", links, least=1)
     offsets = np.zeros((links + 1, 3))
     offsets[1:, 0] = number("link_length", link_length, above=0.0)
     return Skeleton(np.arange(-1, links), offsets), rotation.identity(links + 1)
