@@ -114,7 +114,10 @@ def count(name: str, value: Any, *, least: int) -> int:
     Raises:
         ValueError: if it is not an integer (a boolean is none) in that range.
     """
-    return integer(name, value, least=least, below=LARGEST_COUNT + 1)
+    result = integer(name, value, least=least)
+    if result > LARGEST_COUNT:
+        raise ValueError(f"{name}: expected at most {LARGEST_COUNT:,}, got {shown(result)}")
+    return result
 
 
 def indices(
