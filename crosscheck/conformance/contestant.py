@@ -1,0 +1,73 @@
+"""A solver under judgement, whatever door it came through, and what it answers."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Protocol
+
+from .case import Case
+from .greeting import Greeting
+from .sentence import Sentence
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What a solver answered.
+
+    Attributes:
+        values: by the names of the task's outputs, as float64 arrays, numbers and booleans, of the
+            task's shapes; NaN where it gave none.
+        seconds: how long it took, without the door where that can be told [s].
+        remarks: what was odd without voiding the answer: prints, changed inputs.
+    """
+
+    values: Mapping[str, Any]
+    seconds: float
+    remarks: tuple[Sentence, ...] = ()
+
+
+class FailureKind(StrEnum):
+    """Why there is no answer."""
+
+    REFUSED = "refused"  # it says that it cannot
+    RAISED = "raised"
+    CRASHED = "crashed"
+    HUNG = "hung"
+    MEMORY = "memory"
+    GARBAGE = "garbage"
+    ABSENT = "absent"  # of a folder of answers
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """Why there is no answer, with a sentence for people."""
+
+    kind: FailureKind
+    sentence: Sentence
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A case, and what was answered the first and the second time."""
+
+    case: Case
+    answer: Answer | Failure
+    again: Answer | Failure
+
+
+class Contestant(Protocol):
+    """Anyone's solver, behind one of the doors."""
+
+    @property
+    def greeting(self) -> Greeting:
+        """What it says of itself."""
+
+    def answer(self, case: Case) -> Answer | Failure:
+        """Ask it; start it again if it was lost."""
+
+    def close(self) -> None:
+        """End it, and whatever it has started; the next case starts it anew."""
+
+
+# A solver of ours or of an engine: a function for each task, by the names of its inputs.
+Functions = Mapping[str, Callable[..., Any]]

@@ -1,0 +1,145 @@
+"""Find which variants of the reference reproduce a solver's answers.
+
+A variant is the reference with faults, each an independent small change. The variants with the
+fewest faults are tried first, so that a combination is named only where no part of it suffices.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import groupby
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .case import Case
+from .contestant import Answer, Asked
+from .judgement import Explanation
+from .sentence import Sentence
+
+# A variant is compared with all answers only if it reproduces one of so many, the telling ones.
+TRIAL = 4
+# How many explanations are told, and the least share of the answers that one must reproduce.
+MOST_TOLD, LEAST_SHARE = 3, 0.5
+
+
+class Variant(NamedTuple):
+    """The reference with some faults.
+
+    Attributes:
+        faults: their keys, in the order of the computation; () for an honest model.
+        predict: returns outputs by name for a case; those that are also answered are compared. An
+            exception of NumPy or a ValueError means that it has no answer.
+    """
+
+    faults: tuple[str, ...]
+    predict: Callable[[Case], Mapping[str, Any]]
+
+
+class Match(NamedTuple):
+    """How well a variant reproduces answers."""
+
+    variant: Variant
+    share: float
+    distance: float
+    predictions: list[Mapping[str, Any]]
+
+
+def explain(
+    variants: Iterable[Variant],
+    asked: Sequence[Asked],
+    tolerance: Callable[[Case], float],
+    describe: Callable[[Sequence[str]], Sentence],
+) -> tuple[tuple[Explanation, ...], int]:
+    """Return the variants that reproduce most answers, nearest first, and how many were tried.
+
+    Args:
+        variants: in ascending order of the number of faults.
+        asked: the cases to compare, the most telling first: small, and answered wrongly.
+        tolerance: the relative difference from a prediction that rounding explains.
+        describe: puts faults into words, given the keys of a class that no answer tells apart.
+    """
+    answered = [one for one in asked if isinstance(one.answer, Answer)]
+    tried, best = 0, list[Match]()
+    for _, same_size in groupby(variants, key=lambda one: len(one.faults)):
+        for variant in same_size:
+            tried += 1
+            match = _match(variant, answered, tolerance)
+            if match is not None and match.share >= LEAST_SHARE:
+                best.append(match)
+        if any(match.share == 1.0 for match in best):
+            break
+    best.sort(key=lambda match: (-match.share, len(match.variant.faults), match.distance))
+    classes = _classes(best, answered, tolerance)[:MOST_TOLD]
+    return tuple(_explanation(one, describe) for one in classes), tried
+
+
+def _match(
+    variant: Variant, answered: Sequence[Asked], tolerance: Callable[[Case], float]
+) -> Match | None:
+    hits, distance = 0, 0.0
+    predictions: list[Mapping[str, Any]] = []
+    for i, one in enumerate(answered):
+        if i == TRIAL and not hits:
+            return None
+        predictions.append(_prediction(variant, one.case))
+        assert isinstance(one.answer, Answer)
+        apart = difference(predictions[-1], one.answer.values)
+        if apart <= tolerance(one.case):
+            hits, distance = hits + 1, max(distance, apart)
+    return Match(variant, hits / len(answered), distance, predictions) if hits else None
+
+
+def _prediction(variant: Variant, case: Case) -> Mapping[str, Any]:
+    try:
+        with np.errstate(all="ignore"):
+            return variant.predict(case)
+    except (ValueError, ArithmeticError, np.linalg.LinAlgError):
+        return {}
+
+
+def difference(one: Mapping[str, Any], other: Mapping[str, Any]) -> float:
+    """Return the largest difference of outputs that both have, relative to the output's size.
+
+    Quaternions, outputs named rotations, are compared up to their sign. NaN equals NaN. Infinite
+    if they share no output, or if an output has another shape.
+    """
+    shared = one.keys() & other.keys()
+    return max((_apart(name, one[name], other[name]) for name in shared), default=np.inf)
+
+
+def _apart(name: str, one: Any, other: Any) -> float:
+    a, b = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
+    if a.shape != b.shape or (np.isnan(a) != np.isnan(b)).any():
+        return np.inf
+    a, b = np.nan_to_num(a), np.nan_to_num(b)
+    if name.endswith("rotations"):
+        b = b * np.where((a * b).sum(-1, keepdims=True) < 0.0, -1.0, 1.0)
+    return float(np.abs(a - b).max(initial=0.0) / max(np.abs(a).max(initial=0.0), 1e-300))
+
+
+def _classes(
+    matches: Sequence[Match], answered: Sequence[Asked], tolerance: Callable[[Case], float]
+) -> list[list[Match]]:
+    """Return matches grouped with those of as many faults that no answer tells apart."""
+    classes: list[list[Match]] = []
+    for match in matches:
+        for known in classes:
+            if _indistinguishable(known[0], match, answered, tolerance):
+                known.append(match)
+                break
+        else:
+            classes.append([match])
+    return classes
+
+
+def _indistinguishable(
+    one: Match, other: Match, answered: Sequence[Asked], tolerance: Callable[[Case], float]
+) -> bool:
+    return len(one.variant.faults) == len(other.variant.faults) and all(
+        difference(a, b) <= tolerance(asked.case)
+        for a, b, asked in zip(one.predictions, other.predictions, answered, strict=True)
+    )
+
+
+def _explanation(matches: Sequence[Match], describe: Callable[[Sequence[str]], Sentence]) -> Any:
+    keys = [" + ".join(match.variant.faults) for match in matches]
+    return Explanation(tuple(keys), describe(keys), matches[0].share, matches[0].distance)

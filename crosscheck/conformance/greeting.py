@@ -1,0 +1,104 @@
+"""What a solver says of itself: its tasks, its precision, and the model it declares to follow.
+
+A solver is judged first against what it declares. What it leaves out (None) is inferred from its
+answers.
+"""
+
+from typing import Literal
+
+import msgspec
+
+PROTOCOL = 1
+
+Precision = Literal["single", "double"]
+Method = Literal["explicit", "symplectic", "linearised", "local_global", "newton", "converged"]
+
+
+class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The time step that a solver declares to make.
+
+    Attributes:
+        method: explicit or symplectic Euler, one linearised implicit step, local/global or Newton
+            iterations, or implicit Euler converged.
+        start: where iterations begin: x_n, or y = x_n + h v_n.
+        iterations: how many of them a step has.
+        substeps: how many equal steps make up h.
+        damper: none; explicit; length_rate: (c/h) (l - l_n) along the spring; end_velocity:
+            the force of the velocities at the end; global_factor: every velocity is scaled.
+        damping_factor: what global_factor multiplies velocities by after each substep.
+        pins: eliminated from the unknowns, overwritten after the solve, held by a penalty, or
+            heavy.
+        velocity: displacement: (x' - x_n) / h; separate: integrated beside the positions.
+    """
+
+    method: Method | None = None
+    start: Literal["x_n", "y"] | None = None
+    iterations: int | None = None
+    substeps: int | None = None
+    damper: Literal["none", "explicit", "length_rate", "end_velocity", "global_factor"] | None = (
+        None
+    )
+    damping_factor: float | None = None
+    pins: Literal["eliminated", "overwritten", "penalty", "heavy"] | None = None
+    velocity: Literal["displacement", "separate"] | None = None
+
+
+class System(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which mass-spring systems and states a solver takes.
+
+    Attributes:
+        masses, stiffnesses, dampings: one for all, or one each.
+        rest_lengths: given, or measured by the solver in `rest_positions`.
+        gravity: any vector, or a single number g, downwards along y.
+        external_forces: whether it takes them.
+        tension_only: whether it knows springs that resist no compression.
+        pinned: whether it can pin particles.
+        state: by velocities, or by the positions one step before.
+        continues: whether it goes on from its own last answer, whatever a request says; the first
+            request of a case is then the only one with a state of ours.
+    """
+
+    masses: Literal["one", "each"] = "each"
+    stiffnesses: Literal["one", "each"] = "each"
+    dampings: Literal["one", "each"] = "each"
+    rest_lengths: Literal["given", "measured"] = "given"
+    gravity: Literal["vector", "number"] = "vector"
+    external_forces: bool = False
+    tension_only: bool = False
+    pinned: bool = True
+    state: Literal["velocities", "previous_positions"] = "velocities"
+    continues: bool = False
+
+
+class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a solver says of itself before it is asked anything.
+
+    Attributes:
+        protocol: the version that it speaks.
+        tasks: those that it offers.
+        name, version, language: as they are to be shown.
+        precision: of its numbers.
+        chains_only: whether it takes no skeletons with branches.
+        max_joints: the most joints that it takes.
+        methods: of inverse kinematics, in its own words; "ccd" and "fabrik" are understood. Each
+            is asked for by the request's `method`.
+        system: which mass-spring systems it takes.
+        step: the time step that it declares.
+    """
+
+    protocol: int
+    tasks: tuple[str, ...]
+    name: str = "solver"
+    version: str = ""
+    language: str = ""
+    precision: Precision = "double"
+    chains_only: bool = False
+    max_joints: int | None = None
+    methods: tuple[str, ...] = ("",)
+    system: System = System()
+    step: Step = Step()
+
+    @property
+    def epsilon(self) -> float:
+        """The distance from 1 to the next number in the solver's precision."""
+        return 2.0**-23 if self.precision == "single" else 2.0**-52

@@ -1,0 +1,163 @@
+"""What is found about answers: laws that hold or not, verdicts, and their sum over a task."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+from .case import Case
+from .contestant import Answer, Failure
+from .greeting import Greeting
+from .sentence import Sentence
+
+
+class Verdict(IntEnum):
+    """How good answers are, from best to worst; the worst law decides."""
+
+    RIGHT = 0
+    RIGHT_BUT = 1  # another honest model, stalls, slow, not unit, prints
+    UNDECIDED = 2  # below what rounding lets one tell
+    WRONG = 3
+    BROKEN = 4  # a crash, a hang, garbage, NaN where numbers exist
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """A law, and how an answer stands to it.
+
+    Attributes:
+        law: its name, the same for all cases: "link lengths".
+        verdict: what follows from it.
+        error: how far the answer is off, in the unit of the tolerance.
+        tolerance: what rounding or the solver's own promise allows.
+        unit: "m", "rad", "" for a ratio.
+        sentence: what was seen; for a law that holds, what was tried.
+        where: joint, spring or particle that is worst, if one is.
+    """
+
+    law: str
+    verdict: Verdict
+    error: float
+    tolerance: float
+    unit: str
+    sentence: Sentence
+    where: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CaseJudgement:
+    """A case, what was answered, and what was found.
+
+    Attributes:
+        expected: what the reference answers, by output, for a comparison side by side; {} if many
+            answers are right.
+        digits: correct significant digits, or None where that says nothing.
+        reference_seconds: what the reference takes for it, or None [s].
+    """
+
+    case: Case
+    answer: Answer | Failure
+    findings: tuple[Finding, ...]
+    expected: Mapping[str, Any]
+    digits: float | None = None
+    reference_seconds: float | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of the findings."""
+        if isinstance(self.answer, Failure):
+            return Verdict.BROKEN
+        return max((finding.verdict for finding in self.findings), default=Verdict.UNDECIDED)
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A fault, or several at once, that reproduces wrong answers.
+
+    Attributes:
+        faults: one key, or several joined by " + " in the order of the computation; more than one
+            entry where no answer tells them apart.
+        sentence: what is wrong in the solver, and what it should be.
+        share: of the answers that were compared, how many it reproduces, 0 to 1.
+        distance: the largest relative difference from the answers that it reproduces.
+    """
+
+    faults: tuple[str, ...]
+    sentence: Sentence
+    share: float
+    distance: float
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Why answers are wrong.
+
+    Attributes:
+        explanations: nearest first; none if no variant reproduces the answers.
+        behaviour: what the solver behaves like, where it did not declare it; or None.
+        first_broken: the law that broke first along the computation, where nothing matches.
+        hints: what no variant explains: state left over, answers that differ between equal
+            requests.
+        tried: number of variants that were compared.
+    """
+
+    explanations: tuple[Explanation, ...] = ()
+    behaviour: Sentence | None = None
+    first_broken: Sentence | None = None
+    hints: tuple[Sentence, ...] = ()
+    tried: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class TaskReport:
+    """All about one task, or one method of inverse kinematics.
+
+    Attributes:
+        task: its name; method: of inverse kinematics, else "".
+        judgements: one a case.
+        diagnosis: of what is wrong or inferred.
+        smallest_failure: the failing case with the fewest numbers, or None.
+    """
+
+    task: str
+    method: str
+    judgements: Sequence[CaseJudgement]
+    diagnosis: Diagnosis
+    smallest_failure: CaseJudgement | None
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of all cases."""
+        return max((one.verdict for one in self.judgements), default=Verdict.UNDECIDED)
+
+    @property
+    def digits(self) -> float | None:
+        """Correct digits in the worst case where they can be counted."""
+        known = [one.digits for one in self.judgements if one.digits is not None]
+        return min(known, default=None)
+
+    @property
+    def slowdown(self) -> float | None:
+        """The geometric mean, over the cases, of its time over the reference's."""
+        logs = [
+            math.log(one.answer.seconds / one.reference_seconds)
+            for one in self.judgements
+            if isinstance(one.answer, Answer) and one.reference_seconds and one.answer.seconds > 0.0
+        ]
+        return math.exp(sum(logs) / len(logs)) if logs else None
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What `verify` found: a report for each task, and what concerns them all."""
+
+    greeting: Greeting
+    tasks: Sequence[TaskReport]
+    seed: int
+    remarks: tuple[Sentence, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of the tasks."""
+        return max((task.verdict for task in self.tasks), default=Verdict.UNDECIDED)

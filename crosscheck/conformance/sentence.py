@@ -1,0 +1,32 @@
+"""Sentences that are told to people, in English or translated.
+
+A sentence is a literal template and its values; it is put into words only where it is shown. Every
+template stands literally in a call of `sentence`, where the tests look for those without a
+translation.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+
+class Sentence(NamedTuple):
+    """A template with named fields, and their values: numbers, names or sentences."""
+
+    template: str
+    values: Mapping[str, object]
+
+    def text(self, translate: Callable[[str], str] = str) -> str:
+        """Return the words, the template and all sentences within it translated."""
+        values = {
+            name: value.text(translate) if isinstance(value, Sentence) else value
+            for name, value in self.values.items()
+        }
+        return translate(self.template).format(**values)
+
+    def __str__(self) -> str:
+        return self.text()
+
+
+def sentence(template: str, /, **values: object) -> Sentence:
+    """Return a sentence: `sentence("{joint} is {distance:.2g} m off", joint=..., distance=...)`."""
+    return Sentence(template, values)

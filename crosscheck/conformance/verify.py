@@ -1,0 +1,91 @@
+"""Ask a solver every case of its tasks, judge its answers, and say why they are wrong."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from typing import Protocol
+
+from .case import Case
+from .contestant import Asked, Contestant, Failure, FailureKind
+from .greeting import Greeting
+from .judgement import Report, TaskReport
+
+# After so many answers of a task were waited for in vain, the rest of the task is not asked.
+MOST_HANGS = 2
+# Tasks that are tried once for every method that the greeting names.
+WITH_METHODS = ("inverse_kinematics", "track")
+
+
+class Discipline(Protocol):
+    """How one task is tried; a module with these functions."""
+
+    def cases(self, greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
+        """Return cases that suit the solver, from trivial to hostile, the smallest first."""
+
+    def judge(self, asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+        """Hold the answers against laws, the reference, and what was declared; name the faults."""
+
+
+DISCIPLINES: Mapping[str, Discipline] = {}
+
+
+def verify(
+    contestant: Contestant,
+    tasks: Sequence[str] | None = None,
+    seed: int = 0,
+    thorough: bool = False,
+    notify: Callable[[str, int, int], None] = lambda task, done, of: None,
+) -> Report:
+    """Try a solver at its tasks and return what was found.
+
+    Args:
+        contestant: the solver, behind its door.
+        tasks: only these of those that it offers.
+        seed: of the random cases.
+        thorough: whether to ask the long list of cases.
+        notify: called before each case with the task, the number of cases done, and of all.
+
+    Raises:
+        ValueError: if it does not offer a task.
+    """
+    greeting = contestant.greeting
+    reports = []
+    for task, method in trials(greeting, tasks):
+        discipline = DISCIPLINES[task]
+        cases = discipline.cases(greeting, method, seed, thorough)
+        asked = list(_ask(contestant, cases, partial(notify, task)))
+        reports.append(discipline.judge(asked, greeting, method))
+    return Report(greeting, reports, seed)
+
+
+def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple[str, str]]:
+    """Return the tasks to be tried, each with a method or ""."""
+    for task in tasks or ():
+        if task not in greeting.tasks:
+            raise ValueError(
+                f"task: expected one that the solver offers ({', '.join(greeting.tasks)}), "
+                f"got {task!r}"
+            )
+    return [
+        (task, method)
+        for task in DISCIPLINES
+        if task in (tasks or greeting.tasks)
+        for method in (greeting.methods if task in WITH_METHODS else ("",))
+    ]
+
+
+def _ask(
+    contestant: Contestant, cases: Sequence[Case], notify: Callable[[int, int], None]
+) -> Iterator[Asked]:
+    """Ask each case, and each that has an answer once more after all the others."""
+    first = []
+    hangs = 0
+    for i, case in enumerate(cases):
+        notify(i, 2 * len(cases))
+        first.append(contestant.answer(case))
+        hangs += isinstance(first[-1], Failure) and first[-1].kind is FailureKind.HUNG
+        if hangs == MOST_HANGS:
+            break
+    for i, (case, answer) in enumerate(zip(cases, first, strict=False)):
+        notify(len(cases) + i, 2 * len(cases))
+        again = answer if isinstance(answer, Failure) else contestant.answer(case)
+        yield Asked(case, answer, again)
