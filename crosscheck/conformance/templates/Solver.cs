@@ -44,9 +44,9 @@ static class Solver {
         options.Converters.Add(new NullIsNaN());
         while (Console.ReadLine() is string line) {
             var ask = JsonSerializer.Deserialize<Request>(line, options)!;
-            var answer = new Dictionary<string, object> { ["id"] = ask.id };
-            try { tasks[ask.task](ask, answer); } catch (Exception e) { answer["error"] = e.Message; }
-            answers.WriteLine(JsonSerializer.Serialize(answer, options));
+            var reply = new Dictionary<string, object> { ["id"] = ask.id };
+            try { tasks[ask.task](ask, reply); } catch (Exception e) { reply["error"] = e.Message; }
+            answers.WriteLine(JsonSerializer.Serialize(reply, options));
         }
     }
 }
