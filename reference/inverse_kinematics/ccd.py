@@ -1,7 +1,11 @@
 """Cyclic coordinate descent (Wang & Chen 1991)."""
 
 import math
+from typing import NamedTuple
 
+import numpy as np
+
+from ..arguments import FloatArray
 from ..articulation import BALL, FREE, HINGE, SLIDE
 from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
@@ -20,7 +24,14 @@ from ..quaternion import (
     subtract,
     turn_about,
 )
-from .box_step import freedom_scale, inner, linearise_task, squared
+from .box_step import (
+    TaskSystem,
+    freedom_scale,
+    inner,
+    linearise_task,
+    new_task_system,
+    squared,
+)
 from .chain import place_joints
 from .joint_updates import ball_at, move_by, put_ball, rotate_to, translate_free
 from .mechanism import (
@@ -37,6 +48,23 @@ from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, 
 
 # A step of a joint that others follow is halved at most so often.
 HALVINGS = 20
+
+
+class CCDWorkspace(NamedTuple):
+    """Arrays to write to.
+
+    Attributes:
+        system: where a joint that others follow finds its gradient.
+        eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
+    """
+
+    system: TaskSystem
+    eigen: FloatArray
+
+
+def new_ccd_workspace(mechanism):
+    """Return a workspace to be filled."""
+    return CCDWorkspace(new_task_system(mechanism), np.empty((2, 4, 4)))
 
 
 def ccd_sweep(chain, target):

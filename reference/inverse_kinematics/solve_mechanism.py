@@ -1,11 +1,11 @@
 """Any targets of any mechanism: what the loops of `restarts.py` work on."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import LARGEST_COORDINATE, FloatArray, RecordArray
+from ..arguments import LARGEST_COORDINATE, FloatArray
 from ..articulation import (
     BALL,
     FREE,
@@ -28,9 +28,7 @@ from ..quaternion import (
     subtract,
     turn_about,
 )
-from .box_step import TaskSystem, new_task_system
 from .chain import BEND, POSITION_ROUNDING
-from .fabrik import BACKWARD
 from .joint_updates import ball_at, move_by, put_ball
 from .mechanism import (
     LEVER,
@@ -70,6 +68,8 @@ from .result import (
 
 # One iteration of a solver: step(mechanism, target, data, workspace).
 step = Slot("step")
+# new_workspace(mechanism): the arrays that its step writes to, in a NamedTuple.
+new_workspace = Slot("new_workspace")
 
 # A start that settles within so few iterations away from its target is stuck, such as a straight
 # chain, perhaps folded since, whose target lies on its own line.
@@ -78,27 +78,13 @@ STUCK = 6
 PERTURBATION_AXIS = (0.48, 0.6, 0.64)
 
 
-class Workspace(NamedTuple):
-    """Arrays that a solver writes to.
-
-    Attributes:
-        system: of the Jacobian methods.
-        backward: FABRIK's backward positions, records BACKWARD, (joint,).
-        eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
-    """
-
-    system: TaskSystem
-    backward: RecordArray
-    eigen: FloatArray
-
-
 class MechanismState(NamedTuple):
     """A mechanism, where it is, and the ends of attempts on it.
 
     Attributes:
         mechanism: what moves.
         data: its configuration.
-        workspace: of the solver.
+        workspace: of the solver, what `new_workspace` returns.
         restarts: coordinates of the mechanism for further attempts, (restart, coordinate).
         tips: where they put the effectors, positions [m] and rotations, (restart, effector, 7).
         saved: coordinates of the mechanism, (attempt + 1, coordinate).
@@ -107,7 +93,7 @@ class MechanismState(NamedTuple):
 
     mechanism: Mechanism
     data: ConfigurationData
-    workspace: Workspace
+    workspace: Any
     restarts: FloatArray
     tips: FloatArray
     saved: FloatArray
@@ -157,10 +143,8 @@ def solve_mechanisms(
 def new_state(mechanism, restarts, tips):
     """Return a state to begin from."""
     rows = len(restarts) + 2
-    backward = np.empty(len(mechanism.joints), BACKWARD)
-    workspace = Workspace(new_task_system(mechanism), backward, np.empty((2, 4, 4)))
     return MechanismState(
-        mechanism, new_data(mechanism), workspace, restarts, tips,
+        mechanism, new_data(mechanism), new_workspace(mechanism), restarts, tips,
         np.empty((rows, mechanism.coordinates)), new_progress(rows - 1),
     )  # fmt: skip
 
@@ -313,11 +297,12 @@ def take_nearest(state, q):
     copy_row(state.restarts[nearest], q)
 
 
-def on_mechanisms(name, step):
+def on_mechanisms(name, step, new_workspace):
     """Return the kernel that solves mechanisms by the step of a named solver."""
     return Kernel(
         bind(
-            solve_mechanisms, update=bind(update_mechanism, step=step), error=mechanism_error,
+            solve_mechanisms, new_workspace=new_workspace,
+            update=bind(update_mechanism, step=step), error=mechanism_error,
             merit=mechanism_merit, perturb=perturb_mechanism, save=save_mechanism,
             restore=restore_mechanism, draw=draw_mechanism,
         ),

@@ -34,8 +34,8 @@ def figure(kind="ball", **limits):
 
 def hands(model, rng):
     """Return targets for both hands that one pose reaches."""
-    goal = forward_kinematics(model, model.random(rng)).positions
-    return [Target(goal[5], effector=5), Target(goal[8], effector=8)]
+    positions = forward_kinematics(model, model.random(rng)).positions
+    return [Target(positions[5], effector=5), Target(positions[8], effector=8)]
 
 
 # Of 40 pairs; alternating projections need not converge, and limits bar the way of single joints.

@@ -42,16 +42,16 @@ def planar(links, **limits):
 
 def updates(machine):
     """Update joint after joint as CCD does; yield the joint and the cost before and after."""
-    mechanism, goal, data, room = machine
+    mechanism, target, data, workspace = machine
     joints = mechanism.joints
     for j in range(len(joints) - 1, -1, -1):
-        before = cost(mechanism, goal, data)
+        before = cost(mechanism, target, data)
         if mechanism.joints["followed"][j]:
-            descend(mechanism, goal, data, room, j)
+            descend(mechanism, target, data, workspace, j)
         elif joints["leader"][j] == j:
-            update_joint(mechanism, goal, data, room, j)
+            update_joint(mechanism, target, data, workspace, j)
         tips = data.positions.copy(), data.rotations.copy()
-        yield j, before, cost(mechanism, goal, data), tips
+        yield j, before, cost(mechanism, target, data), tips
     update_forward_kinematics(mechanism, data)
 
 
@@ -122,8 +122,8 @@ def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, mac
 def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, backend):
     """By turns and shifts in alternation."""
     body = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0.3, 0.4, 0.5]]), ["free", "fixed"])
-    goal, q = forward_kinematics(body, body.random(rng)), body.random(rng)
-    target = Target(goal.positions[1], goal.rotations[1])
+    target, q = forward_kinematics(body, body.random(rng)), body.random(rng)
+    target = Target(target.positions[1], target.rotations[1])
     solution = solve_ik(body, q, target, "ccd", tolerance=1e-5, tolerance_rotation=1e-5)
     assert solution.outcome is Outcome.CONVERGED
 
@@ -208,10 +208,11 @@ def test_backward_a_branch_takes_the_weighted_mean_of_what_its_children_ask(mach
         Target([1.0, 1.2, 0.0], effector=3, weight=1.0),
     ]
     ready = machine(model, rotation.identity(4).ravel(), targets)
-    backward_pass(*ready[:3], ready.room.backward)
+    backward = ready.workspace.backward
+    backward_pass(*ready[:3], backward)
     expected = (3.0 * np.array([1.5, 0.0, 0.0]) + np.array([1.0, 0.2, 0.0])) / 4.0
-    np.testing.assert_allclose(ready.room.backward["position"][1], expected, rtol=0, atol=1e-15)
-    assert ready.room.backward["weight"][1] == 4.0
+    np.testing.assert_allclose(backward["position"][1], expected, rtol=0, atol=1e-15)
+    assert backward["weight"][1] == 4.0
 
 
 def test_forward_a_branch_turns_all_its_children_alike(machine, rng):
@@ -264,12 +265,12 @@ def test_forward_each_joint_is_left_where_the_coordinates_put_it(
         lower=drawn.lower, upper=drawn.upper, cones=drawn.cones,
     )  # fmt: skip
     targets, _ = reachable(model, rng, 2)
-    mechanism, goal, data, room = machine(model, model.random(rng), targets)
-    backward_pass(mechanism, goal, data, room.backward)
+    mechanism, target, data, workspace = machine(model, model.random(rng), targets)
+    backward_pass(mechanism, target, data, workspace.backward)
     count = len(mechanism.joints)
     for j in range(count):
-        put_joint(mechanism.joints, data, room.backward, j)
-        forward_joint(mechanism, goal, data, room, j)
+        put_joint(mechanism.joints, data, workspace.backward, j)
+        forward_joint(mechanism, target, data, workspace, j)
     positions, rotations = data.positions[:count].copy(), data.rotations[:count].copy()
     update_forward_kinematics(mechanism, data)
     np.testing.assert_allclose(positions, data.positions[:count], rtol=0, atol=ROUNDING)

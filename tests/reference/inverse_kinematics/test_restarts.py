@@ -21,8 +21,8 @@ def arm(chain_of_joints, rng):
 @pytest.fixture
 def poses(arm, rng):
     """Return 30 poses that the arm can take."""
-    goal = forward_kinematics(arm, arm.random(rng, 30))
-    return Target(goal.positions[:, -1], goal.rotations[:, -1])
+    pose = forward_kinematics(arm, arm.random(rng, 30))
+    return Target(pose.positions[:, -1], pose.rotations[:, -1])
 
 
 def reached(solution):
@@ -41,8 +41,8 @@ def test_more_restarts_reach_more_targets(arm, poses, rng, solver):
 def test_what_one_start_reaches_soon_takes_no_restart(arm, rng, solver, backend):
     """A start near the target: the very same answer."""
     q = 0.9 * arm.random(rng)
-    goal = forward_kinematics(arm, q + 1e-3)
-    target = Target(goal.positions[-1], goal.rotations[-1])
+    there = forward_kinematics(arm, q + 1e-3)
+    target = Target(there.positions[-1], there.rotations[-1])
     options = {"tolerance": 2e-3, "tolerance_rotation": 2e-3, "record": True}
     one = solve_ik(arm, q, target, solver, **options)
     more = solve_ik(arm, q, target, solver, restarts=5, **options)
@@ -53,12 +53,12 @@ def test_what_one_start_reaches_soon_takes_no_restart(arm, rng, solver, backend)
         assert solver in ("fabrik", "ccd", "jacobian_transpose")
 
 
-def test_one_restart_from_the_very_goal_arrives(arm, solver, backend, rng):
-    """The start is bent the wrong way and given no iterations, so that restarts alone count."""
+def test_one_restart_from_the_very_answer_arrives(arm, solver, backend, rng):
+    """The start is bent wrongly and given no iterations, so that only restarts count."""
     random = prepare(arm, (7,), (True,), 3, 11).restarts
     assert random.shape == (3, 8)
-    goal = forward_kinematics(arm, random[1])
-    target = Target(goal.positions[-1], goal.rotations[-1])
+    there = forward_kinematics(arm, random[1])
+    target = Target(there.positions[-1], there.rotations[-1])
     solution = solve_ik(arm, arm.random(rng), target, solver, restarts=3, seed=11, max_iterations=0)
     assert solution.outcome is Outcome.CONVERGED
     assert solution.iterations == 0
@@ -73,19 +73,21 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
         Target(poses.position[0], poses.rotation[0], 7),
         Target(poses.position[1] / 2.0, None, 3),
     ]
-    goal = machine(arm, arm.neutral(), targets).goal
+    target = machine(arm, arm.neutral(), targets).target
     state = SimpleNamespace(
         mechanism=prepared.mechanism,
         restarts=prepared.restarts,
         tips=prepared.tips,
         progress=new_progress(10),
     )
-    rank_restarts(state, goal)
+    rank_restarts(state, target)
     full = np.hstack([prepared.restarts, np.zeros((9, arm.coordinate_count))])[:, :8]
     pose = forward_kinematics(arm, full)
-    ways = [np.linalg.norm(pose.positions[:, t.effector] - t.position, axis=1) for t in targets]
+    errors = [pose.positions[:, t.effector] - t.position for t in targets]
+    distances = np.linalg.norm(errors, axis=2)
     angles = rotation.angle(pose.rotations[:, 7], targets[0].rotation)
-    expected = np.max(ways, axis=0) + LEVER * prepared.mechanism.reach * 4.0 * np.sin(angles / 4.0)
+    lever = LEVER * prepared.mechanism.reach
+    expected = np.max(distances, axis=0) + lever * 4.0 * np.sin(angles / 4.0)
     np.testing.assert_allclose(state.progress[1:10, RANK], expected, rtol=1e-12, atol=0)
     taken = np.empty((9, prepared.mechanism.coordinates))
     for q in taken:

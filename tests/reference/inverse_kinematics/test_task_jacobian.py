@@ -83,12 +83,12 @@ def freedoms_on_the_way(model, joints):
 @given(**TREES)
 def test_errors_and_rows_are_those_of_the_jacobians(problem, machine, on_the_way, kinds, seed):
     model, q, targets = problem(kinds, seed)
-    mechanism, goal, data, room = machine(model, q, targets)
-    linearise_task(mechanism, goal, data, room.system)
+    mechanism, target, data, workspace = machine(model, q, targets)
+    linearise_task(mechanism, target, data, workspace.system)
     e, J = stacked(model, q, targets, mechanism.reach)
     own = freedoms_on_the_way(model, on_the_way(model, targets))
-    np.testing.assert_allclose(room.system.e, e, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(room.system.J, J[:, own].T, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(workspace.system.e, e, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(workspace.system.J, J[:, own].T, rtol=0, atol=ROUNDING)
     others = np.setdiff1d(np.arange(model.freedom_count), own)
     assert not J[:, others].any()  # whoever is left out moves no effector
 
@@ -101,10 +101,10 @@ def test_a_follower_of_another_kind_adds_to_its_leader_s_row(machine):
         mimics={1: Mimic(0, 0.3, 0.1), 3: Mimic(2, -2.0)},
     )  # fmt: skip
     q, targets = np.array([0.4, -0.3]), [Target([1.0, 2.0, 0.5], rotation.identity(), 4)]
-    mechanism, goal, data, room = machine(model, q, targets)
-    linearise_task(mechanism, goal, data, room.system)
+    mechanism, target, data, workspace = machine(model, q, targets)
+    linearise_task(mechanism, target, data, workspace.system)
     _, J = stacked(model, q, targets, mechanism.reach)
-    np.testing.assert_allclose(room.system.J, J.T, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(workspace.system.J, J.T, rtol=0, atol=ROUNDING)
 
 
 def damped(J, e, damping):
@@ -157,8 +157,8 @@ def test_levenberg_marquardt_converges_quadratically_to_poses(
 ):
     model = chain_of_joints("hinge", rng, links=7)
     q = model.random(rng)
-    goal = forward_kinematics(model, q + 0.3)
-    target = Target(goal.positions[-1], goal.rotations[-1])
+    target = forward_kinematics(model, q + 0.3)
+    target = Target(target.positions[-1], target.rotations[-1])
     history = solve_ik(model, q, target, solver, tolerance=1e-13, record=True).history
     errors = history[(history > 1e-13) & (history < 1e-2)]
     assert len(errors) >= 2
@@ -177,8 +177,8 @@ def limited(rng, machine, chain_of_joints, targets=1):
         model.skeleton, list(kinds), model.axes,
         lower=q - rng.uniform(0.0, 0.3, 6), upper=q + rng.uniform(0.0, 0.3, 6),
     )  # fmt: skip
-    goal = forward_kinematics(model, q + rng.standard_normal(6))
-    wanted = [Target(goal.positions[j], effector=j) for j in (5, 3)[:targets]]
+    target = forward_kinematics(model, q + rng.standard_normal(6))
+    wanted = [Target(target.positions[j], effector=j) for j in (5, 3)[:targets]]
     return model, q, wanted, machine(model, q, wanted)
 
 
@@ -190,46 +190,46 @@ def bounds(model, q, reach):
 def test_a_held_step_is_the_least_squares_solution_within_the_limits(rng, machine, chain_of_joints):
     active = 0
     for _ in range(60):
-        model, _, _, (mechanism, goal, data, room) = limited(rng, machine, chain_of_joints)
+        model, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)
         own = data.q.copy()
-        linearise_task(mechanism, goal, data, room.system)
-        J, e = room.system.J.T.copy(), room.system.e.copy()
+        linearise_task(mechanism, target, data, workspace.system)
+        J, e = workspace.system.J.T.copy(), workspace.system.e.copy()
         damping = 0.1 * mechanism.reach**2
-        damped_step(mechanism, data, room.system, damping)
+        damped_step(mechanism, data, workspace.system, damping)
         lower, upper = bounds(model, own, mechanism.reach)
         system = np.vstack([J, np.sqrt(damping) * np.eye(len(own))])
         wanted = np.concatenate([e, np.zeros(len(own))])
         best = lsq_linear(system, wanted, (lower, upper + 1e-15), tol=1e-14)
-        step = room.system.step
+        step = workspace.system.step
         assert (step >= lower - ROUNDING).all()
         assert (step <= upper + ROUNDING).all()
         cost = 0.5 * np.sum((system @ step - wanted) ** 2)
         assert cost == pytest.approx(best.cost, rel=1e-9)
-        active += np.count_nonzero(room.system.active)
+        active += np.count_nonzero(workspace.system.active)
     assert active > 100
 
 
 def test_a_transposed_step_leaves_out_what_limits_stop(rng, machine, chain_of_joints):
     for _ in range(20):
-        _, _, _, (mechanism, goal, data, room) = limited(rng, machine, chain_of_joints)
+        _, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)
         joints = mechanism.joints
         data.q[:] = np.where(rng.random(len(data.q)) < 0.5, joints["lower"], joints["upper"])
-        linearise_task(mechanism, goal, data, room.system)
-        J, e = room.system.J.T.copy(), room.system.e.copy()
-        transposed_step(mechanism, data, room.system)
+        linearise_task(mechanism, target, data, workspace.system)
+        J, e = workspace.system.J.T.copy(), workspace.system.e.copy()
+        transposed_step(mechanism, data, workspace.system)
         g = J.T @ e
         free = np.where(data.q == joints["lower"], g > 0.0, g < 0.0)
         expected = np.zeros(len(g))
         expected[free] = transposed(J[:, free], e, None, None)
-        np.testing.assert_allclose(room.system.step, expected, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(workspace.system.step, expected, rtol=0, atol=ROUNDING)
 
 
 def test_steps_end_within_the_limits(rng, machine, chain_of_joints):
     for _ in range(20):
-        model, _, _, (mechanism, goal, data, room) = limited(rng, machine, chain_of_joints)
-        linearise_task(mechanism, goal, data, room.system)
-        damped_step(mechanism, data, room.system, 1e-6)
-        take_step(mechanism, data, room.system)
+        model, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)
+        linearise_task(mechanism, target, data, workspace.system)
+        damped_step(mechanism, data, workspace.system, 1e-6)
+        take_step(mechanism, data, workspace.system)
         assert (data.q >= mechanism.joints["lower"]).all()
         assert (data.q <= mechanism.joints["upper"]).all()
 
@@ -278,7 +278,7 @@ def test_a_singular_system_has_a_finite_answer(chain_of_joints, machine, rng, ra
     for _ in range(20):
         model = chain_of_joints("ball", rng, links=3)
         target = Target([1.0, 2.0, 3.0], rotation.identity(), 3)
-        system = machine(model, model.random(rng), [target]).room.system
+        system = machine(model, model.random(rng), [target]).workspace.system
         span = rng.standard_normal((rank, 6))
         system.J[:] = rng.standard_normal((len(system.J), rank)) @ span
         system.e[:] = rng.standard_normal(rank) @ span
@@ -300,9 +300,9 @@ def test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly(rng, size, back
         across = np.cross(axis, [0.6, 0.0, 0.8])
         offsets = size * np.outer([0, 1, 1, 1], across / np.linalg.norm(across))
         arm = Articulation(Skeleton(range(-1, 3), offsets), ["hinge"] * 3 + ["fixed"], axis)
-        goal = forward_kinematics(arm, rng.uniform(-1.0, 1.0, 3))
+        target = forward_kinematics(arm, rng.uniform(-1.0, 1.0, 3))
         solution = solve_ik(
-            arm, [0.3, 0.2, 0.1], goal.positions[-1], "levenberg_marquardt", tolerance=0.0
+            arm, [0.3, 0.2, 0.1], target.positions[-1], "levenberg_marquardt", tolerance=0.0
         )
         assert solution.residual <= 1e-14 * size
 
@@ -310,10 +310,10 @@ def test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly(rng, size, back
 @pytest.mark.parametrize("solver", STEPS)
 def test_huge_and_tiny_weights_do_no_harm(chain_of_joints, rng, solver, backend):
     model = chain_of_joints("ball", rng)
-    goal, q = forward_kinematics(model, model.random(rng)), model.random(rng)
+    target, q = forward_kinematics(model, model.random(rng)), model.random(rng)
     for weights in ((1e-20, 1e20), (1e20, 1e20), (1e-20, 1e-20), (1e-75, 1e75)):
         targets = [
-            Target(goal.positions[j], effector=j, weight=weight)
+            Target(target.positions[j], effector=j, weight=weight)
             for j, weight in zip((2, 4), weights, strict=True)
         ]
         solution = solve_ik(model, q, targets, solver, max_iterations=10)
