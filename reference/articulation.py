@@ -24,7 +24,7 @@ from .quaternion import (
     add,
     dot,
     exponential,
-    half_turn,
+    half_angle,
     load_quaternion,
     load_vector,
     logarithm,
@@ -33,10 +33,10 @@ from .quaternion import (
     normalised,
     perpendicular,
     rotate,
+    rotation_about,
     scale,
     store_quaternion,
     store_vector,
-    turn_about,
 )
 from .skeleton import Skeleton, checked_skeleton
 
@@ -69,7 +69,7 @@ JOINT = np.dtype(
         ("freedom", np.int64),  # where its degrees of freedom begin in a velocity, likewise
         ("offset", np.float64, 3),  # from the parent [m]
         ("frame", np.float64, 4),  # rotation in the parent's frame where its coordinates are zero
-        ("turned", np.float64, 4),  # the frame rotated by pi about the axis
+        ("rotated", np.float64, 4),  # the frame rotated by pi about the axis
         ("axis", np.float64, 3),
         ("lower", np.float64),  # [rad or m]
         ("upper", np.float64),
@@ -166,7 +166,7 @@ class Articulation:
         joints["lower"], joints["upper"] = lower, upper
         _check_twists(joints)
         joints["frame"], joints["axis"] = _checked_frames(frames, count), _checked_axes(axes, count)
-        joints["turned"], joints["cone"] = half_turned(joints), _checked_cones(cones, count)
+        joints["rotated"], joints["cone"] = rotated_by_pi(joints), _checked_cones(cones, count)
         shown = {name: frozen(joints[name].copy()) for name in ("lower", "upper")}
         self.__dict__.update(
             skeleton=skeleton, kinds=names, mimics=follows, joints=joints, mechanisms={}, **shown,
@@ -241,7 +241,7 @@ class Articulation:
     def random(self, rng: np.random.Generator, *shape: int) -> FloatArray:
         """Return coordinates drawn evenly within the limits, (..., coordinate).
 
-        Without limits a hinge is drawn from a whole turn, a slide or a free joint from within a
+        Without limits a hinge is drawn from all angles, a slide or a free joint from within a
         metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
 
         Raises:
@@ -322,10 +322,10 @@ class Articulation:
     @functools.cached_property
     def _quaternions(self) -> list[slice]:
         """Where in q quaternions are."""
-        ends = [self.coordinates_of(int(j)).stop for j in self._leading if self._is_turning(j)]
+        ends = [self.coordinates_of(int(j)).stop for j in self._leading if self._has_quaternion(j)]
         return [slice(end - 4, end) for end in ends]
 
-    def _is_turning(self, j: int) -> bool:
+    def _has_quaternion(self, j: int) -> bool:
         return self.kinds[j] in ("ball", "free")
 
     @functools.cached_property
@@ -350,7 +350,7 @@ def joint_transform(joints, j, q):
     kind, at = joints["kind"][j], joints["coordinate"][j]
     if kind == HINGE:
         angle = joints["multiplier"][j] * q[at] + joints["shift"][j]
-        R = rotated_by_half(R, load_quaternion(joints["turned"], j), half_turn(angle))
+        R = rotated_by_half(R, load_quaternion(joints["rotated"], j), half_angle(angle))
     elif kind == SLIDE:
         distance = joints["multiplier"][j] * q[at] + joints["shift"][j]
         x = add(x, rotate(R, scale(distance, load_vector(joints["axis"], j))))
@@ -362,37 +362,37 @@ def joint_transform(joints, j, q):
     return x, R
 
 
-def half_turned(joints: RecordArray) -> FloatArray:
+def rotated_by_pi(joints: RecordArray) -> FloatArray:
     """Return each joint's frame rotated by pi about its axis, (joint, 4)."""
     half = np.column_stack([np.zeros(len(joints)), joints["axis"]])
     return rotation.multiply(np.ascontiguousarray(joints["frame"]), half)
 
 
-def rotated_by_half(R, turned, half):
-    """Return R rotated about the axis about which `turned` is R rotated by pi.
+def rotated_by_half(R, rotated, half):
+    """Return R rotated about the axis about which `rotated` is R rotated by pi.
 
     With c, s of half the angle, R (c + s axis) is c R + s (R axis).
     """
     c, s = half
     return (
-        c * R[0] + s * turned[0],
-        c * R[1] + s * turned[1],
-        c * R[2] + s * turned[2],
-        c * R[3] + s * turned[3],
+        c * R[0] + s * rotated[0],
+        c * R[1] + s * rotated[1],
+        c * R[2] + s * rotated[2],
+        c * R[3] + s * rotated[3],
     )
 
 
 def swing_twist(Q, axis):
     """Return swing S and twist angle t [rad] of Q = S exp(t axis): first t about the axis."""
     along = dot((Q[1], Q[2], Q[3]), axis)
-    if Q[0] == 0.0 and along == 0.0:  # half a turn about an axis across: any twist would do
+    if Q[0] == 0.0 and along == 0.0:  # a rotation by pi about an axis across: any twist would do
         return Q, 0.0
     twist = 2.0 * math.atan2(along, Q[0])
     if twist > math.pi:
         twist -= 2.0 * math.pi
     elif twist <= -math.pi:
         twist += 2.0 * math.pi
-    return multiply(Q, turn_about(axis, -twist)), twist
+    return multiply(Q, rotation_about(axis, -twist)), twist
 
 
 def clamp_ball(Q, axis, lower, upper, cone):
@@ -405,7 +405,7 @@ def clamp_ball(Q, axis, lower, upper, cone):
         return Q
     if angle > cone:
         swing = exponential(scale(cone / angle, tilt))
-    return normalised(multiply(swing, turn_about(axis, bounded)))
+    return normalised(multiply(swing, rotation_about(axis, bounded)))
 
 
 def clamp_joint(joints, j, q):
@@ -440,21 +440,21 @@ def joint_excess(joints, j, q):
 
 
 def fit_start(joints, q):
-    """Make the quaternions among coordinates unit; return whether they and all others were fit.
+    """Make the quaternions among coordinates unit; return whether they and all others are valid.
 
-    Fit are numbers up to 1e75, and quaternions unit within 1e-6.
+    Valid are numbers up to 1e75, and quaternions unit within 1e-6.
     """
-    fine = True
+    valid = True
     for k in range(len(q)):
-        fine &= abs(q[k]) <= LARGEST_COORDINATE
+        valid &= abs(q[k]) <= LARGEST_COORDINATE
     for j in range(len(joints)):
         kind = joints["kind"][j]
         if kind in (BALL, FREE):
             at = joints["coordinate"][j] + (3 if kind == FREE else 0)
             Q, unit = made_unit((q[at], q[at + 1], q[at + 2], q[at + 3]))
             q[at], q[at + 1], q[at + 2], q[at + 3] = Q
-            fine &= unit
-    return fine
+            valid &= unit
+    return valid
 
 
 def articulated_pose(joints, q, positions, rotations):

@@ -1,9 +1,9 @@
 """Jacobians of a tree of joints, and the steps on its coordinates that they are derivatives by.
 
-A velocity v, (..., freedom), holds for each joint in turn what its kind may do: the rate of a
+A velocity v, (..., freedom), holds joint after joint what its kind may do: the rate of a
 hinge [rad/s] or a slide [m/s]; of a ball the angular velocity in its own, moved frame; of a free
 joint the rate of its position coordinates, then the angular velocity in its own frame. So a step
-turns a quaternion from the right: Q exp(v). A mimic joint has no velocity of its own: it adds to
+rotates a quaternion from the right: Q exp(v). A mimic joint has no velocity of its own: it adds to
 its leader's column.
 """
 
@@ -90,7 +90,7 @@ def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
 def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
     """Return the velocity that leads from q0 to q1 in one second, (..., freedom).
 
-    It is the inverse of `integrate`: rotations go the shorter way round, at most pi.
+    It is the inverse of `integrate`: rotations go through the smaller angle, at most pi.
 
     Raises:
         ValueError: as for `jacobian`, or if the leading axes do not broadcast.

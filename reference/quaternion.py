@@ -233,13 +233,13 @@ def angle_between(a, b):
     return norm(v)
 
 
-def turn_about(axis, angle):
+def rotation_about(axis, angle):
     """Return the rotation by an angle [rad] about a unit axis."""
-    c, s = half_turn(angle)
+    c, s = half_angle(angle)
     return c, s * axis[0], s * axis[1], s * axis[2]
 
 
-def half_turn(angle):
+def half_angle(angle):
     """Return cosine and sine of half an angle; up to pi by the series of its quarter."""
     quarter = 0.25 * angle
     t = quarter * quarter

@@ -193,15 +193,15 @@ def _settled(
     """Return the motion q with its residuals, those of its frames solved again that need it."""
     limits = settings.limits._replace(chained=False)
     unchained = replace(settings, limits=limits, record=False)
-    still = replace(unchained, limits=limits._replace(max_iterations=0, far_iterations=0))
-    last = solve_checked(skeleton, q, targets, still)
+    unmoved = replace(unchained, limits=limits._replace(max_iterations=0, far_iterations=0))
+    last = solve_checked(skeleton, q, targets, unmoved)
     off = np.flatnonzero(reached & (last.outcome != Outcome.CONVERGED))
     iterations = np.asarray(motion.iterations) + steps
     if len(off):
         again = solve_checked(skeleton, q[off], [_part(one, off) for one in targets], unchained)
         q[off] = again.coordinates
         iterations[off] += again.iterations
-        last = solve_checked(skeleton, q, targets, still)
+        last = solve_checked(skeleton, q, targets, unmoved)
     outcome = np.where(reached | (last.outcome == Outcome.CONVERGED), last.outcome, motion.outcome)
     return last._replace(
         iterations=arguments.frozen(iterations),

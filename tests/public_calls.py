@@ -56,7 +56,7 @@ MODULES = [
 # What stands in these modules for other modules of ours, and why no user calls it.
 INTERNAL = {
     "reference.articulation.one_batch": "reshapes what is checked already",
-    "reference.articulation.half_turned": "of joints that are checked already",
+    "reference.articulation.rotated_by_pi": "of joints that are checked already",
     "reference.articulation.number_coordinates": "of joints that are checked already",
     "reference.mass_spring.MassSpring.replaced": "unchecked twin of the constructor",
     "reference.mass_spring.State.of": "unchecked twin of the constructor",

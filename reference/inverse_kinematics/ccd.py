@@ -19,10 +19,10 @@ from ..quaternion import (
     multiply,
     renormalised,
     rotate,
+    rotation_about,
     scale,
     store_quaternion,
     subtract,
-    turn_about,
 )
 from .box_step import (
     TaskSystem,
@@ -71,7 +71,7 @@ def ccd_sweep(chain, target):
     """Point each joint, from the effector's parent to the root, so that its effector is nearest.
 
     A joint moves what lies below it only. The joints still to come lie above and stay, so that on
-    the way up only the effector needs to be followed; the rotations are then applied from the root
+    that path only the effector needs to be followed; the rotations are then applied from the root
     down, each to its joint and to all below it.
     """
     n = len(chain.lengths)
@@ -79,10 +79,10 @@ def ccd_sweep(chain, target):
     for k in range(n - 1, -1, -1):
         joint = load_vector(chain.positions, k)
         Q, effector = pointing(joint, effector, target)
-        store_quaternion(chain.turns, k, Q)
+        store_quaternion(chain.deltas, k, Q)
     above = IDENTITY
     for k in range(n):
-        above = renormalised(multiply(above, load_quaternion(chain.turns, k)))
+        above = renormalised(multiply(above, load_quaternion(chain.deltas, k)))
         R = load_quaternion(chain.rotations, k)
         store_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
     place_joints(chain)
@@ -127,7 +127,7 @@ def update_joint(mechanism, target, data, work, j):
         return
     M = attitude_profile(mechanism, target, data, j)
     if kind == HINGE:
-        Q = turn_about(axis, move_by(joints, q, j, best_angle(M, axis)))
+        Q = rotation_about(axis, move_by(joints, q, j, best_angle(M, axis)))
     else:
         Q = rotate_within_limits(mechanism, target, data, work, j, M)
     rotate_effectors(mechanism, data, j, Q)

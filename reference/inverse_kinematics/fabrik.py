@@ -25,13 +25,13 @@ from ..quaternion import (
     norm,
     normalised,
     rotate,
+    rotation_about,
     scale,
     store_quaternion,
     store_vector,
     subtract,
-    turn_about,
 )
-from .chain import in_hole, out_of_reach, root_distance
+from .chain import inside_inner_radius, out_of_reach, root_distance
 from .joint_updates import move_by, rotate_to, translate_free
 from .mechanism import rotation_weight, update_forward_kinematics
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, best_angle, best_rotation
@@ -69,7 +69,7 @@ def fabrik_sweep(chain, target):
     d = root_distance(chain, target)
     if out_of_reach(chain, d):
         lay_on_line(chain, target, 1.0)
-    elif in_hole(chain, d):
+    elif inside_inner_radius(chain, d):
         lay_on_line(chain, target, -1.0)
     else:
         reach_backward(chain, target)
@@ -205,7 +205,7 @@ def forward_joint(mechanism, target, data, work, j):
     if kind == HINGE and leads:
         axis = axis_of(joints, j, R)
         angle = best_angle(attitude_profile(mechanism, target, data, work.backward, j), axis)
-        R = multiply(turn_about(axis, move_by(joints, q, j, angle)), R)
+        R = multiply(rotation_about(axis, move_by(joints, q, j, angle)), R)
     elif kind == BALL and work.backward["weight"][j] > 0.0:
         wanted = multiply(forward_rotation(mechanism, target, data, work, j), R)
         R = rotate_to(joints, q, j, frame_of(joints, j, data.rotations), wanted)

@@ -51,7 +51,7 @@ class IKSolution(NamedTuple):
             where a rotation is asked for, the lever half the reach.
         excess: how far `residual` is above the least that geometry proves possible [m]: the
             distance beyond all links and slides, and on a Skeleton with one position also that to
-            the rim of the hole which the longest link leaves; above 0 where nothing is proven.
+            the inner radius which the longest link leaves; above 0 where nothing is proven.
     """
 
     local_rotations: FloatArray
@@ -120,11 +120,11 @@ def _checked(
             f"effector: expected that of the target, {target.effector!r}, got {effector!r}"
         )
     position = arguments.floats("target", target.position, "...", 3)
-    turned = target.rotation
-    if turned is not None:
-        turned = arguments.floats("rotation", turned, "...", 4)
+    quaternion = target.rotation
+    if quaternion is not None:
+        quaternion = arguments.floats("rotation", quaternion, "...", 4)
     weight = arguments.number("weight", target.weight, above=0.0)
-    return CheckedTarget(joint, position, turned, weight)
+    return CheckedTarget(joint, position, quaternion, weight)
 
 
 def check_numbers(targets: list[CheckedTarget]) -> list[CheckedTarget]:

@@ -12,8 +12,8 @@ from ..articulation import (
     HINGE,
     SLIDE,
     Articulation,
-    half_turned,
     number_coordinates,
+    rotated_by_pi,
 )
 from ..quaternion import IDENTITY, add, load_quaternion, load_vector, multiply, rotate
 from .mechanism import EFFECTOR, Mechanism
@@ -98,12 +98,12 @@ def _active(
 ) -> IndexArray:
     """Return the joints that move on the paths to the effectors, and those that they follow.
 
-    An effector's own ball or hinge turns it, but does not move it.
+    An effector's own ball or hinge rotates it, but does not move it.
     """
     path, kinds = articulation.skeleton.path_array, articulation.joints["kind"]
     needed: set[int] = set()
-    for joint, turned in zip(effectors, oriented, strict=True):
-        moving = turned or kinds[joint] in (SLIDE, FREE)
+    for joint, posed in zip(effectors, oriented, strict=True):
+        moving = posed or kinds[joint] in (SLIDE, FREE)
         needed.update(path(joint).tolist() if moving else path(joint).tolist()[:-1])
     needed.update(articulation.joints["leader"][sorted(needed)].tolist())
     return np.array([j for j in sorted(needed) if kinds[j] != FIXED], dtype=np.int64)
@@ -151,7 +151,7 @@ def _moving_joints(
     widths = number_coordinates(joints)
     for k, j in enumerate(active):
         joints["parent"][k], joints["offset"][k], joints["frame"][k] = _merged(whole, j, number)
-    joints["turned"] = half_turned(joints)
+    joints["rotated"] = rotated_by_pi(joints)
     columns = [np.arange(a, a + w) for a, w in zip(at, widths, strict=True)]
     return joints, np.concatenate([*columns, np.empty(0, dtype=np.int64)])
 
@@ -193,7 +193,7 @@ def _adjacent(joints: RecordArray, ends: RecordArray, reach: float) -> BoolArray
 
 
 def _stays(joints: RecordArray, j: int, c: int, margin: float) -> bool:
-    """Return whether turning joint j leaves joint c in place, if it does so with c's parent."""
+    """Return whether rotating joint j leaves joint c in place, if it does so with c's parent."""
     offset = joints["offset"][c]
     if joints["kind"][c] in (SLIDE, FREE):
         return False

@@ -28,9 +28,9 @@ from .chain import (
     pose_chain,
     put_local,
     root_distance,
+    rotate_links,
     rounding,
     tip_error,
-    turn_links,
 )
 from .restarts import MADE, Criteria, limits_of, new_progress, solve_with_restarts
 from .result import (
@@ -87,7 +87,7 @@ def solve_chains(
         iterations, settled = solve_with_restarts(state, target, limits, criteria, past)
         if iterations > 0:
             restore_chain(state, len(state.saved) - 1)
-            turn_links(chain)
+            rotate_links(chain)
             put_local(chain, path, pose)
         forward_pose(parents, offsets, pose, positions[i], rotations)
         distance = norm(subtract(load_vector(positions[i], path[-1]), target))
@@ -137,7 +137,7 @@ def chain_merit(state, target):
 
 
 def perturb_chain(state, target, criteria, first):
-    """Bend a chain that starts on one line with its target, off which no solver would leave it."""
+    """Bend a chain that starts collinear with its target, which no solver would leave."""
     chain, d = state.chain, root_distance(state.chain, target)
     if first[MADE] > 0 or tip_error(chain, target) <= criteria.distance or out_of_reach(chain, d):
         return False

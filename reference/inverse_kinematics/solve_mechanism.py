@@ -24,9 +24,9 @@ from ..quaternion import (
     multiply,
     norm,
     normalised,
+    rotation_about,
     store_quaternion,
     subtract,
-    turn_about,
 )
 from .chain import BEND, POSITION_ROUNDING
 from .joint_updates import ball_at, move_by, put_ball
@@ -238,13 +238,13 @@ def perturb_mechanism(state, _target, _criteria, first):
 
 
 def perturb_joint(joints, q, j, angle):
-    """Turn a joint by an angle [rad], always in the same way, within its limits."""
+    """Rotate a joint by an angle [rad], always alike, within its limits."""
     kind = joints["kind"][j]
     if kind == HINGE and move_by(joints, q, j, angle) == 0.0:
         move_by(joints, q, j, -angle)
     elif kind in (BALL, FREE):
-        turn = turn_about(PERTURBATION_AXIS, angle)
-        put_ball(joints, q, j, normalised(multiply(ball_at(joints, q, j), turn)))
+        bend = rotation_about(PERTURBATION_AXIS, angle)
+        put_ball(joints, q, j, normalised(multiply(ball_at(joints, q, j), bend)))
         clamp_joint(joints, j, q)
 
 

@@ -159,14 +159,14 @@ def _distance(wanted: CheckedTarget, position: FloatArray) -> float:
     return float(np.linalg.norm(position - wanted.position))
 
 
-def _angle(wanted: CheckedTarget, turn: FloatArray) -> float:
+def _angle(wanted: CheckedTarget, Q: FloatArray) -> float:
     if wanted.rotation is None:
         return 0.0
     if wanted.rotation.ndim != 1:
         raise ValueError(
             f"rotation: expected shape (4,), got {arguments.shape(wanted.rotation.shape)}"
         )
-    return float(rotation.angle(turn, wanted.rotation))
+    return float(rotation.angle(Q, wanted.rotation))
 
 
 def _limit_excess(model: Skeleton | Articulation, q: FloatArray) -> FloatArray:

@@ -51,7 +51,7 @@ def reachable():
     return targets_by_pose
 
 
-def joints_on_the_way(model, targets):
+def joints_that_move(model, targets):
     """Return the joints that may be moved: those above the effectors, and leaders of those."""
     found = set()
     for target in targets:
@@ -63,9 +63,9 @@ def joints_on_the_way(model, targets):
 
 
 @pytest.fixture(scope="session")
-def on_the_way():
+def moving_joints():
     """Return the function that tells which joints may be moved."""
-    return joints_on_the_way
+    return joints_that_move
 
 
 def outside(model, rng, *shape):

@@ -1,4 +1,4 @@
-"""What CCD and FABRIK do joint by joint: never worse, limits on the way, one turn at a branch."""
+"""What CCD and FABRIK do joint by joint: never worse, limits kept, one rotation at a branch."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ from reference.inverse_kinematics.fabrik import (
 from reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
 from reference.inverse_kinematics.reduce import prepare
 
-# Squared distances of a few metres, and quaternions normalised after a turn.
+# Squared distances of a few metres, and quaternions normalised after a rotation.
 ROUNDING = 1e-12
 
 shared = drawn(max_examples=40)
@@ -95,7 +95,7 @@ def _units(quaternions):
 
 @pytest.mark.parametrize("kind", ["hinge", "slide", "ball", "free"])
 def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, machine, rng):
-    """No small move of the joint alone, in any direction, lowers the cost."""
+    """No small move of only the joint, in any direction, lowers the cost."""
     model = chain_of_joints(kind, rng, links=3)
     pose = forward_kinematics(model, model.random(rng))
     targets = [
@@ -114,13 +114,13 @@ def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, mac
         if width > 1:
             own[-4:] /= np.linalg.norm(own[-4:])
         update_forward_kinematics(ready.mechanism, ready.data)
-        # A free joint turns first and then shifts, so that its optimum is one of each alone.
+        # A free joint rotates first and then shifts, so that its optimum is one of each apart.
         if kind != "free":
             assert cost(*ready[:3]) >= least - 1e-9
 
 
 def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, backend):
-    """By turns and shifts in alternation."""
+    """By rotations and shifts in alternation."""
     body = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0.3, 0.4, 0.5]]), ["free", "fixed"])
     target, q = forward_kinematics(body, body.random(rng)), body.random(rng)
     target = Target(target.positions[1], target.rotations[1])
@@ -131,10 +131,10 @@ def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, backend):
 @pytest.mark.parametrize(
     ("start", "upper", "wanted", "expected"),
     [
-        (-1.0, 0.5, 0.3, 0.3),  # the way is free
-        (-1.0, 0.5, 1.2, 0.5),  # the limit stops it on the way
+        (-1.0, 0.5, 0.3, 0.3),  # nothing stops it
+        (-1.0, 0.5, 1.2, 0.5),  # the limit stops it on its path
         (0.5, 0.5, 1.2, 0.5),  # it is there already
-        (-3.0, 0.5, 2.9, -3.0),  # the short way leads through half a turn, where the lower limit is
+        (-3.0, 0.5, 2.9, -3.0),  # the smaller angle leads past pi, where the lower limit is
     ],
 )
 def test_a_hinge_stops_at_its_limit_along_the_arc(start, upper, wanted, expected, backend):
@@ -152,7 +152,7 @@ def test_a_slide_goes_as_far_as_its_limit_allows(upper, expected, backend):
 
 
 def test_inside_a_cone_an_update_that_would_be_worse_is_refused(machine, rng):
-    """Cutting the swing of the best turn down to the cone may lead away from the target."""
+    """Cutting the swing of the best rotation down to the cone may lead away from the target."""
     refused = taken = 0
     for _ in range(200):
         ball = Articulation(
@@ -215,8 +215,8 @@ def test_backward_a_branch_takes_the_weighted_mean_of_what_its_children_ask(mach
     assert backward["weight"][1] == 4.0
 
 
-def test_forward_a_branch_turns_all_its_children_alike(machine, rng):
-    """A ball with three arms: one iteration turns it as singular values say, weights regarded."""
+def test_forward_a_branch_rotates_all_its_children_alike(machine, rng):
+    """A ball with three arms: one iteration rotates it as singular values say, weights regarded."""
     arms = rng.standard_normal((3, 3))
     tree = Skeleton([-1, 0, 0, 0], np.vstack([np.zeros(3), arms]))
     model, R, weights = Articulation(tree), rotation.random(rng), np.array([0.5, 1.0, 3.0])
@@ -236,7 +236,7 @@ def test_forward_a_branch_turns_all_its_children_alike(machine, rng):
 def test_a_pose_that_reaches_all_targets_is_a_fixed_point(
     kind, oriented, chain_of_joints, machine, rng
 ):
-    """The hand is a fixed joint with a frame of its own, which hangs on the last one that moves."""
+    """The hand is a fixed joint with a frame of its own, attached to the last one that moves."""
     chain = chain_of_joints(kind, rng)
     model = Articulation(
         chain.skeleton, [*[kind] * 4, "fixed"], chain.axes, frames=rotation.random(rng, 5)

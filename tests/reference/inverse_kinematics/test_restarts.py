@@ -101,8 +101,8 @@ def test_the_best_of_all_attempts_is_returned(arm, poses, rng, solver, backend):
     random = prepare(arm, (7,), (False,), 6, 5).restarts
     starts = np.vstack([q[:7], random])
     full = np.hstack([starts, np.full((7, 1), q[7])])
-    ways = forward_kinematics(arm, full).positions[:, -1] - wanted.position
-    best = np.linalg.norm(ways, axis=1)
+    errors = forward_kinematics(arm, full).positions[:, -1] - wanted.position
+    best = np.linalg.norm(errors, axis=1)
     solution = solve_ik(arm, q, wanted, solver, restarts=6, seed=5, max_iterations=0)
     assert solution.residual == pytest.approx(best.min(), abs=1e-14)
     np.testing.assert_allclose(solution.coordinates, full[best.argmin()], rtol=0, atol=1e-15)
@@ -117,7 +117,7 @@ def test_restarts_follow_from_the_seed(arm, poses, rng):
     assert (first.coordinates != other.coordinates).any()
 
 
-def test_restarts_are_the_same_alone_and_in_a_batch(arm, poses, rng, solver):
+def test_restarts_are_the_same_one_by_one_and_in_a_batch(arm, poses, rng, solver):
     q = arm.random(rng)
     batch = solve_ik(arm, q, poses, solver, restarts=3, max_iterations=20)
     for i in (0, 7, 29):
@@ -127,8 +127,8 @@ def test_restarts_are_the_same_alone_and_in_a_batch(arm, poses, rng, solver):
         assert batch.iterations[i] == one.iterations
 
 
-def test_restarts_keep_limits_and_leave_joints_off_the_way(
-    articulated, reachable, on_the_way, rng, solver, backend
+def test_restarts_keep_limits_and_leave_other_joints(
+    articulated, reachable, moving_joints, rng, solver, backend
 ):
     for seed in range(4):
         model = articulated(["ball", "hinge", "ball", "slide", "hinge", "ball", "hinge"], seed)
@@ -136,7 +136,7 @@ def test_restarts_keep_limits_and_leave_joints_off_the_way(
         q = model.random(rng)
         solution = solve_ik(model, q, targets, solver, restarts=3, max_iterations=3)
         assert model.within_limits(solution.coordinates, 1e-7)
-        for j in set(range(7)) - on_the_way(model, targets) - set(model.mimics):
+        for j in set(range(7)) - moving_joints(model, targets) - set(model.mimics):
             own = model.coordinates_of(j)
             np.testing.assert_allclose(solution.coordinates[own], q[own], rtol=0, atol=1e-15)
 

@@ -51,29 +51,29 @@ def problem(articulated, reachable, unlimited):
 
 
 def worth_of_freedoms(model, reach):
-    """Return what a unit of each freedom is worth: 1 rad, or the reach [m]."""
-    worth = np.ones(model.freedom_count)
+    """Return what a unit of each freedom stands for: 1 rad, or the reach [m]."""
+    scale = np.ones(model.freedom_count)
     for j, kind in enumerate(model.kinds):
         if j not in model.mimics and kind in ("slide", "free"):
-            worth[model.freedoms_of(j)][:3] = reach
-    return worth
+            scale[model.freedoms_of(j)][:3] = reach
+    return scale
 
 
 def stacked(model, q, targets, reach):
     """Return e (equation,) and J (equation, freedom) of all targets, by `jacobians.jacobian`."""
     pose, errors, rows = forward_kinematics(model, q), [], []
-    for position, turn, joint, weight in targets:
+    for position, Q, joint, weight in targets:
         root, J = np.sqrt(weight), jacobian(model, q, joint)
         errors.append(root * (position - pose.positions[joint]))
         rows.append(root * J[:3])
-        if turn is not None:
-            wrong = rotation.multiply(turn, rotation.conjugate(pose.rotations[joint]))
+        if Q is not None:
+            wrong = rotation.multiply(Q, rotation.conjugate(pose.rotations[joint]))
             errors.append(root * LEVER * reach * rotation.logarithm(wrong))
             rows.append(root * LEVER * reach * J[3:])
     return np.concatenate(errors), np.concatenate(rows) * worth_of_freedoms(model, reach)
 
 
-def freedoms_on_the_way(model, joints):
+def freedoms_of_moving(model, joints):
     """Return the freedoms of some joints, in their order."""
     return np.concatenate([np.r_[model.freedoms_of(j)] for j in sorted(joints)] + [[]]).astype(int)
 
@@ -81,12 +81,12 @@ def freedoms_on_the_way(model, joints):
 @at_both_speeds
 @with_examples
 @given(**TREES)
-def test_errors_and_rows_are_those_of_the_jacobians(problem, machine, on_the_way, kinds, seed):
+def test_errors_and_rows_are_those_of_the_jacobians(problem, machine, moving_joints, kinds, seed):
     model, q, targets = problem(kinds, seed)
     mechanism, target, data, workspace = machine(model, q, targets)
     linearise_task(mechanism, target, data, workspace.system)
     e, J = stacked(model, q, targets, mechanism.reach)
-    own = freedoms_on_the_way(model, on_the_way(model, targets))
+    own = freedoms_of_moving(model, moving_joints(model, targets))
     np.testing.assert_allclose(workspace.system.e, e, rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(workspace.system.J, J[:, own].T, rtol=0, atol=ROUNDING)
     others = np.setdiff1d(np.arange(model.freedom_count), own)
@@ -183,8 +183,8 @@ def limited(rng, machine, chain_of_joints, targets=1):
 
 
 def bounds(model, q, reach):
-    worth = worth_of_freedoms(model, reach)[: len(q)]
-    return (model.lower[: len(q)] - q) / worth, (model.upper[: len(q)] - q) / worth
+    scale = worth_of_freedoms(model, reach)[: len(q)]
+    return (model.lower[: len(q)] - q) / scale, (model.upper[: len(q)] - q) / scale
 
 
 def test_a_held_step_is_the_least_squares_solution_within_the_limits(rng, machine, chain_of_joints):
@@ -235,8 +235,8 @@ def test_steps_end_within_the_limits(rng, machine, chain_of_joints):
 
 
 @pytest.mark.parametrize("solver", STEPS)
-def test_a_hinge_of_whole_turns_goes_round_where_it_must(solver, backend):
-    """From near its upper limit the short way to the target leads beyond it."""
+def test_a_hinge_that_covers_the_circle_goes_round_where_it_must(solver, backend):
+    """From near its upper limit the smaller angle to the target leads beyond it."""
     arm = Articulation(
         Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"], lower=-4.0, upper=4.0
     )
@@ -250,7 +250,9 @@ def test_a_hinge_of_whole_turns_goes_round_where_it_must(solver, backend):
 @pytest.mark.parametrize(
     ("lower", "upper"), [(-4.0, 4.0), (-1.0, 9.0), (-np.inf, 2.0), (0, np.inf)]
 )
-def test_beyond_its_limits_a_hinge_takes_the_nearest_angle_of_the_same_turn(lower, upper, machine):
+def test_beyond_its_limits_a_hinge_takes_the_nearest_angle_of_the_same_period(
+    lower, upper, machine
+):
     arm = Articulation(
         Skeleton([-1, 0], np.eye(2, 3)), ["hinge", "fixed"], lower=lower, upper=upper
     )
@@ -274,7 +276,7 @@ def test_beyond_its_limits_a_hinge_takes_the_nearest_angle_of_the_same_turn(lowe
 @pytest.mark.parametrize("rank", [0, 1, 2, 3])
 @pytest.mark.parametrize("damping", [0.0, 1e-30, 1e-12, 1.0])
 def test_a_singular_system_has_a_finite_answer(chain_of_joints, machine, rng, rank, damping):
-    """Rows of low rank in a turned world; the damping is held above rounding, whatever is asked."""
+    """Rows of low rank in a rotated world; the damping is above rounding, whatever is asked."""
     for _ in range(20):
         model = chain_of_joints("ball", rng, links=3)
         target = Target([1.0, 2.0, 3.0], rotation.identity(), 3)
