@@ -55,8 +55,8 @@ def run_claims(
     Raises:
         ValueError: if a name is unknown or the list is empty.
     """
-    wanted = CLAIMS if names is None else names
-    chosen = [arguments.choice("names", name, CLAIMS) for name in wanted]
+    asked = CLAIMS if names is None else names
+    chosen = [arguments.choice("names", name, CLAIMS) for name in asked]
     if not chosen:
         raise ValueError("names: expected at least one claim, got none")
     verdicts = []

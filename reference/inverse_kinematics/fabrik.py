@@ -207,8 +207,8 @@ def forward_joint(mechanism, target, data, work, j):
         angle = best_angle(attitude_profile(mechanism, target, data, work.backward, j), axis)
         R = multiply(rotation_about(axis, move_by(joints, q, j, angle)), R)
     elif kind == BALL and work.backward["weight"][j] > 0.0:
-        wanted = multiply(forward_rotation(mechanism, target, data, work, j), R)
-        R = rotate_to(joints, q, j, frame_of(joints, j, data.rotations), wanted)
+        R_wanted = multiply(forward_rotation(mechanism, target, data, work, j), R)
+        R = rotate_to(joints, q, j, frame_of(joints, j, data.rotations), R_wanted)
     store_quaternion(data.rotations, j, normalised(R))
 
 
@@ -221,13 +221,13 @@ def forward_free(mechanism, target, data, work, j):
     one, the least of the best rotations is taken.
     """
     joints, x = mechanism.joints, load_vector(data.positions, j)
-    total, arm, wanted = mean_arms(mechanism, target, data, work.backward, j)
+    total, arm, to = mean_arms(mechanism, target, data, work.backward, j)
     M = attitude_profile(mechanism, target, data, work.backward, j)
-    M = add_outer(M, -total, wanted, arm)
+    M = add_outer(M, -total, to, arm)
     stay = LEAST_ROTATION * total * mechanism.reach * mechanism.reach
     M = add_rotation(M, stay, IDENTITY)
     Q = best_rotation(M, work.eigen[0], work.eigen[1])
-    v, frame = subtract(wanted, rotate(Q, arm)), frame_of(joints, j, data.rotations)
+    v, frame = subtract(to, rotate(Q, arm)), frame_of(joints, j, data.rotations)
     R = rotate_to(joints, data.q, j, frame, multiply(Q, load_quaternion(data.rotations, j)))
     translate_free(joints, data.q, j, rotate(conjugate(frame), v))
     store_vector(data.positions, j, add(x, v))
@@ -236,20 +236,20 @@ def forward_free(mechanism, target, data, work, j):
 
 def mean_arms(mechanism, target, data, backward, j):
     """Return the weight of what `attitude_profile` counts, and the means of its arms [m]."""
-    total, arms, wanted = 0.0, ZERO, ZERO
+    total, arms, ends = 0.0, ZERO, ZERO
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
             arm, to = effector_arms(mechanism, target, data, e, j)
             weight = target["weight"][e]
-            arms, wanted = add(arms, scale(weight, arm)), add(wanted, scale(weight, to))
+            arms, ends = add(arms, scale(weight, arm)), add(ends, scale(weight, to))
             total += weight
     for c in range(j + 1, len(backward)):
         if mechanism.adjacent[j, c]:
             arm, to = joint_arms(mechanism, data, backward, c, j)
             weight = backward["weight"][c]
-            arms, wanted = add(arms, scale(weight, arm)), add(wanted, scale(weight, to))
+            arms, ends = add(arms, scale(weight, arm)), add(ends, scale(weight, to))
             total += weight
-    return total, scale(1.0 / total, arms), scale(1.0 / total, wanted)
+    return total, scale(1.0 / total, arms), scale(1.0 / total, ends)
 
 
 def forward_rotation(mechanism, target, data, work, j):

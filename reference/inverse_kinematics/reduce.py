@@ -30,14 +30,15 @@ class Prepared(NamedTuple):
     Attributes:
         mechanism: what moves the effectors.
         restarts: the mechanism's coordinates in random poses, (restart, coordinate).
-        tips: where these put the effectors, positions [m] and rotations, (restart, effector, 7).
+        effector_frames: where these put the effectors, positions [m] and rotations, (restart,
+            effector, 7).
         flat: joints of the articulation and mechanism, one array or number after the other, and
             the two above.
     """
 
     mechanism: Mechanism
     restarts: FloatArray
-    tips: FloatArray
+    effector_frames: FloatArray
     flat: tuple[Any, ...]
 
 
@@ -53,11 +54,11 @@ def prepare(
     if key not in articulation.mechanisms:
         mechanism, columns = _prepared(articulation, effectors, oriented)
         poses = _random_poses(articulation, restarts, seed)
-        tips = np.empty((0, len(effectors), 7))
+        effector_frames = np.empty((0, len(effectors), 7))
         if restarts:  # without, forward kinematics need not be compiled
             x, R = articulation.forward(poses)
-            tips = np.concatenate([x, R], axis=-1)[:, list(effectors)]
-        drawn = np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(tips)
+            effector_frames = np.concatenate([x, R], axis=-1)[:, list(effectors)]
+        drawn = np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(effector_frames)
         flat = (articulation.joints, *mechanism, *drawn)
         articulation.mechanisms[key] = Prepared(mechanism, *drawn, flat)
     return articulation.mechanisms[key]

@@ -86,7 +86,8 @@ class MechanismState(NamedTuple):
         data: its configuration.
         workspace: of the solver, what `new_workspace` returns.
         restarts: coordinates of the mechanism for further attempts, (restart, coordinate).
-        tips: where they put the effectors, positions [m] and rotations, (restart, effector, 7).
+        effector_frames: where they put the effectors, positions [m] and rotations, (restart,
+            effector, 7).
         saved: coordinates of the mechanism, (attempt + 1, coordinate).
         progress: see `restarts.py`.
     """
@@ -95,14 +96,14 @@ class MechanismState(NamedTuple):
     data: ConfigurationData
     workspace: Any
     restarts: FloatArray
-    tips: FloatArray
+    effector_frames: FloatArray
     saved: FloatArray
     progress: FloatArray
 
 
 def solve_mechanisms(
     joints, own_joints, sources, effectors, moves, adjacent, reach, width, freedoms, equations,
-    restarts, restart_tips, numbers, starts, targets, local,
+    restarts, restart_frames, numbers, starts, targets, local,
     positions, figures, history, coordinates,
 ):  # fmt: skip
     """Solve target after target; return whether all starts and targets were valid.
@@ -117,7 +118,7 @@ def solve_mechanisms(
     mechanism = Mechanism(
         own_joints, sources, effectors, moves, adjacent, reach, width, freedoms, equations
     )
-    state = new_state(mechanism, restarts, restart_tips)
+    state = new_state(mechanism, restarts, restart_frames)
     rotations = np.empty((len(joints), 4))
     for i in range(len(targets)):
         q, target = coordinates[i], targets[i]
@@ -140,11 +141,11 @@ def solve_mechanisms(
     return True
 
 
-def new_state(mechanism, restarts, tips):
+def new_state(mechanism, restarts, effector_frames):
     """Return a state to begin from."""
     rows = len(restarts) + 2
     return MechanismState(
-        mechanism, new_data(mechanism), new_workspace(mechanism), restarts, tips,
+        mechanism, new_data(mechanism), new_workspace(mechanism), restarts, effector_frames,
         np.empty((rows, mechanism.coordinates)), new_progress(rows - 1),
     )  # fmt: skip
 
@@ -273,10 +274,12 @@ def rank_restarts(state, target):
     for r in range(len(state.restarts)):
         distance, angle = 0.0, 0.0
         for e in range(len(target)):
-            offset = subtract(load_vector(target["position"], e), load_vector(state.tips[r], e))
+            offset = subtract(
+                load_vector(target["position"], e), load_vector(state.effector_frames[r], e)
+            )
             distance = max(distance, norm(offset))
             if state.mechanism.effectors["oriented"][e]:
-                there = load_quaternion(state.tips[r], e, 3)
+                there = load_quaternion(state.effector_frames[r], e, 3)
                 angle = max(angle, rough_angle(there, load_quaternion(target["rotation"], e)))
         state.progress[1 + r, RANK] = distance + lever * angle
 

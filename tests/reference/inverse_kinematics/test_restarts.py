@@ -77,7 +77,7 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
     state = SimpleNamespace(
         mechanism=prepared.mechanism,
         restarts=prepared.restarts,
-        tips=prepared.tips,
+        effector_frames=prepared.effector_frames,
         progress=new_progress(10),
     )
     rank_restarts(state, target)
