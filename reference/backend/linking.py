@@ -18,7 +18,7 @@ class LinkedLibrary(JITCodeLibrary):
     It has no address that Python could call, and so no place for an environment of Python objects.
     """
 
-    def _optimize_functions(self, module):
+    def _optimize_functions(self, module: Any) -> None:
         """Simplify what the module defines, not what it declares: both cost the same."""
         module.data_layout = self._codegen._data_layout
         for function in module.functions:
@@ -26,29 +26,29 @@ class LinkedLibrary(JITCodeLibrary):
                 passes, builder = self._codegen._function_pass_manager()
                 passes.run(function, builder)
 
-    def finalize(self):
+    def finalize(self) -> None:
         """Leave linking, optimisation and machine code to the kernel's library."""
         self._raise_if_finalized()
         self._finalized = True
 
-    def get_pointer_to_function(self, name):
+    def get_pointer_to_function(self, name: str) -> int:
         """Return 0, which stands for no address."""
         self._ensure_finalized()
         return 0
 
     @property
-    def codegen(self):
+    def codegen(self) -> Any:
         """The library itself, as numba asks only for `set_env`."""
         return self
 
-    def set_env(self, name, environment):
+    def set_env(self, name: str, environment: Any) -> None:
         """Do nothing: without machine code no environment is read."""
 
 
 class KernelLibrary(JITCodeLibrary):
     """The code of a kernel, with that of its callees and of theirs linked into it, each once."""
 
-    def add_linking_library(self, library):
+    def add_linking_library(self, library: Any) -> None:
         """Add a library and those that it would have linked."""
         super().add_linking_library(library)
         if isinstance(library, LinkedLibrary):
@@ -73,7 +73,7 @@ NEEDLESS = {
 class LinkedCompiler(Compiler):
     """Numba's compiler, writing into a LinkedLibrary, without passes for what no kernel has."""
 
-    def define_pipelines(self):
+    def define_pipelines(self) -> Any:
         """Return numba's passes without the needless ones."""
         self.state.library = LinkedLibrary(self.state.targetctx.codegen(), "callee")
         pipelines = super().define_pipelines()
@@ -85,7 +85,7 @@ class LinkedCompiler(Compiler):
 class KernelCompiler(Compiler):
     """Numba's compiler, writing into a KernelLibrary."""
 
-    def define_pipelines(self):
+    def define_pipelines(self) -> Any:
         """Return numba's passes."""
         self.state.library = KernelLibrary(self.state.targetctx.codegen(), "kernel")
         self.state.library.enable_object_caching()
@@ -100,14 +100,14 @@ class FixedFlags(Flags):
 
     __slots__ = ["_hash"]
 
-    def __init__(self, flags):
+    def __init__(self, flags: Any) -> None:
         super().__init__(flags)
         self._hash = super().__hash__()
 
-    def __hash__(self):
+    def __hash__(self) -> int:
         return self._hash
 
-    def copy(self):
+    def copy(self) -> Any:
         """Return the flags themselves."""
         return self
 
@@ -119,7 +119,7 @@ _known: dict[FixedFlags, FixedFlags] = {}
 def fix_flags(dispatcher: Any) -> Any:
     """Let a kernel be compiled with FixedFlags."""
 
-    def fixed(flags):
+    def fixed(flags: Any) -> FixedFlags:
         new = FixedFlags(flags)
         return _known.setdefault(new, new)
 
@@ -135,7 +135,7 @@ def compile_directly(dispatcher: Any) -> Any:
     """
     resolve = dispatcher.get_call_template
 
-    def get_call_template(args, kws):
+    def get_call_template(args: Any, kws: Any) -> Any:
         args = [types.unliteral(kind) for kind in args]
         _, folded = dispatcher._compiler.fold_argument_types(args, kws)
         if folded not in dispatcher.overloads:

@@ -110,7 +110,7 @@ def _active(
     return np.array([j for j in sorted(needed) if kinds[j] != FIXED], dtype=np.int64)
 
 
-def _merged(whole: RecordArray, joint: int, number: dict[int, int]):
+def _merged(whole: RecordArray, joint: int, number: dict[int, int]) -> tuple[int, Any, Any]:
     """Return the nearest moving joint above, and this joint's frame in the frame of that one."""
     x, R = load_vector(whole["offset"], joint), load_quaternion(whole["frame"], joint)
     j = int(whole["parent"][joint])
