@@ -77,6 +77,11 @@ class Verdict:
         return not self.failure
 
 
+def each_case(compare: Callable[[int], Comparison]) -> Callable[[int], Iterable[Comparison]]:
+    """Return the comparisons of the first n cases from the comparison of case i."""
+    return lambda cases: map(compare, range(cases))
+
+
 def check_claim(claim: Claim, cases: int | None = None) -> Verdict:
     """Compare all cases of a claim, or the first few, and return the verdict.
 

@@ -32,6 +32,8 @@ from .quaternion import (
     multiply,
     normalised,
     perpendicular,
+    put_quaternion,
+    quaternion_at,
     rotate,
     rotation_about,
     scale,
@@ -213,9 +215,7 @@ class Articulation:
         Raises:
             ValueError: if there is no such joint.
         """
-        j = self.index(joint)
-        begin = int(self.joints["coordinate"][j])
-        return slice(begin, begin + int(WIDTHS[self.joints["kind"][j]]))
+        return self._range("coordinate", WIDTHS, joint)
 
     def freedoms_of(self, joint: int | str) -> slice:
         """Return where a joint's degrees of freedom are in a velocity, likewise.
@@ -223,9 +223,12 @@ class Articulation:
         Raises:
             ValueError: if there is no such joint.
         """
+        return self._range("freedom", FREEDOMS, joint)
+
+    def _range(self, field: str, counts: IndexArray, joint: int | str) -> slice:
         j = self.index(joint)
-        begin = int(self.joints["freedom"][j])
-        return slice(begin, begin + int(FREEDOMS[self.joints["kind"][j]]))
+        begin = int(self.joints[field][j])
+        return slice(begin, begin + int(counts[self.joints["kind"][j]]))
 
     def neutral(self) -> FloatArray:
         """Return the coordinates in which every joint is at zero, or at its nearest limit."""
@@ -286,11 +289,7 @@ class Articulation:
         Raises:
             ValueError: as for `clamp`.
         """
-        given = self.checked("q", q)
-        shape = (*given.shape[:-1], self.joint_count)
-        offsets, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
-        _locals(self.joints, one_batch(given), one_batch(offsets, 2), one_batch(rotations, 2))
-        return offsets, rotations
+        return self._posed(_locals, q)
 
     def forward(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4).
@@ -298,10 +297,13 @@ class Articulation:
         Raises:
             ValueError: as for `clamp`.
         """
+        return self._posed(_forward, q)
+
+    def _posed(self, kernel: Kernel, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         given = self.checked("q", q)
         shape = (*given.shape[:-1], self.joint_count)
         positions, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
-        _forward(self.joints, one_batch(given), one_batch(positions, 2), one_batch(rotations, 2))
+        kernel(self.joints, one_batch(given), one_batch(positions, 2), one_batch(rotations, 2))
         return positions, rotations
 
     def checked(self, name: str, q: ArrayLike) -> FloatArray:
@@ -355,10 +357,10 @@ def joint_transform(joints, j, q):
         distance = joints["multiplier"][j] * q[at] + joints["shift"][j]
         x = add(x, rotate(R, scale(distance, load_vector(joints["axis"], j))))
     elif kind == BALL:
-        R = multiply(R, (q[at], q[at + 1], q[at + 2], q[at + 3]))
+        R = multiply(R, quaternion_at(q, at))
     elif kind == FREE:
         x = add(x, rotate(R, (q[at], q[at + 1], q[at + 2])))
-        R = multiply(R, (q[at + 3], q[at + 4], q[at + 5], q[at + 6]))
+        R = multiply(R, quaternion_at(q, at + 3))
     return x, R
 
 
@@ -416,10 +418,9 @@ def clamp_joint(joints, j, q):
     if kind in (HINGE, SLIDE):
         q[at] = min(max(q[at], joints["lower"][j]), joints["upper"][j])
     elif kind == BALL:
-        Q = (q[at], q[at + 1], q[at + 2], q[at + 3])
         bounds = joints["lower"][j], joints["upper"][j], joints["cone"][j]
-        w, x, y, z = clamp_ball(Q, load_vector(joints["axis"], j), *bounds)
-        q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
+        Q = clamp_ball(quaternion_at(q, at), load_vector(joints["axis"], j), *bounds)
+        put_quaternion(q, at, Q)
 
 
 def joint_excess(joints, j, q):
@@ -430,9 +431,7 @@ def joint_excess(joints, j, q):
     if kind in (HINGE, SLIDE):
         return max(joints["lower"][j] - q[at], q[at] - joints["upper"][j], 0.0)
     if kind == BALL:
-        swing, twist = swing_twist(
-            (q[at], q[at + 1], q[at + 2], q[at + 3]), load_vector(joints["axis"], j)
-        )
+        swing, twist = swing_twist(quaternion_at(q, at), load_vector(joints["axis"], j))
         tilt = logarithm(swing)
         over = math.sqrt(dot(tilt, tilt)) - joints["cone"][j]
         return max(joints["lower"][j] - twist, twist - joints["upper"][j], over, 0.0)
@@ -448,13 +447,17 @@ def fit_start(joints, q):
     for k in range(len(q)):
         valid &= abs(q[k]) <= LARGEST_COORDINATE
     for j in range(len(joints)):
-        kind = joints["kind"][j]
-        if kind in (BALL, FREE):
-            at = joints["coordinate"][j] + (3 if kind == FREE else 0)
-            Q, unit = made_unit((q[at], q[at + 1], q[at + 2], q[at + 3]))
-            q[at], q[at + 1], q[at + 2], q[at + 3] = Q
+        if joints["kind"][j] in (BALL, FREE):
+            at = ball_coordinate(joints, j)
+            Q, unit = made_unit(quaternion_at(q, at))
+            put_quaternion(q, at, Q)
             valid &= unit
     return valid
+
+
+def ball_coordinate(joints, j):
+    """Return where the quaternion of a ball or free joint begins in q."""
+    return joints["coordinate"][j] + (3 if joints["kind"][j] == FREE else 0)
 
 
 def articulated_pose(joints, q, positions, rotations):

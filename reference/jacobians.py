@@ -30,6 +30,8 @@ from .quaternion import (
     load_vector,
     logarithm,
     multiply,
+    put_quaternion,
+    quaternion_at,
     subtract,
 )
 from .skeleton import Skeleton
@@ -81,7 +83,7 @@ def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
     """
     model, start = _coordinates("q", articulation, q)
     step = arguments.coordinates("v", v, "...", model.freedom_count)
-    start, step = _spread("v", start, step)
+    start, step = arguments.together("v", start, step)
     moved = start.copy()
     _integrate(model.joints, one_batch(step), one_batch(moved))
     return moved.reshape(*moved.shape[:-1], -1, 4) if isinstance(articulation, Skeleton) else moved
@@ -97,7 +99,7 @@ def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
     """
     model, start = _coordinates("q0", articulation, q0)
     _, end = _coordinates("q1", articulation, q1)
-    start, end = _spread("q1", start, end)
+    start, end = arguments.together("q1", start, end)
     v = np.empty((*start.shape[:-1], model.freedom_count))
     _difference(model.joints, one_batch(end), one_batch(start), one_batch(v))
     return v
@@ -133,9 +135,7 @@ def move_joint(joints, j, v, q):
 
 def rotate_ball(q, at, v):
     """Rotate the quaternion that begins at an index of q by a rotation vector in its own frame."""
-    Q = (q[at], q[at + 1], q[at + 2], q[at + 3])
-    w, x, y, z = multiply(Q, exponential(v))
-    q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
+    put_quaternion(q, at, multiply(quaternion_at(q, at), exponential(v)))
 
 
 def joint_difference(joints, j, q1, q0, v):
@@ -155,8 +155,7 @@ def joint_difference(joints, j, q1, q0, v):
 
 def rotation_between(q1, q0, at):
     """Return log(Q0* Q1), the rotation vector in Q0's own frame from Q0 to Q1."""
-    Q0 = (q0[at], q0[at + 1], q0[at + 2], q0[at + 3])
-    return logarithm(multiply(conjugate(Q0), (q1[at], q1[at + 1], q1[at + 2], q1[at + 3])))
+    return logarithm(multiply(conjugate(quaternion_at(q0, at)), quaternion_at(q1, at)))
 
 
 def _jacobians_batch(joints, effectors, q, J):
@@ -199,9 +198,3 @@ def _coordinates(name: str, given: Model, q: ArrayLike) -> tuple[Articulation, F
     balls = Articulation(model)
     local = arguments.floats(name, q, "...", model.joint_count, 4)
     return balls, balls.checked(name, local.reshape(*local.shape[:-2], balls.coordinate_count))
-
-
-def _spread(name: str, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return both with the same leading axes; `name` is the second's, for the error."""
-    batch = arguments.broadcast(name, a.shape[:-1], b.shape[:-1])
-    return arguments.spread(a, (*batch, a.shape[-1])), arguments.spread(b, (*batch, b.shape[-1]))

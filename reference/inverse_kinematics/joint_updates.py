@@ -1,7 +1,14 @@
 """Changes of one joint's coordinates within its limits."""
 
-from ..articulation import FREE, clamp_ball
-from ..quaternion import conjugate, load_vector, multiply, normalised
+from ..articulation import FREE, ball_coordinate, clamp_ball
+from ..quaternion import (
+    conjugate,
+    load_vector,
+    multiply,
+    normalised,
+    put_quaternion,
+    quaternion_at,
+)
 
 
 def move_by(joints, q, j, wanted):
@@ -14,14 +21,12 @@ def move_by(joints, q, j, wanted):
 
 def ball_at(joints, q, j):
     """Return the quaternion of a ball or free joint."""
-    at = joints["coordinate"][j] + (3 if joints["kind"][j] == FREE else 0)
-    return q[at], q[at + 1], q[at + 2], q[at + 3]
+    return quaternion_at(q, ball_coordinate(joints, j))
 
 
 def put_ball(joints, q, j, Q):
     """Write the quaternion of a ball or free joint."""
-    at = joints["coordinate"][j] + (3 if joints["kind"][j] == FREE else 0)
-    q[at], q[at + 1], q[at + 2], q[at + 3] = Q
+    put_quaternion(q, ball_coordinate(joints, j), Q)
 
 
 def rotate_to(joints, q, j, frame, R):

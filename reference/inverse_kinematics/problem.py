@@ -1,6 +1,6 @@
 """What is asked of a solver, and what it answers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
@@ -80,6 +80,11 @@ class CheckedTarget(NamedTuple):
     position: FloatArray
     rotation: FloatArray | None
     weight: float
+
+    def mapped(self, change: Callable[[FloatArray], FloatArray]) -> "CheckedTarget":
+        """Return the target with its position and its rotation, if it has one, changed."""
+        Q = None if self.rotation is None else change(self.rotation)
+        return self._replace(position=change(self.position), rotation=Q)
 
 
 def checked_targets(

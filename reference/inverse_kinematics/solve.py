@@ -174,21 +174,12 @@ def batch_shape(
     """
     batch = starts
     for one in targets:
-        if one.position.ndim > 1:
-            batch = _broadcast(name, batch, one.position.shape[:-1])
-        if one.rotation is not None and one.rotation.ndim > 1:
-            batch = _broadcast(name, batch, one.rotation.shape[:-1])
+        for values in (one.position, one.rotation):
+            if values is not None and values.ndim > 1:
+                batch = arguments.broadcast(
+                    "target", batch, values.shape[:-1], f"those of {name}, "
+                )
     return batch
-
-
-def _broadcast(name: str, starts: tuple[int, ...], targets: tuple[int, ...]) -> tuple[int, ...]:
-    try:
-        return np.broadcast_shapes(starts, targets)
-    except ValueError:
-        raise ValueError(
-            f"target: expected leading axes that broadcast with those of {name}, "
-            f"{arguments.shape(starts)}, got {arguments.shape(targets)}"
-        ) from None
 
 
 def _rows(starts: FloatArray, batch: tuple[int, ...], axes: int) -> FloatArray:
