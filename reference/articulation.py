@@ -26,18 +26,18 @@ from .quaternion import (
     exponential,
     half_angle,
     load_quaternion,
+    load_quaternion_from,
     load_vector,
     logarithm,
     made_unit,
     multiply,
     normalised,
     perpendicular,
-    put_quaternion,
-    quaternion_at,
     rotate,
     rotation_about,
     scale,
     store_quaternion,
+    store_quaternion_to,
     store_vector,
 )
 from .skeleton import Skeleton, checked_skeleton
@@ -357,10 +357,10 @@ def joint_transform(joints, j, q):
         distance = joints["multiplier"][j] * q[at] + joints["shift"][j]
         x = add(x, rotate(R, scale(distance, load_vector(joints["axis"], j))))
     elif kind == BALL:
-        R = multiply(R, quaternion_at(q, at))
+        R = multiply(R, load_quaternion_from(q, at))
     elif kind == FREE:
         x = add(x, rotate(R, (q[at], q[at + 1], q[at + 2])))
-        R = multiply(R, quaternion_at(q, at + 3))
+        R = multiply(R, load_quaternion_from(q, at + 3))
     return x, R
 
 
@@ -419,8 +419,8 @@ def clamp_joint(joints, j, q):
         q[at] = min(max(q[at], joints["lower"][j]), joints["upper"][j])
     elif kind == BALL:
         bounds = joints["lower"][j], joints["upper"][j], joints["cone"][j]
-        Q = clamp_ball(quaternion_at(q, at), load_vector(joints["axis"], j), *bounds)
-        put_quaternion(q, at, Q)
+        Q = clamp_ball(load_quaternion_from(q, at), load_vector(joints["axis"], j), *bounds)
+        store_quaternion_to(q, at, Q)
 
 
 def joint_excess(joints, j, q):
@@ -431,14 +431,14 @@ def joint_excess(joints, j, q):
     if kind in (HINGE, SLIDE):
         return max(joints["lower"][j] - q[at], q[at] - joints["upper"][j], 0.0)
     if kind == BALL:
-        swing, twist = swing_twist(quaternion_at(q, at), load_vector(joints["axis"], j))
+        swing, twist = swing_twist(load_quaternion_from(q, at), load_vector(joints["axis"], j))
         tilt = logarithm(swing)
         over = math.sqrt(dot(tilt, tilt)) - joints["cone"][j]
         return max(joints["lower"][j] - twist, twist - joints["upper"][j], over, 0.0)
     return 0.0
 
 
-def fit_start(joints, q):
+def normalise_start(joints, q):
     """Make the quaternions among coordinates unit; return whether they and all others are valid.
 
     Valid are numbers up to 1e75, and quaternions unit within 1e-6.
@@ -449,8 +449,8 @@ def fit_start(joints, q):
     for j in range(len(joints)):
         if joints["kind"][j] in (BALL, FREE):
             at = ball_coordinate(joints, j)
-            Q, unit = made_unit(quaternion_at(q, at))
-            put_quaternion(q, at, Q)
+            Q, unit = made_unit(load_quaternion_from(q, at))
+            store_quaternion_to(q, at, Q)
             valid &= unit
     return valid
 

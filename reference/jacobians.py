@@ -27,11 +27,11 @@ from .motion_subspace import accumulate, motion, velocity_at
 from .quaternion import (
     conjugate,
     exponential,
+    load_quaternion_from,
     load_vector,
     logarithm,
     multiply,
-    put_quaternion,
-    quaternion_at,
+    store_quaternion_to,
     subtract,
 )
 from .skeleton import Skeleton
@@ -135,7 +135,7 @@ def move_joint(joints, j, v, q):
 
 def rotate_ball(q, at, v):
     """Rotate the quaternion that begins at an index of q by a rotation vector in its own frame."""
-    put_quaternion(q, at, multiply(quaternion_at(q, at), exponential(v)))
+    store_quaternion_to(q, at, multiply(load_quaternion_from(q, at), exponential(v)))
 
 
 def joint_difference(joints, j, q1, q0, v):
@@ -155,7 +155,9 @@ def joint_difference(joints, j, q1, q0, v):
 
 def rotation_between(q1, q0, at):
     """Return log(Q0* Q1), the rotation vector in Q0's own frame from Q0 to Q1."""
-    return logarithm(multiply(conjugate(quaternion_at(q0, at)), quaternion_at(q1, at)))
+    return logarithm(
+        multiply(conjugate(load_quaternion_from(q0, at)), load_quaternion_from(q1, at))
+    )
 
 
 def _jacobians_batch(joints, effectors, q, J):

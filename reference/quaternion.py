@@ -43,12 +43,12 @@ def store_vector(p, j, value):
     p[j, 0], p[j, 1], p[j, 2] = value
 
 
-def quaternion_at(q, k):
+def load_quaternion_from(q, k):
     """Return four entries of an array from the k-th on, as a tuple."""
     return q[k], q[k + 1], q[k + 2], q[k + 3]
 
 
-def put_quaternion(q, k, value):
+def store_quaternion_to(q, k, value):
     """Write a tuple into four entries of an array from the k-th on."""
     q[k], q[k + 1], q[k + 2], q[k + 3] = value
 

@@ -14,7 +14,7 @@ from ..articulation import BALL, FREE, HINGE, SLIDE, clamp_joint
 from ..jacobians import move_joint
 from ..quaternion import normalised
 from .jacobian import LEAST_DAMPING
-from .joint_updates import ball_at, put_ball
+from .joint_updates import load_ball, store_ball
 from .mechanism import update_forward_kinematics
 from .task_jacobian import clear, fill_errors, fill_jacobian
 
@@ -243,7 +243,7 @@ def take_step(mechanism, data, system):
                 step[k + i] *= mechanism.reach
             move_joint(joints, j, step, q)
             if kind in (BALL, FREE):
-                put_ball(joints, q, j, normalised(ball_at(joints, q, j)))
+                store_ball(joints, q, j, normalised(load_ball(joints, q, j)))
             elif covers_circle(joints, j):
                 wrap(joints, j, q)
             clamp_joint(joints, j, q)

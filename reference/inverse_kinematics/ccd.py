@@ -32,16 +32,16 @@ from .box_step import (
     new_task_system,
     squared,
 )
-from .chain import place_joints
-from .joint_updates import ball_at, move_by, put_ball, rotate_to, translate_free
+from .chain import update_positions
+from .joint_updates import load_ball, move_by, rotate_to, store_ball, translate_free
 from .mechanism import (
     cost,
     effector_position,
     effector_rotation,
     position_error,
-    put_effector,
     rotation_error,
     rotation_weight,
+    store_effector,
     update_forward_kinematics,
 )
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, best_rotation
@@ -85,7 +85,7 @@ def ccd_sweep(chain, target):
         above = renormalised(multiply(above, load_quaternion(chain.deltas, k)))
         R = load_quaternion(chain.rotations, k)
         store_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
-    place_joints(chain)
+    update_positions(chain)
 
 
 def pointing(joint, effector, target):
@@ -167,11 +167,11 @@ def rotate_within_limits(mechanism, target, data, work, j, M):
     """Rotate a ball or free joint as is best within its limits; return the rotation made."""
     joints, R = mechanism.joints, load_quaternion(data.rotations, j)
     Q = unlimited_rotation(mechanism, target, data, work, j, M)
-    before = ball_at(joints, data.q, j)
+    before = load_ball(joints, data.q, j)
     moved = rotate_to(joints, data.q, j, frame_of(joints, j, data.rotations), multiply(Q, R))
     allowed = renormalised(multiply(moved, conjugate(R)))
     if joints["kind"][j] == BALL and alignment(M, allowed) < alignment(M, IDENTITY):
-        put_ball(joints, data.q, j, before)
+        store_ball(joints, data.q, j, before)
         return IDENTITY
     return allowed
 
@@ -204,7 +204,7 @@ def rotate_effectors(mechanism, data, j, Q):
         if mechanism.moves[j, e]:
             arm = subtract(effector_position(mechanism, data, e), x)
             R = multiply(Q, effector_rotation(mechanism, data, e))
-            put_effector(mechanism, data, e, add(x, rotate(Q, arm)), R)
+            store_effector(mechanism, data, e, add(x, rotate(Q, arm)), R)
 
 
 def translate_effectors(mechanism, data, j, v):
@@ -212,7 +212,7 @@ def translate_effectors(mechanism, data, j, v):
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
             moved = add(effector_position(mechanism, data, e), v)
-            put_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
+            store_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
 
 
 def descend(mechanism, target, data, work, j):

@@ -78,10 +78,10 @@ def pose_chain(chain, path, local):
     for k in range(1, len(path)):
         R_parent = load_quaternion(chain.rotations, k - 1)
         store_quaternion(chain.rotations, k, multiply(R_parent, load_quaternion(local, path[k])))
-    place_joints(chain)
+    update_positions(chain)
 
 
-def place_joints(chain):
+def update_positions(chain):
     """Compute the positions from the rotations, the root fixed."""
     for k in range(len(chain.lengths)):
         link = rotate(load_quaternion(chain.rotations, k), load_vector(chain.offsets, k + 1))
@@ -101,7 +101,7 @@ def rotate_links(chain):
         store_quaternion(chain.rotations, k, renormalised(multiply(between(link, direction), R)))
 
 
-def put_local(chain, path, local):
+def store_local(chain, path, local):
     """Write the chain's local rotations over those of (joint, 4); the effector keeps its own."""
     store_quaternion(local, path[0], load_quaternion(chain.rotations, 0))
     for k in range(1, len(chain.lengths)):
@@ -110,7 +110,7 @@ def put_local(chain, path, local):
         store_quaternion(local, path[k], renormalised(q))
 
 
-def tip_error(chain, target):
+def effector_error(chain, target):
     """Return the distance from the effector to the target [m]."""
     return norm(subtract(load_vector(chain.positions, len(chain.lengths)), target))
 
@@ -134,12 +134,12 @@ def rounding(chain, d):
     return POSITION_ROUNDING * (chain.reach + d)
 
 
-def out_of_reach(chain, d):
+def is_beyond_reach(chain, d):
     """Return whether a target at distance d lies at full reach, to rounding, or beyond."""
     return d >= chain.reach - rounding(chain, d)
 
 
-def inside_inner_radius(chain, d):
+def is_inside_inner_radius(chain, d):
     """Return whether a target at distance d is the inner radius, to rounding, or less."""
     return d <= 2.0 * chain.longest - chain.reach + rounding(chain, d)
 
@@ -159,7 +159,7 @@ def drawn_near(chain, target, beyond):
     return add(root, scale((d - least if d > chain.reach else d + least) / d, direction))
 
 
-def on_one_line(chain, target):
+def is_collinear(chain, target):
     """Return whether all joints and the target lie on a line through the root.
 
     On it every solver that rotates links towards the target in their common plane has no plane to
@@ -191,4 +191,4 @@ def bend(chain):
         store_quaternion(
             chain.rotations, k, renormalised(multiply(Q, load_quaternion(chain.rotations, k)))
         )
-    place_joints(chain)
+    update_positions(chain)

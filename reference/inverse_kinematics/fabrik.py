@@ -31,7 +31,7 @@ from ..quaternion import (
     store_vector,
     subtract,
 )
-from .chain import inside_inner_radius, out_of_reach, root_distance
+from .chain import is_beyond_reach, is_inside_inner_radius, root_distance
 from .joint_updates import move_by, rotate_to, translate_free
 from .mechanism import rotation_weight, update_forward_kinematics
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, best_angle, best_rotation
@@ -67,9 +67,9 @@ def fabrik_sweep(chain, target):
     Only positions move; the joints' rotations follow after the last sweep.
     """
     d = root_distance(chain, target)
-    if out_of_reach(chain, d):
+    if is_beyond_reach(chain, d):
         lay_on_line(chain, target, 1.0)
-    elif inside_inner_radius(chain, d):
+    elif is_inside_inner_radius(chain, d):
         lay_on_line(chain, target, -1.0)
     else:
         reach_backward(chain, target)
@@ -124,7 +124,7 @@ def fabrik_update(mechanism, target, data, work):
     backward_pass(mechanism, target, data, work.backward)
     joints = mechanism.joints
     for j in range(len(joints)):
-        put_joint(joints, data, work.backward, j)
+        update_joint_pose(joints, data, work.backward, j)
         forward_joint(mechanism, target, data, work, j)
     update_forward_kinematics(mechanism, data)
 
@@ -173,7 +173,7 @@ def add_backward(backward, j, weight, x):
     backward["weight"][j] += weight
 
 
-def put_joint(joints, data, backward, j):
+def update_joint_pose(joints, data, backward, j):
     """Put a joint where its parent and its coordinates have it now.
 
     A ball with a backward position below keeps the rotation in the world that it had.

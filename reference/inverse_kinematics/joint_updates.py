@@ -3,11 +3,11 @@
 from ..articulation import FREE, ball_coordinate, clamp_ball
 from ..quaternion import (
     conjugate,
+    load_quaternion_from,
     load_vector,
     multiply,
     normalised,
-    put_quaternion,
-    quaternion_at,
+    store_quaternion_to,
 )
 
 
@@ -19,14 +19,14 @@ def move_by(joints, q, j, wanted):
     return q[at] - before
 
 
-def ball_at(joints, q, j):
+def load_ball(joints, q, j):
     """Return the quaternion of a ball or free joint."""
-    return quaternion_at(q, ball_coordinate(joints, j))
+    return load_quaternion_from(q, ball_coordinate(joints, j))
 
 
-def put_ball(joints, q, j, Q):
+def store_ball(joints, q, j, Q):
     """Write the quaternion of a ball or free joint."""
-    put_quaternion(q, ball_coordinate(joints, j), Q)
+    store_quaternion_to(q, ball_coordinate(joints, j), Q)
 
 
 def rotate_to(joints, q, j, frame, R):
@@ -38,7 +38,7 @@ def rotate_to(joints, q, j, frame, R):
     if joints["kind"][j] != FREE:
         axis, cone = load_vector(joints["axis"], j), joints["cone"][j]
         Q = clamp_ball(Q, axis, joints["lower"][j], joints["upper"][j], cone)
-    put_ball(joints, q, j, Q)
+    store_ball(joints, q, j, Q)
     return multiply(frame, Q)
 
 

@@ -12,8 +12,8 @@ from ..articulation import (
     HINGE,
     articulated_pose,
     clamp_joint,
-    fit_start,
     joint_transform,
+    normalise_start,
 )
 from ..backend.compiled import Kernel, Slot, bind
 from ..quaternion import (
@@ -29,7 +29,7 @@ from ..quaternion import (
     subtract,
 )
 from .chain import BEND, POSITION_ROUNDING
-from .joint_updates import ball_at, move_by, put_ball
+from .joint_updates import load_ball, move_by, store_ball
 from .mechanism import (
     LEVER,
     ConfigurationData,
@@ -124,7 +124,7 @@ def solve_mechanisms(
         q, target = coordinates[i], targets[i]
         chained = limits.chained and i > 0
         copy_row(coordinates[i - 1] if chained else starts[i % len(starts)], q)
-        if not (fit_start(joints, q) and normalise_target(target)):
+        if not (normalise_start(joints, q) and normalise_target(target)):
             return False
         begin(state, q)
         least = least_residual(mechanism, target)
@@ -245,7 +245,7 @@ def perturb_joint(joints, q, j, angle):
         move_by(joints, q, j, -angle)
     elif kind in (BALL, FREE):
         bend = rotation_about(PERTURBATION_AXIS, angle)
-        put_ball(joints, q, j, normalised(multiply(ball_at(joints, q, j), bend)))
+        store_ball(joints, q, j, normalised(multiply(load_ball(joints, q, j), bend)))
         clamp_joint(joints, j, q)
 
 

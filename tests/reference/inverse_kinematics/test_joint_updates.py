@@ -20,7 +20,7 @@ from reference.inverse_kinematics.fabrik import (
     backward_pass,
     fabrik_update,
     forward_joint,
-    put_joint,
+    update_joint_pose,
 )
 from reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
 from reference.inverse_kinematics.reduce import prepare
@@ -269,7 +269,7 @@ def test_forward_each_joint_is_left_where_the_coordinates_put_it(
     backward_pass(mechanism, target, data, workspace.backward)
     count = len(mechanism.joints)
     for j in range(count):
-        put_joint(mechanism.joints, data, workspace.backward, j)
+        update_joint_pose(mechanism.joints, data, workspace.backward, j)
         forward_joint(mechanism, target, data, workspace, j)
     positions, rotations = data.positions[:count].copy(), data.rotations[:count].copy()
     update_forward_kinematics(mechanism, data)
