@@ -393,7 +393,7 @@ def print_verdicts(verdicts: Iterable[Any]) -> None:
             words(verdict.cases),
             words(verdict.difference),
             words(verdict.claim.tolerance.value),
-            "held" if verdict.holds else f"MISSED: {verdict.missed}",
+            "held" if verdict.holds else f"MISSED: {verdict.failure}",
             style=None if verdict.holds else "bold red",
         )
     console = Console(
