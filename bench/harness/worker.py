@@ -4,13 +4,13 @@ A solver may print, crash or hang: it does so in a process of its own, which `is
 Only messages go through the connection.
 """
 
-import os
-import threading
 from collections.abc import Iterator, Mapping
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+
+from crosscheck.child_process import attach
 
 from .progress import Progress, listening
 
@@ -98,13 +98,5 @@ def serve(connection: Connection) -> None:
 
 
 def main(descriptor: int) -> None:
-    """Serve at a connection that this process was born with, for as long as its parent lives."""
-    os.set_inheritable(descriptor, False)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    serve(Connection(descriptor))
-
-
-def _end_with_parent() -> None:
-    """Wait for the end of the input, which only the parent holds open, and leave."""
-    os.read(0, 1)
-    os._exit(1)
+    """Serve at a connection that this process was started with, as long as its parent lives."""
+    serve(attach(descriptor))
