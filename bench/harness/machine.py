@@ -27,7 +27,7 @@ _PACKAGES = ("reference", "crosscheck", "bench")
 # What only shows numbers; all else may change one. None of these is imported by what measures.
 PRESENTATION = ("bench/cli.py", "bench/show.py", "bench/presentation")
 # Likewise in every experiment.
-PRESENTATION_FILES = ("tables.py", "figures.py", "entries.py", "files.py")
+PRESENTATION_FILES = ("tables.py", "figures.py", "readings.py", "files.py")
 
 
 @functools.cache

@@ -73,7 +73,7 @@ SECTIONS = (
 
 def offered(experiment: Experiment) -> tuple[Entry, ...]:
     """Return the entries of an experiment; its tables and figures are imported only now."""
-    entries: tuple[Entry, ...] = importlib.import_module(f"{experiment.package}.entries").ENTRIES
+    entries: tuple[Entry, ...] = importlib.import_module(f"{experiment.package}.tables").ENTRIES
     return entries
 
 

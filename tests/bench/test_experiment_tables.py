@@ -1,5 +1,7 @@
 """Tables of experiments show the numbers of the records, and their sentences follow them."""
 
+import csv
+import io
 import math
 from dataclasses import replace
 
@@ -17,6 +19,7 @@ from bench.experiments.robots import tables as robots
 from bench.experiments.timing import tables as timing
 from bench.presentation.results import Results
 from bench.presentation.sections import SECTIONS, tables
+from bench.presentation.tables import comma_separated
 
 
 def column(table, heading):
@@ -33,6 +36,12 @@ def test_every_table_has_a_name_of_its_own_and_says_how_it_was_measured():
     made = tables(Results([]))
     assert len({table.name for table in made}) == len(made)
     assert all(table.shows and table.measured for table in made)
+
+
+def test_every_number_in_csv_is_one(records):
+    for table in tables(Results(records)):
+        for row in list(csv.reader(io.StringIO(comma_separated(table))))[1:]:
+            assert not [cell for cell in row if cell.startswith(("np.", "array"))], table.name
 
 
 def test_every_section_has_a_name_of_its_own():

@@ -13,7 +13,8 @@ from ...presentation.figures import (
     written,
 )
 from ...presentation.results import Results
-from . import tables as cloth_peers
+from . import MOTION, ONE_STEP
+from .readings import Point, points
 
 # Errors beyond this are left out: of a motion that blew up.
 MOST_DRAWN = 10.0
@@ -27,7 +28,7 @@ def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str
     """
 
     def draw(results: Results) -> Drawing | None:
-        found = [p for p in cloth_peers.points(results, task) if _can_be_drawn(p, error)]
+        found = [p for p in points(results, task) if _can_be_drawn(p, error)]
         if not found:
             return None
         stiffnesses, sizes = (
@@ -55,9 +56,7 @@ def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str
     return draw
 
 
-def _work_precision_curves(
-    ax: Axes, found: list[cloth_peers.Point], names: list[str], error: str
-) -> None:
+def _work_precision_curves(ax: Axes, found: list[Point], names: list[str], error: str) -> None:
     for solver in dict.fromkeys(p.solver for p in found):
         mine = [p for p in found if p.solver == solver]
         ax.plot(
@@ -72,15 +71,15 @@ def _marker(solver: str) -> str:
     return registry.ENGINE_MARKERS.get(registry.find(solver).engine, registry.OTHER.marker)
 
 
-def _can_be_drawn(point: cloth_peers.Point, error: str) -> bool:
+def _can_be_drawn(point: Point, error: str) -> bool:
     """Return whether a point has got to its end and lies within what anyone wants to see."""
-    whole = "wanted" not in point.values or cloth_peers.is_whole(point)
+    whole = "wanted" not in point.values or point.is_whole
     return whole and point.values["seconds"] > 0 and 0 < point.values[error] < MOST_DRAWN
 
 
 one_step = work_precision(
     "work_precision_step",
-    cloth_peers.ONE_STEP,
+    ONE_STEP,
     "error",
     (
         "Work and precision in one step",
@@ -90,7 +89,7 @@ one_step = work_precision(
 )
 to_implicit_euler = work_precision(
     "work_precision_implicit",
-    cloth_peers.MOTION,
+    MOTION,
     "implicit",
     (
         "Work and precision, to implicit Euler",
@@ -101,7 +100,7 @@ to_implicit_euler = work_precision(
 )
 to_the_truth = work_precision(
     "work_precision_truth",
-    cloth_peers.MOTION,
+    MOTION,
     "true",
     (
         "Work and precision, to the truth",
