@@ -189,13 +189,7 @@ def bench(
     return code
 
 
-@app.command(
-    epilog=_block(
-        "Examples",
-        "plumbob report",
-        "plumbob report --output results/laptop",
-    )
-)
+@app.command(epilog=_block("Examples", "plumbob report", "plumbob report --output results/laptop"))
 def report(output: Output = REPORT) -> int:
     """Write tables (Markdown, LaTeX, CSV), figures and one offline page from the records."""
     return write_report(output)

@@ -5,14 +5,7 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
-from ...presentation.figures import (
-    COLOURS,
-    Drawing,
-    canvas,
-    finished,
-    plain_powers,
-    written,
-)
+from ...presentation.figures import COLOURS, Drawing, canvas, finished, plain_powers, written
 from ...presentation.results import Results, by_problem, label
 from . import BEYOND, CHAIN
 

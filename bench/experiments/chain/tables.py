@@ -138,9 +138,6 @@ def _rival_summary(pairs: Sequence[Pair]) -> Summary:
 
 
 ENTRIES = (
-    Entry(
-        "Q1. If the target is too far away, what does inverse kinematics give?",
-        beyond_reach,
-    ),
+    Entry("Q1. If the target is too far away, what does inverse kinematics give?", beyond_reach),
     Entry("Q2. How many iterations do CCD and FABRIK need?", iterations, (figures.iterations,)),
 )

@@ -21,11 +21,7 @@ from .problem import (
 
 SUITE = "tracking"
 TOLERANCE, ITERATIONS = 1e-4, 100
-OPTIONS = {
-    COLD: {"warm": False},
-    WARM: {},
-    COHERENT: {"coherent": True, "closed": True},
-}
+OPTIONS = {COLD: {"warm": False}, WARM: {}, COHERENT: {"coherent": True, "closed": True}}
 # On a robot the other solvers take long to compile: a quick run leaves them out.
 ROBOT_SOLVER = "levenberg_marquardt"
 

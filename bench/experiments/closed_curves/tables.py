@@ -183,7 +183,7 @@ def _drift_summary(pairs: Sequence[Case]) -> Summary:
     return Summary(
         f"With warm starts the arm is {words_in(min(warm), '°').rstrip('°')} to "
         f"{words_in(max(warm), '°')} from its first pose after three repetitions; the closed "
-        f"coherent motion at no time more than {words_in(closed, '°')}.",
+        f"coherent motion at no time more than {words_in(closed, '°')}."
     )
 
 

@@ -3,14 +3,7 @@
 import numpy as np
 
 from ...peers import registry
-from ...presentation.figures import (
-    COLOURS,
-    Drawing,
-    canvas,
-    finished,
-    plain_powers,
-    written,
-)
+from ...presentation.figures import COLOURS, Drawing, canvas, finished, plain_powers, written
 from ...presentation.results import Results, by_problem, label
 from . import ONE_STEP
 

@@ -226,9 +226,7 @@ ENTRIES = (
         (pictures.falling_cloth,),
     ),
     Entry(
-        "How fast do local/global and Newton converge?",
-        convergence,
-        (figures.cloth_convergence,),
+        "How fast do local/global and Newton converge?", convergence, (figures.cloth_convergence,)
     ),
     Entry("Does Newton always get there?", newton_steps),
     Entry("How far apart are the two laws of dampers?", dampers),

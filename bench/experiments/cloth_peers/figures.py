@@ -4,14 +4,7 @@ from matplotlib.axes import Axes
 
 from ...peers import registry
 from ...presentation.entry import Figure
-from ...presentation.figures import (
-    Drawing,
-    canvas,
-    every_handle,
-    finished,
-    nth_style,
-    written,
-)
+from ...presentation.figures import Drawing, canvas, every_handle, finished, nth_style, written
 from ...presentation.results import Results
 from . import MOTION, ONE_STEP
 from .readings import Point, points

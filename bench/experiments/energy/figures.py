@@ -26,11 +26,7 @@ def energy(results: Results) -> Drawing | None:
                     record.arrays["time"], record.arrays["left"],
                     label=written(label(record.solver)), **style,
                 )  # fmt: skip
-            ax.set(
-                title=written(group[0].title),
-                xlabel="time [s]",
-                xlim=(0, None),
-            )
+            ax.set(title=written(group[0].title), xlabel="time [s]", xlim=(0, None))
         axes[0].set(ylabel="energy above rest, of the start", ylim=(0, None))
         figure.legend(*every_handle(axes), loc="outside lower left", ncols=3)
         return finished(

@@ -86,10 +86,7 @@ class Evaluator:
             positions[i] = self._data.xpos[self._tips]
             rotations[i] = self._data.xmat[self._tips]
         batch = q.shape[:-1]
-        return (
-            positions.reshape(*batch, -1, 3),
-            rotations.reshape(*batch, len(self._tips), 3, 3),
-        )
+        return (positions.reshape(*batch, -1, 3), rotations.reshape(*batch, len(self._tips), 3, 3))
 
     def jacobians(self, q: FloatArray) -> FloatArray:
         """Return the Jacobians of the tips' positions and rotations, (row, 6 tip, freedom)."""

@@ -32,15 +32,7 @@ from ...presentation.entry import Entry
 from ...presentation.results import Results, listed, settings
 from ...presentation.tables import Cell, Column, Summary, Table, listing, tabulate, words
 from . import REACHABLE, UNREACHABLE, figures
-from .readings import (
-    KINDS,
-    budget_curve,
-    budget_curves,
-    by_robot,
-    measured,
-    profiles,
-    records_of,
-)
+from .readings import KINDS, budget_curve, budget_curves, by_robot, measured, profiles, records_of
 
 # Shares of the targets are shown for these budgets [s] and these ratios to the fastest.
 BUDGETS = np.array([1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 1e-1])
