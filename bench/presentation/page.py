@@ -11,8 +11,8 @@ from markupsafe import Markup
 
 from ..harness.record import Record
 from . import svg, tables
-from .entry import Entry, Figure
 from .figures import Drawing
+from .layout import Figure, Layout
 from .sections import SECTIONS
 from .tables import Cell, Column, Table
 
@@ -38,7 +38,7 @@ class Shown(NamedTuple):
     """All that a report shows: its records, and what is made of them."""
 
     records: Sequence[Record]
-    tables: Mapping[Entry, Table]
+    tables: Mapping[Layout, Table]
     drawings: Mapping[Figure, Drawing]
 
 

@@ -47,7 +47,7 @@ class Column:
 
     The note says how a cell is written, such as `INTERVAL`; it is left out where parts of the cell
     have columns of their own. `read` takes the cell from what a row is about, in SI units or as a
-    share of one; `tabulate` converts it to the column's unit, or multiplies it by `factor`.
+    share of one; `cell` converts it to the column's unit, or multiplies it by `factor`.
     """
 
     title: str
@@ -107,23 +107,6 @@ class Table:
                 raise ValueError(
                     f"rows: expected {len(self.columns)} cells in table {self.name}, got {len(row)}"
                 )
-
-
-def tabulate(
-    name: str,
-    title: str,
-    columns: Iterable[Column],
-    subjects: Iterable[Any],
-    *,
-    shows: str,
-    measured: str,
-    summary: Callable[[Any], Summary] = lambda subjects: NO_SUMMARY,
-) -> Table:
-    """Return the table with a row for each subject; without any it has no summary."""
-    columns, subjects = tuple(columns), list(subjects)
-    rows = tuple(tuple(column.cell(subject) for column in columns) for subject in subjects)
-    said = summary(subjects) if subjects else NO_SUMMARY
-    return Table(name, title, columns, rows, shows, measured, said)
 
 
 def listing(sentence: str, points: Iterable[str]) -> Summary:

@@ -153,7 +153,7 @@ def test_every_suite_has_a_chapter_and_its_tables_are_some_of_all():
     assert [table.name for table in tables(Results([]), SUITES)] == every
 
 
-ONE, AGAIN = robots.TABLES["one start"], robots.TABLES["restarts"]
+ONE, AGAIN = robots.OF_KIND["one start"], robots.OF_KIND["restarts"]
 
 
 def test_success_counts_what_the_judge_says_and_times_count_failures(make):
@@ -173,7 +173,7 @@ def test_one_start_and_restarts_are_never_in_one_table(make):
     results = Results([make.raced("a", "one start"), make.raced("b", "restarts")])
     for name in robots.Tables._fields:
         for kind, mine, other in (("one start", "a", "b"), ("restarts", "b", "a")):
-            table = getattr(robots.TABLES[kind], name)(results)
+            table = getattr(robots.OF_KIND[kind], name)(results)
             cells = [cell for row in table.rows for cell in row]
             assert other not in cells
             assert (mine in cells) == (name != "unreachable")

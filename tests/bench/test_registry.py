@@ -22,10 +22,11 @@ from bench.harness.record import RecordFile
 from bench.harness.worker import Found, Solved, Unfit
 from bench.peers import registry
 from bench.peers.registry import ONE_START, Entry, Peer
-from bench.presentation import entry, report
+from bench.presentation import report
+from bench.presentation.layout import Layout
 from bench.presentation.results import Results
 from bench.presentation.sections import tables
-from bench.presentation.tables import Column, Table
+from bench.presentation.tables import Column
 from reference import STEP_SOLVERS
 from reference.implicit_euler.local_global import LocalGlobal
 
@@ -106,22 +107,26 @@ def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, 
     monkeypatch.delitem(sys.modules, "stays_put")
     assert not record.failed
     results = Results([record])
-    (row,) = robot_tables.TABLES[ONE_START].success(results).rows
+    (row,) = robot_tables.OF_KIND[ONE_START].success(results).rows
     assert row[:2] == ("character", "Stays put")
     assert "Stays put" in [row[0] for row in robot_tables.who(results).rows]
 
 
-def counted(results):
-    """A table of how many records there are."""
-    rows = ((len(results.records),),)
-    return Table("counted", "Records, counted", (Column("records"),), rows, "All.", "Counted.")
+counted = Layout(
+    "How many records are there?",
+    "counted",
+    "Records, counted",
+    subjects=lambda results: [results],
+    columns=[Column("records", read=lambda results: len(results.records))],
+    shows="All.",
+    measured="Counted.",
+)
 
 
 def test_a_new_table_is_a_function_and_a_line_and_stands_in_the_page(
     tmp_path, monkeypatch, records
 ):
-    line = entry.Entry("How many records are there?", counted)
-    monkeypatch.setattr(arm_tables, "ENTRIES", (*arm_tables.ENTRIES, line))
+    monkeypatch.setattr(arm_tables, "LAYOUTS", (*arm_tables.LAYOUTS, counted))
     assert "counted" in [table.name for table in tables(Results([]), ["arm"])]
     monkeypatch.setattr(report, "all_figures", list)
     RecordFile(tmp_path).append(records)
@@ -142,14 +147,19 @@ def blocks(scale):
 """,
     "tables.py": """
 from bench.presentation.columns import number, titled
-from bench.presentation.entry import Entry
-from bench.presentation.tables import tabulate
+from bench.presentation.layout import Layout
 
-def sums(results):
-    columns = titled("of"), number("sum")
-    return tabulate("sums", "Sums", columns, results.all("sums"), shows="a", measured="b")
+sums = Layout(
+    "What is 1 + 1?",
+    "sums",
+    "Sums",
+    subjects=lambda results: results.all("sums"),
+    columns=(titled("of"), number("sum")),
+    shows="a",
+    measured="b",
+)
 
-ENTRIES = (Entry("What is 1 + 1?", sums),)
+LAYOUTS = (sums,)
 """,
 }
 

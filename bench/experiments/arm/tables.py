@@ -6,9 +6,9 @@ from typing import Any
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.columns import LARGEST, MEDIAN, P95, SOLVER, share, spread, text, titled
-from ...presentation.entry import Entry
+from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem, label, settings, solvers
-from ...presentation.tables import Summary, Table, tabulate, words
+from ...presentation.tables import Summary, words
 from ..chain import BEYOND, CHAIN
 from ..chain import figures as chain
 from . import CURVE
@@ -16,30 +16,11 @@ from . import CURVE
 STARTS = {None: "random", False: "rest", True: "last solution"}
 
 
-def accuracy(results: Results) -> Table:
-    """Return success and residuals of every solver on every problem within reach."""
+def _within_reach(results: Results) -> list[Record]:
     records = results.all("arm", task=CURVE, warm=False)
     records += results.all("arm", task=CURVE, warm=True)
     records += [r for r in results.all("ik", task=CHAIN) if r.facts["stratum"] != BEYOND]
-    return tabulate(
-        "accuracy",
-        "Success and residuals within reach",
-        (
-            titled("problem"),
-            SOLVER,
-            text("start", lambda record: STARTS[record.settings.get("warm")]),
-            share("within tolerance", _met),
-            *spread("residual", "residual", "m", (MEDIAN, P95, LARGEST)),
-            *spread("iterations", "iterations", of=(MEDIAN, P95, LARGEST)),
-        ),
-        [record for group in by_problem(records).values() for record in group],
-        shows=f"A solve succeeds if the effector is within {settings(records, 'tolerance')} m of "
-        "its target. Residuals are not cut off at the tolerance. The interval is Wilson’s.",
-        measured="Residuals recomputed by forward kinematics of the rotations returned, whatever "
-        "the solver says. Starts: the arm’s rest pose, the last frame’s solution, or seeded random "
-        f"rotations. At most {settings(records, 'max_iterations')} iterations.",
-        summary=_summary,
-    )
+    return [record for group in by_problem(records).values() for record in group]
 
 
 def _met(record: Record) -> Any:
@@ -55,6 +36,31 @@ def _summary(records: Sequence[Record]) -> Summary:
     return Summary("Solved within tolerance, over all these problems:", tuple(points))
 
 
-ENTRIES = (
-    Entry("How often, and how closely, is the target met?", accuracy, (chain.ik_residuals,)),
+accuracy = Layout(
+    "How often, and how closely, is the target met?",
+    "accuracy",
+    "Success and residuals within reach",
+    columns=(
+        titled("problem"),
+        SOLVER,
+        text("start", lambda record: STARTS[record.settings.get("warm")]),
+        share("within tolerance", _met),
+        *spread("residual", "residual", "m", (MEDIAN, P95, LARGEST)),
+        *spread("iterations", "iterations", of=(MEDIAN, P95, LARGEST)),
+    ),
+    subjects=_within_reach,
+    shows=lambda records: (
+        f"A solve succeeds if the effector is within {settings(records, 'tolerance')} m of "
+        "its target. Residuals are not cut off at the tolerance. The interval is Wilson’s."
+    ),
+    measured=lambda records: (
+        "Residuals recomputed by forward kinematics of the rotations returned, whatever "
+        "the solver says. Starts: the arm’s rest pose, the last frame’s solution, or seeded random "
+        f"rotations. At most {settings(records, 'max_iterations')} iterations."
+    ),
+    summary=_summary,
+    figures=(chain.ik_residuals,),
 )
+
+
+LAYOUTS = (accuracy,)

@@ -19,9 +19,9 @@ from ...presentation.columns import (
     titled,
     words_in,
 )
-from ...presentation.entry import Entry
+from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem, counted, label, settings, solvers
-from ...presentation.tables import Column, Summary, Table, tabulate, words
+from ...presentation.tables import Column, Summary, words
 from .. import arm
 from . import BEYOND, CHAIN, figures
 
@@ -31,31 +31,6 @@ RIVALS = ("ccd", "fabrik")
 
 # The records of both rivals on one problem.
 Pair = tuple[Record, Record]
-
-
-def beyond_reach(results: Results) -> Table:
-    """Return Q1: what becomes of a target that is too far away."""
-    records = results.all("arm", task=arm.BEYOND)
-    records += results.all("ik", task=CHAIN, stratum=BEYOND)
-    return tabulate(
-        "q1_beyond_reach",
-        "Targets beyond reach",
-        (
-            titled("problem"),
-            SOLVER,
-            Column("targets", read=lambda record: int(record.size)),
-            *spread("off the line", "bend", "m"),
-            *spread("residual above distance − reach", "excess", "m"),
-            *spread("iterations", "iterations"),
-        ),
-        records,
-        shows="The best answer is the straight line from root to target, which leaves exactly "
-        "distance − reach. “Off the line” is the joint farthest from that line.",
-        measured=f"Seeded targets in all directions, {_distances(records)} times the reach away. "
-        f"Solvers stop at a residual of {settings(records, 'tolerance')} m, ours also as close as "
-        f"that to the best one, or after {settings(records, 'max_iterations')} iterations.",
-        summary=_beyond_summary,
-    )
 
 
 def _over_reach(records: Sequence[Record], name: str) -> metrics.Floats:
@@ -91,29 +66,37 @@ def _straightness(records: Sequence[Record]) -> str:
     )
 
 
-def iterations(results: Results) -> Table:
-    """Return Q2: the iterations of CCD against FABRIK."""
+beyond_reach = Layout(
+    "Q1. If the target is too far away, what does inverse kinematics give?",
+    "q1_beyond_reach",
+    "Targets beyond reach",
+    columns=(
+        titled("problem"),
+        SOLVER,
+        Column("targets", read=lambda record: int(record.size)),
+        *spread("off the line", "bend", "m"),
+        *spread("residual above distance − reach", "excess", "m"),
+        *spread("iterations", "iterations"),
+    ),
+    subjects=lambda results: (
+        results.all("arm", task=arm.BEYOND) + results.all("ik", task=CHAIN, stratum=BEYOND)
+    ),
+    shows="The best answer is the straight line from root to target, which leaves exactly "
+    "distance − reach. “Off the line” is the joint farthest from that line.",
+    measured=lambda records: (
+        f"Seeded targets in all directions, {_distances(records)} times the reach away. "
+        f"Solvers stop at a residual of {settings(records, 'tolerance')} m, ours also as close as "
+        f"that to the best one, or after {settings(records, 'max_iterations')} iterations."
+    ),
+    summary=_beyond_summary,
+)
+
+
+def _pairs(results: Results) -> list[Pair]:
     records = results.all("arm", task=arm.CURVE, warm=True)
     records += results.all("arm", task=arm.BEYOND) + results.all("ik", task=CHAIN)
-    records = [record for record in records if record.solver in RIVALS]
     groups = [{r.solver: r for r in group} for group in by_problem(records).values()]
-    return tabulate(
-        "q2_iterations",
-        "Iterations of CCD and of FABRIK",
-        (
-            text("problem", lambda pair: pair[0].title),
-            Column("solves", read=lambda pair: pair[0].arrays["iterations"].size),
-            *(column for i in range(len(RIVALS)) for column in _counts(i)),
-            Column("CCD / FABRIK, means", read=_fewer),
-        ),
-        [(both["ccd"], both["fabrik"]) for both in groups if len(both) == len(RIVALS)],
-        shows="One iteration rotates every joint once (CCD) or runs along the chain once in each "
-        "direction (FABRIK). Solves that fail count with all the iterations they made.",
-        measured="The arm starts each frame from its last solution, or from rest towards targets "
-        "beyond its reach; the chain starts from random poses. At most "
-        f"{settings(records, 'max_iterations')} iterations.",
-        summary=_rival_summary,
-    )
+    return [(both["ccd"], both["fabrik"]) for both in groups if both.keys() >= set(RIVALS)]
 
 
 def _counts(i: int) -> list[Column]:
@@ -137,7 +120,27 @@ def _rival_summary(pairs: Sequence[Pair]) -> Summary:
     )
 
 
-ENTRIES = (
-    Entry("Q1. If the target is too far away, what does inverse kinematics give?", beyond_reach),
-    Entry("Q2. How many iterations do CCD and FABRIK need?", iterations, (figures.iterations,)),
+iterations = Layout(
+    "Q2. How many iterations do CCD and FABRIK need?",
+    "q2_iterations",
+    "Iterations of CCD and of FABRIK",
+    columns=(
+        text("problem", lambda pair: pair[0].title),
+        Column("solves", read=lambda pair: pair[0].arrays["iterations"].size),
+        *(column for i in range(len(RIVALS)) for column in _counts(i)),
+        Column("CCD / FABRIK, means", read=_fewer),
+    ),
+    subjects=_pairs,
+    shows="One iteration rotates every joint once (CCD) or runs along the chain once in each "
+    "direction (FABRIK). Solves that fail count with all the iterations they made.",
+    measured=lambda pairs: (
+        "The arm starts each frame from its last solution, or from rest towards targets "
+        "beyond its reach; the chain starts from random poses. At most "
+        f"{settings((record for pair in pairs for record in pair), 'max_iterations')} iterations."
+    ),
+    summary=_rival_summary,
+    figures=(figures.iterations,),
 )
+
+
+LAYOUTS = (beyond_reach, iterations)

@@ -5,31 +5,8 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.columns import number, text
-from ...presentation.entry import Entry
-from ...presentation.results import Results
-from ...presentation.tables import Summary, Table, in_unit, tabulate, words
-
-
-def verdicts(results: Results) -> Table:
-    """Return the claims with their verdicts."""
-    return tabulate(
-        "check",
-        "Claims held against Pinocchio and MuJoCo",
-        (
-            text("claim", lambda record: record.problem),
-            text("what we compute", lambda record: record.notes["ours"]),
-            text("held against", lambda record: record.solver),
-            number("cases"),
-            number("largest difference", "difference"),
-            number("tolerance"),
-            text("verdict", _verdict),
-        ),
-        results.all("check"),
-        shows="Differences are relative, to the reach, the largest force or whatever scale the "
-        "claim's tolerance names. A claim holds only if something moved in each of its cases.",
-        measured="Each quantity computed twice, by us and by an engine, on seeded random systems.",
-        summary=_summary,
-    )
+from ...presentation.layout import Layout
+from ...presentation.tables import Summary, in_unit, words
 
 
 def _verdict(record: Record) -> str:
@@ -50,4 +27,25 @@ def _summary(records: Sequence[Record]) -> Summary:
     )
 
 
-ENTRIES = (Entry("Do Pinocchio and MuJoCo agree with the reference?", verdicts),)
+verdicts = Layout(
+    "Do Pinocchio and MuJoCo agree with the reference?",
+    "check",
+    "Claims held against Pinocchio and MuJoCo",
+    subjects=lambda results: results.all("check"),
+    columns=(
+        text("claim", lambda record: record.problem),
+        text("what we compute", lambda record: record.notes["ours"]),
+        text("held against", lambda record: record.solver),
+        number("cases"),
+        number("largest difference", "difference"),
+        number("tolerance"),
+        text("verdict", _verdict),
+    ),
+    shows="Differences are relative, to the reach, the largest force or whatever scale the "
+    "claim's tolerance names. A claim holds only if something moved in each of its cases.",
+    measured="Each quantity computed twice, by us and by an engine, on seeded random systems.",
+    summary=_summary,
+)
+
+
+LAYOUTS = (verdicts,)

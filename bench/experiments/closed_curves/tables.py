@@ -6,9 +6,9 @@ from typing import Any
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.columns import largest, text, words_in
-from ...presentation.entry import Entry
+from ...presentation.layout import Layout
 from ...presentation.results import Results, label, settings
-from ...presentation.tables import Column, Summary, Table, tabulate, words
+from ...presentation.tables import Column, Summary, words
 from ..arm import figures as arm
 from . import COHERENT, COLD, CURVE, DRIFT, WARM
 
@@ -45,31 +45,6 @@ def _by_mode(
     return [Column(f"{mode}, {what}", unit, read=read_in(mode)) for mode in modes]
 
 
-def jitter(results: Results) -> Table:
-    """Return Q3: by which angles joints rotate from frame to frame."""
-    return tabulate(
-        "q3_jitter",
-        "How far joints rotate from frame to frame",
-        (
-            CURVE_COLUMN,
-            SOLVER,
-            Column("frames", read=lambda case: case[WARM].arrays["residual"].size),
-            *_by_mode("largest", _largest_angle, "°"),
-            *_by_mode("mean", _mean_angle, "°"),
-            *_by_mode("last to first", _closing_angle, "°", (WARM, COHERENT)),
-        ),
-        _cases(results, CURVE, MODES),
-        shows="The angle by which a joint rotates between neighbouring frames: of a ball the "
-        "geodesic one, of a hinge the change of its coordinate. The largest is over all frames and "
-        "joints, the mean over both; the step from the last frame back to the first stands apart.",
-        measured="Each curve is closed and followed once. Cold: every frame solved from the start "
-        "pose; warm: every frame from the solution before it; coherent: all frames changed "
-        "together from there until the sum of all squared angles, the one that closes the curve "
-        "among them, is least.",
-        summary=_jitter_summary,
-    )
-
-
 def _largest_angle(record: Record) -> float:
     return metrics.spread(record.arrays["largest_angle"][:-1]).largest
 
@@ -103,30 +78,33 @@ def _jitter_summary(cases: Sequence[Case]) -> Summary:
     )
 
 
-def price(results: Results) -> Table:
-    """Return how closely the curves are followed, and in how many iterations."""
-    cases = _cases(results, CURVE, MODES)
-    cold = [case[COLD] for case in cases]
-    return tabulate(
-        "q3_price",
-        "What a smooth motion costs",
-        (
-            CURVE_COLUMN,
-            SOLVER,
-            *_by_mode("within tolerance", _within),
-            *_by_mode("largest path error", lambda r: largest([r], "residual"), "m"),
-            *_by_mode("mean iterations", lambda r: metrics.mean(r.arrays["iterations"])),
-            Column("of these over all frames at once", read=_together),
-        ),
-        cases,
-        shows="The path error is the distance from the effector to its point on the curve. An "
-        "iteration over all frames at once counts as one of each frame.",
-        measured="Residuals recomputed by forward kinematics of the answers, whatever the solver "
-        f"says. Frames are solved to {settings(cold, 'tolerance')} m in at most "
-        f"{settings(cold, 'max_iterations')} iterations, a coherent motion is "
-        "then on its path to rounding; a frame that is not reached is drawn to its point.",
-        summary=_price_summary,
-    )
+jitter = Layout(
+    "Q3. Joints may jitter from frame to frame: how is it avoided?",
+    "q3_jitter",
+    "How far joints rotate from frame to frame",
+    subjects=lambda results: _cases(results, CURVE, MODES),
+    columns=(
+        CURVE_COLUMN,
+        SOLVER,
+        Column("frames", read=lambda case: case[WARM].arrays["residual"].size),
+        *_by_mode("largest", _largest_angle, "°"),
+        *_by_mode("mean", _mean_angle, "°"),
+        *_by_mode("last to first", _closing_angle, "°", (WARM, COHERENT)),
+    ),
+    shows="The angle by which a joint rotates between neighbouring frames: of a ball the "
+    "geodesic one, of a hinge the change of its coordinate. The largest is over all frames and "
+    "joints, the mean over both; the step from the last frame back to the first stands apart.",
+    measured="Each curve is closed and followed once. Cold: every frame solved from the start "
+    "pose; warm: every frame from the solution before it; coherent: all frames changed "
+    "together from there until the sum of all squared angles, the one that closes the curve "
+    "among them, is least.",
+    summary=_jitter_summary,
+    figures=(arm.jitter,),
+)
+
+
+def _colds(cases: Sequence[Case]) -> list[Record]:
+    return [case[COLD] for case in cases]
 
 
 def _within(record: Record) -> metrics.Share:
@@ -150,29 +128,6 @@ def _price_summary(cases: Sequence[Case]) -> Summary:
     )
 
 
-def drift(results: Results) -> Table:
-    """Return how far the pose drifts away from one repetition to the next."""
-    return tabulate(
-        "q3_drift",
-        "How far the arm is from its first pose after each repetition",
-        (
-            SOLVER,
-            *(
-                Column(f"{mode}, after {counted}", "°", read=_drift_after(mode, i))
-                for mode in (WARM, COHERENT)
-                for i, counted in enumerate(("one repetition", "two", "three"))
-            ),
-        ),
-        _cases(results, DRIFT, (WARM, COHERENT)),
-        shows="The largest angle between a joint’s first rotation and the one it has when the tip "
-        "is back at the first point.",
-        measured="The lab’s arm draws the heart three times without a break. The coherent motion "
-        "is closed: its last frame leads back to its first, so that after the third repetition "
-        "it has returned by construction.",
-        summary=_drift_summary,
-    )
-
-
 def _drift_after(mode: str, i: int) -> Callable[[Case], Any]:
     return lambda case: case[mode].arrays["drift"][i]
 
@@ -187,8 +142,51 @@ def _drift_summary(pairs: Sequence[Case]) -> Summary:
     )
 
 
-ENTRIES = (
-    Entry("Q3. Joints may jitter from frame to frame: how is it avoided?", jitter, (arm.jitter,)),
-    Entry("What does a smooth motion cost?", price),
-    Entry("Does a motion drift as it is repeated?", drift),
+price = Layout(
+    "What does a smooth motion cost?",
+    "q3_price",
+    "What a smooth motion costs",
+    columns=(
+        CURVE_COLUMN,
+        SOLVER,
+        *_by_mode("within tolerance", _within),
+        *_by_mode("largest path error", lambda r: largest([r], "residual"), "m"),
+        *_by_mode("mean iterations", lambda r: metrics.mean(r.arrays["iterations"])),
+        Column("of these over all frames at once", read=_together),
+    ),
+    subjects=lambda results: _cases(results, CURVE, MODES),
+    shows="The path error is the distance from the effector to its point on the curve. An "
+    "iteration over all frames at once counts as one of each frame.",
+    measured=lambda cases: (
+        "Residuals recomputed by forward kinematics of the answers, whatever the solver "
+        f"says. Frames are solved to {settings(_colds(cases), 'tolerance')} m in at most "
+        f"{settings(_colds(cases), 'max_iterations')} iterations, a coherent motion is "
+        "then on its path to rounding; a frame that is not reached is drawn to its point."
+    ),
+    summary=_price_summary,
 )
+
+
+drift = Layout(
+    "Does a motion drift as it is repeated?",
+    "q3_drift",
+    "How far the arm is from its first pose after each repetition",
+    subjects=lambda results: _cases(results, DRIFT, (WARM, COHERENT)),
+    columns=(
+        SOLVER,
+        *(
+            Column(f"{mode}, after {counted}", "°", read=_drift_after(mode, i))
+            for mode in (WARM, COHERENT)
+            for i, counted in enumerate(("one repetition", "two", "three"))
+        ),
+    ),
+    shows="The largest angle between a joint’s first rotation and the one it has when the tip "
+    "is back at the first point.",
+    measured="The lab’s arm draws the heart three times without a break. The coherent motion "
+    "is closed: its last frame leads back to its first, so that after the third repetition "
+    "it has returned by construction.",
+    summary=_drift_summary,
+)
+
+
+LAYOUTS = (jitter, price, drift)

@@ -3,8 +3,8 @@
 from matplotlib.axes import Axes
 
 from ...peers import registry
-from ...presentation.entry import Figure
 from ...presentation.figures import Drawing, canvas, every_handle, finished, nth_style, written
+from ...presentation.layout import Figure
 from ...presentation.results import Results
 from . import MOTION, ONE_STEP
 from .readings import Point, points

@@ -1,7 +1,7 @@
 """One cloth for every solver: work against precision, iterations, limits of stability."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -11,9 +11,9 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...presentation.columns import SOLVER, number, text, words_in
-from ...presentation.entry import Entry
+from ...presentation.layout import Layout
 from ...presentation.results import Results, label, listed
-from ...presentation.tables import Column, Summary, Table, listing, tabulate, words
+from ...presentation.tables import Column, Summary, Table, listing, words
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY, figures
 from .readings import Point, points
@@ -56,36 +56,17 @@ def _groups(found: Sequence[Point]) -> list[list[Point]]:
     return list(groups.values())
 
 
-def _with_missing(results: Results, table: Table) -> Table:
-    """Return the table with a row for each engine that is missing, its remark last."""
-    blank = (None,) * (len(table.columns) - 3)
-    missing = results.all("cloth", task=MISSING)
-    rows = [("every cloth", r.solver, *blank, r.notes["remark"]) for r in missing]
-    return replace(table, rows=(*table.rows, *rows))
+@dataclass(frozen=True, eq=False)
+class WithMissing(Layout):
+    """A layout whose tables end with a row for each engine that is missing, its remark last."""
 
-
-def one_step(results: Results) -> Table:
-    """Return how soon every solver is near the converged step."""
-    table = tabulate(
-        "cloth_peers_step",
-        "One step of a falling cloth by every solver",
-        (
-            text("cloth", lambda group: _cloth_of(group[0])),
-            text("solver", lambda group: group[0].solver),
-            *(column for target in TARGETS for column in _columns_to(target)),
-            Column("least error", read=lambda group: _best(group).values["error"]),
-            text("least by", lambda group: _best(group).rung),
-            text("remark", _remark),
-        ),
-        _groups(points(results, ONE_STEP)),
-        shows="The error is |x − x*| / |y − x*|, what is left of the distance between the inertial "
-        "start y and the converged step x*. Explicit solvers and those that solve one linear "
-        "system do another step: their error stays, however long they take.",
-        measured=f"{_CLOTH}{_FAIR}{_TRUTH}. Times are medians of up to five; settings are those of "
-        "a ladder, of which the cheapest that suffices counts.",
-        summary=_step_summary,
-    )
-    return _with_missing(results, table)
+    def __call__(self, results: Results) -> Table:
+        """Return the table with a row for each subject and for each engine that is missing."""
+        table = super().__call__(results)
+        blank = (None,) * (len(table.columns) - 3)
+        missing = results.all("cloth", task=MISSING)
+        rows = [("every cloth", r.solver, *blank, r.notes["remark"]) for r in missing]
+        return replace(table, rows=(*table.rows, *rows))
 
 
 def _columns_to(target: str) -> tuple[Column, Column]:
@@ -156,30 +137,27 @@ def _with_time(point: Point) -> str:
     return f"{point.solver}, {words_in(_seconds(point), 'ms')}"
 
 
-def motion(results: Results) -> Table:
-    """Return how far every solver's motion is from implicit Euler's and from the truth."""
-    found = points(results, MOTION)
-    table = tabulate(
-        "cloth_peers_motion",
-        "A falling cloth by every solver, frame after frame",
-        (
-            text("cloth", _cloth_of),
-            text("solver", lambda point: point.solver),
-            text("a frame by", lambda point: point.rung),
-            Column("frames", read=lambda point: int(point.values["frames"])),
-            _known("distance from implicit Euler", "implicit", "m"),
-            _known("distance from the truth", "true", "m"),
-            _known("time for a frame", "seconds", "ms"),
-            Column("time for a simulated second", "s", read=_simulated_second),
-            text("remark", _fate),
-        ),
-        found,
-        shows="Distances are root mean squares over the particles after the last frame. Diverged "
-        "means that a particle was farther from its true place than the cloth is wide.",
-        measured=f"{_CLOTH}{_FAIR}{_TRUTH}: {_certainty(found)}.",
-        summary=_motion_summary,
-    )
-    return _with_missing(results, table)
+one_step = WithMissing(
+    "Which of all solvers is soonest near the converged step?",
+    "cloth_peers_step",
+    "One step of a falling cloth by every solver",
+    columns=(
+        text("cloth", lambda group: _cloth_of(group[0])),
+        text("solver", lambda group: group[0].solver),
+        *(column for target in TARGETS for column in _columns_to(target)),
+        Column("least error", read=lambda group: _best(group).values["error"]),
+        text("least by", lambda group: _best(group).rung),
+        text("remark", _remark),
+    ),
+    subjects=lambda results: _groups(points(results, ONE_STEP)),
+    shows="The error is |x − x*| / |y − x*|, what is left of the distance between the inertial "
+    "start y and the converged step x*. Explicit solvers and those that solve one linear "
+    "system do another step: their error stays, however long they take.",
+    measured=f"{_CLOTH}{_FAIR}{_TRUTH}. Times are medians of up to five; settings are those of "
+    "a ladder, of which the cheapest that suffices counts.",
+    summary=_step_summary,
+    figures=(figures.one_step,),
+)
 
 
 def _known(title: str, name: str, unit: str) -> Column:
@@ -239,26 +217,9 @@ def _nearest(whole: Sequence[Point]) -> str:
     )
 
 
-def iterations(results: Results) -> Table:
-    """Return the iterations of our solvers to each power of ten."""
-    records = results.all("cloth", task=NEEDED)
+def _sizes(records: Sequence[Record]) -> str:
     size = records[0].settings["size"] if records else 0
-    return tabulate(
-        "cloth_iterations",
-        "Iterations needed in one step",
-        (
-            Column("stiffness", "N/m", read=lambda record: int(record.settings["stiffness"])),
-            SOLVER,
-            *(Column(f"to {decade}", read=partial(_needed, decade=decade)) for decade in DECADES),
-            number("tried"),
-            number("least error", "least"),
-        ),
-        records,
-        shows="Iterations until |x − x*| / |y − x*| is at most so much; nothing where all that "
-        "were tried did not suffice.",
-        measured=f"{_CLOTH}{size} × {size} particles. x* by Newton at the rounding floor.",
-        summary=_needed_summary,
-    )
+    return f"{size} × {size}"
 
 
 def _needed(record: Record, decade: str) -> int | None:
@@ -301,62 +262,88 @@ def _limits(record: Record) -> Iterator[Limit]:
         yield Limit(record, int(stiffness), _number_or_none(float(limit)), theory)
 
 
-def stability(results: Results) -> Table:
-    """Return the longest stable steps, beside what theory has for them."""
-    return tabulate(
-        "cloth_stability",
-        "The longest stable step of explicit solvers",
-        (
-            text("solver", lambda limit: limit.record.solver),
-            Column("stiffness", "N/m", read=lambda limit: limit.stiffness),
-            Column("longest stable step", "ms", read=lambda limit: limit.step),
-            Column("2 / ω", "ms", read=lambda limit: limit.theory),
-            Column("of 2 / ω", read=lambda limit: limit.share),
-            text("remark", lambda limit: limit.record.notes["remark"]),
-        ),
-        [limit for record in results.all("cloth", task=STABILITY) for limit in _limits(record)],
-        shows="Symplectic Euler is stable up to h = 2 / ω, the classical Runge-Kutta method up to "
-        "2.828 / ω; ω² is the largest eigenvalue of M⁻¹ K at rest.",
-        measured="A cloth of 6 × 6 particles hangs at rest and is pushed by 1e-5 m along its "
-        "highest mode; a step is stable if that has not grown a hundredfold 400 steps later. Found "
-        "by bisection to two ten-thousandths.",
-        summary=_stability_summary,
-    )
-
-
 def _stability_summary(limits: Sequence[Limit]) -> Summary:
     shares = {limit.record.solver: limit.share for limit in limits if limit.step is not None}
     points = (f"{solver}: {words(share)} × 2 / ω" for solver, share in shares.items())
     return listing("The longest stable step:", points)
 
 
-def liu_2013(results: Results) -> Table:
-    """Return the published times of Liu et al. 2013, and ours for as many vertices."""
-    known = [r for r in results.all("cloth", task=LIU) if r.solver in published.LIU_2013]
-    records = [r for r in known if "seconds" in r.arrays]
-    vertices = int(records[0].arrays["vertices"]) if records else 0
-    return tabulate(
-        "cloth_liu_2013",
-        "The times of Liu et al. (2013), and here",
-        (
-            SOLVER,
-            text("a frame by", lambda record: published.LIU_2013[record.solver].done),
-            Column(
-                "published", "ms", read=lambda record: published.LIU_2013[record.solver].seconds
-            ),
-            Column("here", "ms", read=_median),
-            number("here, error left", "error"),
-        ),
-        records,
-        shows="The error is |x − x*| / |y − x*| as above; the paper’s ten iterations leave most of "
-        "it.",
-        measured="Published: 6,561 vertices; read in the abstract and captions, so springs, "
-        f"stiffness, step and machine are not known to us. Here: {words(vertices)} particles, 81 × "
-        f"81, {words(int(published.LIU_2013_STIFFNESS))} N/m, "
-        f"one step of {words_in(published.LIU_2013_FRAME, 'ms')} from mid-fall, on "
-        "one core; Newton to a residual of 1e-6.",
-        summary=_liu_summary,
-    )
+motion = WithMissing(
+    "And frame after frame, near implicit Euler and near the truth?",
+    "cloth_peers_motion",
+    "A falling cloth by every solver, frame after frame",
+    columns=(
+        text("cloth", _cloth_of),
+        text("solver", lambda point: point.solver),
+        text("a frame by", lambda point: point.rung),
+        Column("frames", read=lambda point: int(point.values["frames"])),
+        _known("distance from implicit Euler", "implicit", "m"),
+        _known("distance from the truth", "true", "m"),
+        _known("time for a frame", "seconds", "ms"),
+        Column("time for a simulated second", "s", read=_simulated_second),
+        text("remark", _fate),
+    ),
+    subjects=lambda results: points(results, MOTION),
+    shows="Distances are root mean squares over the particles after the last frame. Diverged "
+    "means that a particle was farther from its true place than the cloth is wide.",
+    measured=lambda found: f"{_CLOTH}{_FAIR}{_TRUTH}: {_certainty(found)}.",
+    summary=_motion_summary,
+    figures=(figures.to_implicit_euler, figures.to_the_truth),
+)
+
+
+iterations = Layout(
+    "How many iterations does an error of 1e-8 take?",
+    "cloth_iterations",
+    "Iterations needed in one step",
+    columns=(
+        Column("stiffness", "N/m", read=lambda record: int(record.settings["stiffness"])),
+        SOLVER,
+        *(Column(f"to {decade}", read=partial(_needed, decade=decade)) for decade in DECADES),
+        number("tried"),
+        number("least error", "least"),
+    ),
+    subjects=lambda results: results.all("cloth", task=NEEDED),
+    shows="Iterations until |x − x*| / |y − x*| is at most so much; nothing where all that "
+    "were tried did not suffice.",
+    measured=lambda records: (
+        f"{_CLOTH}{_sizes(records)} particles. x* by Newton at the rounding floor."
+    ),
+    summary=_needed_summary,
+)
+
+
+stability = Layout(
+    "How long may the steps of explicit solvers be?",
+    "cloth_stability",
+    "The longest stable step of explicit solvers",
+    subjects=lambda results: [
+        limit for record in results.all("cloth", task=STABILITY) for limit in _limits(record)
+    ],
+    columns=(
+        text("solver", lambda limit: limit.record.solver),
+        Column("stiffness", "N/m", read=lambda limit: limit.stiffness),
+        Column("longest stable step", "ms", read=lambda limit: limit.step),
+        Column("2 / ω", "ms", read=lambda limit: limit.theory),
+        Column("of 2 / ω", read=lambda limit: limit.share),
+        text("remark", lambda limit: limit.record.notes["remark"]),
+    ),
+    shows="Symplectic Euler is stable up to h = 2 / ω, the classical Runge-Kutta method up to "
+    "2.828 / ω; ω² is the largest eigenvalue of M⁻¹ K at rest.",
+    measured="A cloth of 6 × 6 particles hangs at rest and is pushed by 1e-5 m along its "
+    "highest mode; a step is stable if that has not grown a hundredfold 400 steps later. Found "
+    "by bisection to two ten-thousandths.",
+    summary=_stability_summary,
+)
+
+
+def _as_published(results: Results) -> list[Record]:
+    records = results.all("cloth", task=LIU)
+    return [r for r in records if r.solver in published.LIU_2013 and "seconds" in r.arrays]
+
+
+def _vertices(records: Sequence[Record]) -> int:
+    return int(records[0].arrays["vertices"]) if records else 0
 
 
 def _median(record: Record) -> float:
@@ -374,16 +361,29 @@ def _liu_summary(records: Sequence[Record]) -> Summary:
     )
 
 
-ENTRIES = (
-    Entry("How many iterations does an error of 1e-8 take?", iterations),
-    Entry(
-        "Which of all solvers is soonest near the converged step?", one_step, (figures.one_step,)
+liu_2013 = Layout(
+    "What did Liu et al. (2013) measure, and what do we?",
+    "cloth_liu_2013",
+    "The times of Liu et al. (2013), and here",
+    columns=(
+        SOLVER,
+        text("a frame by", lambda record: published.LIU_2013[record.solver].done),
+        Column("published", "ms", read=lambda record: published.LIU_2013[record.solver].seconds),
+        Column("here", "ms", read=_median),
+        number("here, error left", "error"),
     ),
-    Entry(
-        "And frame after frame, near implicit Euler and near the truth?",
-        motion,
-        (figures.to_implicit_euler, figures.to_the_truth),
+    subjects=_as_published,
+    shows="The error is |x − x*| / |y − x*| as above; the paper’s ten iterations leave most of it.",
+    measured=lambda records: (
+        "Published: 6,561 vertices; read in the abstract and captions, so springs, "
+        "stiffness, step and machine are not known to us. Here: "
+        f"{words(_vertices(records))} particles, 81 × 81, "
+        f"{words(int(published.LIU_2013_STIFFNESS))} N/m, one step of "
+        f"{words_in(published.LIU_2013_FRAME, 'ms')} from mid-fall, on one core; "
+        "Newton to a residual of 1e-6."
     ),
-    Entry("How long may the steps of explicit solvers be?", stability),
-    Entry("What did Liu et al. (2013) measure, and what do we?", liu_2013),
+    summary=_liu_summary,
 )
+
+
+LAYOUTS = (iterations, one_step, motion, stability, liu_2013)

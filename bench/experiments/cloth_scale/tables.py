@@ -6,69 +6,34 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...presentation.columns import number, setting, text
-from ...presentation.entry import Entry
-from ...presentation.results import Results, settings
-from ...presentation.tables import Column, Summary, Table, listing, tabulate, words
+from ...presentation.layout import Layout
+from ...presentation.results import settings
+from ...presentation.tables import Column, Summary, listing, words
 
 OURS = registry.SUPERNODAL.name
 PEERS = {library.name: library.label for library in registry.FACTORS}
 
 
-def iterations(results: Results) -> Table:
-    """Return the time of solves and iterations for each particle and nonzero."""
-    records = [r for r in results.all("cloth_scale") if r.solver == OURS]
+def _iterations_columns(records: Sequence[Record]) -> tuple[Column, ...]:
     count = settings(records, "iterations")
-    return tabulate(
-        "cloth_scale",
-        "Local/global iterations as the cloth grows",
-        (
-            setting("particles", "particles"),
-            _over_particles("nonzeros of L for each", "entries"),
-            Column("solve", "ns/nonzero", read=lambda r: _ratio(r, "solve", "entries")),
-            _over_particles("solve", "solve", "ns/particle"),
-            _over_particles("local step", "local", "ns/particle"),
-            Column(
-                "iteration",
-                "ns/particle",
-                read=lambda r: metrics.ratio(_iteration(r), r.settings["particles"]),
-            ),
-            Column(f"{count} iterations", "solves", read=lambda r: _ratio(r, "step", "solve")),
-            Column(
-                f"{count} iterations",
-                "limits",
-                read=lambda r: metrics.ratio(_iteration(r), _median(r, "limit")),
-            ),
-            number("residual then", "residual"),
+    return (
+        setting("particles", "particles"),
+        _over_particles("nonzeros of L for each", "entries"),
+        Column("solve", "ns/nonzero", read=lambda r: _ratio(r, "solve", "entries")),
+        _over_particles("solve", "solve", "ns/particle"),
+        _over_particles("local step", "local", "ns/particle"),
+        Column(
+            "iteration",
+            "ns/particle",
+            read=lambda r: metrics.ratio(_iteration(r), r.settings["particles"]),
         ),
-        records,
-        shows="A solve has three right-hand sides. The limit is the time of reading as many bytes "
-        "as an iteration has to: the factor twice, the springs, the particles, in memory as near "
-        "as theirs. As a factor outgrows a cache, its nonzeros cost more.",
-        measured=_measured(records),
-        summary=_iterations_summary,
-    )
-
-
-def factors(results: Results) -> Table:
-    """Return the time and the memory of factors, ours and CHOLMOD's."""
-    records = results.all("cloth_scale")
-    return tabulate(
-        "cloth_factors",
-        "Factors of M + h² L as the cloth grows",
-        (
-            setting("particles", "particles"),
-            text("by", _library),
-            number("first factor", "factor", "s"),
-            number("again, pattern known", "refactor", "s"),
-            Column("solve", "ms", read=lambda r: _median(r, "solve") if r.arrays else None),
-            Column("most memory", "GiB", read=_memory),
+        Column(f"{count} iterations", "solves", read=lambda r: _ratio(r, "step", "solve")),
+        Column(
+            f"{count} iterations",
+            "limits",
+            read=lambda r: metrics.ratio(_iteration(r), _median(r, "limit")),
         ),
-        records,
-        shows="The first factor finds an order of elimination; another step length or stiffness "
-        "needs only the second. The memory is that of a whole process, compiler and cloth "
-        "included, but for a second factor beside the first.",
-        measured=_measured(records),
-        summary=_factors_summary,
+        number("residual then", "residual"),
     )
 
 
@@ -137,7 +102,39 @@ def _measured(records: Sequence[Record]) -> str:
     )
 
 
-ENTRIES = (
-    Entry("Iterations, up to a million particles", iterations),
-    Entry("Factors, up to a million particles", factors),
+iterations = Layout(
+    "Iterations, up to a million particles",
+    "cloth_scale",
+    "Local/global iterations as the cloth grows",
+    columns=_iterations_columns,
+    subjects=lambda results: [r for r in results.all("cloth_scale") if r.solver == OURS],
+    shows="A solve has three right-hand sides. The limit is the time of reading as many bytes "
+    "as an iteration has to: the factor twice, the springs, the particles, in memory as near "
+    "as theirs. As a factor outgrows a cache, its nonzeros cost more.",
+    measured=_measured,
+    summary=_iterations_summary,
 )
+
+
+factors = Layout(
+    "Factors, up to a million particles",
+    "cloth_factors",
+    "Factors of M + h² L as the cloth grows",
+    subjects=lambda results: results.all("cloth_scale"),
+    columns=(
+        setting("particles", "particles"),
+        text("by", _library),
+        number("first factor", "factor", "s"),
+        number("again, pattern known", "refactor", "s"),
+        Column("solve", "ms", read=lambda r: _median(r, "solve") if r.arrays else None),
+        Column("most memory", "GiB", read=_memory),
+    ),
+    shows="The first factor finds an order of elimination; another step length or stiffness "
+    "needs only the second. The memory is that of a whole process, compiler and cloth "
+    "included, but for a second factor beside the first.",
+    measured=_measured,
+    summary=_factors_summary,
+)
+
+
+LAYOUTS = (iterations, factors)

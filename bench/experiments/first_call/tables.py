@@ -4,33 +4,9 @@ from collections.abc import Sequence
 
 from ...harness.record import Record
 from ...presentation.columns import number, text, titled
-from ...presentation.entry import Entry
-from ...presentation.results import Results, label
-from ...presentation.tables import Summary, Table, tabulate, words
-
-
-def first_calls(results: Results) -> Table:
-    """Return the times of first calls."""
-    return tabulate(
-        "first_calls",
-        "The first call in a process",
-        (
-            titled("function"),
-            text("by", lambda record: label(record.solver)),
-            number("compiled", "cold compiled"),
-            number("nothing on disk, processor", "cold processor", "s"),
-            number("nothing on disk, wall", "cold wall", "s"),
-            number("compiled before, processor", "warm processor", "s"),
-            number("compiled before, wall", "warm wall", "s"),
-        ),
-        results.all("first_call"),
-        shows="A kernel is compiled by the first call that needs it, and kept on disk; importing "
-        "the compiler is part of the first call, importing Plumbob is not. The third column counts "
-        "the kernels compiled, each with all that it calls.",
-        measured="Each in two fresh processes, the first with an empty folder for what is "
-        "compiled.",
-        summary=_summary,
-    )
+from ...presentation.layout import Layout
+from ...presentation.results import label
+from ...presentation.tables import Summary, words
 
 
 def _summary(records: Sequence[Record]) -> Summary:
@@ -43,4 +19,26 @@ def _summary(records: Sequence[Record]) -> Summary:
     )
 
 
-ENTRIES = (Entry("What does the first call cost, which compiles?", first_calls),)
+first_calls = Layout(
+    "What does the first call cost, which compiles?",
+    "first_calls",
+    "The first call in a process",
+    subjects=lambda results: results.all("first_call"),
+    columns=(
+        titled("function"),
+        text("by", lambda record: label(record.solver)),
+        number("compiled", "cold compiled"),
+        number("nothing on disk, processor", "cold processor", "s"),
+        number("nothing on disk, wall", "cold wall", "s"),
+        number("compiled before, processor", "warm processor", "s"),
+        number("compiled before, wall", "warm wall", "s"),
+    ),
+    shows="A kernel is compiled by the first call that needs it, and kept on disk; importing "
+    "the compiler is part of the first call, importing Plumbob is not. The third column counts "
+    "the kernels compiled, each with all that it calls.",
+    measured="Each in two fresh processes, the first with an empty folder for what is compiled.",
+    summary=_summary,
+)
+
+
+LAYOUTS = (first_calls,)

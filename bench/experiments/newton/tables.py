@@ -7,41 +7,9 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.columns import SOLVER, number, text
-from ...presentation.entry import Entry
-from ...presentation.results import Results, counted, settings
-from ...presentation.tables import Column, Summary, Table, tabulate, words
-
-
-def certified(results: Results) -> Table:
-    """Return every answer with its residuals, the proven distance or why there is none."""
-    records = results.all("newton")
-    return tabulate(
-        "newton_certified",
-        "One step of a cloth in mid-swing: which answers are proven",
-        (
-            Column("stiffness", "N/m", read=lambda record: float(record.facts["stiffness"])),
-            SOLVER,
-            text("from", lambda record: record.settings["start"]),
-            number("iterations"),
-            number("residual"),
-            number("residual in MuJoCo’s forces", "balance"),
-            Column("a minimiser within", "m", read=_distance),
-            text("bound", _bound),
-            number("to Newton’s answer", "apart", "m"),
-            number("error"),
-            number("g above Newton’s", "above", "kg m²"),
-            text("Newton’s minimiser", _same),
-        ),
-        records,
-        shows="Within the distance there is a minimiser of g, and only one: proven, with all "
-        "rounding allowed for, from the Newton step, the least eigenvalue of the Hessian and how "
-        "fast the Hessian may change. Where there is no bound the column says why, and error and g "
-        "are all there is. The error is |x − x*| / |y − x*| for Newton’s answer x*.",
-        measured=f"The lab’s cloth of {_sizes(records)} particles under 9.81 m/s², half a second "
-        f"after it was let go; one step of {settings(records, 'h')} s, to a residual of "
-        f"{settings(records, 'tolerance')}, the rounding floor, or the solver’s last iteration.",
-        summary=_summary,
-    )
+from ...presentation.layout import Layout
+from ...presentation.results import counted, settings
+from ...presentation.tables import Column, Summary, words
 
 
 def _distance(record: Record) -> float | None:
@@ -85,4 +53,36 @@ def _sizes(records: Sequence[Record]) -> str:
     return " or ".join(f"{size} × {size}" for size in sizes) or "–"
 
 
-ENTRIES = (Entry("Which answers to a hard step are proven?", certified),)
+certified = Layout(
+    "Which answers to a hard step are proven?",
+    "newton_certified",
+    "One step of a cloth in mid-swing: which answers are proven",
+    subjects=lambda results: results.all("newton"),
+    columns=(
+        Column("stiffness", "N/m", read=lambda record: float(record.facts["stiffness"])),
+        SOLVER,
+        text("from", lambda record: record.settings["start"]),
+        number("iterations"),
+        number("residual"),
+        number("residual in MuJoCo’s forces", "balance"),
+        Column("a minimiser within", "m", read=_distance),
+        text("bound", _bound),
+        number("to Newton’s answer", "apart", "m"),
+        number("error"),
+        number("g above Newton’s", "above", "kg m²"),
+        text("Newton’s minimiser", _same),
+    ),
+    shows="Within the distance there is a minimiser of g, and only one: proven, with all "
+    "rounding allowed for, from the Newton step, the least eigenvalue of the Hessian and how "
+    "fast the Hessian may change. Where there is no bound the column says why, and error and g "
+    "are all there is. The error is |x − x*| / |y − x*| for Newton’s answer x*.",
+    measured=lambda records: (
+        f"The lab’s cloth of {_sizes(records)} particles under 9.81 m/s², half a second "
+        f"after it was let go; one step of {settings(records, 'h')} s, to a residual of "
+        f"{settings(records, 'tolerance')}, the rounding floor, or the solver’s last iteration."
+    ),
+    summary=_summary,
+)
+
+
+LAYOUTS = (certified,)

@@ -5,36 +5,10 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.columns import LARGEST, MEDIAN, spread, spread_of, text, words_in
-from ...presentation.entry import Entry
-from ...presentation.results import Results, label, listed, settings, solvers
-from ...presentation.tables import Column, Summary, Table, tabulate, words
+from ...presentation.layout import Layout
+from ...presentation.results import label, listed, settings, solvers
+from ...presentation.tables import Column, Summary, words
 from . import ARM, figures
-
-
-def resampling(results: Results) -> Table:
-    """Return what resampling makes of the custom curve."""
-    records = results.all("pictures", task=ARM)
-    return tabulate(
-        "resampling",
-        "The custom curve before and after resampling",
-        (
-            text("curve", _curve),
-            Column("points", read=lambda record: len(record.arrays["curve"])),
-            Column("gap, least", "m", read=_least_gap),
-            *spread("gap", "spacing", "m", (MEDIAN, LARGEST)),
-            Column("rotation of a joint, mean", "°", read=_mean_angle),
-            *spread("rotation of a joint", "largest_angle", "°", [LARGEST]),
-            *spread("iterations", "iterations", of=[LARGEST]),
-            *spread("residual", "residual", "m", [LARGEST]),
-        ),
-        records,
-        shows="The gap is the distance between neighbouring points; rotations are geodesic angles "
-        "between neighbouring frames, a frame a point.",
-        measured=f"Gaps kept from {settings(records, 'min_spacing')} to "
-        f"{settings(records, 'max_spacing')} m; {listed([label(s) for s in solvers(records)])}, "
-        "each frame started from the last solution.",
-        summary=_summary,
-    )
 
 
 def _curve(record: Record) -> str:
@@ -59,6 +33,31 @@ def _summary(records: Sequence[Record]) -> Summary:
     return Summary("How evenly the points lie, and how smoothly the arm follows:", tuple(points))
 
 
-ENTRIES = (
-    Entry("What does resampling the custom curve change?", resampling, (figures.arm_draws,)),
+resampling = Layout(
+    "What does resampling the custom curve change?",
+    "resampling",
+    "The custom curve before and after resampling",
+    subjects=lambda results: results.all("pictures", task=ARM),
+    columns=(
+        text("curve", _curve),
+        Column("points", read=lambda record: len(record.arrays["curve"])),
+        Column("gap, least", "m", read=_least_gap),
+        *spread("gap", "spacing", "m", (MEDIAN, LARGEST)),
+        Column("rotation of a joint, mean", "°", read=_mean_angle),
+        *spread("rotation of a joint", "largest_angle", "°", [LARGEST]),
+        *spread("iterations", "iterations", of=[LARGEST]),
+        *spread("residual", "residual", "m", [LARGEST]),
+    ),
+    shows="The gap is the distance between neighbouring points; rotations are geodesic angles "
+    "between neighbouring frames, a frame a point.",
+    measured=lambda records: (
+        f"Gaps kept from {settings(records, 'min_spacing')} to "
+        f"{settings(records, 'max_spacing')} m; {listed([label(s) for s in solvers(records)])}, "
+        "each frame started from the last solution."
+    ),
+    summary=_summary,
+    figures=(figures.arm_draws,),
 )
+
+
+LAYOUTS = (resampling,)

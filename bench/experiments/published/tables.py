@@ -1,21 +1,19 @@
 """Published tables, and the same set-up here."""
 
-from functools import partial
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.columns import effort, places, spread_of, text, words_in
-from ...presentation.entry import Entry
+from ...presentation.layout import Layout
 from ...presentation.results import Results, label, settings
 from ...presentation.tables import (
     INTERVAL,
     Column,
     Summary,
-    Table,
     in_unit,
     listing,
-    tabulate,
     words,
 )
 from . import FABRIK, TOOLBOX, TRAC_IK
@@ -36,8 +34,8 @@ class Rate(NamedTuple):
     mean: float | None = None
 
 
-def trac_ik(results: Results) -> Table:
-    """Return TRAC-IK's table, and what the solvers do here."""
+def _rates(results: Results) -> list[Rate]:
+    """Return the rates published for the robots at hand, and then ours, robot by robot."""
     here = [_measured_rate(record) for record in results.all("ik", task=TRAC_IK)]
     robots = {rate.robot for rate in here}
     rates = [
@@ -45,35 +43,8 @@ def trac_ik(results: Results) -> Table:
         for r in published.TRAC_IK
         if r.robot in robots
     ]
-    order = list(dict.fromkeys(rate.robot for rate in published.TRAC_IK))
-    return tabulate(
-        "published_trac_ik",
-        "TRAC-IK’s published table, and here",
-        (
-            text("robot", lambda rate: rate.robot),
-            text("solver", lambda rate: rate.solver),
-            text("from", lambda rate: rate.source),
-            Column("solved", note=INTERVAL, read=lambda rate: rate.solved),
-            Column("solved", "%", read=lambda rate: rate.percent, factor=1.0),
-            Column("time, median", "ms", read=lambda rate: rate.median, factor=1.0),
-            Column("time, mean", "ms", read=lambda rate: rate.mean, factor=1.0),
-        ),
-        sorted([*rates, *here], key=lambda rate: order.index(rate.robot)),
-        shows="Full poses at 1e-5 m and rad in each of six components, every search from the "
-        "middle of the limits, at most 5 ms for TRAC-IK; times of all targets, those that failed "
-        "included.",
-        measured="Published: 10,000 reachable random poses on a machine of its time. Here: as many "
-        "of our own as the column says, evaluated by MuJoCo at the norm of three such components; "
-        "the PR2’s continuous joints have two revolutions in either direction.",
-        summary=lambda rates: listing(
-            "Here:",
-            (
-                f"{rate.robot}, {rate.solver}: {words(rate.solved)}, mean {words(rate.mean)} ms"
-                for rate in rates
-                if rate.solved
-            ),
-        ),
-    )
+    order = [rate.robot for rate in published.TRAC_IK]
+    return sorted([*rates, *here], key=lambda rate: order.index(rate.robot))
 
 
 def _measured_rate(record: Record) -> Rate:
@@ -89,32 +60,6 @@ def _measured_rate(record: Record) -> Rate:
         metrics.percent(share.hits, share.total),
         in_unit(median, "ms"),
         in_unit(mean, "ms"),
-    )
-
-
-def toolbox(results: Results) -> Table:
-    """Return the Robotics Toolbox's table of one search, and what the solvers do here."""
-    return tabulate(
-        "published_toolbox",
-        "The Robotics Toolbox tutorial’s table of one search, and here",
-        (
-            text("solver", lambda record: record.solver),
-            Column("published, infeasible", "%", read=_published_rate, factor=1.0),
-            Column("here, by its own word", "%", read=_unclaimed),
-            Column("here, not solved within the limits", note=INTERVAL, read=_failed),
-            *places("time", "µs", ("median",), effort),
-        ),
-        [r for r in results.all("ik", task=TOOLBOX) if "solved" in r.arrays],
-        shows="UR5, random poses and starts, one search of at most "
-        f"{words(published.TOOLBOX_ITERATIONS)} iterations; infeasible is what the search does not "
-        "solve. The published searches look at no limits, nor do the toolbox’s here; the last "
-        "share counts answers beyond the limits as not solved.",
-        measured="Published: 10,000 poses, the tutorial’s own Python loops (Haviland and Corke "
-        "2022). Here the toolbox’s compiled ones, and ours; half the squared error within "
-        f"{words(published.TOOLBOX_HALF_SQUARE)}.",
-        summary=lambda records: Summary(
-            "Not solved by one search:", tuple(map(_said_of_search, records))
-        ),
     )
 
 
@@ -138,65 +83,134 @@ def _said_of_search(record: Record) -> str:
     return f"{record.solver}: {own} infeasible by its own word{beside}; {words(_failed(record))}"
 
 
-def fabrik(results: Results) -> Table:
-    """Return table 1 of the paper on FABRIK, and our iterations."""
-    records = results.all("ik", task=FABRIK)
-    by = {(record.solver, record.facts["stratum"]): record for record in records}
-    return tabulate(
-        "published_fabrik",
-        "Iterations in the paper on FABRIK, and here",
+trac_ik = Layout(
+    "What did TRAC-IK’s authors measure, and what do we?",
+    "published_trac_ik",
+    "TRAC-IK’s published table, and here",
+    columns=(
+        text("robot", lambda rate: rate.robot),
+        text("solver", lambda rate: rate.solver),
+        text("from", lambda rate: rate.source),
+        Column("solved", note=INTERVAL, read=lambda rate: rate.solved),
+        Column("solved", "%", read=lambda rate: rate.percent, factor=1.0),
+        Column("time, median", "ms", read=lambda rate: rate.median, factor=1.0),
+        Column("time, mean", "ms", read=lambda rate: rate.mean, factor=1.0),
+    ),
+    subjects=_rates,
+    shows="Full poses at 1e-5 m and rad in each of six components, every search from the "
+    "middle of the limits, at most 5 ms for TRAC-IK; times of all targets, those that failed "
+    "included.",
+    measured="Published: 10,000 reachable random poses on a machine of its time. Here: as many "
+    "of our own as the column says, evaluated by MuJoCo at the norm of three such components; "
+    "the PR2’s continuous joints have two revolutions in either direction.",
+    summary=lambda rates: listing(
+        "Here:",
         (
-            text("solver", label),
-            *(
-                Column(f"{stratum}, {what}", read=partial(read, by, stratum))
-                for stratum in published.FABRIK_DISTANCES
-                for what, read in (
-                    ("published, mean", _published_count),
-                    ("here, mean", _mean_count),
-                    ("here, largest", _largest_count),
-                )
-            ),
+            f"{rate.robot}, {rate.solver}: {words(rate.solved)}, mean {words(rate.mean)} ms"
+            for rate in rates
+            if rate.solved
         ),
-        dict.fromkeys(record.solver for record in records),
-        shows="Iterations for one target, ten joints, no limits. Here a target out of reach is "
-        "recognised as such by geometry where the chain is straight.",
-        measured="Published: Aristidou and Lasenby 2011, table 1, 20 runs, MATLAB, read in a "
-        "secondary source; chain, target and tolerance are not stated there. Here a guess: "
-        f"{published.FABRIK_LINKS} links of 0.1 m from straight, {published.FABRIK_RUNS} seeded "
-        f"directions, targets at {' and '.join(map(str, published.FABRIK_DISTANCES.values()))} m, "
-        f"to {settings(records, 'tolerance')} m.",
-        summary=lambda solvers: Summary(
-            "Mean iterations towards a reachable target:",
-            tuple(
-                f"{label(solver)}: {words(_mean_count(by, NEAR, solver))} here, "
-                f"{words(_published_count(by, NEAR, solver))} published"
-                for solver in solvers
-            ),
+    ),
+)
+
+
+toolbox = Layout(
+    "And those of the Robotics Toolbox?",
+    "published_toolbox",
+    "The Robotics Toolbox tutorial’s table of one search, and here",
+    subjects=lambda results: [r for r in results.all("ik", task=TOOLBOX) if "solved" in r.arrays],
+    columns=(
+        text("solver", lambda record: record.solver),
+        Column("published, infeasible", "%", read=_published_rate, factor=1.0),
+        Column("here, by its own word", "%", read=_unclaimed),
+        Column("here, not solved within the limits", note=INTERVAL, read=_failed),
+        *places("time", "µs", ("median",), effort),
+    ),
+    shows="UR5, random poses and starts, one search of at most "
+    f"{words(published.TOOLBOX_ITERATIONS)} iterations; infeasible is what the search does not "
+    "solve. The published searches look at no limits, nor do the toolbox’s here; the last "
+    "share counts answers beyond the limits as not solved.",
+    measured="Published: 10,000 poses, the tutorial’s own Python loops (Haviland and Corke "
+    "2022). Here the toolbox’s compiled ones, and ours; half the squared error within "
+    f"{words(published.TOOLBOX_HALF_SQUARE)}.",
+    summary=lambda records: Summary(
+        "Not solved by one search:", tuple(map(_said_of_search, records))
+    ),
+)
+
+
+NEAR = next(iter(published.FABRIK_DISTANCES))
+
+
+class Counted(NamedTuple):
+    """The iterations of a solver in the set-up of the paper on FABRIK, by stratum."""
+
+    solver: str
+    here: dict[str, Record]
+
+    def published(self, stratum: str) -> float | None:
+        """Return the mean of the paper."""
+        counts = published.FABRIK.get(self.solver, (None, None))
+        return counts[list(published.FABRIK_DISTANCES).index(stratum)]
+
+    def mean(self, stratum: str) -> float | None:
+        """Return the mean here."""
+        here = self.here.get(stratum)
+        return None if here is None else metrics.mean(here.arrays["iterations"])
+
+    def largest(self, stratum: str) -> float | None:
+        """Return the largest number here."""
+        here = self.here.get(stratum)
+        return None if here is None else spread_of(here, "iterations")[2]
+
+
+def _counted(results: Results) -> list[Counted]:
+    records = results.all("ik", task=FABRIK)
+    by: dict[str, dict[str, Record]] = {}
+    for record in records:
+        by.setdefault(record.solver, {})[record.facts["stratum"]] = record
+    return [Counted(solver, here) for solver, here in by.items()]
+
+
+def _fabrik_columns(stratum: str) -> tuple[Column, ...]:
+    return (
+        Column(f"{stratum}, published, mean", read=lambda counted: counted.published(stratum)),
+        Column(f"{stratum}, here, mean", read=lambda counted: counted.mean(stratum)),
+        Column(f"{stratum}, here, largest", read=lambda counted: counted.largest(stratum)),
+    )
+
+
+def _fabrik_summary(solvers: Sequence[Counted]) -> Summary:
+    return Summary(
+        "Mean iterations towards a reachable target:",
+        tuple(
+            f"{label(one.solver)}: {words(one.mean(NEAR))} here, "
+            f"{words(one.published(NEAR))} published"
+            for one in solvers
         ),
     )
 
 
-NEAR = next(iter(published.FABRIK_DISTANCES))
-ByStratum = dict[tuple[str, str], Record]
-
-
-def _published_count(_: ByStratum, stratum: str, solver: str) -> float | None:
-    counts = published.FABRIK.get(solver)
-    return None if counts is None else counts[list(published.FABRIK_DISTANCES).index(stratum)]
-
-
-def _mean_count(by: ByStratum, stratum: str, solver: str) -> float | None:
-    record = by.get((solver, stratum))
-    return None if record is None else metrics.mean(record.arrays["iterations"])
-
-
-def _largest_count(by: ByStratum, stratum: str, solver: str) -> float | None:
-    record = by.get((solver, stratum))
-    return None if record is None else spread_of(record, "iterations")[2]
-
-
-ENTRIES = (
-    Entry("What did TRAC-IK’s authors measure, and what do we?", trac_ik),
-    Entry("And those of the Robotics Toolbox?", toolbox),
-    Entry("And those of FABRIK?", fabrik),
+fabrik = Layout(
+    "And those of FABRIK?",
+    "published_fabrik",
+    "Iterations in the paper on FABRIK, and here",
+    subjects=_counted,
+    columns=(
+        text("solver", lambda counted: label(counted.solver)),
+        *(column for stratum in published.FABRIK_DISTANCES for column in _fabrik_columns(stratum)),
+    ),
+    shows="Iterations for one target, ten joints, no limits. Here a target out of reach is "
+    "recognised as such by geometry where the chain is straight.",
+    measured=lambda solvers: (
+        "Published: Aristidou and Lasenby 2011, table 1, 20 runs, MATLAB, read in a "
+        "secondary source; chain, target and tolerance are not stated there. Here a guess: "
+        f"{published.FABRIK_LINKS} links of 0.1 m from straight, {published.FABRIK_RUNS} seeded "
+        f"directions, targets at {' and '.join(map(str, published.FABRIK_DISTANCES.values()))} m, "
+        f"to {settings((r for one in solvers for r in one.here.values()), 'tolerance')} m."
+    ),
+    summary=_fabrik_summary,
 )
+
+
+LAYOUTS = (trac_ik, toolbox, fabrik)

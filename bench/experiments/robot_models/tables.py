@@ -5,9 +5,9 @@ from functools import partial
 
 from ...harness.record import Record
 from ...presentation.columns import text
-from ...presentation.entry import Entry
-from ...presentation.results import Results, by_problem, counted, listed, problems, settings
-from ...presentation.tables import Column, Summary, Table, tabulate, words
+from ...presentation.layout import Layout
+from ...presentation.results import by_problem, counted, listed, problems, settings
+from ...presentation.tables import Column, Summary, words
 
 SIZES = {"links": "links", "moving joints": "joints", "freedoms": "freedoms"}
 QUANTITIES = {
@@ -17,28 +17,8 @@ QUANTITIES = {
 }
 
 
-def agreement(results: Results) -> Table:
-    """Return a row a file: its size, the largest differences, and what an engine does otherwise."""
-    records = results.all("robot_models")
-    return tabulate(
-        "robot_models",
-        "Robots and characters from files, beside both engines",
-        (
-            text("file", lambda file: file[0].title),
-            *(Column(title, read=partial(_size, name=name)) for title, name in SIZES.items()),
-            *(Column(title, read=partial(_most, name=name)) for title, name in QUANTITIES.items()),
-            text("engines", lambda file: listed([r.solver for r in _agreeing(file)]) or "none"),
-            text("but", lambda file: "; ".join(filter(None, map(_remark, file)))),
-        ),
-        by_problem(records).values(),
-        shows="The reference reads each file itself. Differences are the largest of all links in "
-        "all configurations; positions are measured against the extent of the links, "
-        "Jacobians against that and one radian. An engine that is known to place links elsewhere "
-        "is left out of the numbers, and the cause is given.",
-        measured=f"{settings(records, 'configurations') or 'No'} random configurations of each "
-        "file, within the limits; links and joints are matched by name.",
-        summary=_summary,
-    )
+def _all(files: Sequence[Sequence[Record]]) -> list[Record]:
+    return [record for file in files for record in file]
 
 
 def _size(file: Sequence[Record], name: str) -> int | None:
@@ -72,7 +52,7 @@ def _remark(record: Record) -> str:
 
 
 def _summary(files: Sequence[Sequence[Record]]) -> Summary:
-    records = [record for file in files for record in file]
+    records = _all(files)
     agreeing = _agreeing(records)
     if not agreeing:
         return Summary()
@@ -92,4 +72,28 @@ def _reads(records: Sequence[Record], engine: str) -> str:
     return f"{engine}: {words(len(read))} of {counted(len(mine), 'file')} read{otherwise}"
 
 
-ENTRIES = (Entry("On which robots and characters do they agree?", agreement),)
+agreement = Layout(
+    "On which robots and characters do they agree?",
+    "robot_models",
+    "Robots and characters from files, beside both engines",
+    columns=(
+        text("file", lambda file: file[0].title),
+        *(Column(title, read=partial(_size, name=name)) for title, name in SIZES.items()),
+        *(Column(title, read=partial(_most, name=name)) for title, name in QUANTITIES.items()),
+        text("engines", lambda file: listed([r.solver for r in _agreeing(file)]) or "none"),
+        text("but", lambda file: "; ".join(filter(None, map(_remark, file)))),
+    ),
+    subjects=lambda results: by_problem(results.all("robot_models")).values(),
+    shows="The reference reads each file itself. Differences are the largest of all links in "
+    "all configurations; positions are measured against the extent of the links, "
+    "Jacobians against that and one radian. An engine that is known to place links elsewhere "
+    "is left out of the numbers, and the cause is given.",
+    measured=lambda files: (
+        f"{settings(_all(files), 'configurations') or 'No'} random configurations of each "
+        "file, within the limits; links and joints are matched by name."
+    ),
+    summary=_summary,
+)
+
+
+LAYOUTS = (agreement,)

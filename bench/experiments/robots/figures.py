@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ...harness.record import Record
-from ...presentation.entry import Figure
 from ...presentation.figures import Drawing, canvas, every_handle, finished, nth_style, written
+from ...presentation.layout import Figure
 from ...presentation.results import Results
 from . import readings
 

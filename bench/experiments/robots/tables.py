@@ -5,7 +5,7 @@ five tables exists for either kind.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -28,9 +28,9 @@ from ...presentation.columns import (
     titled,
     words_in,
 )
-from ...presentation.entry import Entry
+from ...presentation.layout import Layout
 from ...presentation.results import Results, listed, settings
-from ...presentation.tables import Cell, Column, Summary, Table, listing, tabulate, words
+from ...presentation.tables import Cell, Column, Summary, listing, words
 from . import REACHABLE, UNREACHABLE, figures
 from .readings import KINDS, budget_curve, budget_curves, by_robot, measured, profiles, records_of
 
@@ -51,70 +51,87 @@ NAMES = (titled("robot"), text("solver", lambda record: record.solver))
 class Tables(NamedTuple):
     """The tables that exist for either kind."""
 
-    success: Callable[[Results], Table]
-    strata: Callable[[Results], Table]
-    unreachable: Callable[[Results], Table]
-    budgets: Callable[[Results], Table]
-    profiles: Callable[[Results], Table]
+    success: Layout
+    strata: Layout
+    unreachable: Layout
+    budgets: Layout
+    profiles: Layout
 
 
-def models(results: Results) -> Table:
-    """Return the robots and what is asked of them."""
-    one = {r.title: r for kind in KINDS for r in measured(records_of(results, kind))}
-    return tabulate(
-        "robots_list",
-        "The robots",
-        (
-            titled("robot"),
-            Column("joints", read=lambda record: record.facts["joints"]),
-            Column("degrees of freedom", read=lambda record: record.facts["freedom"]),
-            text("tips", lambda record: ", ".join(record.facts["tips"])),
-            text("wanted of each tip", lambda record: record.facts["wanted"]),
-        ),
-        one.values(),
-        shows="Arms are the chains of links that end in the tip, hinges alone, with the limits of "
-        "their files; continuous joints have two revolutions in either direction. The "
-        "character is our own, of balls without and hinges with limits.",
-        measured="The arms’ files are those of example-robot-data, without soft limits; every "
-        "solver and the evaluation read the same text.",
-        summary=lambda _: Summary(f"{listed(list(one))}."),
-    )
+def _robots(results: Results) -> list[Record]:
+    """Return a record on each robot."""
+    found = [r for kind in KINDS for r in measured(records_of(results, kind))]
+    return list({record.title: record for record in found}.values())
 
 
-def who(results: Results) -> Table:
-    """Return the solvers that take part."""
-    present = {r.solver: r.settings.get("version") for r in results.all("ik", task=REACHABLE)}
+models = Layout(
+    "On which robots?",
+    "robots_list",
+    "The robots",
+    subjects=_robots,
+    columns=(
+        titled("robot"),
+        Column("joints", read=lambda record: record.facts["joints"]),
+        Column("degrees of freedom", read=lambda record: record.facts["freedom"]),
+        text("tips", lambda record: ", ".join(record.facts["tips"])),
+        text("wanted of each tip", lambda record: record.facts["wanted"]),
+    ),
+    shows="Arms are the chains of links that end in the tip, hinges alone, with the limits of "
+    "their files; continuous joints have two revolutions in either direction. The "
+    "character is our own, of balls without and hinges with limits.",
+    measured="The arms’ files are those of example-robot-data, without soft limits; every "
+    "solver and the evaluation read the same text.",
+    summary=lambda robots: Summary(f"{listed([robot.title for robot in robots])}."),
+)
 
-    def version(peer: Peer) -> str:
-        found = [present[name] for name in map(peer.called, peer.entries) if name in present]
-        return next(iter(found), "") or "not installed"
 
-    def installed(peers: Sequence[Peer]) -> Summary:
-        count = sum(version(peer) != "not installed" for peer in peers)
-        return Summary(f"{count} of {len(peers)} installed.")
+class Participant(NamedTuple):
+    """A peer and the version that took part, "" if it did not."""
 
-    return tabulate(
-        "robots_solvers",
-        "The solvers",
-        (
-            text("solver", lambda peer: peer.title),
-            text("package", lambda peer: peer.package),
-            text("version", version),
-            text("license", lambda peer: peer.license),
-            text("takes", lambda peer: peer.can),
-            text("takes part as", _kinds),
-        ),
-        registry.PEERS if present else (),
-        shows="A solver that makes one attempt is also started again by the bench, from seeded "
-        "random poses until it claims an answer within the limits.",
-        measured="Settings are the packages’ own but for those in brackets and what their adapters "
-        "in bench/peers say.",
-        summary=installed,
-    )
+    peer: Peer
+    version: str
+
+
+def _participants(results: Results) -> list[Participant]:
+    """Return all peers if any took part."""
+    present = {r.solver: r.settings.get("version", "") for r in results.all("ik", task=REACHABLE)}
+    return [
+        Participant(
+            peer, next((present[n] for n in map(peer.called, peer.entries) if n in present), "")
+        )
+        for peer in (registry.PEERS if present else ())
+    ]
 
 
 def _kinds(peer: Peer) -> str:
     return listed([f"{e.kind} ({e.note})" if e.note else e.kind for e in peer.entries])
+
+
+who = Layout(
+    "Who takes part?",
+    "robots_solvers",
+    "The solvers",
+    subjects=_participants,
+    columns=(
+        text("solver", lambda one: one.peer.title),
+        text("package", lambda one: one.peer.package),
+        text("version", lambda one: one.version or "not installed"),
+        text("license", lambda one: one.peer.license),
+        text("takes", lambda one: one.peer.can),
+        text("takes part as", lambda one: _kinds(one.peer)),
+    ),
+    shows="A solver that makes one attempt is also started again by the bench, from seeded "
+    "random poses until it claims an answer within the limits.",
+    measured="Settings are the packages’ own but for those in brackets and what their adapters "
+    "in bench/peers say.",
+    summary=lambda all: Summary(
+        f"{sum(bool(one.version) for one in all)} of {len(all)} installed."
+    ),
+)
+
+
+def _measured(kind: str, results: Results, task: str = REACHABLE) -> list[Record]:
+    return measured(records_of(results, kind, task))
 
 
 def _how(records: Sequence[Record]) -> str:
@@ -124,9 +141,8 @@ def _how(records: Sequence[Record]) -> str:
     )
 
 
-def success(kind: str, results: Results) -> Table:
+def success(kind: str) -> Layout:
     """Return how many targets are solved, how soon, and how closely."""
-    records = records_of(results, kind)
     columns = (
         share("solved, uniform in joint space", partial(_solved, stratum=0)),
         share("solved, all strata within reach", _solved),
@@ -136,20 +152,21 @@ def success(kind: str, results: Results) -> Table:
         Column("claimed but not so", read=false_claims),
         Column("set-up", "ms", read=lambda record: record.arrays["setup"]),
     )
-    return tabulate(
+    return Layout(
+        f"With {kind}: how many targets are solved, how soon?",
         f"robots_success_{KINDS[kind]}",
         f"Robots, {kind}: success, time and accuracy",
-        (
+        subjects=partial(records_of, kind=kind),
+        columns=(
             *NAMES,
             *map(_if_measured, columns),
             text("remark", lambda record: record.notes.get("remark", "")),
         ),
-        records,
         shows="Times are of all targets within reach, those that failed included. Residuals "
         "are of those solved, not cut off at the tolerance. “Claimed but not so” counts "
         "answers that the solver calls solved and the evaluation does not. A solver that runs "
         "out of time has fewer targets; all have them in one order, the strata alternating.",
-        measured=_how(records),
+        measured=_how,
         summary=_success_summary,
     )
 
@@ -194,26 +211,31 @@ def _rate(record: Record) -> str:
     return f"{record.solver} {rate} in {words_in(median, 'µs')}"
 
 
-def strata(kind: str, results: Results) -> Table:
+def strata(kind: str) -> Layout:
     """Return how many targets are solved in each stratum."""
-    records = measured(records_of(results, kind))
-    names = records[0].facts["strata"] if records else []
-    return tabulate(
+    return Layout(
+        f"With {kind}: which targets are hard?",
         f"robots_strata_{KINDS[kind]}",
         f"Robots, {kind}: success in each stratum",
-        (*NAMES, *(share(name, partial(_solved, stratum=i)) for i, name in enumerate(names))),
-        records,
+        subjects=partial(_measured, kind),
+        columns=_strata_columns,
         shows="Targets from random poses within the limits. Space: the tip spread evenly over "
         "the cells of a grid; outer shell and near the root: the twentieth of the poses whose "
         "tip is farthest from and nearest to the first joint; near singular: the twentieth "
         "with the smallest least singular value of the Jacobian; at a limit: one joint put at "
         "one of its limits.",
-        measured=_how(records),
-        summary=partial(_strata_summary, names),
+        measured=_how,
+        summary=_strata_summary,
     )
 
 
-def _strata_summary(names: Sequence[str], records: Sequence[Record]) -> Summary:
+def _strata_columns(records: Sequence[Record]) -> tuple[Column, ...]:
+    names = records[0].facts["strata"] if records else []
+    return (*NAMES, *(share(name, partial(_solved, stratum=i)) for i, name in enumerate(names)))
+
+
+def _strata_summary(records: Sequence[Record]) -> Summary:
+    names = records[0].facts["strata"]
     hardest = Counter(name for record in records if (name := _hardest(record, names)))
     if not hardest:
         return Summary("No stratum is harder than the others to any solver.")
@@ -228,13 +250,14 @@ def _hardest(record: Record, names: Sequence[str]) -> str:
     return names[int(np.argmin(rates))] if rates and min(rates) < max(rates) else ""
 
 
-def unreachable(kind: str, results: Results) -> Table:
+def unreachable(kind: str) -> Layout:
     """Return what becomes of targets out of reach."""
-    records = measured(records_of(results, kind, UNREACHABLE))
-    return tabulate(
+    return Layout(
+        f"With {kind}: what happens out of reach?",
         f"robots_unreachable_{KINDS[kind]}",
         f"Robots, {kind}: targets out of reach",
-        (
+        subjects=partial(_measured, kind, task=UNREACHABLE),
+        columns=(
             *NAMES,
             Column("targets", read=lambda record: record.arrays["solved"].size),
             Column("claimed as solved", read=false_claims),
@@ -242,10 +265,9 @@ def unreachable(kind: str, results: Results) -> Table:
             *places("distance left", "m", (MEDIAN, LARGEST), _distances_left),
             Column("answers", read=lambda record: _left(record).size),
         ),
-        records,
         shows="Targets farther from the first joint than all links in a row reach. What counts "
         "is how soon a solver gives up, and that it claims nothing.",
-        measured=_how(records),
+        measured=_how,
         summary=_unreachable_summary,
     )
 
@@ -270,23 +292,24 @@ def _unreachable_summary(records: Sequence[Record]) -> Summary:
     return Summary("Claimed though out of reach:", tuple(points))
 
 
-def budgets(kind: str, results: Results) -> Table:
+def budgets(kind: str) -> Layout:
     """Return how many targets are solved within an equal time."""
-    records = measured(records_of(results, kind))
-    return tabulate(
+    return Layout(
+        f"With {kind}: who is ahead at an equal budget?",
         f"robots_budget_{KINDS[kind]}",
         f"Robots, {kind}: solved within an equal budget of time",
-        (
+        subjects=partial(_measured, kind),
+        columns=(
             *NAMES,
             *(
                 Column(f"within {_duration(budget)}", "%", read=at(i, _within_budgets))
                 for i, budget in enumerate(BUDGETS)
             ),
         ),
-        records,
         shows="Share of the targets within reach that are solved within so much time for each.",
-        measured=_how(records),
+        measured=_how,
         summary=_leaders,
+        figures=(figures.budgets(kind),),
     )
 
 
@@ -309,66 +332,76 @@ def _ahead(curves: dict[str, np.ndarray]) -> str:
     )
 
 
-def profile(kind: str, results: Results) -> Table:
-    """Return how many targets are solved within some times the time of the fastest."""
+class Profile(NamedTuple):
+    """The performance profile of a solver on a robot."""
+
+    robot: str
+    solver: str
+    curve: np.ndarray
+    records: list[Record]
+
+
+def _profiles(kind: str, results: Results) -> list[Profile]:
     records = records_of(results, kind)
-    made = profiles(records, RATIOS)
-    return tabulate(
+    return [
+        Profile(robot, solver, curve, records)
+        for robot, curves in profiles(records, RATIOS).items()
+        for solver, curve in curves.items()
+    ]
+
+
+def profile(kind: str) -> Layout:
+    """Return how many targets are solved within some times the time of the fastest."""
+    return Layout(
+        f"With {kind}: who is the fastest, how often?",
         f"robots_profile_{KINDS[kind]}",
         f"Robots, {kind}: performance profiles",
-        (
-            text("robot", lambda row: row[0]),
-            text("solver", lambda row: row[1]),
+        subjects=partial(_profiles, kind),
+        columns=(
+            text("robot", lambda row: row.robot),
+            text("solver", lambda row: row.solver),
             *(
                 Column(f"within {words(x)} times the fastest", "%", read=at(i, _curve))
                 for i, x in enumerate(RATIOS.tolist())
             ),
         ),
-        [(robot, *one) for robot, curves in made.items() for one in curves.items()],
         shows="Share of the targets, among those within reach that any of these solvers "
         "solves, that a solver solves within so many times the time of the fastest on that "
         "target (Dolan and Moré 2002).",
-        measured=f"{_how(records)} The targets are those that all solvers shown were given; a "
-        "solver given less than an eighth of them is left out.",
-        summary=lambda _: Summary(
-            "Most often the fastest:",
-            tuple(f"{robot}: {_fastest(curves)}" for robot, curves in made.items()),
+        measured=lambda rows: (
+            f"{_how(rows[0].records if rows else [])} The targets are those that "
+            "all solvers shown were given; a solver given less than an eighth of them is left out."
         ),
+        summary=_profile_summary,
+        figures=(figures.profiles(kind),),
     )
 
 
-def _curve(row: tuple[str, str, np.ndarray]) -> np.ndarray:
-    return row[2]
+def _curve(row: Profile) -> np.ndarray:
+    return row.curve
 
 
-def _fastest(curves: dict[str, np.ndarray]) -> str:
-    first = max(curves, key=lambda solver: curves[solver][0])
-    return f"{first}, on {words_in(float(curves[first][0]), '%')} of the targets"
+def _profile_summary(rows: Sequence[Profile]) -> Summary:
+    """Say who is the fastest most often, robot by robot."""
+    first: dict[str, Profile] = {}
+    for row in rows:
+        if row.robot not in first or row.curve[0] > first[row.robot].curve[0]:
+            first[row.robot] = row
+    return Summary(
+        "Most often the fastest:",
+        tuple(
+            f"{robot}: {row.solver}, on {words_in(float(row.curve[0]), '%')} of the targets"
+            for robot, row in first.items()
+        ),
+    )
 
 
 def _duration(seconds: float) -> str:
     return words_in(seconds, "µs" if seconds < 1e-3 else "ms")
 
 
-MAKERS = (success, strata, unreachable, budgets, profile)
-TABLES = {kind: Tables(*(partial(make, kind) for make in MAKERS)) for kind in KINDS}
-
-
-def _entries(kind: str) -> tuple[Entry, ...]:
-    """Return the entries that exist for either kind of solver."""
-    made = TABLES[kind]
-    solved_in_time, against_fastest = figures.budgets(kind), figures.profiles(kind)
-    return (
-        Entry(f"With {kind}: how many targets are solved, how soon?", made.success),
-        Entry(f"With {kind}: which targets are hard?", made.strata),
-        Entry(f"With {kind}: what happens out of reach?", made.unreachable),
-        Entry(f"With {kind}: who is ahead at an equal budget?", made.budgets, (solved_in_time,)),
-        Entry(f"With {kind}: who is the fastest, how often?", made.profiles, (against_fastest,)),
-    )
-
-
-ENTRIES = (
-    Entry("Who takes part?", who),
-    Entry("On which robots?", models),
-    *(entry for kind in KINDS for entry in _entries(kind)),
-)
+OF_KIND = {
+    kind: Tables(success(kind), strata(kind), unreachable(kind), budgets(kind), profile(kind))
+    for kind in KINDS
+}
+LAYOUTS = (who, models, *(layout for made in OF_KIND.values() for layout in made))

@@ -5,7 +5,6 @@ from matplotlib.axes import Axes
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
-from ...presentation.entry import Figure
 from ...presentation.figures import (
     COLOURS,
     Drawing,
@@ -15,6 +14,7 @@ from ...presentation.figures import (
     plain_powers,
     written,
 )
+from ...presentation.layout import Figure
 from ...presentation.results import Results, by_problem, solvers
 
 
@@ -60,6 +60,8 @@ def _timing_marks(ax: Axes, records: list[Record], works: list[str], scale: floa
         )  # fmt: skip
 
 
-kinematics = timing("kinematics", "ns", 1e9, "Time of forward kinematics, for one pose")
-inverse_kinematics = timing("ik", "µs", 1e6, "Time of inverse kinematics, for one solve")
-cloth = timing("cloth", "µs", 1e6, "Time of a cloth step, for one frame")
+TIMINGS = {
+    "kinematics": timing("kinematics", "ns", 1e9, "Time of forward kinematics, for one pose"),
+    "ik": timing("ik", "µs", 1e6, "Time of inverse kinematics, for one solve"),
+    "cloth": timing("cloth", "µs", 1e6, "Time of a cloth step, for one frame"),
+}
