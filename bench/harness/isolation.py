@@ -4,13 +4,13 @@ import atexit
 import contextlib
 import os
 from collections import Counter
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from crosscheck.child_process import PipedProcess
 
 from .progress import Progress, announce
-from .worker import LAST, Begun, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
+from .worker import LAST, Begun, Calculation, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
 
 # A worker that says nothing for so long [s] is ended: before it is ready it may compile.
 START_PATIENCE = 180.0
@@ -76,6 +76,17 @@ class WorkerProcess:
                         outcome = outcome._replace(trouble=raised(outcome.solved))
         return outcome
 
+    def find(self, job: Work) -> Mapping[str, Any]:
+        """Return what a job measures.
+
+        Raises:
+            RuntimeError: if it measures nothing; the message says why.
+        """
+        outcome = self.perform(job)
+        if outcome.found is None:
+            raise RuntimeError(outcome.trouble)
+        return outcome.found
+
     def stream(self, job: Work) -> Generator[Message, None, None]:
         """Perform a job and yield its messages as they come; the last is Done, Unfit or Lost.
 
@@ -128,6 +139,18 @@ def _received(worker: PipedProcess, patience: float) -> Message:
     if not how:
         return Lost("its process broke off the connection, or sent what is no message")
     return Lost(f"its process {'was ' if how.startswith('by') else ''}ended {how}")
+
+
+def in_a_fresh_process(
+    patience: float, function: Callable[..., Mapping[str, Any]], *arguments: Any
+) -> Mapping[str, Any]:
+    """Return what a call measures in a process that does nothing else, within so long [s].
+
+    Raises:
+        RuntimeError: if it raises, or is lost; the message says which.
+    """
+    with contextlib.closing(WorkerProcess(patience)) as worker:
+        return worker.find(Calculation(function, arguments))
 
 
 def raised(solved: list[Solved]) -> str:

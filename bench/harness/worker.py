@@ -4,7 +4,7 @@ A solver may print, crash or hang: it does so in a process of its own, which `is
 Only messages go through the connection.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple, Protocol
 
@@ -74,6 +74,21 @@ class Work(Protocol):
 
     def perform(self) -> Iterator[Message]:
         """Yield what comes of it, each part as soon as it is there."""
+
+
+class Calculation(NamedTuple):
+    """A job that is one call, which returns what was measured, by name."""
+
+    function: Callable[..., Mapping[str, Any]]
+    arguments: tuple[Any, ...]
+
+    def perform(self) -> Iterator[Message]:
+        """Yield what is measured."""
+        try:
+            yield Found(self.function(*self.arguments))
+            yield Done()
+        except Exception as error:
+            yield Unfit(said(error))
 
 
 def said(error: Exception) -> str:

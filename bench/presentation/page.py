@@ -42,19 +42,15 @@ class Shown(NamedTuple):
     drawings: Mapping[Figure, Drawing]
 
 
-class ShownCell(NamedTuple):
-    """A cell and its class in the page."""
-
-    value: Cell
-    kind: str
-
-
 class Row(NamedTuple):
-    """A row of a table: neighbours with the same first cell share it, over `span` rows."""
+    """A row of a table: neighbours with the same first cell share it, over `span` rows.
+
+    The other cells each have their class in the page.
+    """
 
     head: Cell
     span: int
-    cells: list[ShownCell]
+    cells: list[tuple[Cell, str]]
 
 
 class Download(NamedTuple):
@@ -104,18 +100,15 @@ def _machine(record: Record) -> dict[str, str]:
 def rows(table: Table) -> list[Row]:
     """Return the rows of a table; the span of a first cell that stands in a row above is 0."""
     heads = [row[0] for row in table.rows]
-    spans = [0] * len(heads)
+    spans, others = [0] * len(heads), table.columns[1:]
     first = 0
     for i, head in enumerate(heads):
         first = i if head != heads[first] else first
         spans[first] += 1
     return [
-        Row(row[0], span, [
-            ShownCell(cell, _kind(cell, column))
-            for cell, column in zip(row[1:], table.columns[1:], strict=True)
-        ])
+        Row(row[0], span, [(cell, _kind(cell, c)) for cell, c in zip(row[1:], others, strict=True)])
         for row, span in zip(table.rows, spans, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def _kind(cell: Cell, column: Column) -> str:

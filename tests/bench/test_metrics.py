@@ -159,7 +159,3 @@ def test_the_profile_of_a_textbook():
     solved = np.array([[True, False, False], [True, True, False]])
     curves = metrics.performance_profiles(seconds, solved, np.array([1.0, 3.9, 4.0]))
     assert curves.tolist() == [[0.5, 0.5, 0.5], [0.5, 0.5, 1.0]]
-
-
-def test_microseconds():
-    assert metrics.microseconds(2e-6) == 2.0

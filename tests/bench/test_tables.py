@@ -49,6 +49,16 @@ def test_words(value, text):
     assert words(value) == text
 
 
+@pytest.mark.parametrize(
+    ("unit", "value"),
+    [("µs", 2e6), ("ns/particle", 2e9), ("°", 360 / np.pi), ("%", 200.0), ("m/s", 2.0), ("", 2.0)],
+)
+def test_a_column_converts_what_it_reads_to_its_unit(unit, value):
+    assert Column("a", unit).cell(np.float64(2.0)) == pytest.approx(value, rel=1e-15)
+    assert Column("a", unit).cell(np.int64(2)) == 2
+    assert Column("a", unit, factor=1.0).cell(2.0) == 2.0
+
+
 @given(st.floats(-1e300, 1e300))
 def test_a_number_in_words_is_near_itself(value):
     shown = float(words(value).replace(",", ""))

@@ -15,6 +15,7 @@ from ...presentation.figures import (
     written,
 )
 from ...presentation.results import Results, by_problem, label, solvers
+from ...presentation.tables import in_unit
 from . import CURVE
 
 
@@ -54,7 +55,7 @@ def jitter(results: Results) -> Drawing | None:
 
 
 def _largest_angle(record: Record) -> float:
-    return metrics.degrees(metrics.spread(record.arrays["largest_angle"]).largest)
+    return in_unit(metrics.spread(record.arrays["largest_angle"]).largest, "°")
 
 
 def _aside(solver: str, names: list[str]) -> float:

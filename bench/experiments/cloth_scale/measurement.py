@@ -4,13 +4,12 @@ Each cloth is measured in a process of its own, since only a process can say how
 had.
 """
 
-import contextlib
 import importlib.util
 import resource
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +22,9 @@ from reference.sparse import CholeskyFactor
 from reference.sparse.linear_solver import factorize
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import WorkerProcess
+from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
 from ...harness.stopwatch import timed
-from ...harness.worker import Done, Found, Message, Unfit, said
 from ...peers import registry
 
 H = 1 / 60
@@ -61,28 +59,14 @@ def in_its_own_process(size: int, library: str) -> Measured:
     """Measure one cloth in a process that does nothing else; say so if there is no such library."""
     if library != OURS and importlib.util.find_spec(library) is None:
         return Measured({}, {"missing": f"{library} is not installed"})
-    with contextlib.closing(WorkerProcess(PATIENCE)) as worker:
-        outcome = worker.perform(LargeCloth(size, library))
-    if outcome.found is None:
-        raise RuntimeError(outcome.trouble)
-    return Measured(dict(outcome.found))
+    return Measured(in_a_fresh_process(PATIENCE, compiled_and_measured, size, library))
 
 
-class LargeCloth(NamedTuple):
-    """A cloth to be measured in a worker's process, by particles along a side and library."""
-
-    size: int
-    library: str
-
-    def perform(self) -> Iterator[Message]:
-        """Yield what is measured, after a small cloth for which everything is compiled."""
-        try:
-            measure(min(SIZES), self.library)
-            clear_factor_cache()
-            yield Found(measure(self.size, self.library))
-            yield Done()
-        except Exception as error:
-            yield Unfit(said(error))
+def compiled_and_measured(size: int, library: str) -> dict[str, Any]:
+    """Return what is measured after a small cloth, for which everything is compiled."""
+    measure(min(SIZES), library)
+    clear_factor_cache()
+    return measure(size, library)
 
 
 def _say(size: int, library: str, what: str) -> None:

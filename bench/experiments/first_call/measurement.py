@@ -4,12 +4,11 @@ Each is measured in two fresh processes, the first with an empty folder for comp
 the second with what the first has left there.
 """
 
-import contextlib
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +18,8 @@ from reference.backend.compilation import on_compile
 from reference.jacobians import jacobian
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import WorkerProcess
+from ...harness.isolation import in_a_fresh_process
 from ...harness.stopwatch import timed_twice
-from ...harness.worker import Done, Found, Message, Unfit, said
 
 Call = Callable[[], Any]
 
@@ -54,38 +52,18 @@ def calls() -> list[tuple[str, str]]:
 def cold_and_warm(name: str, solver: str) -> Measured:
     """Measure a call in a process that has to compile, and in the next one."""
     with tempfile.TemporaryDirectory() as folder:
-        runs = {when: in_a_fresh_process(name, solver, folder) for when in ("cold", "warm")}
+        runs = {when: in_a_process(name, solver, folder) for when in ("cold", "warm")}
     return Measured({f"{when} {k}": v for when, run in runs.items() for k, v in run.items()})
 
 
-def in_a_fresh_process(name: str, solver: str, folder: str) -> Mapping[str, Any]:
-    """Measure a call, with compiled kernels kept in a folder."""
-    with contextlib.closing(WorkerProcess(PATIENCE)) as shop:
-        outcome = shop.perform(FirstCall(name, solver, os.fspath(folder)))
-    if outcome.found is None:
-        raise RuntimeError(outcome.trouble)
-    return outcome.found
+def in_a_process(name: str, solver: str, folder: str) -> Mapping[str, Any]:
+    """Measure a call in a process of its own, with compiled kernels kept in a folder."""
+    return in_a_fresh_process(PATIENCE, measure, name, solver, os.fspath(folder))
 
 
-class FirstCall(NamedTuple):
-    """A call to be measured in a worker's process, with the folder for what it compiles."""
-
-    name: str
-    solver: str
-    folder: str
-
-    def perform(self) -> Iterator[Message]:
-        """Yield what is measured; the compiler reads its settings only now."""
-        os.environ["NUMBA_CACHE_DIR"] = self.folder
-        try:
-            yield Found(measure(self.name, self.solver))
-            yield Done()
-        except Exception as error:
-            yield Unfit(said(error))
-
-
-def measure(name: str, solver: str) -> dict[str, Any]:
+def measure(name: str, solver: str, folder: str) -> dict[str, Any]:
     """Return the time on the wall and of the processor [s], and how many kernels were compiled."""
+    os.environ["NUMBA_CACHE_DIR"] = folder  # the compiler reads its settings only now
     compiled: list[str] = []
     call = CALLS[name][1](solver)
     with on_compile(lambda label, begins: compiled.append(label) if begins else None):

@@ -57,7 +57,7 @@ def _measured_rate(record: Record) -> Rate:
         record.solver,
         HERE,
         share,
-        metrics.percent(share.hits, share.total),
+        in_unit(metrics.ratio(share.hits, share.total), "%"),
         in_unit(median, "ms"),
         in_unit(mean, "ms"),
     )
