@@ -104,8 +104,8 @@ def plumbob(
 ) -> int:
     """Validate, measure and report: skeleton kinematics and implicit mass-spring dynamics.
 
-    Alone, it does the main job: check the reference against Pinocchio and MuJoCo, run the quick
-    bench, and write report/index.html, in a few minutes.
+    Without a command it does the main job: check the reference against Pinocchio and MuJoCo, run
+    the quick bench, and write report/index.html, in a few minutes.
     """
     if version:
         import importlib.metadata

@@ -88,10 +88,10 @@ class Calculation(NamedTuple):
             yield Found(self.function(*self.arguments))
             yield Done()
         except Exception as error:
-            yield Unfit(said(error))
+            yield Unfit(describe(error))
 
 
-def said(error: Exception) -> str:
+def describe(error: Exception) -> str:
     """Return what an exception says, on one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:200]
 
@@ -105,7 +105,7 @@ def serve(connection: Connection) -> None:
             except EOFError:
                 return
             except Exception as error:  # a class that cannot be imported here, or is another
-                connection.send(Unfit(said(error)))
+                connection.send(Unfit(describe(error)))
                 continue
             connection.send(Begun())
             for message in job.perform():

@@ -199,7 +199,7 @@ def _either(iterations: int | None = None) -> tuple[Entry, Entry]:
 _CHAINS = "poses and limits of one chain of hinges"
 OURS = Peer(
     "Plumbob LM", "bench.peers.ik.plumbob", "plumbob", "MIT",
-    "poses, positions and limits of several tips, balls",
+    "poses, positions and limits of several effectors, balls",
     (
         Entry(ONE_START, {"restarts": 0}),
         Entry(RESTARTS, {"restarts": 100}, note="100 restarts"),
@@ -224,15 +224,15 @@ PEERS = (
     OURS,
     Peer(
         "Pinocchio’s closed loop", "bench.peers.ik.closed_loop", "pin", "BSD-3-Clause",
-        "poses and positions of several tips, balls; looks at no limits", _either(200),
+        "poses and positions of several effectors, balls; looks at no limits", _either(200),
     ),
     Peer(
         "pink", "bench.peers.ik.pink", "pin-pink", "Apache-2.0",
-        "poses, positions and limits of several tips, balls", _either(50),
+        "poses, positions and limits of several effectors, balls", _either(50),
     ),
     Peer(
         "mink", "bench.peers.ik.mink", "mink", "Apache-2.0",
-        "poses, positions and limits of several tips, balls", _either(50),
+        "poses, positions and limits of several effectors, balls", _either(50),
     ),
     Peer("mujoco.minimize", "bench.peers.ik.minimize", "mujoco", "Apache-2.0", _CHAINS, _either()),
     TOOLBOX,

@@ -44,7 +44,7 @@ SECTIONS = (
     Section(
         "kinematics",
         "Task 1: inverse kinematics",
-        "The lab’s arm of five joints draws curves with its tip, by cyclic coordinate descent "
+        "The lab’s arm of five joints draws curves with its effector, by cyclic coordinate descent "
         "(CCD) and by FABRIK; a chain of ten ball joints reaches for targets near, far, at the "
         "edge of its reach and beyond it, also by Levenberg-Marquardt on the engines’ kinematics "
         "(LM).",

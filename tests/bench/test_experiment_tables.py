@@ -70,11 +70,11 @@ def test_iterations_count_for_whoever_needs_fewer(records):
     assert "fewer iterations than CCD on 1 of 3 problems" in table.summary.sentence
 
 
-def test_jitter_is_the_largest_turn_in_degrees_and_the_seam_stands_apart(make):
+def test_jitter_is_the_largest_angle_in_degrees_and_the_closing_one_stands_apart(make):
     table = tracking.jitter(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
-    for mode, turn in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
-        assert column(table, f"{mode}, largest [°]") == [pytest.approx(math.degrees(turn))]
-        assert column(table, f"{mode}, mean [°]") == [pytest.approx(math.degrees(turn / 4))]
+    for mode, angle in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
+        assert column(table, f"{mode}, largest [°]") == [pytest.approx(math.degrees(angle))]
+        assert column(table, f"{mode}, mean [°]") == [pytest.approx(math.degrees(angle / 4))]
     assert column(table, "coherent, last to first [°]") == [pytest.approx(math.degrees(0.125))]
     assert "in 1 of 1 cases, and in 1 the step" in table.summary.sentence
     assert table.summary.points[0] == "cold: 57.3° (arm, circle, CCD)"
@@ -85,7 +85,7 @@ def test_jitter_that_grows_is_said_too(make):
     assert "in 0 of 1 cases" in table.summary.sentence
 
 
-def test_a_curve_that_was_not_followed_in_all_ways_has_no_row(make):
+def test_a_curve_that_was_not_followed_in_all_modes_has_no_row(make):
     records = make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)[:2]
     assert tracking.jitter(Results(records)).rows == ()
 
@@ -97,7 +97,7 @@ def test_iterations_over_all_frames_are_those_that_every_frame_has_more(make):
     assert "together 7 to 7 times" in table.summary.sentence
 
 
-def test_drift_is_shown_after_each_round(make):
+def test_drift_is_shown_after_each_repetition(make):
     table = tracking.drift(Results(make.drifted("ccd")))
     assert [round(x) for x in table.rows[0][1:]] == [6, 11, 17, 0, 0, 0]
     assert "17.2 to 17.2° from its first pose" in table.summary.sentence
@@ -156,7 +156,7 @@ def test_every_suite_has_a_chapter_and_its_tables_are_some_of_all():
 ONE, AGAIN = robots.OF_KIND["one start"], robots.OF_KIND["restarts"]
 
 
-def test_success_counts_what_the_judge_says_and_times_count_failures(make):
+def test_success_counts_the_evaluation_says_and_times_count_failures(make):
     table = ONE.success(Results([make.raced("a", "one start")]))
     (row,) = table.rows
     assert row[:2] == ("the arm", "a")

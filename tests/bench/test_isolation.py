@@ -274,7 +274,7 @@ def test_a_worker_serves_job_after_job(targets):
 
 @pytest.fixture
 def suite(monkeypatch, worker):
-    """The suite with fakes for peers, on the iiwa and the character alone."""
+    """The suite with fakes for peers, on the iiwa and the character only."""
 
     def peer(title, package="numpy", **settings):
         return Peer(title, "fake_solvers", package, "MIT", "", (Entry(ONE_START, settings),))

@@ -15,7 +15,7 @@ from bench.peers.ik.protocol import UnableError
 from bench.peers.registry import ONE_START, OURS, PEERS, RESTARTS
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
-# Those that take trees with several tips.
+# Those that take trees with several effectors.
 TREES = {"plumbob", "closed_loop", "pink", "mink"}
 FEW = 6
 

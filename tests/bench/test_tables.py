@@ -67,7 +67,7 @@ def test_a_number_in_words_is_near_itself(value):
 
 def test_a_ragged_row_is_refused():
     with pytest.raises(ValueError, match="expected 2 cells in table t, got 1"):
-        table(("alone",))
+        table(("single",))
 
 
 def test_headings_that_stand_twice_are_refused():

@@ -36,14 +36,14 @@ def draw(problem: CurveForArm, solver: str, warm: bool) -> Measured:
     motion = track(
         problem.skeleton, problem.curve, solver, problem.rest, warm=warm, **LIMITS._asdict()
     )
-    # The tip keeps its rotation and would only dilute the mean.
-    turns = metrics.rotation_angles(motion.local_rotations[:, :-1])
+    # The effector keeps its rotation and would only dilute the mean.
+    angles = metrics.rotation_angles(motion.local_rotations[:, :-1])
     return Measured(
         {
             "residual": residuals(problem.skeleton, motion.local_rotations, problem.curve),
             "iterations": motion.iterations,
             "outcome": motion.outcome,
-            "largest_angle": turns.max(axis=-1),
-            "mean_angle": turns.mean(axis=-1),
+            "largest_angle": angles.max(axis=-1),
+            "mean_angle": angles.mean(axis=-1),
         }
     )

@@ -21,14 +21,14 @@ _SEED = 1986
 
 @dataclass(frozen=True)
 class CurveForArm:
-    """A curve that the tip is to draw, frame by frame, from the rest pose.
+    """A curve that the effector is to draw, frame by frame, from the rest pose.
 
     Attributes:
         name: of the problem.
         title: how the curve is written.
         skeleton: the arm.
         rest: local rotations of its rest pose, (joint, 4).
-        curve: where the tip is wanted in each frame [m], (frame, 3).
+        curve: where the effector is wanted in each frame [m], (frame, 3).
     """
 
     name: str

@@ -83,8 +83,8 @@ def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) ->
 
 def residuals(skeleton: Skeleton, local_rotations: FloatArray, targets: FloatArray) -> FloatArray:
     """Return the effector's distances from the targets by forward kinematics [m], (target,)."""
-    tips = forward_kinematics(skeleton, local_rotations).positions[..., -1, :]
-    return np.linalg.norm(tips - targets, axis=-1)
+    effectors = forward_kinematics(skeleton, local_rotations).positions[..., -1, :]
+    return np.linalg.norm(effectors - targets, axis=-1)
 
 
 def _answers(

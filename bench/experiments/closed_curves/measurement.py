@@ -61,14 +61,14 @@ def follow(problem: ClosedCurve, solver: str, mode: str) -> Measured:
     """
     motion = _tracked(problem, solver, mode)
     pose = forward_kinematics(problem.model, motion.coordinates)
-    turned = _joint_angles(problem, motion, np.arange(len(problem.curve)) - len(problem.curve) + 1)
+    angles = _joint_angles(problem, motion, np.arange(len(problem.curve)) - len(problem.curve) + 1)
     return Measured(
         {
             "residual": np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
             "iterations": motion.iterations,
             "outcome": motion.outcome,
-            "largest_angle": turned.max(axis=-1),
-            "mean_angle": turned.mean(axis=-1),
+            "largest_angle": angles.max(axis=-1),
+            "mean_angle": angles.mean(axis=-1),
         }
     )
 
@@ -83,8 +83,8 @@ def drift(problem: ClosedCurve, solver: str, mode: str) -> Measured:
     )
     motion = _tracked(replace(problem, curve=again), solver, mode)
     later = (DRIFT_FRAMES * np.arange(1, 4)) % len(again)
-    turned = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[later])
-    return Measured({"drift": turned.max(axis=-1), "residual": motion.residual})
+    angles = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[later])
+    return Measured({"drift": angles.max(axis=-1), "residual": motion.residual})
 
 
 def _tracked(problem: ClosedCurve, solver: str, mode: str) -> IKSolution:
@@ -100,7 +100,7 @@ def _joint_angles(problem: ClosedCurve, motion: IKSolution, following: np.ndarra
     A hinge's angle is not reduced to half a revolution, though its link looks the same.
     """
     if isinstance(problem.model, Skeleton):
-        # The tip keeps its rotation and would only dilute the mean.
+        # The effector keeps its rotation and would only dilute the mean.
         R = motion.local_rotations[:, :-1]
         return rotation.angle(R, R[following])
     return np.abs(motion.coordinates[following] - motion.coordinates)

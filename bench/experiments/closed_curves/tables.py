@@ -180,7 +180,7 @@ drift = Layout(
             for i, counted in enumerate(("one repetition", "two", "three"))
         ),
     ),
-    shows="The largest angle between a joint’s first rotation and the one it has when the tip "
+    shows="The largest angle between a joint’s first rotation and the one it has when the effector "
     "is back at the first point.",
     measured="The lab’s arm draws the heart three times without a break. The coherent motion "
     "is closed: its last frame leads back to its first, so that after the third repetition "

@@ -84,7 +84,7 @@ newton_steps = Layout(
         ),
     ),
     shows="The residual is |grad g(x)| over its value at the inertial start y, or over what "
-    "rounding alone leaves where that is more.",
+    "only rounding leaves where that is more.",
     measured=lambda records: (
         f"The lab’s cloth let go from rest; steps of {lengths_of_steps(records)} ms after "
         f"the first {settings(records, 'first')}, to a residual of "

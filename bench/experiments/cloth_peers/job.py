@@ -11,7 +11,7 @@ from reference.arguments import FloatArray
 from reference.mass_spring import SystemArrays
 
 from ...harness.stopwatch import Budget, timed
-from ...harness.worker import Done, Message, Ready, Solved, Unfit, said
+from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
 from ...peers.cloth.protocol import Mover
 
 # Moved once before anything is timed, in so short a frame [s] that any solver is stable: what has
@@ -52,7 +52,7 @@ class ClothJob(NamedTuple):
             yield Ready(setup)
             yield from self._moved(mover)
         except Exception as error:  # whatever an engine raises is its result
-            yield Unfit(said(error))
+            yield Unfit(describe(error))
 
     def _prepared(self) -> tuple[Mover, float]:
         adapter = importlib.import_module(self.module)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from reference import ImplicitEuler, MassSpring, State, scenes
+from reference.arguments import FloatArray
 from reference.backend.compiled import Kernel
 from reference.implicit_euler.factor_cache import clear as clear_factor_cache
 from reference.implicit_euler.factor_cache import prefactored
@@ -34,7 +35,7 @@ ITERATIONS = 10
 SIZES = {32: 0.0, 100: 0.0, 316: 1.0, 1000: 1.0}
 OURS = registry.SUPERNODAL.name
 LIBRARIES = tuple(library.name for library in registry.FACTORS)
-# Rounds in which everything is timed in turn: so many particles in all, within limits.
+# Rounds in each of which everything is timed once: so many particles in all, within limits.
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
 # What the limit of memory reads again and again: more than any cache holds [bytes].
 STRETCH = 2**28
@@ -165,7 +166,7 @@ def reading(size: int) -> Callable[[], float]:
     return run
 
 
-def total(numbers):
+def total(numbers: FloatArray) -> float:
     """Return the sum, in whatever order is fastest."""
     result = 0.0
     for i in range(len(numbers)):

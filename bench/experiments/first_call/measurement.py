@@ -58,12 +58,17 @@ def cold_and_warm(name: str, solver: str) -> Measured:
 
 def in_a_process(name: str, solver: str, folder: str) -> Mapping[str, Any]:
     """Measure a call in a process of its own, with compiled kernels kept in a folder."""
-    return in_a_fresh_process(PATIENCE, measure, name, solver, os.fspath(folder))
+    return in_a_fresh_process(PATIENCE, measure_with_cache, os.fspath(folder), name, solver)
 
 
-def measure(name: str, solver: str, folder: str) -> dict[str, Any]:
+def measure_with_cache(folder: str, name: str, solver: str) -> dict[str, Any]:
+    """Measure a call in a process that has not compiled yet: its settings are read only then."""
+    os.environ["NUMBA_CACHE_DIR"] = folder
+    return measure(name, solver)
+
+
+def measure(name: str, solver: str) -> dict[str, Any]:
     """Return the time on the wall and of the processor [s], and how many kernels were compiled."""
-    os.environ["NUMBA_CACHE_DIR"] = folder  # the compiler reads its settings only now
     compiled: list[str] = []
     call = CALLS[name][1](solver)
     with on_compile(lambda label, begins: compiled.append(label) if begins else None):

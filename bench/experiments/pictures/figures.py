@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.colors import LogNorm, to_rgba
 from numpy.typing import NDArray
 
@@ -16,7 +16,7 @@ from . import ARM, CLOTH
 
 Floats = NDArray[np.float64]
 
-# Where the camera stands: turned about the vertical and lifted above the floor [rad].
+# Where the camera stands: rotated about the vertical and lifted above the floor [rad].
 ARM_VIEW = (np.radians(200.0), np.radians(50.0))
 CLOTH_VIEW = (np.radians(-38.0), np.radians(18.0))
 # Shades of the scale of spacings: few enough to be drawn as shapes rather than as an image.
@@ -109,7 +109,7 @@ def seen(points: Floats, view: tuple[float, float]) -> tuple[Floats, Floats, Flo
     return right, up, np.sin(height) * y + np.cos(height) * toward
 
 
-def _points_by_spacing(ax: Axes, record: Record):
+def _points_by_spacing(ax: Axes, record: Record) -> PathCollection:
     x, y, _ = seen(record.arrays["curve"][:-1], ARM_VIEW)
     shades = mpl.colormaps["viridis"].resampled(SHADES)
     return ax.scatter(

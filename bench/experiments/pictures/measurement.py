@@ -38,15 +38,15 @@ def drawing(solver: str, evened: bool) -> Measured:
     skeleton, rest = scenes.lab_arm()
     curve = evened_custom_curve() if evened else custom_curve()
     motion = track(skeleton, curve, solver, rest)
-    turns = metrics.rotation_angles(motion.local_rotations[:, :-1])
+    angles = metrics.rotation_angles(motion.local_rotations[:, :-1])
     ghosts = np.linspace(0, len(curve) - 1, GHOSTS).round().astype(int)
     return Measured(
         {
             "curve": curve,
             "residual": motion.residual,
             "iterations": motion.iterations,
-            "largest_angle": turns.max(axis=-1),
-            "mean_angle": turns.mean(axis=-1),
+            "largest_angle": angles.max(axis=-1),
+            "mean_angle": angles.mean(axis=-1),
             "spacing": np.linalg.norm(np.diff(curve, axis=0), axis=-1),
             "ghosts": motion.positions[ghosts],
         }

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...harness.stopwatch import Budget, timed
-from ...harness.worker import Done, Message, Ready, Solved, Unfit, said
+from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
 from ...peers.ik.protocol import Ask, Solve, SolverOutput, UnableError
 from ...peers.ik.restarts import restarted
 from .evaluate import Targets, Tolerance
@@ -54,7 +54,7 @@ def perform(job: Job) -> Iterator[Message]:
         yield Unfit(str(error))
         return
     except Exception as error:  # whatever an engine raises is its result
-        yield Unfit(said(error))
+        yield Unfit(describe(error))
         return
     yield Ready(setup)
     budget, before = Budget(job.budget), None
@@ -85,15 +85,15 @@ def _asked(ask: Ask, job: Job, i: int) -> Solve:
 def _solve(solve: Solve, job: Job) -> Solved:
     trouble, starts = "", job.targets.starts
 
-    def attempt() -> SolverOutput:
+    def solve_once() -> SolverOutput:
         nonlocal trouble
         try:
             return solve()
         except Exception as error:  # one target lost, not the rest
-            trouble = said(error)
+            trouble = describe(error)
             return SolverOutput(None, False)
 
-    answer, seconds = timed(attempt)
+    answer, seconds = timed(solve_once)
     nothing = np.full(starts.shape[-1], np.nan)
     q = nothing if answer.q is None else np.array(answer.q, dtype=float)
     if q.shape != nothing.shape:

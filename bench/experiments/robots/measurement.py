@@ -126,7 +126,7 @@ def solve(run: Run, targets: Targets) -> Measured:
         {"remark": outcome.trouble},
         {
             "strata": list(STRATA),
-            "tips": list(robot.tips),
+            "tips": list(robot.effectors),  # as the file of records calls them
             "joints": len(robot.joints),
             "freedom": int(evaluator_of(run.robot).model.nv),
             "wanted": "pose" if robot.posed else "position",

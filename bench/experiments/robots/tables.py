@@ -73,10 +73,10 @@ models = Layout(
         titled("robot"),
         Column("joints", read=lambda record: record.facts["joints"]),
         Column("degrees of freedom", read=lambda record: record.facts["freedom"]),
-        text("tips", lambda record: ", ".join(record.facts["tips"])),
-        text("wanted of each tip", lambda record: record.facts["wanted"]),
+        text("effectors", lambda record: ", ".join(record.facts["tips"])),
+        text("wanted of each effector", lambda record: record.facts["wanted"]),
     ),
-    shows="Arms are the chains of links that end in the tip, hinges alone, with the limits of "
+    shows="Arms are the chains of links that end in the effector, hinges only, with the limits of "
     "their files; continuous joints have two revolutions in either direction. The "
     "character is our own, of balls without and hinges with limits.",
     measured="The arms’ files are those of example-robot-data, without soft limits; every "
@@ -219,9 +219,9 @@ def strata(kind: str) -> Layout:
         f"Robots, {kind}: success in each stratum",
         subjects=partial(_measured, kind),
         columns=_strata_columns,
-        shows="Targets from random poses within the limits. Space: the tip spread evenly over "
+        shows="Targets from random poses within the limits. Space: the effector spread evenly over "
         "the cells of a grid; outer shell and near the root: the twentieth of the poses whose "
-        "tip is farthest from and nearest to the first joint; near singular: the twentieth "
+        "effector is farthest from and nearest to the first joint; near singular: the twentieth "
         "with the smallest least singular value of the Jacobian; at a limit: one joint put at "
         "one of its limits.",
         measured=_how,

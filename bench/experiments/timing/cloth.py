@@ -26,7 +26,7 @@ MUJOCO = "MuJoCo"
 
 
 def cases() -> Iterator[Case]:
-    """Yield one frame of 1/60 s in four ways, at two stiffnesses, and of a larger cloth."""
+    """Yield one frame of 1/60 s by four methods, at two stiffnesses, and of a larger cloth."""
     for factor in FACTORS:
         problem = cloth_swing(factor)
         written = f"stiffness × {factor:g}"

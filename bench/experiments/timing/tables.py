@@ -143,7 +143,7 @@ cloth = _layout(
     "Time of a cloth step, for one frame",
     "µs",
     "The state is written into MuJoCo and read back, as a caller would. The limit of "
-    "local/global iterations counts their triangular solves alone: the factor’s nonzeros, read "
+    "local/global iterations counts only their triangular solves: the factor’s nonzeros, read "
     "twice an iteration.",
 )
 

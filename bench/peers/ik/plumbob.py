@@ -27,10 +27,14 @@ def prepare(
     }  # fmt: skip
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        quaternions = rotation.from_matrix(rotations) if robot.posed else [None] * len(robot.tips)
+        quaternions = (
+            rotation.from_matrix(rotations) if robot.posed else [None] * len(robot.effectors)
+        )
         targets = [
-            Target(position, quaternion, tip)
-            for position, quaternion, tip in zip(positions, quaternions, robot.tips, strict=True)
+            Target(position, quaternion, effector)
+            for position, quaternion, effector in zip(
+                positions, quaternions, robot.effectors, strict=True
+            )
         ]
 
         def solve() -> SolverOutput:

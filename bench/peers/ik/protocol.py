@@ -37,8 +37,8 @@ class Ask(Protocol):
         """Return the call that solves one target.
 
         Args:
-            positions: of the tips [m], (tip, 3).
-            rotations: of the tips, (tip, 3, 3).
+            positions: of the effectors [m], (effector, 3).
+            rotations: of the effectors, (effector, 3, 3).
             start: coordinates, (coordinate,).
         """
 
@@ -59,7 +59,7 @@ class UnableError(ValueError):
 
 
 def needs_a_chain(robot: Robot) -> None:
-    """Raise unless the robot is a chain of hinges with one tip.
+    """Raise unless the robot is a chain of hinges with one effector.
 
     Raises:
         UnableError: if it is not.
