@@ -9,7 +9,7 @@ import pytest
 from bench.experiments import Scale
 from bench.experiments.cloth_peers import measurement as peers_cloth
 from bench.experiments.cloth_peers import tables
-from bench.experiments.cloth_peers.job import ClothJob
+from bench.experiments.cloth_peers.job import ClothJob, Shape
 from bench.experiments.cloth_peers.problem import (
     FRAME,
     MASS,
@@ -335,10 +335,8 @@ def fakes(tmp_path_factory):
 
 
 def job(cloth, manner, frames=5, repeats=1, budget=60.0):
-    return peers_cloth.job(
-        "fake_cloth_solvers", cloth, Rung("", {"manner": manner}),
-        frames=frames, repeats=repeats, budget=budget,
-    )  # fmt: skip
+    shape = Shape(frames, repeats, budget)
+    return peers_cloth.job("fake_cloth_solvers", cloth, {"manner": manner}, shape)
 
 
 def messages(*args, **more):
@@ -624,7 +622,7 @@ def test_a_job_of_a_worker_is_known_by_its_arrays(cloth):
     """What travels between processes is rebuilt there: the same system, to the last bit."""
     import pickle
 
-    sent = peers_cloth.job("m", cloth, Rung("", {}), frames=1, repeats=1, budget=1.0)
+    sent = peers_cloth.job("m", cloth, {}, Shape(1, 1, 1.0))
     got = pickle.loads(pickle.dumps(sent))
     assert isinstance(got, ClothJob)
     system = MassSpring(**got.system._asdict())

@@ -124,7 +124,9 @@ def test_a_law_of_dampers_with_the_wrong_factor_does_not_come_together(monkeypat
     right = cloth.damper_forces
     for factor in (0.5, 2.0, -1.0):
         monkeypatch.setattr(
-            cloth, "damper_forces", lambda system, state, factor=factor: factor * right(system, state)
+            cloth,
+            "damper_forces",
+            lambda system, state, factor=factor: factor * right(system, state),
         )
         apart = cloth.two_dampers(cloth_swing(1, size=5, damping=0.2), first=30).arrays["apart"]
         assert apart[-1] > 0.4

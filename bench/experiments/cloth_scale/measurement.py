@@ -48,12 +48,11 @@ def blocks(scale: Scale) -> Iterator[Block]:
     for size, seconds in SIZES.items():
         if scale.seconds < seconds:
             continue
-        cloth = {"particles": size * size, "h": H, "stiffness": STIFFNESS}
+        settings: dict[str, Any] = {"particles": size * size, "h": H, "stiffness": STIFFNESS}
+        settings["iterations"] = ITERATIONS
         for library in LIBRARIES:
-            yield Block(
-                "cloth_scale", f"cloth/{size}x{size}", library,
-                partial(in_its_own_process, size, library), {**cloth, "iterations": ITERATIONS},
-            )  # fmt: skip
+            measure_it = partial(in_its_own_process, size, library)
+            yield Block("cloth_scale", f"cloth/{size}x{size}", library, measure_it, settings)
 
 
 def in_its_own_process(size: int, library: str) -> Measured:
