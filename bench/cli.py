@@ -4,6 +4,7 @@ import difflib
 import os
 import sys
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -230,12 +231,14 @@ def show(
     writable(path.parent)
     with progress() as bar:
         task = bar.add_task(scene, total=None)
-        write(
-            scene, path, solver,
-            lambda done, total: bar.update(task, completed=done, total=total), coherent,
-        )  # fmt: skip
+        drawn = partial(_drawn, bar, task)
+        write(scene, path, solver, drawn, coherent)
     print(visible(str(path)))
     return SUCCESS
+
+
+def _drawn(bar: Any, task: Any, done: int, total: int) -> None:
+    bar.update(task, completed=done, total=total)
 
 
 def main_job(output: Path, fresh: bool) -> int:

@@ -14,6 +14,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..peers import registry
 from .text import shortened
 
 COLOURS = {
@@ -117,6 +118,13 @@ def nth_style(i: int) -> dict[str, Any]:
     colours = ("blue", "orange", "green", "purple", "brass", "ink")
     lines = ("-", "--", "-.", ":")
     return {"color": COLOURS[colours[i % len(colours)]], "linestyle": lines[i % len(lines)]}
+
+
+def drawn_as(solver: str) -> dict[str, Any]:
+    """Return colour, line and label of a solver that has a style of its own."""
+    known = registry.find(solver)
+    colour, line, _ = known.style
+    return {"color": COLOURS[colour], "linestyle": line, "label": written(known.label)}
 
 
 def legend_height(names: list[str], columns: int) -> float:

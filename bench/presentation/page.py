@@ -63,7 +63,8 @@ class Download(NamedTuple):
 
 def render(shown: Shown, newest: Record, missing: Sequence[str]) -> str:
     """Return the page, whose head is that of the newest record."""
-    return _environment().get_template("page.html").render(
+    template = _environment().get_template("page.html")
+    return template.render(
         style=Markup((_HERE / "page.css").read_text(encoding="utf-8")),
         date=newest.when.replace("T", " ").replace("+00:00", " UTC"),
         day=newest.when[:10],
@@ -73,14 +74,17 @@ def render(shown: Shown, newest: Record, missing: Sequence[str]) -> str:
         tables=shown.tables,
         drawings=shown.drawings,
         missing=missing,
-    )  # fmt: skip
+    )
 
 
 def _environment() -> Environment:
     environment = Environment(
-        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        loader=FileSystemLoader(_HERE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     filters = {"rich": rich, "words": tables.words, "rows": rows, "inline": svg.inline}
     environment.filters.update(filters, downloads=downloads)
     return environment

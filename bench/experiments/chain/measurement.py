@@ -57,10 +57,8 @@ def solve_targets(
     problem: TargetsForSkeleton, solver: str, limits: Limits, record: bool = False
 ) -> Measured:
     """Solve all targets with a solver of ours; residuals are recomputed from the answers."""
-    solution = solve_ik(
-        problem.skeleton, problem.starts, problem.targets, solver,
-        **limits._asdict(), record=record,
-    )  # fmt: skip
+    asked = (problem.skeleton, problem.starts, problem.targets, solver)
+    solution = solve_ik(*asked, **limits._asdict(), record=record)
     arrays = _answers(problem, solution.local_rotations, solution.iterations)
     arrays["outcome"] = np.asarray(solution.outcome)
     if record:

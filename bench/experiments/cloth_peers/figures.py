@@ -31,8 +31,9 @@ def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str
         names = list(dict.fromkeys(p.solver for p in found))
         height = 2.3 * len(sizes) + 0.2 * len(names)
         with canvas(height, len(stiffnesses), len(sizes), sharex=True, sharey=True) as (
-            figure, axes,
-        ):  # fmt: skip
+            figure,
+            axes,
+        ):
             cells = [(size, stiffness) for size in sizes for stiffness in stiffnesses]
             for ax, (size, stiffness) in zip(axes, cells, strict=True):
                 here = [p for p in found if (p.particles, p.stiffness) == (size, stiffness)]
@@ -53,10 +54,13 @@ def _work_precision_curves(ax: Axes, found: list[Point], names: list[str], error
     for solver in dict.fromkeys(p.solver for p in found):
         mine = [p for p in found if p.solver == solver]
         ax.plot(
-            [1e3 * p.values["seconds"] for p in mine], [p.values[error] for p in mine],
-            marker=_marker(solver), markersize=3.5,
-            label=written(solver), **nth_style(names.index(solver)),
-        )  # fmt: skip
+            [1e3 * p.values["seconds"] for p in mine],
+            [p.values[error] for p in mine],
+            marker=_marker(solver),
+            markersize=3.5,
+            label=written(solver),
+            **nth_style(names.index(solver)),
+        )
 
 
 def _marker(solver: str) -> str:

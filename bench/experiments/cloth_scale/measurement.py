@@ -127,11 +127,9 @@ def steps(
     used, result = memory(), integrator.step(state)
     twice = global_matrix(system, 2 * H)
     _, again = timed(lambda: factor.refactorize(twice))
-    return {
-        "assembly": assembly, "factor": seconds, "refactor": again, **times,
-        "entries": factor.entries, "matrix_entries": matrix.nnz, "residual": result.residual,
-        "history": result.history.tolist(), "memory": used,
-    }  # fmt: skip
+    sizes = {"entries": factor.entries, "matrix_entries": matrix.nnz, "memory": used}
+    found = {"residual": result.residual, "history": result.history.tolist()}
+    return {"assembly": assembly, "factor": seconds, "refactor": again, **times, **sizes, **found}
 
 
 def in_turn(

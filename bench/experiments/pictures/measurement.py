@@ -22,15 +22,11 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """Yield the drawings with the first solver, and the cloth; the same at every scale."""
     solver = next(iter(IK_SOLVERS))
     for evened in (False, True):
-        yield Block(
-            "pictures", f"arm/{CUSTOM}", solver, partial(drawing, solver, evened),
-            {"evened": evened, "min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING},
-            facts={"task": ARM},
-        )  # fmt: skip
-    yield Block(
-        "pictures", "cloth/x1", "newton", falling_cloth,
-        {"h": H, "frames": FRAMES}, facts={"task": CLOTH},
-    )  # fmt: skip
+        settings = {"evened": evened, "min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
+        measure, facts = partial(drawing, solver, evened), {"task": ARM}
+        yield Block("pictures", f"arm/{CUSTOM}", solver, measure, settings, facts=facts)
+    settings, facts = {"h": H, "frames": FRAMES}, {"task": CLOTH}
+    yield Block("pictures", "cloth/x1", "newton", falling_cloth, settings, facts=facts)
 
 
 def drawing(solver: str, evened: bool) -> Measured:

@@ -95,10 +95,12 @@ _ARMS = {
     "ur5": _Arm("UR5", "ur_description/urdf/ur5_robot.urdf", "base_link", "tool0"),
     "xarm7": _Arm("xArm7", "xarm_description/urdf/xarm7.urdf", "link_base", "link_eef"),
     "pr2": _Arm(
-        "PR2, right arm", "pr2_description/urdf/pr2.urdf", "torso_lift_link",
+        "PR2, right arm",
+        "pr2_description/urdf/pr2.urdf",
+        "torso_lift_link",
         "r_wrist_roll_link",
     ),
-}  # fmt: skip
+}
 # Heights of the joints above each other [m], axes and limits [°] of the KUKA LBR iiwa 14 R820, by
 # the maker's data sheet; the flange is 0.126 m above the wrist.
 _IIWA = (
@@ -169,10 +171,9 @@ def _chain(name: str, arm: _Arm, text: str) -> Robot:
     joints = _joints_between(ElementTree.fromstring(text), arm.root, arm.effector)
     moving = [joint for joint in joints if joint.get("type") != "fixed"]
     limits = np.array([_limits(joint) for joint in moving])
-    return Robot(
-        name, arm.title, _urdf(name, arm.root, joints), arm.root, (arm.effector,),
-        tuple(joint.get("name", "") for joint in moving), limits[:, 0], limits[:, 1],
-    )  # fmt: skip
+    names = tuple(joint.get("name", "") for joint in moving)
+    text = _urdf(name, arm.root, joints)
+    return Robot(name, arm.title, text, arm.root, (arm.effector,), names, *limits.T)
 
 
 def _joints_between(
@@ -271,11 +272,9 @@ def _character() -> Robot:
             balls.append(len(lower))
         lower += [-math.inf] * 4 if hinge is None else [hinge[1]]
         upper += [math.inf] * 4 if hinge is None else [hinge[2]]
-    return Robot(
-        CHARACTER, title(CHARACTER), _mjcf(), _PELVIS, tuple(hand for hand, _ in _HANDS.values()),
-        tuple(name for name, *_ in _BONES), np.array(lower), np.array(upper), tuple(balls),
-        posed=False,
-    )  # fmt: skip
+    hands, joints = (tuple(name for name, *_ in of) for of in (_HANDS.values(), _BONES))
+    known = (CHARACTER, title(CHARACTER), _mjcf(), _PELVIS, hands, joints)
+    return Robot(*known, np.array(lower), np.array(upper), tuple(balls), posed=False)
 
 
 def _mjcf() -> str:

@@ -47,10 +47,8 @@ def cases() -> Iterator[Case]:
 
 def local_global(problem: ClothSwing) -> Callable[[], Any]:
     """Return one step of a fixed number of local/global iterations, factorised beforehand."""
-    integrator = ImplicitEuler(
-        problem.system, h=problem.h, solver="local_global", tolerance=0.0,
-        max_iterations=ITERATIONS,
-    )  # fmt: skip
+    limits: dict[str, Any] = {"tolerance": 0.0, "max_iterations": ITERATIONS}
+    integrator = ImplicitEuler(problem.system, h=problem.h, solver="local_global", **limits)
     return partial(integrator.step, moving(problem))
 
 

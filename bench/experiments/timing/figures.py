@@ -1,5 +1,7 @@
 """Medians of the timing: a row for each work, a mark for each that does it."""
 
+from typing import Any
+
 from matplotlib.axes import Axes
 
 from ...harness import metrics
@@ -37,9 +39,11 @@ def timing(subject: str, unit: str, scale: float, title: str) -> Figure:
             axes[0].invert_yaxis()
             figure.legend(loc="outside upper right", ncols=3)
             return finished(
-                figure, f"timing_{subject}", title,
+                figure,
+                f"timing_{subject}",
+                title,
                 "Further left is faster; each line of the grid is ten times the one before.",
-            )  # fmt: skip
+            )
 
     return draw
 
@@ -51,13 +55,12 @@ def _timing_marks(ax: Axes, records: list[Record], works: list[str], scale: floa
         colour, _, marker = registry.find(solver).style
         filled = "none" if solver == registry.PLAIN.name else None
         mine = [record for record in records if record.solver == solver]
-        ax.plot(
-            [scale * metrics.timing(record.arrays["seconds"]).median for record in mine],
-            [works.index(record.problem) for record in mine],
-            marker, markersize=11 if solver == registry.LIMIT.name else 5.5, markeredgewidth=1.4,
-            color=COLOURS[colour], markerfacecolor=filled,
-            linestyle="none", label=written(solver),
-        )  # fmt: skip
+        style: dict[str, Any] = {"color": COLOURS[colour], "markerfacecolor": filled}
+        style |= {"linestyle": "none", "markeredgewidth": 1.4, "label": written(solver)}
+        size = 11 if solver == registry.LIMIT.name else 5.5
+        x = [scale * metrics.timing(record.arrays["seconds"]).median for record in mine]
+        y = [works.index(record.problem) for record in mine]
+        ax.plot(x, y, marker, markersize=size, **style)
 
 
 TIMINGS = {

@@ -14,6 +14,8 @@ from ...experiments.robots.evaluate import Tolerance, mujoco_model
 from ...experiments.robots.problem import Robot
 from .protocol import Ask, Solve, SolverOutput, needs_a_chain
 
+SILENT = minimize.Verbosity.SILENT
+
 
 def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
     """Return the solver, set up for a robot."""
@@ -24,10 +26,8 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
         def solve() -> SolverOutput:
             reach.aim(positions[0], rotations[0])
-            q, _ = minimize.least_squares(
-                start[:, None], reach.residuals, bounds, reach.jacobian, max_iter=iterations,
-                verbose=minimize.Verbosity.SILENT,
-            )  # fmt: skip
+            asked = (start[:, None], reach.residuals, bounds, reach.jacobian)
+            q, _ = minimize.least_squares(*asked, max_iter=iterations, verbose=SILENT)
             left = np.linalg.norm(reach.residual(q.ravel()).reshape(2, 3), axis=-1)
             return SolverOutput(q.ravel(), bool((left <= tolerance).all()))
 

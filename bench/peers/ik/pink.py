@@ -26,6 +26,8 @@ def prepare(
         pink.FrameTask(effector, 1.0, 1.0 if robot.posed else 0.0) for effector in robot.effectors
     ]
 
+    options = {"solver": "daqp", "damping": damping, "limits": limits, "safety_break": False}
+
     def solved(configuration: pink.Configuration) -> bool:
         errors = np.array([task.compute_error(configuration) for task in tasks])
         sizes = np.linalg.norm(errors.reshape(len(tasks), 2, 3), axis=-1)
@@ -45,10 +47,7 @@ def prepare(
             for _ in range(iterations):
                 if solved(configuration):
                     break
-                velocity = pink.solve_ik(
-                    configuration, tasks, 1.0, solver="daqp", damping=damping, limits=limits,
-                    safety_break=False,
-                )  # fmt: skip
+                velocity = pink.solve_ik(configuration, tasks, 1.0, **options)
                 configuration.integrate_inplace(velocity, 1.0)
             return SolverOutput(from_pinocchio(robot, configuration.q), solved(configuration))
 

@@ -22,9 +22,12 @@ def prepare(
     read = urdf.parse if robot.is_chain else mjcf.parse
     articulation = read(robot.text).articulation
     settings: dict[str, Any] = {
-        "solver": solver, "restarts": restarts, "max_iterations": iterations,
-        "tolerance": tolerance.position, "tolerance_rotation": tolerance.rotation,
-    }  # fmt: skip
+        "solver": solver,
+        "restarts": restarts,
+        "max_iterations": iterations,
+        "tolerance": tolerance.position,
+        "tolerance_rotation": tolerance.rotation,
+    }
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
         quaternions = (
