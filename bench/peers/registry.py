@@ -193,65 +193,41 @@ def _either(iterations: int | None = None) -> tuple[Entry, Entry]:
 
 _CHAINS = "poses and limits of one chain of hinges"
 _TREES = "poses, positions and limits of several effectors, balls"
-_IK_ADAPTERS = "bench.peers.ik"
-OURS = Peer(
-    "Plumbob LM",
-    f"{_IK_ADAPTERS}.plumbob",
-    "plumbob",
-    "MIT",
-    _TREES,
-    (Entry(ONE_START, {"restarts": 0}), Entry(RESTARTS, {"restarts": 100}, note="100 restarts")),
+_UNLIMITED = "poses and positions of several effectors, balls; looks at no limits"
+_SIX = "poses of six hinges or fewer, analytically"
+
+
+def _peer(title: str, adapter: str, package: str, license: str, can: str, *entries: Entry) -> Peer:
+    return Peer(title, f"bench.peers.ik.{adapter}", package, license, can, entries)
+
+
+OURS = _peer(
+    *("Plumbob LM", "plumbob", "plumbob", "MIT", _TREES),
+    Entry(ONE_START, {"restarts": 0}),
+    Entry(RESTARTS, {"restarts": 100}, note="100 restarts"),
 )
-TOOLBOX = Peer(
-    "Robotics Toolbox ik_LM",
-    f"{_IK_ADAPTERS}.toolbox",
-    "roboticstoolbox-python",
-    "MIT",
-    _CHAINS,
-    (
-        Entry(ONE_START, {"searches": 1, "iterations": 100}),
-        Entry(RESTARTS, {"searches": 100, "iterations": 30}, note="100 searches"),
-    ),
+TOOLBOX = _peer(
+    *("Robotics Toolbox ik_LM", "toolbox", "roboticstoolbox-python", "MIT", _CHAINS),
+    Entry(ONE_START, {"searches": 1, "iterations": 100}),
+    Entry(RESTARTS, {"searches": 100, "iterations": 30}, note="100 searches"),
 )
-TRAC_IK = Peer(
-    "TRAC-IK",
-    f"{_IK_ADAPTERS}.trac_ik",
-    "pytracik",
-    "MIT",
-    _CHAINS,
-    tuple(Entry(RESTARTS, {"seconds": t}, note=f"{1e3 * t:g} ms") for t in (0.005, 0.05)),
+TRAC_IK = _peer(
+    *("TRAC-IK", "trac_ik", "pytracik", "MIT", _CHAINS),
+    *(Entry(RESTARTS, {"seconds": t}, note=f"{1e3 * t:g} ms") for t in (0.005, 0.05)),
 )
+_EVERY_SOLUTION = Entry(RESTARTS, note="all solutions, no start")
 PEERS = (
     OURS,
-    Peer(
-        "Pinocchio’s closed loop",
-        f"{_IK_ADAPTERS}.closed_loop",
-        "pin",
-        "BSD-3-Clause",
-        "poses and positions of several effectors, balls; looks at no limits",
-        _either(200),
+    _peer(
+        "Pinocchio’s closed loop", "closed_loop", "pin", "BSD-3-Clause", _UNLIMITED, *_either(200)
     ),
-    Peer("pink", f"{_IK_ADAPTERS}.pink", "pin-pink", "Apache-2.0", _TREES, _either(50)),
-    Peer("mink", f"{_IK_ADAPTERS}.mink", "mink", "Apache-2.0", _TREES, _either(50)),
-    Peer("mujoco.minimize", f"{_IK_ADAPTERS}.minimize", "mujoco", "Apache-2.0", _CHAINS, _either()),
+    _peer("pink", "pink", "pin-pink", "Apache-2.0", _TREES, *_either(50)),
+    _peer("mink", "mink", "mink", "Apache-2.0", _TREES, *_either(50)),
+    _peer("mujoco.minimize", "minimize", "mujoco", "Apache-2.0", _CHAINS, *_either()),
     TOOLBOX,
     TRAC_IK,
-    Peer(
-        "ikpy",
-        f"{_IK_ADAPTERS}.ikpy",
-        "ikpy",
-        "Apache-2.0",
-        f"{_CHAINS}; makes no claims",
-        (Entry(ONE_START),),
-    ),
-    Peer(
-        "EAIK",
-        f"{_IK_ADAPTERS}.eaik",
-        "eaik",
-        "BSD-3-Clause",
-        "poses of six hinges or fewer, analytically",
-        (Entry(RESTARTS, note="all solutions, no start"),),
-    ),
+    _peer("ikpy", "ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims", Entry(ONE_START)),
+    _peer("EAIK", "eaik", "eaik", "BSD-3-Clause", _SIX, _EVERY_SOLUTION),
 )
 
 

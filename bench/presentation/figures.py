@@ -48,12 +48,6 @@ STYLE: dict[Any, Any] = {
     "grid.color": COLOURS["rule"],
     "grid.linewidth": 0.6,
     "text.color": COLOURS["ink"],
-    "xtick.color": COLOURS["faint"],
-    "ytick.color": COLOURS["faint"],
-    "xtick.labelcolor": COLOURS["ink"],
-    "ytick.labelcolor": COLOURS["ink"],
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
     "legend.frameon": False,
     "legend.fontsize": 8.5,
     "lines.linewidth": 1.6,
@@ -62,6 +56,9 @@ STYLE: dict[Any, Any] = {
     "savefig.facecolor": "none",
     "mathtext.default": "regular",
 }
+for _axis in ("xtick", "ytick"):
+    STYLE |= {f"{_axis}.color": COLOURS["faint"], f"{_axis}.labelcolor": COLOURS["ink"]}
+    STYLE[f"{_axis}.labelsize"] = 8
 WIDTH = 7.4
 # Letters of a name in a figure.
 LONGEST = 60

@@ -88,47 +88,42 @@ def robot() -> tuple[Articulation, np.ndarray]:
 
 def on_the_robot(solver: str) -> Call:
     """Reach for a position and a rotation."""
-    arm, start = robot()
     target = Target([0.4, 0.1, 0.5], [0.0, 1.0, 0.0, 0.0])
-    return lambda: reference.solve_ik(arm, start, target, solver)
+    return partial(reference.solve_ik, *robot(), target, solver)
 
 
 def on_the_chain(solver: str) -> Call:
     """Reach for a position."""
-    skeleton, start = scenes.ball_chain()
-    return lambda: reference.solve_ik(skeleton, start, [0.3, 0.4, 0.2], solver)
+    return partial(reference.solve_ik, *scenes.ball_chain(), [0.3, 0.4, 0.2], solver)
 
 
 def along_a_curve(solver: str) -> Call:
     """Follow a circle."""
-    skeleton, _ = scenes.ball_chain()
     circle = 0.5 + 0.2 * reference.curves["circle"](20)
-    return lambda: reference.track(skeleton, circle, solver)
+    return partial(reference.track, scenes.ball_chain()[0], circle, solver)
 
 
 def posed(solver: str, count: int = 0) -> Call:
     """Pose a skeleton, or many."""
     skeleton, local = scenes.ball_chain()
     poses = np.tile(local, (count, 1, 1)) if count else local
-    return lambda: reference.forward_kinematics(skeleton, poses)
+    return partial(reference.forward_kinematics, skeleton, poses)
 
 
 def posed_robot(solver: str) -> Call:
     """Pose a robot."""
-    arm, start = robot()
-    return lambda: reference.forward_kinematics(arm, start)
+    return partial(reference.forward_kinematics, *robot())
 
 
 def derived(solver: str) -> Call:
     """Derive a robot's pose."""
-    arm, start = robot()
-    return lambda: jacobian(arm, start)
+    return partial(jacobian, *robot())
 
 
 def evened(solver: str) -> Call:
     """Resample a curve."""
     points = reference.curves["heart"](100)
-    return lambda: reference.resample(points, min_spacing=0.01, max_spacing=0.02)
+    return partial(reference.resample, points, min_spacing=0.01, max_spacing=0.02)
 
 
 def stepped(solver: str) -> Call:
@@ -139,8 +134,7 @@ def stepped(solver: str) -> Call:
 
 def stepped_explicitly(solver: str) -> Call:
     """Step a cloth explicitly."""
-    system, state = scenes.lab_cloth()
-    return lambda: reference.symplectic_euler(system, state, h=H)
+    return partial(reference.symplectic_euler, *scenes.lab_cloth(), h=H)
 
 
 # Public function and what it works on: its solvers, and what makes the call.
