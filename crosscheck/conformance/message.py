@@ -277,5 +277,5 @@ def did_you_mean(value: object, options: Iterable[str]) -> str:
     """Return a question after the nearest option, or "" if none is near."""
     simple = {one.replace("_", "").lower(): one for one in options}
     word = str(value).replace("_", "").replace("-", "").lower()
-    near = difflib.get_close_matches(word, simple, n=1, cutoff=0.75)
+    near = difflib.get_close_matches(word, simple, n=1, cutoff=0.6)
     return f"; did you mean {simple[near[0]]}?" if near else ""

@@ -78,6 +78,23 @@ def end_group(leader: int, marker: str = "") -> int:
     return len(killed)
 
 
+def guard(leader: int) -> subprocess.Popen[bytes]:
+    """Start a process that kills a program's group should this one die, by whatever means."""
+    return subprocess.Popen(
+        ["/bin/sh", "-c", 'read line || kill -KILL "-$1"', "sh", str(leader)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def dismiss(guard: subprocess.Popen[bytes]) -> None:
+    """End a guard."""
+    guard.kill()
+    guard.communicate()
+
+
 def _running() -> Iterator[Process]:
     return _running_by_proc() if HAS_PROC else _running_by_ps()
 
