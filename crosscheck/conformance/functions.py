@@ -87,14 +87,14 @@ def describe_exception(error: BaseException, file: str) -> Failure:
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename == file or _is_beside(Path(frame.filename), Path(file))
+        if frame.filename == file or is_beside(Path(frame.filename), Path(file))
     ]
     if not file or not frames:
         return raised(type(error).__name__, why)
     return raised(type(error).__name__, why, Path(frames[-1].filename).name, frames[-1].lineno or 0)
 
 
-def _is_beside(path: Path, file: Path) -> bool:
+def is_beside(path: Path, file: Path) -> bool:
     """Return whether a file is of the same folder as another, and not ours or a library's."""
     ours = Path(__file__).parent in path.parents
     return file.parent in path.parents and not ours and "site-packages" not in path.parts

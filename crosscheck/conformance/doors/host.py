@@ -23,7 +23,7 @@ from typing import Any, BinaryIO
 import msgspec
 
 from ..contestant import Answer, Failure, FailureKind
-from ..functions import call, describe_exception, takes
+from ..functions import call, describe_exception, is_beside, takes
 from ..greeting import PROTOCOL
 from ..message import (
     GREETING,
@@ -230,7 +230,8 @@ class _Watch(threading.Thread):
                 self._say(sys._current_frames().get(self._solver))
 
     def _say(self, frame: FrameType | None) -> None:
-        while frame is not None and not frame.f_code.co_filename.startswith(self._folder):
+        beside = Path(self._folder) / "solver.py"
+        while frame is not None and not is_beside(Path(frame.f_code.co_filename), beside):
             frame = frame.f_back
         if frame is not None:
             file = Path(frame.f_code.co_filename).name
@@ -254,6 +255,7 @@ def serve(spec: str, folder: str, patience: float) -> None:
         watch.start()
         watch.since = time.monotonic()
         solver, failure = _loaded(spec, folder)
+        watch.since = None
         for line in requests:
             watch.since = time.monotonic()
             request = decode_request(line)

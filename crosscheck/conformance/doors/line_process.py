@@ -65,7 +65,7 @@ class Limits(NamedTuple):
     request: float = 10.0
     leave: float = 2.0
     memory: int = 4 << 30
-    line: int = 1 << 28
+    line: int = 1 << 26
     prints: int = 10_000
 
 
@@ -144,6 +144,7 @@ class LineProcess:
     def leave(self) -> tuple[Sentence, ...]:
         """End the input, then all that still runs; return what was odd in how it left."""
         remarks = []
+        self._forget(self._process.stdin)
         with _no_signal_of_pipes(), contextlib.suppress(OSError):
             self._process.stdin.close()
         deadline = time.monotonic() + self._limits.leave
@@ -312,7 +313,7 @@ class LineProcess:
 
     def _computes(self, since: float, used: float) -> bool:
         now = sum(one.seconds for one in family(self._process.pid))
-        return not now - used < IDLE * (time.monotonic() - since)
+        return now - used >= IDLE * (time.monotonic() - since)
 
     def _how(self) -> Sentence:
         code = self._process.returncode
@@ -387,7 +388,8 @@ def _end(
     process: Any, guard: subprocess.Popen[bytes], marker: str, selector: selectors.BaseSelector
 ) -> None:
     end_group(process.pid, marker)
-    process.wait()
+    with contextlib.suppress(subprocess.TimeoutExpired):  # what the system does not let go
+        process.wait(SHUT)
     dismiss(guard)
     selector.close()
     for pipe in (process.stdin, process.stdout, process.stderr):

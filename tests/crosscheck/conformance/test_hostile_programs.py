@@ -131,6 +131,11 @@ HOSTILE = {
         "hung",
         "no answer",
     ),
+    "forks and ends, on and on": (
+        "while True:\n    if os.fork(): os._exit(0)",
+        "crashed",
+        "exit code 0",
+    ),
     "forks and forks": (
         "for _ in range(4): os.fork()\nwhile True: tick()",
         "hung",

@@ -84,6 +84,14 @@ def test_a_group_is_ended_with_all_that_can_be_found(brood, source, tmp_path):
     assert brood.wait() == -signal.SIGKILL
 
 
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [("0:00.05", 0.05), ("00:00:07", 7.0), ("01:02:03", 3723.0), ("2-01:00:00", 176400.0)],
+)
+def test_times_of_ps_are_read(text, seconds):
+    assert processes._seconds(text) == seconds
+
+
 def test_what_has_ended_is_in_no_family(source):
     process = subprocess.Popen(["sleep", "99"], start_new_session=True)
     process.kill()
