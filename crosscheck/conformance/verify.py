@@ -49,15 +49,12 @@ def verify(
     """
     greeting = contestant.greeting
     reports = []
-    try:
-        for task, method in trials(greeting, tasks):
-            discipline = DISCIPLINES[task]
-            cases = discipline.cases(greeting, method, seed, thorough)
-            asked = list(_ask(contestant, cases, partial(notify, task)))
-            reports.append(discipline.judge(asked, greeting, method))
-    finally:
-        contestant.close()
-    return Report(greeting, reports, seed, contestant.remarks)
+    for task, method in trials(greeting, tasks):
+        discipline = DISCIPLINES[task]
+        cases = discipline.cases(greeting, method, seed, thorough)
+        asked = list(_ask(contestant, cases, partial(notify, task)))
+        reports.append(discipline.judge(asked, greeting, method))
+    return Report(greeting, reports, seed)
 
 
 def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple[str, str]]:
