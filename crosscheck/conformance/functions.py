@@ -179,7 +179,7 @@ def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:
     array = _array(field, value)
     shape = tuple(counts.get(n, n) if isinstance(n, str) else n for n in field.shape)
     if array.size == 0 and array.ndim < len(shape):  # nested lists do not say what they lack
-        array = array.reshape([0 if isinstance(n, str) else n for n in field.shape])
+        array = array.reshape([0, *(n if isinstance(n, int) else 0 for n in shape[1:])])
     if len(shape) != array.ndim or any(
         isinstance(n, int) and n != m for n, m in zip(shape, array.shape, strict=True)
     ):

@@ -28,6 +28,8 @@ from .processes import HAS_PROC, MARKER, end_group, family
 TICK = 0.05 if HAS_PROC else 0.5
 # How much of standard error is kept [B], and how many of its lines are shown.
 STDERR_KEPT, STDERR_SHOWN = 4096, 3
+# How often it is read once a program ended: more than a pipe holds.
+STDERR_ROUNDS = 8
 # Below this share of a processor a program waits rather than computes.
 IDLE = 0.1
 # How long what closed one of its pipes may still take to answer, or to end [s].
@@ -107,9 +109,8 @@ class LineProcess:
         """Let a line be written while the answer is awaited."""
         self._unsent += line
         self._sent = len(line)
-        if self._unsent and not self._refuses_input:
-            with contextlib.suppress(KeyError):
-                self._selector.unregister(self._process.stdin)
+        if not self._refuses_input:
+            self._forget(self._process.stdin)
             self._selector.register(self._process.stdin, selectors.EVENT_WRITE)
 
     def receive(self, seconds: float, patience: float) -> bytes:
@@ -128,7 +129,8 @@ class LineProcess:
             now = time.monotonic()
             if now - looked >= TICK:
                 looked = now
-                used = used or (now, self._look())
+                seconds_used = self._look()
+                used = used or (now, seconds_used)
             limit = min(seconds, SHUT) if self._refuses_input else seconds
             if now - start >= limit:
                 raise self._late(patience, *(used or (now, 0.0)))
@@ -183,7 +185,9 @@ class LineProcess:
             elif key.fileobj is self._process.stderr:
                 self._read_stderr()
             else:
-                ended = not self._read()
+                chunk = _read(self._process.stdout)
+                ended = chunk == b""
+                self._received += chunk or b""
         if ended:
             raise self._silent()
         if len(self._received) > self._limits.line:
@@ -208,34 +212,28 @@ class LineProcess:
             self._refuses_input = True
             self._unsent.clear()
         if not self._unsent:
-            self._selector.unregister(self._process.stdin)
-
-    def _read(self) -> bool:
-        with contextlib.suppress(BlockingIOError):
-            chunk = os.read(self._process.stdout.fileno(), _CHUNK)
-            self._received += chunk
-            return bool(chunk)
-        return True
+            self._forget(self._process.stdin)
 
     def _read_stderr(self) -> None:
-        with contextlib.suppress(BlockingIOError):
-            chunk = os.read(self._process.stderr.fileno(), _CHUNK)
-            self._stderr += chunk
-            del self._stderr[:-STDERR_KEPT]
-            if not chunk:
-                self._selector.unregister(self._process.stderr)
+        chunk = _read(self._process.stderr)
+        self._stderr += chunk or b""
+        del self._stderr[:-STDERR_KEPT]
+        if chunk == b"":
+            self._forget(self._process.stderr)
 
     def _drain(self, seconds: float) -> None:
         """Throw away what is printed."""
         for key, _ in self._selector.select(seconds):
             if key.fileobj is self._process.stderr:
                 self._read_stderr()
-            elif key.fileobj is self._process.stdin or not self._read():
-                self._selector.unregister(key.fileobj)
-        self._received.clear()
-        self._searched = 0
+            elif key.fileobj is self._process.stdin or _read(key.fileobj) == b"":
+                self._forget(key.fileobj)
         if not self._selector.get_map():
             time.sleep(seconds)
+
+    def _forget(self, pipe: Any) -> None:
+        with contextlib.suppress(KeyError):
+            self._selector.unregister(pipe)
 
     def _look(self) -> float:
         """Return the processors' time that it has used; raise if it ended or is too large."""
@@ -266,7 +264,7 @@ class LineProcess:
         deadline = time.monotonic() + SHUT
         while not self._has_ended() and time.monotonic() < deadline:
             time.sleep(TICK / 10)
-        with contextlib.suppress(LostError):
+        for _ in range(STDERR_ROUNDS):
             self._read_stderr()
         ended = self._has_ended()
         self._end()
@@ -328,6 +326,14 @@ class LineProcess:
             what=what,
             lines=" / ".join(lines[-STDERR_SHOWN:]),
         )
+
+
+def _read(pipe: Any) -> bytes | None:
+    """Return what is there, b"" if there never will be anything more, None if there is nothing."""
+    try:
+        return os.read(pipe.fileno(), _CHUNK)
+    except BlockingIOError:
+        return None
 
 
 def _start(command: Sequence[str], folder: Path | None, marker: str) -> Any:

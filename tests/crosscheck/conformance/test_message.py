@@ -110,9 +110,11 @@ def decoded(line, task="forward_kinematics", seconds=1.0, **inputs):
 
 @pytest.mark.parametrize(
     ("word", "value"),
-    [("null", np.nan), ("NaN", np.nan), ("nan", np.nan), ("-nan", np.nan), ("-nan(ind)", np.nan)]
-    + [("nan(0x8000)", np.nan), ("Infinity", np.inf), ("-Infinity", -np.inf), ("inf", np.inf)]
-    + [("-inf", -np.inf), ("-INF", -np.inf), ("1e999", np.inf)],
+    [
+        *((word, np.nan) for word in ("null", "NaN", "nan", "-nan", "-nan(ind)", "nan(0x8000)")),
+        *((word, np.inf) for word in ("Infinity", "inf", "1e999")),
+        *((word, -np.inf) for word in ("-Infinity", "-inf", "-INF")),
+    ],
 )
 def test_words_for_what_is_no_number_are_understood(word, value):
     line = f'{{"id": 1, "nan": "an inf, \\"nan\\"", "positions": [[1, {word}, 3], [4, 5, 6]]}}'
