@@ -15,6 +15,8 @@ EXAMPLES = (
     "plumbob verify my_package.cloth:Solver     an object of a module",
     "plumbob verify -- ./my_solver --flag       any program that speaks the protocol",
     "plumbob verify --template cpp              a starter for such a program",
+    "plumbob verify --export-cases cases        for code that can only read and write files,",
+    "plumbob verify --answers cases             and what it has written there",
     "plumbob verify my_ik.py --html verdict.html --junit verdict.xml",
     "plumbob verify my_ik.py --rerun plumbob_failures/CASE.json",
 )
@@ -46,6 +48,13 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         str | None,
         typer.Option(metavar="LANGUAGE", help="Write a starter: cpp, rust, javascript, ..."),
     ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option("--export-cases", metavar="DIR", help="Write cases, to be answered by files."),
+    ] = None,
+    answers: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Judge the answers in such a folder.")
+    ] = None,
     rerun: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Ask a saved failing case again.")
     ] = None,
@@ -75,21 +84,27 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 
     Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 for a wrong command.
     """
+    from crosscheck.conformance.contestant import NoGreetingError
     from crosscheck.conformance.language import language_of
+    from crosscheck.conformance.sentence import sentence
 
     from . import starter, tasks
     from .files import Files
-    from .question import Question, ask
-    from .solver import limits, opened
+    from .question import Question, ask, suited
+    from .solver import ANSWERS, exported, limits, opened
     from .words import Presentation, speaker
 
     language = lang or language_of()
     say = speaker(language)
     words = [*(solver or ()), *context.meta.get(_PROGRAM, ())]
+    if answers:
+        words = [ANSWERS, str(answers), *words]
     if names:
         return _print(tasks.described(task or (), say))
     if template:
         return _print(starter.written(template, Path(), say))
+    if export:
+        return _print(exported(export, task or (), seed, thorough, say))
     if self_test:
         return _self_test(language)
     if time_limit is not None and not 0.0 < time_limit < float("inf"):
@@ -97,8 +112,13 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     files = Files(json, junit, html, output)
     files.check()
     contestant = opened(words, limits(time_limit, memory_limit), say)
-    question = Question(tuple(task or ()), rerun, thorough, seed)
-    report = ask(contestant, question)
+    question = suited(Question(tuple(task or ()), rerun, thorough, seed), contestant)
+    try:
+        report = ask(contestant, question)
+    except NoGreetingError as error:
+        raise ValueError(say(sentence(
+            "solver: expected a greeting, got none: {why}", why=error.failure.sentence
+        ))) from None  # fmt: skip
     return files.write(report, Presentation(say, language, words, files.saved(report, question)))
 
 

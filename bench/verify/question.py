@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crosscheck.conformance.contestant import Contestant
+from crosscheck.conformance.doors.files import FileContestant
 from crosscheck.conformance.judgement import Report
 from crosscheck.conformance.verify import DISCIPLINES, judge_cases, verify
 
@@ -25,6 +26,13 @@ class Question(NamedTuple):
     rerun: Path | None = None
     thorough: bool = False
     seed: int = 0
+
+
+def suited(question: Question, contestant: Contestant) -> Question:
+    """Return the question with the cases that were exported, where answers are files."""
+    if isinstance(contestant, FileContestant):
+        return question._replace(seed=contestant.seed, thorough=contestant.thorough)
+    return question
 
 
 def ask(contestant: Contestant, question: Question) -> Report:
