@@ -37,18 +37,25 @@ def templates() -> dict[str, str]:
 
 
 def literal_templates(source: str, place: str) -> Iterator[str]:
-    """Yield the first argument of every call of `sentence` in a source.
+    """Yield the first argument of every call of `sentence` in a source, both if it chooses one.
 
     Raises:
         ValueError: if one is no literal, so that nobody could translate it.
     """
     calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
     for node in sorted(calls, key=lambda node: (node.lineno, node.col_offset)):
-        if getattr(node.func, "id", None) == "sentence":
-            first = node.args[0] if node.args else None
-            if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
+        if getattr(node.func, "id", None) != "sentence":
+            continue
+        for literal in _choices(node.args[0] if node.args else None):
+            if not isinstance(literal, ast.Constant) or not isinstance(literal.value, str):
                 raise ValueError(f"{place}:{node.lineno}: expected a literal template")
-            yield first.value
+            yield literal.value
+
+
+def _choices(node: ast.expr | None) -> list[ast.expr | None]:
+    if isinstance(node, ast.IfExp):
+        return [*_choices(node.body), *_choices(node.orelse)]
+    return [node]
 
 
 def _of_tasks() -> Iterator[str]:

@@ -88,16 +88,20 @@ def describe_exception(error: BaseException, file: str) -> Failure:
     why = " ".join(str(error).split())[:200]
     if isinstance(error, SyntaxError) and error.filename:
         return raised(type(error).__name__, error.msg, Path(error.filename).name, error.lineno or 0)
-    folder = Path(file).parent
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename == file
-        or (folder in Path(frame.filename).parents and "site-packages" not in frame.filename)
+        if frame.filename == file or is_beside(Path(frame.filename), Path(file))
     ]
     if not file or not frames:
         return raised(type(error).__name__, why)
     return raised(type(error).__name__, why, Path(frames[-1].filename).name, frames[-1].lineno or 0)
+
+
+def is_beside(path: Path, file: Path) -> bool:
+    """Return whether a file is of the same folder as another, and not ours or a library's."""
+    ours = Path(__file__).parent in path.parents
+    return file.parent in path.parents and not ours and "site-packages" not in path.parts
 
 
 def raised(kind: str, why: str, file: str = "", line: int = 0) -> Failure:

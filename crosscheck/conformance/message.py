@@ -3,6 +3,10 @@
 Numbers are written with the shortest digits that give the same number back. null in an answer is
 NaN. JSON has no other word for what is no number, but many writers print one: NaN, nan, -nan,
 -nan(ind), Infinity, inf are understood in an answer as well, and never written in a request.
+
+Besides the outputs of its task an answer may hold "seconds", the solver's own time; "printed", the
+beginning of what it printed; "changed", the names of the inputs that it changed. One that says
+"error" may hold "kind": "raised" with the "exception", its "file" and its "line".
 """
 
 import difflib
@@ -277,5 +281,5 @@ def did_you_mean(value: object, options: Iterable[str]) -> str:
     """Return a question after the nearest option, or "" if none is near."""
     simple = {one.replace("_", "").lower(): one for one in options}
     word = str(value).replace("_", "").replace("-", "").lower()
-    near = difflib.get_close_matches(word, simple, n=1, cutoff=0.75)
+    near = difflib.get_close_matches(word, simple, n=1, cutoff=0.6)
     return f"; did you mean {simple[near[0]]}?" if near else ""

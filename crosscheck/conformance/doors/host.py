@@ -13,14 +13,17 @@ import inspect
 import io
 import os
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import FrameType
 from typing import Any, BinaryIO
 
 import msgspec
 
 from ..contestant import Answer, Failure, FailureKind
-from ..functions import call, describe_exception, takes
+from ..functions import call, describe_exception, is_beside, takes
 from ..greeting import PROTOCOL
 from ..message import (
     GREETING,
@@ -209,22 +212,55 @@ def _moved() -> Iterator[tuple[BinaryIO, BinaryIO, _Prints]]:
         yield requests, answers, prints
 
 
-def serve(spec: str, folder: str) -> None:
+class _Watch(threading.Thread):
+    """Says on standard error in which line the solver is, each time that it took so long."""
+
+    def __init__(self, folder: str, patience: float) -> None:
+        super().__init__(daemon=True)
+        self._folder, self._patience = folder, patience
+        self._solver = threading.get_ident()
+        self.since: float | None = None
+
+    def run(self) -> None:
+        while True:
+            time.sleep(self._patience / 10)
+            since, now = self.since, time.monotonic()
+            if since is not None and now - since > self._patience:
+                self.since = now
+                self._say(sys._current_frames().get(self._solver))
+
+    def _say(self, frame: FrameType | None) -> None:
+        beside = Path(self._folder) / "solver.py"
+        while frame is not None and not is_beside(Path(frame.f_code.co_filename), beside):
+            frame = frame.f_back
+        if frame is not None:
+            file = Path(frame.f_code.co_filename).name
+            os.write(2, f"It was in line {frame.f_lineno} of {file}.\n".encode())
+
+
+def serve(spec: str, folder: str, patience: float) -> None:
     """Answer requests about a solver until they end.
 
     Args:
         spec: as of `load`.
         folder: its own one, where it finds its other modules.
+        patience: after which it is told where the solver is [s].
     """
-    faulthandler.enable()
+    faulthandler.enable(all_threads=False)
     with _moved() as (requests, answers, prints):
         sys.argv = [spec]
         if folder not in sys.path:
             sys.path.insert(0, folder)
+        watch = _Watch(folder, patience)
+        watch.start()
+        watch.since = time.monotonic()
         solver, failure = _loaded(spec, folder)
+        watch.since = None
         for line in requests:
+            watch.since = time.monotonic()
             request = decode_request(line)
             fields = solver.answer(request) if solver else failure
+            watch.since = None
             answers.write(encode_answer(request.id, **{**fields, **prints.taken()}))
             answers.flush()
 

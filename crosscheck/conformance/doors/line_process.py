@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 from ..contestant import Failure, FailureKind
 from ..message import shown
 from ..sentence import Sentence, sentence
-from .processes import HAS_PROC, MARKER, end_group, family
+from .processes import HAS_PROC, MARKER, dismiss, end_group, family, guard
 
 # How often a process that lets one wait is looked at [s], as often as the looking is cheap.
 TICK = 0.05 if HAS_PROC else 0.5
@@ -35,6 +35,8 @@ IDLE = 0.1
 # How long what closed one of its pipes may still take to answer, or to end [s].
 SHUT = 0.5
 _CHUNK = 1 << 18
+# Frames of ours, and a list that Python ends its last words with, are nothing to show.
+_OURS = (str(Path(__file__).parents[1]), 'File "<string>"', "Extension modules:")
 
 _SIGNALS: Mapping[int, Sentence] = {
     signal.SIGSEGV: sentence("it used memory that is not its own (segmentation fault)"),
@@ -63,7 +65,7 @@ class Limits(NamedTuple):
     request: float = 10.0
     leave: float = 2.0
     memory: int = 4 << 30
-    line: int = 1 << 28
+    line: int = 1 << 26
     prints: int = 10_000
 
 
@@ -103,7 +105,9 @@ class LineProcess:
         self._selector = selectors.DefaultSelector()
         for pipe in (self._process.stdout, self._process.stderr):
             self._selector.register(pipe, selectors.EVENT_READ)
-        self._end = weakref.finalize(self, _end, self._process, self._marker, self._selector)
+        self._end = weakref.finalize(
+            self, _end, self._process, guard(self._process.pid), self._marker, self._selector
+        )
 
     def send(self, line: bytes) -> None:
         """Let a line be written while the answer is awaited."""
@@ -140,6 +144,7 @@ class LineProcess:
     def leave(self) -> tuple[Sentence, ...]:
         """End the input, then all that still runs; return what was odd in how it left."""
         remarks = []
+        self._forget(self._process.stdin)
         with _no_signal_of_pipes(), contextlib.suppress(OSError):
             self._process.stdin.close()
         deadline = time.monotonic() + self._limits.leave
@@ -308,7 +313,7 @@ class LineProcess:
 
     def _computes(self, since: float, used: float) -> bool:
         now = sum(one.seconds for one in family(self._process.pid))
-        return not now - used < IDLE * (time.monotonic() - since)
+        return now - used >= IDLE * (time.monotonic() - since)
 
     def _how(self) -> Sentence:
         code = self._process.returncode
@@ -318,7 +323,8 @@ class LineProcess:
         return _SIGNALS.get(-code, sentence("it was ended by signal {name}", name=name))
 
     def _with_stderr(self, what: Sentence) -> Sentence:
-        lines = [line for line in map(shown, bytes(self._stderr).splitlines()) if line]
+        lines = [shown(line) for line in bytes(self._stderr).splitlines()]
+        lines = [line for line in lines if line and not any(one in line for one in _OURS)]
         if not lines:
             return what
         return sentence(
@@ -378,9 +384,13 @@ def _not_started(program: str, error: Exception) -> Sentence:
             )
 
 
-def _end(process: Any, marker: str, selector: selectors.BaseSelector) -> None:
+def _end(
+    process: Any, guard: subprocess.Popen[bytes], marker: str, selector: selectors.BaseSelector
+) -> None:
     end_group(process.pid, marker)
-    process.wait()
+    with contextlib.suppress(subprocess.TimeoutExpired):  # what the system does not let go
+        process.wait(SHUT)
+    dismiss(guard)
     selector.close()
     for pipe in (process.stdin, process.stdout, process.stderr):
         with contextlib.suppress(OSError):

@@ -28,7 +28,7 @@ class Process(NamedTuple):
 
     Attributes:
         memory: what it holds of the machine's memory [B].
-        seconds: of a processor that it has used, or NaN [s].
+        seconds: of a processor that it has used [s].
     """
 
     pid: int
@@ -70,12 +70,31 @@ def end_group(leader: int, marker: str = "") -> int:
         members = [one.pid for one in family(leader, marker)]
         if not members:
             break
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(leader, signal.SIGKILL)  # at once, for those that fork and end
         for pid in members:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
         killed.update(members)
         time.sleep(PAUSE)
     return len(killed)
+
+
+def guard(leader: int) -> subprocess.Popen[bytes]:
+    """Start a process that kills a program's group should this one die, by whatever means."""
+    return subprocess.Popen(
+        ["/bin/sh", "-c", 'read line || kill -KILL "-$1"', "sh", str(leader)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def dismiss(guard: subprocess.Popen[bytes]) -> None:
+    """End a guard."""
+    guard.kill()
+    guard.communicate()
 
 
 def _running() -> Iterator[Process]:
@@ -95,13 +114,22 @@ def _running_by_proc() -> Iterator[Process]:
 
 
 def _running_by_ps() -> Iterator[Process]:
-    columns = ["-o", "pid=", "-o", "ppid=", "-o", "pgid=", "-o", "rss=", "-o", "stat="]
-    listed = subprocess.run(["ps", "-A", *columns], capture_output=True, check=False)
+    columns = [f"-o{name}=" for name in ("pid", "ppid", "pgid", "rss", "time", "stat")]
+    listed = subprocess.run(["ps", "-A", *columns], capture_output=True, text=True, check=False)
     for line in listed.stdout.splitlines():
-        *numbers, state = line.split()
-        if not state.startswith(b"Z"):
+        *numbers, used, state = line.split()
+        if not state.startswith("Z"):
             pid, parent, group, kilobytes = map(int, numbers)
-            yield Process(pid, parent, group, group, kilobytes * 1024, float("nan"))
+            yield Process(pid, parent, group, group, kilobytes * 1024, _seconds(used))
+
+
+def _seconds(used: str) -> float:
+    """Return the seconds of [[days-]hours:]minutes:seconds."""
+    days, _, clock = used.rpartition("-")
+    seconds = 0.0
+    for part in clock.split(":"):
+        seconds = 60.0 * seconds + float(part)
+    return 86400.0 * int(days or 0) + seconds
 
 
 def _carries(pid: int, marker: str) -> bool:

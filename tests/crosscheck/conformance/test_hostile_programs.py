@@ -12,6 +12,7 @@ from hostile_programs import LIMITS, LOOP, case, program, running
 
 from crosscheck.conformance.contestant import Answer, Failure, FailureKind, NoGreetingError
 from crosscheck.conformance.doors.program import ProgramContestant
+from crosscheck.conformance.verify import DISCIPLINES, verify
 
 FORK = "if os.fork() == 0:\n    {before}\n    os.close(1)\n    while True: tick()\n"
 HOSTILE = {
@@ -129,6 +130,11 @@ HOSTILE = {
         FORK.format(before="os.setsid(); os.fork() and os._exit(0)") + "while True: tick()",
         "hung",
         "no answer",
+    ),
+    "forks and ends, on and on": (
+        "while True:\n    if os.fork(): os._exit(0)",
+        "crashed",
+        "exit code 0",
     ),
     "forks and forks": (
         "for _ in range(4): os.fork()\nwhile True: tick()",
@@ -377,6 +383,24 @@ def test_a_program_that_dies_kills_nobody_by_a_broken_pipe(tmp_path):
         assert contestant.answer(case(3)).kind is FailureKind.CRASHED
     finally:
         signal.signal(signal.SIGPIPE, default)
+
+
+def test_the_rest_of_the_cases_goes_on_and_a_report_ends_the_program(tmp_path, monkeypatch):
+    class Discipline:
+        cases = staticmethod(lambda *_: [case(joints) for joints in (2, 3, 2, 3, 2)])
+        judge = staticmethod(lambda asked, *_: asked)
+
+    monkeypatch.setitem(DISCIPLINES, "forward_kinematics", Discipline)
+    stays = f"try:{LOOP}".replace("\n", "\n    ") + "\nfinally:\n    while True: tick()"
+    contestant = program(tmp_path, "os.abort()", loop=stays)
+    report = verify(contestant, ["forward_kinematics"])
+    found = [type(one.answer) for one in report.tasks[0]]
+    assert found == [Answer, Failure, Answer, Failure, Answer]
+    assert [isinstance(one.again, Answer) for one in report.tasks[0]] == [
+        kind is Answer for kind in found
+    ]
+    assert [str(one) for one in report.remarks] == ["It does not leave when its input ends."]
+    assert not running(tmp_path)
 
 
 def test_a_contestant_that_is_dropped_leaves_nothing(tmp_path):

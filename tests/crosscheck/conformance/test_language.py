@@ -61,8 +61,8 @@ def test_a_catalogue_says_what_was_written(text):
 
 
 def test_a_template_that_is_no_literal_is_refused():
-    good = 'sentence("a {b}", b=1)\nsentence("two "\n"parts")'
-    assert list(catalogue.literal_templates(good, "x")) == ["a {b}", "two parts"]
+    good = 'sentence("a {b}", b=1)\nsentence("two "\n"parts")\nsentence("c" if d else "e")'
+    assert list(catalogue.literal_templates(good, "x")) == ["a {b}", "two parts", "c", "e"]
     for bad in ("sentence(words)", 'sentence(f"{a}")', 'sentence("a" + b)', "sentence()"):
         with pytest.raises(ValueError, match="x:1: expected a literal template"):
             list(catalogue.literal_templates(bad, "x"))
