@@ -95,10 +95,15 @@ def record(report: Report, say: Say) -> ReportRecord:
     """Return the report in plain numbers and words."""
     return ReportRecord(
         FORMAT, VERSION, _name(report), report.verdict in GOOD, report.seed,
-        msgspec.convert(all_visible(msgspec.to_builtins(report.greeting)), Greeting, strict=False),
+        _greeting(report.greeting),
         [say(one) for one in report.remarks], say(advice(report.tasks)),
         [_task(task, say) for task in report.tasks],
     )  # fmt: skip
+
+
+def _greeting(greeting: Greeting) -> Greeting:
+    fields = msgspec.json.decode(msgspec.json.encode(greeting))
+    return msgspec.convert(all_visible(fields), Greeting)
 
 
 def _name(judged: Report | TaskReport | CaseJudgement | Finding) -> VerdictName:

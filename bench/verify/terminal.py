@@ -31,8 +31,8 @@ _DASH = "–"
 _PIECE = re.compile(
     r"[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]|[^\s\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]+|\s+"
 )
-# Marks that no line begins with.
-_CLOSING = "，。、；：！？）》」』”’"
+# Marks that no line begins with, and that none ends with.
+_CLOSING, _OPENING = "，。、；：！？）》」』”’", "（《「『"
 
 
 def lines(report: Report, context: Presentation) -> list[str]:
@@ -181,7 +181,7 @@ def wrapped(text: str, size: int, indent: str = "") -> list[str]:
         if width(line + piece) <= size or not line.strip():
             line += piece
             continue
-        moved = line[-1] if piece in _CLOSING else ""
+        moved = line[-1] if piece in _CLOSING or line[-1] in _OPENING else ""
         shown.append(line.removesuffix(moved).rstrip())
         line = indent + moved + piece.lstrip()
     return [*shown, line.rstrip()] if line.strip() else shown

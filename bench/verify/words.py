@@ -114,7 +114,7 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
     first = bad[0]
     if first.verdict is Verdict.UNDECIDED:
         return sentence("Next: ask the long list of cases with --thorough.")
-    if first.verdict is Verdict.BROKEN:
+    if first.verdict is Verdict.BROKEN and not first.diagnosis.explanations:
         return sentence(
             "Next: let {task} answer every case first; what it breaks on is saved above.",
             task=title(first),

@@ -211,6 +211,25 @@ def test_json_holds_every_sentence_verdict_and_number(wrong):
     assert found["tasks"][0]["explanations"][0]["share"] == 1.0
 
 
+def texts_of(value):
+    """Every text in a value that JSON holds."""
+    if isinstance(value, str):
+        yield value
+    for one in (
+        value if isinstance(value, list) else value.values() if isinstance(value, dict) else ()
+    ):
+        yield from texts_of(one)
+
+
+def test_no_text_of_json_holds_a_control_character():
+    greeting = Greeting(1, TASKS, HOSTILE, HOSTILE, HOSTILE, methods=(HOSTILE,))
+    one = undecided(Verdict.RIGHT).tasks[0]
+    report = Report(greeting, [TaskReport("energy", HOSTILE, one.judgements, Diagnosis(), None)], 0)
+    found = json.loads(json_file.text(report, speaker("en")))
+    assert [text for text in texts_of(found) if not text.isprintable()] == []
+    assert found["solver"]["methods"] == [found["tasks"][0]["method"]]
+
+
 def test_numbers_that_json_does_not_have_are_null():
     record = json.loads(json_file.text(undecided(Verdict.RIGHT), speaker("en")))
     finding = record["tasks"][0]["cases"][0]["findings"][0]
@@ -301,6 +320,7 @@ def test_every_word_of_the_page_has_a_translation():
         ("one two three", 7, ["one two", "three"]),
         ("正运动学是错的，请改。", 8, ["正运动学", "是错的，", "请改。"]),
         ("正运动，学", 6, ["正运", "动，学"]),
+        ("正运（动学）", 6, ["正运", "（动", "学）"]),
         ("abcdefghij", 4, ["abcd", "efgh", "ij"]),
         ("in 正运动学 only", 8, ["in 正运", "动学", "only"]),
     ],
