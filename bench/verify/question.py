@@ -1,6 +1,7 @@
 """Ask a solver what the command line says, with a bar that shows how far it is."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,7 +42,7 @@ def ask(contestant: Contestant, question: Question) -> Report:
     try:
         with progress() as bar:
             shown = bar.add_task("", total=None)
-            return _report(
+            report = _report(
                 contestant,
                 question,
                 lambda task, done, of: bar.update(
@@ -49,7 +50,8 @@ def ask(contestant: Contestant, question: Question) -> Report:
                 ),
             )
     finally:
-        contestant.close()
+        contestant.close()  # its remarks are complete then
+    return replace(report, remarks=(*report.remarks, *contestant.remarks))
 
 
 def _report(
@@ -64,5 +66,4 @@ def _report(
     cases = DISCIPLINES[one.task].cases(greeting, one.method, one.seed, one.thorough)
     wanted = saved.cases_of(one, cases)
     judged = judge_cases(contestant, one.task, one.method, wanted, notify)
-    contestant.close()  # remarks are complete then
-    return Report(greeting, [judged], one.seed, contestant.remarks)
+    return Report(greeting, [judged], one.seed)

@@ -7,6 +7,7 @@ as Java, JavaScript, compiled Python and every program under a sanitizer do.
 """
 
 import contextlib
+import fcntl
 import os
 import resource
 import selectors
@@ -72,6 +73,14 @@ class Limits(NamedTuple):
 LIMITS = Limits()
 
 
+class _Look(NamedTuple):
+    """What a program was seen to do: at a time, the processors' time used, and if it runs [s]."""
+
+    time: float
+    used: float
+    runs: bool
+
+
 class LostError(Exception):
     """A program is of no more use; the failure says why."""
 
@@ -102,6 +111,7 @@ class LineProcess:
         self._searched = 0
         self._stderr = bytearray()
         self._refuses_input = False
+        self._looks: list[_Look] = []
         self._selector = selectors.DefaultSelector()
         for pipe in (self._process.stdout, self._process.stderr):
             self._selector.register(pipe, selectors.EVENT_READ)
@@ -128,16 +138,15 @@ class LineProcess:
             LostError: if none comes in time, the program ended, or takes too much.
         """
         start = looked = time.monotonic()
-        used = None
+        self._looks.clear()
         while (line := self._next_line()) is None:
             now = time.monotonic()
-            if now - looked >= TICK:
-                looked = now
-                seconds_used = self._look()
-                used = used or (now, seconds_used)
             limit = min(seconds, SHUT) if self._refuses_input else seconds
+            if now - looked >= TICK or now - start >= limit:
+                looked = now
+                self._look()
             if now - start >= limit:
-                raise self._late(patience, *(used or (now, 0.0)))
+                raise self._late(patience)
             self._exchange(max(min(TICK, start + limit - now), 0.0))
         return line
 
@@ -240,8 +249,8 @@ class LineProcess:
         with contextlib.suppress(KeyError):
             self._selector.unregister(pipe)
 
-    def _look(self) -> float:
-        """Return the processors' time that it has used; raise if it ended or is too large."""
+    def _look(self) -> None:
+        """Raise if it ended or is too large; note what it does."""
         if self._has_ended():  # while something else holds its pipes
             before = len(self._received)
             self._exchange(0.0)
@@ -255,7 +264,15 @@ class LineProcess:
                     "It took more than {limit:.3g} GB of memory.", limit=self._limits.memory / 1e9
                 ),
             )
-        return sum(one.seconds for one in members)
+        used = sum(one.seconds for one in members)
+        self._looks.append(_Look(time.monotonic(), used, any(one.runs for one in members)))
+
+    def _computes(self) -> bool:
+        """Return whether it computed rather than waited, most times when it was looked at."""
+        first, *_, last = (self._looks[0], *self._looks)
+        if last.used - first.used > IDLE * (last.time - first.time):
+            return True
+        return 2 * sum(one.runs for one in self._looks) > len(self._looks)
 
     def _has_ended(self) -> bool:
         """Return whether the program ended, leaving its number its own where that can be had."""
@@ -284,7 +301,7 @@ class LineProcess:
             what = sentence("It ended instead of answering: {how}.", how=self._how())
         return LostError(FailureKind.CRASHED, self._with_stderr(what))
 
-    def _late(self, patience: float, since: float, used: float) -> LostError:
+    def _late(self, patience: float) -> LostError:
         """Return why nothing came in time."""
         if self._refuses_input:
             what = sentence("It closed its standard input before it had read the request.")
@@ -301,7 +318,7 @@ class LineProcess:
                 count=self._sent,
                 seconds=patience,
             )
-        elif self._computes(since, used):
+        elif self._computes():
             what = sentence("It computed for {seconds:g} s without an answer.", seconds=patience)
         else:
             what = sentence(
@@ -310,10 +327,6 @@ class LineProcess:
                 seconds=patience,
             )
         return LostError(FailureKind.HUNG, self._with_stderr(what))
-
-    def _computes(self, since: float, used: float) -> bool:
-        now = sum(one.seconds for one in family(self._process.pid))
-        return now - used >= IDLE * (time.monotonic() - since)
 
     def _how(self) -> Sentence:
         code = self._process.returncode
@@ -358,6 +371,9 @@ def _start(command: Sequence[str], folder: Path | None, marker: str) -> Any:
         raise LostError(FailureKind.CRASHED, _not_started(command[0], error)) from None
     for pipe in (process.stdin, process.stdout, process.stderr):
         os.set_blocking(pipe.fileno(), False)
+        if hasattr(fcntl, "F_SETPIPE_SZ"):  # fewer changes of context for large messages
+            with contextlib.suppress(OSError):
+                fcntl.fcntl(pipe.fileno(), fcntl.F_SETPIPE_SZ, _CHUNK)
     if hasattr(resource, "prlimit"):
         with contextlib.suppress(OSError):  # it has ended already
             resource.prlimit(process.pid, resource.RLIMIT_CORE, (0, 0))

@@ -29,6 +29,7 @@ class Process(NamedTuple):
     Attributes:
         memory: what it holds of the machine's memory [B].
         seconds: of a processor that it has used [s].
+        runs: whether it is on a processor, or waits for one.
     """
 
     pid: int
@@ -37,6 +38,7 @@ class Process(NamedTuple):
     session: int
     memory: int
     seconds: float
+    runs: bool
 
 
 def family(leader: int, marker: str = "") -> list[Process]:
@@ -110,7 +112,9 @@ def _running_by_proc() -> Iterator[Process]:
                     parent, group, session = map(int, words[1:4])
                     seconds = (int(words[11]) + int(words[12])) / _TICKS
                     memory = int(words[21]) * _PAGE
-                    yield Process(int(name), parent, group, session, memory, seconds)
+                    yield Process(
+                        int(name), parent, group, session, memory, seconds, words[0] == b"R"
+                    )
 
 
 def _running_by_ps() -> Iterator[Process]:
@@ -120,7 +124,8 @@ def _running_by_ps() -> Iterator[Process]:
         *numbers, used, state = line.split()
         if not state.startswith("Z"):
             pid, parent, group, kilobytes = map(int, numbers)
-            yield Process(pid, parent, group, group, kilobytes * 1024, _seconds(used))
+            used_seconds, runs = _seconds(used), state.startswith("R")
+            yield Process(pid, parent, group, group, kilobytes * 1024, used_seconds, runs)
 
 
 def _seconds(used: str) -> float:

@@ -100,6 +100,18 @@ def test_what_has_ended_is_in_no_family(source):
     process.wait()
 
 
+@pytest.mark.parametrize("columns", ["40", None])
+def test_what_runs_is_seen(tmp_path, monkeypatch, columns):
+    """Otherwise no test would see what is left running."""
+    if columns:
+        monkeypatch.setenv("COLUMNS", columns)
+    contestant = program(tmp_path, "pass")
+    contestant.answer(case(2))
+    assert len(running(tmp_path, 0.0)) == 1
+    contestant.close()
+    assert not running(tmp_path)
+
+
 @pytest.mark.parametrize(
     "end", ["os._exit(0)", "os.kill(os.getpid(), 9)", "os.kill(os.getpid(), 15)"]
 )
@@ -126,7 +138,7 @@ def test_each_contestant_has_one_guard_and_it_leaves(tmp_path):
     pid = contestant._process._process.pid
 
     def guards():
-        listed = subprocess.run(["ps", "-A", "-o", "args="], capture_output=True, check=True)
+        listed = subprocess.run(["ps", "-A", "-ww", "-o", "args="], capture_output=True, check=True)
         return listed.stdout.splitlines().count(
             f'/bin/sh -c read line || kill -KILL "-$1" sh {pid}'.encode()
         )
