@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from bench.verify import json_file
+from crosscheck.conformance import catalogue
+from crosscheck.conformance.language import translator
 from reference import Skeleton, forward_kinematics, rotation
 
 README = Path(__file__).parents[1] / "README.md"
@@ -112,6 +114,19 @@ def test_every_option_of_verify_that_a_page_shows_exists():
         shown = {option for line in lines for option in re.findall(r" (--[a-z-]+)", line)}
         assert shown - {"--flag"} <= known, page
         assert len(shown) >= 3, page
+
+
+FAULT = (
+    "Your CCD multiplies the world rotation d onto the local one on the left, Q := d Q: the "
+    "parent's inverse is missing. Use Q := conj(R_parent) d R_parent Q."
+)
+
+
+@pytest.mark.parametrize(("page", "language"), [(README, "en"), (CHINESE, "zh")])
+def test_the_screen_that_a_page_shows_says_what_verify_says(page, language):
+    assert FAULT in catalogue.templates()
+    text = re.sub(r"\s+", "", page.read_text(encoding="utf-8"))
+    assert re.sub(r"\s+", "", translator(language)(FAULT)) in text
 
 
 def test_the_page_of_verify_describes_every_key_and_option():

@@ -62,7 +62,6 @@ def laws(
 
     @pytest.mark.parametrize(("task", "method", "case"), parameters)
     def test_law(task: str, method: str, case: str) -> None:
-        __tracebackhide__ = True
         _check(judged(task, method), case)
 
     return test_law
@@ -70,7 +69,6 @@ def laws(
 
 def _check(report: TaskReport, name: str) -> None:
     """Fail if a case is not right; skip it if nobody can tell."""
-    __tracebackhide__ = True
     found = {one.case.name: one for one in report.judgements}
     if name not in found:
         pytest.fail(
