@@ -82,8 +82,9 @@ class Solver:
         """Return the fields of an answer."""
         if request.task == GREETING:
             return self.greeting
-        method = request.inputs.get("method", "")
-        function = self.functions.get(method) or self.functions.get(request.task)
+        function = self.functions.get(request.task)
+        if request.task == INVERSE_KINEMATICS:
+            function = self.functions.get(request.inputs.get("method", ""), function)
         if function is None:
             return {"error": f"there is no function {request.task}"}
         return _fields(call(function, TASKS[request.task], request.inputs))

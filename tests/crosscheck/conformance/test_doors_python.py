@@ -176,6 +176,15 @@ def test_methods_of_inverse_kinematics_are_found(inside, text, methods):
         assert contestant.answer(inverse(method)).values["positions"][0, 0] == value
 
 
+def test_a_method_is_no_answer_to_another_task(inside):
+    contestant = inside(
+        "def ccd(target): 1 / 0\ndef track(offsets): return {'positions': offsets[None]}"
+    )
+    assert contestant.greeting.tasks == ("inverse_kinematics", "track")
+    asked = Case("a", "track", inverse("ccd").inputs, "", sentence("a"))
+    assert contestant.answer(asked).values["positions"].shape == (1, 2, 3)
+
+
 def test_what_a_file_says_of_itself_is_its_greeting(inside):
     contestant = inside(
         "PLUMBOB = {'name': 'mine', 'precision': 'single', 'step': {'substeps': 3}}\n"

@@ -147,6 +147,7 @@ HOSTILE = {
         "no answer",
     ),
     "stops itself": ("os.kill(os.getpid(), signal.SIGSTOP)", "hung", "no answer"),
+    "floods standard error": ("while True: os.write(2, b'e' * 65536)", "hung", " 0.5 s"),
     "fills standard error": (
         "for _ in range(20): os.write(2, b'e' * 65536)\nsys.exit(5)",
         "crashed",
@@ -391,6 +392,14 @@ def test_a_program_that_dies_kills_nobody_by_a_broken_pipe(tmp_path):
         assert contestant.answer(case(3)).kind is FailureKind.CRASHED
     finally:
         signal.signal(signal.SIGPIPE, default)
+
+
+def test_an_answer_too_many_is_told_at_the_next_case(tmp_path):
+    contestant = program(tmp_path, "right(request); right(request)")
+    assert isinstance(contestant.answer(case(3)), Answer)
+    assert "answered request 2 with the id 1" in str(contestant.answer(case(2)).sentence)
+    assert isinstance(contestant.answer(case(2)), Answer)
+    contestant.close()
 
 
 def test_the_rest_of_the_cases_goes_on(tmp_path, monkeypatch):
