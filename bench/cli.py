@@ -14,6 +14,7 @@ from . import compile_notice
 from .experiments import SUITES
 from .harness.progress import listening
 from .presentation.text import visible
+from .verify import command as verify_command
 
 if TYPE_CHECKING:
     from .presentation.tables import Table
@@ -87,6 +88,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
     invoke_without_command=True,
     epilog=_block(
         "Examples",
+        "plumbob verify my_solver.py    is your solver right, and if not, why?",
         "plumbob                        the main job",
         "plumbob check                  is the reference right?",
         "plumbob bench ik cloth         measure two suites at full length",
@@ -120,6 +122,11 @@ def plumbob(
             raise ValueError(f"write options behind the command: {context.invoked_subcommand}")
         return SUCCESS
     return main_job(output or REPORT, fresh)
+
+
+app.command(cls=verify_command.SolverCommand, epilog=_block("Examples", *verify_command.EXAMPLES))(
+    verify_command.verify
+)
 
 
 @app.command(

@@ -20,7 +20,10 @@ _TYPES: Mapping[str, type] = {"number": np.float64, "integer": np.int64, "boolea
 
 
 class FunctionContestant:
-    """Functions by the names of the tasks, called in this process: ours, an engine's, a fault's."""
+    """Functions called in this process: ours, an engine's, a fault's.
+
+    Each has the name of a task, or of a method of inverse kinematics.
+    """
 
     remarks: tuple[Sentence, ...] = ()
 
@@ -34,8 +37,9 @@ class FunctionContestant:
         return self._greeting
 
     def answer(self, case: Case) -> Answer | Failure:
-        """Call the function of the case's task."""
-        return call(self._functions[case.task], TASKS[case.task], case.inputs)
+        """Call the function of the case's method if there is one, else that of its task."""
+        method = self._functions.get(case.inputs.get("method", ""))
+        return call(method or self._functions[case.task], TASKS[case.task], case.inputs)
 
     def close(self) -> None:
         """Do nothing: there is no process."""

@@ -56,11 +56,21 @@ def verify(
     greeting = contestant.greeting
     reports = []
     for task, method in trials(greeting, tasks):
-        discipline = DISCIPLINES[task]
-        cases = discipline.cases(greeting, method, seed, thorough)
-        asked = list(_ask(contestant, cases, partial(notify, task)))
-        reports.append(discipline.judge(asked, greeting, method))
+        cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
+        reports.append(judge_cases(contestant, task, method, cases, notify))
     return Report(greeting, reports, seed)
+
+
+def judge_cases(
+    contestant: Contestant,
+    task: str,
+    method: str,
+    cases: Sequence[Case],
+    notify: Callable[[str, int, int], None] = lambda task, done, of: None,
+) -> TaskReport:
+    """Ask a solver some cases of a task and judge its answers; arguments as of `verify`."""
+    asked = list(_ask(contestant, cases, partial(notify, task)))
+    return DISCIPLINES[task].judge(asked, contestant.greeting, method)
 
 
 def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple[str, str]]:

@@ -78,6 +78,8 @@ def export_cases(
         for task, method in trials(greeting, tasks)
         for case in DISCIPLINES[task].cases(greeting, method, seed, thorough)
     ]
+    if tasks:  # no other is judged then
+        greeting = msgspec.structs.replace(greeting, tasks=tuple(tasks))
     write_cases(folder, cases, greeting, seed, thorough)
     return len(cases)
 
