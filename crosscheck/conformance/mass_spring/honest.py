@@ -165,8 +165,9 @@ def declared(option: Option, step: Step) -> bool:
             return wanted is None or wanted == fields["damper"]
         case "pins":
             return step.pins is None or fields["pins"] in _pins_of(step.pins)
-        case "velocity":
-            return step.velocity is None or step.velocity == fields["velocity"]
+        case "velocity":  # explicit methods have no other velocity than their own
+            own = step.method in ("explicit", "symplectic") and fields["velocity"] == "separate"
+            return own or step.velocity in (None, fields["velocity"])
         case "scaling":
             return _declared_scaling(fields["scaling"], step)
     return False
@@ -215,7 +216,8 @@ def domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
 
 def compatible(chosen: dict[str, Option]) -> bool:
     """Return whether choices make sense together, as far as they are made."""
-    how = chosen["integrator"].fields["integrator"] if "integrator" in chosen else None
+    option = chosen.get("integrator", chosen.get("class"))
+    how = option.fields["integrator"] if option else None
     substeps = chosen["substeps"].fields["substeps"] if "substeps" in chosen else None
     if how is not None:
         explicit = how.method in EXPLICIT_METHODS
@@ -228,12 +230,26 @@ def compatible(chosen: dict[str, Option]) -> bool:
             return False
         if damper and damper not in (EXPLICIT_DAMPERS if explicit else IMPLICIT_DAMPERS):
             return False
-        if substeps and substeps > (1000 if explicit else 20):
+        if substeps and not _countable(chosen, how.method, substeps):
+            return False
+        if explicit and chosen.get("velocity", _NONE).key == "velocity displacement":
             return False
     several = chosen.get("pins", _NONE).fields.get("pins") == "at_the_end"
     several |= chosen.get("time", _NONE).fields.get("time") == "undivided"
     several |= chosen.get("velocity", _NONE).fields.get("velocity") == "over the whole h"
     return not (several and substeps == 1)
+
+
+def _countable(chosen: dict[str, Option], method: str, substeps: int) -> bool:
+    """Return whether so many substeps are worth their time."""
+    if method not in ("explicit", "symplectic"):
+        return substeps <= (30 if method in EXPLICIT_METHODS else 20)
+    plain = all(not chosen.get(one, _NONE).key for one in ("time", "inertia")) and chosen.get(
+        "velocity", _NONE
+    ).key in ("", "velocity separate")
+    return substeps <= 30 or (
+        plain and chosen.get("scaling", _NONE).fields.get("scaling", 1.0) == 1.0
+    )
 
 
 _NONE = Option("", "", sentence(""))

@@ -152,6 +152,8 @@ class Start(NamedTuple):
 def simulate(p: Problem, model: Model) -> dict[str, FloatArray]:
     """Return positions and velocities after the step, or after each of several."""
     p = _with_pins(p, model)
+    if model.integrator.explicit and model.damper == "none":
+        p = p.changed(dampings=np.zeros_like(p.dampings))
     x, v, frames_of = p.positions, p.velocities, []
     for _ in range(p.steps or 1):
         x, v = _step(p, model, x, v)
@@ -219,7 +221,6 @@ def substep(start: Start) -> tuple[FloatArray, FloatArray]:
 def _explicit_rates(start: Start, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return accelerations with the damper that the model has, zero at the pins."""
     p, model = start.p, start.model
-    p = p.changed(dampings=np.zeros_like(p.dampings)) if model.damper == "none" else p
     a = accelerations(p, x, v)
     kind = model.pins.split()[0]
     if kind in ("penalty", "springs"):
@@ -566,9 +567,3 @@ _METHODS: Mapping[str, Callable[[Equation, FloatArray, Integrator], FloatArray]]
     "descent": _descent,
     "converged": _converged,
 }
-
-
-def evaluation(p: Problem, model: Model) -> Mapping[str, Any]:
-    """Return `simulate`, or nothing where the model leaves the finite numbers."""
-    with np.errstate(all="ignore"):
-        return simulate(p, model)

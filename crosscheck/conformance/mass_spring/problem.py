@@ -77,6 +77,16 @@ class Problem:
         return rows
 
     @cached_property
+    def stiff(self) -> bool:
+        """Whether any spring has a stiffness."""
+        return bool(self.stiffnesses.any())
+
+    @cached_property
+    def damped(self) -> bool:
+        """Whether any spring has a damper."""
+        return bool(self.dampings.any())
+
+    @cached_property
     def constant(self) -> FloatArray:
         """Gravity and external forces [N], shape (particle, 3)."""
         weights = self.masses[:, None] * self.gravity if self.weights is None else self.weights
@@ -174,7 +184,11 @@ def all_forces(p: Problem) -> FloatArray:
 
 def accelerations(p: Problem, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return M^-1 f, pins included, shape (particle, 3) [m/s^2]."""
-    total = p.constant + spring_forces(p, x) + damper_forces(p, x, v)
+    total = p.constant
+    if p.stiff:
+        total = total + spring_forces(p, x)
+    if p.damped:
+        total = total + damper_forces(p, x, v)
     return total / p.masses[:, None]
 
 
