@@ -8,6 +8,7 @@ from .case import Case
 from .contestant import Asked, Contestant, Failure, FailureKind
 from .greeting import Greeting
 from .judgement import Report, TaskReport
+from .mass_spring import energy, forces, motion, step
 
 # After so many answers of a task were waited for in vain, the rest of the task is not asked.
 MOST_HANGS = 2
@@ -25,7 +26,12 @@ class Discipline(Protocol):
         """Hold the answers against laws, the reference, and what was declared; name the faults."""
 
 
-DISCIPLINES: Mapping[str, Discipline] = {}
+DISCIPLINES: Mapping[str, Discipline] = {
+    "mass_spring_forces": forces,
+    "energy": energy,
+    "mass_spring_step": step,
+    "mass_spring_motion": motion,
+}
 
 
 def verify(

@@ -20,8 +20,10 @@ from .problem import Problem
 from .rounding import SOLVED, apart, rounding
 
 MOST_FAULTS = 3
-# Seconds after which no further faults are combined; what was begun is finished.
-PATIENCE = 8.0
+# Seconds of the processor after which no further faults are combined; what was begun is finished.
+PATIENCE = 6.0
+# Integrators with more iterations are not combined with faults.
+MOST_ITERATIONS = 10
 # Aspects that matter in any step; the others where there are springs, dampers, pins.
 ALWAYS = (
     "time", "inertia", "masses", "gravity", "integrator", "matrix", "substeps", "velocity",
@@ -68,7 +70,8 @@ class Search:
         self.tried = 0
         self._known: dict[tuple[Any, ...], bool | None] = {}
         self.farthest = -1
-        self._until = time.perf_counter() + PATIENCE
+        self._seen: set[tuple[str, ...]] = set()
+        self._until = time.process_time() + PATIENCE
 
     def run(self) -> list[Found]:
         """Return what explains all probes with the fewest faults; none if nothing does."""
@@ -77,8 +80,8 @@ class Search:
         for budget in range(MOST_FAULTS + 1):
             found = [one for one in self._extend({}, 0, budget) if len(one.faults) == budget]
             if found:
-                return _distinct(found)
-            if time.perf_counter() > self._until:
+                return found
+            if time.process_time() > self._until:
                 break
         return []
 
@@ -86,20 +89,30 @@ class Search:
         """Yield what explains the probes from this one on, given the choices made before."""
         if index == len(self.probes):
             if self._explains_most(chosen):
-                yield self._found(chosen)
+                found = self._found(chosen)
+                self._seen.add(_keys(found))
+                yield found
             return
         probe = self.probes[index]
         known = {*chosen, "integrator"} if "class" in chosen else chosen
         new = [one for one in _relevant(probe.problem) if one not in known]
         springs = _has_springs(probe.problem)
         for more in self._choices(chosen, new, budget, springs):
-            if time.perf_counter() > self._until and budget > 1:
+            if self._told(more):
+                continue
+            if time.process_time() > self._until and budget > 1:
                 return
             explained = self._explains(more, index)
             if explained:
                 self.farthest = max(self.farthest, index)
             if explained or explained is None:
                 yield from self._extend(more, index + 1, budget)
+
+    def _told(self, chosen: Chosen) -> bool:
+        """Return whether the same faults explain all probes with other honest choices already."""
+        if not self._seen or "class" in chosen:
+            return False
+        return _keys(self._found(chosen)) in self._seen
 
     def _explains_most(self, chosen: Chosen) -> bool:
         """Return whether no more than a few answers are left out because of singular matrices."""
@@ -128,7 +141,7 @@ class Search:
         else:
             options = self.domains[aspect]
         for option, cost in options:
-            if cost <= left:
+            if cost <= left and not (cost and budget > 1 and _tedious(option)):
                 yield from self._choices(chosen | {aspect: option}, others, budget, springs)
 
     def _cost(self, chosen: Chosen) -> int:
@@ -176,6 +189,12 @@ class Search:
             one for one in options if self.costs[one.aspect, one.key, _how(one)]
         )
         return Found(options, faults)
+
+
+def _tedious(option: Option) -> bool:
+    """Return whether an integrator takes too long to be tried together with other faults."""
+    how = _how(option)
+    return how is not None and (how.method == "descent" or how.iterations > MOST_ITERATIONS)
 
 
 def _classes(
@@ -226,12 +245,8 @@ def _relevant(p: Problem) -> list[str]:
     return [*ALWAYS, *springs, *dampers, *pins]
 
 
-def _distinct(found: Sequence[Found]) -> list[Found]:
-    """Return the first of those with the same faults."""
-    first: dict[tuple[str, ...], Found] = {}
-    for one in found:
-        first.setdefault(tuple(fault.key for fault in one.faults), one)
-    return list(first.values())
+def _keys(found: Found) -> tuple[str, ...]:
+    return tuple(fault.key for fault in found.faults)
 
 
 def probes_of(asked: Sequence[Asked], problems: Mapping[str, Problem]) -> list[Probe]:
