@@ -9,6 +9,7 @@ from .contestant import Asked, Contestant, Failure, FailureKind
 from .greeting import Greeting
 from .judgement import Report, TaskReport
 from .kinematics import forward_kinematics, inverse_kinematics, resample, track
+from .mass_spring import energy, forces, motion, step
 
 # After so many answers of a task were waited for in vain, the rest of the task is not asked.
 MOST_HANGS = 2
@@ -31,6 +32,10 @@ DISCIPLINES: Mapping[str, Discipline] = {
     "inverse_kinematics": inverse_kinematics,
     "track": track,
     "resample": resample,
+    "mass_spring_forces": forces,
+    "energy": energy,
+    "mass_spring_step": step,
+    "mass_spring_motion": motion,
 }
 
 
