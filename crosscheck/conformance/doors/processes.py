@@ -62,24 +62,21 @@ def family(leader: int, marker: str = "") -> list[Process]:
     return [running[pid] for pid in sorted(found - {os.getpid()})]
 
 
-def end_group(leader: int, marker: str = "") -> int:
-    """Kill a program and all that it has started; return how many processes there were.
+def end_group(leader: int, marker: str = "") -> None:
+    """Kill a program and all that it has started.
 
     The leader must not have been waited for, so that its number is still its own.
     """
-    killed = set[int]()
-    for _ in range(ROUNDS):
-        members = [one.pid for one in family(leader, marker)]
-        if not members:
-            break
+    for again in range(ROUNDS):
+        members = family(leader, marker)
         with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(leader, signal.SIGKILL)  # at once, for those that fork and end
-        for pid in members:
+            os.killpg(leader, signal.SIGKILL)  # at once, for those that fork while they are listed
+        if again and not members:
+            break
+        for one in members:
             with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.kill(pid, signal.SIGKILL)
-        killed.update(members)
+                os.kill(one.pid, signal.SIGKILL)
         time.sleep(PAUSE)
-    return len(killed)
 
 
 def guard(leader: int) -> subprocess.Popen[bytes]:
