@@ -232,7 +232,8 @@ def compatible(chosen: dict[str, Option]) -> bool:
             return False
         if substeps and not _countable(chosen, how.method, substeps):
             return False
-        if explicit and chosen.get("velocity", _NONE).key == "velocity displacement":
+        own = explicit and how.method not in ("symplectic", "in_place")
+        if own and chosen.get("velocity", _NONE).key == "velocity displacement":
             return False
     several = chosen.get("pins", _NONE).fields.get("pins") == "at_the_end"
     several |= chosen.get("time", _NONE).fields.get("time") == "undivided"

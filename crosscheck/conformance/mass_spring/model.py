@@ -418,8 +418,9 @@ class Equation:
         if model.time == "before":
             h = p.h_before / model.substeps
         factor = how.sign * h**how.power
-        cells = np.kron(np.eye(p.count), np.ones((size, size)))
-        springs = np.where(cells, springs, how.beside * springs) if how.beside != 1.0 else springs
+        if how.beside != 1.0:
+            cells = np.kron(np.eye(p.count), np.ones((size, size)))
+            springs = np.where(cells, springs, how.beside * springs)
         masses = np.repeat(p.masses, size) * (2.0 if model.matrix == "2M + h²L" else 1.0)
         if model.matrix == "2M + h²L":
             factor = h**how.power

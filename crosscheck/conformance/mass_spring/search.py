@@ -161,13 +161,34 @@ class Search:
         probe = self.probes[index]
         matters = chosen
         if not _has_springs(probe.problem):
-            if chosen["matrix"].key.startswith("matrix without k"):
-                return None  # such a matrix joins particles even where there is no stiffness
             matters = _in_flight_only(chosen)
+            if chosen["matrix"].key.startswith("matrix without k"):
+                return self._centre_explained(matters, index)
         key = (index, *sorted((aspect, id(option)) for aspect, option in matters.items()))
         if key not in self._known:
             self.tried += 1
             self._known[key] = self._compare(tuple(matters.values()), probe)
+        return self._known[key]
+
+    def _centre_explained(self, chosen: Chosen, index: int) -> bool | None:
+        """Return False where the centre of mass is elsewhere, else None.
+
+        A matrix without stiffness joins particles even where their spring has none, differently
+        for each integrator, but leaves their centre where it is.
+        """
+        key = (-1 - index, *sorted((aspect, id(option)) for aspect, option in chosen.items()))
+        if key not in self._known:
+            probe = self.probes[index]
+            problem, model = apply(tuple(chosen.values()), probe.problem, Model(damper="none"))
+            with np.errstate(all="ignore"):
+                predicted = simulate(problem, model)
+            share = problem.masses / problem.masses.sum()
+            centre = {"positions": share @ predicted["positions"], "velocities": np.zeros(0)}
+            answered = {"positions": share @ probe.answered["positions"]}
+            allowed = rounding(probe.problem, model, self.epsilon)
+            whole = probe.problem.changed(positions=share @ probe.problem.positions)
+            close = apart(whole, centre, answered, allowed) <= SOLVED
+            self._known[key] = None if close else False
         return self._known[key]
 
     def _compare(self, options: tuple[Option, ...], probe: Probe) -> bool | None:
