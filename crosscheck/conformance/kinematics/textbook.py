@@ -28,7 +28,7 @@ from reference.quaternion import (
     store_quaternion,
     store_vector,
     subtract,
-    turn_about,
+    rotation_about,
 )
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -344,7 +344,7 @@ def damped(d: Any, fault: int, damping: Damping) -> Any:
     angle = norm(v)
     if angle == 0.0:
         return d
-    return turn_about(scale(1.0 / angle, v), min(factor * angle, damping.most))
+    return rotation_about(scale(1.0 / angle, v), min(factor * angle, damping.most))
 
 
 def apply_rotation(

@@ -517,9 +517,12 @@ INTEGRATORS = (
     *_shortened(),
     *_descents(),
     Option(
-        "moved in place", "integrator",
-        sentence("Particles are moved one after another while forces are still summed, so that "
-                 "later ones see new positions. Compute all forces first."),
+        "moved in place",
+        "integrator",
+        sentence(
+            "Particles are moved one after another while forces are still summed, so that "
+            "later ones see new positions. Compute all forces first."
+        ),
         fields={"integrator": Integrator("in_place")},
     ),
 )

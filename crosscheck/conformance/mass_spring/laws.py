@@ -61,7 +61,9 @@ def pins(one: Context) -> Finding | None:
     tolerance = one.allowed.positions
     held = one.model.pins in ("eliminated", "overwritten")
     if not held and one.expected:
-        tolerance += 2.0 * float(np.abs(one.expected["positions"] - p.positions)[..., p.pinned, :].max())
+        tolerance += 2.0 * float(
+            np.abs(one.expected["positions"] - p.positions)[..., p.pinned, :].max()
+        )
     right = Verdict.RIGHT if held or not one.known else Verdict.RIGHT_BUT
     said = sentence("A pinned particle moves by {error:.2g} m.", error=worst)
     where = int(p.pinned[moved.argmax()])
@@ -244,9 +246,7 @@ def _gap(one: Any, other: Any) -> float:
     return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
 
 
-def symmetry(
-    asked: Asked, base: Answer, allowed: Mapping[str, float]
-) -> Finding | None:
+def symmetry(asked: Asked, base: Answer, allowed: Mapping[str, float]) -> Finding | None:
     """Return how far the answer is from the transformed answer to the untransformed case."""
     facts = asked.case.facts
     assert isinstance(asked.answer, Answer)

@@ -6,7 +6,7 @@ NumPy, for up to some thirty particles, and independent of the solvers of `refer
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -187,9 +187,7 @@ def _with_pins(p: Problem, model: Model) -> Problem:
     return p
 
 
-def _step(
-    p: Problem, model: Model, x: FloatArray, v: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _step(p: Problem, model: Model, x: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
     whole = p.h if isinstance(model.time, str) else model.time
     h = whole if model.time == "undivided" else whole / model.substeps
     pins = x[p.pinned]

@@ -206,9 +206,7 @@ class Search:
             option = self.members[chosen["class"].fields["integrator"]][0]
             chosen = {**chosen, "integrator": option}
         options = tuple(chosen[one] for one in ASPECTS if one in chosen)
-        faults = tuple(
-            one for one in options if self.costs[one.aspect, one.key, _how(one)]
-        )
+        faults = tuple(one for one in options if self.costs[one.aspect, one.key, _how(one)])
         return Found(options, faults)
 
 
@@ -225,9 +223,7 @@ def _classes(
     members: dict[Integrator, list[Option]] = {}
     for option, _ in integrators:
         members.setdefault(in_flight(option.fields["integrator"]), []).append(option)
-    return [
-        one[0]._replace(fields={"integrator": how}) for how, one in members.items()
-    ], members
+    return [one[0]._replace(fields={"integrator": how}) for how, one in members.items()], members
 
 
 def _in_flight_only(chosen: Chosen) -> Chosen:

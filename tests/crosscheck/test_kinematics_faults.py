@@ -1,4 +1,4 @@
-"""The claims about skeletons go red under the slips that real solutions make."""
+"""The claims about skeletons go red under the faults that real solutions make."""
 
 from functools import partial
 
@@ -18,33 +18,33 @@ from reference.skeleton import Pose, Skeleton
 FEW = 2
 
 
-def slipped_forward(skeleton, local, *, slip):
+def faulty_forward(skeleton, local, *, fault):
     positions, rotations = np.empty((*local.shape[:-1], 3)), np.empty(local.shape)
-    unturned = rotation.identity(*local.shape[:-2])
+    unrotated = rotation.identity(*local.shape[:-2])
     for j, (parent, offset) in enumerate(zip(skeleton.parents, skeleton.offsets, strict=True)):
-        Q = np.roll(local[..., j, :], -1, axis=-1) if slip == "xyzw" else local[..., j, :]
-        R, x = (rotations[..., parent, :], positions[..., parent, :]) if j else (unturned, 0.0)
-        swapped = slip == "wrong order"
+        Q = np.roll(local[..., j, :], -1, axis=-1) if fault == "xyzw" else local[..., j, :]
+        R, x = (rotations[..., parent, :], positions[..., parent, :]) if j else (unrotated, 0.0)
+        swapped = fault == "wrong order"
         rotations[..., j, :] = rotation.multiply(*((Q, R) if swapped else (R, Q)))
-        frame = {"child's rotation": rotations[..., j, :], "no rotation": unturned}.get(slip, R)
-        at_origin = slip == "root at the origin" and parent < 0
+        frame = {"child's rotation": rotations[..., j, :], "no rotation": unrotated}.get(fault, R)
+        at_origin = fault == "root at the origin" and parent < 0
         positions[..., j, :] = 0.0 if at_origin else x + rotation.rotate(frame, offset)
     return Pose(positions, rotations)
 
 
-def slipped_local(skeleton, rotations, *, slip):
+def faulty_local(skeleton, rotations, *, fault):
     local = np.array(rotations)
     for j in range(1, skeleton.joint_count):
         R_parent, R = rotations[..., skeleton.parents[j], :], rotations[..., j, :]
         inverse = rotation.conjugate(R_parent)
         products = {"without inverse": (R_parent, R), "from the right": (R, inverse)}
-        local[..., j, :] = rotation.multiply(*products[slip])
+        local[..., j, :] = rotation.multiply(*products[fault])
     return local
 
 
-def slipped_ik(skeleton, start, target, solver, effector, *, slip, **settings):
+def faulty_ik(skeleton, start, target, solver, effector, *, fault, **settings):
     tree = skeleton
-    if slip == "another link's length":
+    if fault == "another link's length":
         offsets = np.vstack([tree.offsets[:1], 1.1 * tree.offsets[1:]])
         tree = Skeleton(tree.parents, offsets, tree.names)
     solution = solve_ik(tree, start, target, solver, effector, **settings)
@@ -58,21 +58,21 @@ def slipped_ik(skeleton, start, target, solver, effector, *, slip, **settings):
             "local_rotations": forward_kinematics(skeleton, Q).rotations,
         },
     }
-    return solution._replace(**changes.get(slip, {}))
+    return solution._replace(**changes.get(fault, {}))
 
 
-# For each claim: the name that its comparison uses, what takes its place, and the slips of that.
-SLIPS = {
+# For each claim: the name that its comparison uses, what takes its place, and the faults of that.
+FAULTS = {
     "joint positions": (
         "forward_kinematics",
-        slipped_forward,
+        faulty_forward,
         ["xyzw", "wrong order", "child's rotation", "no rotation", "root at the origin"],
     ),
-    "joint rotations": ("forward_kinematics", slipped_forward, ["xyzw", "wrong order"]),
-    "local rotations": ("local_from_global", slipped_local, ["without inverse", "from the right"]),
+    "joint rotations": ("forward_kinematics", faulty_forward, ["xyzw", "wrong order"]),
+    "local rotations": ("local_from_global", faulty_local, ["without inverse", "from the right"]),
     "IK answers": (
         "solve_ik",
-        slipped_ik,
+        faulty_ik,
         [
             "success claimed",
             "residual in centimetres",
@@ -87,22 +87,23 @@ SLIPS = {
 
 @pytest.mark.parametrize("engine", SKELETON_ENGINES)
 @pytest.mark.parametrize(
-    ("quantity", "slip"), [(quantity, slip) for quantity in SLIPS for slip in SLIPS[quantity][2]]
+    ("quantity", "fault"),
+    [(quantity, fault) for quantity in FAULTS for fault in FAULTS[quantity][2]],
 )
-def test_claim_goes_red_under_the_slip(monkeypatch, engine, quantity, slip):
-    name, slipped, _ = SLIPS[quantity]
-    monkeypatch.setattr(kinematics, name, partial(slipped, slip=slip))
-    assert check_claim(CLAIMS[f"{quantity}, {engine}"], FEW).missed == "they differ"
+def test_claim_goes_red_under_the_fault(monkeypatch, engine, quantity, fault):
+    name, faulty, _ = FAULTS[quantity]
+    monkeypatch.setattr(kinematics, name, partial(faulty, fault=fault))
+    assert check_claim(CLAIMS[f"{quantity}, {engine}"], FEW).failure == "they differ"
 
 
 @pytest.mark.parametrize("engine", SKELETON_ENGINES)
-def test_without_a_slip_the_copy_holds(monkeypatch, engine):
-    monkeypatch.setattr(kinematics, "forward_kinematics", partial(slipped_forward, slip=None))
-    monkeypatch.setattr(kinematics, "solve_ik", partial(slipped_ik, slip=None))
+def test_without_a_fault_the_copy_holds(monkeypatch, engine):
+    monkeypatch.setattr(kinematics, "forward_kinematics", partial(faulty_forward, fault=None))
+    monkeypatch.setattr(kinematics, "solve_ik", partial(faulty_ik, fault=None))
     for quantity in ("joint positions", "joint rotations", "IK answers"):
         assert check_claim(CLAIMS[f"{quantity}, {engine}"], FEW).holds
 
 
 @pytest.mark.parametrize("engine", SKELETON_ENGINES)
-def test_every_claim_has_a_slip(engine):
-    assert {claim.name for claim in skeleton_claims(engine)} == {f"{q}, {engine}" for q in SLIPS}
+def test_every_claim_has_a_fault(engine):
+    assert {claim.name for claim in skeleton_claims(engine)} == {f"{q}, {engine}" for q in FAULTS}

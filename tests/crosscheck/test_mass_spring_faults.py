@@ -1,4 +1,4 @@
-"""The claims about mass-spring systems go red under the slips that real solutions make."""
+"""The claims about mass-spring systems go red under the faults that real solutions make."""
 
 import dataclasses
 from functools import partial
@@ -35,8 +35,8 @@ FEW = 2
 PARTS = ["masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity"]
 PARTS += ["tension_only"]
 
-# Slips in the model or the forces: (system, state, h, external) -> (system, external).
-MODEL_SLIPS = {
+# Faults in the model or the forces: (system, state, h, external) -> (system, external).
+MODEL_FAULTS = {
     "gravity times mass twice": lambda s, state, h, f: (s, f + (s.masses - 1)[:, None] * weight(s)),
     "gravity left out": lambda s, state, h, f: (altered(s, gravity=(0, 0, 0)), f),
     "gravity without h²": lambda s, state, h, f: (altered(s, gravity=s.gravity / h**2), f),
@@ -84,77 +84,79 @@ def one_sided(system, state):
     return -pulls
 
 
-def changed(slip, system, state, h, external):
-    """The system and the external forces as the slip has them."""
+def changed(fault, system, state, h, external):
+    """The system and the external forces as the fault has them."""
     given = np.zeros_like(state.positions) if external is None else external
-    return MODEL_SLIPS.get(slip, lambda *same: (same[0], same[3]))(system, state, h, given)
+    return MODEL_FAULTS.get(fault, lambda *same: (same[0], same[3]))(system, state, h, given)
 
 
-def slipped_springs(system, positions, *, slip):
+def faulty_springs(system, positions, *, fault):
     pulls = spring_forces(system, positions)
-    if slip == "push":
+    if fault == "push":
         return -pulls
-    if slip == "twice":
+    if fault == "twice":
         return spring_forces(altered(system, stiffnesses=2 * system.stiffnesses), positions)
-    if slip == "rest lengths left out":
+    if fault == "rest lengths left out":
         return spring_forces(altered(system, rest_lengths=0.0), positions)
-    if slip == "slack springs push":
+    if fault == "slack springs push":
         return spring_forces(altered(system, tension_only=False), positions)
-    if slip == "one spring forgotten":
+    if fault == "one spring forgotten":
         k = np.where(np.arange(len(system.springs)) == 0, 0.0, system.stiffnesses)
         return spring_forces(altered(system, stiffnesses=k), positions)
     return pulls
 
 
-def slipped_dampers(system, state, *, slip):
+def faulty_dampers(system, state, *, fault):
     pulls = damper_forces(system, state)
-    if slip == "across the spring too":
+    if fault == "across the spring too":
         return all_round(system, state)
-    if slip == "pins with a velocity":
+    if fault == "pins with a velocity":
         return damper_forces(altered(system, pinned=()), state)
-    return {"push": -1.0, "twice": 2.0}.get(slip, 1.0) * pulls
+    return {"push": -1.0, "twice": 2.0}.get(fault, 1.0) * pulls
 
 
-def slipped_stiffness(system, positions, *, slip):
+def faulty_stiffness(system, positions, *, fault):
     K = stiffness_matrix(system, positions)
     blocks = spring_blocks(system, np.array(positions), geometric=False)
     along = stiffness_matrix_of(system, blocks)
-    if slip == "one spring forgotten":
+    if fault == "one spring forgotten":
         k = np.where(np.arange(len(system.springs)) == 0, 0.0, system.stiffnesses)
         return stiffness_matrix(altered(system, stiffnesses=k), positions)
     return {"geometric term dropped": along, "geometric term with the wrong sign": 2 * along - K,
             "rest lengths left out": stiffness_matrix(altered(system, rest_lengths=0.0), positions),
-            "negated": -K}.get(slip, K)  # fmt: skip
+            "negated": -K}.get(fault, K)  # fmt: skip
 
 
 def stiffness_matrix_of(system, blocks):
     return BlockSum(derivation(system).A).matrix(blocks)
 
 
-def slipped_potential(system, positions, *, slip):
+def faulty_potential(system, positions, *, fault):
     energy, springs = potential_energy(system, positions), spring_energy(system, positions)
     gravity = energy - springs
-    if slip == "pinned weights left out":
+    if fault == "pinned weights left out":
         return energy + np.sum((weight(system) * positions)[system.pinned])
-    if slip == "gravity times mass twice":
+    if fault == "gravity times mass twice":
         return springs - np.sum(system.masses[:, None] * weight(system) * positions)
-    return {"k (l - r)²": energy + springs, "gravity upwards": springs - gravity}.get(slip, energy)
+    return {"k (l - r)²": energy + springs, "gravity upwards": springs - gravity}.get(fault, energy)
 
 
-def slipped_kinetic(system, state, *, slip):
+def faulty_kinetic(system, state, *, fault):
     energy = kinetic_energy(system, state)
     pins = kinetic_energy(altered(system, pinned=()), state)
     massless = 0.5 * np.sum(state.velocities[system.free] ** 2)
-    return {"m |v|²": 2 * energy, "pins counted": pins, "mass left out": massless}.get(slip, energy)
+    return {"m |v|²": 2 * energy, "pins counted": pins, "mass left out": massless}.get(
+        fault, energy
+    )
 
 
-def slipped_symplectic(system, state, h, external, *, slip):
-    model, given = changed(slip, system, state, h, external)
+def faulty_symplectic(system, state, h, external, *, fault):
+    model, given = changed(fault, system, state, h, external)
     end = symplectic_euler(model, state, h, given)
     x, pins = end.positions.copy(), system.pinned
-    if slip == "old velocities move":
+    if fault == "old velocities move":
         x[system.free] = (state.positions + h * state.velocities)[system.free]
-    if slip == "pins fall":
+    if fault == "pins fall":
         pull = forces(system, state, external) / system.masses[:, None]
         x[pins] += h * h * pull[pins]
     return State(x, end.velocities)
@@ -165,10 +167,10 @@ def accelerations(system, state, external):
     return np.where(system.free[:, None], pull, 0.0)
 
 
-def slipped_runge_kutta(system, state, h, external, *, slip):
-    model, given = changed(slip, system, state, h, external)
-    weights = {"equal weights": np.full(4, 0.25)}.get(slip, np.array([1, 2, 2, 1]) / 6)
-    middle = {"whole steps to the middle": 1.0}.get(slip, 0.5)
+def faulty_runge_kutta(system, state, h, external, *, fault):
+    model, given = changed(fault, system, state, h, external)
+    weights = {"equal weights": np.full(4, 0.25)}.get(fault, np.array([1, 2, 2, 1]) / 6)
+    middle = {"whole steps to the middle": 1.0}.get(fault, 0.5)
 
     def rates(share, before):
         dx, dv = before
@@ -183,58 +185,58 @@ def slipped_runge_kutta(system, state, h, external, *, slip):
     return State(state.positions + h * dx, v + h * dv)
 
 
-def slipped_semi_implicit(system, state, h, external, D, *, slip):
-    model, given = changed(slip, system, state, h, external)
+def faulty_semi_implicit(system, state, h, external, D, *, fault):
+    model, given = changed(fault, system, state, h, external)
     D = {
         "nothing implicit": 0.0 * D,
         "D twice": 2.0 * D,
         "D with the wrong sign": -D,
         "the whole block": damper_blocks(system, state),
         "only the diagonal": np.eye(3) * D,
-    }.get(slip, D)
+    }.get(fault, D)
     end = semi_implicit(model, state, h, given, D)
     v = np.where(system.free[:, None], state.velocities, 0.0)
-    positions = state.positions + h * (v if slip == "old velocities move" else end.velocities)
+    positions = state.positions + h * (v if fault == "old velocities move" else end.velocities)
     return State(positions, end.velocities)
 
 
-def slipped_euler(system, *, h, slip, **settings):
-    """Stand in for ImplicitEuler, with one slip in model, settings or result."""
+def faulty_euler(system, *, h, fault, **settings):
+    """Stand in for ImplicitEuler, with one fault in model, settings or result."""
     settings |= {
         "one iteration": {"max_iterations": 1},
         "one local/global iteration": {"solver": "local_global", "max_iterations": 1},
         "the converged step": {"solver": "newton", "max_iterations": 30},
-    }.get(slip, {})
-    return _SlippedEuler(system, h, slip, settings)
+    }.get(fault, {})
+    return _SlippedEuler(system, h, fault, settings)
 
 
 @dataclasses.dataclass
 class _SlippedEuler:
     system: MassSpring
     h: float
-    slip: str | None
+    fault: str | None
     settings: dict
 
     def step(self, state, external=None):
-        model, given = changed(self.slip, self.system, state, self.h, external)
-        if self.slip == "pins put back after the solve":
+        model, given = changed(self.fault, self.system, state, self.h, external)
+        if self.fault == "pins put back after the solve":
             model = altered(model, pinned=())
         result = ImplicitEuler(model, h=self.h, **self.settings).step(state, given)
         x, v = result.state.positions.copy(), result.state.velocities.copy()
-        if self.slip == "pins put back after the solve":
+        if self.fault == "pins put back after the solve":
             x[self.system.pinned], v[self.system.pinned] = state.positions[self.system.pinned], 0.0
-        if self.slip == "velocities not recomputed":
+        if self.fault == "velocities not recomputed":
             v = state.velocities
         return dataclasses.replace(result, state=State(x, v))
 
 
-def slipped_motion(step, *, slip):
-    """Stand in for an integrator of `SIMULATORS`, slipping in every step."""
+def faulty_motion(step, *, fault):
+    """Stand in for an integrator of `SIMULATORS`, faultping in every step."""
 
     def over(system, h):
         def move(state, external, count):
             for _ in range(count):
-                state = step(system, state, h, external, slip=slip)
+                state = step(system, state, h, external, fault=fault)
             return state
 
         return move
@@ -242,65 +244,65 @@ def slipped_motion(step, *, slip):
     return over
 
 
-def slipped_implicit_step(system, state, h, external, *, slip):
-    if slip == "symplectic Euler in its place":
+def faulty_implicit_step(system, state, h, external, *, fault):
+    if fault == "symplectic Euler in its place":
         return symplectic_euler(system, state, h, external)
-    if slip == "the trapezoid in its place":
-        half = slipped_implicit_step(system, state, h / 2, external, slip=None)
+    if fault == "the trapezoid in its place":
+        half = faulty_implicit_step(system, state, h / 2, external, fault=None)
         return State(2 * half.positions - state.positions, 2 * half.velocities - state.velocities)
-    return slipped_euler(system, h=h, slip=slip).step(state, external).state
+    return faulty_euler(system, h=h, fault=fault).step(state, external).state
 
 
-STEP_SLIPS = [
+STEP_FAULTS = [
     "gravity times mass twice",
     "gravity left out",
     "rest lengths left out",
     "external forces left out",
 ]
 LOOSE = "slack springs push"
-IMPLICIT_SLIPS = [
-    *STEP_SLIPS,
+IMPLICIT_FAULTS = [
+    *STEP_FAULTS,
     "gravity without h²",
     "L in place of M + h² L",
     "pins put back after the solve",
     "one local/global iteration",
 ]
-DAMPER_SLIPS = [
+DAMPER_FAULTS = [
     "dampers left out",
     "dampers twice",
     "dampers push",
     "dampers across the springs too",
 ]
-ENERGY_SLIPS = ["k (l - r)²", "gravity upwards", "gravity times mass twice"]
-SPRING_SLIPS = ["push", "twice", "rest lengths left out", "one spring forgotten"]
-REST_SLIPS = ["gravity times mass twice", "gravity left out", "rest lengths left out"]
+ENERGY_FAULTS = ["k (l - r)²", "gravity upwards", "gravity times mass twice"]
+SPRING_FAULTS = ["push", "twice", "rest lengths left out", "one spring forgotten"]
+REST_FAULTS = ["gravity times mass twice", "gravity left out", "rest lengths left out"]
 
 # What a claim uses, and what takes its place: (module or SIMULATORS, name, stand-in).
 SYMPLECTIC_MOTION = (
     integrators.SIMULATORS,
     "symplectic Euler",
-    partial(slipped_motion, slipped_symplectic),
+    partial(faulty_motion, faulty_symplectic),
 )
 RUNGE_KUTTA_MOTION = (
     integrators.SIMULATORS,
     "Runge-Kutta",
-    partial(slipped_motion, slipped_runge_kutta),
+    partial(faulty_motion, faulty_runge_kutta),
 )
 IMPLICIT_MOTION = (
     integrators.SIMULATORS,
     "implicit Euler",
-    partial(slipped_motion, slipped_implicit_step),
+    partial(faulty_motion, faulty_implicit_step),
 )
 
-# For each claim: what its comparison uses and what takes its place, and the slips of that.
-SLIPS = {
-    "spring forces": ((force_claims, "spring_forces", slipped_springs), [*SPRING_SLIPS, LOOSE]),
+# For each claim: what its comparison uses and what takes its place, and the faults of that.
+FAULTS = {
+    "spring forces": ((force_claims, "spring_forces", faulty_springs), [*SPRING_FAULTS, LOOSE]),
     "damper forces": (
-        (force_claims, "damper_forces", slipped_dampers),
+        (force_claims, "damper_forces", faulty_dampers),
         ["push", "twice", "across the spring too", "pins with a velocity"],
     ),
     "stiffness matrix": (
-        (force_claims, "stiffness_matrix", slipped_stiffness),
+        (force_claims, "stiffness_matrix", faulty_stiffness),
         [
             "geometric term dropped",
             "geometric term with the wrong sign",
@@ -310,36 +312,36 @@ SLIPS = {
         ],
     ),
     "potential energy": (
-        (force_claims, "potential_energy", slipped_potential),
-        [*ENERGY_SLIPS, "pinned weights left out"],
+        (force_claims, "potential_energy", faulty_potential),
+        [*ENERGY_FAULTS, "pinned weights left out"],
     ),
     "kinetic energy": (
-        (force_claims, "kinetic_energy", slipped_kinetic),
+        (force_claims, "kinetic_energy", faulty_kinetic),
         ["m |v|²", "pins counted", "mass left out"],
     ),
-    "flex forces": ((force_claims, "spring_forces", slipped_springs), SPRING_SLIPS),
-    "flex energy": ((force_claims, "potential_energy", slipped_potential), ENERGY_SLIPS),
+    "flex forces": ((force_claims, "spring_forces", faulty_springs), SPRING_FAULTS),
+    "flex energy": ((force_claims, "potential_energy", faulty_potential), ENERGY_FAULTS),
     "symplectic Euler step": (
-        (steps, "symplectic_euler", slipped_symplectic),
-        [*STEP_SLIPS, *DAMPER_SLIPS, LOOSE, "old velocities move", "pins fall"],
+        (steps, "symplectic_euler", faulty_symplectic),
+        [*STEP_FAULTS, *DAMPER_FAULTS, LOOSE, "old velocities move", "pins fall"],
     ),
     "symplectic Euler step, flex": (
-        (steps, "symplectic_euler", slipped_symplectic),
-        [*STEP_SLIPS, *DAMPER_SLIPS, "old velocities move", "pins fall"],
+        (steps, "symplectic_euler", faulty_symplectic),
+        [*STEP_FAULTS, *DAMPER_FAULTS, "old velocities move", "pins fall"],
     ),
     "symplectic Euler, 1,000 steps": (
         SYMPLECTIC_MOTION,
         ["gravity left out", "dampers twice", "old velocities move"],
     ),
     "Runge-Kutta step": (
-        (steps, "runge_kutta", slipped_runge_kutta),
-        [*STEP_SLIPS, *DAMPER_SLIPS, "equal weights", "whole steps to the middle"],
+        (steps, "runge_kutta", faulty_runge_kutta),
+        [*STEP_FAULTS, *DAMPER_FAULTS, "equal weights", "whole steps to the middle"],
     ),
     "Runge-Kutta, 2,000 steps": (RUNGE_KUTTA_MOTION, ["equal weights"]),
     "damper diagonal step": (
-        (steps, "semi_implicit", slipped_semi_implicit),
+        (steps, "semi_implicit", faulty_semi_implicit),
         [
-            *STEP_SLIPS,
+            *STEP_FAULTS,
             LOOSE,
             "nothing implicit",
             "D twice",
@@ -349,16 +351,16 @@ SLIPS = {
         ],
     ),
     "damper block step": (
-        (steps, "semi_implicit", slipped_semi_implicit),
+        (steps, "semi_implicit", faulty_semi_implicit),
         ["nothing implicit", "D twice", "D with the wrong sign", "only the diagonal"],
     ),
     "Gauss-Newton step": (
-        (steps, "ImplicitEuler", slipped_euler),
-        [*IMPLICIT_SLIPS, LOOSE, "velocities not recomputed", "the converged step"],
+        (steps, "ImplicitEuler", faulty_euler),
+        [*IMPLICIT_FAULTS, LOOSE, "velocities not recomputed", "the converged step"],
     ),
-    "Gauss-Newton step, damped": ((steps, "ImplicitEuler", slipped_euler), DAMPER_SLIPS),
+    "Gauss-Newton step, damped": ((steps, "ImplicitEuler", faulty_euler), DAMPER_FAULTS),
     "implicit Euler on a line": (
-        (lines, "ImplicitEuler", slipped_euler),
+        (lines, "ImplicitEuler", faulty_euler),
         [
             "gravity times mass twice",
             "external forces left out",
@@ -368,13 +370,13 @@ SLIPS = {
         ],
     ),
     "implicit Euler balance": (
-        (balances, "ImplicitEuler", slipped_euler),
-        [*IMPLICIT_SLIPS, LOOSE, "one iteration"],
+        (balances, "ImplicitEuler", faulty_euler),
+        [*IMPLICIT_FAULTS, LOOSE, "one iteration"],
     ),
-    "implicit Euler balance, damped": ((balances, "ImplicitEuler", slipped_euler), DAMPER_SLIPS),
-    "rope at rest, closed form": ((equilibria, "ImplicitEuler", slipped_euler), REST_SLIPS),
-    "rope at rest": ((equilibria, "ImplicitEuler", slipped_euler), [*REST_SLIPS, "one iteration"]),
-    "cloth at rest": ((equilibria, "ImplicitEuler", slipped_euler), ["gravity left out"]),
+    "implicit Euler balance, damped": ((balances, "ImplicitEuler", faulty_euler), DAMPER_FAULTS),
+    "rope at rest, closed form": ((equilibria, "ImplicitEuler", faulty_euler), REST_FAULTS),
+    "rope at rest": ((equilibria, "ImplicitEuler", faulty_euler), [*REST_FAULTS, "one iteration"]),
+    "cloth at rest": ((equilibria, "ImplicitEuler", faulty_euler), ["gravity left out"]),
     "order of symplectic Euler": (SYMPLECTIC_MOTION, ["gravity left out", "dampers twice"]),
     "order of implicit Euler": (
         IMPLICIT_MOTION,
@@ -409,12 +411,12 @@ SLIPS = {
 }
 
 
-def put(monkeypatch, claim, slip):
-    (where, name, slipped), _ = SLIPS[claim]
+def put(monkeypatch, claim, fault):
+    (where, name, faulty), _ = FAULTS[claim]
     if where is integrators.SIMULATORS:
-        monkeypatch.setitem(where, name, slipped(slip=slip))
+        monkeypatch.setitem(where, name, faulty(fault=fault))
     else:
-        monkeypatch.setattr(where, name, partial(slipped, slip=slip))
+        monkeypatch.setattr(where, name, partial(faulty, fault=fault))
 
 
 def long(claim):
@@ -427,30 +429,30 @@ def few(claim):
     return check_claim(CLAIMS[claim], 1 if long(claim) else FEW)
 
 
-def cases_of_slips():
-    """Every slip of every claim; of one that takes many steps only the first by default."""
-    for claim, (_, slips) in SLIPS.items():
-        for i, slip in enumerate(slips):
+def cases_of_faults():
+    """Every fault of every claim; of one that takes many steps only the first by default."""
+    for claim, (_, faults) in FAULTS.items():
+        for i, fault in enumerate(faults):
             marks = [pytest.mark.slow] if i and long(claim) else []
-            yield pytest.param(claim, slip, marks=marks)
+            yield pytest.param(claim, fault, marks=marks)
 
 
 def copies():
-    for claim in SLIPS:
+    for claim in FAULTS:
         yield pytest.param(claim, marks=[pytest.mark.slow] if long(claim) else [])
 
 
-@pytest.mark.parametrize(("claim", "slip"), list(cases_of_slips()))
-def test_claim_goes_red_under_the_slip(monkeypatch, claim, slip):
-    put(monkeypatch, claim, slip)
-    assert few(claim).missed == "they differ"
+@pytest.mark.parametrize(("claim", "fault"), list(cases_of_faults()))
+def test_claim_goes_red_under_the_fault(monkeypatch, claim, fault):
+    put(monkeypatch, claim, fault)
+    assert few(claim).failure == "they differ"
 
 
 @pytest.mark.parametrize("claim", list(copies()))
-def test_without_a_slip_the_copy_holds(monkeypatch, claim):
+def test_without_a_fault_the_copy_holds(monkeypatch, claim):
     put(monkeypatch, claim, None)
     assert few(claim).holds
 
 
-def test_every_claim_has_a_slip():
-    assert {claim.name for claim in MASS_SPRING_CLAIMS} == set(SLIPS)
+def test_every_claim_has_a_fault():
+    assert {claim.name for claim in MASS_SPRING_CLAIMS} == set(FAULTS)
