@@ -10,6 +10,7 @@ __all__ = ["EXPERIMENTS", "SCALES", "SUITES", "Block", "Measured", "Scale", "blo
 # What the command line calls the suites, and what each answers.
 SUITES = {
     "check": "the reference against Pinocchio and MuJoCo, claim by claim",
+    "self_test": "planted faults and honest solvers, judged by plumbob verify",
     "robot_models": "robots and characters from files of others, beside both engines",
     "ik": "a chain of ten ball joints, robots and a character, beside every solver installed",
     "tracking": "closed curves: frames from rest, from the last solution, and coherently",
@@ -28,6 +29,7 @@ EXPERIMENTS = [
     Experiment(f"{__package__}.{folder}", suite, chapter)
     for folder, suite, chapter in (
         ("check", "check", "right"),
+        ("self_test", "self_test", "right"),
         ("robot_models", "robot_models", "right"),
         ("chain", "ik", "kinematics"),
         ("closed_curves", "tracking", "kinematics"),
