@@ -114,7 +114,7 @@ class WorkerProcess:
                 if isinstance(message, Lost):
                     self.close()
                 yield message
-        except BaseException:  # what is still under way must not answer the next job
+        except BaseException:  # what is not finished must not answer the next job
             self.close()
             raise
 

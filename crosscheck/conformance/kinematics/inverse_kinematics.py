@@ -54,7 +54,7 @@ def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport
     told = [_extended(one, found.findings.get(one.asked.case.name, ())) for one in told]
     if found.honest:
         told = [_slower(one) for one in told]
-    judgements = _in_other_worlds(told, found.method, greeting)
+    judgements = _in_other_worlds(told, "" if found.honest else found.method, greeting)
     diagnosis = _diagnosis(told, judgements, found, greeting)
     if found.honest and sweeps.is_grave(found.method, diagnosis):
         judgements = [_graver(one) for one in judgements]

@@ -41,6 +41,15 @@ class Line:
         distance = np.linalg.norm(start + share[:, None] * step - point, axis=-1)
         return distance, self.at[:-1] + share * self.lengths
 
+    def is_on_chord(self, point: FloatArray, bound: float) -> bool:
+        """Return whether a point lies between two of the line's points, a corner cut off."""
+        i, j = np.triu_indices(len(self.points), 1)
+        start, step = self.points[i], self.points[j] - self.points[i]
+        square = np.maximum((step * step).sum(-1), 1e-300)
+        share = np.clip(((point - start) * step).sum(-1) / square, 0.0, 1.0)
+        distance = np.linalg.norm(start + share[:, None] * step - point, axis=-1)
+        return bool(distance.min(initial=np.inf) <= bound)
+
     def parameters(self, points: FloatArray, bound: float) -> FloatArray:
         """Return where along the line points are, each as soon as possible after the one before.
 

@@ -71,7 +71,7 @@ def _written(local: FloatArray, switched: Switches) -> FloatArray:
     return np.roll(local, -1, axis=-1) if switched.order.numbers in (2, 3) else local
 
 
-def variants(method: str) -> Iterator[Variant]:
+def variants(method: str, most_faults: int = 3) -> Iterator[Variant]:
     """Yield the textbook's method with all combinations of its faults, the fewest first."""
     predict: Callable[[Switches, Case], Mapping[str, Any]]
     if method == "forward":
@@ -81,6 +81,8 @@ def variants(method: str) -> Iterator[Variant]:
     else:
         predict = partial(predict_inverse, method)
     for faults in combinations(method):
+        if len(faults) > most_faults:
+            return
         keys = tuple(fault.key for fault in faults)
         yield Variant(keys, partial(predict, switches(faults)))
 

@@ -38,6 +38,8 @@ def diagnosed(
     wrong: Sequence[Asked],
     tolerance: Callable[[Case], float],
     behaviour: Sentence | None = None,
+    *,
+    most_faults: int = 3,
 ) -> Diagnosis:
     """Return which faults reproduce the answers; nothing where none is wrong."""
     told = [one for one in wrong if isinstance(one.answer, Answer)]
@@ -46,7 +48,7 @@ def diagnosed(
     right = [one for one in asked if isinstance(one.answer, Answer) and one not in told]
     compared = (sorted(told, key=numbers) + sorted(right, key=numbers))[:COMPARED]
     found, tried = explain(
-        variants(method), compared, tolerance, lambda keys: describe(method, keys)
+        variants(method, most_faults), compared, tolerance, lambda keys: describe(method, keys)
     )
     named = tuple(one for one in found if one.faults != ("",))
     return Diagnosis(named, behaviour, tried=tried)

@@ -165,10 +165,7 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
     line, bound = case.facts["line"], _bound(case, greeting)
     off = _off(points, line, True)
     worst = int(np.argmax(off))
-    told = sentence(
-        "Point {index} is {error:.2g} m off the polyline.", index=worst, error=off[worst]
-    )
-    found = [laws.bounded("on the line", off[worst], bound, "m", told)]
+    found = [_on_line(points, off, line, bound)]
     found.append(_ends(points, case, bound))
     if "count" in case.inputs:
         found.append(_count(points, case))
@@ -176,6 +173,22 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
         at = line.parameters(points, bound)
         found += [_order(at, line, bound), _gaps(points, at, case, bound)]
     return found
+
+
+def _on_line(points: FloatArray, off: FloatArray, line: Line, bound: float) -> Finding:
+    """Return whether points are on the line, or between two of its points."""
+    worst = int(np.argmax(off))
+    verdict = Verdict.WRONG
+    told = sentence(
+        "Point {index} is {error:.2g} m off the polyline.", index=worst, error=off[worst]
+    )
+    if all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(off > bound)):
+        verdict = Verdict.RIGHT_BUT
+        told = sentence(
+            "Points between given ones are left out, so that corners are cut by {error:.2g} m.",
+            error=off[worst],
+        )
+    return laws.bounded("on the line", off[worst], bound, "m", told, verdict=verdict)
 
 
 def _ends(points: FloatArray, case: Case, bound: float) -> Finding:

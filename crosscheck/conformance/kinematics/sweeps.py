@@ -25,6 +25,8 @@ from .report import diagnosed
 NAMES = {"ccd": "CCD", "fabrik": "FABRIK"}
 # A textbook's sweeps are those of a solver if so many of them are.
 MOST = 0.5
+# So many faults at once may hide which method it is.
+SEEN_FAULTS = 2
 LAW = "one sweep"
 
 
@@ -51,6 +53,7 @@ class Comparison(NamedTuple):
         off: names of the cases whose sweeps are not the textbook's.
         findings: by the names of cases.
         honest: whether they are another honest solver's, which may be slower.
+        damped: how its rotations are made smaller on purpose, if they are.
     """
 
     method: str
@@ -59,6 +62,7 @@ class Comparison(NamedTuple):
     off: Sequence[str]
     findings: Mapping[str, Sequence[Finding]]
     honest: bool = False
+    damped: Sentence | None = None
 
 
 def likeness(case: Case, greeting: Greeting) -> float:
@@ -80,16 +84,20 @@ def compare(
     behaviour = None
     if not declared:
         behaviour = sentence("Its sweeps are those of {method}.", method=NAMES[method])
-    verdict, told = Verdict.RIGHT, laws.HOLDS
+    verdict, told, damped = Verdict.RIGHT, laws.HOLDS, None
     if off:
         verdict, told = _verdict(swept, method, others_hold, greeting)
+        if method == "ccd" and honest_variant(swept, method, greeting) is None:
+            damped = damping_of(swept, greeting)
+        if damped is not None:
+            verdict, told = Verdict.RIGHT_BUT, damped
     findings = {
         name: [Finding(LAW, verdict if name in off else Verdict.RIGHT, error, bound, "m",
                        told if name in off else laws.HOLDS)]
         for name, (error, bound) in errors.items()
     }  # fmt: skip
     honest = verdict is Verdict.RIGHT_BUT
-    return Comparison(method, declared, behaviour, off, findings, honest)
+    return Comparison(method, declared, behaviour, off, findings, honest, damped)
 
 
 def seen(swept: Sequence[Swept], greeting: Greeting) -> str:
@@ -101,6 +109,8 @@ def seen(swept: Sequence[Swept], greeting: Greeting) -> str:
             return method
     if not swept or all(map(partial(_is_another_solver, greeting), swept)):
         return ""
+    if honest_variant(swept, "ccd", greeting) is None and damping_of(swept, greeting) is not None:
+        return "ccd"
     fits = {method: _best_fit(swept, method, greeting) for method in NAMES}
     best = max(fits, key=lambda method: fits[method])
     return best if fits[best][0] >= MOST else ""
@@ -116,7 +126,9 @@ def _is_another_solver(greeting: Greeting, one: Swept) -> bool:
 def _best_fit(swept: Sequence[Swept], method: str, greeting: Greeting) -> tuple[float, int]:
     """Return what share of the sweeps a faulty textbook reproduces, and minus its faults."""
     asked = [one.asked for one in swept]
-    found = diagnosed(method, asked, asked, lambda case: likeness(case, greeting)).explanations
+    found = diagnosed(
+        method, asked, asked, lambda case: likeness(case, greeting), most_faults=SEEN_FAULTS
+    ).explanations
     if not found:
         return 0.0, 0
     return found[0].share, -len(found[0].faults[0].split(" + "))
@@ -182,15 +194,18 @@ def honest_variant(swept: Sequence[Swept], method: str, greeting: Greeting) -> S
     for fault in (one for one in FAULTS[method] if one.honest and one.key != "tolerance squared"):
         if _explains(swept, method, greeting, (fault,), Damping()):
             return describe(method, [fault.key])
-    if method != "ccd":
-        return None
+    return None
+
+
+def damping_of(swept: Sequence[Swept], greeting: Greeting) -> Sentence | None:
+    """Return by how much a CCD scales or caps its rotations, if that explains all sweeps."""
     for faults in ((), *(((one,)) for one in FAULTS["ccd"] if one.key == "root to tip")):
         gain, most = _damping(swept, switches(faults))
-        if gain < 1.0 and _explains(swept, method, greeting, faults, Damping(gain=gain)):
+        if gain < 0.999 and _explains(swept, "ccd", greeting, faults, Damping(gain=gain)):
             return sentence(
                 "It is CCD with each rotation scaled by {gain:.4g}, which is slower.", gain=gain
             )
-        if _explains(swept, method, greeting, faults, Damping(most=most)):
+        if _explains(swept, "ccd", greeting, faults, Damping(most=most)):
             return sentence(
                 "It is CCD with each rotation capped at {angle:.4g} rad, which is slower.",
                 angle=most,
@@ -237,6 +252,8 @@ def explained(
     """Return the faults that reproduce the sweeps."""
     if not found.method:
         return Diagnosis()
+    if found.damped is not None:
+        return Diagnosis(behaviour=found.damped)
     return diagnosed(
         found.method, all_sweeps, off, lambda case: likeness(case, greeting), found.behaviour
     )
