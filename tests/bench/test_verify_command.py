@@ -187,7 +187,8 @@ def test_tasks_are_listed_with_what_they_ask(capsys):
 def templates(monkeypatch):
     """Starters in two languages."""
     languages = {
-        "cpp": SimpleNamespace(files=("solver.cpp", "plumbob.hpp"), build="g++ solver.cpp -o solver",
+        "cpp": SimpleNamespace(files=("solver.cpp", "plumbob.hpp"),
+                               build="g++ -o solver solver.cpp",
                                run="./solver"),
         "python": SimpleNamespace(files=("solver.py",), build="", run="python3 solver.py"),
     }  # fmt: skip
@@ -202,7 +203,7 @@ def test_a_template_is_written_and_says_what_comes_next(capsys, folder, template
     assert code == 0
     assert (folder / "solver.cpp").read_text() == "// solver.cpp\n"
     assert (folder / "plumbob.hpp").exists()
-    for words in ("Build: g++ solver.cpp -o solver", "Then: plumbob verify -- ./solver"):
+    for words in ("Build: g++ -o solver solver.cpp", "Then: plumbob verify -- ./solver"):
         assert words in out
     assert "Then: plumbob verify solver.py" in plumbob(capsys, "--template", "python")[1]
 
