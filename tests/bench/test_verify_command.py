@@ -6,6 +6,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -180,6 +181,40 @@ def test_tasks_are_listed_with_what_they_ask(capsys):
     code, out, _ = plumbob(capsys, "--list", "--task", "mass_spring_step")
     assert "[tension_only] (spring): springs that resist no compression" in out
     assert "forward_kinematics" not in out
+
+
+@pytest.fixture
+def templates(monkeypatch):
+    """Starters in two languages."""
+    languages = {
+        "cpp": SimpleNamespace(files=("solver.cpp", "plumbob.hpp"),
+                               build="g++ -o solver solver.cpp",
+                               run="./solver"),
+        "python": SimpleNamespace(files=("solver.py",), build="", run="python3 solver.py"),
+    }  # fmt: skip
+    made = ModuleType("templates")
+    made.LANGUAGES = languages
+    made.template = lambda language: {one: f"// {one}\n" for one in languages[language].files}
+    monkeypatch.setitem(sys.modules, "crosscheck.conformance.templates", made)
+
+
+def test_a_template_is_written_and_says_what_comes_next(capsys, folder, templates):
+    code, out, _ = plumbob(capsys, "--template", "cpp")
+    assert code == 0
+    assert (folder / "solver.cpp").read_text() == "// solver.cpp\n"
+    assert (folder / "plumbob.hpp").exists()
+    for words in ("Build: g++ -o solver solver.cpp", "Then: plumbob verify -- ./solver"):
+        assert words in out
+    assert "Then: plumbob verify solver.py" in plumbob(capsys, "--template", "python")[1]
+
+
+def test_a_template_overwrites_nothing(capsys, folder, templates):
+    (folder / "plumbob.hpp").write_text("mine")
+    code, out, err = plumbob(capsys, "--template", "cpp")
+    assert (code, out) == (2, "")
+    assert "plumbob.hpp is here already and stays as it is" in err
+    assert (folder / "plumbob.hpp").read_text() == "mine"
+    assert not (folder / "solver.cpp").exists()
 
 
 def test_help_has_examples(capsys):
