@@ -6,6 +6,7 @@ NumPy, for up to some thirty particles, and independent of the solvers of `refer
 """
 
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -187,7 +188,9 @@ def _with_pins(p: Problem, model: Model) -> Problem:
     return p
 
 
-def _step(p: Problem, model: Model, x: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _step(
+    p: Problem, model: Model, x: FloatArray, v: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     whole = p.h if isinstance(model.time, str) else model.time
     h = whole if model.time == "undivided" else whole / model.substeps
     pins = x[p.pinned]
@@ -207,8 +210,10 @@ def substep(start: Start) -> tuple[FloatArray, FloatArray]:
     else:
         equation = Equation(start)
         x = _implicit(equation)
-        rest = equation.gradient(x) / p.masses[:, None]
-        natural = v_n + (x - equation.y - rest) / h
+        natural = v_n
+        if model.velocity == "separate":
+            rest = equation.gradient(x) / p.masses[:, None]
+            natural = v_n + (x - equation.y - rest) / h
     v = VELOCITIES[model.velocity](start, x, natural) * model.scaling
     if model.pins == "overwritten" or not start.free.all():
         x, v = x.copy(), v.copy()
@@ -330,7 +335,6 @@ class Equation:
             self.constant = self.constant + damper_forces(p, x, v)
         self.damped = model.damper in ("length_rate", "end_velocity") and bool(p.dampings.any())
         self.by_length = model.damper == "length_rate" and p.damping == "along"
-        self.length_n, _ = frames(p, x)
         self.pins = p.pinned if model.pins.split()[0] in ("penalty", "springs") else p.pinned[:0]
         self.hold = PIN_STRENGTHS.get(model.pins, 0.0)
         if model.pins.startswith("springs"):
@@ -338,6 +342,17 @@ class Equation:
         self.conservative = (
             p.ends == (1.0, 1.0) and p.normalised and (self.by_length or not self.damped)
         )
+
+    @property
+    def uncoupled(self) -> bool:
+        """Whether no spring acts and the matrix is M: one Newton step arrives."""
+        p, model = self.start.p, self.start.model
+        return not (p.stiff or self.damped or len(self.pins)) and model.matrix == "M + h²L"
+
+    @cached_property
+    def length_n(self) -> FloatArray:
+        """Length of each spring at the start."""
+        return frames(self.start.p, self.start.x)[0]
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return M (x - y) - h² f(x), shape (particle, 3)."""
@@ -461,6 +476,11 @@ def _implicit(equation: Equation) -> FloatArray:
     start = equation.start
     how = start.model.integrator
     x = np.where(equation.free[:, None], equation.y if how.start == "y" else start.x, start.x)
+    if equation.uncoupled and how.method != "descent":
+        p, h = start.p, start.h
+        best = equation.y + h * h * equation.constant / p.masses[:, None]
+        left = (1.0 - how.rate) ** how.iterations
+        return np.where(equation.free[:, None], best + left * (x - best), x)
     return _METHODS[how.method](equation, x, how)
 
 

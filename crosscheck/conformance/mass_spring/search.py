@@ -17,7 +17,7 @@ from .faults import ASPECTS, Option, apply
 from .honest import compatible, domains
 from .model import Integrator, Model, simulate
 from .problem import Problem
-from .rounding import SOLVED, apart, rounding
+from .rounding import SOLVED, Rounding, apart, rounding
 
 MOST_FAULTS = 3
 # Seconds of the processor after which no further faults are combined; what was begun is finished.
@@ -68,6 +68,7 @@ class Search:
         self.epsilon = epsilon
         self.classes, self.members = _classes(self.domains["integrator"])
         self.tried = 0
+        self._roundings: dict[tuple[Any, ...], Rounding] = {}
         self._known: dict[tuple[Any, ...], bool | None] = {}
         self.farthest = -1
         self._seen: set[tuple[str, ...]] = set()
@@ -185,11 +186,17 @@ class Search:
             share = problem.masses / problem.masses.sum()
             centre = {"positions": share @ predicted["positions"], "velocities": np.zeros(0)}
             answered = {"positions": share @ probe.answered["positions"]}
-            allowed = rounding(probe.problem, model, self.epsilon)
+            allowed = self._rounding(probe, model)
             whole = probe.problem.changed(positions=share @ probe.problem.positions)
             close = apart(whole, centre, answered, allowed) <= SOLVED
             self._known[key] = None if close else False
         return self._known[key]
+
+    def _rounding(self, probe: Probe, model: Model) -> Rounding:
+        key = probe.name, model.substeps, model.integrator.explicit
+        if key not in self._roundings:
+            self._roundings[key] = rounding(probe.problem, model, self.epsilon)
+        return self._roundings[key]
 
     def _compare(self, options: tuple[Option, ...], probe: Probe) -> bool | None:
         problem, model = apply(options, probe.problem, Model(damper="none"))
@@ -198,7 +205,7 @@ class Search:
                 predicted = simulate(problem, model)
             except np.linalg.LinAlgError:  # a singular matrix predicts nothing
                 return None
-        allowed = rounding(probe.problem, model, self.epsilon)
+        allowed = self._rounding(probe, model)
         return bool(apart(probe.problem, predicted, probe.answered, allowed) <= SOLVED)
 
     def _found(self, chosen: Chosen) -> Found:
