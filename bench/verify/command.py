@@ -1,14 +1,16 @@
 """The command `plumbob verify`."""
 
-import importlib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
-RIGHT = 0
+if TYPE_CHECKING:
+    from .words import Say
+
+RIGHT, WRONG = 0, 1
 _PROGRAM = "plumbob.program"
 EXAMPLES = (
     "plumbob verify my_ik.py                    the functions of a Python file",
@@ -106,7 +108,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     if export:
         return _print(exported(export, task or (), seed, thorough, say))
     if self_test:
-        return _self_test(language)
+        return _self_test(say)
     if time_limit is not None and not 0.0 < time_limit < float("inf"):
         raise ValueError(f"time-limit: expected seconds above 0, got {time_limit}")
     files = Files(json, junit, html, output)
@@ -127,11 +129,18 @@ def _print(lines: Iterable[str]) -> int:
     return RIGHT
 
 
-def _self_test(language: str) -> int:
+def _self_test(say: "Say") -> int:
     """Show that every fault is caught and named, and nobody is accused who is right."""
-    try:
-        module = importlib.import_module("crosscheck.conformance.self_test")
-    except ModuleNotFoundError:
-        raise ValueError("self-test: expected crosscheck.conformance.self_test, got none") from None
-    code: int = module.run(language)
-    return code
+    from rich.console import Console
+    from rich.progress import track
+
+    from crosscheck.conformance.self_test import attempt, subjects
+
+    from .self_test import lines
+
+    console = Console(stderr=True)
+    known = list(subjects())
+    shown = track(known, "", console=console, transient=True, disable=not console.is_terminal)
+    trials = [attempt(subject) for subject in shown]
+    _print(lines(trials, say))
+    return RIGHT if all(trial.passed for trial in trials) else WRONG

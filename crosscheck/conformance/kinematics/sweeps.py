@@ -19,8 +19,9 @@ from ..sentence import Sentence, sentence
 from . import laws, pose_laws, rounding
 from .faults import FAULTS, Fault, Switches, by_key, describe, switches
 from .pose_laws import Posed
-from .predictions import Damping, predict_inverse, solve
+from .predictions import predict_inverse, solve
 from .report import diagnosed
+from .textbook import Damping
 
 NAMES = {"ccd": "CCD", "fabrik": "FABRIK"}
 # A textbook's sweeps are those of a solver if so many of them are.

@@ -24,11 +24,11 @@ from reference.quaternion import (
     norm,
     renormalised,
     rotate,
+    rotation_about,
     scale,
     store_quaternion,
     store_vector,
     subtract,
-    rotation_about,
 )
 
 ORIGIN = (0.0, 0.0, 0.0)

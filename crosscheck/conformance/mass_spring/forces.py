@@ -83,7 +83,10 @@ def _findings(
     if not np.isfinite(given).all():
         said = sentence("Forces hold NaN or infinity.")
         return [Finding("finite numbers", Verdict.BROKEN, np.inf, 0.0, "", said)]
-    found = [_formula(p, given, expected, allowed), _balance(p, given, allowed)]
+    found: list[Finding | None] = [
+        _formula(p, given, expected, allowed),
+        _balance(p, given, allowed),
+    ]
     limits = {"forces": 2.0 * allowed}
     bases = [other.answer for other in asked if other.case.name == one.case.facts.get("of")]
     if bases and isinstance(bases[0], Answer):

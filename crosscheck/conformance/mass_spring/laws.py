@@ -201,9 +201,12 @@ def consistency(one: Context) -> Finding | None:
     """Return how far the mean acceleration of a small step is from f / m."""
     p = one.problem
     v, x = one.answered.get("velocities"), one.answered.get("positions")
-    if v is None and x is None:
+    if v is not None:
+        moved = v
+    elif x is not None:
+        moved = 2.0 * (x - p.positions) / p.h - p.velocities
+    else:
         return None
-    moved = v if v is not None else 2.0 * (x - p.positions) / p.h - p.velocities
     a = (moved - p.velocities) / p.h
     wanted = accelerations(p, p.positions, p.velocities)
     free = np.setdiff1d(np.arange(p.count), p.pinned)

@@ -24,7 +24,7 @@ from .problem import (
 
 # Newton's method ends in rounding long before this on systems of this size.
 MOST_ITERATIONS = 200
-# Stiffness of springs to the pins, weight of a penalty, and mass of heavy pins, as solvers have them.
+# Stiffness of springs to the pins, weight of a penalty, and mass of heavy pins, as in solvers.
 PIN_STRENGTHS: Mapping[str, float] = {
     "penalty 1e10": 1e10,
     "penalty 1e8": 1e8,
@@ -188,9 +188,7 @@ def _with_pins(p: Problem, model: Model) -> Problem:
     return p
 
 
-def _step(
-    p: Problem, model: Model, x: FloatArray, v: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _step(p: Problem, model: Model, x: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
     whole = p.h if isinstance(model.time, str) else model.time
     h = whole if model.time == "undivided" else whole / model.substeps
     pins = x[p.pinned]

@@ -1,7 +1,8 @@
 """A small mass-spring system as dense arrays, with the changes that a wrong solver makes to it.
 
 Its forces are written from the formulas, apart from `reference`: a spring pulls its first end with
--(k (l - r) + c (v_i - v_j)·u) u. What differs in a faulty solver, such as a missing end, is a field.
+-(k (l - r) + c (v_i - v_j)·u) u. What a faulty solver does otherwise, such as a missing end, is a
+field.
 """
 
 import dataclasses
@@ -104,8 +105,9 @@ def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> Prob
     velocities = np.array(inputs["velocities"], dtype=float)
     velocities[pinned] = 0.0
     h = float(inputs.get("h", 0.0))
+    numbers: dict[str, Any] = {name: np.asarray(inputs[name], dtype=float) for name in _NUMBERS}
     return Problem(
-        **{name: np.asarray(inputs[name], dtype=float) for name in _NUMBERS},
+        **numbers,
         springs=np.asarray(inputs["springs"], dtype=int).reshape(-1, 2),
         velocities=velocities,
         pinned=pinned,
