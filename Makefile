@@ -3,6 +3,7 @@
 # make lint     ruff and mypy
 # make bench    every benchmark at full length, then the report
 # make drawing  draw the pictures of docs/ anew, the architecture's from the imports
+# make messages renew the translations of `plumbob verify` from its sentences
 # make locks    renew the two lock files after a change of pyproject.toml; UPGRADE=--upgrade
 #               takes the newest versions of everything
 # make clean    remove everything made here
@@ -19,7 +20,7 @@ BIN := .venv/bin
 UV ?= build/uv/bin/uv
 export UV_PYTHON_DOWNLOADS := never
 
-.PHONY: help report test test-all lint bench drawing locks wheels test-pythons test-lowest clean
+.PHONY: help report test test-all lint bench drawing messages locks wheels test-pythons test-lowest clean
 
 help:
 	@sed -n 's/^# \{0,1\}//p' $(MAKEFILE_LIST)
@@ -45,6 +46,9 @@ bench: .venv/installed
 drawing: .venv/installed
 	$(BIN)/python docs/draw_architecture.py
 	$(BIN)/python docs/draw_lab.py
+
+messages: .venv/installed
+	$(BIN)/python -m crosscheck.conformance.catalogue
 
 .venv/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and \

@@ -4,7 +4,7 @@ import difflib
 import os
 import sys
 from collections.abc import Iterable, Sequence
-from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +14,7 @@ from . import compile_notice
 from .experiments import SUITES
 from .harness.progress import listening
 from .presentation.text import visible
+from .verify import command as verify_command
 
 if TYPE_CHECKING:
     from .presentation.tables import Table
@@ -87,6 +88,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
     invoke_without_command=True,
     epilog=_block(
         "Examples",
+        "plumbob verify my_solver.py    is your solver right, and if not, why?",
         "plumbob                        the main job",
         "plumbob check                  is the reference right?",
         "plumbob bench ik cloth         measure two suites at full length",
@@ -105,8 +107,8 @@ def plumbob(
 ) -> int:
     """Validate, measure and report: skeleton kinematics and implicit mass-spring dynamics.
 
-    Alone, it does the main job: check the reference against Pinocchio and MuJoCo, run the quick
-    bench, and write report/index.html, in a few minutes.
+    Without a command it does the main job: check the reference against Pinocchio and MuJoCo, run
+    the quick bench, and write report/index.html, in a few minutes.
     """
     if version:
         import importlib.metadata
@@ -120,6 +122,11 @@ def plumbob(
             raise ValueError(f"write options behind the command: {context.invoked_subcommand}")
         return SUCCESS
     return main_job(output or REPORT, fresh)
+
+
+app.command(cls=verify_command.SolverCommand, epilog=_block("Examples", *verify_command.EXAMPLES))(
+    verify_command.verify
+)
 
 
 @app.command(
@@ -189,13 +196,7 @@ def bench(
     return code
 
 
-@app.command(
-    epilog=_block(
-        "Examples",
-        "plumbob report",
-        "plumbob report --output results/laptop",
-    )
-)
+@app.command(epilog=_block("Examples", "plumbob report", "plumbob report --output results/laptop"))
 def report(output: Output = REPORT) -> int:
     """Write tables (Markdown, LaTeX, CSV), figures and one offline page from the records."""
     return write_report(output)
@@ -237,12 +238,14 @@ def show(
     writable(path.parent)
     with progress() as bar:
         task = bar.add_task(scene, total=None)
-        write(
-            scene, path, solver,
-            lambda done, total: bar.update(task, completed=done, total=total), coherent,
-        )  # fmt: skip
+        drawn = partial(_drawn, bar, task)
+        write(scene, path, solver, drawn, coherent)
     print(visible(str(path)))
     return SUCCESS
+
+
+def _drawn(bar: Any, task: Any, done: int, total: int) -> None:
+    bar.update(task, completed=done, total=total)
 
 
 def main_job(output: Path, fresh: bool) -> int:
@@ -294,8 +297,7 @@ def write_report(output: Path) -> int:
     written = write(output)
     for table in written.tables:
         if table.rows:
-            print(f"\n{table.title}\n  {table.summary.sentence}")
-            print("".join(f"    {point}\n" for point in table.summary.points), end="")
+            print_summary(table)
     print()
     for sentence in written.missing:
         print(f"Missing: {sentence}")
@@ -329,39 +331,47 @@ def print_table(table: "Table") -> None:
     """Print a table with what it says: aligned on a terminal, as Markdown in a pipe."""
     from .presentation.tables import markdown
 
-    if not sys.stdout.isatty():
+    if sys.stdout.isatty():
+        print_aligned(table)
+    else:
         print(markdown(table))
-        return
-    from rich.console import Console
-
-    print(f"\n{table.title}\n  {table.summary.sentence}".rstrip())
-    Console(highlight=False).print(_aligned(table), markup=False)
-    print("".join(f"    {point}\n" for point in table.summary.points), end="", flush=True)
 
 
 def print_tables(suites: Sequence[str], output: Path) -> None:
     """Print the tables that come from these suites, with what they say."""
-    from rich.console import Console
-
     from .harness.record import RecordFile
     from .presentation.results import Results, plain, sift
     from .presentation.sections import tables
 
-    console = Console(
-        width=None if sys.stdout.isatty() else 240, highlight=False, markup=False, emoji=False
-    )
     records = [plain(record) for record in RecordFile(output).read().records]
     records, _ = sift(lambda results: tables(results, suites), records)
     for made in tables(Results(records), suites):
-        if not made.rows:
-            continue
-        print(f"\n{made.title}\n  {made.summary.sentence}")
-        print("".join(f"    {point}\n" for point in made.summary.points), end="", flush=True)
-        console.print(_aligned(made))
+        if made.rows:
+            print_aligned(made)
+
+
+def print_summary(table: "Table") -> None:
+    """Print what a table is called and says."""
+    print(f"\n{table.title}\n  {table.summary.sentence}".rstrip())
+    print("".join(f"    {point}\n" for point in table.summary.points), end="", flush=True)
+
+
+def print_aligned(table: "Table") -> None:
+    """Print a table with what it says; as wide as the terminal, or very wide in a pipe."""
+    print_summary(table)
+    _print(_aligned(table), 240)
+
+
+def _print(shown: Any, width: int) -> None:
+    from rich.console import Console
+
+    Console(
+        width=None if sys.stdout.isatty() else width, highlight=False, markup=False, emoji=False
+    ).print(shown)
 
 
 def _aligned(table: "Table") -> Any:
-    """Return a table as rich prints it."""
+    """Return a table as rich prints it, rows that miss something in red."""
     import rich.table
     from rich.text import Text
 
@@ -371,65 +381,45 @@ def _aligned(table: "Table") -> Any:
     for column in table.columns:
         shown.add_column(column.heading, justify="left" if column.words else "right")
     for row in table.rows:
-        shown.add_row(*(Text(words(cell)) for cell in row))
+        missed = any(str(cell).startswith("MISSED") for cell in row)
+        shown.add_row(*(Text(words(cell)) for cell in row), style="bold red" if missed else None)
     return shown
 
 
-def print_verdicts(verdicts: Iterable[Any]) -> None:
+def print_verdicts(verdicts: Sequence[Any]) -> None:
     """Print the table of verdicts."""
-    from rich.console import Console
-    from rich.table import Table
+    from .presentation.tables import Column, Table
 
-    from .presentation.tables import words
-
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in ("claim", "cases", "largest difference", "tolerance", "verdict"):
-        table.add_column(heading, justify="left" if heading in ("claim", "verdict") else "right")
-    held = 0
-    for verdict in verdicts:
-        held += verdict.holds
-        table.add_row(
+    words = {name: Column(name, words=True) for name in ("claim", "verdict")}
+    numbers = map(Column, ("cases", "largest difference", "tolerance"))
+    rows = [
+        (
             verdict.claim.name,
-            words(verdict.cases),
-            words(verdict.difference),
-            words(verdict.claim.tolerance.value),
-            "held" if verdict.holds else f"MISSED: {verdict.missed}",
-            style=None if verdict.holds else "bold red",
+            verdict.cases,
+            verdict.difference,
+            verdict.claim.tolerance.value,
+            "held" if verdict.holds else f"MISSED: {verdict.failure}",
         )
-    console = Console(
-        width=None if sys.stdout.isatty() else 120, highlight=False, markup=False, emoji=False
-    )
-    console.print(table)
-    print(f"{held} of {table.row_count} claims held")
-
-
-class _Quiet:
-    """Stands where a progress bar would, and says nothing."""
-
-    def add_task(self, description: str, total: float | None = None) -> int:
-        return 0
-
-    def update(self, task: int, **_: Any) -> None:
-        pass
-
-    def advance(self, task: int) -> None:
-        pass
+        for verdict in verdicts
+    ]
+    table = Table("verdicts", "", (words["claim"], *numbers, words["verdict"]), tuple(rows))
+    _print(_aligned(table), 120)
+    print(f"{sum(verdict.holds for verdict in verdicts)} of {len(rows)} claims held")
 
 
 def progress() -> Any:
     """Return a progress bar on a terminal, and nothing to see in a pipe."""
-    if not sys.stderr.isatty():
-        return nullcontext(_Quiet())
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (
-        BarColumn(24),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}", markup=False),
+    text = TextColumn("{task.description}", markup=False)
+    return Progress(
+        *(BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), text),
+        console=Console(stderr=True),
+        transient=True,
+        refresh_per_second=2,
+        disable=not sys.stderr.isatty(),
     )
-    return Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=2)
 
 
 def writable(folder: Path) -> None:

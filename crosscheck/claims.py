@@ -11,7 +11,7 @@ from .engines import SKELETON_ENGINES
 from .mass_spring.claims import MASS_SPRING_CLAIMS
 from .robots.claims import ROBOT_CLAIMS
 from .tolerances import POSITION, ROTATION
-from .verdict import Claim, Verdict, check_claim
+from .verdict import Claim, Verdict, check_claim, each_case
 
 
 def skeleton_claims(engine: str) -> list[Claim]:
@@ -23,7 +23,9 @@ def skeleton_claims(engine: str) -> list[Claim]:
     solved = f"solve_ik by {', '.join(IK_SOLVERS)}: all joints' positions and the residual"
     found = f"{engine}'s forward kinematics of the local rotations found"
     return [
-        Claim(f"{name}, {engine}", ours, theirs, partial(compare, engine), tolerance, cases)
+        Claim(
+            f"{name}, {engine}", ours, theirs, each_case(partial(compare, engine)), tolerance, cases
+        )
         for name, ours, theirs, compare, tolerance, cases in (
             ("joint positions", poses, joints, kinematics.joint_positions, POSITION, 100),
             ("joint rotations", poses, joints, kinematics.joint_rotations, ROTATION, 100),
@@ -55,8 +57,8 @@ def run_claims(
     Raises:
         ValueError: if a name is unknown or the list is empty.
     """
-    wanted = CLAIMS if names is None else names
-    chosen = [arguments.choice("names", name, CLAIMS) for name in wanted]
+    asked = CLAIMS if names is None else names
+    chosen = [arguments.choice("names", name, CLAIMS) for name in asked]
     if not chosen:
         raise ValueError("names: expected at least one claim, got none")
     verdicts = []

@@ -1,8 +1,6 @@
 """Comparisons of our kinematics of skeletons with an engine's."""
 
 import functools
-import itertools
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,50 +18,46 @@ from .verdict import Comparison
 POSES = 4
 
 
-def joint_positions(engine: str, cases: int) -> Iterator[Comparison]:
+def joint_positions(engine: str, case: int) -> Comparison:
     """Compare all joints' global positions, relative to the reach."""
-    for case in range(cases):
-        skeleton, local = _posed(case)
-        yield Comparison(
-            ours=forward_kinematics(skeleton, local).positions,
-            theirs=_engine_pose(engine, case).positions,
-            baseline=forward_kinematics(skeleton, rotation.identity(*local.shape[:-1])).positions,
-            scale=full_reach(skeleton),
-        )
+    skeleton, local = _posed(case)
+    return Comparison(
+        ours=forward_kinematics(skeleton, local).positions,
+        theirs=_engine_pose(engine, case).positions,
+        baseline=forward_kinematics(skeleton, rotation.identity(*local.shape[:-1])).positions,
+        scale=full_reach(skeleton),
+    )
 
 
-def joint_rotations(engine: str, cases: int) -> Iterator[Comparison]:
+def joint_rotations(engine: str, case: int) -> Comparison:
     """Compare all joints' global rotations, as quaternions."""
-    for case in range(cases):
-        ours = forward_kinematics(*_posed(case)).rotations
-        yield _rotations(ours, _engine_pose(engine, case).rotations)
+    ours = forward_kinematics(*_posed(case)).rotations
+    return _rotations(ours, _engine_pose(engine, case).rotations)
 
 
-def back_to_local(engine: str, cases: int) -> Iterator[Comparison]:
+def back_to_local(engine: str, case: int) -> Comparison:
     """Compare the local rotations that we derive from an engine's global ones with its input."""
-    for case in range(cases):
-        skeleton, local = _posed(case)
-        ours = local_from_global(skeleton, _engine_pose(engine, case).rotations)
-        yield _rotations(ours, local)
+    skeleton, local = _posed(case)
+    ours = local_from_global(skeleton, _engine_pose(engine, case).rotations)
+    return _rotations(ours, local)
 
 
-def ik_answers(engine: str, cases: int) -> Iterator[Comparison]:
+def ik_answers(engine: str, case: int) -> Comparison:
     """Compare the joints' positions and the residual of IK solutions, alternating the solvers."""
-    problems = ((problem, solver) for problem in itertools.count() for solver in IK_SOLVERS)
-    for problem, solver in itertools.islice(problems, cases):
-        skeleton, start, effector, target = samples.reach(problem)
-        reach = full_reach(skeleton)
-        solution = solve_ik(
-            skeleton, start, target, solver, effector, tolerance=1e-6 * reach, max_iterations=50
-        )
-        theirs = _by(engine, skeleton, solution.local_rotations).positions
-        initial = forward_kinematics(skeleton, start).positions
-        yield Comparison(
-            ours=np.append(solution.positions, solution.residual),
-            theirs=np.append(theirs, np.linalg.norm(theirs[effector] - target)),
-            baseline=np.append(initial, np.linalg.norm(initial[effector] - target)),
-            scale=reach,
-        )
+    problem, solver = divmod(case, len(IK_SOLVERS))
+    skeleton, start, effector, target = samples.reach(problem)
+    reach, names = full_reach(skeleton), tuple(IK_SOLVERS)
+    solution = solve_ik(
+        skeleton, start, target, names[solver], effector, tolerance=1e-6 * reach, max_iterations=50
+    )
+    theirs = _by(engine, skeleton, solution.local_rotations).positions
+    initial = forward_kinematics(skeleton, start).positions
+    return Comparison(
+        ours=np.append(solution.positions, solution.residual),
+        theirs=np.append(theirs, np.linalg.norm(theirs[effector] - target)),
+        baseline=np.append(initial, np.linalg.norm(initial[effector] - target)),
+        scale=reach,
+    )
 
 
 def full_reach(skeleton: Skeleton) -> float:

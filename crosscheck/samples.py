@@ -15,6 +15,8 @@ LEAST_PARTICLES, MOST_PARTICLES = 5, 500
 SIZES = 10
 # h omega of a smooth problem, with omega its highest rate.
 RESOLVED = 0.04
+# What all springs of a uniform network share.
+ALIKE = ("stiffnesses", "dampings")
 
 
 def generator(quantity: str, case: int) -> np.random.Generator:
@@ -80,19 +82,22 @@ def network(case: int, *, damped: bool = True) -> StepProblem:
     MuJoCo's integrator "discrete" omits its stiffness. In every fifth case the ends of one spring
     coincide, and in odd cases half of the springs are tension-only.
     """
-    return _random_problem(
-        "motion",
-        case,
-        particles(case),
-        damped=damped,
-        coincident=case % 5 == 1,
-        tension_only=0.5 * (case % 2),
+    n, tension_only = particles(case), 0.5 * (case % 2)
+    problem = _random_problem(
+        "motion", case, n, coincident=case % 5 == 1, tension_only=tension_only
     )
+    if arguments.boolean("damped", damped):
+        return problem
+    none = np.zeros_like(problem.system.dampings)
+    return problem._replace(system=problem.system.replaced(dampings=none))
 
 
 def uniform(case: int) -> StepProblem:
     """Return a random network with one pin and the same stiffness and damping for all springs."""
-    return _random_problem("alike", case, particles(case), uniform=True, pins=1)
+    problem = _random_problem("alike", case, particles(case), pins=1)
+    system = problem.system
+    first = {k: np.full_like(v, v[0]) for k, v in system.arrays._asdict().items() if k in ALIKE}
+    return problem._replace(system=system.replaced(**first))
 
 
 def smooth(case: int) -> StepProblem:
@@ -182,31 +187,24 @@ def _random_problem(
     case: int,
     n: int,
     *,
-    damped: bool = True,
     coincident: bool = False,
-    uniform: bool = False,
     tension_only: float = 0.0,
     pins: int | None = None,
     gravity: float = 5.0,
 ) -> StepProblem:
     rng = generator(quantity, case)
-    damped = arguments.boolean("damped", damped)
     springs = _network(rng, n)
     x = rng.standard_normal((n, 3))
     if coincident:
         x[springs[0, 0]] = x[springs[0, 1]]
     lengths = np.linalg.norm(x[springs[:, 0]] - x[springs[:, 1]], axis=-1)
     parts = _springs(rng, springs, lengths)
-    if uniform:
-        parts |= {name: parts[name][0] for name in ("stiffnesses", "dampings")}
     masses = rng.uniform(0.2, 2.0, n)
     pinned = rng.choice(n, size=1 + case % 2 if pins is None else pins, replace=False)
     weight = rng.standard_normal(3) * gravity
     h = float(rng.choice([1 / 240, 1 / 60, 1 / 30]))
     state, external = State(x, rng.standard_normal((n, 3))), rng.standard_normal((n, 3))
     parts["tension_only"] = rng.uniform(size=len(springs)) < tension_only
-    if not damped:
-        parts["dampings"] = 0.0
     system = MassSpring(masses, **parts, pinned=pinned, gravity=weight)
     return StepProblem(system, state, external, h)
 

@@ -62,19 +62,24 @@ class Verdict:
         cases: the number of cases compared.
         difference: the largest relative difference of a case; NaN if a value is not finite.
         displacement: the least relative distance of a case from its baseline; NaN likewise.
-        missed: the reason why the claim does not hold; empty if it holds.
+        failure: the reason why the claim does not hold; empty if it holds.
     """
 
     claim: Claim
     cases: int
     difference: float
     displacement: float
-    missed: str
+    failure: str
 
     @property
     def holds(self) -> bool:
         """Whether the claim holds."""
-        return not self.missed
+        return not self.failure
+
+
+def each_case(compare: Callable[[int], Comparison]) -> Callable[[int], Iterable[Comparison]]:
+    """Return the comparisons of the first n cases from the comparison of case i."""
+    return lambda cases: map(compare, range(cases))
 
 
 def check_claim(claim: Claim, cases: int | None = None) -> Verdict:
@@ -90,8 +95,8 @@ def check_claim(claim: Claim, cases: int | None = None) -> Verdict:
     displacements = [_relative_difference(c.ours, c.baseline, c.scale) for c in compared]
     difference = float(np.max(differences, initial=0.0))
     displacement = float(np.min(displacements or [0.0]))
-    missed = _missed(len(compared), difference, displacement, claim.tolerance.value)
-    return Verdict(claim, len(compared), difference, displacement, missed)
+    failure = _failure(len(compared), difference, displacement, claim.tolerance.value)
+    return Verdict(claim, len(compared), difference, displacement, failure)
 
 
 def _relative_difference(a: FloatArray, b: FloatArray, scale: float) -> float:
@@ -107,7 +112,7 @@ def _relative_difference(a: FloatArray, b: FloatArray, scale: float) -> float:
     return float(np.max(np.abs(a - b))) / scale
 
 
-def _missed(cases: int, difference: float, displacement: float, tolerance: float) -> str:
+def _failure(cases: int, difference: float, displacement: float, tolerance: float) -> str:
     if cases == 0:
         return "no cases"
     if not np.isfinite([difference, displacement]).all():

@@ -223,8 +223,12 @@ def generator(name: str, value: Any) -> np.random.Generator:
     return instance(name, value, np.random.Generator)
 
 
-def broadcast(name: str, one: tuple[int, ...], other: tuple[int, ...]) -> tuple[int, ...]:
+def broadcast(
+    name: str, one: tuple[int, ...], other: tuple[int, ...], whose: str = ""
+) -> tuple[int, ...]:
     """Return two batches' common leading axes; `name` is the second's argument.
+
+    `whose` names those of the first in the error.
 
     Raises:
         ValueError: if they do not broadcast with one another.
@@ -232,9 +236,18 @@ def broadcast(name: str, one: tuple[int, ...], other: tuple[int, ...]) -> tuple[
     try:
         return np.broadcast_shapes(one, other)
     except ValueError:
-        raise ValueError(
-            f"{name}: expected leading axes that broadcast with {shape(one)}, got {shape(other)}"
-        ) from None
+        expected = f"leading axes that broadcast with {whose}{shape(one)}"
+        raise ValueError(f"{name}: expected {expected}, got {shape(other)}") from None
+
+
+def together(name: str, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return both with the same leading axes, all but the last; `name` is the second's argument.
+
+    Raises:
+        ValueError: if they do not broadcast with one another.
+    """
+    batch = broadcast(name, a.shape[:-1], b.shape[:-1])
+    return spread(a, (*batch, a.shape[-1])), spread(b, (*batch, b.shape[-1]))
 
 
 def check_shape(name: str, given: np.ndarray, *trailing: int | str) -> None:

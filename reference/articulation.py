@@ -24,8 +24,9 @@ from .quaternion import (
     add,
     dot,
     exponential,
-    half_turn,
+    half_angle,
     load_quaternion,
+    load_quaternion_from,
     load_vector,
     logarithm,
     made_unit,
@@ -33,10 +34,11 @@ from .quaternion import (
     normalised,
     perpendicular,
     rotate,
+    rotation_about,
     scale,
     store_quaternion,
+    store_quaternion_to,
     store_vector,
-    turn_about,
 )
 from .skeleton import Skeleton, checked_skeleton
 
@@ -69,7 +71,7 @@ JOINT = np.dtype(
         ("freedom", np.int64),  # where its degrees of freedom begin in a velocity, likewise
         ("offset", np.float64, 3),  # from the parent [m]
         ("frame", np.float64, 4),  # rotation in the parent's frame where its coordinates are zero
-        ("turned", np.float64, 4),  # the frame rotated by pi about the axis
+        ("rotated", np.float64, 4),  # the frame rotated by pi about the axis
         ("axis", np.float64, 3),
         ("lower", np.float64),  # [rad or m]
         ("upper", np.float64),
@@ -166,7 +168,7 @@ class Articulation:
         joints["lower"], joints["upper"] = lower, upper
         _check_twists(joints)
         joints["frame"], joints["axis"] = _checked_frames(frames, count), _checked_axes(axes, count)
-        joints["turned"], joints["cone"] = half_turned(joints), _checked_cones(cones, count)
+        joints["rotated"], joints["cone"] = rotated_by_pi(joints), _checked_cones(cones, count)
         shown = {name: frozen(joints[name].copy()) for name in ("lower", "upper")}
         self.__dict__.update(
             skeleton=skeleton, kinds=names, mimics=follows, joints=joints, mechanisms={}, **shown,
@@ -213,9 +215,7 @@ class Articulation:
         Raises:
             ValueError: if there is no such joint.
         """
-        j = self.index(joint)
-        begin = int(self.joints["coordinate"][j])
-        return slice(begin, begin + int(WIDTHS[self.joints["kind"][j]]))
+        return self._range("coordinate", WIDTHS, joint)
 
     def freedoms_of(self, joint: int | str) -> slice:
         """Return where a joint's degrees of freedom are in a velocity, likewise.
@@ -223,9 +223,12 @@ class Articulation:
         Raises:
             ValueError: if there is no such joint.
         """
+        return self._range("freedom", FREEDOMS, joint)
+
+    def _range(self, field: str, counts: IndexArray, joint: int | str) -> slice:
         j = self.index(joint)
-        begin = int(self.joints["freedom"][j])
-        return slice(begin, begin + int(FREEDOMS[self.joints["kind"][j]]))
+        begin = int(self.joints[field][j])
+        return slice(begin, begin + int(counts[self.joints["kind"][j]]))
 
     def neutral(self) -> FloatArray:
         """Return the coordinates in which every joint is at zero, or at its nearest limit."""
@@ -241,7 +244,7 @@ class Articulation:
     def random(self, rng: np.random.Generator, *shape: int) -> FloatArray:
         """Return coordinates drawn evenly within the limits, (..., coordinate).
 
-        Without limits a hinge is drawn from a whole turn, a slide or a free joint from within a
+        Without limits a hinge is drawn from all angles, a slide or a free joint from within a
         metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
 
         Raises:
@@ -286,11 +289,7 @@ class Articulation:
         Raises:
             ValueError: as for `clamp`.
         """
-        given = self.checked("q", q)
-        shape = (*given.shape[:-1], self.joint_count)
-        offsets, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
-        _locals(self.joints, one_batch(given), one_batch(offsets, 2), one_batch(rotations, 2))
-        return offsets, rotations
+        return self._posed(_locals, q)
 
     def forward(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4).
@@ -298,10 +297,13 @@ class Articulation:
         Raises:
             ValueError: as for `clamp`.
         """
+        return self._posed(_forward, q)
+
+    def _posed(self, kernel: Kernel, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
         given = self.checked("q", q)
         shape = (*given.shape[:-1], self.joint_count)
         positions, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
-        _forward(self.joints, one_batch(given), one_batch(positions, 2), one_batch(rotations, 2))
+        kernel(self.joints, one_batch(given), one_batch(positions, 2), one_batch(rotations, 2))
         return positions, rotations
 
     def checked(self, name: str, q: ArrayLike) -> FloatArray:
@@ -322,10 +324,10 @@ class Articulation:
     @functools.cached_property
     def _quaternions(self) -> list[slice]:
         """Where in q quaternions are."""
-        ends = [self.coordinates_of(int(j)).stop for j in self._leading if self._is_turning(j)]
+        ends = [self.coordinates_of(int(j)).stop for j in self._leading if self._has_quaternion(j)]
         return [slice(end - 4, end) for end in ends]
 
-    def _is_turning(self, j: int) -> bool:
+    def _has_quaternion(self, j: int) -> bool:
         return self.kinds[j] in ("ball", "free")
 
     @functools.cached_property
@@ -350,49 +352,49 @@ def joint_transform(joints, j, q):
     kind, at = joints["kind"][j], joints["coordinate"][j]
     if kind == HINGE:
         angle = joints["multiplier"][j] * q[at] + joints["shift"][j]
-        R = rotated_by_half(R, load_quaternion(joints["turned"], j), half_turn(angle))
+        R = rotated_by_half(R, load_quaternion(joints["rotated"], j), half_angle(angle))
     elif kind == SLIDE:
         distance = joints["multiplier"][j] * q[at] + joints["shift"][j]
         x = add(x, rotate(R, scale(distance, load_vector(joints["axis"], j))))
     elif kind == BALL:
-        R = multiply(R, (q[at], q[at + 1], q[at + 2], q[at + 3]))
+        R = multiply(R, load_quaternion_from(q, at))
     elif kind == FREE:
         x = add(x, rotate(R, (q[at], q[at + 1], q[at + 2])))
-        R = multiply(R, (q[at + 3], q[at + 4], q[at + 5], q[at + 6]))
+        R = multiply(R, load_quaternion_from(q, at + 3))
     return x, R
 
 
-def half_turned(joints: RecordArray) -> FloatArray:
+def rotated_by_pi(joints: RecordArray) -> FloatArray:
     """Return each joint's frame rotated by pi about its axis, (joint, 4)."""
     half = np.column_stack([np.zeros(len(joints)), joints["axis"]])
     return rotation.multiply(np.ascontiguousarray(joints["frame"]), half)
 
 
-def rotated_by_half(R, turned, half):
-    """Return R rotated about the axis about which `turned` is R rotated by pi.
+def rotated_by_half(R, rotated, half):
+    """Return R rotated about the axis about which `rotated` is R rotated by pi.
 
     With c, s of half the angle, R (c + s axis) is c R + s (R axis).
     """
     c, s = half
     return (
-        c * R[0] + s * turned[0],
-        c * R[1] + s * turned[1],
-        c * R[2] + s * turned[2],
-        c * R[3] + s * turned[3],
+        c * R[0] + s * rotated[0],
+        c * R[1] + s * rotated[1],
+        c * R[2] + s * rotated[2],
+        c * R[3] + s * rotated[3],
     )
 
 
 def swing_twist(Q, axis):
     """Return swing S and twist angle t [rad] of Q = S exp(t axis): first t about the axis."""
     along = dot((Q[1], Q[2], Q[3]), axis)
-    if Q[0] == 0.0 and along == 0.0:  # half a turn about an axis across: any twist would do
+    if Q[0] == 0.0 and along == 0.0:  # a rotation by pi about an axis across: any twist would do
         return Q, 0.0
     twist = 2.0 * math.atan2(along, Q[0])
     if twist > math.pi:
         twist -= 2.0 * math.pi
     elif twist <= -math.pi:
         twist += 2.0 * math.pi
-    return multiply(Q, turn_about(axis, -twist)), twist
+    return multiply(Q, rotation_about(axis, -twist)), twist
 
 
 def clamp_ball(Q, axis, lower, upper, cone):
@@ -405,7 +407,7 @@ def clamp_ball(Q, axis, lower, upper, cone):
         return Q
     if angle > cone:
         swing = exponential(scale(cone / angle, tilt))
-    return normalised(multiply(swing, turn_about(axis, bounded)))
+    return normalised(multiply(swing, rotation_about(axis, bounded)))
 
 
 def clamp_joint(joints, j, q):
@@ -416,10 +418,9 @@ def clamp_joint(joints, j, q):
     if kind in (HINGE, SLIDE):
         q[at] = min(max(q[at], joints["lower"][j]), joints["upper"][j])
     elif kind == BALL:
-        Q = (q[at], q[at + 1], q[at + 2], q[at + 3])
         bounds = joints["lower"][j], joints["upper"][j], joints["cone"][j]
-        w, x, y, z = clamp_ball(Q, load_vector(joints["axis"], j), *bounds)
-        q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
+        Q = clamp_ball(load_quaternion_from(q, at), load_vector(joints["axis"], j), *bounds)
+        store_quaternion_to(q, at, Q)
 
 
 def joint_excess(joints, j, q):
@@ -430,31 +431,33 @@ def joint_excess(joints, j, q):
     if kind in (HINGE, SLIDE):
         return max(joints["lower"][j] - q[at], q[at] - joints["upper"][j], 0.0)
     if kind == BALL:
-        swing, twist = swing_twist(
-            (q[at], q[at + 1], q[at + 2], q[at + 3]), load_vector(joints["axis"], j)
-        )
+        swing, twist = swing_twist(load_quaternion_from(q, at), load_vector(joints["axis"], j))
         tilt = logarithm(swing)
         over = math.sqrt(dot(tilt, tilt)) - joints["cone"][j]
         return max(joints["lower"][j] - twist, twist - joints["upper"][j], over, 0.0)
     return 0.0
 
 
-def fit_start(joints, q):
-    """Make the quaternions among coordinates unit; return whether they and all others were fit.
+def normalise_start(joints, q):
+    """Make the quaternions among coordinates unit; return whether they and all others are valid.
 
-    Fit are numbers up to 1e75, and quaternions unit within 1e-6.
+    Valid are numbers up to 1e75, and quaternions unit within 1e-6.
     """
-    fine = True
+    valid = True
     for k in range(len(q)):
-        fine &= abs(q[k]) <= LARGEST_COORDINATE
+        valid &= abs(q[k]) <= LARGEST_COORDINATE
     for j in range(len(joints)):
-        kind = joints["kind"][j]
-        if kind in (BALL, FREE):
-            at = joints["coordinate"][j] + (3 if kind == FREE else 0)
-            Q, unit = made_unit((q[at], q[at + 1], q[at + 2], q[at + 3]))
-            q[at], q[at + 1], q[at + 2], q[at + 3] = Q
-            fine &= unit
-    return fine
+        if joints["kind"][j] in (BALL, FREE):
+            at = ball_coordinate(joints, j)
+            Q, unit = made_unit(load_quaternion_from(q, at))
+            store_quaternion_to(q, at, Q)
+            valid &= unit
+    return valid
+
+
+def ball_coordinate(joints, j):
+    """Return where the quaternion of a ball or free joint begins in q."""
+    return joints["coordinate"][j] + (3 if joints["kind"][j] == FREE else 0)
 
 
 def articulated_pose(joints, q, positions, rotations):

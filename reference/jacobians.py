@@ -1,9 +1,9 @@
 """Jacobians of a tree of joints, and the steps on its coordinates that they are derivatives by.
 
-A velocity v, (..., freedom), holds for each joint in turn what its kind may do: the rate of a
+A velocity v, (..., freedom), holds joint after joint what its kind may do: the rate of a
 hinge [rad/s] or a slide [m/s]; of a ball the angular velocity in its own, moved frame; of a free
 joint the rate of its position coordinates, then the angular velocity in its own frame. So a step
-turns a quaternion from the right: Q exp(v). A mimic joint has no velocity of its own: it adds to
+rotates a quaternion from the right: Q exp(v). A mimic joint has no velocity of its own: it adds to
 its leader's column.
 """
 
@@ -27,9 +27,11 @@ from .motion_subspace import accumulate, motion, velocity_at
 from .quaternion import (
     conjugate,
     exponential,
+    load_quaternion_from,
     load_vector,
     logarithm,
     multiply,
+    store_quaternion_to,
     subtract,
 )
 from .skeleton import Skeleton
@@ -81,7 +83,7 @@ def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
     """
     model, start = _coordinates("q", articulation, q)
     step = arguments.coordinates("v", v, "...", model.freedom_count)
-    start, step = _spread("v", start, step)
+    start, step = arguments.together("v", start, step)
     moved = start.copy()
     _integrate(model.joints, one_batch(step), one_batch(moved))
     return moved.reshape(*moved.shape[:-1], -1, 4) if isinstance(articulation, Skeleton) else moved
@@ -90,14 +92,14 @@ def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
 def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
     """Return the velocity that leads from q0 to q1 in one second, (..., freedom).
 
-    It is the inverse of `integrate`: rotations go the shorter way round, at most pi.
+    It is the inverse of `integrate`: rotations go through the smaller angle, at most pi.
 
     Raises:
         ValueError: as for `jacobian`, or if the leading axes do not broadcast.
     """
     model, start = _coordinates("q0", articulation, q0)
     _, end = _coordinates("q1", articulation, q1)
-    start, end = _spread("q1", start, end)
+    start, end = arguments.together("q1", start, end)
     v = np.empty((*start.shape[:-1], model.freedom_count))
     _difference(model.joints, one_batch(end), one_batch(start), one_batch(v))
     return v
@@ -133,9 +135,7 @@ def move_joint(joints, j, v, q):
 
 def rotate_ball(q, at, v):
     """Rotate the quaternion that begins at an index of q by a rotation vector in its own frame."""
-    Q = (q[at], q[at + 1], q[at + 2], q[at + 3])
-    w, x, y, z = multiply(Q, exponential(v))
-    q[at], q[at + 1], q[at + 2], q[at + 3] = w, x, y, z
+    store_quaternion_to(q, at, multiply(load_quaternion_from(q, at), exponential(v)))
 
 
 def joint_difference(joints, j, q1, q0, v):
@@ -155,8 +155,9 @@ def joint_difference(joints, j, q1, q0, v):
 
 def rotation_between(q1, q0, at):
     """Return log(Q0* Q1), the rotation vector in Q0's own frame from Q0 to Q1."""
-    Q0 = (q0[at], q0[at + 1], q0[at + 2], q0[at + 3])
-    return logarithm(multiply(conjugate(Q0), (q1[at], q1[at + 1], q1[at + 2], q1[at + 3])))
+    return logarithm(
+        multiply(conjugate(load_quaternion_from(q0, at)), load_quaternion_from(q1, at))
+    )
 
 
 def _jacobians_batch(joints, effectors, q, J):
@@ -199,9 +200,3 @@ def _coordinates(name: str, given: Model, q: ArrayLike) -> tuple[Articulation, F
     balls = Articulation(model)
     local = arguments.floats(name, q, "...", model.joint_count, 4)
     return balls, balls.checked(name, local.reshape(*local.shape[:-2], balls.coordinate_count))
-
-
-def _spread(name: str, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return both with the same leading axes; `name` is the second's, for the error."""
-    batch = arguments.broadcast(name, a.shape[:-1], b.shape[:-1])
-    return arguments.spread(a, (*batch, a.shape[-1])), arguments.spread(b, (*batch, b.shape[-1]))

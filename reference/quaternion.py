@@ -43,6 +43,16 @@ def store_vector(p, j, value):
     p[j, 0], p[j, 1], p[j, 2] = value
 
 
+def load_quaternion_from(q, k):
+    """Return four entries of an array from the k-th on, as a tuple."""
+    return q[k], q[k + 1], q[k + 2], q[k + 3]
+
+
+def store_quaternion_to(q, k, value):
+    """Write a tuple into four entries of an array from the k-th on."""
+    q[k], q[k + 1], q[k + 2], q[k + 3] = value
+
+
 def add(a, b):
     """Return the sum of two vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
@@ -233,13 +243,13 @@ def angle_between(a, b):
     return norm(v)
 
 
-def turn_about(axis, angle):
+def rotation_about(axis, angle):
     """Return the rotation by an angle [rad] about a unit axis."""
-    c, s = half_turn(angle)
+    c, s = half_angle(angle)
     return c, s * axis[0], s * axis[1], s * axis[2]
 
 
-def half_turn(angle):
+def half_angle(angle):
     """Return cosine and sine of half an angle; up to pi by the series of its quarter."""
     quarter = 0.25 * angle
     t = quarter * quarter

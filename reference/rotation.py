@@ -81,7 +81,9 @@ def multiply(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if an argument does not hold finite quaternions.
     """
-    a, b = _together(arguments.array("a", a, "...", 4), "b", arguments.array("b", b, "...", 4))
+    a, b = arguments.together(
+        "b", arguments.array("a", a, "...", 4), arguments.array("b", b, "...", 4)
+    )
     return _joined(quaternion.multiply(_parts(a), _parts(b)))
 
 
@@ -100,7 +102,9 @@ def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if an argument does not hold finite quaternions or vectors.
     """
-    q, v = _together(arguments.array("q", q, "...", 4), "v", arguments.array("v", v, "...", 3))
+    q, v = arguments.together(
+        "v", arguments.array("q", q, "...", 4), arguments.array("v", v, "...", 3)
+    )
     return _joined(quaternion.rotate(_parts(q), _parts(v)))
 
 
@@ -113,7 +117,9 @@ def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if an argument does not hold finite vectors.
     """
-    a, b = _together(arguments.array("a", a, "...", 3), "b", arguments.array("b", b, "...", 3))
+    a, b = arguments.together(
+        "b", arguments.array("a", a, "...", 3), arguments.array("b", b, "...", 3)
+    )
     a, b = _scaled(a), _scaled(b)
     result = np.empty((*a.shape[:-1], 4))
     _between(_rows(a), _rows(b), result.reshape(-1, 4))
@@ -150,7 +156,7 @@ def angle(a: ArrayLike, b: ArrayLike) -> FloatArray:
     Raises:
         ValueError: if an argument does not hold unit quaternions.
     """
-    a, b = _together(unit("a", a), "b", unit("b", b))
+    a, b = arguments.together("b", unit("a", a), unit("b", b))
     return np.linalg.norm(logarithm(multiply(conjugate(a), b)), axis=-1)
 
 
@@ -198,15 +204,6 @@ def _quaternion_form(R: FloatArray) -> FloatArray:
 
 def _lengths(shape: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(arguments.integer("shape", length, least=0) for length in shape)
-
-
-def _together(a: FloatArray, name: str, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return both with the same leading axes; `name` is the second's, for the error."""
-    batch = arguments.broadcast(name, a.shape[:-1], b.shape[:-1])
-    return (
-        np.broadcast_to(a, (*batch, a.shape[-1])),
-        np.broadcast_to(b, (*batch, b.shape[-1])),
-    )
 
 
 def _scaled(v: FloatArray) -> FloatArray:

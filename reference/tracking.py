@@ -128,13 +128,11 @@ def _along(
         raise ValueError(f"curve: expected shape (frame, 3), got {came}")
     if batch[0] == 0:
         raise ValueError("curve: expected at least one point, got none")
-    return [_spread(one, *batch) for one in check_numbers(targets)]
-
-
-def _spread(one: CheckedTarget, frames: int) -> CheckedTarget:
-    if one.rotation is not None:
-        one = one._replace(rotation=arguments.spread(one.rotation, (frames, 4)))
-    return one._replace(position=arguments.spread(one.position, (frames, 3)))
+    frames = batch[0]
+    return [
+        one.mapped(lambda values: arguments.spread(values, (frames, values.shape[-1])))
+        for one in check_numbers(targets)
+    ]
 
 
 def _start(skeleton: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
@@ -193,24 +191,20 @@ def _settled(
     """Return the motion q with its residuals, those of its frames solved again that need it."""
     limits = settings.limits._replace(chained=False)
     unchained = replace(settings, limits=limits, record=False)
-    still = replace(unchained, limits=limits._replace(max_iterations=0, far_iterations=0))
-    last = solve_checked(skeleton, q, targets, still)
+    unmoved = replace(unchained, limits=limits._replace(max_iterations=0, far_iterations=0))
+    last = solve_checked(skeleton, q, targets, unmoved)
     off = np.flatnonzero(reached & (last.outcome != Outcome.CONVERGED))
     iterations = np.asarray(motion.iterations) + steps
     if len(off):
-        again = solve_checked(skeleton, q[off], [_part(one, off) for one in targets], unchained)
+        again = solve_checked(
+            skeleton, q[off], [one.mapped(lambda values: values[off]) for one in targets], unchained
+        )
         q[off] = again.coordinates
         iterations[off] += again.iterations
-        last = solve_checked(skeleton, q, targets, still)
+        last = solve_checked(skeleton, q, targets, unmoved)
     outcome = np.where(reached | (last.outcome == Outcome.CONVERGED), last.outcome, motion.outcome)
     return last._replace(
         iterations=arguments.frozen(iterations),
         outcome=arguments.frozen(outcome),
         history=motion.history,
     )
-
-
-def _part(one: CheckedTarget, frames: IndexArray) -> CheckedTarget:
-    if one.rotation is not None:
-        one = one._replace(rotation=one.rotation[frames])
-    return one._replace(position=one.position[frames])

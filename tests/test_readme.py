@@ -1,15 +1,24 @@
 import re
+import subprocess
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from bench.verify import json_file
+from crosscheck.conformance import catalogue
+from crosscheck.conformance.language import translator
+from reference import Skeleton, forward_kinematics, rotation
+
 README = Path(__file__).parents[1] / "README.md"
+CHINESE = README.with_name("README.zh-CN.md")
 PAGES = sorted((README.parent / "docs").glob("*.md"))
 PROGRAMS = [page for page in PAGES if "```python" in page.read_text(encoding="utf-8")]
 
 
-def snippets(language):
-    return re.findall(rf"```{language}\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+def snippets(language, page=README):
+    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
 
 
 def blocks(page):
@@ -40,9 +49,27 @@ def test_the_python_interface_runs_as_printed(capsys, monkeypatch, tmp_path):
     assert (tmp_path / "heart.bvh").stat().st_size > 0
 
 
+def test_the_code_in_chinese_runs_and_is_right(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    kinematics, interface, laws = snippets("python", CHINESE)
+    names = {}
+    exec(compile(kinematics, str(CHINESE), "exec"), names)
+    rng = np.random.default_rng(7)
+    arm = Skeleton([-1, 0, 1, 1], rng.normal(size=(4, 3)))
+    local = rotation.random(rng, 4)
+    pose = forward_kinematics(arm, local)
+    theirs = names["forward_kinematics"](arm.parents, arm.offsets, local)
+    for found, expected in zip(theirs, (pose.positions, pose.rotations), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+    exec(compile(interface, str(CHINESE), "exec"), {})
+    assert capsys.readouterr().out.count("CONVERGED") == 2
+    exec(compile(laws, str(CHINESE), "exec"), names)
+    assert callable(names["test_my_kinematics"])
+
+
 LINKS = [
     (page, link)
-    for page in (README, *PAGES)
+    for page in (README, CHINESE, *PAGES)
     for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8"))
 ]
 
@@ -67,6 +94,45 @@ def test_every_make_target_that_is_named_exists():
     targets = set(
         re.findall(r"^([a-z-]+):", (README.parent / "Makefile").read_text(), re.MULTILINE)
     )
-    named = set(re.findall(r"make ([a-z-]+)  ", README.read_text(encoding="utf-8")))
-    assert named <= targets
-    assert {"report", "test"} <= named
+    for page in (README, CHINESE):
+        named = set(re.findall(r"make ([a-z-]+)  ", page.read_text(encoding="utf-8")))
+        assert named <= targets
+        assert {"report", "test"} <= named
+
+
+def options():
+    """The options of `plumbob verify` that its help names."""
+    command = [sys.executable, "-m", "plumbob", "verify", "--help"]
+    run = subprocess.run(command, capture_output=True, text=True, check=True, cwd=README.parent)
+    return set(re.findall(r"--[a-z-]+", run.stdout))
+
+
+def test_every_option_of_verify_that_a_page_shows_exists():
+    known = options()
+    for page in (README, CHINESE, README.parent / "docs" / "verify.md"):
+        lines = re.findall(r"plumbob verify [^\n`]*", page.read_text(encoding="utf-8"))
+        shown = {option for line in lines for option in re.findall(r" (--[a-z-]+)", line)}
+        assert shown - {"--flag"} <= known, page
+        assert len(shown) >= 3, page
+
+
+FAULT = (
+    "Your CCD multiplies the world rotation d onto the local one on the left, Q := d Q: the "
+    "parent's inverse is missing. Use Q := conj(R_parent) d R_parent Q."
+)
+
+
+@pytest.mark.parametrize(("page", "language"), [(README, "en"), (CHINESE, "zh")])
+def test_the_screen_that_a_page_shows_says_what_verify_says(page, language):
+    assert FAULT in catalogue.templates()
+    text = re.sub(r"\s+", "", page.read_text(encoding="utf-8"))
+    assert re.sub(r"\s+", "", translator(language)(FAULT)) in text
+
+
+def test_the_page_of_verify_describes_every_key_and_option():
+    text = (README.parent / "docs" / "verify.md").read_text(encoding="utf-8")
+    for kind in (json_file.ReportRecord, json_file.TaskRecord, json_file.CaseRecord,
+                 json_file.FindingRecord, json_file.ExplanationRecord):  # fmt: skip
+        for name in kind.__struct_fields__:
+            assert f"`{name}`" in text or f"`{name}[]`" in text, name
+    assert {option for option in options() if option not in text} == {"--help", "--output"}

@@ -14,13 +14,11 @@ class Experiment(NamedTuple):
         package: the folder, by its full name as a package.
         suite: what the command line calls it; experiments may share a suite.
         chapter: the section of the report that shows it.
-        about: what the suite answers; "" where another experiment of the suite says so.
     """
 
     package: str
     suite: str
     chapter: str
-    about: str = ""
 
     def blocks(self, scale: Scale) -> Iterator[Block]:
         """Yield what there is to be measured; engines are imported only now."""

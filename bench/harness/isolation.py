@@ -3,31 +3,19 @@
 import atexit
 import contextlib
 import os
-import queue
-import signal
-import socket
-import subprocess
-import sys
-import threading
 from collections import Counter
-from collections.abc import Generator, Iterator, Mapping
-from multiprocessing import Pipe
-from multiprocessing.reduction import ForkingPickler
-from pathlib import Path
+from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from crosscheck.child_process import PipedProcess
+
 from .progress import Progress, announce
-from .worker import LAST, Begun, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
+from .worker import LAST, Begun, Calculation, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
 
 # A worker that says nothing for so long [s] is ended: before it is ready it may compile.
 START_PATIENCE = 180.0
 TARGET_PATIENCE = 10.0
-# A process whose connection has ended is given so long [s] to end by itself.
-_LEAVE = 1.0
-# In safe-path mode (-P) nothing is imported from where one works; the bench comes from where ours
-# is, before any other that the path may lead to.
-_ROOT = Path(__file__).resolve().parents[2]
-_START = "import sys; sys.path.insert(0, sys.argv[1]); import bench.harness.worker as w; w.main({})"
+_START = "import bench.harness.worker as w; w.main({})"
 
 
 class Outcome(NamedTuple):
@@ -58,7 +46,7 @@ class WorkerProcess:
     ) -> None:
         # While it is being set up, and once it is ready.
         self._patience = start_patience, target_patience
-        self._worker: _Worker | None = None
+        self._worker: PipedProcess | None = None
         atexit.register(self.close)
 
     @property
@@ -88,6 +76,17 @@ class WorkerProcess:
                         outcome = outcome._replace(trouble=raised(outcome.solved))
         return outcome
 
+    def find(self, job: Work) -> Mapping[str, Any]:
+        """Return what a job measures.
+
+        Raises:
+            RuntimeError: if it measures nothing; the message says why.
+        """
+        outcome = self.perform(job)
+        if outcome.found is None:
+            raise RuntimeError(outcome.trouble)
+        return outcome.found
+
     def stream(self, job: Work) -> Generator[Message, None, None]:
         """Perform a job and yield its messages as they come; the last is Done, Unfit or Lost.
 
@@ -106,16 +105,16 @@ class WorkerProcess:
     def _once(self, job: Work) -> Iterator[Message]:
         ready = False
         try:
-            worker = self._worker = self._worker or _Worker()
+            worker = self._worker = self._worker or PipedProcess(_START, one_thread())
             worker.send(job)
             message: Message | None = None
             while not isinstance(message, LAST):
-                message = worker.receive(self._patience[ready])
+                message = _received(worker, self._patience[ready])
                 ready = ready or isinstance(message, Ready)
                 if isinstance(message, Lost):
                     self.close()
                 yield message
-        except BaseException:  # what is still under way must not answer the next job
+        except BaseException:  # what is not finished must not answer the next job
             self.close()
             raise
 
@@ -126,73 +125,32 @@ class WorkerProcess:
             worker.end()
 
 
-class _Worker:
-    """A process that performs jobs, and a thread that talks with it, so that we never wait."""
+def _received(worker: PipedProcess, patience: float) -> Message:
+    """Return the next message, Lost if there will be none or none came in time [s]."""
+    try:
+        message = worker.receive(patience)
+    except TimeoutError:
+        return Lost(f"ended after {patience:g} s of silence", silent=True)
+    except EOFError:
+        message = None
+    if isinstance(message, Message):
+        return message
+    how = worker.ending()
+    if not how:
+        return Lost("its process broke off the connection, or sent what is no message")
+    return Lost(f"its process {'was ' if how.startswith('by') else ''}ended {how}")
 
-    def __init__(self) -> None:
-        self._jobs: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._messages: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._connection, theirs = Pipe()
-        with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-c", _START.format(theirs.fileno()), str(_ROOT)],
-                pass_fds=[theirs.fileno()], env=one_thread(), process_group=0,
-                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-            )  # fmt: skip
-        self._thread = threading.Thread(target=self._talk, daemon=True)
-        self._thread.start()
 
-    def send(self, job: Work) -> None:
-        """Send a job; if the process is gone, the next message says so."""
-        self._jobs.put(bytes(ForkingPickler.dumps(job)))
+def in_a_fresh_process(
+    patience: float, function: Callable[..., Mapping[str, Any]], *arguments: Any
+) -> Mapping[str, Any]:
+    """Return what a call measures in a process that does nothing else, within so long [s].
 
-    def receive(self, patience: float) -> Message:
-        """Return the next message, Lost if there will be none or none came in time [s]."""
-        try:
-            message = self._messages.get(timeout=patience)
-        except queue.Empty:
-            return Lost(f"ended after {patience:g} s of silence", silent=True)
-        if isinstance(message, Message):
-            return message
-        return Lost(self._end_of_process())
-
-    def end(self) -> None:
-        """End the process and those that it has started."""
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.kill()
-        self._process.wait()
-        self._jobs.put(None)
-        with (
-            socket.socket(fileno=os.dup(self._connection.fileno())) as ours,
-            contextlib.suppress(OSError),
-        ):
-            ours.shutdown(socket.SHUT_RDWR)  # whoever else may hold the other end
-        self._thread.join()
-        self._connection.close()
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-
-    def _talk(self) -> None:
-        """Pass on jobs and messages; None is the end, by whatever the process does or sends."""
-        with contextlib.suppress(Exception):
-            while (job := self._jobs.get()) is not None:
-                self._connection.send_bytes(job)
-                message = None
-                while not isinstance(message, LAST):
-                    message = self._connection.recv()
-                    self._messages.put(message)
-        self._messages.put(None)
-
-    def _end_of_process(self) -> str:
-        try:
-            code = self._process.wait(timeout=_LEAVE)
-        except subprocess.TimeoutExpired:
-            return "its process broke off the connection, or sent what is no message"
-        if code >= 0:
-            return f"its process ended with code {code}"
-        names = {int(known): known.name for known in signal.Signals}
-        return f"its process was ended by {names.get(-code, f'signal {-code}')}"
+    Raises:
+        RuntimeError: if it raises, or is lost; the message says which.
+    """
+    with contextlib.closing(WorkerProcess(patience)) as worker:
+        return worker.find(Calculation(function, arguments))
 
 
 def raised(solved: list[Solved]) -> str:

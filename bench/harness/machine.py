@@ -27,7 +27,7 @@ _PACKAGES = ("reference", "crosscheck", "bench")
 # What only shows numbers; all else may change one. None of these is imported by what measures.
 PRESENTATION = ("bench/cli.py", "bench/show.py", "bench/presentation")
 # Likewise in every experiment.
-PRESENTATION_FILES = ("tables.py", "figures.py", "entries.py", "files.py")
+PRESENTATION_FILES = ("tables.py", "figures.py", "readings.py", "files.py")
 
 
 @functools.cache
@@ -69,17 +69,13 @@ def source_digest() -> str:
 
 def source_files() -> list[Path]:
     """Return all files of the three packages but those that only show numbers."""
-    found = [
-        Path(folder, file)
-        for name in _PACKAGES for folder, _, files in os.walk(_ROOT / name) for file in files
-        if not _is_left_out(os.path.relpath(os.path.join(folder, file), _ROOT).split(os.sep))
-    ]  # fmt: skip
-    return sorted(found)
+    every = (path for name in _PACKAGES for path in (_ROOT / name).rglob("*") if path.is_file())
+    return sorted(path for path in every if not _is_left_out(path.relative_to(_ROOT).parts))
 
 
-def _is_left_out(parts: list[str]) -> bool:
+def _is_left_out(parts: tuple[str, ...]) -> bool:
     shows = "/".join(parts[:2]) in PRESENTATION
-    shows |= parts[:2] == ["bench", "experiments"] and parts[-1] in PRESENTATION_FILES
+    shows |= parts[:2] == ("bench", "experiments") and parts[-1] in PRESENTATION_FILES
     return shows or "__pycache__" in parts
 
 

@@ -171,16 +171,6 @@ def ratio(a: float, b: float) -> float:
     return a / b if b else math.nan
 
 
-def microseconds(seconds: float) -> float:
-    """Return a time in microseconds."""
-    return 1e6 * seconds
-
-
-def nanoseconds(seconds: float) -> float:
-    """Return a time in nanoseconds."""
-    return 1e9 * seconds
-
-
 def gigabytes_per_second(moved: float, seconds: float) -> float:
     """Return the bandwidth of so many bytes in so many seconds [GB/s]."""
     return moved / seconds / 1e9
@@ -191,24 +181,9 @@ def mean(values: Floats) -> float:
     return float(np.mean(values)) if np.size(values) else math.nan
 
 
-def degrees(radians: float) -> float:
-    """Return an angle in degrees."""
-    return math.degrees(radians)
-
-
 def extent(values: Floats) -> tuple[float, float]:
     """Return the least and the greatest value."""
     return float(np.min(values)), float(np.max(values))
-
-
-def percent(part: float, whole: float) -> float:
-    """Return a part in percent of the whole; NaN where that is zero."""
-    return 100.0 * ratio(part, whole)
-
-
-def milliseconds(seconds: float) -> float:
-    """Return a time in milliseconds."""
-    return 1e3 * seconds
 
 
 def first_below(values: Floats, limit: float) -> int | None:

@@ -238,10 +238,8 @@ def check_folder(path: Path) -> None:
 
 
 def _kind(mode: int) -> str:
-    kinds = {
-        stat.S_IFDIR: "folder", stat.S_IFIFO: "pipe", stat.S_IFCHR: "device",
-        stat.S_IFBLK: "device", stat.S_IFSOCK: "socket", stat.S_IFREG: "file",
-    }  # fmt: skip
+    kinds = {stat.S_IFDIR: "folder", stat.S_IFIFO: "pipe", stat.S_IFREG: "file"}
+    kinds |= {stat.S_IFCHR: "device", stat.S_IFBLK: "device", stat.S_IFSOCK: "socket"}
     return kinds.get(stat.S_IFMT(mode), "special file")
 
 

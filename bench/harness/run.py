@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -61,10 +61,8 @@ def _run_suite(
 
 def _finished(suite: str, scale: str, count: int, seconds: float) -> Record:
     """Return the record that says that a suite was gone through to its end."""
-    return Record(
-        FINISHED, suite, "", size=count, notes={"scale": scale},
-        stamp=stamp(), when=now(), seconds=seconds,
-    )  # fmt: skip
+    made: dict[str, Any] = {"stamp": stamp(), "when": now(), "seconds": seconds}
+    return Record(FINISHED, suite, "", size=count, notes={"scale": scale}, **made)
 
 
 def _is_left_over(suite: str, known: set[Key], record: Record) -> bool:
@@ -77,10 +75,8 @@ def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
     if "check" not in suites:
         return []
     checks = [r for r in RecordFile(folder).read().records if r.suite == "check"]
-    return [
-        f"claim {record.problem!r} missed: {record.notes.get('missed', '')}"
-        for record in checks if not np.all(record.arrays.get("held", True))
-    ]  # fmt: skip
+    missed = [record for record in checks if not np.all(record.arrays.get("held", True))]
+    return [f"claim {r.problem!r} missed: {r.notes.get('missed', '')}" for r in missed]
 
 
 def forget(suites: Sequence[str], folder: Path) -> None:

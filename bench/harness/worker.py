@@ -4,13 +4,13 @@ A solver may print, crash or hang: it does so in a process of its own, which `is
 Only messages go through the connection.
 """
 
-import os
-import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+
+from crosscheck.child_process import attach
 
 from .progress import Progress, listening
 
@@ -76,7 +76,22 @@ class Work(Protocol):
         """Yield what comes of it, each part as soon as it is there."""
 
 
-def said(error: Exception) -> str:
+class Calculation(NamedTuple):
+    """A job that is one call, which returns what was measured, by name."""
+
+    function: Callable[..., Mapping[str, Any]]
+    arguments: tuple[Any, ...]
+
+    def perform(self) -> Iterator[Message]:
+        """Yield what is measured."""
+        try:
+            yield Found(self.function(*self.arguments))
+            yield Done()
+        except Exception as error:
+            yield Unfit(describe(error))
+
+
+def describe(error: Exception) -> str:
     """Return what an exception says, on one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())[:200]
 
@@ -90,7 +105,7 @@ def serve(connection: Connection) -> None:
             except EOFError:
                 return
             except Exception as error:  # a class that cannot be imported here, or is another
-                connection.send(Unfit(said(error)))
+                connection.send(Unfit(describe(error)))
                 continue
             connection.send(Begun())
             for message in job.perform():
@@ -98,13 +113,5 @@ def serve(connection: Connection) -> None:
 
 
 def main(descriptor: int) -> None:
-    """Serve at a connection that this process was born with, for as long as its parent lives."""
-    os.set_inheritable(descriptor, False)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    serve(Connection(descriptor))
-
-
-def _end_with_parent() -> None:
-    """Wait for the end of the input, which only the parent holds open, and leave."""
-    os.read(0, 1)
-    os._exit(1)
+    """Serve at a connection that this process was started with, as long as its parent lives."""
+    serve(attach(descriptor))

@@ -86,22 +86,18 @@ _IK = (
     Solver("damped_least_squares", "damped least squares", style=FOURTH),
     Solver("jacobian_transpose", "Jacobian transpose", style=FIFTH),
 )
+# Few iterations suffice for some, and one is all there is for others.
+_QUADRATIC: dict[str, Any] = {"converges": True, "followed": 12, "counted": 60}
+_QUADRATIC |= {"ladder": FEW, "motion": (1, 3)}
+_ONE_SOLVE: dict[str, Any] = {"followed": 0, "counted": 20, "certified": 1}
 _STEP = (
     StepSolver("local_global", "local/global", style=FIRST, followed=1000),
     StepSolver("chebyshev", "Chebyshev", style=THIRD, followed=1000),
     StepSolver("lbfgs", "L-BFGS", style=FOURTH),
-    StepSolver(
-        "newton_cg", "Newton-CG", style=FIFTH, converges=True, followed=12, counted=60,
-        ladder=FEW, motion=(1, 3),
-    ),
-    StepSolver(
-        "newton", "Newton", style=SECOND, converges=True, followed=12, counted=60, certified=100,
-        ladder=FEW, motion=(1, 3),
-    ),
-    StepSolver(
-        "gauss_newton", "Gauss-Newton", is_linear=True, followed=0, counted=20, certified=1
-    ),
-)  # fmt: skip
+    StepSolver("newton_cg", "Newton-CG", style=FIFTH, **_QUADRATIC),
+    StepSolver("newton", "Newton", style=SECOND, certified=100, **_QUADRATIC),
+    StepSolver("gauss_newton", "Gauss-Newton", is_linear=True, **_ONE_SOLVE),
+)
 
 # One Levenberg-Marquardt loop on the kinematics of either engine.
 LOOPS = tuple(Solver(f"lm/{engine}", f"LM, {engine}", engine) for engine in (PINOCCHIO, MUJOCO))
@@ -111,9 +107,8 @@ PLAIN = Solver("Plumbob, plain Python", "Plumbob, plain Python", style=Style("or
 OUR_KINEMATICS = Solver(
     "Plumbob's kinematics", "Plumbob's kinematics", style=Style("brass", "", "v")
 )
-LIMIT = Solver(
-    "limit: copying as many bytes", "limit: copying as many bytes", "", Style("ink", "", "|")
-)
+LIMIT_NAME = "limit: copying as many bytes"
+LIMIT = Solver(LIMIT_NAME, LIMIT_NAME, "", Style("ink", "", "|"))
 TIMED = (
     COMPILED,
     PLAIN,
@@ -197,56 +192,43 @@ def _either(iterations: int | None = None) -> tuple[Entry, Entry]:
 
 
 _CHAINS = "poses and limits of one chain of hinges"
-OURS = Peer(
-    "Plumbob LM", "bench.peers.ik.plumbob", "plumbob", "MIT",
-    "poses, positions and limits of several tips, balls",
-    (
-        Entry(ONE_START, {"restarts": 0}),
-        Entry(RESTARTS, {"restarts": 100}, note="100 restarts"),
-    ),
-)  # fmt: skip
-TOOLBOX = Peer(
-    "Robotics Toolbox ik_LM", "bench.peers.ik.toolbox", "roboticstoolbox-python", "MIT",
-    _CHAINS,
-    (
-        Entry(ONE_START, {"searches": 1, "iterations": 100}),
-        Entry(RESTARTS, {"searches": 100, "iterations": 30}, note="100 searches"),
-    ),
-)  # fmt: skip
-TRAC_IK = Peer(
-    "TRAC-IK", "bench.peers.ik.trac_ik", "pytracik", "MIT", _CHAINS,
-    (
-        Entry(RESTARTS, {"seconds": 0.005}, note="5 ms"),
-        Entry(RESTARTS, {"seconds": 0.05}, note="50 ms"),
-    ),
-)  # fmt: skip
+_TREES = "poses, positions and limits of several effectors, balls"
+_UNLIMITED = "poses and positions of several effectors, balls; looks at no limits"
+_SIX = "poses of six hinges or fewer, analytically"
+
+
+def _peer(title: str, adapter: str, package: str, license: str, can: str, *entries: Entry) -> Peer:
+    return Peer(title, f"bench.peers.ik.{adapter}", package, license, can, entries)
+
+
+OURS = _peer(
+    *("Plumbob LM", "plumbob", "plumbob", "MIT", _TREES),
+    Entry(ONE_START, {"restarts": 0}),
+    Entry(RESTARTS, {"restarts": 100}, note="100 restarts"),
+)
+TOOLBOX = _peer(
+    *("Robotics Toolbox ik_LM", "toolbox", "roboticstoolbox-python", "MIT", _CHAINS),
+    Entry(ONE_START, {"searches": 1, "iterations": 100}),
+    Entry(RESTARTS, {"searches": 100, "iterations": 30}, note="100 searches"),
+)
+TRAC_IK = _peer(
+    *("TRAC-IK", "trac_ik", "pytracik", "MIT", _CHAINS),
+    *(Entry(RESTARTS, {"seconds": t}, note=f"{1e3 * t:g} ms") for t in (0.005, 0.05)),
+)
+_EVERY_SOLUTION = Entry(RESTARTS, note="all solutions, no start")
 PEERS = (
     OURS,
-    Peer(
-        "Pinocchio’s closed loop", "bench.peers.ik.closed_loop", "pin", "BSD-3-Clause",
-        "poses and positions of several tips, balls; looks at no limits", _either(200),
+    _peer(
+        "Pinocchio’s closed loop", "closed_loop", "pin", "BSD-3-Clause", _UNLIMITED, *_either(200)
     ),
-    Peer(
-        "pink", "bench.peers.ik.pink", "pin-pink", "Apache-2.0",
-        "poses, positions and limits of several tips, balls", _either(50),
-    ),
-    Peer(
-        "mink", "bench.peers.ik.mink", "mink", "Apache-2.0",
-        "poses, positions and limits of several tips, balls", _either(50),
-    ),
-    Peer("mujoco.minimize", "bench.peers.ik.minimize", "mujoco", "Apache-2.0", _CHAINS, _either()),
+    _peer("pink", "pink", "pin-pink", "Apache-2.0", _TREES, *_either(50)),
+    _peer("mink", "mink", "mink", "Apache-2.0", _TREES, *_either(50)),
+    _peer("mujoco.minimize", "minimize", "mujoco", "Apache-2.0", _CHAINS, *_either()),
     TOOLBOX,
     TRAC_IK,
-    Peer(
-        "ikpy", "bench.peers.ik.ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims",
-        (Entry(ONE_START),),
-    ),
-    Peer(
-        "EAIK", "bench.peers.ik.eaik", "eaik", "BSD-3-Clause",
-        "poses of six hinges or fewer, analytically",
-        (Entry(RESTARTS, note="all solutions, no start"),),
-    ),
-)  # fmt: skip
+    _peer("ikpy", "ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims", Entry(ONE_START)),
+    _peer("EAIK", "eaik", "eaik", "BSD-3-Clause", _SIX, _EVERY_SOLUTION),
+)
 
 
 # Peers for cloths: what distinguishes the settings that each is tried with.
@@ -287,64 +269,62 @@ class ClothPeer:
 
 def _of_ours(solver: StepSolver) -> ClothPeer:
     """Return a solver of the reference as a peer."""
-    title, module = f"Plumbob {solver.label}", "bench.peers.cloth.step_solvers"
-    settings: dict[str, Any] = {"solver": solver.name}
-    if solver.is_linear:
-        settings |= {"iterations": 1}
-        return ClothPeer(title, PLUMBOB, module, "plumbob", LINEARISED, settings)
+    settings = {"solver": solver.name, **({"iterations": 1} if solver.is_linear else {})}
+    iterated = (solver.ladder, solver.motion, solver.converges)
     return ClothPeer(
-        title, PLUMBOB, module, "plumbob", ITERATED, settings, solver.ladder, solver.motion,
-        solver.converges,
-    )  # fmt: skip
+        f"Plumbob {solver.label}",
+        PLUMBOB,
+        "bench.peers.cloth.step_solvers",
+        "plumbob",
+        LINEARISED if solver.is_linear else ITERATED,
+        settings,
+        *(() if solver.is_linear else iterated),
+    )
 
 
-_TENDONS, _FLEX = "bench.peers.cloth.mujoco_tendons", "bench.peers.cloth.mujoco_flex"
-_NEWTON = "bench.peers.cloth.newton_{}"
+def _explicit(title: str, integrator: str) -> ClothPeer:
+    adapter, settings = "bench.peers.cloth.explicit", {"integrator": integrator}
+    return ClothPeer(f"Plumbob {title}", PLUMBOB, adapter, "plumbob", EXPLICIT, settings)
+
+
+def _mujoco(title: str, kind: str, **settings: Any) -> ClothPeer:
+    """Return one of MuJoCo's integrators, with springs as tendons."""
+    adapter = "bench.peers.cloth.mujoco_tendons"
+    return ClothPeer(f"MuJoCo {title}", MUJOCO, adapter, "mujoco", kind, settings)
+
+
+def _newton(
+    title: str, adapter: str, kind: str, ladder: tuple[int, ...] = (), **settings: Any
+) -> ClothPeer:
+    """Return a solver of Newton, the engine."""
+    return ClothPeer(
+        f"Newton engine, {title}",
+        NEWTON,
+        f"bench.peers.cloth.newton_{adapter}",
+        "newton",
+        kind,
+        settings,
+        ladder,
+        SOME if ladder else (),
+    )
+
+
 CLOTH_ENGINES = (
-    *(
-        ClothPeer(
-            f"Plumbob {title}", PLUMBOB, "bench.peers.cloth.explicit", "plumbob", EXPLICIT,
-            {"integrator": name},
-        )
-        for name, title in (
-            ("symplectic_euler", "symplectic Euler"), ("runge_kutta", "Runge-Kutta"),
-        )
+    _explicit("symplectic Euler", "symplectic_euler"),
+    _explicit("Runge-Kutta", "runge_kutta"),
+    _mujoco("Euler", EXPLICIT, integrator="Euler"),
+    _mujoco("implicitfast", EXPLICIT, integrator="implicitfast"),
+    ClothPeer("MuJoCo flex, Euler", MUJOCO, "bench.peers.cloth.mujoco_flex", "mujoco", EXPLICIT),
+    _mujoco("discrete", LINEARISED, integrator="discrete"),
+    _mujoco(
+        "discrete, to the end", LINEARISED, integrator="discrete", iterations=5000, tolerance=1e-15
     ),
-    *(
-        ClothPeer(
-            f"MuJoCo {name}", MUJOCO, _TENDONS, "mujoco", EXPLICIT, {"integrator": name}
-        )
-        for name in ("Euler", "implicitfast")
-    ),
-    ClothPeer("MuJoCo flex, Euler", MUJOCO, _FLEX, "mujoco", EXPLICIT),
-    ClothPeer(
-        "MuJoCo discrete", MUJOCO, _TENDONS, "mujoco", LINEARISED, {"integrator": "discrete"}
-    ),
-    ClothPeer(
-        "MuJoCo discrete, to the end", MUJOCO, _TENDONS, "mujoco", LINEARISED,
-        {"integrator": "discrete", "iterations": 5000, "tolerance": 1e-15},
-    ),
-    ClothPeer(
-        "Newton engine, semi-implicit", NEWTON, _NEWTON.format("semi_implicit"), "newton",
-        EXPLICIT,
-    ),
-    ClothPeer(
-        "Newton engine, VBD", NEWTON, _NEWTON.format("vbd"), "newton", ITERATED, {},
-        MANY, SOME,
-    ),
-    ClothPeer(
-        "Newton engine, VBD, its own colours", NEWTON, _NEWTON.format("vbd"), "newton", ITERATED,
-        {"own": 1}, SOME, SOME,
-    ),
-    ClothPeer(
-        "Newton engine, XPBD", NEWTON, _NEWTON.format("xpbd"), "newton", ITERATED, {},
-        SOME, SOME,
-    ),
-    ClothPeer(
-        "Newton engine, XPBD, substeps", NEWTON, _NEWTON.format("xpbd"), "newton", EXPLICIT,
-        {"iterations": 1},
-    ),
-)  # fmt: skip
+    _newton("semi-implicit", "semi_implicit", EXPLICIT),
+    _newton("VBD", "vbd", ITERATED, MANY),
+    _newton("VBD, its own colours", "vbd", ITERATED, SOME, own=1),
+    _newton("XPBD", "xpbd", ITERATED, SOME),
+    _newton("XPBD, substeps", "xpbd", EXPLICIT, iterations=1),
+)
 
 
 def ik_solvers() -> dict[str, Solver]:

@@ -14,6 +14,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..peers import registry
 from .text import shortened
 
 COLOURS = {
@@ -47,12 +48,6 @@ STYLE: dict[Any, Any] = {
     "grid.color": COLOURS["rule"],
     "grid.linewidth": 0.6,
     "text.color": COLOURS["ink"],
-    "xtick.color": COLOURS["faint"],
-    "ytick.color": COLOURS["faint"],
-    "xtick.labelcolor": COLOURS["ink"],
-    "ytick.labelcolor": COLOURS["ink"],
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
     "legend.frameon": False,
     "legend.fontsize": 8.5,
     "lines.linewidth": 1.6,
@@ -61,6 +56,9 @@ STYLE: dict[Any, Any] = {
     "savefig.facecolor": "none",
     "mathtext.default": "regular",
 }
+for _axis in ("xtick", "ytick"):
+    STYLE |= {f"{_axis}.color": COLOURS["faint"], f"{_axis}.labelcolor": COLOURS["ink"]}
+    STYLE[f"{_axis}.labelsize"] = 8
 WIDTH = 7.4
 # Letters of a name in a figure.
 LONGEST = 60
@@ -117,6 +115,13 @@ def nth_style(i: int) -> dict[str, Any]:
     colours = ("blue", "orange", "green", "purple", "brass", "ink")
     lines = ("-", "--", "-.", ":")
     return {"color": COLOURS[colours[i % len(colours)]], "linestyle": lines[i % len(lines)]}
+
+
+def drawn_as(solver: str) -> dict[str, Any]:
+    """Return colour, line and label of a solver that has a style of its own."""
+    known = registry.find(solver)
+    colour, line, _ = known.style
+    return {"color": COLOURS[colour], "linestyle": line, "label": written(known.label)}
 
 
 def legend_height(names: list[str], columns: int) -> float:

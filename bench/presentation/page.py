@@ -11,8 +11,8 @@ from markupsafe import Markup
 
 from ..harness.record import Record
 from . import svg, tables
-from .entry import Entry, Figure
 from .figures import Drawing
+from .layout import Figure, Layout
 from .sections import SECTIONS
 from .tables import Cell, Column, Table
 
@@ -38,23 +38,19 @@ class Shown(NamedTuple):
     """All that a report shows: its records, and what is made of them."""
 
     records: Sequence[Record]
-    tables: Mapping[Entry, Table]
+    tables: Mapping[Layout, Table]
     drawings: Mapping[Figure, Drawing]
 
 
-class ShownCell(NamedTuple):
-    """A cell and its class in the page."""
-
-    value: Cell
-    kind: str
-
-
 class Row(NamedTuple):
-    """A row of a table: neighbours with the same first cell share it, over `span` rows."""
+    """A row of a table: neighbours with the same first cell share it, over `span` rows.
+
+    The other cells each have their class in the page.
+    """
 
     head: Cell
     span: int
-    cells: list[ShownCell]
+    cells: list[tuple[Cell, str]]
 
 
 class Download(NamedTuple):
@@ -67,7 +63,8 @@ class Download(NamedTuple):
 
 def render(shown: Shown, newest: Record, missing: Sequence[str]) -> str:
     """Return the page, whose head is that of the newest record."""
-    return _environment().get_template("page.html").render(
+    template = _environment().get_template("page.html")
+    return template.render(
         style=Markup((_HERE / "page.css").read_text(encoding="utf-8")),
         date=newest.when.replace("T", " ").replace("+00:00", " UTC"),
         day=newest.when[:10],
@@ -77,14 +74,17 @@ def render(shown: Shown, newest: Record, missing: Sequence[str]) -> str:
         tables=shown.tables,
         drawings=shown.drawings,
         missing=missing,
-    )  # fmt: skip
+    )
 
 
 def _environment() -> Environment:
     environment = Environment(
-        loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        loader=FileSystemLoader(_HERE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     filters = {"rich": rich, "words": tables.words, "rows": rows, "inline": svg.inline}
     environment.filters.update(filters, downloads=downloads)
     return environment
@@ -104,18 +104,15 @@ def _machine(record: Record) -> dict[str, str]:
 def rows(table: Table) -> list[Row]:
     """Return the rows of a table; the span of a first cell that stands in a row above is 0."""
     heads = [row[0] for row in table.rows]
-    spans = [0] * len(heads)
+    spans, others = [0] * len(heads), table.columns[1:]
     first = 0
     for i, head in enumerate(heads):
         first = i if head != heads[first] else first
         spans[first] += 1
     return [
-        Row(row[0], span, [
-            ShownCell(cell, _kind(cell, column))
-            for cell, column in zip(row[1:], table.columns[1:], strict=True)
-        ])
+        Row(row[0], span, [(cell, _kind(cell, c)) for cell, c in zip(row[1:], others, strict=True)])
         for row, span in zip(table.rows, spans, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def _kind(cell: Cell, column: Column) -> str:

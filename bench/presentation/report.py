@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from ..experiments import SUITES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
-from .entry import Entry, Figure
 from .figures import Drawing
+from .layout import Figure, Layout
 from .page import FORMATS, Shown, render, rows
 from .results import Results, plain, sift
 from .sections import SECTIONS
@@ -56,26 +56,26 @@ def sound(records: Sequence[Record]) -> tuple[Shown, list[str]]:
 
 def _shown(records: Sequence[Record]) -> Shown:
     results = Results(records)
-    made = {entry: _checked(entry, results) for section in SECTIONS for entry in section.entries}
+    made = {layout: _checked(layout, results) for section in SECTIONS for layout in section.layouts}
     drawn = {draw: draw(results) for draw in all_figures()}
     return Shown(records, made, {draw: drawing for draw, drawing in drawn.items() if drawing})
 
 
 def all_figures() -> list[Figure]:
     """Return the figures of all sections, in order."""
-    return [draw for section in SECTIONS for entry in section.entries for draw in entry.figures]
+    return [draw for section in SECTIONS for layout in section.layouts for draw in layout.figures]
 
 
 def _makers() -> Iterator[Callable[[Results], Any]]:
     """Yield all that makes something of records, one by one."""
     for section in SECTIONS:
-        yield from (partial(_checked, entry) for entry in section.entries)
+        yield from (partial(_checked, layout) for layout in section.layouts)
     yield from all_figures()
 
 
-def _checked(entry: Entry, results: Results) -> Table:
+def _checked(layout: Layout, results: Results) -> Table:
     """Return a table that can be written in every form."""
-    table = entry.table(results)
+    table = layout(results)
     rows(table)
     for form in FORMATS.values():
         form.write(table)

@@ -51,20 +51,20 @@ def sift(
 
 
 def _joined(
-    make: Callable[[Results], Any], fit: list[Record], more: list[Record]
+    make: Callable[[Results], Any], valid: list[Record], more: list[Record]
 ) -> tuple[list[Record], list[str]]:
-    """Return what of more records fits to those that fit already, by halves, and what is said."""
+    """Return what of more records goes with those that are valid, by halves, and what is said."""
     try:
-        make(Results([*fit, *more]))
-        return [*fit, *more], []
+        make(Results([*valid, *more]))
+        return [*valid, *more], []
     except Exception as error:  # a record may hold anything
         if len(more) == 1:
-            return fit, [_does_not_fit(more[0], error)]
+            return valid, [_does_not_fit(more[0], error)]
     half, said = len(more) // 2, []
     for part in (more[:half], more[half:]):
-        fit, sentences = _joined(make, fit, part)
+        valid, sentences = _joined(make, valid, part)
         said += sentences
-    return fit, said
+    return valid, said
 
 
 def _does_not_fit(record: Record, error: Exception) -> str:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ..experiments import EXPERIMENTS
 from ..harness.experiment import Experiment
-from .entry import Entry
+from .layout import Layout
 from .results import Results
 from .tables import Table
 
@@ -24,9 +24,9 @@ class Section(NamedTuple):
         return [experiment for experiment in EXPERIMENTS if experiment.chapter == self.name]
 
     @property
-    def entries(self) -> tuple[Entry, ...]:
+    def layouts(self) -> tuple[Layout, ...]:
         """The questions of all its experiments."""
-        return tuple(entry for made in self.experiments for entry in offered(made))
+        return tuple(layout for made in self.experiments for layout in offered(made))
 
     @property
     def suites(self) -> set[str]:
@@ -44,7 +44,7 @@ SECTIONS = (
     Section(
         "kinematics",
         "Task 1: inverse kinematics",
-        "The lab’s arm of five joints draws curves with its tip, by cyclic coordinate descent "
+        "The lab’s arm of five joints draws curves with its effector, by cyclic coordinate descent "
         "(CCD) and by FABRIK; a chain of ten ball joints reaches for targets near, far, at the "
         "edge of its reach and beyond it, also by Levenberg-Marquardt on the engines’ kinematics "
         "(LM).",
@@ -71,17 +71,17 @@ SECTIONS = (
 )
 
 
-def offered(experiment: Experiment) -> tuple[Entry, ...]:
-    """Return the entries of an experiment; its tables and figures are imported only now."""
-    entries: tuple[Entry, ...] = importlib.import_module(f"{experiment.package}.entries").ENTRIES
-    return entries
+def offered(experiment: Experiment) -> tuple[Layout, ...]:
+    """Return the tables of an experiment; its tables and figures are imported only now."""
+    layouts: tuple[Layout, ...] = importlib.import_module(f"{experiment.package}.tables").LAYOUTS
+    return layouts
 
 
 def tables(results: Results, suites: Iterable[str] | None = None) -> list[Table]:
     """Return the tables made from any of these suites, or all, in the order of the report."""
     return [
-        entry.table(results)
+        layout(results)
         for section in SECTIONS
         if suites is None or set(suites) & section.suites
-        for entry in section.entries
+        for layout in section.layouts
     ]

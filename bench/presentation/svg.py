@@ -1,4 +1,4 @@
-"""Figures as parts of a page: an SVG file's tree made fit to stand within HTML."""
+"""Figures as parts of a page: an SVG file's tree changed so that it can stand within HTML."""
 
 import xml.etree.ElementTree as ElementTree
 
@@ -14,7 +14,7 @@ _VARIABLES = {colour: f"var(--{name})" for name, colour in COLOURS.items()}
 
 
 def inline(drawing: Drawing) -> Markup:
-    """Return an SVG fit to stand in a page: own ids, colours by name, no links, the page's fonts.
+    """Return an SVG that can stand in a page: own ids, colours by name, no links, the page's fonts.
 
     Ids are made unique, since all drawings of a page share one name space.
     """
@@ -54,7 +54,7 @@ def _attributes(given: dict[str, str], name: str) -> dict[str, str]:
 
 
 def _style(text: str) -> str:
-    """Return a style whose colours are the page's, and whose fonts are sizes and weights alone."""
+    """Return a style whose colours are the page's, and whose fonts are only sizes and weights."""
     declared = dict(part.strip().split(": ", 1) for part in text.split(";") if part.strip())
     declared.pop("font-family", None)
     if font := declared.pop("font", ""):  # a weight, where it is not the usual one, and the size

@@ -7,7 +7,8 @@ import csv
 import io
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from ..harness.metrics import Share
@@ -26,6 +27,18 @@ NO_SUMMARY = Summary()
 
 # How a share is written: with the interval that holds the true rate.
 INTERVAL = "95 % interval"
+# What one metre, second, radian, byte or whole is in other units.
+UNITS = {"ms": 1e3, "µs": 1e6, "ns": 1e9, "°": 180.0 / math.pi, "%": 100.0, "GiB": 2.0**-30}
+
+
+def in_unit(value: float, unit: str) -> float:
+    """Return a value in SI units, or a share of one, in a unit such as "ms", "°" or "ns/solve"."""
+    return UNITS.get(unit.partition("/")[0], 1.0) * value
+
+
+def _itself(subject: Any) -> Cell:
+    cell: Cell = subject
+    return cell
 
 
 @dataclass(frozen=True)
@@ -33,13 +46,24 @@ class Column:
     """A heading with its unit, such as `Column("median", "µs")`; words are set to the left.
 
     The note says how a cell is written, such as `INTERVAL`; it is left out where parts of the cell
-    have columns of their own.
+    have columns of their own. `read` takes the cell from what a row is about, in SI units or as a
+    share of one; `cell` converts it to the column's unit, or multiplies it by `factor`.
     """
 
     title: str
     unit: str = ""
     words: bool = False
     note: str = ""
+    read: Callable[[Any], Any] = field(default=_itself, compare=False)
+    factor: float | None = None
+
+    def cell(self, subject: Any) -> Cell:
+        """Return the cell of the row that is about this subject."""
+        value = self.read(subject)
+        plain: Cell = value.item() if hasattr(value, "item") else value
+        if not isinstance(plain, float):
+            return plain
+        return in_unit(plain, self.unit) if self.factor is None else self.factor * plain
 
     @property
     def titled(self) -> str:
@@ -83,6 +107,12 @@ class Table:
                 raise ValueError(
                     f"rows: expected {len(self.columns)} cells in table {self.name}, got {len(row)}"
                 )
+
+
+def listing(sentence: str, points: Iterable[str]) -> Summary:
+    """Return a sentence with points below it, or nothing where there are no points."""
+    made = tuple(points)
+    return Summary(sentence, made) if made else NO_SUMMARY
 
 
 def words(cell: Cell) -> str:

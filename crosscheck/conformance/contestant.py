@@ -17,7 +17,7 @@ class Answer:
     Attributes:
         values: by the names of the task's outputs, as float64 arrays, numbers and booleans, of the
             task's shapes; NaN where it gave none.
-        seconds: how long it took, without the door where that can be told [s].
+        seconds: how long it took, without the door where that can be told; 0 if unknown [s].
         remarks: what was odd without voiding the answer: prints, changed inputs.
     """
 
@@ -46,6 +46,14 @@ class Failure:
     sentence: Sentence
 
 
+class NoGreetingError(ValueError):
+    """A solver did not say what it is, so that nothing can be asked; `failure` says why."""
+
+    def __init__(self, failure: Failure) -> None:
+        super().__init__(f"solver: expected a greeting, got none: {failure.sentence}")
+        self.failure = failure
+
+
 @dataclass(frozen=True, eq=False)
 class Asked:
     """A case, and what was answered the first and the second time."""
@@ -60,7 +68,15 @@ class Contestant(Protocol):
 
     @property
     def greeting(self) -> Greeting:
-        """What it says of itself."""
+        """What it says of itself.
+
+        Raises:
+            NoGreetingError: if it cannot be had.
+        """
+
+    @property
+    def remarks(self) -> tuple[Sentence, ...]:
+        """What was odd apart from its answers; complete when it is closed."""
 
     def answer(self, case: Case) -> Answer | Failure:
         """Ask it; start it again if it was lost."""

@@ -67,9 +67,19 @@ def explain(
                 best.append(match)
         if any(match.share == 1.0 for match in best):
             break
+    best = _telling(best)
     best.sort(key=lambda match: (-match.share, len(match.variant.faults), match.distance))
     classes = _classes(best, answered, tolerance)[:MOST_TOLD]
     return tuple(_explanation(one, describe) for one in classes), tried
+
+
+def _telling(matches: Sequence[Match]) -> list[Match]:
+    """Return those that reproduce more than what has no fault; if one reproduces all, only such."""
+    right = max((match.share for match in matches if not match.variant.faults), default=0.0)
+    most = max((match.share for match in matches), default=0.0)
+    return [
+        match for match in matches if match.share == 1.0 or (most < 1.0 and match.share > right)
+    ]
 
 
 def _match(
@@ -80,8 +90,9 @@ def _match(
     for i, one in enumerate(answered):
         if i == TRIAL and not hits:
             return None
-        predictions.append(_prediction(variant, one.case))
         assert isinstance(one.answer, Answer)
+        predicted = _prediction(variant, one.case)
+        predictions.append({k: v for k, v in predicted.items() if k in one.answer.values})
         apart = difference(predictions[-1], one.answer.values)
         if apart <= tolerance(one.case):
             hits, distance = hits + 1, max(distance, apart)

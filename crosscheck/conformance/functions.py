@@ -1,8 +1,11 @@
 """Functions of Python as a contestant, and what they may return."""
 
 import inspect
+import reprlib
 import time
+import traceback
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +20,12 @@ _TYPES: Mapping[str, type] = {"number": np.float64, "integer": np.int64, "boolea
 
 
 class FunctionContestant:
-    """Functions by the names of the tasks, called in this process: ours, an engine's, a fault's."""
+    """Functions called in this process: ours, an engine's, a fault's.
+
+    Each has the name of a task, or of a method of inverse kinematics.
+    """
+
+    remarks: tuple[Sentence, ...] = ()
 
     def __init__(self, functions: Functions, greeting: Greeting) -> None:
         self._functions = functions
@@ -29,8 +37,9 @@ class FunctionContestant:
         return self._greeting
 
     def answer(self, case: Case) -> Answer | Failure:
-        """Call the function of the case's task."""
-        return call(self._functions[case.task], TASKS[case.task], case.inputs)
+        """Call the function of the case's method if there is one, else that of its task."""
+        method = self._functions.get(case.inputs.get("method", ""))
+        return call(method or self._functions[case.task], TASKS[case.task], case.inputs)
 
     def close(self) -> None:
         """Do nothing: there is no process."""
@@ -44,16 +53,13 @@ def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) ->
     given = {
         name: np.array(value) if isinstance(value, np.ndarray) else value
         for name, value in inputs.items()
-        if _takes(function, name)
+        if takes(function, name)
     }
     start = time.perf_counter()
     try:
         returned = function(**given)
-    except Exception as error:
-        return Failure(
-            FailureKind.RAISED,
-            sentence("It raised {kind}: {why}", kind=type(error).__name__, why=str(error)[:200]),
-        )
+    except (Exception, SystemExit) as error:
+        return describe_exception(error, _file(function))
     seconds = time.perf_counter() - start
     try:
         values = understand(task, task.counts(inputs), returned)
@@ -62,11 +68,55 @@ def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) ->
     return Answer(values, seconds, _changed(inputs, given))
 
 
-def _takes(function: Callable[..., Any], name: str) -> bool:
-    parameters = inspect.signature(function).parameters
+def takes(function: Callable[..., Any], name: str) -> bool:
+    """Return whether a function takes an argument, as those that do not say so are taken to do."""
+    try:
+        parameters = inspect.signature(function).parameters
+    except (TypeError, ValueError):  # of compiled code
+        return True
     return name in parameters or any(
         one.kind is inspect.Parameter.VAR_KEYWORD for one in parameters.values()
     )
+
+
+def _file(function: Callable[..., Any]) -> str:
+    return getattr(getattr(inspect.unwrap(function), "__code__", None), "co_filename", "")
+
+
+def describe_exception(error: BaseException, file: str) -> Failure:
+    """Return the failure of code that raised, with the last line in the folder of its file."""
+    why = " ".join(str(error).split())[:200]
+    if isinstance(error, SyntaxError) and error.filename:
+        return raised(type(error).__name__, error.msg, Path(error.filename).name, error.lineno or 0)
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename == file or is_beside(Path(frame.filename), Path(file))
+    ]
+    if not file or not frames:
+        return raised(type(error).__name__, why)
+    return raised(type(error).__name__, why, Path(frames[-1].filename).name, frames[-1].lineno or 0)
+
+
+def is_beside(path: Path, file: Path) -> bool:
+    """Return whether a file is of the same folder as another, and not ours or a library's."""
+    ours = Path(__file__).parent in path.parents
+    return file.parent in path.parents and not ours and "site-packages" not in path.parts
+
+
+def raised(kind: str, why: str, file: str = "", line: int = 0) -> Failure:
+    """Return the failure of code that raised an exception, in a line of a file if that is known."""
+    if file and line:
+        words = sentence(
+            "It raised {kind} in line {line} of {file}: {why}",
+            kind=kind,
+            line=line,
+            file=file,
+            why=why,
+        )
+    else:
+        words = sentence("It raised {kind}: {why}", kind=kind, why=why)
+    return Failure(FailureKind.RAISED, words)
 
 
 def _changed(inputs: Mapping[str, Any], given: Mapping[str, Any]) -> tuple[Sentence, ...]:
@@ -132,6 +182,8 @@ def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:
         raise ValueError(f"{field.name}: expected a text, got {_describe(value)}")
     array = _array(field, value)
     shape = tuple(counts.get(n, n) if isinstance(n, str) else n for n in field.shape)
+    if array.size == 0 and array.ndim < len(shape):  # nested lists do not say what they lack
+        array = array.reshape([0, *(n if isinstance(n, int) else 0 for n in shape[1:])])
     if len(shape) != array.ndim or any(
         isinstance(n, int) and n != m for n, m in zip(shape, array.shape, strict=True)
     ):
@@ -145,16 +197,21 @@ def _array(field: Field, value: object) -> Any:
         array = np.asarray(value)
         if array.dtype == object:  # None among the numbers
             array = np.asarray(value, dtype=np.float64)
-        if array.dtype.kind not in "biuf" or (
-            field.kind != "number" and array.dtype.kind == "f" and not (array % 1 == 0).all()
-        ):
+        if array.dtype.kind not in "biuf" or (field.kind != "number" and not _whole(array)):
             raise ValueError
         return np.array(array, dtype=kind)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError, RecursionError):
         raise ValueError(
             f"{field.name}: expected {field.kind}s of shape {_shape(field.shape)}, "
             f"got {_describe(value)}"
         ) from None
+
+
+def _whole(array: Any) -> bool:
+    """Return whether all are integers that 64 bits hold."""
+    if array.dtype.kind in "biu":
+        return array.dtype != np.uint64 or not (array > np.iinfo(np.int64).max).any()
+    return bool(((np.abs(array) < 2.0**62) & (np.floor(array) == array)).all())
 
 
 def _shape(shape: tuple[str | int, ...]) -> str:
@@ -164,5 +221,8 @@ def _shape(shape: tuple[str | int, ...]) -> str:
 def _describe(value: object) -> str:
     if isinstance(value, np.ndarray):
         return _shape(value.shape)
-    text = repr(value)
+    try:
+        text = reprlib.repr(value)
+    except ValueError:  # of an integer of thousands of digits
+        return f"a {type(value).__name__} too long to show"
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -8,6 +8,8 @@ from .case import Case
 from .contestant import Asked, Contestant, Failure, FailureKind
 from .greeting import Greeting
 from .judgement import Report, TaskReport
+from .kinematics import forward_kinematics, inverse_kinematics, resample, track
+from .mass_spring import energy, forces, motion, step
 
 # After so many answers of a task were waited for in vain, the rest of the task is not asked.
 MOST_HANGS = 2
@@ -25,7 +27,16 @@ class Discipline(Protocol):
         """Hold the answers against laws, the reference, and what was declared; name the faults."""
 
 
-DISCIPLINES: Mapping[str, Discipline] = {}
+DISCIPLINES: Mapping[str, Discipline] = {
+    "forward_kinematics": forward_kinematics,
+    "inverse_kinematics": inverse_kinematics,
+    "track": track,
+    "resample": resample,
+    "mass_spring_forces": forces,
+    "energy": energy,
+    "mass_spring_step": step,
+    "mass_spring_motion": motion,
+}
 
 
 def verify(
@@ -50,11 +61,21 @@ def verify(
     greeting = contestant.greeting
     reports = []
     for task, method in trials(greeting, tasks):
-        discipline = DISCIPLINES[task]
-        cases = discipline.cases(greeting, method, seed, thorough)
-        asked = list(_ask(contestant, cases, partial(notify, task)))
-        reports.append(discipline.judge(asked, greeting, method))
+        cases = DISCIPLINES[task].cases(greeting, method, seed, thorough)
+        reports.append(judge_cases(contestant, task, method, cases, notify))
     return Report(greeting, reports, seed)
+
+
+def judge_cases(
+    contestant: Contestant,
+    task: str,
+    method: str,
+    cases: Sequence[Case],
+    notify: Callable[[str, int, int], None] = lambda task, done, of: None,
+) -> TaskReport:
+    """Ask a solver some cases of a task and judge its answers; arguments as of `verify`."""
+    asked = list(_ask(contestant, cases, partial(notify, task)))
+    return DISCIPLINES[task].judge(asked, contestant.greeting, method)
 
 
 def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple[str, str]]:

@@ -1,6 +1,5 @@
 """Equilibria: minima of the potential energy against MuJoCo's damped motion and closed forms."""
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -34,28 +33,25 @@ CLOTH = Relaxation(h=0.03, drag=1.0, steps=6000)
 FALL_STEPS = 67
 
 
-def ropes_in_closed_form(cases: int) -> Iterator[Comparison]:
+def ropes_in_closed_form(case: int) -> Comparison:
     """Compare our equilibrium of a rope with the load of each spring over its stiffness."""
-    for case in range(cases):
-        system, state = rope(case)
-        yield _comparison(equilibrium(system, state), hanging(system, state), state)
+    system, state = rope(case)
+    return _comparison(equilibrium(system, state), hanging(system, state), state)
 
 
-def ropes(cases: int) -> Iterator[Comparison]:
+def ropes(case: int) -> Comparison:
     """Compare our equilibrium of a rope with the end of MuJoCo's damped motion."""
-    for case in range(cases):
-        system, state = rope(case)
-        yield _comparison(equilibrium(system, state), relaxed(system, state, ROPE), state)
+    system, state = rope(case)
+    return _comparison(equilibrium(system, state), relaxed(system, state, ROPE), state)
 
 
-def cloths(cases: int) -> Iterator[Comparison]:
+def cloths(case: int) -> Comparison:
     """Compare our equilibrium of a cloth with the end of MuJoCo's damped motion.
 
     A cloth has several equilibria: both start from the state after a fall of two seconds.
     """
-    for case in range(cases):
-        system, state = cloth(case)
-        yield _comparison(equilibrium(system, state), relaxed(system, state, CLOTH), state)
+    system, state = cloth(case)
+    return _comparison(equilibrium(system, state), relaxed(system, state, CLOTH), state)
 
 
 def equilibrium(system: MassSpring, state: State) -> FloatArray:

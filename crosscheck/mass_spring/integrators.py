@@ -1,6 +1,6 @@
 """Simulations of many steps by our integrators and MuJoCo's, and comparisons of the results."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 
 from numpy.typing import ArrayLike
@@ -68,11 +68,8 @@ SIMULATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
 }
 
 
-def long_simulations(ours: str, theirs: str, steps: int, cases: int) -> Iterator[Comparison]:
+def long_simulations(ours: str, theirs: str, steps: int, case: int) -> Comparison:
     """Compare the states after many steps of two integrators of the same method."""
-    for case in range(cases):
-        system, state, external, h = samples.smooth(case)
-        one, other = (
-            SIMULATORS[name](system, h)(state, external, steps) for name in (ours, theirs)
-        )
-        yield states(one, other, state)
+    system, state, external, h = samples.smooth(case)
+    one, other = (SIMULATORS[name](system, h)(state, external, steps) for name in (ours, theirs))
+    return states(one, other, state)

@@ -1,6 +1,6 @@
 """Conserved quantities, and the dissipation of implicit Euler in closed form."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,61 +16,57 @@ from .orders import observed_order
 STEPS = 40
 
 
-def linear_momenta(names: Sequence[str], cases: int) -> Iterator[Comparison]:
+def linear_momenta(names: Sequence[str], case: int) -> Comparison:
     """Compare the momentum after many steps with P + t F, relative to the sum of |m v| and |t F|.
 
     F is the sum of the weights and the external forces; springs and dampers cancel.
     """
-    for case in range(cases):
-        system, state, external, h = samples.unpinned(case)
-        impulse = STEPS * h * (system.masses[:, None] * system.gravity + external)
-        before = linear_momentum(system, state)
-        after = [
-            linear_momentum(system, SIMULATORS[name](system, h)(state, external, STEPS))
-            for name in names
-        ]
-        momenta = np.abs(system.masses[:, None] * state.velocities).sum()
-        yield Comparison(
-            ours=np.array(after),
-            theirs=np.tile(before + impulse.sum(axis=0), (len(names), 1)),
-            baseline=np.tile(before, (len(names), 1)),
-            scale=float(momenta + np.abs(impulse).sum()),
-        )
+    system, state, external, h = samples.unpinned(case)
+    impulse = STEPS * h * (system.masses[:, None] * system.gravity + external)
+    before = linear_momentum(system, state)
+    after = [
+        linear_momentum(system, SIMULATORS[name](system, h)(state, external, STEPS))
+        for name in names
+    ]
+    momenta = np.abs(system.masses[:, None] * state.velocities).sum()
+    return Comparison(
+        ours=np.array(after),
+        theirs=np.tile(before + impulse.sum(axis=0), (len(names), 1)),
+        baseline=np.tile(before, (len(names), 1)),
+        scale=float(momenta + np.abs(impulse).sum()),
+    )
 
 
-def angular_momenta(names: Sequence[str], cases: int) -> Iterator[Comparison]:
+def angular_momenta(names: Sequence[str], case: int) -> Comparison:
     """Compare the angular momentum before and after, relative to the sum of |x| |m v|."""
-    for case in range(cases):
-        system, state, external, h = samples.drifting(case)
-        ends = [SIMULATORS[name](system, h)(state, external, STEPS) for name in names]
-        yield Comparison(
-            ours=np.array([angular_momentum(system, end) for end in ends]),
-            theirs=np.tile(angular_momentum(system, state), (len(names), 1)),
-            baseline=np.zeros((len(names), 3)),
-            scale=_angular_scale(system, state),
-        )
+    system, state, external, h = samples.drifting(case)
+    ends = [SIMULATORS[name](system, h)(state, external, STEPS) for name in names]
+    return Comparison(
+        ours=np.array([angular_momentum(system, end) for end in ends]),
+        theirs=np.tile(angular_momentum(system, state), (len(names), 1)),
+        baseline=np.zeros((len(names), 3)),
+        scale=_angular_scale(system, state),
+    )
 
 
-def angular_momentum_orders(name: str, order: int, cases: int) -> Iterator[Comparison]:
+def angular_momentum_orders(name: str, order: int, case: int) -> Comparison:
     """Compare the order in h of the error of the angular momentum with the expected one."""
-    for case in range(cases):
-        errors = [_angular_error(case, name, refinement) for refinement in (1, 2)]
-        observed = np.array(observed_order(*errors))
-        yield Comparison(observed, np.array(float(order)), np.array(0.0), scale=1.0)
+    errors = [_angular_error(case, name, refinement) for refinement in (1, 2)]
+    observed = np.array(observed_order(*errors))
+    return Comparison(observed, np.array(float(order)), np.array(0.0), scale=1.0)
 
 
-def scalar_spring_energies(cases: int) -> Iterator[Comparison]:
+def scalar_spring_energies(case: int) -> Comparison:
     """Compare the ratio of the energies of one spring after and before n steps of implicit Euler.
 
     It is (1 + h² omega²)^-n for a spring of rest length zero, whose force is linear in x.
     """
-    for case in range(cases):
-        system, state, h = samples.oscillator(case)
-        omega = np.sqrt(system.stiffnesses[0] / system.masses[1])
-        end = SIMULATORS["implicit Euler"](system, h)(state, None, STEPS)
-        left = (1.0 + (h * omega) ** 2) ** -STEPS
-        ratio = mechanical_energy(system, end) / mechanical_energy(system, state)
-        yield Comparison(np.array(ratio), np.array(left), np.array(1.0), scale=float(left))
+    system, state, h = samples.oscillator(case)
+    omega = np.sqrt(system.stiffnesses[0] / system.masses[1])
+    end = SIMULATORS["implicit Euler"](system, h)(state, None, STEPS)
+    left = (1.0 + (h * omega) ** 2) ** -STEPS
+    ratio = mechanical_energy(system, end) / mechanical_energy(system, state)
+    return Comparison(np.array(ratio), np.array(left), np.array(1.0), scale=float(left))
 
 
 def linear_momentum(system: MassSpring, state: State) -> FloatArray:

@@ -1,6 +1,6 @@
 """Orders of convergence in h, towards an accurate solution and between two integrators."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,21 +15,17 @@ STEPS = 40
 REFINEMENT = 8
 
 
-def orders_to_the_limit(
-    names: Sequence[str], order: int, truth: str, cases: int
-) -> Iterator[Comparison]:
+def orders_to_the_limit(names: Sequence[str], order: int, truth: str, case: int) -> Comparison:
     """Compare the orders of convergence to an accurate solution with the expected one."""
-    for case in range(cases):
-        limit = end(case, truth, REFINEMENT)
-        runs = [(end(case, name, 1) - limit, end(case, name, 2) - limit) for name in names]
-        yield _orders(runs, order)
+    limit = end(case, truth, REFINEMENT)
+    runs = [(end(case, name, 1) - limit, end(case, name, 2) - limit) for name in names]
+    return _orders(runs, order)
 
 
-def orders_to_each_other(name: str, other: str, order: int, cases: int) -> Iterator[Comparison]:
+def orders_to_each_other(name: str, other: str, order: int, case: int) -> Comparison:
     """Compare the order of the difference between two integrators with the expected one."""
-    for case in range(cases):
-        differences = [end(case, name, k) - end(case, other, k) for k in (1, 2)]
-        yield _orders([differences], order)
+    differences = [end(case, name, k) - end(case, other, k) for k in (1, 2)]
+    return _orders([differences], order)
 
 
 def end(case: int, name: str, refinement: int) -> FloatArray:

@@ -1,7 +1,5 @@
 """Comparisons of single explicit, semi-implicit and linearised steps with MuJoCo's."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -16,50 +14,44 @@ from ..verdict import Comparison
 from .comparison import engine_of, flex, states
 
 
-def symplectic_steps(cases: int) -> Iterator[Comparison]:
+def symplectic_steps(case: int) -> Comparison:
     """Compare the state after one step of symplectic Euler with one of MuJoCo's Euler."""
-    for case in range(cases):
-        system, state, external, h = samples.network(case)
-        yield _compare_with("Euler", case, symplectic_euler(system, state, h, external))
+    system, state, external, h = samples.network(case)
+    return _compare_with("Euler", case, symplectic_euler(system, state, h, external))
 
 
-def flex_steps(cases: int) -> Iterator[Comparison]:
+def flex_steps(case: int) -> Comparison:
     """Compare the state after one step of symplectic Euler with MuJoCo's Euler on a flex."""
-    for case in range(cases):
-        system, state, external, h = samples.uniform(case)
-        ours = symplectic_euler(system, state, h, external)
-        yield states(ours, flex(case).step(state, external), state)
+    system, state, external, h = samples.uniform(case)
+    ours = symplectic_euler(system, state, h, external)
+    return states(ours, flex(case).step(state, external), state)
 
 
-def runge_kutta_steps(cases: int) -> Iterator[Comparison]:
+def runge_kutta_steps(case: int) -> Comparison:
     """Compare the state after one step of the classical Runge-Kutta method with MuJoCo's RK4."""
-    for case in range(cases):
-        system, state, external, h = samples.network(case)
-        yield _compare_with("RK4", case, runge_kutta(system, state, h, external))
+    system, state, external, h = samples.network(case)
+    return _compare_with("RK4", case, runge_kutta(system, state, h, external))
 
 
-def damper_diagonal_steps(cases: int) -> Iterator[Comparison]:
+def damper_diagonal_steps(case: int) -> Comparison:
     """Compare the step with implicit diag(C) with MuJoCo's implicitfast."""
-    for case in range(cases):
-        system, state, external, h = samples.network(case)
-        D = damper_blocks(system, state) * np.eye(3)
-        yield _compare_with("implicitfast", case, semi_implicit(system, state, h, external, D))
+    system, state, external, h = samples.network(case)
+    D = damper_blocks(system, state) * np.eye(3)
+    return _compare_with("implicitfast", case, semi_implicit(system, state, h, external, D))
 
 
-def damper_block_steps(cases: int) -> Iterator[Comparison]:
+def damper_block_steps(case: int) -> Comparison:
     """Compare the step with implicit 3 x 3 blocks of C with MuJoCo's implicit."""
-    for case in range(cases):
-        system, state, external, h = samples.network(case)
-        D = damper_blocks(system, state)
-        yield _compare_with("implicit", case, semi_implicit(system, state, h, external, D))
+    system, state, external, h = samples.network(case)
+    D = damper_blocks(system, state)
+    return _compare_with("implicit", case, semi_implicit(system, state, h, external, D))
 
 
-def gauss_newton_steps(cases: int, *, damped: bool) -> Iterator[Comparison]:
+def gauss_newton_steps(case: int, *, damped: bool) -> Comparison:
     """Compare the state after one Gauss-Newton step with one of MuJoCo's discrete."""
-    for case in range(cases):
-        system, state, external, h = samples.network(case, damped=damped)
-        ours = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, external).state
-        yield _compare_with("discrete", case, ours, damped=damped)
+    system, state, external, h = samples.network(case, damped=damped)
+    ours = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, external).state
+    return _compare_with("discrete", case, ours, damped=damped)
 
 
 def semi_implicit(

@@ -176,11 +176,12 @@ def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
 @functools.cache
 def _entry(kernel: PythonKernel, relaxed: bool, label: str | None) -> PythonKernel:
     """Compile what Python calls; cached on disk together with all that it calls."""
-    from . import disk_cache
+    from . import disk_cache, linking
 
     compilation.watch_numba()
-    compiled = _jit(kernel, relaxed)
+    compiled = _jit(kernel, relaxed, pipeline_class=linking.KernelCompiler)
     compiled.label = label or kernel.__name__.strip("_").replace("_", " ")
+    linking.fix_flags(compiled)
     disk_cache.use_cache(compiled)
     return compiled
 
@@ -197,7 +198,7 @@ def _callee(kernel: PythonKernel, relaxed: bool, inline: bool) -> PythonKernel:
     if not allocates(kernel):
         options["_nrt"] = False
     compiled = _jit(kernel, relaxed, pipeline_class=linking.LinkedCompiler, **options)
-    return linking.ignore_literals(compiled)
+    return linking.compile_directly(compiled)
 
 
 def _jit(kernel: PythonKernel, relaxed: bool, **options: Any) -> PythonKernel:

@@ -88,7 +88,7 @@ def in_slices(
             part.cancel()
 
 
-def _result(part: Future) -> Any:
+def _result(part: Future[Any]) -> Any:
     """Wait for a slice, and see an interrupt within `POLL` seconds."""
     while not part.done():
         with contextlib.suppress(TimeoutError):

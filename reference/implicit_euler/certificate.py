@@ -32,7 +32,8 @@ from numpy.typing import ArrayLike
 
 from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, floats, instance
 from ..mass_spring import lengths
-from ..sparse.linear_solver import Factor, NotPositiveDefiniteError, factorize
+from ..sparse import NotPositiveDefiniteError
+from ..sparse.linear_solver import Factor, factorize
 from .objective import Objective
 
 EPS = float(np.finfo(float).eps)

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..mass_spring import MassSpring
-from ..sparse.linear_solver import NotPositiveDefiniteError
+from ..sparse import NotPositiveDefiniteError
 from .factor_cache import hessian_factor
 from .objective import Iterate, Objective
 

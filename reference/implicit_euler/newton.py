@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..mass_spring import MassSpring
-from ..sparse.linear_solver import Factor, NotPositiveDefiniteError
+from ..sparse import NotPositiveDefiniteError
+from ..sparse.linear_solver import Factor
 from .factor_cache import hessian_factor
 from .line_search import line_search
 from .objective import Iterate, Objective

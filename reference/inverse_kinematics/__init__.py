@@ -43,10 +43,10 @@ def solve_ik(
 ) -> IKSolution:
     """Return the pose that brings effectors to targets, from a start pose.
 
-    The root of a Skeleton turns but does not move. Joints that move no effector keep their
+    The root of a Skeleton rotates but does not move. Joints that move no effector keep their
     rotation, as does an effector whose own rotation is not asked for. An answer is always given;
     `outcome` says what it is. A start that is stuck, such as a straight chain whose target lies on
-    its own line, is first bent, always in the same way. Limits are kept; a start outside of them
+    its own line, is first bent, always alike. Limits are kept; a start outside of them
     is brought within.
 
     Restarts never make an answer worse: what is reached with fewer is reached with more, and where

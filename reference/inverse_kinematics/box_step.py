@@ -14,11 +14,11 @@ from ..articulation import BALL, FREE, HINGE, SLIDE, clamp_joint
 from ..jacobians import move_joint
 from ..quaternion import normalised
 from .jacobian import LEAST_DAMPING
-from .joint_updates import ball_at, put_ball
+from .joint_updates import load_ball, store_ball
 from .mechanism import update_forward_kinematics
 from .task_jacobian import clear, fill_errors, fill_jacobian
 
-WHOLE_TURN = 2.0 * math.pi
+FULL_CIRCLE = 2.0 * math.pi
 
 
 class TaskSystem(NamedTuple):
@@ -87,7 +87,7 @@ def activate_limits(mechanism, data, system):
         q, scale = data.q[joints["coordinate"][j]], freedom_scale(mechanism, j)
         wanted = q + scale * system.step[k]
         bounded = min(max(wanted, joints["lower"][j]), joints["upper"][j])
-        if bounded != wanted and not turns_round(joints, j):
+        if bounded != wanted and not covers_circle(joints, j):
             system.active[k] = 1.0 if wanted > bounded else -1.0
             system.step[k] = (bounded - q) / scale
             for i in range(len(system.e)):
@@ -243,24 +243,24 @@ def take_step(mechanism, data, system):
                 step[k + i] *= mechanism.reach
             move_joint(joints, j, step, q)
             if kind in (BALL, FREE):
-                put_ball(joints, q, j, normalised(ball_at(joints, q, j)))
-            elif turns_round(joints, j):
+                store_ball(joints, q, j, normalised(load_ball(joints, q, j)))
+            elif covers_circle(joints, j):
                 wrap(joints, j, q)
             clamp_joint(joints, j, q)
     update_forward_kinematics(mechanism, data)
 
 
-def turns_round(joints, j):
-    """Return whether a hinge's limits leave a whole turn, so that none of them need stop it."""
+def covers_circle(joints, j):
+    """Return whether a hinge's limits leave all angles, so that none of them need stop it."""
     span = joints["upper"][j] - joints["lower"][j]
-    return joints["kind"][j] == HINGE and span >= WHOLE_TURN and not joints["followed"][j]
+    return joints["kind"][j] == HINGE and span >= FULL_CIRCLE and not joints["followed"][j]
 
 
 def wrap(joints, j, q):
-    """Bring a hinge's coordinate within its limits by whole turns, as few as do."""
+    """Bring a hinge's coordinate within its limits by multiples of 2 pi, as few as do."""
     at = joints["coordinate"][j]
     lower, upper = joints["lower"][j], joints["upper"][j]
     if q[at] > upper:
-        q[at] -= WHOLE_TURN * math.ceil((q[at] - upper) / WHOLE_TURN)
+        q[at] -= FULL_CIRCLE * math.ceil((q[at] - upper) / FULL_CIRCLE)
     elif q[at] < lower:
-        q[at] += WHOLE_TURN * math.ceil((lower - q[at]) / WHOLE_TURN)
+        q[at] += FULL_CIRCLE * math.ceil((lower - q[at]) / FULL_CIRCLE)

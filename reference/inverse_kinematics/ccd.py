@@ -1,7 +1,11 @@
 """Cyclic coordinate descent (Wang & Chen 1991)."""
 
 import math
+from typing import NamedTuple
 
+import numpy as np
+
+from ..arguments import FloatArray
 from ..articulation import BALL, FREE, HINGE, SLIDE
 from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
@@ -15,22 +19,29 @@ from ..quaternion import (
     multiply,
     renormalised,
     rotate,
+    rotation_about,
     scale,
     store_quaternion,
     subtract,
-    turn_about,
 )
-from .box_step import freedom_scale, inner, linearise_task, squared
-from .chain import place_joints
-from .joint_updates import ball_at, move_by, put_ball, rotate_to, translate_free
+from .box_step import (
+    TaskSystem,
+    freedom_scale,
+    inner,
+    linearise_task,
+    new_task_system,
+    squared,
+)
+from .chain import update_positions
+from .joint_updates import load_ball, move_by, rotate_to, store_ball, translate_free
 from .mechanism import (
     cost,
     effector_position,
     effector_rotation,
     position_error,
-    put_effector,
     rotation_error,
     rotation_weight,
+    store_effector,
     update_forward_kinematics,
 )
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, best_rotation
@@ -39,11 +50,28 @@ from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, 
 HALVINGS = 20
 
 
+class CCDWorkspace(NamedTuple):
+    """Arrays to write to.
+
+    Attributes:
+        system: where a joint that others follow finds its gradient.
+        eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
+    """
+
+    system: TaskSystem
+    eigen: FloatArray
+
+
+def new_ccd_workspace(mechanism):
+    """Return a workspace to be filled."""
+    return CCDWorkspace(new_task_system(mechanism), np.empty((2, 4, 4)))
+
+
 def ccd_sweep(chain, target):
     """Point each joint, from the effector's parent to the root, so that its effector is nearest.
 
     A joint moves what lies below it only. The joints still to come lie above and stay, so that on
-    the way up only the effector needs to be followed; the rotations are then applied from the root
+    that path only the effector needs to be followed; the rotations are then applied from the root
     down, each to its joint and to all below it.
     """
     n = len(chain.lengths)
@@ -51,13 +79,13 @@ def ccd_sweep(chain, target):
     for k in range(n - 1, -1, -1):
         joint = load_vector(chain.positions, k)
         Q, effector = pointing(joint, effector, target)
-        store_quaternion(chain.turns, k, Q)
+        store_quaternion(chain.deltas, k, Q)
     above = IDENTITY
     for k in range(n):
-        above = renormalised(multiply(above, load_quaternion(chain.turns, k)))
+        above = renormalised(multiply(above, load_quaternion(chain.deltas, k)))
         R = load_quaternion(chain.rotations, k)
         store_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
-    place_joints(chain)
+    update_positions(chain)
 
 
 def pointing(joint, effector, target):
@@ -99,7 +127,7 @@ def update_joint(mechanism, target, data, work, j):
         return
     M = attitude_profile(mechanism, target, data, j)
     if kind == HINGE:
-        Q = turn_about(axis, move_by(joints, q, j, best_angle(M, axis)))
+        Q = rotation_about(axis, move_by(joints, q, j, best_angle(M, axis)))
     else:
         Q = rotate_within_limits(mechanism, target, data, work, j, M)
     rotate_effectors(mechanism, data, j, Q)
@@ -139,11 +167,11 @@ def rotate_within_limits(mechanism, target, data, work, j, M):
     """Rotate a ball or free joint as is best within its limits; return the rotation made."""
     joints, R = mechanism.joints, load_quaternion(data.rotations, j)
     Q = unlimited_rotation(mechanism, target, data, work, j, M)
-    before = ball_at(joints, data.q, j)
+    before = load_ball(joints, data.q, j)
     moved = rotate_to(joints, data.q, j, frame_of(joints, j, data.rotations), multiply(Q, R))
     allowed = renormalised(multiply(moved, conjugate(R)))
     if joints["kind"][j] == BALL and alignment(M, allowed) < alignment(M, IDENTITY):
-        put_ball(joints, data.q, j, before)
+        store_ball(joints, data.q, j, before)
         return IDENTITY
     return allowed
 
@@ -176,7 +204,7 @@ def rotate_effectors(mechanism, data, j, Q):
         if mechanism.moves[j, e]:
             arm = subtract(effector_position(mechanism, data, e), x)
             R = multiply(Q, effector_rotation(mechanism, data, e))
-            put_effector(mechanism, data, e, add(x, rotate(Q, arm)), R)
+            store_effector(mechanism, data, e, add(x, rotate(Q, arm)), R)
 
 
 def translate_effectors(mechanism, data, j, v):
@@ -184,7 +212,7 @@ def translate_effectors(mechanism, data, j, v):
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
             moved = add(effector_position(mechanism, data, e), v)
-            put_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
+            store_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
 
 
 def descend(mechanism, target, data, work, j):

@@ -24,7 +24,7 @@ from ..quaternion import (
     subtract,
 )
 
-# A chain and target are on one line if no joint is further off it than this, over the reach.
+# A chain and target are collinear if no joint is further off their line than this, over the reach.
 LINE_TOLERANCE = 1e-9
 # Such a chain is bent by this angle [rad] in all, shared evenly by its joints.
 BEND = 2.0
@@ -40,7 +40,7 @@ class Chain(NamedTuple):
         lengths: link lengths [m], (n,).
         positions: global joint positions [m], (n + 1, 3).
         rotations: global joint rotations, (n + 1, 4).
-        turns: room for one rotation a joint, (n, 4).
+        deltas: where a sweep notes the rotation of each joint, (n, 4).
         reach: total length [m].
         longest: the longest link [m].
     """
@@ -49,7 +49,7 @@ class Chain(NamedTuple):
     lengths: FloatArray
     positions: FloatArray
     rotations: FloatArray
-    turns: FloatArray
+    deltas: FloatArray
     reach: float
     longest: float
 
@@ -67,8 +67,8 @@ def new_chain(offsets, path):
         lengths[k] = norm(link)
         reach += lengths[k]
         longest = max(longest, lengths[k])
-    positions, rotations, turns = np.empty((n + 1, 3)), np.empty((n + 1, 4)), np.empty((n, 4))
-    return Chain(along, lengths, positions, rotations, turns, reach, longest)
+    positions, rotations, deltas = np.empty((n + 1, 3)), np.empty((n + 1, 4)), np.empty((n, 4))
+    return Chain(along, lengths, positions, rotations, deltas, reach, longest)
 
 
 def pose_chain(chain, path, local):
@@ -78,18 +78,18 @@ def pose_chain(chain, path, local):
     for k in range(1, len(path)):
         R_parent = load_quaternion(chain.rotations, k - 1)
         store_quaternion(chain.rotations, k, multiply(R_parent, load_quaternion(local, path[k])))
-    place_joints(chain)
+    update_positions(chain)
 
 
-def place_joints(chain):
+def update_positions(chain):
     """Compute the positions from the rotations, the root fixed."""
     for k in range(len(chain.lengths)):
         link = rotate(load_quaternion(chain.rotations, k), load_vector(chain.offsets, k + 1))
         store_vector(chain.positions, k + 1, add(load_vector(chain.positions, k), link))
 
 
-def turn_links(chain):
-    """Turn every joint so that its link points at the next joint's position.
+def rotate_links(chain):
+    """Rotate every joint so that its link points at the next joint's position.
 
     The shortest arc from the link's direction to the new one multiplies the global rotation from
     the left, so that the joint keeps its twist about the link.
@@ -97,11 +97,11 @@ def turn_links(chain):
     for k in range(len(chain.lengths)):
         R = load_quaternion(chain.rotations, k)
         link = rotate(R, load_vector(chain.offsets, k + 1))
-        way = subtract(load_vector(chain.positions, k + 1), load_vector(chain.positions, k))
-        store_quaternion(chain.rotations, k, renormalised(multiply(between(link, way), R)))
+        direction = subtract(load_vector(chain.positions, k + 1), load_vector(chain.positions, k))
+        store_quaternion(chain.rotations, k, renormalised(multiply(between(link, direction), R)))
 
 
-def put_local(chain, path, local):
+def store_local(chain, path, local):
     """Write the chain's local rotations over those of (joint, 4); the effector keeps its own."""
     store_quaternion(local, path[0], load_quaternion(chain.rotations, 0))
     for k in range(1, len(chain.lengths)):
@@ -110,7 +110,7 @@ def put_local(chain, path, local):
         store_quaternion(local, path[k], renormalised(q))
 
 
-def tip_error(chain, target):
+def effector_error(chain, target):
     """Return the distance from the effector to the target [m]."""
     return norm(subtract(load_vector(chain.positions, len(chain.lengths)), target))
 
@@ -123,7 +123,7 @@ def root_distance(chain, target):
 def least_distance(chain, d):
     """Return how close the effector can come to a target at distance d from the root [m].
 
-    It reaches all of the shell between the full reach and the hole that the longest link leaves
+    It reaches all of the shell between its reach and the inner radius that the longest link leaves
     when all others fold back: max(0, d - reach, 2 longest - reach - d).
     """
     return max(0.0, d - chain.reach, 2.0 * chain.longest - chain.reach - d)
@@ -134,44 +134,44 @@ def rounding(chain, d):
     return POSITION_ROUNDING * (chain.reach + d)
 
 
-def out_of_reach(chain, d):
+def is_beyond_reach(chain, d):
     """Return whether a target at distance d lies at full reach, to rounding, or beyond."""
     return d >= chain.reach - rounding(chain, d)
 
 
-def in_hole(chain, d):
-    """Return whether a target at distance d lies on the rim of the hole, to rounding, or inside."""
+def is_inside_inner_radius(chain, d):
+    """Return whether a target at distance d is the inner radius, to rounding, or less."""
     return d <= 2.0 * chain.longest - chain.reach + rounding(chain, d)
 
 
 def drawn_near(chain, target, beyond):
     """Return the target, drawn to within a distance of what the effector can reach [m]."""
     root = load_vector(chain.positions, 0)
-    way = subtract(target, root)
-    d = norm(way)
+    direction = subtract(target, root)
+    d = norm(direction)
     least = least_distance(chain, d) - beyond
     if least <= 0.0:
         return target
     if d <= rounding(chain, d):  # all directions are as near: the effector keeps its own
-        way = subtract(load_vector(chain.positions, len(chain.lengths)), root)
-        d = norm(way)
-        return add(root, scale(least / d, way)) if d > 0.0 else target
-    return add(root, scale((d - least if d > chain.reach else d + least) / d, way))
+        direction = subtract(load_vector(chain.positions, len(chain.lengths)), root)
+        d = norm(direction)
+        return add(root, scale(least / d, direction)) if d > 0.0 else target
+    return add(root, scale((d - least if d > chain.reach else d + least) / d, direction))
 
 
-def on_one_line(chain, target):
+def is_collinear(chain, target):
     """Return whether all joints and the target lie on a line through the root.
 
-    On it every solver that turns links towards the target in their common plane has no plane to
-    turn them in, and stays there.
+    On it every solver that rotates links towards the target in their common plane has no plane to
+    rotate them in, and stays there.
     """
     root = load_vector(chain.positions, 0)
-    way = subtract(target, root)
+    direction = subtract(target, root)
     for k in range(1, len(chain.positions)):
         arm = subtract(load_vector(chain.positions, k), root)
-        if norm(way) <= LINE_TOLERANCE * chain.reach:
-            way = arm
-        elif norm(cross(way, arm)) > LINE_TOLERANCE * chain.reach * norm(way):
+        if norm(direction) <= LINE_TOLERANCE * chain.reach:
+            direction = arm
+        elif norm(cross(direction, arm)) > LINE_TOLERANCE * chain.reach * norm(direction):
             return False
     return True
 
@@ -187,8 +187,8 @@ def bend(chain):
             )
     axis = perpendicular(direction)
     for k in range(n):
-        turn = exponential(scale(BEND * (k + 1) / n, axis))
+        Q = exponential(scale(BEND * (k + 1) / n, axis))
         store_quaternion(
-            chain.rotations, k, renormalised(multiply(turn, load_quaternion(chain.rotations, k)))
+            chain.rotations, k, renormalised(multiply(Q, load_quaternion(chain.rotations, k)))
         )
-    place_joints(chain)
+    update_positions(chain)

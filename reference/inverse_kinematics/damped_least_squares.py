@@ -20,9 +20,9 @@ def damped_least_squares_sweep(chain, target):
     rotate_joints(chain, solve_damped(A, DAMPING * chain.reach * chain.reach, e))
 
 
-def damped_least_squares_update(mechanism, target, data, work):
+def damped_least_squares_update(mechanism, target, data, system):
     """Change the coordinates by J' (J J' + (0.1 reach)^2 1)^-1 e, within their limits."""
-    linearise_task(mechanism, target, data, work.system)
+    linearise_task(mechanism, target, data, system)
     damping = DAMPING * mechanism.reach * mechanism.reach
-    damped_step(mechanism, data, work.system, damping)
-    take_step(mechanism, data, work.system)
+    damped_step(mechanism, data, system, damping)
+    take_step(mechanism, data, system)

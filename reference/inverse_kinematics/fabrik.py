@@ -6,8 +6,11 @@ their backward positions: a hinge about its axis, a ball within its limits, one 
 children of a branch, a free joint as one body. What that cannot meet remains as the residual.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
+from ..arguments import FloatArray, RecordArray
 from ..articulation import BALL, FREE, HINGE, SLIDE, joint_transform
 from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
@@ -22,13 +25,13 @@ from ..quaternion import (
     norm,
     normalised,
     rotate,
+    rotation_about,
     scale,
     store_quaternion,
     store_vector,
     subtract,
-    turn_about,
 )
-from .chain import in_hole, out_of_reach, root_distance
+from .chain import is_beyond_reach, is_inside_inner_radius, root_distance
 from .joint_updates import move_by, rotate_to, translate_free
 from .mechanism import rotation_weight, update_forward_kinematics
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, best_angle, best_rotation
@@ -41,15 +44,32 @@ LEAST_ROTATION = 1e-6
 BACKWARD = np.dtype([("position", np.float64, 3), ("weight", np.float64)], align=True)
 
 
+class FabrikWorkspace(NamedTuple):
+    """Arrays to write to.
+
+    Attributes:
+        backward: backward positions, records BACKWARD, (joint,).
+        eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
+    """
+
+    backward: RecordArray
+    eigen: FloatArray
+
+
+def new_fabrik_workspace(mechanism):
+    """Return a workspace to be filled."""
+    return FabrikWorkspace(np.empty(len(mechanism.joints), BACKWARD), np.empty((2, 4, 4)))
+
+
 def fabrik_sweep(chain, target):
     """Move the joints' positions: to the target and back to the root, or, beyond reach, on a line.
 
     Only positions move; the joints' rotations follow after the last sweep.
     """
     d = root_distance(chain, target)
-    if out_of_reach(chain, d):
+    if is_beyond_reach(chain, d):
         lay_on_line(chain, target, 1.0)
-    elif in_hole(chain, d):
+    elif is_inside_inner_radius(chain, d):
         lay_on_line(chain, target, -1.0)
     else:
         reach_backward(chain, target)
@@ -104,7 +124,7 @@ def fabrik_update(mechanism, target, data, work):
     backward_pass(mechanism, target, data, work.backward)
     joints = mechanism.joints
     for j in range(len(joints)):
-        put_joint(joints, data, work.backward, j)
+        update_joint_pose(joints, data, work.backward, j)
         forward_joint(mechanism, target, data, work, j)
     update_forward_kinematics(mechanism, data)
 
@@ -153,7 +173,7 @@ def add_backward(backward, j, weight, x):
     backward["weight"][j] += weight
 
 
-def put_joint(joints, data, backward, j):
+def update_joint_pose(joints, data, backward, j):
     """Put a joint where its parent and its coordinates have it now.
 
     A ball with a backward position below keeps the rotation in the world that it had.
@@ -185,10 +205,10 @@ def forward_joint(mechanism, target, data, work, j):
     if kind == HINGE and leads:
         axis = axis_of(joints, j, R)
         angle = best_angle(attitude_profile(mechanism, target, data, work.backward, j), axis)
-        R = multiply(turn_about(axis, move_by(joints, q, j, angle)), R)
+        R = multiply(rotation_about(axis, move_by(joints, q, j, angle)), R)
     elif kind == BALL and work.backward["weight"][j] > 0.0:
-        wanted = multiply(forward_rotation(mechanism, target, data, work, j), R)
-        R = rotate_to(joints, q, j, frame_of(joints, j, data.rotations), wanted)
+        R_wanted = multiply(forward_rotation(mechanism, target, data, work, j), R)
+        R = rotate_to(joints, q, j, frame_of(joints, j, data.rotations), R_wanted)
     store_quaternion(data.rotations, j, normalised(R))
 
 
@@ -201,13 +221,13 @@ def forward_free(mechanism, target, data, work, j):
     one, the least of the best rotations is taken.
     """
     joints, x = mechanism.joints, load_vector(data.positions, j)
-    total, arm, wanted = mean_arms(mechanism, target, data, work.backward, j)
+    total, arm, to = mean_arms(mechanism, target, data, work.backward, j)
     M = attitude_profile(mechanism, target, data, work.backward, j)
-    M = add_outer(M, -total, wanted, arm)
+    M = add_outer(M, -total, to, arm)
     stay = LEAST_ROTATION * total * mechanism.reach * mechanism.reach
     M = add_rotation(M, stay, IDENTITY)
     Q = best_rotation(M, work.eigen[0], work.eigen[1])
-    v, frame = subtract(wanted, rotate(Q, arm)), frame_of(joints, j, data.rotations)
+    v, frame = subtract(to, rotate(Q, arm)), frame_of(joints, j, data.rotations)
     R = rotate_to(joints, data.q, j, frame, multiply(Q, load_quaternion(data.rotations, j)))
     translate_free(joints, data.q, j, rotate(conjugate(frame), v))
     store_vector(data.positions, j, add(x, v))
@@ -216,20 +236,20 @@ def forward_free(mechanism, target, data, work, j):
 
 def mean_arms(mechanism, target, data, backward, j):
     """Return the weight of what `attitude_profile` counts, and the means of its arms [m]."""
-    total, arms, wanted = 0.0, ZERO, ZERO
+    total, arms, ends = 0.0, ZERO, ZERO
     for e in range(len(mechanism.effectors)):
         if mechanism.moves[j, e]:
             arm, to = effector_arms(mechanism, target, data, e, j)
             weight = target["weight"][e]
-            arms, wanted = add(arms, scale(weight, arm)), add(wanted, scale(weight, to))
+            arms, ends = add(arms, scale(weight, arm)), add(ends, scale(weight, to))
             total += weight
     for c in range(j + 1, len(backward)):
         if mechanism.adjacent[j, c]:
             arm, to = joint_arms(mechanism, data, backward, c, j)
             weight = backward["weight"][c]
-            arms, wanted = add(arms, scale(weight, arm)), add(wanted, scale(weight, to))
+            arms, ends = add(arms, scale(weight, arm)), add(ends, scale(weight, to))
             total += weight
-    return total, scale(1.0 / total, arms), scale(1.0 / total, wanted)
+    return total, scale(1.0 / total, arms), scale(1.0 / total, ends)
 
 
 def forward_rotation(mechanism, target, data, work, j):

@@ -18,7 +18,7 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .chain import LINE_TOLERANCE, bend, drawn_near, place_joints
+from .chain import LINE_TOLERANCE, bend, drawn_near, update_positions
 
 # Where J J^T is singular, a damping of so much of its trace keeps its factors above rounding.
 LEAST_DAMPING = 1e-14
@@ -91,4 +91,4 @@ def rotate_joints(chain, z):
         above = multiply(above, Q)
         R = load_quaternion(chain.rotations, k)
         store_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
-    place_joints(chain)
+    update_positions(chain)

@@ -25,8 +25,8 @@ def jacobian_transpose_sweep(chain, target):
         rotate_joints(chain, scale(dot(e, move) / dot(move, move), e))
 
 
-def jacobian_transpose_update(mechanism, target, data, work):
+def jacobian_transpose_update(mechanism, target, data, system):
     """Change the coordinates by a J' e with the same a, within their limits."""
-    linearise_task(mechanism, target, data, work.system)
-    transposed_step(mechanism, data, work.system)
-    take_step(mechanism, data, work.system)
+    linearise_task(mechanism, target, data, system)
+    transposed_step(mechanism, data, system)
+    take_step(mechanism, data, system)

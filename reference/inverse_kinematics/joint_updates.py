@@ -1,7 +1,14 @@
 """Changes of one joint's coordinates within its limits."""
 
-from ..articulation import FREE, clamp_ball
-from ..quaternion import conjugate, load_vector, multiply, normalised
+from ..articulation import FREE, ball_coordinate, clamp_ball
+from ..quaternion import (
+    conjugate,
+    load_quaternion_from,
+    load_vector,
+    multiply,
+    normalised,
+    store_quaternion_to,
+)
 
 
 def move_by(joints, q, j, wanted):
@@ -12,16 +19,14 @@ def move_by(joints, q, j, wanted):
     return q[at] - before
 
 
-def ball_at(joints, q, j):
+def load_ball(joints, q, j):
     """Return the quaternion of a ball or free joint."""
-    at = joints["coordinate"][j] + (3 if joints["kind"][j] == FREE else 0)
-    return q[at], q[at + 1], q[at + 2], q[at + 3]
+    return load_quaternion_from(q, ball_coordinate(joints, j))
 
 
-def put_ball(joints, q, j, Q):
+def store_ball(joints, q, j, Q):
     """Write the quaternion of a ball or free joint."""
-    at = joints["coordinate"][j] + (3 if joints["kind"][j] == FREE else 0)
-    q[at], q[at + 1], q[at + 2], q[at + 3] = Q
+    store_quaternion_to(q, ball_coordinate(joints, j), Q)
 
 
 def rotate_to(joints, q, j, frame, R):
@@ -33,7 +38,7 @@ def rotate_to(joints, q, j, frame, R):
     if joints["kind"][j] != FREE:
         axis, cone = load_vector(joints["axis"], j), joints["cone"][j]
         Q = clamp_ball(Q, axis, joints["lower"][j], joints["upper"][j], cone)
-    put_ball(joints, q, j, Q)
+    store_ball(joints, q, j, Q)
     return multiply(frame, Q)
 
 

@@ -25,11 +25,11 @@ def levenberg_marquardt_sweep(chain, target):
     rotate_joints(chain, solve_damped(A, damping, e))
 
 
-def levenberg_marquardt_update(mechanism, target, data, work):
+def levenberg_marquardt_update(mechanism, target, data, system):
     """Change the coordinates by J' (J J' + mu 1)^-1 e, within their limits."""
-    linearise_task(mechanism, target, data, work.system)
+    linearise_task(mechanism, target, data, system)
     positions = 3 * len(mechanism.effectors) == mechanism.equations
     share = DAMPING if positions else DAMPING_OF_POSES
-    damping = share * squared(work.system.e) + BIAS * mechanism.reach * mechanism.reach
-    damped_step(mechanism, data, work.system, damping)
-    take_step(mechanism, data, work.system)
+    damping = share * squared(system.e) + BIAS * mechanism.reach * mechanism.reach
+    damped_step(mechanism, data, system, damping)
+    take_step(mechanism, data, system)

@@ -134,7 +134,7 @@ def update_forward_kinematics(mechanism, data):
             R_joint = load_quaternion(data.rotations, j)
             x = add(load_vector(data.positions, j), rotate(R_joint, x))
             R = multiply(R_joint, R)
-        put_effector(mechanism, data, e, x, R)
+        store_effector(mechanism, data, e, x, R)
 
 
 def effector_position(mechanism, data, e):
@@ -147,7 +147,7 @@ def effector_rotation(mechanism, data, e):
     return load_quaternion(data.rotations, len(mechanism.joints) + e)
 
 
-def put_effector(mechanism, data, e, x, R):
+def store_effector(mechanism, data, e, x, R):
     """Write an effector's position and rotation in the world."""
     store_vector(data.positions, len(mechanism.joints) + e, x)
     store_quaternion(data.rotations, len(mechanism.joints) + e, R)

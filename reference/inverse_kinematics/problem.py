@@ -1,6 +1,6 @@
 """What is asked of a solver, and what it answers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
@@ -51,7 +51,7 @@ class IKSolution(NamedTuple):
             where a rotation is asked for, the lever half the reach.
         excess: how far `residual` is above the least that geometry proves possible [m]: the
             distance beyond all links and slides, and on a Skeleton with one position also that to
-            the rim of the hole which the longest link leaves; above 0 where nothing is proven.
+            the inner radius which the longest link leaves; above 0 where nothing is proven.
     """
 
     local_rotations: FloatArray
@@ -80,6 +80,11 @@ class CheckedTarget(NamedTuple):
     position: FloatArray
     rotation: FloatArray | None
     weight: float
+
+    def mapped(self, change: Callable[[FloatArray], FloatArray]) -> "CheckedTarget":
+        """Return the target with its position and its rotation, if it has one, changed."""
+        Q = None if self.rotation is None else change(self.rotation)
+        return self._replace(position=change(self.position), rotation=Q)
 
 
 def checked_targets(
@@ -120,11 +125,11 @@ def _checked(
             f"effector: expected that of the target, {target.effector!r}, got {effector!r}"
         )
     position = arguments.floats("target", target.position, "...", 3)
-    turned = target.rotation
-    if turned is not None:
-        turned = arguments.floats("rotation", turned, "...", 4)
+    quaternion = target.rotation
+    if quaternion is not None:
+        quaternion = arguments.floats("rotation", quaternion, "...", 4)
     weight = arguments.number("weight", target.weight, above=0.0)
-    return CheckedTarget(joint, position, turned, weight)
+    return CheckedTarget(joint, position, quaternion, weight)
 
 
 def check_numbers(targets: list[CheckedTarget]) -> list[CheckedTarget]:

@@ -12,8 +12,8 @@ from ..articulation import (
     HINGE,
     SLIDE,
     Articulation,
-    half_turned,
     number_coordinates,
+    rotated_by_pi,
 )
 from ..quaternion import IDENTITY, add, load_quaternion, load_vector, multiply, rotate
 from .mechanism import EFFECTOR, Mechanism
@@ -30,14 +30,15 @@ class Prepared(NamedTuple):
     Attributes:
         mechanism: what moves the effectors.
         restarts: the mechanism's coordinates in random poses, (restart, coordinate).
-        tips: where these put the effectors, positions [m] and rotations, (restart, effector, 7).
+        effector_frames: where these put the effectors, positions [m] and rotations, (restart,
+            effector, 7).
         flat: joints of the articulation and mechanism, one array or number after the other, and
             the two above.
     """
 
     mechanism: Mechanism
     restarts: FloatArray
-    tips: FloatArray
+    effector_frames: FloatArray
     flat: tuple[Any, ...]
 
 
@@ -53,11 +54,11 @@ def prepare(
     if key not in articulation.mechanisms:
         mechanism, columns = _prepared(articulation, effectors, oriented)
         poses = _random_poses(articulation, restarts, seed)
-        tips = np.empty((0, len(effectors), 7))
+        effector_frames = np.empty((0, len(effectors), 7))
         if restarts:  # without, forward kinematics need not be compiled
             x, R = articulation.forward(poses)
-            tips = np.concatenate([x, R], axis=-1)[:, list(effectors)]
-        drawn = np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(tips)
+            effector_frames = np.concatenate([x, R], axis=-1)[:, list(effectors)]
+        drawn = np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(effector_frames)
         flat = (articulation.joints, *mechanism, *drawn)
         articulation.mechanisms[key] = Prepared(mechanism, *drawn, flat)
     return articulation.mechanisms[key]
@@ -98,18 +99,18 @@ def _active(
 ) -> IndexArray:
     """Return the joints that move on the paths to the effectors, and those that they follow.
 
-    An effector's own ball or hinge turns it, but does not move it.
+    An effector's own ball or hinge rotates it, but does not move it.
     """
     path, kinds = articulation.skeleton.path_array, articulation.joints["kind"]
     needed: set[int] = set()
-    for joint, turned in zip(effectors, oriented, strict=True):
-        moving = turned or kinds[joint] in (SLIDE, FREE)
+    for joint, posed in zip(effectors, oriented, strict=True):
+        moving = posed or kinds[joint] in (SLIDE, FREE)
         needed.update(path(joint).tolist() if moving else path(joint).tolist()[:-1])
     needed.update(articulation.joints["leader"][sorted(needed)].tolist())
     return np.array([j for j in sorted(needed) if kinds[j] != FIXED], dtype=np.int64)
 
 
-def _merged(whole: RecordArray, joint: int, number: dict[int, int]):
+def _merged(whole: RecordArray, joint: int, number: dict[int, int]) -> tuple[int, Any, Any]:
     """Return the nearest moving joint above, and this joint's frame in the frame of that one."""
     x, R = load_vector(whole["offset"], joint), load_quaternion(whole["frame"], joint)
     j = int(whole["parent"][joint])
@@ -151,7 +152,7 @@ def _moving_joints(
     widths = number_coordinates(joints)
     for k, j in enumerate(active):
         joints["parent"][k], joints["offset"][k], joints["frame"][k] = _merged(whole, j, number)
-    joints["turned"] = half_turned(joints)
+    joints["rotated"] = rotated_by_pi(joints)
     columns = [np.arange(a, a + w) for a, w in zip(at, widths, strict=True)]
     return joints, np.concatenate([*columns, np.empty(0, dtype=np.int64)])
 
@@ -193,7 +194,7 @@ def _adjacent(joints: RecordArray, ends: RecordArray, reach: float) -> BoolArray
 
 
 def _stays(joints: RecordArray, j: int, c: int, margin: float) -> bool:
-    """Return whether turning joint j leaves joint c in place, if it does so with c's parent."""
+    """Return whether rotating joint j leaves joint c in place, if it does so with c's parent."""
     offset = joints["offset"][c]
     if joints["kind"][c] in (SLIDE, FREE):
         return False

@@ -68,7 +68,7 @@ class Criteria(NamedTuple):
     """When an attempt at one target ends.
 
     Attributes:
-        distance: at most this far from the target counts as reached [m], some room left for the
+        distance: at most this far from the target counts as reached [m], some of it left for the
             rounding of the final pose.
         angle: the same for rotations [rad].
         margin: an error that changes by no more has settled [m].

@@ -10,9 +10,10 @@ from .. import arguments
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from ..skeleton import Skeleton
-from .ccd import ccd_sweep, ccd_update
+from .box_step import new_task_system
+from .ccd import ccd_sweep, ccd_update, new_ccd_workspace
 from .damped_least_squares import damped_least_squares_sweep, damped_least_squares_update
-from .fabrik import fabrik_sweep, fabrik_update
+from .fabrik import fabrik_sweep, fabrik_update, new_fabrik_workspace
 from .jacobian_transpose import jacobian_transpose_sweep, jacobian_transpose_update
 from .levenberg_marquardt import levenberg_marquardt_sweep, levenberg_marquardt_update
 from .problem import Target, are_targets
@@ -33,6 +34,7 @@ class IKSolver(NamedTuple):
     mechanism: Kernel
 
 
+# A solver's sweep over a chain, and its update of a mechanism.
 _KERNELS = {
     "ccd": (ccd_sweep, ccd_update),
     "fabrik": (fabrik_sweep, fabrik_update),
@@ -40,8 +42,12 @@ _KERNELS = {
     "damped_least_squares": (damped_least_squares_sweep, damped_least_squares_update),
     "jacobian_transpose": (jacobian_transpose_sweep, jacobian_transpose_update),
 }
+# What makes the arrays that an update writes to, where it is no Jacobian method.
+_WORKSPACES = {"ccd": new_ccd_workspace, "fabrik": new_fabrik_workspace}
 IK_SOLVERS = {
-    name: IKSolver(on_chains(name, sweep), on_mechanisms(name, update))
+    name: IKSolver(
+        on_chains(name, sweep), on_mechanisms(name, update, _WORKSPACES.get(name, new_task_system))
+    )
     for name, (sweep, update) in _KERNELS.items()
 }
 

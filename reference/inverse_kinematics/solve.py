@@ -51,14 +51,14 @@ def solve_on_chain(
     count, name = skeleton.joint_count, "local_rotations"
     starts = arguments.floats(name, start, "...", count, 4)
     batch = batch_shape(starts.shape[:-2], [target], name)
-    wanted = target.position[None]
+    target_array = target.position[None]
     if batch:
-        wanted = arguments.spread(target.position, (*batch, 3)).reshape(-1, 3)
-    n, figures = len(wanted), np.empty((len(wanted), len(FIGURES)))
+        target_array = arguments.spread(target.position, (*batch, 3)).reshape(-1, 3)
+    n, figures = len(target_array), np.empty((len(target_array), len(FIGURES)))
     local, positions = np.empty((n, count, 4)), np.empty((n, count, 3))
     history = _new_history(n, settings.limits.restarts + 1, settings)
     model = (*skeleton.arrays, skeleton.path_array(target.joint))
-    rows = _rows(starts, batch, 2), wanted, local, positions, figures, history
+    rows = _rows(starts, batch, 2), target_array, local, positions, figures, history
     if not _run(settings.solver.chain, model, settings, rows, LEAST_ON_CHAINS):
         _raise_invalid(skeleton, start, [target])
     return _solution(Result(local, positions, figures, history, local), batch, settings)
@@ -84,8 +84,8 @@ def solve_on_mechanism(
     restarts = settings.limits.restarts
     prepared = prepare(articulation, effectors, oriented, restarts, settings.seed)
     batch = batch_shape(starts.shape[:-1], targets, name)
-    wanted, count = target_rows(targets, batch), articulation.joint_count
-    n = len(wanted)
+    target_array, count = target_rows(targets, batch), articulation.joint_count
+    n = len(target_array)
     result = Result(
         np.empty((n, count, 4)),
         np.empty((n, count, 3)),
@@ -93,7 +93,7 @@ def solve_on_mechanism(
         _new_history(n, 2 * restarts + 1, settings),
         np.empty((n, articulation.coordinate_count)),
     )
-    rows = (_rows(starts, batch, 1), wanted, *result)
+    rows = (_rows(starts, batch, 1), target_array, *result)
     if not _run(settings.solver.mechanism, prepared.flat, settings, rows, LEAST):
         _raise_invalid(model, start, targets)
     if isinstance(model, Skeleton):
@@ -174,21 +174,12 @@ def batch_shape(
     """
     batch = starts
     for one in targets:
-        if one.position.ndim > 1:
-            batch = _broadcast(name, batch, one.position.shape[:-1])
-        if one.rotation is not None and one.rotation.ndim > 1:
-            batch = _broadcast(name, batch, one.rotation.shape[:-1])
+        for values in (one.position, one.rotation):
+            if values is not None and values.ndim > 1:
+                batch = arguments.broadcast(
+                    "target", batch, values.shape[:-1], f"those of {name}, "
+                )
     return batch
-
-
-def _broadcast(name: str, starts: tuple[int, ...], targets: tuple[int, ...]) -> tuple[int, ...]:
-    try:
-        return np.broadcast_shapes(starts, targets)
-    except ValueError:
-        raise ValueError(
-            f"target: expected leading axes that broadcast with those of {name}, "
-            f"{arguments.shape(starts)}, got {arguments.shape(targets)}"
-        ) from None
 
 
 def _rows(starts: FloatArray, batch: tuple[int, ...], axes: int) -> FloatArray:

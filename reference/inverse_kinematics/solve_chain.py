@@ -21,16 +21,16 @@ from ..quaternion import (
 from .chain import (
     Chain,
     bend,
+    effector_error,
+    is_beyond_reach,
+    is_collinear,
     least_distance,
     new_chain,
-    on_one_line,
-    out_of_reach,
     pose_chain,
-    put_local,
     root_distance,
+    rotate_links,
     rounding,
-    tip_error,
-    turn_links,
+    store_local,
 )
 from .restarts import MADE, Criteria, limits_of, new_progress, solve_with_restarts
 from .result import (
@@ -87,8 +87,8 @@ def solve_chains(
         iterations, settled = solve_with_restarts(state, target, limits, criteria, past)
         if iterations > 0:
             restore_chain(state, len(state.saved) - 1)
-            turn_links(chain)
-            put_local(chain, path, pose)
+            rotate_links(chain)
+            store_local(chain, path, pose)
         forward_pose(parents, offsets, pose, positions[i], rotations)
         distance = norm(subtract(load_vector(positions[i], path[-1]), target))
         figures[i, ITERATIONS] = iterations
@@ -127,21 +127,25 @@ def update_chain(state, target):
 
 def chain_error(state, target):
     """Return the distance from effector to target [m] as the loops want it."""
-    distance = tip_error(state.chain, target)
+    distance = effector_error(state.chain, target)
     return distance, 0.0, distance
 
 
 def chain_merit(state, target):
     """Return the distance from effector to target [m]."""
-    return tip_error(state.chain, target)
+    return effector_error(state.chain, target)
 
 
 def perturb_chain(state, target, criteria, first):
-    """Bend a chain that starts on one line with its target, off which no solver would leave it."""
+    """Bend a chain that starts collinear with its target, which no solver would leave."""
     chain, d = state.chain, root_distance(state.chain, target)
-    if first[MADE] > 0 or tip_error(chain, target) <= criteria.distance or out_of_reach(chain, d):
+    if (
+        first[MADE] > 0
+        or effector_error(chain, target) <= criteria.distance
+        or is_beyond_reach(chain, d)
+    ):
         return False
-    if not on_one_line(chain, target):
+    if not is_collinear(chain, target):
         return False
     bend(chain)
     return True

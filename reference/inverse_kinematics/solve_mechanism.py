@@ -1,19 +1,19 @@
 """Any targets of any mechanism: what the loops of `restarts.py` work on."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arguments import LARGEST_COORDINATE, FloatArray, RecordArray
+from ..arguments import LARGEST_COORDINATE, FloatArray
 from ..articulation import (
     BALL,
     FREE,
     HINGE,
     articulated_pose,
     clamp_joint,
-    fit_start,
     joint_transform,
+    normalise_start,
 )
 from ..backend.compiled import Kernel, Slot, bind
 from ..quaternion import (
@@ -24,14 +24,12 @@ from ..quaternion import (
     multiply,
     norm,
     normalised,
+    rotation_about,
     store_quaternion,
     subtract,
-    turn_about,
 )
-from .box_step import TaskSystem, new_task_system
 from .chain import BEND, POSITION_ROUNDING
-from .fabrik import BACKWARD
-from .joint_updates import ball_at, move_by, put_ball
+from .joint_updates import load_ball, move_by, store_ball
 from .mechanism import (
     LEVER,
     ConfigurationData,
@@ -70,6 +68,8 @@ from .result import (
 
 # One iteration of a solver: step(mechanism, target, data, workspace).
 step = Slot("step")
+# new_workspace(mechanism): the arrays that its step writes to, in a NamedTuple.
+new_workspace = Slot("new_workspace")
 
 # A start that settles within so few iterations away from its target is stuck, such as a straight
 # chain, perhaps folded since, whose target lies on its own line.
@@ -78,45 +78,32 @@ STUCK = 6
 PERTURBATION_AXIS = (0.48, 0.6, 0.64)
 
 
-class Workspace(NamedTuple):
-    """Arrays that a solver writes to.
-
-    Attributes:
-        system: of the Jacobian methods.
-        backward: FABRIK's backward positions, records BACKWARD, (joint,).
-        eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
-    """
-
-    system: TaskSystem
-    backward: RecordArray
-    eigen: FloatArray
-
-
 class MechanismState(NamedTuple):
     """A mechanism, where it is, and the ends of attempts on it.
 
     Attributes:
         mechanism: what moves.
         data: its configuration.
-        workspace: of the solver.
+        workspace: of the solver, what `new_workspace` returns.
         restarts: coordinates of the mechanism for further attempts, (restart, coordinate).
-        tips: where they put the effectors, positions [m] and rotations, (restart, effector, 7).
+        effector_frames: where they put the effectors, positions [m] and rotations, (restart,
+            effector, 7).
         saved: coordinates of the mechanism, (attempt + 1, coordinate).
         progress: see `restarts.py`.
     """
 
     mechanism: Mechanism
     data: ConfigurationData
-    workspace: Workspace
+    workspace: Any
     restarts: FloatArray
-    tips: FloatArray
+    effector_frames: FloatArray
     saved: FloatArray
     progress: FloatArray
 
 
 def solve_mechanisms(
     joints, own_joints, sources, effectors, moves, adjacent, reach, width, freedoms, equations,
-    restarts, restart_tips, numbers, starts, targets, local,
+    restarts, restart_frames, numbers, starts, targets, local,
     positions, figures, history, coordinates,
 ):  # fmt: skip
     """Solve target after target; return whether all starts and targets were valid.
@@ -131,13 +118,13 @@ def solve_mechanisms(
     mechanism = Mechanism(
         own_joints, sources, effectors, moves, adjacent, reach, width, freedoms, equations
     )
-    state = new_state(mechanism, restarts, restart_tips)
+    state = new_state(mechanism, restarts, restart_frames)
     rotations = np.empty((len(joints), 4))
     for i in range(len(targets)):
         q, target = coordinates[i], targets[i]
         chained = limits.chained and i > 0
         copy_row(coordinates[i - 1] if chained else starts[i % len(starts)], q)
-        if not (fit_start(joints, q) and normalise_target(target)):
+        if not (normalise_start(joints, q) and normalise_target(target)):
             return False
         begin(state, q)
         least = least_residual(mechanism, target)
@@ -154,13 +141,11 @@ def solve_mechanisms(
     return True
 
 
-def new_state(mechanism, restarts, tips):
+def new_state(mechanism, restarts, effector_frames):
     """Return a state to begin from."""
     rows = len(restarts) + 2
-    backward = np.empty(len(mechanism.joints), BACKWARD)
-    workspace = Workspace(new_task_system(mechanism), backward, np.empty((2, 4, 4)))
     return MechanismState(
-        mechanism, new_data(mechanism), workspace, restarts, tips,
+        mechanism, new_data(mechanism), new_workspace(mechanism), restarts, effector_frames,
         np.empty((rows, mechanism.coordinates)), new_progress(rows - 1),
     )  # fmt: skip
 
@@ -254,13 +239,13 @@ def perturb_mechanism(state, _target, _criteria, first):
 
 
 def perturb_joint(joints, q, j, angle):
-    """Turn a joint by an angle [rad], always in the same way, within its limits."""
+    """Rotate a joint by an angle [rad], always alike, within its limits."""
     kind = joints["kind"][j]
     if kind == HINGE and move_by(joints, q, j, angle) == 0.0:
         move_by(joints, q, j, -angle)
     elif kind in (BALL, FREE):
-        turn = turn_about(PERTURBATION_AXIS, angle)
-        put_ball(joints, q, j, normalised(multiply(ball_at(joints, q, j), turn)))
+        bend = rotation_about(PERTURBATION_AXIS, angle)
+        store_ball(joints, q, j, normalised(multiply(load_ball(joints, q, j), bend)))
         clamp_joint(joints, j, q)
 
 
@@ -289,10 +274,12 @@ def rank_restarts(state, target):
     for r in range(len(state.restarts)):
         distance, angle = 0.0, 0.0
         for e in range(len(target)):
-            offset = subtract(load_vector(target["position"], e), load_vector(state.tips[r], e))
+            offset = subtract(
+                load_vector(target["position"], e), load_vector(state.effector_frames[r], e)
+            )
             distance = max(distance, norm(offset))
             if state.mechanism.effectors["oriented"][e]:
-                there = load_quaternion(state.tips[r], e, 3)
+                there = load_quaternion(state.effector_frames[r], e, 3)
                 angle = max(angle, rough_angle(there, load_quaternion(target["rotation"], e)))
         state.progress[1 + r, RANK] = distance + lever * angle
 
@@ -313,11 +300,12 @@ def take_nearest(state, q):
     copy_row(state.restarts[nearest], q)
 
 
-def on_mechanisms(name, step):
+def on_mechanisms(name, step, new_workspace):
     """Return the kernel that solves mechanisms by the step of a named solver."""
     return Kernel(
         bind(
-            solve_mechanisms, update=bind(update_mechanism, step=step), error=mechanism_error,
+            solve_mechanisms, new_workspace=new_workspace,
+            update=bind(update_mechanism, step=step), error=mechanism_error,
             merit=mechanism_merit, perturb=perturb_mechanism, save=save_mechanism,
             restore=restore_mechanism, draw=draw_mechanism,
         ),

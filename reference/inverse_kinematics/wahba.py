@@ -9,7 +9,7 @@ import math
 
 from ..quaternion import dot
 
-# Where all vectors are on one line many rotations are best: the identity, added by this share of
+# Where all vectors are collinear many rotations are best: the identity, added by this share of
 # M's norm, makes the smallest of them the best. It brings no vector further from its own.
 LEAST_ROTATION = 1e-6
 # Below this share of M's norm the angle that is best is known to no digit.

@@ -1,7 +1,8 @@
-"""Anyone's answer to an inverse-kinematics problem, held against forward kinematics.
+"""Anyone's answer to an inverse-kinematics problem, checked by forward kinematics.
 
 Answers in single precision hold quaternions that are off unit length by 1e-5 after some hundred
-products. They are normalised, and how far they were off is told beside the distances, not instead.
+products. They are normalised, and how far they were off is reported beside the distances, not
+instead.
 """
 
 from collections.abc import Sequence
@@ -120,10 +121,10 @@ def judge_pose(
     """
     model = checked_model(model, "model")
     unit, deviation = _normalised(model, pose)
-    wanted = check_numbers(checked_targets(model, target, effector))
+    targets = check_numbers(checked_targets(model, target, effector))
     found = forward_kinematics(model, unit)
-    distances = [_distance(one, found.positions[one.joint]) for one in wanted]
-    angles = [_angle(one, found.rotations[one.joint]) for one in wanted]
+    distances = [_distance(one, found.positions[one.joint]) for one in targets]
+    angles = [_angle(one, found.rotations[one.joint]) for one in targets]
     tree = model if isinstance(model, Skeleton) else model.skeleton
     moved, stretched = _compared(model, tree, found.positions, positions)
     return PoseJudgement(
@@ -151,22 +152,22 @@ def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatA
     return unit, worst
 
 
-def _distance(wanted: CheckedTarget, position: FloatArray) -> float:
-    if wanted.position.ndim != 1:
+def _distance(target: CheckedTarget, position: FloatArray) -> float:
+    if target.position.ndim != 1:
         raise ValueError(
-            f"target: expected shape (3,), got {arguments.shape(wanted.position.shape)}"
+            f"target: expected shape (3,), got {arguments.shape(target.position.shape)}"
         )
-    return float(np.linalg.norm(position - wanted.position))
+    return float(np.linalg.norm(position - target.position))
 
 
-def _angle(wanted: CheckedTarget, turn: FloatArray) -> float:
-    if wanted.rotation is None:
+def _angle(target: CheckedTarget, Q: FloatArray) -> float:
+    if target.rotation is None:
         return 0.0
-    if wanted.rotation.ndim != 1:
+    if target.rotation.ndim != 1:
         raise ValueError(
-            f"rotation: expected shape (4,), got {arguments.shape(wanted.rotation.shape)}"
+            f"rotation: expected shape (4,), got {arguments.shape(target.rotation.shape)}"
         )
-    return float(rotation.angle(turn, wanted.rotation))
+    return float(rotation.angle(Q, target.rotation))
 
 
 def _limit_excess(model: Skeleton | Articulation, q: FloatArray) -> FloatArray:

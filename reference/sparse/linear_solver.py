@@ -1,6 +1,6 @@
 """Direct solves with one sparse symmetric positive definite matrix and many right-hand sides.
 
-Three ways stand behind one interface: our own `cholesky`, the default, CHOLMOD through cholespy
+Three solvers stand behind one interface: our own `cholesky`, the default, CHOLMOD through cholespy
 where that is installed, and SciPy's SuperLU. cholespy prints a warning at an indefinite matrix.
 """
 

@@ -85,10 +85,10 @@ def every(stride: int, frames: int, closed: bool) -> IndexArray:
 
 
 def interpolate(
-    problem: TrajectoryProblem, q: FloatArray, coarse: IndexArray, fine: IndexArray, frames: int
+    problem: TrajectoryProblem, q: FloatArray, coarse: IndexArray, dense: IndexArray, frames: int
 ) -> FloatArray:
-    """Return the poses at the frames `fine`, along the displacements between those at `coarse`."""
+    """Return the poses at the frames `dense`, along the displacements between those at `coarse`."""
     d, ends = displacements(problem, q), np.append(coarse, frames)
-    before = np.searchsorted(coarse, fine, side="right") - 1
-    fraction = (fine - coarse[before]) / (ends[before + 1] - coarse[before])
+    before = np.searchsorted(coarse, dense, side="right") - 1
+    fraction = (dense - coarse[before]) / (ends[before + 1] - coarse[before])
     return integrate(problem, q[before], fraction[:, None] * d[np.minimum(before, len(d) - 1)])

@@ -5,7 +5,7 @@ Each limit h(q) <= 0 adds psi = (max(0, z + r h)^2 - z^2) / 2 r, z its multiplie
 gradient is max(0, z + r h) grad h, and where a limit is active the Gauss-Newton Hessian is
 r grad h grad h'.
 
-A ball with the twist axis u turns by Q = w + v; with s = v . u its twist is 2 atan(s/w), of
+A ball with the twist axis u rotates by Q = w + v; with s = v . u its twist is 2 atan(s/w), of
 gradient (w (w u + u x v) + s v)/(w^2 + s^2) in the ball's own frame. Its swing is the angle from u
 to Q u, of gradient along Q* u x u.
 """

@@ -15,7 +15,7 @@ class CyclicBandedSystem:
     """A positive definite system, filled and solved many times: n unknowns for each frame."""
 
     def __init__(self, frames: int, unknowns: int, closed: bool) -> None:
-        """Number the frames and make room for the band; `closed` couples the last to the first."""
+        """Number the frames and allocate the band; `closed` couples the last to the first."""
         number = np.arange(frames)
         if closed:
             number = np.where(2 * number < frames, 2 * number, 2 * (frames - number) - 1)

@@ -1,7 +1,7 @@
 """Newton's method over all frames at once, on the manifold of poses that meet their targets.
 
 A step lies in the null spaces of the frames' Jacobians and is then projected back onto the targets,
-so that the cost alone decides whether it is taken. Within the null spaces the Hessian is that of
+so that only the cost decides whether it is taken. Within the null spaces the Hessian is that of
 the cost less sum_i m_i times that of constraint i, m the least-squares multipliers of the gradient
 (Absil, Mahony & Sepulchre 2008, Riemannian Newton on a submanifold). It is shifted by a multiple of
 the identity until it is positive definite and the step lowers the cost (Levenberg-Marquardt).

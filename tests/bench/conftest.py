@@ -31,7 +31,7 @@ def first_called(name, solver, cold, warm=0.3):
     return record("first_call", name, solver, {}, arrays, facts=facts)
 
 
-def drawn(solver, warm, turn):
+def drawn(solver, warm, angle):
     """The arm drawing a curve, in three frames."""
     return record(
         "arm",
@@ -41,14 +41,14 @@ def drawn(solver, warm, turn):
         {
             "residual": [1e-5, 2e-5, 3e-4],
             "iterations": [4, 5, 6] if solver == "ccd" else [1, 2, 3],
-            "largest_angle": [turn, turn / 2],
-            "mean_angle": [turn / 4, turn / 4],
+            "largest_angle": [angle, angle / 2],
+            "mean_angle": [angle / 4, angle / 4],
         },
         facts={"task": "curve", "title": "arm, circle", "curve": "circle"},
     )
 
 
-def followed(solver, **turns):
+def followed(solver, **angles):
     """A closed curve of three points followed in three modes, its angles halving."""
     return [
         record(
@@ -59,17 +59,17 @@ def followed(solver, **turns):
             {
                 "residual": [1e-5, 2e-5, 3e-5 if mode == "coherent" else 3e-4],
                 "iterations": [12, 11, 10] if mode == "coherent" else [5, 4, 3],
-                "largest_angle": [turn, turn / 2, turn / 2],
-                "mean_angle": [turn / 4, turn / 4, turn / 8],
+                "largest_angle": [angle, angle / 2, angle / 2],
+                "mean_angle": [angle / 4, angle / 4, angle / 8],
             },
             facts={"task": "curve", "title": "arm, circle"},
         )
-        for mode, turn in turns.items()
+        for mode, angle in angles.items()
     ]
 
 
 def drifted(solver):
-    """Three rounds, warm and coherent."""
+    """Three repetitions, warm and coherent."""
     modes = {"warm": [0.1, 0.2, 0.3], "coherent": [0.0, 1e-9, 0.0]}
     return [
         record(
@@ -339,8 +339,8 @@ def make():
 def records():
     """A small report's worth of records; every suite went through."""
     finished = [record(FINISHED, suite, "") for suite in SUITES]
-    turns = {"ccd": (1.0, 0.1), "fabrik": (2.0, 0.3)}
-    arm = [drawn(s, warm, turns[s][warm]) for s in turns for warm in (False, True)]
+    angles = {"ccd": (1.0, 0.1), "fabrik": (2.0, 0.3)}
+    arm = [drawn(s, warm, angles[s][warm]) for s in angles for warm in (False, True)]
     return [
         claim(),
         first_called("solve_ik/chain", "fabrik", 2.0),

@@ -8,8 +8,8 @@ import pytest
 
 from bench.experiments import Scale
 from bench.experiments.cloth_peers import measurement as peers_cloth
-from bench.experiments.cloth_peers import tables as findings
-from bench.experiments.cloth_peers.job import ClothJob
+from bench.experiments.cloth_peers import tables
+from bench.experiments.cloth_peers.job import ClothJob, Shape
 from bench.experiments.cloth_peers.problem import (
     FRAME,
     MASS,
@@ -157,9 +157,9 @@ def test_the_error_of_a_step_is_zero_at_the_answer_one_at_the_start_and_infinite
 def test_errors_do_not_care_how_the_world_is_turned_or_particles_are_numbered(rng):
     x, exact, start = rng.standard_normal((3, 7, 3))
     R, order = rotation.to_matrix(rotation.random(rng)), rng.permutation(7)
-    turned = [(points @ R.T + 5.0)[order] for points in (x, exact, start)]
-    assert metrics.relative_error(*turned) == pytest.approx(metrics.relative_error(x, exact, start))
-    assert metrics.rms_distance(*turned[:2]) == pytest.approx(metrics.rms_distance(x, exact))
+    moved = [(points @ R.T + 5.0)[order] for points in (x, exact, start)]
+    assert metrics.relative_error(*moved) == pytest.approx(metrics.relative_error(x, exact, start))
+    assert metrics.rms_distance(*moved[:2]) == pytest.approx(metrics.rms_distance(x, exact))
 
 
 def test_a_motion_has_diverged_if_one_particle_is_ever_too_far(rng):
@@ -220,7 +220,7 @@ def test_all_who_say_so_are_symplectic_euler(peer, cloth):
 
 
 def test_one_linear_solve_is_the_gauss_newton_step(peer, cloth):
-    """MuJoCo's conjugate gradients end at 1e-8, if not told to go on."""
+    """MuJoCo's conjugate gradients end at 1e-8, unless set to go on."""
     if peer.kind != LINEARISED:
         pytest.skip("solves no linear system, or several")
     result = ImplicitEuler(cloth.system, h=FRAME, solver="gauss_newton").step(cloth.start)
@@ -315,7 +315,7 @@ class Mover:
     def positions(self):
         return self.x
 
-def prepare(system, frame, manner="fine"):
+def prepare(system, frame, manner="well"):
     if manner == "unable":
         raise ValueError("takes no cloths")
     return Mover(manner)
@@ -335,10 +335,8 @@ def fakes(tmp_path_factory):
 
 
 def job(cloth, manner, frames=5, repeats=1, budget=60.0):
-    return peers_cloth.job(
-        "fake_cloth_solvers", cloth, Rung("", {"manner": manner}),
-        frames=frames, repeats=repeats, budget=budget,
-    )  # fmt: skip
+    shape = Shape(frames, repeats, budget)
+    return peers_cloth.job("fake_cloth_solvers", cloth, {"manner": manner}, shape)
 
 
 def messages(*args, **more):
@@ -346,7 +344,7 @@ def messages(*args, **more):
 
 
 def test_a_job_says_when_it_is_ready_each_frame_and_the_end(cloth):
-    said = messages(cloth, "fine", frames=2, repeats=2)
+    said = messages(cloth, "well", frames=2, repeats=2)
     assert [type(message) for message in said] == [Ready, *[Solved] * 4, Done]
     ends = [message.q for message in said if isinstance(message, Solved)]
     np.testing.assert_array_equal(ends[1], ends[3])
@@ -399,7 +397,7 @@ LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
 @pytest.mark.parametrize(
     ("manner", "frames", "lost", "why"),
     [
-        ("fine", 5, False, ""),
+        ("well", 5, False, ""),
         ("hangs", 2, False, "5 × 5, as it is: ended after 0.5 s of silence"),
         ("crashes", 2, False, "5 × 5, as it is: its process ended with code 3"),
         ("explodes", 3, True, ""),
@@ -440,7 +438,7 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})
-    arrays, _, facts = peers_cloth.motion(fake_peer("fine"), STIFFNESS, (LEVEL, LEVEL))
+    arrays, _, facts = peers_cloth.motion(fake_peer("well"), STIFFNESS, (LEVEL, LEVEL))
     assert len(tried) == 1
     assert arrays["frames"].tolist() == [0, 0]
     assert np.isnan(arrays["true"]).all()
@@ -548,7 +546,7 @@ def test_the_table_of_one_step_names_the_cheapest_setting_and_the_fastest_solver
         make.worked("Newton engine, VBD", seconds=(1e-3, 0.5)),
         make.worked("MuJoCo Euler", error=(0.5, 0.4)),
     ]
-    table = findings.one_step(Results(records))
+    table = tables.one_step(Results(records))
     assert column(table, "time to 1e-3 [ms]") == [10.0, 500.0, None]
     assert column(table, "1e-3 by") == ["10 iterations", "10 iterations", None]
     assert column(table, "time to 1e-6 [ms]") == [None] * 3
@@ -562,7 +560,7 @@ def test_the_table_of_one_step_names_the_cheapest_setting_and_the_fastest_solver
 
 
 def test_the_table_of_motions_says_what_diverged_and_what_was_cut_short(make):
-    table = findings.motion(Results([make.fell("MuJoCo Euler")]))
+    table = tables.motion(Results([make.fell("MuJoCo Euler")]))
     assert column(table, "distance from the truth [m]") == [None, 2e-2, 1e-3]
     assert column(table, "time for a simulated second [s]") == pytest.approx([0.006, 0.06, 60.0])
     assert column(table, "remark") == ["diverged", "", "out of time before frame 4"]
@@ -574,26 +572,26 @@ def test_the_table_of_motions_says_what_diverged_and_what_was_cut_short(make):
 def test_a_missing_engine_has_a_row_in_both_tables(make):
     notes, facts = {"remark": "not installed"}, {"task": "missing"}
     missing = make.record("cloth", "peers/all", "newton", notes=notes, facts=facts)
-    for table in (findings.one_step(Results([missing])), findings.motion(Results([missing]))):
+    for table in (tables.one_step(Results([missing])), tables.motion(Results([missing]))):
         (row,) = table.rows
         assert row[:2] == ("every cloth", "newton")
         assert row[-1] == "not installed"
 
 
 def test_iterations_that_did_not_suffice_are_said_so(make):
-    table = findings.iterations(Results([make.needed("lbfgs", [1, 2, 3, 4] + [np.nan] * 4)]))
+    table = tables.iterations(Results([make.needed("lbfgs", [1, 2, 3, 4] + [np.nan] * 4)]))
     assert table.rows[0][2:10] == (1, 2, 3, 4, None, None, None, None)
     assert table.summary.points == ("1,000 N/m: L-BFGS more than 100",)
 
 
 def test_a_limit_is_shown_in_units_of_the_theory(make):
-    table = findings.stability(Results([make.bounded("a", 0.02), make.bounded("b", np.nan)]))
+    table = tables.stability(Results([make.bounded("a", 0.02), make.bounded("b", np.nan)]))
     assert column(table, "of 2 / ω") == [pytest.approx(1.0), None]
     assert table.summary.points == ("a: 1.00 × 2 / ω",)
 
 
 def test_the_published_times_stand_beside_ours(make):
-    table = findings.liu_2013(Results([make.as_liu("local_global", 0.03)]))
+    table = tables.liu_2013(Results([make.as_liu("local_global", 0.03)]))
     assert table.rows == (("local/global", "10 iterations", 50.0, 30.0, 0.5),)
     assert "abstract" in table.measured
 
@@ -624,7 +622,7 @@ def test_a_job_of_a_worker_is_known_by_its_arrays(cloth):
     """What travels between processes is rebuilt there: the same system, to the last bit."""
     import pickle
 
-    sent = peers_cloth.job("m", cloth, Rung("", {}), frames=1, repeats=1, budget=1.0)
+    sent = peers_cloth.job("m", cloth, {}, Shape(1, 1, 1.0))
     got = pickle.loads(pickle.dumps(sent))
     assert isinstance(got, ClothJob)
     system = MassSpring(**got.system._asdict())

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from bench.experiments import Scale, blocks
-from bench.experiments.energy import figures
+from bench.experiments.energy import figures, tables
 from bench.experiments.energy import measurement as suite
-from bench.experiments.energy import tables as findings
 from bench.presentation.results import Results
 
 STEPS = 100
@@ -49,7 +48,7 @@ def test_blocks_are_listed_without_measuring():
 def test_table_and_sentence_follow_the_records(make):
     left = np.linspace(1.0, 0.5, 11)
     records = [make.swung("RK4", left=left), make.swung("discrete", "damped", left)]
-    table = findings.energy(Results(records))
+    table = tables.energy(Results(records))
     assert [row[:2] for row in table.rows] == [("undamped", "RK4"), ("damped", "discrete")]
     assert table.rows[0][2:5] == (50.0, None, None)
     assert table.rows[0][5:] == (100.0, 50.0)
@@ -57,7 +56,7 @@ def test_table_and_sentence_follow_the_records(make):
 
 
 def test_without_a_swing_undamped_nothing_is_said(make):
-    assert findings.energy(Results([make.swung("RK4", "damped")])).summary.sentence == ""
+    assert tables.energy(Results([make.swung("RK4", "damped")])).summary.sentence == ""
 
 
 def test_figure_has_a_panel_for_each_cloth_and_a_line_for_each_integrator(make):

@@ -1,5 +1,7 @@
 """Tables of experiments show the numbers of the records, and their sentences follow them."""
 
+import csv
+import io
 import math
 from dataclasses import replace
 
@@ -17,6 +19,7 @@ from bench.experiments.robots import tables as robots
 from bench.experiments.timing import tables as timing
 from bench.presentation.results import Results
 from bench.presentation.sections import SECTIONS, tables
+from bench.presentation.tables import comma_separated
 
 
 def column(table, heading):
@@ -33,6 +36,12 @@ def test_every_table_has_a_name_of_its_own_and_says_how_it_was_measured():
     made = tables(Results([]))
     assert len({table.name for table in made}) == len(made)
     assert all(table.shows and table.measured for table in made)
+
+
+def test_every_number_in_csv_is_one(records):
+    for table in tables(Results(records)):
+        for row in list(csv.reader(io.StringIO(comma_separated(table))))[1:]:
+            assert not [cell for cell in row if cell.startswith(("np.", "array"))], table.name
 
 
 def test_every_section_has_a_name_of_its_own():
@@ -61,11 +70,11 @@ def test_iterations_count_for_whoever_needs_fewer(records):
     assert "fewer iterations than CCD on 1 of 3 problems" in table.summary.sentence
 
 
-def test_jitter_is_the_largest_turn_in_degrees_and_the_seam_stands_apart(make):
+def test_jitter_is_the_largest_angle_in_degrees_and_the_closing_one_stands_apart(make):
     table = tracking.jitter(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
-    for mode, turn in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
-        assert column(table, f"{mode}, largest [°]") == [pytest.approx(math.degrees(turn))]
-        assert column(table, f"{mode}, mean [°]") == [pytest.approx(math.degrees(turn / 4))]
+    for mode, angle in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
+        assert column(table, f"{mode}, largest [°]") == [pytest.approx(math.degrees(angle))]
+        assert column(table, f"{mode}, mean [°]") == [pytest.approx(math.degrees(angle / 4))]
     assert column(table, "coherent, last to first [°]") == [pytest.approx(math.degrees(0.125))]
     assert "in 1 of 1 cases, and in 1 the step" in table.summary.sentence
     assert table.summary.points[0] == "cold: 57.3° (arm, circle, CCD)"
@@ -76,7 +85,7 @@ def test_jitter_that_grows_is_said_too(make):
     assert "in 0 of 1 cases" in table.summary.sentence
 
 
-def test_a_curve_that_was_not_followed_in_all_ways_has_no_row(make):
+def test_a_curve_that_was_not_followed_in_all_modes_has_no_row(make):
     records = make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)[:2]
     assert tracking.jitter(Results(records)).rows == ()
 
@@ -88,7 +97,7 @@ def test_iterations_over_all_frames_are_those_that_every_frame_has_more(make):
     assert "together 7 to 7 times" in table.summary.sentence
 
 
-def test_drift_is_shown_after_each_round(make):
+def test_drift_is_shown_after_each_repetition(make):
     table = tracking.drift(Results(make.drifted("ccd")))
     assert [round(x) for x in table.rows[0][1:]] == [6, 11, 17, 0, 0, 0]
     assert "17.2 to 17.2° from its first pose" in table.summary.sentence
@@ -144,10 +153,10 @@ def test_every_suite_has_a_chapter_and_its_tables_are_some_of_all():
     assert [table.name for table in tables(Results([]), SUITES)] == every
 
 
-ONE, AGAIN = robots.TABLES["one start"], robots.TABLES["restarts"]
+ONE, AGAIN = robots.OF_KIND["one start"], robots.OF_KIND["restarts"]
 
 
-def test_success_counts_what_the_judge_says_and_times_count_failures(make):
+def test_success_counts_the_evaluation_says_and_times_count_failures(make):
     table = ONE.success(Results([make.raced("a", "one start")]))
     (row,) = table.rows
     assert row[:2] == ("the arm", "a")
@@ -164,7 +173,7 @@ def test_one_start_and_restarts_are_never_in_one_table(make):
     results = Results([make.raced("a", "one start"), make.raced("b", "restarts")])
     for name in robots.Tables._fields:
         for kind, mine, other in (("one start", "a", "b"), ("restarts", "b", "a")):
-            table = getattr(robots.TABLES[kind], name)(results)
+            table = getattr(robots.OF_KIND[kind], name)(results)
             cells = [cell for row in table.rows for cell in row]
             assert other not in cells
             assert (mine in cells) == (name != "unreachable")

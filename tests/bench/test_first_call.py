@@ -50,7 +50,7 @@ def test_every_call_can_be_measured(call):
 
 def test_a_call_that_fails_says_why(tmp_path):
     with pytest.raises(RuntimeError, match="KeyError"):
-        suite.in_a_fresh_process("no such function", suite.OURS, tmp_path)
+        suite.in_a_process("no such function", suite.OURS, tmp_path)
 
 
 def test_importing_the_suite_does_not_import_the_compiler():

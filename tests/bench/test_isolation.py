@@ -12,7 +12,7 @@ import pytest
 from bench.experiments import Scale
 from bench.experiments.robots import measurement as robots
 from bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
-from bench.experiments.robots.job import AGAIN, Job, perform
+from bench.experiments.robots.job import AGAIN, Job
 from bench.experiments.robots.problem import robot
 from bench.harness import stopwatch
 from bench.harness.isolation import WorkerProcess, raised
@@ -179,7 +179,7 @@ def test_what_a_solver_prints_does_not_disturb_its_results(worker, targets):
 
 def messages(targets, manner, **more):
     """What the worker says, in this process."""
-    return list(perform(job(targets, manner, **more)))
+    return list(job(targets, manner, **more).perform())
 
 
 def test_the_worker_says_when_it_is_ready_each_target_and_the_end(targets):
@@ -274,7 +274,7 @@ def test_a_worker_serves_job_after_job(targets):
 
 @pytest.fixture
 def suite(monkeypatch, worker):
-    """The suite with fakes for peers, on the iiwa and the character alone."""
+    """The suite with fakes for peers, on the iiwa and the character only."""
 
     def peer(title, package="numpy", **settings):
         return Peer(title, "fake_solvers", package, "MIT", "", (Entry(ONE_START, settings),))

@@ -66,9 +66,9 @@ def test_excess_is_measured_from_the_best_residual():
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.1, 3.0])
 def test_turns_are_the_angle_between_frames_whatever_the_quaternions_sign(angle):
-    still, turned = rotation.identity(2), rotation.exponential([[0, angle, 0], [0, 0, 0]])
-    turns = metrics.rotation_angles(np.array([still, turned, -turned]))
-    np.testing.assert_allclose(turns, [[angle, 0], [0, 0]], rtol=1e-9, atol=1e-15)
+    baseline, rotated = rotation.identity(2), rotation.exponential([[0, angle, 0], [0, 0, 0]])
+    angles = metrics.rotation_angles(np.array([baseline, rotated, -rotated]))
+    np.testing.assert_allclose(angles, [[angle, 0], [0, 0]], rtol=1e-9, atol=1e-15)
 
 
 def test_errors_and_distances():
@@ -159,7 +159,3 @@ def test_the_profile_of_a_textbook():
     solved = np.array([[True, False, False], [True, True, False]])
     curves = metrics.performance_profiles(seconds, solved, np.array([1.0, 3.9, 4.0]))
     assert curves.tolist() == [[0.5, 0.5, 0.5], [0.5, 0.5, 1.0]]
-
-
-def test_microseconds():
-    assert metrics.microseconds(2e-6) == 2.0

@@ -5,7 +5,7 @@ import pytest
 
 from bench.experiments import SCALES, Scale, blocks
 from bench.experiments.newton import measurement as suite
-from bench.experiments.newton import tables as findings
+from bench.experiments.newton import tables as newton
 from bench.presentation.results import Results
 from reference import STEP_SOLVERS
 
@@ -94,7 +94,7 @@ def test_every_solver_has_a_block_at_every_stiffness():
 
 def test_table_and_sentence_follow_the_records(make, stiff):
     records = [stored(make, which, measured) for which, measured in stiff.items()]
-    table = findings.certified(Results(records))
+    table = newton.certified(Results(records))
     columns = [column.title for column in table.columns]
     bound, same = (columns.index(name) for name in ("bound", "Newton’s minimiser"))
     assert [row[same] for row in table.rows] == ["yes", "yes", "not proven", "yes"]
@@ -108,10 +108,10 @@ def test_table_and_sentence_follow_the_records(make, stiff):
 def test_another_minimiser_and_a_newton_that_fails_are_said(make, stiff):
     (which, measured), *_ = stiff.items()
     failed = stored(make, which, measured, residual=1.0, at_floor=False, same=False, different=True)
-    table = findings.certified(Results([failed]))
+    table = newton.certified(Results([failed]))
     assert table.rows[0][-1] == "no"
     assert "in 0 of 1 cloth." in table.summary.sentence
 
 
 def test_without_records_nothing_is_said():
-    assert findings.certified(Results([])).summary.sentence == ""
+    assert newton.certified(Results([])).summary.sentence == ""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
-from bench.experiments.robots.job import Job, perform
+from bench.experiments.robots.job import Job
 from bench.experiments.robots.problem import CHARACTER, is_installed, robot
 from bench.experiments.robots.targets import robot_targets, uniform_targets, unreachable_targets
 from bench.harness.worker import Solved
@@ -15,7 +15,7 @@ from bench.peers.ik.protocol import UnableError
 from bench.peers.registry import ONE_START, OURS, PEERS, RESTARTS
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
-# Those that take trees with several tips.
+# Those that take trees with several effectors.
 TREES = {"plumbob", "closed_loop", "pink", "mink"}
 FEW = 6
 
@@ -35,7 +35,7 @@ def module(peer):
 def answers(peer, entry, name, targets, tolerance=TOLERANCE):
     """What a peer says of targets, and the evaluation."""
     job = Job(peer.module, robot(name), targets, tolerance, entry.settings, entry.restarts, 60.0)
-    said = list(perform(job))
+    said = list(job.perform())
     solved = [message for message in said if isinstance(message, Solved)]
     assert solved, said
     q = np.array([one.q for one in solved])

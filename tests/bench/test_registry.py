@@ -8,6 +8,7 @@ import pytest
 
 import bench.experiments
 from bench.experiments import Scale, blocks
+from bench.experiments.arm import tables as arm_tables
 from bench.experiments.cloth import measurement as cloth
 from bench.experiments.cloth import tables as cloth_tables
 from bench.experiments.cloth.problem import cloth_swing
@@ -15,15 +16,17 @@ from bench.experiments.newton import tables as newton_tables
 from bench.experiments.robots import measurement as robots
 from bench.experiments.robots import tables as robot_tables
 from bench.harness import run
+from bench.harness.experiment import Experiment
 from bench.harness.isolation import Outcome
 from bench.harness.record import RecordFile
 from bench.harness.worker import Found, Solved, Unfit
 from bench.peers import registry
 from bench.peers.registry import ONE_START, Entry, Peer
-from bench.presentation import entry, report
+from bench.presentation import report
+from bench.presentation.layout import Layout
 from bench.presentation.results import Results
 from bench.presentation.sections import tables
-from bench.presentation.tables import Column, Table
+from bench.presentation.tables import Column
 from reference import STEP_SOLVERS
 from reference.implicit_euler.local_global import LocalGlobal
 
@@ -104,24 +107,26 @@ def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, 
     monkeypatch.delitem(sys.modules, "stays_put")
     assert not record.failed
     results = Results([record])
-    (row,) = robot_tables.TABLES[ONE_START].success(results).rows
+    (row,) = robot_tables.OF_KIND[ONE_START].success(results).rows
     assert row[:2] == ("character", "Stays put")
     assert "Stays put" in [row[0] for row in robot_tables.who(results).rows]
 
 
-def counted(results):
-    """A table of how many records there are."""
-    rows = ((len(results.records),),)
-    return Table("counted", "Records, counted", (Column("records"),), rows, "All.", "Counted.")
+counted = Layout(
+    "How many records are there?",
+    "counted",
+    "Records, counted",
+    subjects=lambda results: [results],
+    columns=[Column("records", read=lambda results: len(results.records))],
+    shows="All.",
+    measured="Counted.",
+)
 
 
 def test_a_new_table_is_a_function_and_a_line_and_stands_in_the_page(
     tmp_path, monkeypatch, records
 ):
-    from bench.experiments.arm import entries
-
-    line = entry.Entry("How many records are there?", counted)
-    monkeypatch.setattr(entries, "ENTRIES", (*entries.ENTRIES, line))
+    monkeypatch.setattr(arm_tables, "LAYOUTS", (*arm_tables.LAYOUTS, counted))
     assert "counted" in [table.name for table in tables(Results([]), ["arm"])]
     monkeypatch.setattr(report, "all_figures", list)
     RecordFile(tmp_path).append(records)
@@ -133,27 +138,28 @@ def test_a_new_table_is_a_function_and_a_line_and_stands_in_the_page(
 
 
 FOLDER = {
-    "__init__.py": """
-from bench.harness.experiment import Experiment
-EXPERIMENT = Experiment(__package__, suite="sums", chapter="speed", about="is 1 + 1 two?")
-""",
+    "__init__.py": "",
     "measurement.py": """
 from bench.harness.block import Block, Measured
 
 def blocks(scale):
-    yield Block("sums", "1 + 1", "Python", lambda: Measured({"sum": [2]}), facts={"title": "One"})
+    yield Block("sums", "1 + 1", "Python", lambda: Measured({"sum": 2}), facts={"title": "One"})
 """,
     "tables.py": """
-from bench.presentation.tables import Column, Table
+from bench.presentation.columns import number, titled
+from bench.presentation.layout import Layout
 
-def sums(results):
-    rows = tuple((r.title, int(r.arrays["sum"][0])) for r in results.all("sums"))
-    return Table("sums", "Sums", (Column("of", words=True), Column("sum")), rows, "a", "b")
-""",
-    "entries.py": """
-from bench.presentation.entry import Entry
-from . import tables
-ENTRIES = (Entry("What is 1 + 1?", tables.sums),)
+sums = Layout(
+    "What is 1 + 1?",
+    "sums",
+    "Sums",
+    subjects=lambda results: results.all("sums"),
+    columns=(titled("of"), number("sum")),
+    shows="a",
+    measured="b",
+)
+
+LAYOUTS = (sums,)
 """,
 }
 
@@ -164,18 +170,17 @@ def test_a_new_experiment_is_a_folder_and_a_line(tmp_path, monkeypatch):
     for name, text in FOLDER.items():
         (folder / name).write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
-    import sums_experiment
-
-    bench.experiments.EXPERIMENTS.append(sums_experiment.EXPERIMENT)
+    line = Experiment("sums_experiment", "sums", "speed")
+    bench.experiments.EXPERIMENTS.append(line)
     try:
-        monkeypatch.setitem(bench.experiments.SUITES, "sums", sums_experiment.EXPERIMENT.about)
+        monkeypatch.setitem(bench.experiments.SUITES, "sums", "is 1 + 1 two?")
         states = [event.state for event in run.run(["sums"], "quick", tmp_path / "out")]
         assert states == [run.MEASURING, run.MEASURED]
         results = Results(RecordFile(tmp_path / "out").read().records)
         (table,) = [t for t in tables(results, ["sums"]) if t.name == "sums"]
         assert table.rows == (("One", 2),)
     finally:
-        bench.experiments.EXPERIMENTS.remove(sums_experiment.EXPERIMENT)
+        bench.experiments.EXPERIMENTS.remove(line)
 
 
 def test_every_solver_has_one_entry_and_every_style_is_its_own():

@@ -1,4 +1,4 @@
-"""The report: one page that needs nothing else, from the records alone."""
+"""The report: one page that needs nothing else, from nothing but the records."""
 
 import csv
 import html.parser

@@ -1,4 +1,4 @@
-"""Files beside both engines: what is measured, and how it is told."""
+"""Files beside both engines: what is measured, and how it is shown."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Robots as problems: the same text for everyone, strata that are what they say, a fair judge."""
+"""Robots as problems: the same text for everyone, true strata, a fair evaluation."""
 
 import mujoco
 import numpy as np
@@ -70,7 +70,7 @@ def test_the_character_has_twenty_joints_and_two_hands():
     known = robot(CHARACTER)
     assert len(known.joints) == 20
     assert 0 < len(known.balls) < 20
-    assert known.tips == ("left_hand", "right_hand")
+    assert known.effectors == ("left_hand", "right_hand")
     assert not known.posed
 
 
@@ -143,10 +143,10 @@ def test_at_a_limit_one_joint_is_at_it_and_none_beyond(poses):
 
 
 def test_a_crowd_of_tips_is_thinned_out(rng):
-    """Nine tenths of the tips are within one cell; of those spread out, hardly any are."""
+    """Nine tenths of the effectors are within one cell; of those spread out, hardly any are."""
     crowd, others = 0.05 * rng.random((900, 1, 3)), rng.random((100, 1, 3))
-    tips = np.concatenate([crowd, others])
-    drawn = spread(rng, tips, 200)
+    effectors = np.concatenate([crowd, others])
+    drawn = spread(rng, effectors, 200)
     assert (drawn < 900).mean() < 0.1
     assert len(np.unique(drawn)) > 60
 
@@ -160,8 +160,8 @@ def test_poses_are_within_the_limits(poses):
 
 def test_nothing_reaches_farther_than_all_links_in_a_row(name, rng):
     evaluator = evaluator_of(name)
-    tips, _ = evaluator.forward(evaluator.robot.draw(rng, 300))
-    assert np.linalg.norm(tips - root(evaluator), axis=-1).max() <= farthest(evaluator) * (
+    effectors, _ = evaluator.forward(evaluator.robot.draw(rng, 300))
+    assert np.linalg.norm(effectors - root(evaluator), axis=-1).max() <= farthest(evaluator) * (
         1 + 1e-12
     )
     away = np.linalg.norm(unreachable_targets(name, COUNT).positions - root(evaluator), axis=-1)
@@ -213,7 +213,7 @@ def test_the_judge_lets_a_limit_be_passed_by_no_more_than_its_tolerance(asked, o
 
 def test_the_judge_denies_a_tip_in_the_right_place_but_turned(asked):
     evaluator, q, targets = asked
-    q[:, 6] += 0.01  # the last hinge of the iiwa turns about the flange's own axis
+    q[:, 6] += 0.01  # the last hinge of the iiwa rotates about the flange's own axis
     evaluation = evaluator.evaluate(targets, q, TOLERANCE)
     assert evaluation.position.max() < 1e-12
     np.testing.assert_allclose(evaluation.rotation, 0.01, rtol=1e-9)
@@ -237,5 +237,5 @@ def test_the_first_answers_are_judged_by_the_first_targets(asked):
 def test_the_angle_between_rotations_is_exact_where_it_is_tiny(angle, rng):
     """An arc cosine would return 0 or 1.5e-8 for 1e-12."""
     A = rotation.to_matrix(rotation.random(rng))
-    turn = rotation.to_matrix(rotation.exponential([0.0, angle, 0.0]))
-    assert angle_between(A, A @ turn) == pytest.approx(angle, rel=1e-7, abs=1e-15)
+    R = rotation.to_matrix(rotation.exponential([0.0, angle, 0.0]))
+    assert angle_between(A, A @ R) == pytest.approx(angle, rel=1e-7, abs=1e-15)

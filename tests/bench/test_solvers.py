@@ -39,30 +39,30 @@ def test_the_jacobian_is_the_derivative_of_the_position(tree, rng):
 @pytest.mark.parametrize("name", KINEMATICS)
 def test_every_kinematics_takes_the_same_way_to_the_target(name):
     problem = chain_targets("far", 3)
-    tip = problem.skeleton.joint_count - 1
-    ways = []
+    effector = problem.skeleton.joint_count - 1
+    outcomes = []
     for kind in (ReferenceKinematics, KINEMATICS[name]):
         kinematics = kind(problem.skeleton)
         starts = coordinates(kinematics, problem.starts)
         answers = [
-            levenberg_marquardt(kinematics, q, target, tip, tolerance=1e-9, max_iterations=100)
+            levenberg_marquardt(kinematics, q, target, effector, tolerance=1e-9, max_iterations=100)
             for q, target in zip(starts, problem.targets, strict=True)
         ]
         found = np.array([answer.q[kinematics.columns] for answer in answers])
-        tips = forward_kinematics(problem.skeleton, found).positions[:, -1]
-        assert np.linalg.norm(tips - problem.targets, axis=-1).max() < 1.1e-9
-        ways.append(([answer.iterations for answer in answers], tips))
-    assert ways[0][0] == ways[1][0]
-    assert min(ways[0][0]) > 1
+        effectors = forward_kinematics(problem.skeleton, found).positions[:, -1]
+        assert np.linalg.norm(effectors - problem.targets, axis=-1).max() < 1.1e-9
+        outcomes.append(([answer.iterations for answer in answers], effectors))
+    assert outcomes[0][0] == outcomes[1][0]
+    assert min(outcomes[0][0]) > 1
 
 
 def test_a_start_at_the_target_takes_no_iteration():
     problem = chain_targets("far", 1)
     kinematics = ReferenceKinematics(problem.skeleton)
     q = coordinates(kinematics, problem.starts)[0]
-    tip = problem.skeleton.joint_count - 1
-    target = forward_kinematics(problem.skeleton, problem.starts[0]).positions[tip]
-    answer = levenberg_marquardt(kinematics, q, target, tip, tolerance=1e-6, max_iterations=9)
+    effector = problem.skeleton.joint_count - 1
+    target = forward_kinematics(problem.skeleton, problem.starts[0]).positions[effector]
+    answer = levenberg_marquardt(kinematics, q, target, effector, tolerance=1e-6, max_iterations=9)
     assert answer.iterations == 0
     np.testing.assert_array_equal(answer.q, q)
 
@@ -71,26 +71,26 @@ def test_out_of_reach_all_iterations_are_made():
     problem = chain_targets("beyond", 1)
     kinematics = ReferenceKinematics(problem.skeleton)
     q = coordinates(kinematics, problem.starts)[0]
-    tip = problem.skeleton.joint_count - 1
+    effector = problem.skeleton.joint_count - 1
     answer = levenberg_marquardt(
-        kinematics, q, problem.targets[0], tip, tolerance=1e-6, max_iterations=3
+        kinematics, q, problem.targets[0], effector, tolerance=1e-6, max_iterations=3
     )
     assert answer.iterations == 3
     assert answer.residual > 0
 
 
 def test_the_loop_and_the_reference_s_solver_are_one_method():
-    """Turns in the world from the left are tangents in the joints' frames from the right."""
+    """Rotations in the world from the left are tangents in the joints' frames from the right."""
     problem = chain_targets("far", 20)
     kinematics = ReferenceKinematics(problem.skeleton)
-    tip = problem.skeleton.joint_count - 1
+    effector = problem.skeleton.joint_count - 1
     limits = {"tolerance": 1e-6, "max_iterations": 100}
     ours = solve_ik(
         problem.skeleton, problem.starts, problem.targets, "levenberg_marquardt", **limits
     )
     starts = coordinates(kinematics, problem.starts)
     answers = [
-        levenberg_marquardt(kinematics, q, target, tip, **limits)
+        levenberg_marquardt(kinematics, q, target, effector, **limits)
         for q, target in zip(starts, problem.targets, strict=True)
     ]
     assert [answer.iterations for answer in answers] == ours.iterations.tolist()

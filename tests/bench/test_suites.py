@@ -122,9 +122,11 @@ def test_the_two_laws_of_dampers_come_together_with_h_to_first_order():
 def test_a_law_of_dampers_with_the_wrong_factor_does_not_come_together(monkeypatch):
     """Twice the damper, or half of it, is as far off however short the step."""
     right = cloth.damper_forces
-    for slip in (0.5, 2.0, -1.0):
+    for factor in (0.5, 2.0, -1.0):
         monkeypatch.setattr(
-            cloth, "damper_forces", lambda system, state, slip=slip: slip * right(system, state)
+            cloth,
+            "damper_forces",
+            lambda system, state, factor=factor: factor * right(system, state),
         )
         apart = cloth.two_dampers(cloth_swing(1, size=5, damping=0.2), first=30).arrays["apart"]
         assert apart[-1] > 0.4

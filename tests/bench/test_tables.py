@@ -49,6 +49,16 @@ def test_words(value, text):
     assert words(value) == text
 
 
+@pytest.mark.parametrize(
+    ("unit", "value"),
+    [("µs", 2e6), ("ns/particle", 2e9), ("°", 360 / np.pi), ("%", 200.0), ("m/s", 2.0), ("", 2.0)],
+)
+def test_a_column_converts_what_it_reads_to_its_unit(unit, value):
+    assert Column("a", unit).cell(np.float64(2.0)) == pytest.approx(value, rel=1e-15)
+    assert Column("a", unit).cell(np.int64(2)) == 2
+    assert Column("a", unit, factor=1.0).cell(2.0) == 2.0
+
+
 @given(st.floats(-1e300, 1e300))
 def test_a_number_in_words_is_near_itself(value):
     shown = float(words(value).replace(",", ""))
@@ -57,7 +67,7 @@ def test_a_number_in_words_is_near_itself(value):
 
 def test_a_ragged_row_is_refused():
     with pytest.raises(ValueError, match="expected 2 cells in table t, got 1"):
-        table(("alone",))
+        table(("single",))
 
 
 def test_headings_that_stand_twice_are_refused():

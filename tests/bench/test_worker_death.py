@@ -13,6 +13,7 @@ import pytest
 from bench.harness import isolation
 from bench.harness.isolation import WorkerProcess
 from bench.harness.worker import Ready
+from crosscheck.child_process import PipedProcess
 
 ROOT = Path(isolation.__file__).parent.parent
 PATIENCE = 3.0
@@ -136,7 +137,7 @@ def worker(jobs):
 
 
 def pid(worker):
-    return worker._worker._process.pid
+    return worker._worker.process.pid
 
 
 def is_gone(process):
@@ -174,8 +175,8 @@ def test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job(worker, jobs
         assert_works(worker, jobs)
         before = pid(worker)
         seen = []
-        end = isolation._Worker.end
-        patch.setattr(isolation._Worker, "end", lambda w: (seen.append(w._process.pid), end(w)))
+        end = PipedProcess.end
+        patch.setattr(PipedProcess, "end", lambda w: (seen.append(w.process.pid), end(w)))
         outcome = worker.perform(jobs.Dying(manner, moment))
     assert re.fullmatch(SAYS[manner], outcome.trouble)
     assert len(outcome.solved) == MOMENTS[moment]

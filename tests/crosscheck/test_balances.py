@@ -40,9 +40,9 @@ def test_external_forces_and_gauss_newtons_linearisation_are_seen():
 
 def test_moved_pins_are_where_the_step_took_them():
     system, state, external, h = samples.network(0, damped=False)
-    goal = state.positions[system.pinned] + 0.1
+    pins_at = state.positions[system.pinned] + 0.1
     settings = {"h": h, "tolerance": 1e-14}
-    x = ImplicitEuler(system, **settings).step(state, external, goal).state.positions
+    x = ImplicitEuler(system, **settings).step(state, external, pins_at).state.positions
     assert balance_residual(system, state, x, h, external) < BALANCE.value
     x = ImplicitEuler(system, **settings).step(state, external).state.positions
     x = np.where(system.free[:, None], x, x + 0.1)

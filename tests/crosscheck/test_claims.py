@@ -17,7 +17,7 @@ from reference.backend.compiled import set_backend
 FEW = 2
 
 
-# What is not rounding alone: the next term of an error, and of a difference.
+# What is not only rounding: the next term of an error, and of a difference.
 LARGEST = {ORDER: 0.1, STIFFNESS: 5e-11}
 
 # What follows many steps; in the interpreter that takes minutes.
@@ -82,22 +82,22 @@ def test_claim_about_long_motions_holds_in_more_cases(name):
 
 def test_claim_goes_red_when_disturbed_by_ten_tolerances(known):
     assert check_claim(disturbed(known, 0.0), FEW).holds
-    assert check_claim(disturbed(known, 10.0), FEW).missed == "they differ"
+    assert check_claim(disturbed(known, 10.0), FEW).failure == "they differ"
 
 
 def test_claim_goes_red_where_ours_is_not_a_number(known):
-    assert check_claim(disturbed(known, np.nan), FEW).missed == "not a number"
+    assert check_claim(disturbed(known, np.nan), FEW).failure == "not a number"
 
 
 def test_claim_goes_red_without_cases(claim):
-    assert check_claim(claim, 0).missed == "no cases"
+    assert check_claim(claim, 0).failure == "no cases"
 
 
 def test_claim_goes_red_where_ours_equals_the_baseline(known):
     def compare(cases):
         return [case._replace(baseline=case.ours) for case in known.compare(cases)]
 
-    assert check_claim(dataclasses.replace(known, compare=compare), 1).missed == "nothing moved"
+    assert check_claim(dataclasses.replace(known, compare=compare), 1).failure == "nothing moved"
 
 
 def test_tolerance_exceeds_rounding_errors_but_little_else(known):

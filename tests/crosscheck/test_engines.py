@@ -31,17 +31,17 @@ def engine_of(request):
     return SKELETON_ENGINES[request.param]
 
 
-def quarter_turn(axis):
+def quarter(axis):
     return rotation.exponential(np.eye(3)[axis] * np.pi / 2)
 
 
 def test_quaternions_rotate_the_links_below(engine_of):
     skeleton = Skeleton([-1, 0, 1], [[0.0, 0.0, 5.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    local = np.array([quarter_turn(2), quarter_turn(0), rotation.identity()])
+    local = np.array([quarter(2), quarter(0), rotation.identity()])
     pose = forward_kinematics_by(engine_of(skeleton), local)
     assert np.allclose(pose.positions, [[0, 0, 5], [0, 1, 5], [0, 2, 5]], atol=1e-15)
-    assert np.allclose(rotation.angle(pose.rotations[0], quarter_turn(2)), 0.0, atol=1e-15)
-    both = rotation.multiply(quarter_turn(2), quarter_turn(0))
+    assert np.allclose(rotation.angle(pose.rotations[0], quarter(2)), 0.0, atol=1e-15)
+    both = rotation.multiply(quarter(2), quarter(0))
     assert np.allclose(rotation.angle(pose.rotations[1:], both), 0.0, atol=1e-15)
 
 
@@ -93,10 +93,10 @@ def test_jacobian_updates_the_kinematics(engine_of):
 def test_integrate_rotates_a_joint_in_its_own_frame(engine_of):
     skeleton = Skeleton([-1, 0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     engine = engine_of(skeleton)
-    q = coordinates(engine, np.array([quarter_turn(2), rotation.identity()]))
+    q = coordinates(engine, np.array([quarter(2), rotation.identity()]))
     rotated = engine.integrate(q, np.array([np.pi / 2, 0.0, 0.0, 0.0, 0.0, 0.0]))
     engine.update_kinematics(rotated)
-    expected = rotation.multiply(quarter_turn(2), quarter_turn(0))
+    expected = rotation.multiply(quarter(2), quarter(0))
     assert rotation.angle(engine.pose().rotations[0], expected) < 1e-15
 
 

@@ -326,8 +326,8 @@ def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
         with pytest.raises(LostError, match=r"takes longer than 0\.5 s"):
             child.call(time.sleep, 60)
         assert child.call(loud) not in (first, os.getpid())
-        process = child._process
-    assert not process.is_alive()
+        process = child._child.process
+    assert process.returncode is not None
     assert capfd.readouterr() == ("", "")
 
 

@@ -78,10 +78,10 @@ MJCF = """<mujoco model="all">
       <body name="hip" pos="0.2 0.1 -0.3" euler="20 -40 70">
         <geom size="0.1"/>
         <joint name="swing" type="hinge" axis="1 1 0" pos="0.05 0 0.1" range="-60 80"/>
-        <joint name="turn" type="hinge" axis="0 0 1" pos="0 0.07 0" range="-30 45"/>
+        <joint name="twist" type="hinge" axis="0 0 1" pos="0 0.07 0" range="-30 45"/>
         <body name="shin" pos="0 0 -0.5" axisangle="0 1 0 35">
           <geom size="0.1"/>
-          <joint name="slip" type="slide" axis="0 1 1" range="-0.2 0.3" ref="0.1"/>
+          <joint name="slide" type="slide" axis="0 1 1" range="-0.2 0.3" ref="0.1"/>
           <body name="foot" pos="0.1 0.2 -0.4">
             <geom size="0.1"/>
             <joint name="bend" axis="1 1 0" pos="0.05 0 0.1" range="-60 80" ref="25"/>
@@ -125,7 +125,7 @@ BLIND = {
         "anchors not read": (r'(axis="[01 ]*") pos="[^"]*"', r"\1"),
         "ref not read": (r'ref="[^"]*"', ""),
         "joints of a body in another order": (
-            r"(<joint name=.swing.*)\n\s*(<joint name=.turn.*)",
+            r"(<joint name=.swing.*)\n\s*(<joint name=.twist.*)",
             r"\2\n\1",
         ),
     },
@@ -141,45 +141,45 @@ def rebuilt(articulation, **changes):
 
 def turned_frames(robot, change):
     """The robot with the roll, pitch and yaw of its frames changed."""
-    turns = Rotation.from_quat(robot.articulation.frames, scalar_first=True)
-    frames = change(turns.as_euler("xyz")).as_quat(scalar_first=True)
+    rotations = Rotation.from_quat(robot.articulation.frames, scalar_first=True)
+    frames = change(rotations.as_euler("xyz")).as_quat(scalar_first=True)
     return robot._replace(articulation=rebuilt(robot.articulation, frames=frames))
 
 
-def slipped(robot, q, links, *, slip):
-    """Stand in for `reference_kinematics`, with a slip in the robot, in q or in the formulas."""
+def faulty(robot, q, links, *, fault):
+    """Stand in for `reference_kinematics`, with a fault in the robot, in q or in the formulas."""
     a = robot.articulation
-    if slip == "rpy in the other order":
+    if fault == "rpy in the other order":
         robot = turned_frames(robot, lambda rpy: Rotation.from_euler("XYZ", rpy))
-    if slip == "rpy in degrees":
+    if fault == "rpy in degrees":
         robot = turned_frames(robot, lambda rpy: Rotation.from_euler("xyz", rpy, degrees=True))
-    if slip == "axis not rotated by the frame":
+    if fault == "axis not rotated by the frame":
         frames = Rotation.from_quat(a.frames, scalar_first=True)
         robot = robot._replace(articulation=rebuilt(a, axes=frames.inv().apply(a.axes.copy())))
-    if slip == "joints by their order in another tree":
+    if fault == "joints by their order in another tree":
         single = [a.coordinates_of(j).start for j, k in enumerate(a.kinds) if k in ONE]
         q = q.copy()
         q[:, single] = q[:, single[::-1]]
-    if slip == "degrees for radians":
+    if fault == "degrees for radians":
         q = np.degrees(q)
-    if slip == "mimic joints not in the Jacobian":
+    if fault == "mimic joints not in the Jacobian":
         kinds = ["fixed" if j in a.mimics else k for j, k in enumerate(a.kinds)]
         without_mimics = rebuilt(a, kinds=kinds, mimics={})
         fixed = reference_kinematics(robot._replace(articulation=without_mimics), q, links)
         return reference_kinematics(robot, q, links)._replace(jacobians=fixed.jacobians)
     motion = reference_kinematics(robot, q, links)
-    return motion._replace(jacobians=slipped_jacobians(motion, slip))
+    return motion._replace(jacobians=faulty_jacobians(motion, fault))
 
 
-def slipped_jacobians(motion, slip):
+def faulty_jacobians(motion, fault):
     J, R = motion.jacobians.copy(), motion.matrices
     linear, angular = J[..., :3, :], J[..., 3:, :]
-    if slip == "Jacobian along the link's own axes":
+    if fault == "Jacobian along the link's own axes":
         inverse = np.swapaxes(R, -1, -2)
         J = np.concatenate([inverse @ linear, inverse @ angular], axis=-2)
-    if slip == "Jacobian at the origin of the world":
+    if fault == "Jacobian at the origin of the world":
         linear += np.cross(motion.positions[..., None], angular, axis=-2)
-    if slip == "angular rows first":
+    if fault == "angular rows first":
         J = np.roll(J, 3, axis=-2)
     return J
 
@@ -225,10 +225,10 @@ def test_one_of_everything_agrees(family, engine, quantity, small, backend):
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
 @pytest.mark.parametrize(
-    ("family", "slip"), [(family, slip) for family, slips in BLIND.items() for slip in slips]
+    ("family", "fault"), [(family, fault) for family, faults in BLIND.items() for fault in faults]
 )
-def test_claims_go_red_if_the_reader_is_blind(family, slip, engine, small, monkeypatch):
-    pattern, instead = BLIND[family][slip]
+def test_claims_go_red_if_the_reader_is_blind(family, fault, engine, small, monkeypatch):
+    pattern, instead = BLIND[family][fault]
     text, count = re.subn(pattern, instead, TEXTS[family][1])
     assert count
     blind = READERS[family].parse(text)
@@ -241,22 +241,22 @@ def test_claims_go_red_if_the_reader_is_blind(family, slip, engine, small, monke
 
     monkeypatch.setattr(comparisons, "reference_kinematics", blindly)
     for quantity in QUANTITIES:
-        holds = quantity == "rotations" and slip in KEEPS_ROTATIONS
+        holds = quantity == "rotations" and fault in KEEPS_ROTATIONS
         expected = "" if holds else "they differ"
-        assert verdict(family, engine, quantity).missed == expected, quantity
+        assert verdict(family, engine, quantity).failure == expected, quantity
 
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
-@pytest.mark.parametrize("slip", FORMULAS)
-def test_claims_go_red_under_the_slip(slip, engine, small, monkeypatch):
-    monkeypatch.setattr(comparisons, "reference_kinematics", partial(slipped, slip=slip))
-    for quantity in FORMULAS[slip]:
-        assert verdict(ROBOTS, engine, quantity).missed == "they differ", quantity
+@pytest.mark.parametrize("fault", FORMULAS)
+def test_claims_go_red_under_the_fault(fault, engine, small, monkeypatch):
+    monkeypatch.setattr(comparisons, "reference_kinematics", partial(faulty, fault=fault))
+    for quantity in FORMULAS[fault]:
+        assert verdict(ROBOTS, engine, quantity).failure == "they differ", quantity
 
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
-def test_without_a_slip_the_copy_holds(engine, small, monkeypatch):
-    monkeypatch.setattr(comparisons, "reference_kinematics", partial(slipped, slip=None))
+def test_without_a_fault_the_copy_holds(engine, small, monkeypatch):
+    monkeypatch.setattr(comparisons, "reference_kinematics", partial(faulty, fault=None))
     assert all(verdict(ROBOTS, engine, quantity).holds for quantity in QUANTITIES)
 
 
@@ -441,7 +441,7 @@ def test_mimics_in_a_ring_are_left_free(engine, tmp_path):
     assert max(differences(swept)) < 1e-14
 
 
-def by_name_alone(model, bodies, joint):
+def only_by_name(model, bodies, joint):
     return model.joint(joint).name or f"unnamed{joint}"
 
 
@@ -460,7 +460,7 @@ CHAIN = ("a.urdf", chain_of_mimics(4, (0, 1, 2, 3)))
 # What an adapter may get wrong: (engine, what of it, what in its place, a file that shows it).
 ADAPTERS = {
     "joints by name only": (
-        "MuJoCo", "mujoco_robot._joint_name", by_name_alone, UNNAMED_TWO
+        "MuJoCo", "mujoco_robot._joint_name", only_by_name, UNNAMED_TWO
     ),
     "followers before their leaders": (
         "MuJoCo", "mujoco_robot._followers", as_the_file_has_them, CHAIN
@@ -477,9 +477,9 @@ ADAPTERS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("slip", ADAPTERS)
-def test_differences_show_the_slip_of_an_adapter(slip, tmp_path, monkeypatch):
-    engine, name, instead, (file, text) = ADAPTERS[slip]
+@pytest.mark.parametrize("fault", ADAPTERS)
+def test_differences_show_the_fault_of_an_adapter(fault, tmp_path, monkeypatch):
+    engine, name, instead, (file, text) = ADAPTERS[fault]
     model = written(tmp_path, text, file)
     assert max(differences(sweep(engine, model))) < 1e-14
     monkeypatch.setattr(f"crosscheck.engines.{name}", instead, raising=False)

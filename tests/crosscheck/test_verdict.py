@@ -27,18 +27,18 @@ def test_equal_values_away_from_the_baseline_hold():
 
 
 def test_no_cases_is_missed():
-    assert verdict_of().missed == "no cases"
+    assert verdict_of().failure == "no cases"
 
 
 def test_one_bad_case_among_many_is_missed():
     verdict = verdict_of(comparison(), comparison(theirs=(1.0, 2.1)), comparison())
-    assert verdict.missed == "they differ"
+    assert verdict.failure == "they differ"
     assert verdict.difference == pytest.approx(0.05)
 
 
 def test_one_case_at_its_baseline_among_many_is_missed():
     verdict = verdict_of(comparison(), comparison(baseline=(1.0, 2.0 + 1e-5)))
-    assert verdict.missed == "nothing moved"
+    assert verdict.failure == "nothing moved"
     assert verdict.displacement == pytest.approx(5e-6)
 
 
@@ -46,18 +46,18 @@ def test_one_case_at_its_baseline_among_many_is_missed():
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_what_is_not_a_number_is_missed(field, bad):
     verdict = verdict_of(comparison(), comparison(**{field: (1.0, bad)}))
-    assert verdict.missed == "not a number"
+    assert verdict.failure == "not a number"
 
 
 def test_the_same_infinity_is_missed():
     verdict = verdict_of(comparison(ours=(1.0, np.inf), theirs=(1.0, np.inf)))
-    assert verdict.missed == "not a number"
+    assert verdict.failure == "not a number"
     assert np.isnan(verdict.difference)
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, np.nan, np.inf])
 def test_a_scale_that_measures_nothing_is_missed(scale):
-    assert verdict_of(comparison(scale=scale)).missed == "not a number"
+    assert verdict_of(comparison(scale=scale)).failure == "not a number"
 
 
 @pytest.mark.parametrize(("ours", "theirs"), [((1.0, 2.0), (1.0,)), ((), ())])

@@ -34,7 +34,7 @@ def test_a_fitting_array_is_not_copied():
         ([1j], (1,), "a: expected an array of numbers, got"),
     ],
 )
-def test_a_misfit_array_is_named(given, trailing, message):
+def test_a_wrong_array_is_named(given, trailing, message):
     with pytest.raises(ValueError, match=message):
         arguments.array("a", given, *trailing)
 
@@ -50,7 +50,7 @@ def test_a_misfit_array_is_named(given, trailing, message):
         (-1, {"least": 0.0}, "h: expected a number of at least 0, got -1"),
     ],
 )
-def test_a_misfit_number_is_named(given, limits, message):
+def test_a_wrong_number_is_named(given, limits, message):
     with pytest.raises(ValueError, match=message):
         arguments.number("h", given, **limits)
 
@@ -61,7 +61,7 @@ def test_the_least_of_a_range_belongs_to_it():
     assert arguments.indices("i", [0, 2], "pin", least=0, below=3).tolist() == [0, 2]
 
 
-def test_coordinates_are_bounded_both_ways():
+def test_coordinates_are_bounded_on_both_sides():
     assert arguments.coordinates("x", [-1e75, 1e75], 2).tolist() == [-1e75, 1e75]
     with pytest.raises(ValueError, match="x: expected coordinates of at most 1e\\+75, got 2e"):
         arguments.coordinates("x", [-2e75, 0.0], 2)
@@ -92,7 +92,7 @@ def test_only_an_integer_in_range_is_one(given):
         ([[0]], r"pinned: expected shape \(pin,\), got \(1, 1\)"),
     ],
 )
-def test_misfit_indices_are_named(given, message):
+def test_wrong_indices_are_named(given, message):
     with pytest.raises(ValueError, match=message):
         arguments.indices("pinned", given, "pin", least=0, below=3)
 
@@ -121,7 +121,7 @@ def test_a_positive_number_is_within_75_orders_of_one(given):
         (arguments.generator, 3, "a Generator, got int"),
     ],
 )
-def test_a_misfit_of_any_kind_is_named(border, given, message):
+def test_a_wrong_value_of_any_kind_is_named(border, given, message):
     with pytest.raises(ValueError, match=f"x: expected (an array of )?{message}"):
         border("x", given)
 

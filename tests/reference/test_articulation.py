@@ -12,7 +12,7 @@ from reference.articulation import KINDS, clamp_ball, swing_twist
 
 # Eight joints with offsets of a few metres, slides and free joints: some dozens of roundings.
 ROUNDING = 1e-13
-# Where a ball is tilted by nearly half a turn, its twist is known only to 1e-16 over the rest.
+# Where a ball is tilted by nearly pi, its twist is known only to 1e-16 over the rest.
 ANGLE = 1e-9
 
 at_both_speeds = drawn()
@@ -108,22 +108,24 @@ def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, backend):
     np.testing.assert_allclose(balls.rotations, pose.rotations, rtol=0, atol=ROUNDING)
 
 
-def test_a_hinge_is_a_ball_that_turns_about_its_axis(skeleton, rng, backend):
+def test_a_hinge_is_a_ball_that_rotates_about_its_axis(skeleton, rng, backend):
     axes = rng.standard_normal((6, 3))
     q = rng.uniform(-7.0, 7.0, 6)
-    turns = rotation.exponential(q[:, None] * axes / np.linalg.norm(axes, axis=1, keepdims=True))
+    rotations = rotation.exponential(
+        q[:, None] * axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    )
     hinges = forward_kinematics(Articulation(skeleton, "hinge", axes), q)
-    balls = forward_kinematics(skeleton, turns)
+    balls = forward_kinematics(skeleton, rotations)
     np.testing.assert_allclose(hinges.positions, balls.positions, rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(hinges.rotations, balls.rotations, rtol=0, atol=ROUNDING)
 
 
-def test_a_slide_shifts_along_its_axis_in_its_frame_and_does_not_turn(backend):
-    turn = rotation.exponential([0.0, 0.0, np.pi / 2])
-    slide = one("slide", axis=(2.0, 0.0, 0.0), offset=(1.0, 2.0, 3.0), frames=turn)
+def test_a_slide_shifts_along_its_axis_in_its_frame_and_does_not_rotate(backend):
+    Q = rotation.exponential([0.0, 0.0, np.pi / 2])
+    slide = one("slide", axis=(2.0, 0.0, 0.0), offset=(1.0, 2.0, 3.0), frames=Q)
     pose = forward_kinematics(slide, [0.5])
     np.testing.assert_allclose(pose.positions, [[1.0, 2.5, 3.0]], rtol=0, atol=1e-15)
-    np.testing.assert_allclose(pose.rotations, [turn], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(pose.rotations, [Q], rtol=0, atol=1e-15)
 
 
 def test_a_free_joint_is_where_its_coordinates_say(rng, backend):
@@ -164,8 +166,10 @@ def test_joints_are_found_by_name(arm):
 
 def test_a_mimic_joint_moves_with_its_leader(arm, q, backend):
     offsets, _ = arm.local_transforms(q)
-    way = rotation.rotate(arm.frames[5], (-0.5 * q[1] + 0.3) * arm.axes[5])
-    np.testing.assert_allclose(offsets[5], arm.skeleton.offsets[5] + way, rtol=0, atol=1e-15)
+    displacement = rotation.rotate(arm.frames[5], (-0.5 * q[1] + 0.3) * arm.axes[5])
+    np.testing.assert_allclose(
+        offsets[5], arm.skeleton.offsets[5] + displacement, rtol=0, atol=1e-15
+    )
 
 
 def test_a_mimic_of_a_mimic_moves_with_the_first(backend):
@@ -174,9 +178,9 @@ def test_a_mimic_of_a_mimic_moves_with_the_first(backend):
         chain, "hinge", mimics={"a": Mimic("b", 2.0, 0.5), "b": Mimic("c", 3.0, -0.25)}
     )
     assert model.mimics == {0: Mimic(2, 6.0, 0.0), 1: Mimic(2, 3.0, -0.25)}
-    _, turns = model.local_transforms([0.1])
+    _, rotations = model.local_transforms([0.1])
     np.testing.assert_allclose(
-        rotation.logarithm(turns)[:, 2], [0.6, 0.05, 0.1], rtol=0, atol=1e-15
+        rotation.logarithm(rotations)[:, 2], [0.6, 0.05, 0.1], rtol=0, atol=1e-15
     )
 
 
@@ -243,9 +247,9 @@ vectors = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)
 directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.1).map(lambda v: v / np.linalg.norm(v))
 
 
-@given(turn=vectors, axis=directions)
-def test_swing_and_twist_recompose_and_are_what_they_are_called(turn, axis):
-    Q = rotation.exponential(turn)
+@given(vector=vectors, axis=directions)
+def test_swing_and_twist_recompose_and_are_what_they_are_called(vector, axis):
+    Q = rotation.exponential(vector)
     swing, twist = swing_twist(tuple(Q), tuple(axis))
     again = rotation.multiply(swing, rotation.exponential(twist * axis))
     np.testing.assert_allclose(rotation.angle(again, Q), 0.0, rtol=0, atol=1e-14)
@@ -257,17 +261,17 @@ def test_swing_and_twist_recompose_and_are_what_they_are_called(turn, axis):
 
 
 @pytest.mark.parametrize(("axis", "across"), [(0, 1), (0, 2), (1, 0), (2, 1)])
-def test_half_a_turn_about_an_axis_across_is_all_swing(axis, across):
+def test_pi_about_an_axis_across_is_all_swing(axis, across):
     Q = (0.0, *np.eye(3)[across])
     assert swing_twist(Q, tuple(np.eye(3)[axis])) == (Q, 0.0)
     assert clamp_ball(Q, tuple(np.eye(3)[axis]), -0.1, 0.1, np.pi) == Q
 
 
-@given(turn=vectors, axis=directions, cone=st.floats(0.0, 3.0), most=st.floats(0.0, 3.0))
+@given(vector=vectors, axis=directions, cone=st.floats(0.0, 3.0), most=st.floats(0.0, 3.0))
 def test_a_clamped_ball_keeps_the_direction_of_its_tilt_and_the_nearer_twist(
-    turn, axis, cone, most
+    vector, axis, cone, most
 ):
-    Q = tuple(rotation.exponential(turn))
+    Q = tuple(rotation.exponential(vector))
     swing, twist = swing_twist(Q, tuple(axis))
     clamped = clamp_ball(Q, tuple(axis), -most, most, cone)
     again, held = swing_twist(clamped, tuple(axis))
@@ -294,8 +298,8 @@ def test_a_ball_beyond_its_cone_or_its_twist_is_outside(limit, over, backend):
     ball = one("ball", **{limit: -0.4 if limit == "lower" else 0.4})
     sign = -1.0 if limit == "lower" else 1.0
     for angle, within in ((0.39, True), (0.41, False)):
-        turn = rotation.exponential(sign * angle * np.eye(3)[over])
-        assert ball.within_limits(turn) == within
+        Q = rotation.exponential(sign * angle * np.eye(3)[over])
+        assert ball.within_limits(Q) == within
     clamped = ball.clamp(rotation.exponential(sign * 1.0 * np.eye(3)[over]))
     np.testing.assert_allclose(
         rotation.logarithm(clamped), sign * 0.4 * np.eye(3)[over], rtol=0, atol=1e-15

@@ -152,7 +152,7 @@ class TestHessianChange:
         objective, x = step_of(*swing, h=1 / 30)
         assert self.hessian_changes_no_faster(objective, x, 1e-3, pairs=10) > 0.05
 
-    def steepest_way(self, objective, x, pinned):
+    def steepest(self, objective, x, pinned):
         """Along (1, 2^1/2, 0) / 3^1/2 the length has its largest third derivative."""
         direction = np.zeros((2, 3))
         direction[1] = np.array([1.0, math.sqrt(2.0), 0.0]) / math.sqrt(3.0)
@@ -172,7 +172,7 @@ class TestHessianChange:
         objective = ImplicitEuler(system, h=h).objective(state)
         _, L = hessian_change(objective, state.positions, 0.0)
         # All bounds are taken 1e-8 too large to be on the safe side of their own rounding.
-        steepest = self.steepest_way(objective, state.positions, pinned)
+        steepest = self.steepest(objective, state.positions, pinned)
         assert pytest.approx(steepest, rel=1e-7) == L
 
     @pytest.mark.parametrize(("pinned", "radius"), [((0,), 0.4), ((), 0.4 / math.sqrt(2.0))])
@@ -197,7 +197,7 @@ class TestHessianChange:
         objective = ImplicitEuler(system, h=h).objective(state)
         monkeypatch.setattr(certificate, "laplacian_norm", fault)
         _, L = hessian_change(objective, state.positions, 0.0)
-        assert self.steepest_way(objective, state.positions, ()) > L * (1 + 1e-3)
+        assert self.steepest(objective, state.positions, ()) > L * (1 + 1e-3)
 
     def test_springs_that_are_linear_or_slack_or_pinned_do_not_count(self, altered):
         system = MassSpring(
@@ -239,10 +239,10 @@ class TestNewtonStep:
         given = H, factorize(H), np.array([2.0, 0, 0]), 2.0, RoundingErrors(*errors)
         assert newton_length(*given) == pytest.approx(length, rel=1e-7)
 
-    @pytest.mark.parametrize("slip", [1.5, 0.5])
-    def test_a_poor_solve_does_not_make_it_shorter(self, slip):
+    @pytest.mark.parametrize("fault", [1.5, 0.5])
+    def test_a_poor_solve_does_not_make_it_shorter(self, fault):
         H = scipy.sparse.csc_array(2.0 * np.eye(3))
-        given = factorize(slip * H), np.array([2.0, 0, 0]), 2.0, RoundingErrors(0.0, 0.0)
+        given = factorize(fault * H), np.array([2.0, 0, 0]), 2.0, RoundingErrors(0.0, 0.0)
         assert newton_length(H, *given) >= 1.0
 
 

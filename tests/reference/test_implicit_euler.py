@@ -621,12 +621,12 @@ class TestOutcome:
         assert result.iterations > 2
         assert result.residual < 0.2 * result.history[0]
 
-    @pytest.mark.parametrize("slip", ["at the floor", "two steps back"])
-    def test_the_laws_of_rounding_see_a_solve_that_ends_early(self, cloth, slip, monkeypatch):
+    @pytest.mark.parametrize("fault", ["at the floor", "two steps back"])
+    def test_the_laws_of_rounding_see_a_solve_that_ends_early(self, cloth, fault, monkeypatch):
         """The rule as it was, and one that takes a rise of an accelerated residual for the end."""
 
         def outcome(self, iterate, residuals, best, stuck):
-            early = slip == "at the floor" or len(residuals) - 1 > best
+            early = fault == "at the floor" or len(residuals) - 1 > best
             if residuals[-1] <= self.tolerance or (iterate.at_floor and early):
                 return Outcome.AT_ROUNDING
             return None

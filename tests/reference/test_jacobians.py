@@ -23,8 +23,10 @@ def by_differences(model, q):
     for step in STEP * np.eye(model.freedom_count):
         ends = [forward_kinematics(model, integrate(model, q, v)) for v in (step, -step)]
         moved = ends[0].positions - ends[1].positions
-        turns = [rotation.multiply(end.rotations, rotation.conjugate(at.rotations)) for end in ends]
-        turned = rotation.logarithm(turns[0]) - rotation.logarithm(turns[1])
+        rotations = [
+            rotation.multiply(end.rotations, rotation.conjugate(at.rotations)) for end in ends
+        ]
+        turned = rotation.logarithm(rotations[0]) - rotation.logarithm(rotations[1])
         columns.append(np.concatenate([moved, turned], axis=1)[..., None] / (2 * STEP))
     return np.concatenate(columns, axis=-1)
 
@@ -73,11 +75,11 @@ def test_a_step_by_the_difference_arrives(articulated, backend, kinds, seed):
     arrived = forward_kinematics(model, integrate(model, q0, difference(model, q1, q0)))
     expected = forward_kinematics(model, q1)
     np.testing.assert_allclose(arrived.positions, expected.positions, rtol=0, atol=ROUNDING)
-    turned = rotation.angle(arrived.rotations, expected.rotations)
-    np.testing.assert_allclose(turned, 0.0, rtol=0, atol=ROUNDING)
+    angles = rotation.angle(arrived.rotations, expected.rotations)
+    np.testing.assert_allclose(angles, 0.0, rtol=0, atol=ROUNDING)
 
 
-def test_rotations_differ_by_the_shorter_way_round(backend):
+def test_rotations_differ_by_the_smaller_angle(backend):
     ball = Articulation(Skeleton([-1], np.zeros((1, 3))))
     end = rotation.exponential([0.0, 0.0, 4.0])
     v = difference(ball, end, rotation.identity())
@@ -85,14 +87,14 @@ def test_rotations_differ_by_the_shorter_way_round(backend):
     assert (difference(ball, -end, rotation.identity()) == v).all()
 
 
-def test_steps_turn_a_ball_in_its_own_frame_and_shift_a_free_joint_in_its_unmoved_one(backend):
+def test_steps_rotate_a_ball_in_its_own_frame_and_shift_a_free_joint_in_its_unmoved_one(backend):
     quarter = rotation.exponential([0.0, 0.0, np.pi / 2])
     free = Articulation(Skeleton([-1], np.zeros((1, 3))), "free")
     moved = integrate(free, [1.0, 2.0, 3.0, *quarter], [1.0, 0.0, 0.0, np.pi / 2, 0.0, 0.0])
     about_x = rotation.exponential([np.pi / 2, 0.0, 0.0])
     expected = [2.0, 2.0, 3.0, *rotation.multiply(quarter, about_x)]
     np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-15)
-    # At the turned joint a shift along x is one along the world's x; a turn about x one about y.
+    # Shifts are along the world's axes; here a rotation about the joint's x is one about y.
     J = jacobian(free, [1.0, 2.0, 3.0, *quarter])
     np.testing.assert_allclose(J[:, 0], [1, 0, 0, 0, 0, 0], rtol=0, atol=1e-15)
     np.testing.assert_allclose(J[:, 3], [0, 0, 0, 0, 1, 0], rtol=0, atol=1e-15)

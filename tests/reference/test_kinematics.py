@@ -109,14 +109,14 @@ def test_links_keep_their_lengths(skeleton, local, backend):
     np.testing.assert_allclose(links, skeleton.link_lengths[1:], rtol=ROUNDING)
 
 
-def test_turning_the_root_turns_the_body_about_it(skeleton, local, rng, backend):
-    turn = rotation.random(rng)
+def test_rotating_the_root_rotates_the_body_about_it(skeleton, local, rng, backend):
+    Q = rotation.random(rng)
     before = forward_kinematics(skeleton, local).positions
-    local[0] = rotation.multiply(turn, local[0])
+    local[0] = rotation.multiply(Q, local[0])
     after = forward_kinematics(skeleton, local).positions
     root = skeleton.offsets[0]
     np.testing.assert_allclose(
-        after, root + rotation.rotate(turn, before - root), rtol=0, atol=ROUNDING
+        after, root + rotation.rotate(Q, before - root), rtol=0, atol=ROUNDING
     )
 
 

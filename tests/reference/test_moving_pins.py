@@ -9,7 +9,7 @@ from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
 from reference.mass_spring import MassSpring, State, damping_matrix, derivation, forces, lengths
 
 h = 0.02
-WAY = np.array([0.3, -0.1, 0.2])
+DISPLACEMENT = np.array([0.3, -0.1, 0.2])
 
 
 def implicit(name):
@@ -37,21 +37,21 @@ def step(request):
 def hung(network, altered):
     """The network with two pins, and where they are to go."""
     system = altered(network[0], pinned=[5, 2])
-    return system, network[1], network[1].positions[[2, 5]] + [WAY, -2 * WAY]
+    return system, network[1], network[1].positions[[2, 5]] + [DISPLACEMENT, -2 * DISPLACEMENT]
 
 
 def test_pins_end_with_their_displacement_over_h(hung, step, backend):
-    system, state, goal = hung
-    after = step(system, state, h, None, goal)
-    np.testing.assert_array_equal(after.positions[[2, 5]], goal)
-    expected = (goal - state.positions[[2, 5]]) / h
+    system, state, pins_at = hung
+    after = step(system, state, h, None, pins_at)
+    np.testing.assert_array_equal(after.positions[[2, 5]], pins_at)
+    expected = (pins_at - state.positions[[2, 5]]) / h
     np.testing.assert_allclose(after.velocities[[2, 5]], expected, rtol=1e-15)
 
 
 def test_what_moves_is_felt(hung, step, backend):
-    system, state, goal = hung
+    system, state, pins_at = hung
     free = system.free
-    fixed, moving = (step(system, state, h, None, pins) for pins in (None, goal))
+    fixed, moving = (step(system, state, h, None, pins) for pins in (None, pins_at))
     assert np.abs(fixed.velocities - moving.velocities)[free].max() > 0.01
 
 
@@ -64,11 +64,11 @@ def test_pins_that_stay_need_no_path(hung, step):
 
 def test_a_world_that_moves_evenly_is_like_one_at_rest(hung, rng, step, backend):
     """Galileo's principle, with dampers, with pins that move with the frame."""
-    system, state, goal = hung
+    system, state, pins_at = hung
     drift, pull = np.array([2.0, 1.0, -3.0]), rng.standard_normal((7, 3))
-    at_rest = step(system, state, h, pull, goal)
+    at_rest = step(system, state, h, pull, pins_at)
     moving = State(state.positions, state.velocities + drift)
-    after = step(system, moving, h, pull, goal + h * drift)
+    after = step(system, moving, h, pull, pins_at + h * drift)
     # Velocities of implicit steps are differences of positions, 1e-16 of 1 m, over h.
     np.testing.assert_allclose(after.positions, at_rest.positions + h * drift, rtol=0, atol=1e-13)
     np.testing.assert_allclose(after.velocities, at_rest.velocities + drift, rtol=0, atol=1e-11)
@@ -77,14 +77,14 @@ def test_a_world_that_moves_evenly_is_like_one_at_rest(hung, rng, step, backend)
 @pytest.mark.parametrize("name", ["newton", "symplectic_euler", "runge_kutta"])
 def test_a_moving_pin_is_a_huge_mass_in_motion(hung, altered, backend, name):
     """Alike but for what springs of some 10 N do to a billion kilograms."""
-    system, state, goal = hung
+    system, state, pins_at = hung
     masses = system.masses.copy()
     masses[[2, 5]] = 1e9
     heavy = altered(system, masses=masses, pinned=(), gravity=(0, 0, 0))
     v = state.velocities.copy()
-    v[[2, 5]] = (goal - state.positions[[2, 5]]) / h
+    v[[2, 5]] = (pins_at - state.positions[[2, 5]]) / h
     weightless = altered(system, gravity=(0, 0, 0))
-    pinned = STEPS[name](weightless, state, h, None, goal)
+    pinned = STEPS[name](weightless, state, h, None, pins_at)
     loose = STEPS[name](heavy, State(state.positions, v), h)
     np.testing.assert_allclose(pinned.positions, loose.positions, rtol=0, atol=1e-8)
     np.testing.assert_allclose(pinned.velocities, loose.velocities, rtol=0, atol=1e-6)
@@ -92,7 +92,7 @@ def test_a_moving_pin_is_a_huge_mass_in_motion(hung, altered, backend, name):
 
 def test_gauss_newton_linearises_where_the_pins_start(hung, rng, backend):
     """M (v' - v) = h (f(x_n) - C v' - h K v') at the free particles, v' at the pins given."""
-    system, state, goal = hung
+    system, state, pins_at = hung
     pull, free = rng.standard_normal((7, 3)), system.free
     i, j = system.springs.T
     u = (state.positions[i] - state.positions[j]) / lengths(system, state.positions)[:, None]
@@ -105,11 +105,11 @@ def test_gauss_newton_linearises_where_the_pins_start(hung, rng, backend):
     right = np.repeat(system.masses, 3) * state.velocities.ravel()
     right += h * forces(system, resting, pull).ravel()
     expected = np.zeros((7, 3))
-    expected[~free] = (goal - state.positions[~free]) / h
+    expected[~free] = (pins_at - state.positions[~free]) / h
     rows, given = np.repeat(free, 3), expected.ravel()
     right -= matrix @ given
     expected[free] = np.linalg.solve(matrix[np.ix_(rows, rows)], right[rows]).reshape(-1, 3)
-    after = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, pull, goal).state
+    after = ImplicitEuler(system, h=h, solver="gauss_newton").step(state, pull, pins_at).state
     # Positions of about 1 m round to 1e-16, and velocities are differences of them over h.
     np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-12)
 
@@ -118,36 +118,36 @@ def test_a_damper_drags_by_the_velocity_of_its_pin(backend):
     """Without a spring, m v' = h c (w - v') along it, w being the pin's velocity."""
     system = MassSpring([1.0, 2.0], [[0, 1]], 1.0, 0.0, 3.0, pinned=[0], gravity=(0, 0, 0))
     state = State([[0.0, 0, 0], [1.0, 0, 0]], np.zeros((2, 3)))
-    goal = [[-0.04, 0, 0]]
-    dragged = ImplicitEuler(system, h=h, tolerance=1e-14).step(state, None, goal).state
+    pins_at = [[-0.04, 0, 0]]
+    dragged = ImplicitEuler(system, h=h, tolerance=1e-14).step(state, None, pins_at).state
     assert dragged.velocities[1, 0] == pytest.approx(-2.0 * h * 3 / (2 + h * 3), rel=1e-12)
-    pulled = symplectic_euler(system, state, h, None, goal)
+    pulled = symplectic_euler(system, state, h, None, pins_at)
     assert pulled.velocities[1, 0] == pytest.approx(-2.0 * h * 3 / 2, rel=1e-14)
 
 
 @pytest.mark.parametrize("name", STEP_SOLVERS)
 def test_a_used_integrator_takes_pins_like_a_fresh_one(hung, name):
-    system, state, goal = hung
+    system, state, pins_at = hung
     used = ImplicitEuler(system, h=h, solver=name)
-    middle = used.step(state, None, goal).state
-    for pins in (goal + WAY, None):
+    middle = used.step(state, None, pins_at).state
+    for pins in (pins_at + DISPLACEMENT, None):
         again = used.step(middle, None, pins)
         fresh = ImplicitEuler(system, h=h, solver=name).step(middle, None, pins)
         np.testing.assert_array_equal(again.state.positions, fresh.state.positions)
         np.testing.assert_array_equal(again.history, fresh.history)
 
 
-def test_the_objective_holds_the_pins_at_their_goal(hung, backend):
-    system, state, goal = hung
-    objective = ImplicitEuler(system, h=h).objective(state, None, goal)
-    np.testing.assert_array_equal(objective.y[[2, 5]], goal)
+def test_the_objective_holds_the_pins_at_their_targets(hung, backend):
+    system, state, pins_at = hung
+    objective = ImplicitEuler(system, h=h).objective(state, None, pins_at)
+    np.testing.assert_array_equal(objective.y[[2, 5]], pins_at)
     np.testing.assert_array_equal(objective.x_n, state.positions)
     for x in (objective.y, objective.x_n):
         assert not objective.gradient(x)[[2, 5]].any()
     for iterate, _ in zip(
-        ImplicitEuler(system, h=h).iterates(state, None, goal), range(3), strict=False
+        ImplicitEuler(system, h=h).iterates(state, None, pins_at), range(3), strict=False
     ):
-        np.testing.assert_array_equal(iterate.positions[[2, 5]], goal)
+        np.testing.assert_array_equal(iterate.positions[[2, 5]], pins_at)
 
 
 def test_a_rope_follows_the_hand_that_swings_it(step):
@@ -161,9 +161,9 @@ def test_a_rope_follows_the_hand_that_swings_it(step):
 
 def test_a_system_that_is_all_pins_goes_where_it_is_taken(step, backend):
     system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
-    goal = 2 * np.eye(3)[:2]
-    after = step(system, State(np.eye(3)[:2], np.ones((2, 3))), h, None, goal)
-    np.testing.assert_array_equal(after.positions, goal)
+    pins_at = 2 * np.eye(3)[:2]
+    after = step(system, State(np.eye(3)[:2], np.ones((2, 3))), h, None, pins_at)
+    np.testing.assert_array_equal(after.positions, pins_at)
 
 
 def test_a_system_without_pins_takes_an_empty_path(network, altered, step):

@@ -27,7 +27,7 @@ from reference.mass_spring import (
 EPS = np.finfo(float).eps
 # A spring's or a damper's force is made by some twenty roundings of half an EPS.
 TERM = 16 * EPS
-# Nudge and error of a central difference in 50 digits.
+# Step and error of a central difference in 50 digits.
 DX, DIFFERENCE = 1e-16, 1e-28
 CONVERGING = [name for name in STEP_SOLVERS if name != "gauss_newton"]
 
@@ -48,7 +48,7 @@ def wide(extended_precision):
 
 
 def random_motion(seed, *, mildly=False):
-    """Two to five particles, some pinned, in any state: system, state, forces, pins' goal and h.
+    """Two to five particles, some pinned, in any state: system, state, forces, pins' targets and h.
 
     Springs and ropes, damped or not, some without a rest length, stretched and compressed by up to
     a half, anywhere within 100 m; "mildly" not far from rest.
@@ -71,19 +71,19 @@ def random_motion(seed, *, mildly=False):
         gravity=rng.standard_normal(3) * 5,
         tension_only=rng.random(s) < 0.2,
     )
-    goal = x[system.pinned] + 0.01 * rng.standard_normal((len(system.pinned), 3))
+    pins_at = x[system.pinned] + 0.01 * rng.standard_normal((len(system.pinned), 3))
     h = float(rng.choice([1 / 240, 1 / 60, 1 / 30]))
-    return system, State(x, rng.standard_normal((n, 3))), rng.standard_normal((n, 3)), goal, h
+    return system, State(x, rng.standard_normal((n, 3))), rng.standard_normal((n, 3)), pins_at, h
 
 
 def disturbed(seed, exponent):
     """The objective of a step and a point 10^exponent beside where Newton's method ends."""
-    system, state, forces, goal, h = random_motion(seed)
+    system, state, forces, pins_at, h = random_motion(seed)
     integrator = ImplicitEuler(system, h=h, tolerance=1e-14)
-    x = integrator.step(state, forces, goal).state.positions
+    x = integrator.step(state, forces, pins_at).state.positions
     direction = np.random.default_rng([8, seed]).standard_normal(x.shape)
     direction[system.pinned] = 0.0
-    objective = integrator.objective(state, forces, goal)
+    objective = integrator.objective(state, forces, pins_at)
     return objective, x + 10.0**exponent * direction / np.linalg.norm(direction)
 
 
@@ -193,14 +193,14 @@ class TestSteps:
     @settings(max_examples=6)
     @given(seeds)
     def test_every_solver_ends_at_the_minimiser(self, extended_precision, seed):
-        system, state, forces, goal, h = random_motion(seed, mildly=True)
+        system, state, forces, pins_at, h = random_motion(seed, mildly=True)
         oracle = oracle_of(extended_precision, seed, mildly=True)
         for solver in CONVERGING:
             integrator = ImplicitEuler(
                 system, h=h, solver=solver, tolerance=1e-14, max_iterations=3000
             )
-            result = integrator.step(state, forces, goal)
-            known = integrator.certify(state, result, forces, goal)
+            result = integrator.step(state, forces, pins_at)
+            known = integrator.certify(state, result, forces, pins_at)
             error = distance_to_minimiser(extended_precision, oracle, result.state.positions)
             assert known.covered
             assert error <= known.distance
@@ -315,8 +315,8 @@ def is_broken(objective, x, error):
 
 
 def oracle_of(extended_precision, seed, *, mildly=False):
-    system, state, forces, goal, h = random_motion(seed, mildly=mildly)
-    return extended_precision.Step(system, state, h, forces, goal)
+    system, state, forces, pins_at, h = random_motion(seed, mildly=mildly)
+    return extended_precision.Step(system, state, h, forces, pins_at)
 
 
 def distance_to_minimiser(extended_precision, oracle, x):

@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reference import rotation
-from reference.quaternion import half_turn, perpendicular
+from reference.quaternion import half_angle, perpendicular
 
-# Products of unit quaternions round to a few eps; 32 leaves room for a dozen operations.
+# Products of unit quaternions round to a few eps; 32 allows a dozen operations.
 ROUNDING = 32 * np.finfo(float).eps
 # A series sums terms below one: a few halves of an eps, where one term too few leaves six.
 FEW_ROUNDINGS = 2 * np.finfo(float).eps
@@ -40,12 +40,12 @@ def test_i_j_k_multiply_as_hamilton_wrote():
     assert_close(rotation.multiply(i, i), -one)
 
 
-def test_a_quarter_turn_about_z_takes_x_to_y():
+def test_a_quarter_of_a_circle_about_z_takes_x_to_y():
     q = rotation.exponential([0.0, 0.0, np.pi / 2])
     assert_close(rotation.rotate(q, [1.0, 0.0, 0.0]), [0.0, 1.0, 0.0])
 
 
-def test_a_product_turns_by_its_right_factor_first(a, b, v):
+def test_a_product_rotates_by_its_right_factor_first(a, b, v):
     one_by_one = rotation.rotate(a, rotation.rotate(b, v))
     assert_close(rotation.rotate(rotation.multiply(a, b), v), one_by_one, 4 * ROUNDING)
 
@@ -80,7 +80,7 @@ def test_a_quaternion_comes_back_from_its_matrix(a):
 
 
 @pytest.mark.parametrize("axis", np.eye(3))
-def test_half_turns_come_back_from_their_matrices(axis):
+def test_rotations_by_pi_come_back_from_their_matrices(axis):
     R = 2 * np.outer(axis, axis) - np.eye(3)
     assert_close(np.abs(rotation.from_matrix(R)[1:]), axis)
 
@@ -101,7 +101,7 @@ def test_between_takes_one_direction_to_the_other_by_the_shortest_arc(v, backend
 
 
 @pytest.mark.parametrize("direction", [*np.eye(3), [1.0, 2.0, 3.0], [1e-9, 1.0, 0.0]])
-def test_between_opposites_is_a_half_turn_about_a_fixed_axis(direction, backend):
+def test_between_opposites_is_pi_about_a_fixed_axis(direction, backend):
     direction = np.asarray(direction)
     q = rotation.between(direction, -direction)
     assert_close(q[0], 0.0)
@@ -168,22 +168,22 @@ def test_the_logarithm_undoes_the_exponential(v):
 def test_the_exponential_agrees_with_extended_precision(angle, backend):
     with mpmath.workdps(40):
         w, x = float(mpmath.cos(mpmath.mpf(angle) / 2)), float(mpmath.sin(mpmath.mpf(angle) / 2))
-    turn = rotation.exponential([angle, 0.0, 0.0])
-    np.testing.assert_allclose(turn, [w, x, 0.0, 0.0], rtol=ROUNDING)
-    assert_close(turn, [w, x, 0.0, 0.0], FEW_ROUNDINGS)
+    Q = rotation.exponential([angle, 0.0, 0.0])
+    np.testing.assert_allclose(Q, [w, x, 0.0, 0.0], rtol=ROUNDING)
+    assert_close(Q, [w, x, 0.0, 0.0], FEW_ROUNDINGS)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-300, -1e-9, 0.1, -3.1, 6.2, -50.0, 3.1496, -3.1497])
-def test_half_a_turn_agrees_with_extended_precision(angle):
+def test_half_an_angle_agrees_with_extended_precision(angle):
     with mpmath.workdps(40):
         half = mpmath.mpf(angle) / 2
         c, s = float(mpmath.cos(half)), float(mpmath.sin(half))
-    assert_close(half_turn(angle), [c, s], FEW_ROUNDINGS)
-    assert half_turn(angle)[1] == pytest.approx(s, rel=ROUNDING, abs=0)
+    assert_close(half_angle(angle), [c, s], FEW_ROUNDINGS)
+    assert half_angle(angle)[1] == pytest.approx(s, rel=ROUNDING, abs=0)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-300, 1e-9, 1e-8, 1e-7, 0.1, 3.1, np.pi - 1e-7])
-def test_the_logarithm_is_accurate_near_zero_and_near_half_a_turn(angle, backend):
+def test_the_logarithm_is_accurate_near_zero_and_near_pi(angle, backend):
     q = [np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0]
     np.testing.assert_allclose(rotation.logarithm(q), [angle, 0.0, 0.0], rtol=ROUNDING)
 
@@ -197,9 +197,9 @@ def test_random_rotations_are_uniform(rng):
     assert_close((q**4).mean(axis=0), np.full(4, 1 / 8), 0.003)
 
 
-def test_the_angle_between_rotations_is_that_of_the_turn(a):
-    turn = rotation.exponential([0.0, 0.7, 0.0])
-    assert_close(rotation.angle(a, rotation.multiply(a, turn)), np.full(50, 0.7), 1e-14)
+def test_the_angle_between_rotations_is_that_of_the_rotation(a):
+    Q = rotation.exponential([0.0, 0.7, 0.0])
+    assert_close(rotation.angle(a, rotation.multiply(a, Q)), np.full(50, 0.7), 1e-14)
     assert_close(rotation.angle(a, -a), np.zeros(50), 1e-7)
 
 

@@ -336,7 +336,7 @@ def test_a_point_that_stays_is_followed_by_an_arm_that_stays():
     np.testing.assert_allclose(motion.positions, motion.positions[[0] * 9], rtol=0, atol=1e-12)
 
 
-def test_an_effector_that_nothing_moves_is_left_alone():
+def test_an_effector_that_nothing_moves_is_left_as_it_is():
     motion = track(ARM, line([0, 1.7, 0], [0, 1.7, 0], 3), effector=0, coherent=True)
     assert (motion.outcome == Outcome.CONVERGED).all()
 
@@ -384,15 +384,15 @@ def problem_of(name, closed, rng, drawn_to=()):
         Target(pose.positions[:, e], pose.rotations[:, e] if oriented else None, e, 1.0 + k)
         for k, e in enumerate(effectors)
     ]
-    goals = target_rows(checked_targets(model, targets, None), (4,))
+    rows = target_rows(checked_targets(model, targets, None), (4,))
     constrained = ~np.isin(np.arange(4), drawn_to)
-    goals["position"][~constrained] += 0.1
+    rows["position"][~constrained] += 0.1
     mechanism = prepared.mechanism
     columns = np.concatenate([
         np.arange(model.coordinate_count)[model.coordinates_of(j)] for j in range(5)
         if j not in mimics and j in joints_of(mechanism, model)
     ])  # fmt: skip
-    return new_problem(mechanism, goals, constrained, closed), q[:, columns].copy()
+    return new_problem(mechanism, rows, constrained, closed), q[:, columns].copy()
 
 
 def joints_of(mechanism, model):
@@ -446,8 +446,8 @@ def test_no_step_raises_the_cost(monkeypatch, seed):
     """Even from poses that have nothing to do with one another; whole Newton steps would here."""
     curve, frames = curves["heart"](5), 5
     mechanism = prepare(balls(ARM), (4,), (False,)).mechanism
-    goals = target_rows(checked_targets(ARM, curve, -1), (frames,))
-    problem = new_problem(mechanism, goals, np.ones(frames, dtype=bool), True)
+    rows = target_rows(checked_targets(ARM, curve, -1), (frames,))
+    problem = new_problem(mechanism, rows, np.ones(frames, dtype=bool), True)
     start = rotation.random(np.random.default_rng(seed), frames, 5)
     q = solve_ik(ARM, start, curve, LM).local_rotations
     q, on = project(problem, q[:, :4].reshape(frames, -1))
@@ -512,11 +512,11 @@ def test_a_cycle_of_frames_is_solved_like_a_dense_system(frames, closed, rng, ba
 
 
 def test_a_straight_arm_is_near_singular():
-    """Hinges in a plane can never leave it: that alone is not singular."""
+    """Hinges in a plane can never leave it: that by itself is not singular."""
     q = np.array([[0.3, 0.0, 0.0], [0.3, 0.0, 0.5]])
     arm = hinges(3)
     mechanism = prepare(arm, (3,), (False,)).mechanism
-    goals = np.zeros((2, 1), TARGET)
-    goals["weight"] = 1.0
-    problem = new_problem(mechanism, goals, np.ones(2, dtype=bool), False)
+    rows = np.zeros((2, 1), TARGET)
+    rows["weight"] = 1.0
+    problem = new_problem(mechanism, rows, np.ones(2, dtype=bool), False)
     assert near_singular(problem, q).tolist() == [True, False]

@@ -1,5 +1,7 @@
 """The largest rotation of a joint between frames, on every curve."""
 
+from typing import Any
+
 from matplotlib.axes import Axes
 
 from ...harness import metrics
@@ -15,6 +17,7 @@ from ...presentation.figures import (
     written,
 )
 from ...presentation.results import Results, by_problem, label, solvers
+from ...presentation.tables import in_unit
 from . import CURVE
 
 
@@ -34,10 +37,9 @@ def jitter(results: Results) -> Drawing | None:
             ends = [_largest_angle(r) for r in (record, warm) if r is not None]
             axes[0].plot(ends, [y] * len(ends), color=COLOURS[colour], linewidth=0.9, alpha=0.6)
             for x, filled in zip(ends, ("none", COLOURS[colour]), strict=False):
-                axes[0].plot(
-                    x, y, marker, color=COLOURS[colour], markerfacecolor=filled, markersize=5.5,
-                    linestyle="none", label=_once(axes[0], written(label(record.solver)), filled),
-                )  # fmt: skip
+                style: dict[str, Any] = {"color": COLOURS[colour], "markerfacecolor": filled}
+                name = _once(axes[0], written(label(record.solver)), filled)
+                axes[0].plot(x, y, marker, markersize=5.5, linestyle="none", label=name, **style)
         labels = [written(of[0].facts["curve"]) for of in rows.values()]
         axes[0].set_yticks(range(len(curves)), labels)
         axes[0].set(
@@ -47,14 +49,16 @@ def jitter(results: Results) -> Drawing | None:
         plain_powers(axes[0])
         figure.legend(loc="outside upper right", ncols=2)
         return finished(
-            figure, "jitter", "Largest rotation of a joint between neighbouring frames",
+            figure,
+            "jitter",
+            "Largest rotation of a joint between neighbouring frames",
             "Hollow: every frame solved from the rest pose; filled: every frame started from the "
             "last solution.",
-        )  # fmt: skip
+        )
 
 
 def _largest_angle(record: Record) -> float:
-    return metrics.degrees(metrics.spread(record.arrays["largest_angle"]).largest)
+    return in_unit(metrics.spread(record.arrays["largest_angle"]).largest, "°")
 
 
 def _aside(solver: str, names: list[str]) -> float:

@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from functools import partial
 
-from reference import IK_SOLVERS, track
+from reference import IK_SOLVERS, scenes, track
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ..chain.measurement import BEYOND_TOLERANCE, Limits, residuals, solve_targets
 from . import BEYOND, CURVE
-from .problem import CurveForArm, arm_beyond, arm_curves
+from .problem import FollowedCurve, arm_beyond, arm_curves
 
 LIMITS = Limits(tolerance=1e-4, max_iterations=100)
 BEYOND_LIMITS = Limits(BEYOND_TOLERANCE, max_iterations=1000)
@@ -31,19 +31,18 @@ def blocks(scale: Scale) -> Iterator[Block]:
         yield Block("arm", far.name, solver, measure, BEYOND_LIMITS._asdict(), scale.targets, facts)
 
 
-def draw(problem: CurveForArm, solver: str, warm: bool) -> Measured:
+def draw(problem: FollowedCurve, solver: str, warm: bool) -> Measured:
     """Follow the curve; residuals are recomputed by forward kinematics of the answers."""
-    motion = track(
-        problem.skeleton, problem.curve, solver, problem.rest, warm=warm, **LIMITS._asdict()
-    )
-    # The tip keeps its rotation and would only dilute the mean.
-    turns = metrics.rotation_angles(motion.local_rotations[:, :-1])
+    skeleton, rest = scenes.lab_arm()
+    motion = track(skeleton, problem.curve, solver, rest, warm=warm, **LIMITS._asdict())
+    # The effector keeps its rotation and would only dilute the mean.
+    angles = metrics.rotation_angles(motion.local_rotations[:, :-1])
     return Measured(
         {
-            "residual": residuals(problem.skeleton, motion.local_rotations, problem.curve),
+            "residual": residuals(skeleton, motion.local_rotations, problem.curve),
             "iterations": motion.iterations,
             "outcome": motion.outcome,
-            "largest_angle": turns.max(axis=-1),
-            "mean_angle": turns.mean(axis=-1),
+            "largest_angle": angles.max(axis=-1),
+            "mean_angle": angles.mean(axis=-1),
         }
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference import Skeleton, curves, resample, scenes
+from reference import Articulation, Skeleton, curves, resample, scenes
 from reference.arguments import FloatArray
 
 from ..chain.problem import TargetsForSkeleton, unit
@@ -20,31 +20,31 @@ _SEED = 1986
 
 
 @dataclass(frozen=True)
-class CurveForArm:
-    """A curve that the tip is to draw, frame by frame, from the rest pose.
+class FollowedCurve:
+    """A curve that an effector is to follow, frame by frame.
 
     Attributes:
         name: of the problem.
-        title: how the curve is written.
-        skeleton: the arm.
-        rest: local rotations of its rest pose, (joint, 4).
-        curve: where the tip is wanted in each frame [m], (frame, 3).
+        title: how it is written.
+        model: what follows.
+        start: its pose at the start: local rotations of a Skeleton, else coordinates.
+        curve: the target of the effector in each frame [m], (frame, 3).
     """
 
     name: str
     title: str
-    skeleton: Skeleton
-    rest: FloatArray
+    model: Skeleton | Articulation
+    start: FloatArray
     curve: FloatArray
 
 
-def arm_curves() -> list[CurveForArm]:
+def arm_curves() -> list[FollowedCurve]:
     """Return the arm with every named curve; the custom one evened out."""
     skeleton, rest = scenes.lab_arm()
     even = {name: curves[name](frames) for name, frames in FRAMES.items()}
     even[CUSTOM] = evened_custom_curve()
     return [
-        CurveForArm(f"arm/{name}", spaced(name), skeleton, rest, curve)
+        FollowedCurve(f"arm/{name}", spaced(name), skeleton, rest, curve)
         for name, curve in even.items()
     ]
 

@@ -1,67 +1,66 @@
 """How often, and how closely, every solver meets its target within reach."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, label, problems, settings, solvers
-from ...presentation.tables import INTERVAL, Cell, Column, Summary, Table, words
+from ...presentation.columns import LARGEST, MEDIAN, P95, SOLVER, share, spread, text, titled
+from ...presentation.layout import Layout
+from ...presentation.results import Results, by_problem, label, settings, solvers
+from ...presentation.tables import Summary, words
 from ..chain import BEYOND, CHAIN
+from ..chain import figures as chain
 from . import CURVE
 
+STARTS = {None: "random", False: "rest", True: "last solution"}
 
-def accuracy(results: Results) -> Table:
-    """Return success and residuals of every solver on every problem within reach."""
+
+def _within_reach(results: Results) -> list[Record]:
     records = results.all("arm", task=CURVE, warm=False)
     records += results.all("arm", task=CURVE, warm=True)
     records += [r for r in results.all("ik", task=CHAIN) if r.facts["stratum"] != BEYOND]
-    order = problems(records)
-    records.sort(key=lambda record: order.index(record.problem))
-    return Table(
-        "accuracy",
-        "Success and residuals within reach",
-        (
-            Column("problem", words=True),
-            Column("solver", words=True),
-            Column("start", words=True),
-            Column("within tolerance", note=INTERVAL),
-            Column("residual, median", "m"),
-            Column("residual, 95 %", "m"),
-            Column("residual, largest", "m"),
-            Column("iterations, median"),
-            Column("iterations, 95 %"),
-            Column("iterations, largest"),
-        ),
-        tuple(_accuracy_row(record) for record in records),
-        shows=f"A solve succeeds if the effector is within {settings(records, 'tolerance')} m of "
-        "its target. Residuals are not cut off at the tolerance. The interval is Wilson’s.",
-        measured="Residuals recomputed by forward kinematics of the rotations returned, whatever "
-        "the solver says. Starts: the arm’s rest pose, the last frame’s solution, or seeded random "
-        f"rotations. At most {settings(records, 'max_iterations')} iterations.",
-        summary=_accuracy_summary(records),
-    )
+    return [record for group in by_problem(records).values() for record in group]
 
 
-def _accuracy_row(record: Record) -> tuple[Cell, ...]:
-    starts = {None: "random", False: "rest", True: "last solution"}
-    return (
-        record.title,
-        label(record.solver),
-        starts[record.settings.get("warm")],
-        _success(record),
-        *metrics.spread(record.arrays["residual"]),
-        *metrics.whole(record.arrays["iterations"]),
-    )
+def _met(record: Record) -> Any:
+    return record.arrays["residual"] <= record.settings["tolerance"]
 
 
-def _success(record: Record) -> metrics.Share:
-    return metrics.share(record.arrays["residual"] <= record.settings["tolerance"])
-
-
-def _accuracy_summary(records: Sequence[Record]) -> Summary:
+def _summary(records: Sequence[Record]) -> Summary:
     points = []
     for solver in solvers(records):
-        shares = [_success(record) for record in records if record.solver == solver]
+        shares = [metrics.share(_met(record)) for record in records if record.solver == solver]
         hits, total = sum(share.hits for share in shares), sum(share.total for share in shares)
         points.append(f"{label(solver)}: {words(hits)} of {words(total)}")
     return Summary("Solved within tolerance, over all these problems:", tuple(points))
+
+
+accuracy = Layout(
+    "How often, and how closely, is the target met?",
+    "accuracy",
+    "Success and residuals within reach",
+    columns=(
+        titled("problem"),
+        SOLVER,
+        text("start", lambda record: STARTS[record.settings.get("warm")]),
+        share("within tolerance", _met),
+        *spread("residual", "residual", "m", (MEDIAN, P95, LARGEST)),
+        *spread("iterations", "iterations", of=(MEDIAN, P95, LARGEST)),
+    ),
+    subjects=_within_reach,
+    shows=lambda records: (
+        f"A solve succeeds if the effector is within {settings(records, 'tolerance')} m of "
+        "its target. Residuals are not cut off at the tolerance. The interval is Wilson’s."
+    ),
+    measured=lambda records: (
+        "Residuals recomputed by forward kinematics of the rotations returned, whatever "
+        "the solver says. Starts: the arm’s rest pose, the last frame’s solution, or seeded random "
+        f"rotations. At most {settings(records, 'max_iterations')} iterations."
+    ),
+    summary=_summary,
+    figures=(chain.ik_residuals,),
+)
+
+
+LAYOUTS = (accuracy,)

@@ -57,10 +57,8 @@ def solve_targets(
     problem: TargetsForSkeleton, solver: str, limits: Limits, record: bool = False
 ) -> Measured:
     """Solve all targets with a solver of ours; residuals are recomputed from the answers."""
-    solution = solve_ik(
-        problem.skeleton, problem.starts, problem.targets, solver,
-        **limits._asdict(), record=record,
-    )  # fmt: skip
+    asked = (problem.skeleton, problem.starts, problem.targets, solver)
+    solution = solve_ik(*asked, **limits._asdict(), record=record)
     arrays = _answers(problem, solution.local_rotations, solution.iterations)
     arrays["outcome"] = np.asarray(solution.outcome)
     if record:
@@ -83,8 +81,8 @@ def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) ->
 
 def residuals(skeleton: Skeleton, local_rotations: FloatArray, targets: FloatArray) -> FloatArray:
     """Return the effector's distances from the targets by forward kinematics [m], (target,)."""
-    tips = forward_kinematics(skeleton, local_rotations).positions[..., -1, :]
-    return np.linalg.norm(tips - targets, axis=-1)
+    effectors = forward_kinematics(skeleton, local_rotations).positions[..., -1, :]
+    return np.linalg.norm(effectors - targets, axis=-1)
 
 
 def _answers(

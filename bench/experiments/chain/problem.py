@@ -12,12 +12,7 @@ from . import BEYOND
 BALLS = 10
 
 # How far targets lie from the root, as shares of the reach; uniform within the shell.
-STRATA = {
-    "near": (0.05, 0.4),
-    "far": (0.6, 0.95),
-    "edge": (0.99, 0.9999),
-    BEYOND: (1.01, 2.0),
-}
+STRATA = {"near": (0.05, 0.4), "far": (0.6, 0.95), "edge": (0.99, 0.9999), BEYOND: (1.01, 2.0)}
 _SEED = 1986
 
 

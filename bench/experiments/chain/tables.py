@@ -1,4 +1,4 @@
-"""The lab's three questions about inverse kinematics, and accuracy."""
+"""The lab's first two questions about inverse kinematics."""
 
 from collections.abc import Sequence
 
@@ -6,141 +6,141 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...presentation.columns import (
+    LARGEST,
+    MEDIAN,
+    P95,
+    SOLVER,
+    largest,
+    places,
+    spread,
+    spread_of,
+    text,
+    titled,
+    words_in,
+)
+from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem, counted, label, settings, solvers
-from ...presentation.tables import Cell, Column, Summary, Table, words
+from ...presentation.tables import Column, Summary, words
 from .. import arm
-from . import BEYOND, CHAIN
+from . import BEYOND, CHAIN, figures
 
 # A chain counts as straight if no joint is off the line by more than this share of the reach.
 STRAIGHT = 0.01
 RIVALS = ("ccd", "fabrik")
 
-
-def beyond_reach(results: Results) -> Table:
-    """Return Q1: what becomes of a target that is too far away."""
-    records = results.all("arm", task=arm.BEYOND)
-    records += results.all("ik", task=CHAIN, stratum=BEYOND)
-    return Table(
-        "q1_beyond_reach",
-        "Targets beyond reach",
-        (
-            Column("problem", words=True),
-            Column("solver", words=True),
-            Column("targets"),
-            Column("off the line, median", "m"),
-            Column("off the line, largest", "m"),
-            Column("residual above distance − reach, median", "m"),
-            Column("residual above distance − reach, largest", "m"),
-            Column("iterations, median"),
-            Column("iterations, largest"),
-        ),
-        tuple(_beyond_row(record) for record in records),
-        shows="The best answer is the straight line from root to target, which leaves exactly "
-        "distance − reach. “Off the line” is the joint farthest from that line.",
-        measured=f"Seeded targets in all directions, {_distances(records)} times the reach away. "
-        f"Solvers stop at a residual of {settings(records, 'tolerance')} m, ours also as close as "
-        f"that to the best one, or after {settings(records, 'max_iterations')} iterations.",
-        summary=_beyond_summary(records),
-    )
+# The records of both rivals on one problem.
+Pair = tuple[Record, Record]
 
 
-def _beyond_row(record: Record) -> tuple[Cell, ...]:
-    bend, excess = (metrics.spread(record.arrays[name]) for name in ("bend", "excess"))
-    median, _, largest = metrics.whole(record.arrays["iterations"])
-    return (
-        record.title, label(record.solver), int(record.size), bend.median, bend.largest,
-        excess.median, excess.largest, median, largest,
-    )  # fmt: skip
+def _over_reach(records: Sequence[Record], name: str) -> metrics.Floats:
+    return np.concatenate([record.arrays[name] / record.arrays["reach"] for record in records])
 
 
 def _distances(records: Sequence[Record]) -> str:
-    shares = [record.arrays["distance"] / record.arrays["reach"] for record in records]
-    if not shares:
+    if not records:
         return "–"
-    low, high = metrics.extent(np.concatenate(shares))
-    return f"{words(low)} to {words(high)}"
+    return " to ".join(words(x) for x in metrics.extent(_over_reach(records, "distance")))
 
 
 def _beyond_summary(records: Sequence[Record]) -> Summary:
-    points = []
-    for solver in solvers(records):
-        mine = [record for record in records if record.solver == solver]
-        bends = np.concatenate([r.arrays["bend"] / r.arrays["reach"] for r in mine])
-        straight = metrics.share(bends <= STRAIGHT)
-        excess = max(metrics.spread(r.arrays["excess"]).largest for r in mine)
-        most = max(metrics.whole(r.arrays["iterations"])[2] for r in mine)
-        points.append(
-            f"{label(solver)}: {words(straight.hits)} of {words(straight.total)}; at worst "
-            f"{words(metrics.percent(metrics.spread(bends).largest, 1.0))} % of the reach off the "
-            f"line, {words(excess)} m above distance − reach, {counted(int(most), 'iteration')}"
-        )
     return Summary(
         "The best answer is the straight line from root to target. Answers within "
-        f"{words(metrics.percent(STRAIGHT, 1.0))} % of the reach of that line:",
-        tuple(points),
-    )
-
-
-def iterations(results: Results) -> Table:
-    """Return Q2: the iterations of CCD against FABRIK."""
-    records = [
-        record
-        for record in results.all("arm", task=arm.CURVE, warm=True)
-        + results.all("arm", task=arm.BEYOND)
-        + results.all("ik", task=CHAIN)
-        if record.solver in RIVALS
-    ]
-    pairs = []
-    for both in by_problem(records).values():
-        pair = [next((r for r in both if r.solver == rival), None) for rival in RIVALS]
-        if pair[0] is not None and pair[1] is not None:
-            pairs.append((pair[0], pair[1]))
-    return Table(
-        "q2_iterations",
-        "Iterations of CCD and of FABRIK",
-        (
-            Column("problem", words=True),
-            Column("solves"),
-            *(
-                Column(f"{label(rival)}, {what}")
-                for rival in RIVALS
-                for what in ("median", "95 %", "largest")
-            ),
-            Column("CCD / FABRIK, means"),
+        f"{words_in(STRAIGHT, '%')} of the reach of that line:",
+        tuple(
+            f"{label(solver)}: {_straightness([r for r in records if r.solver == solver])}"
+            for solver in solvers(records)
         ),
-        tuple(_rival_row(*pair) for pair in pairs),
-        shows="One iteration rotates every joint once (CCD) or runs along the chain once in each "
-        "direction (FABRIK). Solves that fail count with all the iterations they made.",
-        measured="The arm starts each frame from its last solution, or from rest towards targets "
-        "beyond its reach; the chain starts from random poses. At most "
-        f"{settings(records, 'max_iterations')} iterations.",
-        summary=_rival_summary(pairs),
     )
 
 
-def _rival_row(ccd: Record, fabrik: Record) -> tuple[Cell, ...]:
-    spreads = [metrics.whole(record.arrays["iterations"]) for record in (ccd, fabrik)]
+def _straightness(records: Sequence[Record]) -> str:
+    bends = _over_reach(records, "bend")
+    straight = metrics.share(bends <= STRAIGHT)
+    most = max(spread_of(record, "iterations")[2] for record in records)
     return (
-        ccd.title,
-        int(ccd.arrays["iterations"].size),
-        *(value for spread in spreads for value in spread),
-        _fewer(ccd, fabrik),
+        f"{words(straight.hits)} of {words(straight.total)}; at worst "
+        f"{words_in(metrics.spread(bends).largest, '%')} of the reach off the line, "
+        f"{words(largest(records, 'excess'))} m above distance − reach, "
+        f"{counted(int(most), 'iteration')}"
     )
 
 
-def _fewer(ccd: Record, fabrik: Record) -> float:
-    return metrics.ratio(
-        metrics.mean(ccd.arrays["iterations"]), metrics.mean(fabrik.arrays["iterations"])
+beyond_reach = Layout(
+    "Q1. If the target is too far away, what does inverse kinematics give?",
+    "q1_beyond_reach",
+    "Targets beyond reach",
+    columns=(
+        titled("problem"),
+        SOLVER,
+        Column("targets", read=lambda record: int(record.size)),
+        *spread("off the line", "bend", "m"),
+        *spread("residual above distance − reach", "excess", "m"),
+        *spread("iterations", "iterations"),
+    ),
+    subjects=lambda results: (
+        results.all("arm", task=arm.BEYOND) + results.all("ik", task=CHAIN, stratum=BEYOND)
+    ),
+    shows="The best answer is the straight line from root to target, which leaves exactly "
+    "distance − reach. “Off the line” is the joint farthest from that line.",
+    measured=lambda records: (
+        f"Seeded targets in all directions, {_distances(records)} times the reach away. "
+        f"Solvers stop at a residual of {settings(records, 'tolerance')} m, ours also as close as "
+        f"that to the best one, or after {settings(records, 'max_iterations')} iterations."
+    ),
+    summary=_beyond_summary,
+)
+
+
+def _pairs(results: Results) -> list[Pair]:
+    records = results.all("arm", task=arm.CURVE, warm=True)
+    records += results.all("arm", task=arm.BEYOND) + results.all("ik", task=CHAIN)
+    groups = [{r.solver: r for r in group} for group in by_problem(records).values()]
+    return [(both["ccd"], both["fabrik"]) for both in groups if both.keys() >= set(RIVALS)]
+
+
+def _counts(i: int) -> list[Column]:
+    return places(
+        label(RIVALS[i]), "", (MEDIAN, P95, LARGEST), lambda pair: spread_of(pair[i], "iterations")
     )
 
 
-def _rival_summary(pairs: Sequence[tuple[Record, Record]]) -> Summary:
-    if not pairs:
-        return Summary()
-    factors = [_fewer(ccd, fabrik) for ccd, fabrik in pairs]
+def _fewer(pair: Pair) -> float:
+    ccd, fabrik = (metrics.mean(record.arrays["iterations"]) for record in pair)
+    return metrics.ratio(ccd, fabrik)
+
+
+def _rival_summary(pairs: Sequence[Pair]) -> Summary:
+    factors = [_fewer(pair) for pair in pairs]
     wins = sum(factor > 1 for factor in factors)
     return Summary(
         f"FABRIK needs fewer iterations than CCD on {wins} of {len(pairs)} problems; CCD makes "
         f"{words(min(factors))} to {words(max(factors))} times as many on average "
         f"(median of the problems {words(metrics.spread(np.array(factors)).median)})."
     )
+
+
+iterations = Layout(
+    "Q2. How many iterations do CCD and FABRIK need?",
+    "q2_iterations",
+    "Iterations of CCD and of FABRIK",
+    columns=(
+        text("problem", lambda pair: pair[0].title),
+        Column("solves", read=lambda pair: pair[0].arrays["iterations"].size),
+        *(column for i in range(len(RIVALS)) for column in _counts(i)),
+        Column("CCD / FABRIK, means", read=_fewer),
+    ),
+    subjects=_pairs,
+    shows="One iteration rotates every joint once (CCD) or runs along the chain once in each "
+    "direction (FABRIK). Solves that fail count with all the iterations they made.",
+    measured=lambda pairs: (
+        "The arm starts each frame from its last solution, or from rest towards targets "
+        "beyond its reach; the chain starts from random poses. At most "
+        f"{settings((record for pair in pairs for record in pair), 'max_iterations')} iterations."
+    ),
+    summary=_rival_summary,
+    figures=(figures.iterations,),
+)
+
+
+LAYOUTS = (beyond_reach, iterations)

@@ -41,30 +41,35 @@ def report(found: Found, checked: Sequence[Checked]) -> Report:
     """Return the tables of files that were checked."""
     rows = [_row(one) for one in checked if one.file.kind != FRAGMENT]
     files = Table(
-        "files", "Files", (Column("file", words=True), Column("format", words=True),
-        *(Column(name, words=True) for name in NAMES)), tuple(rows), shows=SHOWS,
+        "files",
+        "Files",
+        tuple(Column(name, words=True) for name in ("file", "format", *NAMES)),
+        tuple(rows),
+        shows=SHOWS,
         summary=Summary("", tuple(point for one in checked for point in _points(one))),
-    )  # fmt: skip
+    )
     return Report(files, *_summary(found, checked))
 
 
 def _summary(found: Found, checked: Sequence[Checked]) -> tuple[Table, int]:
     """Return a row for each kind and engine, of the outcomes that there are, and disagreements."""
-    readings = {
-        (kind, engine): [r for one in checked if one.file.kind == kind
-                         for r in one.readings if r.engine == engine]
-        for kind, engines in ENGINES.items() for engine in engines
-    }  # fmt: skip
+    readings: dict[tuple[str, str], list[Reading]] = {
+        (kind, engine): [] for kind, engines in ENGINES.items() for engine in engines
+    }
+    for one in checked:
+        for reading in one.readings:
+            readings[one.file.kind, reading.engine].append(reading)
     found_outcomes = {r.outcome for of in readings.values() for r in of}
     outcomes = [name for name in OUTCOMES if name in (AGREES, DIFFERS, *found_outcomes)]
     disagreements = sum(r.outcome == DIFFERS for of in readings.values() for r in of)
+    names = [Column(name, words=True) for name in ("format", "beside")]
     summary = Table(
-        "summary", "Who reads and who agrees",
-        (Column("format", words=True), Column("beside", words=True), Column("files"),
-         *map(Column, outcomes), Column("agrees within")),
+        "summary",
+        "Who reads and who agrees",
+        (*names, *map(Column, ("files", *outcomes, "agrees within"))),
         tuple((*of, *_count(these, outcomes)) for of, these in readings.items() if these),
         summary=Summary(_sentence(found, checked, disagreements)),
-    )  # fmt: skip
+    )
     return summary, disagreements
 
 

@@ -26,5 +26,5 @@ def verdict(name: str) -> Measured:
             "moved": verdict.displacement,
             "held": verdict.holds,
         },
-        {"ours": claim.ours, "reason": claim.tolerance.reason, "missed": verdict.missed},
+        {"ours": claim.ours, "reason": claim.tolerance.reason, "missed": verdict.failure},
     )

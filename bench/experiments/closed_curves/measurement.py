@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -10,10 +11,10 @@ from reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rota
 from reference.arguments import FloatArray
 
 from ...harness.block import SCALES, Block, Measured, Scale
+from ..arm.problem import FollowedCurve
 from . import COHERENT, COLD, CURVE, DRIFT, WARM
 from .problem import (
     DRIFT_FRAMES,
-    ClosedCurve,
     arm_closed_curves,
     heart_three_times,
     robot_closed_curves,
@@ -21,11 +22,8 @@ from .problem import (
 
 SUITE = "tracking"
 TOLERANCE, ITERATIONS = 1e-4, 100
-OPTIONS = {
-    COLD: {"warm": False},
-    WARM: {},
-    COHERENT: {"coherent": True, "closed": True},
-}
+LIMITS: dict[str, Any] = {"tolerance": TOLERANCE, "max_iterations": ITERATIONS}
+OPTIONS = {COLD: {"warm": False}, WARM: {}, COHERENT: {"coherent": True, "closed": True}}
 # On a robot the other solvers take long to compile: a quick run leaves them out.
 ROBOT_SOLVER = "levenberg_marquardt"
 
@@ -46,7 +44,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
             )
 
 
-def _modes(problem: ClosedCurve, solvers: list[str]) -> Iterator[Block]:
+def _modes(problem: FollowedCurve, solvers: list[str]) -> Iterator[Block]:
     for solver in solvers:
         for mode in OPTIONS:
             measure = partial(follow, problem, solver, mode)
@@ -54,30 +52,30 @@ def _modes(problem: ClosedCurve, solvers: list[str]) -> Iterator[Block]:
             yield Block(SUITE, problem.name, solver, measure, _settings(mode), facts=facts)
 
 
-def _settings(mode: str) -> dict[str, str | float]:
-    return {"mode": mode, "tolerance": TOLERANCE, "max_iterations": ITERATIONS}
+def _settings(mode: str) -> dict[str, Any]:
+    return {"mode": mode, **LIMITS}
 
 
-def follow(problem: ClosedCurve, solver: str, mode: str) -> Measured:
+def follow(problem: FollowedCurve, solver: str, mode: str) -> Measured:
     """Follow the curve once; residuals are recomputed by forward kinematics of the answers.
 
     The last angle is that from the last frame back to the first.
     """
     motion = _tracked(problem, solver, mode)
     pose = forward_kinematics(problem.model, motion.coordinates)
-    turned = _joint_angles(problem, motion, np.arange(len(problem.curve)) - len(problem.curve) + 1)
+    angles = _joint_angles(problem, motion, np.arange(len(problem.curve)) - len(problem.curve) + 1)
     return Measured(
         {
             "residual": np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
             "iterations": motion.iterations,
             "outcome": motion.outcome,
-            "largest_angle": turned.max(axis=-1),
-            "mean_angle": turned.mean(axis=-1),
+            "largest_angle": angles.max(axis=-1),
+            "mean_angle": angles.mean(axis=-1),
         }
     )
 
 
-def drift(problem: ClosedCurve, solver: str, mode: str) -> Measured:
+def drift(problem: FollowedCurve, solver: str, mode: str) -> Measured:
     """Follow the curve three times over; return how far the first pose is left behind after each.
 
     A coherent motion is closed: after its last frame comes its first.
@@ -87,24 +85,26 @@ def drift(problem: ClosedCurve, solver: str, mode: str) -> Measured:
     )
     motion = _tracked(replace(problem, curve=again), solver, mode)
     later = (DRIFT_FRAMES * np.arange(1, 4)) % len(again)
-    turned = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[later])
-    return Measured({"drift": turned.max(axis=-1), "residual": motion.residual})
+    angles = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[later])
+    return Measured({"drift": angles.max(axis=-1), "residual": motion.residual})
 
 
-def _tracked(problem: ClosedCurve, solver: str, mode: str) -> IKSolution:
-    return track(
-        problem.model, problem.curve, solver, problem.start,
-        tolerance=TOLERANCE, max_iterations=ITERATIONS, **OPTIONS[mode],
-    )  # fmt: skip
+def _tracked(problem: FollowedCurve, solver: str, mode: str) -> IKSolution:
+    options: dict[str, Any] = {
+        "tolerance": TOLERANCE,
+        "max_iterations": ITERATIONS,
+        **OPTIONS[mode],
+    }
+    return track(problem.model, problem.curve, solver, problem.start, **options)
 
 
-def _joint_angles(problem: ClosedCurve, motion: IKSolution, following: np.ndarray) -> FloatArray:
+def _joint_angles(problem: FollowedCurve, motion: IKSolution, following: np.ndarray) -> FloatArray:
     """Return the angle by which each joint rotates to the following frame [rad], (frame, joint).
 
     A hinge's angle is not reduced to half a revolution, though its link looks the same.
     """
     if isinstance(problem.model, Skeleton):
-        # The tip keeps its rotation and would only dilute the mean.
+        # The effector keeps its rotation and would only dilute the mean.
         R = motion.local_rotations[:, :-1]
         return rotation.angle(R, R[following])
     return np.abs(motion.coordinates[following] - motion.coordinates)

@@ -2,16 +2,8 @@
 
 import numpy as np
 
-from ...peers import registry
-from ...presentation.figures import (
-    COLOURS,
-    Drawing,
-    canvas,
-    finished,
-    plain_powers,
-    written,
-)
-from ...presentation.results import Results, by_problem, label
+from ...presentation.figures import Drawing, canvas, drawn_as, finished, plain_powers, written
+from ...presentation.results import Results, by_problem
 from . import ONE_STEP
 
 
@@ -26,11 +18,8 @@ def cloth_convergence(results: Results) -> Drawing | None:
             for j, records in enumerate(cloths):
                 ax = axes[i * len(cloths) + j]
                 for record in records:
-                    colour, line, _ = registry.find(record.solver).style
-                    values = record.arrays[quantity]
-                    shown = {"linestyle": line, "color": COLOURS[colour]}
-                    k = np.arange(1, len(values))
-                    ax.plot(k, values[1:], **shown, label=written(label(record.solver)))
+                    values = record.arrays[quantity][1:]
+                    ax.plot(np.arange(1, 1 + len(values)), values, **drawn_as(record.solver))
                 ax.set(xscale="log", yscale="log", ylim=(1e-14, 2))
                 plain_powers(ax)
             axes[i * len(cloths)].set_ylabel(ylabel)
@@ -40,7 +29,9 @@ def cloth_convergence(results: Results) -> Drawing | None:
             ax.set_xlabel("iteration, log scale")
         axes[0].legend(loc="upper right")
         return finished(
-            figure, "cloth_convergence", "Convergence of one implicit Euler step",
+            figure,
+            "cloth_convergence",
+            "Convergence of one implicit Euler step",
             "Above the residual, below the error to the converged step; both are 1 at the start. "
             "Lines end in rounding.",
-        )  # fmt: skip
+        )

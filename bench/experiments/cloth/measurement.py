@@ -1,8 +1,9 @@
 """The lab's cloth: how implicit Euler's solvers converge, and what one iteration leaves behind."""
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,31 +35,38 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """
     for factor in FACTORS:
         problem = cloth_swing(factor)
-        facts = {"title": f"stiffness × {factor:g}"}
-        swinging = {"h": H, "first": FALLING, "steps": STEPS}
-        yield Block(
-            "cloth", problem.name, "newton", partial(newton_steps, problem),
-            {**swinging, "tolerance": TOLERANCE}, facts={**facts, "task": SWING},
-        )  # fmt: skip
-        for solver in registry.followed_step_solvers():
-            yield Block(
-                "cloth", f"{problem.name}/one step", solver.name,
-                partial(one_step, problem, solver.name, solver.followed),
-                {"h": H, "step": MIDDLE, "iterations": solver.followed},
-                facts={**facts, "task": ONE_STEP},
-            )  # fmt: skip
-        for iterations in FEW_ITERATIONS:
-            yield Block(
-                "cloth", f"{problem.name}/few iterations", "local_global",
-                partial(few_iterations, problem, iterations),
-                {**swinging, "iterations": iterations}, facts={**facts, "task": FEW},
-            )  # fmt: skip
-        damped = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
-        halved = {"longest": HALVED[0], "halvings": len(HALVED) - 1}
-        yield Block(
-            "cloth", f"{problem.name}/dampers", "newton", damped,
-            {"first": MIDDLE, "damping": DAMPING, **halved}, facts={**facts, "task": DAMPERS},
-        )  # fmt: skip
+        title = {"title": f"stiffness × {factor:g}"}
+        for task, name, solver, measure, settings in _measurements(problem, factor):
+            facts = {**title, "task": task}
+            yield Block("cloth", f"{problem.name}{name}", solver, measure, settings, facts=facts)
+
+
+class _Measurement(NamedTuple):
+    """What is measured of a cloth: its task, name, solver, how, and with which settings."""
+
+    task: str
+    name: str
+    solver: str
+    measure: Callable[[], Measured]
+    settings: dict[str, Any]
+
+
+def _measurements(problem: ClothSwing, factor: float) -> Iterator[_Measurement]:
+    swinging = {"h": H, "first": FALLING, "steps": STEPS}
+    settings = {**swinging, "tolerance": TOLERANCE}
+    yield _Measurement(SWING, "", "newton", partial(newton_steps, problem), settings)
+    for solver in registry.followed_step_solvers():
+        measure = partial(one_step, problem, solver.name, solver.followed)
+        settings = {"h": H, "step": MIDDLE, "iterations": solver.followed}
+        yield _Measurement(ONE_STEP, "/one step", solver.name, measure, settings)
+    for count in FEW_ITERATIONS:
+        measure = partial(few_iterations, problem, count)
+        settings = {**swinging, "iterations": count}
+        yield _Measurement(FEW, "/few iterations", "local_global", measure, settings)
+    measure = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
+    settings = {"first": MIDDLE, "damping": DAMPING}
+    settings |= {"longest": HALVED[0], "halvings": len(HALVED) - 1}
+    yield _Measurement(DAMPERS, "/dampers", "newton", measure, settings)
 
 
 def newton_steps(problem: ClothSwing) -> Measured:
@@ -98,10 +106,7 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
     of the converged motion from where both began.
     """
     converged = converging(problem)
-    few = ImplicitEuler(
-        problem.system, h=problem.h, solver="local_global", tolerance=0.0,
-        max_iterations=iterations,
-    )  # fmt: skip
+    few = _integrator(problem, "local_global", 0.0, iterations)
     true = converged_motion(problem)[FALLING:]
     own = motion(true[0], STEPS, few)
     after = [few.step(state).state for state in true[:-1]]
@@ -149,10 +154,14 @@ def converging(
     problem: ClothSwing, tolerance: float = TOLERANCE, max_iterations: int = 100
 ) -> ImplicitEuler:
     """Return the integrator that solves every step to the end."""
-    return ImplicitEuler(
-        problem.system, h=problem.h, solver="newton", tolerance=tolerance,
-        max_iterations=max_iterations,
-    )  # fmt: skip
+    return _integrator(problem, "newton", tolerance, max_iterations)
+
+
+def _integrator(
+    problem: ClothSwing, solver: str, tolerance: float, max_iterations: int
+) -> ImplicitEuler:
+    limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations}
+    return ImplicitEuler(problem.system, h=problem.h, solver=solver, **limits)
 
 
 @functools.cache

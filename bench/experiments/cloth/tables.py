@@ -1,6 +1,7 @@
 """How the solvers of an implicit Euler step converge, and what a few iterations leave behind."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,68 +10,39 @@ from reference import Outcome
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
+from ...presentation.columns import (
+    LARGEST,
+    MEDIAN,
+    largest,
+    lengths_of_steps,
+    setting,
+    share,
+    spread,
+    spread_of,
+    text,
+    titled,
+    words_in,
+)
+from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem, counted, label, settings
-from ...presentation.tables import INTERVAL, Cell, Column, Summary, Table, words
-from . import DAMPERS, FEW, ONE_STEP, SWING
+from ...presentation.tables import Column, Summary, words
+from ..pictures import figures as pictures
+from . import DAMPERS, FEW, ONE_STEP, SWING, figures
 
 LISTED = (1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000)
 # Those whose residual is listed beside the error.
 CHECKED = ("local_global", "newton")
-# The answer in a sentence counts the iterations to this error.
+# The summary counts the iterations to this error.
 TARGET_ERROR = 1e-6
 
 
-def newton_steps(results: Results) -> Table:
-    """Return how Newton does over consecutive steps."""
-    records = results.all("cloth", task=SWING)
-    return Table(
-        "cloth_newton",
-        "Newton over consecutive steps of the swinging cloth",
-        (
-            Column("cloth", words=True),
-            Column("steps"),
-            Column("converged", note=INTERVAL),
-            Column("iterations, median"),
-            Column("iterations, largest"),
-            Column("residual, median"),
-            Column("residual, largest"),
-            Column("steps at the rounding floor"),
-        ),
-        tuple(_newton_row(record) for record in records),
-        shows="The residual is |grad g(x)| over its value at the inertial start y, or over what "
-        "rounding alone leaves where that is more.",
-        measured=f"The lab’s cloth let go from rest; steps of {_milliseconds(records)} ms after "
-        f"the first {settings(records, 'first')}, to a residual of "
-        f"{settings(records, 'tolerance')} or the rounding floor.",
-        summary=_newton_summary(records),
-    )
-
-
-def _newton_row(record: Record) -> tuple[Cell, ...]:
-    residual = metrics.spread(record.arrays["residual"])
-    median, _, largest = metrics.whole(record.arrays["iterations"])
-    return (
-        record.title,
-        int(record.arrays["iterations"].size),
-        metrics.share(_solved(record)),
-        median,
-        largest,
-        residual.median,
-        residual.largest,
-        metrics.share(record.arrays["at_floor"]).hits,
-    )
-
-
 def _newton_summary(records: Sequence[Record]) -> Summary:
-    if not records:
-        return Summary()
     steps = sum(record.arrays["iterations"].size for record in records)
     done = sum(metrics.share(_solved(record)).hits for record in records)
-    iterations = max(metrics.whole(record.arrays["iterations"])[2] for record in records)
-    residual = max(metrics.spread(record.arrays["residual"]).largest for record in records)
     return Summary(
         f"Newton converged in {words(done)} of {words(steps)} steps, with at most "
-        f"{counted(int(iterations), 'iteration')} and a residual of at most {words(residual)}."
+        f"{counted(int(largest(records, 'iterations')), 'iteration')} and a residual of at most "
+        f"{words(largest(records, 'residual'))}."
     )
 
 
@@ -78,56 +50,81 @@ def _solved(record: Record) -> np.ndarray:
     return np.isin(record.arrays["outcome"], [outcome for outcome in Outcome if outcome.solved])
 
 
-def convergence(results: Results) -> Table:
-    """Return residual and error after each of some iterations of one step."""
-    rivals = [solver.name for solver in registry.followed_step_solvers()]
-    cloths = by_problem(results.all("cloth", task=ONE_STEP)).values()
-    solved = [
-        (cloth[0].title, {r: next((s for s in cloth if s.solver == r), None) for r in rivals})
-        for cloth in cloths
-    ]
-    rows = [
-        (
-            title,
-            k,
-            *(_after(by[rival], "error", k) for rival in rivals),
-            *(_after(by[rival], "residual", k) for rival in CHECKED),
-        )
-        for title, by in solved
-        for k in LISTED
-        if any(_after(record, "error", k) is not None for record in by.values())
-    ]
-    records = [record for _, by in solved for record in by.values() if record is not None]
-    return Table(
-        "cloth_convergence",
-        "Convergence of one implicit Euler step",
-        (
-            Column("cloth", words=True),
-            Column("iterations"),
-            *(Column(f"{label(rival)}: error") for rival in rivals),
-            *(Column(f"{label(rival)}: residual") for rival in CHECKED),
+class _Iteration(NamedTuple):
+    """The records of a cloth, by solver, after so many iterations."""
+
+    by: dict[str, Record]
+    k: int
+
+    @property
+    def title(self) -> str:
+        """How the cloth is written."""
+        return next(iter(self.by.values())).title
+
+    def reached(self, solver: str, what: str) -> float | None:
+        """Return the residual or error that a solver has reached, None if it stopped before."""
+        values = self.by[solver].arrays[what] if solver in self.by else np.array([])
+        return float(values[self.k]) if self.k < values.size else None
+
+
+newton_steps = Layout(
+    "Does Newton always get there?",
+    "cloth_newton",
+    "Newton over consecutive steps of the swinging cloth",
+    subjects=lambda results: results.all("cloth", task=SWING),
+    columns=(
+        titled("cloth"),
+        Column("steps", read=lambda record: record.arrays["iterations"].size),
+        share("converged", _solved),
+        *spread("iterations", "iterations"),
+        *spread("residual", "residual"),
+        Column(
+            "steps at the rounding floor",
+            read=lambda record: np.count_nonzero(record.arrays["at_floor"]),
         ),
-        tuple(rows),
-        shows="The error is |x − x*| / |y − x*|: what is left of the distance between the "
-        "inertial start y and the converged step x*. Where it stands still, rounding is reached.",
-        measured=f"Step {settings(records, 'step')} of the motion, {_milliseconds(records)} ms; "
-        "x* by Newton, iterated far beyond the rounding floor.",
-        summary=_convergence_summary(solved),
+    ),
+    shows="The residual is |grad g(x)| over its value at the inertial start y, or over what "
+    "only rounding leaves where that is more.",
+    measured=lambda records: (
+        f"The lab’s cloth let go from rest; steps of {lengths_of_steps(records)} ms after "
+        f"the first {settings(records, 'first')}, to a residual of "
+        f"{settings(records, 'tolerance')} or the rounding floor."
+    ),
+    summary=_newton_summary,
+)
+
+
+def _rivals() -> list[str]:
+    return [solver.name for solver in registry.followed_step_solvers()]
+
+
+def _iterations(results: Results) -> list[_Iteration]:
+    records = [r for r in results.all("cloth", task=ONE_STEP) if r.solver in _rivals()]
+    return [
+        row
+        for cloth in by_problem(records).values()
+        for row in (_Iteration({record.solver: record for record in cloth}, k) for k in LISTED)
+        if any(row.reached(solver, "error") is not None for solver in row.by)
+    ]
+
+
+def _records(rows: Sequence[_Iteration]) -> list[Record]:
+    return [record for row in rows for record in row.by.values()]
+
+
+def _reached(solver: str, what: str) -> Column:
+    return Column(f"{label(solver)}: {what}", read=lambda row: row.reached(solver, what))
+
+
+def _convergence_summary(rows: Sequence[_Iteration]) -> Summary:
+    cloths = {row.title: row.by for row in rows}
+    return Summary(
+        f"Iterations until the error is {words(TARGET_ERROR)}:",
+        tuple(
+            f"{title}: {', '.join(f'{label(r)} {_needed(by[r])}' for r in _rivals() if r in by)}"
+            for title, by in cloths.items()
+        ),
     )
-
-
-def _after(record: Record | None, what: str, k: int) -> float | None:
-    if record is None or k >= record.arrays[what].size:
-        return None
-    return float(record.arrays[what][k])
-
-
-def _convergence_summary(solved: Sequence[tuple[str, dict[str, Record | None]]]) -> Summary:
-    points = []
-    for title, by in solved:
-        needed = [f"{label(r.solver)} {_needed(r)}" for r in by.values() if r is not None]
-        points.append(f"{title}: {', '.join(needed)}")
-    return Summary(f"Iterations until the error is {words(TARGET_ERROR)}:", tuple(points))
 
 
 def _needed(record: Record) -> str:
@@ -136,111 +133,119 @@ def _needed(record: Record) -> str:
     return words(needed) if needed is not None else f"more than {words(done)}"
 
 
-def few_iterations(results: Results) -> Table:
-    """Return the error of the lab's Q x = b, one local/global iteration, and of a few more."""
-    records = results.all("cloth", task=FEW)
-    return Table(
-        "cloth_few_iterations",
-        "The lab’s Q x = b: a fixed number of local/global iterations",
-        (
-            Column("cloth", words=True),
-            Column("iterations a step"),
-            Column("error of a step, median"),
-            Column("error of a step, largest"),
-            Column("distance of a step, median", "m"),
-            Column("distance of a step, largest", "m"),
-            Column("drift in the end", "m"),
-            Column("drift, share of the path", "%"),
-        ),
-        tuple(_few_row(record) for record in records),
-        shows="Error and distance are those of one such step begun at each state of the converged "
-        "motion: relative as above, and as root mean square over the particles. Drift is how far "
-        "the cloth is from the converged one when all steps are taken so; the path is how far the "
-        "converged one has moved.",
-        measured=f"{settings(records, 'steps')} steps of {_milliseconds(records)} ms of the "
-        f"swinging cloth after the first {settings(records, 'first')}; one iteration is the lab’s "
-        "version.",
-        summary=_few_summary(records),
-    )
-
-
-def _few_row(record: Record) -> tuple[Cell, ...]:
-    error, distance = (metrics.spread(record.arrays[name]) for name in ("error", "distance"))
-    drift, path = _drift(record)
-    return (
-        record.title, record.settings["iterations"], error.median,
-        error.largest, distance.median, distance.largest, drift, metrics.percent(drift, path),
-    )  # fmt: skip
+def _share_of_path(record: Record) -> float:
+    return metrics.ratio(float(record.arrays["drift"][-1]), float(record.arrays["path"][-1]))
 
 
 def _few_summary(records: Sequence[Record]) -> Summary:
-    points = []
-    for record in records:
-        if record.settings["iterations"] == 1:
-            error = metrics.percent(metrics.spread(record.arrays["error"]).median, 1.0)
-            drift, path = _drift(record)
-            points.append(
-                f"{record.title}: {words(error)} %; the cloth drifts by {words(drift)} m,"
-                f" {words(metrics.percent(drift, path))} % of its path, in "
-                f"{record.settings['steps']} steps"
-            )
     return Summary(
         "What one iteration leaves of the distance to the converged step, in the median:",
-        tuple(points),
-    )
-
-
-def dampers(results: Results) -> Table:
-    """Return how far the two laws of dampers are apart at the end of one step."""
-    records = results.all("cloth", task=DAMPERS)
-    return Table(
-        "cloth_dampers",
-        "Two laws of dampers at the end of one step",
-        (
-            Column("cloth", words=True),
-            Column("h", "ms"),
-            Column("difference"),
-            Column("observed order"),
-        ),
-        tuple(row for record in records for row in _damper_rows(record)),
-        shows="A step’s damper has an energy and pulls with −(c/h)(l − l_n) u; an explicit "
-        "integrator’s pulls with −c ((v_i − v_j)·u) u. The difference of all forces over those of "
-        "the second law, where both are at home: at the end of the step, with its velocities. It "
-        "comes from the springs’ rotation within the step and shrinks with h, to first order.",
-        measured=f"The lab’s cloth with a damping of {settings(records, 'damping')} N s/m after "
-        f"{settings(records, 'first')} steps of its swing; one converged step of each length from "
-        "there.",
-        summary=_damper_summary(records),
-    )
-
-
-def _damper_rows(record: Record) -> list[tuple[Cell, ...]]:
-    apart = record.arrays["apart"]
-    orders = [None, *np.log2(apart[:-1] / apart[1:])]
-    return [
-        (record.title, metrics.milliseconds(float(h)), float(difference), order)
-        for h, difference, order in zip(record.arrays["h"], apart, orders, strict=True)
-    ]
-
-
-def _damper_summary(records: Sequence[Record]) -> Summary:
-    return Summary(
-        "The forces of the two laws differ, relatively, by:" if records else "",
         tuple(
-            f"{record.title}: {words(float(record.arrays['apart'][0]))} at "
-            f"{words(metrics.milliseconds(float(record.arrays['h'][0])))} ms, "
-            f"{words(float(record.arrays['apart'][-1]))} at "
-            f"{words(metrics.milliseconds(float(record.arrays['h'][-1])))} ms"
+            f"{record.title}: {words_in(spread_of(record, 'error')[0], '%')}; the cloth drifts by "
+            f"{words(float(record.arrays['drift'][-1]))} m, {words_in(_share_of_path(record), '%')}"
+            f" of its path, in {record.settings['steps']} steps"
             for record in records
+            if record.settings["iterations"] == 1
         ),
     )
 
 
-def _drift(record: Record) -> tuple[float, float]:
-    """Return drift and path at the end [m]."""
-    return float(record.arrays["drift"][-1]), float(record.arrays["path"][-1])
+convergence = Layout(
+    "How fast do local/global and Newton converge?",
+    "cloth_convergence",
+    "Convergence of one implicit Euler step",
+    columns=lambda rows: (
+        text("cloth", lambda row: row.title),
+        Column("iterations", read=lambda row: row.k),
+        *(_reached(rival, "error") for rival in _rivals()),
+        *(_reached(rival, "residual") for rival in CHECKED),
+    ),
+    subjects=_iterations,
+    shows="The error is |x − x*| / |y − x*|: what is left of the distance between the "
+    "inertial start y and the converged step x*. Where it stands still, rounding is reached.",
+    measured=lambda rows: (
+        f"Step {settings(_records(rows), 'step')} of the motion, "
+        f"{lengths_of_steps(_records(rows))} ms; "
+        "x* by Newton, iterated far beyond the rounding floor."
+    ),
+    summary=_convergence_summary,
+    figures=(figures.cloth_convergence,),
+)
 
 
-def _milliseconds(records: Sequence[Record]) -> str:
-    lengths = {record.settings["h"] for record in records}
-    return " or ".join(words(metrics.milliseconds(h)) for h in sorted(lengths)) or "–"
+few_iterations = Layout(
+    "How far is one solve of Q x = b from the step it stands for?",
+    "cloth_few_iterations",
+    "The lab’s Q x = b: a fixed number of local/global iterations",
+    subjects=lambda results: results.all("cloth", task=FEW),
+    columns=(
+        titled("cloth"),
+        setting("iterations a step", "iterations"),
+        *spread("error of a step", "error", of=(MEDIAN, LARGEST)),
+        *spread("distance of a step", "distance", "m"),
+        Column("drift in the end", "m", read=lambda record: record.arrays["drift"][-1]),
+        Column("drift, share of the path", "%", read=_share_of_path),
+    ),
+    shows="Error and distance are those of one such step begun at each state of the converged "
+    "motion: relative as above, and as root mean square over the particles. Drift is how far "
+    "the cloth is from the converged one when all steps are taken so; the path is how far the "
+    "converged one has moved.",
+    measured=lambda records: (
+        f"{settings(records, 'steps')} steps of {lengths_of_steps(records)} ms of the "
+        f"swinging cloth after the first {settings(records, 'first')}; one iteration is the lab’s "
+        "version."
+    ),
+    summary=_few_summary,
+    figures=(pictures.falling_cloth,),
+)
+
+
+def _damped_steps(results: Results) -> list[tuple[Record, int]]:
+    records = results.all("cloth", task=DAMPERS)
+    return [(record, i) for record in records for i in range(record.arrays["h"].size)]
+
+
+def _damper_summary(steps: Sequence[tuple[Record, int]]) -> Summary:
+    records = [record for record, i in steps if i == 0]
+    return Summary(
+        "The forces of the two laws differ, relatively, by:",
+        tuple(f"{r.title}: {_difference_at(r, 0)}, {_difference_at(r, -1)}" for r in records),
+    )
+
+
+def _order(record: Record, i: int) -> float | None:
+    apart = record.arrays["apart"]
+    return np.log2(apart[i - 1] / apart[i]) if i else None
+
+
+def _difference_at(record: Record, i: int) -> str:
+    h, apart = float(record.arrays["h"][i]), float(record.arrays["apart"][i])
+    return f"{words(apart)} at {words_in(h, 'ms')}"
+
+
+dampers = Layout(
+    "How far apart are the two laws of dampers?",
+    "cloth_dampers",
+    "Two laws of dampers at the end of one step",
+    columns=(
+        text("cloth", lambda step: step[0].title),
+        Column("h", "ms", read=lambda step: step[0].arrays["h"][step[1]]),
+        Column("difference", read=lambda step: step[0].arrays["apart"][step[1]]),
+        Column("observed order", read=lambda step: _order(*step)),
+    ),
+    subjects=_damped_steps,
+    shows="A step’s damper has an energy and pulls with −(c/h)(l − l_n) u; an explicit "
+    "integrator’s pulls with −c ((v_i − v_j)·u) u. The difference of all forces over those of "
+    "the second law, where both are at home: at the end of the step, with its velocities. It "
+    "comes from the springs’ rotation within the step and shrinks with h, to first order.",
+    measured=lambda steps: (
+        "The lab’s cloth with a damping of "
+        f"{settings((step[0] for step in steps), 'damping')} N s/m after "
+        f"{settings((step[0] for step in steps), 'first')} steps of its swing; one converged step "
+        "of each length from there."
+    ),
+    summary=_damper_summary,
+)
+
+
+LAYOUTS = (few_iterations, convergence, newton_steps, dampers)

@@ -1,9 +1,5 @@
 """One cloth for every engine: work against precision, stability."""
 
-from ...harness.experiment import Experiment
-
 # What a record is about.
 ONE_STEP, MOTION, NEEDED = "work of a step", "work of a motion", "iterations of a step"
 STABILITY, LIU, MISSING = "stability", "Liu 2013", "missing"
-
-EXPERIMENT = Experiment(__package__, suite="cloth", chapter="cloth")

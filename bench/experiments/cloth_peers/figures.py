@@ -3,17 +3,11 @@
 from matplotlib.axes import Axes
 
 from ...peers import registry
-from ...presentation.entry import Figure
-from ...presentation.figures import (
-    Drawing,
-    canvas,
-    every_handle,
-    finished,
-    nth_style,
-    written,
-)
+from ...presentation.figures import Drawing, canvas, every_handle, finished, nth_style, written
+from ...presentation.layout import Figure
 from ...presentation.results import Results
-from . import tables as cloth_peers
+from . import MOTION, ONE_STEP
+from .readings import Point, points
 
 # Errors beyond this are left out: of a motion that blew up.
 MOST_DRAWN = 10.0
@@ -27,7 +21,7 @@ def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str
     """
 
     def draw(results: Results) -> Drawing | None:
-        found = [p for p in cloth_peers.points(results, task) if _can_be_drawn(p, error)]
+        found = [p for p in points(results, task) if _can_be_drawn(p, error)]
         if not found:
             return None
         stiffnesses, sizes = (
@@ -37,8 +31,9 @@ def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str
         names = list(dict.fromkeys(p.solver for p in found))
         height = 2.3 * len(sizes) + 0.2 * len(names)
         with canvas(height, len(stiffnesses), len(sizes), sharex=True, sharey=True) as (
-            figure, axes,
-        ):  # fmt: skip
+            figure,
+            axes,
+        ):
             cells = [(size, stiffness) for size in sizes for stiffness in stiffnesses]
             for ax, (size, stiffness) in zip(axes, cells, strict=True):
                 here = [p for p in found if (p.particles, p.stiffness) == (size, stiffness)]
@@ -55,16 +50,17 @@ def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str
     return draw
 
 
-def _work_precision_curves(
-    ax: Axes, found: list[cloth_peers.Point], names: list[str], error: str
-) -> None:
+def _work_precision_curves(ax: Axes, found: list[Point], names: list[str], error: str) -> None:
     for solver in dict.fromkeys(p.solver for p in found):
         mine = [p for p in found if p.solver == solver]
         ax.plot(
-            [1e3 * p.values["seconds"] for p in mine], [p.values[error] for p in mine],
-            marker=_marker(solver), markersize=3.5,
-            label=written(solver), **nth_style(names.index(solver)),
-        )  # fmt: skip
+            [1e3 * p.values["seconds"] for p in mine],
+            [p.values[error] for p in mine],
+            marker=_marker(solver),
+            markersize=3.5,
+            label=written(solver),
+            **nth_style(names.index(solver)),
+        )
 
 
 def _marker(solver: str) -> str:
@@ -72,15 +68,15 @@ def _marker(solver: str) -> str:
     return registry.ENGINE_MARKERS.get(registry.find(solver).engine, registry.OTHER.marker)
 
 
-def _can_be_drawn(point: cloth_peers.Point, error: str) -> bool:
+def _can_be_drawn(point: Point, error: str) -> bool:
     """Return whether a point has got to its end and lies within what anyone wants to see."""
-    whole = "wanted" not in point.values or cloth_peers.is_whole(point)
+    whole = "wanted" not in point.values or point.is_whole
     return whole and point.values["seconds"] > 0 and 0 < point.values[error] < MOST_DRAWN
 
 
 one_step = work_precision(
     "work_precision_step",
-    cloth_peers.ONE_STEP,
+    ONE_STEP,
     "error",
     (
         "Work and precision in one step",
@@ -90,7 +86,7 @@ one_step = work_precision(
 )
 to_implicit_euler = work_precision(
     "work_precision_implicit",
-    cloth_peers.MOTION,
+    MOTION,
     "implicit",
     (
         "Work and precision, to implicit Euler",
@@ -101,7 +97,7 @@ to_implicit_euler = work_precision(
 )
 to_the_truth = work_precision(
     "work_precision_truth",
-    cloth_peers.MOTION,
+    MOTION,
     "true",
     (
         "Work and precision, to the truth",

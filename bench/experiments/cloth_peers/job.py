@@ -7,17 +7,33 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from reference import MassSpring, State, scenes
-from reference.arguments import FloatArray
 from reference.mass_spring import SystemArrays
 
 from ...harness.stopwatch import Budget, timed
-from ...harness.worker import Done, Message, Ready, Solved, Unfit, said
+from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
 from ...peers.cloth.protocol import Mover
+from .problem import FRAME
 
 # Moved once before anything is timed, in so short a frame [s] that any solver is stable: what has
 # to be compiled is compiled then.
 _SMALL, _SHORT = 3, 1e-4
 UNKNOWN = -1
+
+
+class Shape(NamedTuple):
+    """How far and how often a cloth is moved.
+
+    Attributes:
+        frames: how many to move on.
+        repeats: how often, from the start each time.
+        budget: no further frame is begun after so long [s].
+        frame: the length of a frame [s].
+    """
+
+    frames: int
+    repeats: int
+    budget: float
+    frame: float = FRAME
 
 
 class ClothJob(NamedTuple):
@@ -26,24 +42,16 @@ class ClothJob(NamedTuple):
     Attributes:
         module: the adapter's module, by its full name.
         system: particles and springs.
-        positions: at the start [m], (particle, 3).
-        velocities: at the start [m/s], (particle, 3).
-        frame: the length of a frame [s].
-        frames: how many to move on.
-        repeats: how often, from the start each time.
+        start: where the particles are at first.
         settings: what the adapter is prepared with.
-        budget: no further frame is begun after so long [s].
+        shape: how far and how often it is moved.
     """
 
     module: str
     system: SystemArrays
-    positions: FloatArray
-    velocities: FloatArray
-    frame: float
-    frames: int
-    repeats: int
+    start: State
     settings: Mapping[str, Any]
-    budget: float
+    shape: Shape
 
     def perform(self) -> Iterator[Message]:
         """Yield the positions after each frame and how long it took, as soon as they are there."""
@@ -52,7 +60,7 @@ class ClothJob(NamedTuple):
             yield Ready(setup)
             yield from self._moved(mover)
         except Exception as error:  # whatever an engine raises is its result
-            yield Unfit(said(error))
+            yield Unfit(describe(error))
 
     def _prepared(self) -> tuple[Mover, float]:
         adapter = importlib.import_module(self.module)
@@ -61,15 +69,15 @@ class ClothJob(NamedTuple):
         trial.begin(state)
         trial.advance()
         system = MassSpring(**self.system._asdict())
-        return timed(lambda: adapter.prepare(system, self.frame, **self.settings))
+        return timed(lambda: adapter.prepare(system, self.shape.frame, **self.settings))
 
     def _moved(self, mover: Mover) -> Iterator[Message]:
-        budget = Budget(self.budget)
-        for _ in range(self.repeats):
-            mover.begin(State(self.positions, self.velocities))
-            for _ in range(self.frames):
+        budget, nowhere = Budget(self.shape.budget), np.full_like(self.start.positions, np.nan)
+        for _ in range(self.shape.repeats):
+            mover.begin(self.start)
+            for _ in range(self.shape.frames):
                 stays_finite, seconds = timed(lambda: advanced(mover))
-                where = mover.positions() if stays_finite else np.full_like(self.positions, np.nan)
+                where = mover.positions() if stays_finite else nowhere
                 yield Solved(where, UNKNOWN, seconds, "")
                 if budget.is_spent or not np.isfinite(where).all():
                     yield Done()

@@ -5,7 +5,7 @@ and against the motion itself.
 """
 
 import functools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
 from ...peers.registry import EXPLICIT, ClothPeer
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
-from .job import ClothJob
+from .job import ClothJob, Shape
 from .problem import (
     FRAME,
     SIDE,
@@ -85,39 +85,32 @@ def blocks(scale: Scale) -> Iterator[Block]:
         absent = partial(not_installed, package)
         yield Block(SUITE, "peers/all", package, absent, facts={"task": MISSING})
     for stiffness in STIFFNESSES:
+        settings = {"size": NEEDED_SIZE, "stiffness": stiffness, "frame": FRAME}
+        name, facts = f"peers/iterations/k{stiffness:g}", {"task": NEEDED}
         for solver in registry.step_solvers():
-            yield Block(
-                SUITE, f"peers/iterations/k{stiffness:g}", solver,
-                partial(iterations_needed, solver, stiffness),
-                {"size": NEEDED_SIZE, "stiffness": stiffness, "frame": FRAME},
-                facts={"task": NEEDED},
-            )  # fmt: skip
+            measure = partial(iterations_needed, solver, stiffness)
+            yield Block(SUITE, name, solver, measure, settings, facts=facts)
     for peer in (peer for peer in peers if peer.version):
         yield from _peer_blocks(peer, sizes)
+    settings = {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME}
     for solver in published.LIU_2013 if sizes == FULL else ():
-        yield Block(
-            SUITE, "peers/liu2013", solver, partial(liu_2013, solver),
-            {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME},
-            facts={"task": LIU},
-        )  # fmt: skip
+        measure, facts = partial(liu_2013, solver), {"task": LIU}
+        yield Block(SUITE, "peers/liu2013", solver, measure, settings, facts=facts)
 
 
 def _peer_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
     most = sum(level.size for level in sizes)
     for stiffness in STIFFNESSES:
+        settings = {"stiffness": stiffness, "frame": FRAME, "version": peer.version}
         for name, task, measure in (("one step", ONE_STEP, one_step), ("motion", MOTION, motion)):
-            yield Block(
-                SUITE, f"peers/{name}/k{stiffness:g}", peer.title,
-                partial(measure, peer, stiffness, sizes),
-                {"stiffness": stiffness, "frame": FRAME, "version": peer.version}, most,
-                {"task": task},
-            )  # fmt: skip
+            call = partial(measure, peer, stiffness, sizes)
+            problem, facts = f"peers/{name}/k{stiffness:g}", {"task": task}
+            yield Block(SUITE, problem, peer.title, call, settings, most, facts)
     if peer.kind == EXPLICIT and not peer.settings.get("iterations"):
         hung = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
-        yield Block(
-            SUITE, "peers/stability", peer.title, partial(stability, peer, hung),
-            {"size": STABILITY_SIZE, "version": peer.version}, len(hung), {"task": STABILITY},
-        )  # fmt: skip
+        settings = {"size": STABILITY_SIZE, "version": peer.version}
+        found, facts = partial(stability, peer, hung), {"task": STABILITY}
+        yield Block(SUITE, "peers/stability", peer.title, found, settings, len(hung), facts)
 
 
 def not_installed(package: str) -> Measured:
@@ -136,12 +129,8 @@ def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Mea
         cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
         spent = 0.0
         for rung in step_rungs(peer, cloth.frequency):
-            outcome = _tried(
-                job(
-                    peer.module, cloth, rung, frames=1, repeats=_REPEATS,
-                    budget=_REPEATING * level.budget,
-                )
-            )  # fmt: skip
+            shape = Shape(1, _REPEATS, _REPEATING * level.budget)
+            outcome = _tried(job(peer.module, cloth, rung.settings, shape))
             remarks += _remarks(level, rung, outcome)
             if not outcome.solved:
                 break
@@ -156,7 +145,7 @@ def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Mea
 
 def _tried(job: ClothJob) -> Outcome:
     """Return what came of a job; one that could not be set up in time is not set up again."""
-    what = job.module, len(job.positions)
+    what = job.module, len(job.start.positions)
     if what in _given_up:
         return Outcome(0.0, [], _given_up[what])
     outcome = worker_process().perform(job)
@@ -197,11 +186,8 @@ def motion(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measu
     for level in sizes:
         cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
         for rung in motion_rungs(peer, cloth.frequency):
-            outcome = _tried(
-                job(
-                    peer.module, cloth, rung, frames=level.frames, repeats=1, budget=level.budget,
-                )
-            )  # fmt: skip
+            shape = Shape(level.frames, 1, level.budget)
+            outcome = _tried(job(peer.module, cloth, rung.settings, shape))
             remarks += _remarks(level, rung, outcome)
             rows.append((*_moved(outcome, level, truth), rung.label))
             if not outcome.solved:
@@ -282,11 +268,9 @@ def is_stable(
     Raises:
         ArithmeticError: if the solver does not get through.
     """
-    shape = ClothJob(
-        peer.module, system.arrays, start.positions, start.velocities,
-        h * STABILITY_STEPS, 1, 1, {**peer.settings, "substeps": STABILITY_STEPS}, np.inf,
-    )  # fmt: skip
-    outcome = worker_process().perform(shape)
+    settings = {**peer.settings, "substeps": STABILITY_STEPS}
+    shape = Shape(1, 1, np.inf, h * STABILITY_STEPS)
+    outcome = worker_process().perform(ClothJob(peer.module, system.arrays, start, settings, shape))
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     away = np.abs(outcome.solved[-1].q - rest)
@@ -320,13 +304,11 @@ def liu_2013(solver: str) -> Measured:
     cloth = falling_cloth(published.LIU_2013_SIZE, published.LIU_2013_STIFFNESS)
     exact = implicit_motion(cloth, 1, published.LIU_2013_FRAME)[0]
     x, v = cloth.start.positions, cloth.start.velocities
-    settings = published.LIU_2013[solver].settings
+    settings = {"solver": solver, **published.LIU_2013[solver].settings}
+    shape = Shape(1, _REPEATS, 5.0, published.LIU_2013_FRAME)
     outcome = worker_process().perform(
-        job(
-            "bench.peers.cloth.step_solvers", cloth, Rung("", {"solver": solver, **settings}),
-            frames=1, repeats=_REPEATS, budget=5.0, frame=published.LIU_2013_FRAME,
-        )
-    )  # fmt: skip
+        job("bench.peers.cloth.step_solvers", cloth, settings, shape)
+    )
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     inertial = x + published.LIU_2013_FRAME * np.where(cloth.system.free[:, None], v, 0.0)
@@ -339,15 +321,9 @@ def liu_2013(solver: str) -> Measured:
     )
 
 
-def job(
-    module: str, cloth: FallingCloth, rung: Rung, *, frames: int, repeats: int, budget: float,
-    frame: float = FRAME,
-) -> ClothJob:  # fmt: skip
+def job(module: str, cloth: FallingCloth, settings: Mapping[str, Any], shape: Shape) -> ClothJob:
     """Return the job of moving a cloth from its start."""
-    return ClothJob(
-        module, cloth.system.arrays, cloth.start.positions, cloth.start.velocities, frame, frames,
-        repeats, rung.settings, budget,
-    )  # fmt: skip
+    return ClothJob(module, cloth.system.arrays, cloth.start, settings, shape)
 
 
 def _truth(level: Level, stiffness: float) -> ClothTruth:

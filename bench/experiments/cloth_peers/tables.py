@@ -1,6 +1,8 @@
 """One cloth for every solver: work against precision, iterations, limits of stability."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -8,14 +10,16 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
+from ...presentation.columns import SOLVER, number, text, words_in
+from ...presentation.layout import Layout
 from ...presentation.results import Results, label, listed
-from ...presentation.tables import Cell, Column, Summary, Table, words
+from ...presentation.tables import Column, Summary, Table, listing, words
 from ..published import problem as published
-from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
+from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY, figures
+from .readings import Point, points
 
 TARGETS = {"1e-3": 1e-3, "1e-6": 1e-6}
 DECADES = tuple(f"1e-{p}" for p in range(1, 9))
-EVERY = "every cloth"
 # So near to the truth [m] a motion is hard to tell from it by eye.
 _NEAR = 1e-2
 _CLOTH = (
@@ -32,93 +36,53 @@ _TRUTH = (
 )
 
 
-class Point(NamedTuple):
-    """A solver with one setting on one cloth.
-
-    Attributes:
-        stiffness: of the springs [N/m].
-        particles: along each side.
-        solver: the method.
-        rung: the setting.
-        values: what was measured, by name.
-        record: where it is from.
-    """
-
-    stiffness: float
-    particles: int
-    solver: str
-    rung: str
-    values: dict[str, float]
-    record: Record
-
-
-def points(results: Results, task: str) -> list[Point]:
-    """Return all points of a task, cloth by cloth: stiffness first, then particles."""
-    found = [p for record in results.all("cloth", task=task) for p in _points_of(record)]
-    return sorted(found, key=lambda point: (point.stiffness, point.particles))
-
-
-def _points_of(record: Record) -> Iterator[Point]:
-    if "particles" not in record.arrays:
-        return
-    count = record.arrays["particles"].size
-    whole = {name: values for name, values in record.arrays.items() if values.size == count}
-    for i in range(count):
-        values = {name: float(array[i]) for name, array in whole.items()}
-        yield Point(
-            record.settings["stiffness"], int(values["particles"]), record.solver,
-            record.facts["rungs"][i], values,
-            record,
-        )  # fmt: skip
-
-
 def _cloth_of(point: Point) -> str:
     return f"{point.particles} × {point.particles}, {words(int(point.stiffness))} N/m"
 
 
-def _missing_rows(results: Results, cells: int) -> list[tuple[Cell, ...]]:
-    return [
-        (EVERY, record.solver, *[None] * (cells - 3), record.notes["remark"])
-        for record in results.all("cloth", task=MISSING)
-    ]
-
-
-def one_step(results: Results) -> Table:
-    """Return how soon every solver is near the converged step."""
-    found = points(results, ONE_STEP)
-    columns = (
-        Column("cloth", words=True), Column("solver", words=True),
-        *(
-            column
-            for name in TARGETS
-            for column in (
-                Column(f"time to {name}", "ms"), Column(f"{name} by", words=True),
-            )
-        ),
-        Column("least error"), Column("least by", words=True), Column("remark", words=True),
-    )  # fmt: skip
-    rows = [_step_row(group) for group in _groups(found)] if found else []
-    rows += _missing_rows(results, len(columns))
-    return Table(
-        "cloth_peers_step",
-        "One step of a falling cloth by every solver",
-        columns,
-        tuple(rows),
-        shows="The error is |x − x*| / |y − x*|, what is left of the distance between the inertial "
-        "start y and the converged step x*. Explicit solvers and those that solve one linear "
-        "system do another step: their error stays, however long they take.",
-        measured=f"{_CLOTH}{_FAIR}{_TRUTH}. Times are medians of up to five; settings are those of "
-        "a ladder, of which the cheapest that suffices counts.",
-        summary=_step_summary(found),
-    )
+def _cloths(found: Sequence[Point]) -> dict[str, list[Point]]:
+    """Return the points on each cloth."""
+    cloths: dict[str, list[Point]] = {}
+    for point in found:
+        cloths.setdefault(_cloth_of(point), []).append(point)
+    return cloths
 
 
 def _groups(found: Sequence[Point]) -> list[list[Point]]:
     """Return the points of each solver on each cloth, in order."""
-    groups: dict[tuple[float, int, str], list[Point]] = {}
+    groups: dict[tuple[str, str], list[Point]] = {}
     for point in found:
-        groups.setdefault((point.stiffness, point.particles, point.solver), []).append(point)
+        groups.setdefault((_cloth_of(point), point.solver), []).append(point)
     return list(groups.values())
+
+
+@dataclass(frozen=True, eq=False)
+class WithMissing(Layout):
+    """A layout whose tables end with a row for each engine that is missing, its remark last."""
+
+    def __call__(self, results: Results) -> Table:
+        """Return the table with a row for each subject and for each engine that is missing."""
+        table = super().__call__(results)
+        blank = (None,) * (len(table.columns) - 3)
+        missing = results.all("cloth", task=MISSING)
+        rows = [("every cloth", r.solver, *blank, r.notes["remark"]) for r in missing]
+        return replace(table, rows=(*table.rows, *rows))
+
+
+def _columns_to(target: str) -> tuple[Column, Column]:
+    """Return what the cheapest setting takes to an error, and which it is."""
+
+    def cheapest(group: Sequence[Point]) -> Point | None:
+        return _reached(group, TARGETS[target])
+
+    return (
+        Column(
+            f"time to {target}",
+            "ms",
+            read=lambda group: (point := cheapest(group)) and point.values["seconds"],
+        ),
+        text(f"{target} by", lambda group: (point := cheapest(group)) and point.rung),
+    )
 
 
 def _reached(group: Sequence[Point], target: float) -> Point | None:
@@ -127,13 +91,8 @@ def _reached(group: Sequence[Point], target: float) -> Point | None:
     return None if i is None else group[i]
 
 
-def _step_row(group: Sequence[Point]) -> tuple[Cell, ...]:
-    cells: list[Cell] = [_cloth_of(group[0]), group[0].solver]
-    for target in TARGETS.values():
-        point = _reached(group, target)
-        cells += [None, None] if point is None else [_milliseconds(point), point.rung]
-    best = min(group, key=lambda point: point.values["error"])
-    return (*cells, best.values["error"], best.rung, _remark(group))
+def _best(group: Sequence[Point]) -> Point:
+    return min(group, key=lambda point: point.values["error"])
 
 
 def _remark(group: Sequence[Point]) -> str:
@@ -143,17 +102,21 @@ def _remark(group: Sequence[Point]) -> str:
     return "; ".join(sentence for particles, sentence in remarks if particles == group[0].particles)
 
 
-def _milliseconds(point: Point) -> float:
-    return metrics.milliseconds(point.values["seconds"])
+def _seconds(point: Point) -> float:
+    return point.values["seconds"]
 
 
-def _step_summary(found: Sequence[Point]) -> Summary:
-    said = []
-    for cloth in dict.fromkeys(_cloth_of(point) for point in found):
-        groups = _groups([point for point in found if _cloth_of(point) == cloth])
-        fastest = [f"to {name} {_fastest(groups, target)}" for name, target in TARGETS.items()]
-        said.append(f"{cloth}: {listed(fastest)}")
-    return Summary("The fastest of all solvers in one step:", tuple(said)) if said else Summary()
+def _step_summary(groups: Sequence[Sequence[Point]]) -> Summary:
+    cloths: dict[str, list[Sequence[Point]]] = {}
+    for group in groups:
+        cloths.setdefault(_cloth_of(group[0]), []).append(group)
+    return Summary(
+        "The fastest of all solvers in one step:",
+        tuple(
+            f"{cloth}: {listed([f'to {name} {_fastest(of, x)}' for name, x in TARGETS.items()])}"
+            for cloth, of in cloths.items()
+        ),
+    )
 
 
 def _engine(point: Point) -> str:
@@ -164,61 +127,59 @@ def _fastest(groups: Sequence[Sequence[Point]], target: float) -> str:
     reached = [point for group in groups if (point := _reached(group, target)) is not None]
     if not reached:
         return "none"
-    best = min(reached, key=_milliseconds)
-    others = [p for p in reached if _engine(p) != _engine(best)]
-    after = min(others, key=_milliseconds) if others else None
-    beside = "" if after is None else f" (then {after.solver}, {words(_milliseconds(after))} ms)"
-    return f"{best.solver}, {words(_milliseconds(best))} ms{beside}"
+    best = min(reached, key=_seconds)
+    after = min((p for p in reached if _engine(p) != _engine(best)), key=_seconds, default=None)
+    beside = "" if after is None else f" (then {_with_time(after)})"
+    return f"{_with_time(best)}{beside}"
 
 
-def motion(results: Results) -> Table:
-    """Return how far every solver's motion is from implicit Euler's and from the truth."""
-    found = points(results, MOTION)
-    columns = (
-        Column("cloth", words=True), Column("solver", words=True),
-        Column("a frame by", words=True), Column("frames"),
-        Column("distance from implicit Euler", "m"), Column("distance from the truth", "m"),
-        Column("time for a frame", "ms"), Column("time for a simulated second", "s"),
-        Column("remark", words=True),
-    )  # fmt: skip
-    rows = [_motion_row(point) for point in found]
-    rows += _missing_rows(results, len(columns))
-    return Table(
-        "cloth_peers_motion",
-        "A falling cloth by every solver, frame after frame",
-        columns,
-        tuple(rows),
-        shows="Distances are root mean squares over the particles after the last frame. Diverged "
-        "means that a particle was farther from its true place than the cloth is wide.",
-        measured=f"{_CLOTH}{_FAIR}{_TRUTH}: {_certainty(found)}.",
-        summary=_motion_summary(found),
-    )  # fmt: skip
+def _with_time(point: Point) -> str:
+    return f"{point.solver}, {words_in(_seconds(point), 'ms')}"
 
 
-def _motion_row(point: Point) -> tuple[Cell, ...]:
-    values = point.values
-    apart = [None if np.isnan(values[name]) else values[name] for name in ("implicit", "true")]
-    frame = None if np.isnan(values["seconds"]) else values["seconds"]
-    return (
-        _cloth_of(point), point.solver, point.rung, int(values["frames"]), *apart,
-        None if frame is None else metrics.milliseconds(frame),
-        None if frame is None else metrics.ratio(frame, point.record.settings["frame"]),
-        _fate(point),
-    )  # fmt: skip
+one_step = WithMissing(
+    "Which of all solvers is soonest near the converged step?",
+    "cloth_peers_step",
+    "One step of a falling cloth by every solver",
+    columns=(
+        text("cloth", lambda group: _cloth_of(group[0])),
+        text("solver", lambda group: group[0].solver),
+        *(column for target in TARGETS for column in _columns_to(target)),
+        Column("least error", read=lambda group: _best(group).values["error"]),
+        text("least by", lambda group: _best(group).rung),
+        text("remark", _remark),
+    ),
+    subjects=lambda results: _groups(points(results, ONE_STEP)),
+    shows="The error is |x − x*| / |y − x*|, what is left of the distance between the inertial "
+    "start y and the converged step x*. Explicit solvers and those that solve one linear "
+    "system do another step: their error stays, however long they take.",
+    measured=f"{_CLOTH}{_FAIR}{_TRUTH}. Times are medians of up to five; settings are those of "
+    "a ladder, of which the cheapest that suffices counts.",
+    summary=_step_summary,
+    figures=(figures.one_step,),
+)
+
+
+def _known(title: str, name: str, unit: str) -> Column:
+    """Return the column of a value, empty where it is not a number."""
+    return Column(title, unit, read=lambda point: _number_or_none(point.values[name]))
+
+
+def _number_or_none(value: float) -> float | None:
+    return None if np.isnan(value) else value
+
+
+def _simulated_second(point: Point) -> float | None:
+    frame = _number_or_none(_seconds(point))
+    return None if frame is None else metrics.ratio(frame, point.record.settings["frame"])
 
 
 def _fate(point: Point) -> str:
     if point.values["diverged"]:
         return "diverged"
-    if point.values["frames"] < point.values["wanted"]:
-        said = _remark([point])
-        return said or f"out of time before frame {int(point.values['frames']) + 1}"
-    return ""
-
-
-def is_whole(point: Point) -> bool:
-    """Return whether a motion got to its end."""
-    return not point.values["diverged"] and point.values["frames"] == point.values["wanted"]
+    if point.is_whole:
+        return ""
+    return _remark([point]) or f"out of time before frame {int(point.values['frames']) + 1}"
 
 
 def _certainty(found: Sequence[Point]) -> str:
@@ -235,15 +196,12 @@ def _certainty(found: Sequence[Point]) -> str:
 
 def _motion_summary(found: Sequence[Point]) -> Summary:
     lost = dict.fromkeys(point.solver for point in found if point.values["diverged"])
-    if not found:
-        return Summary()
-    said = []
-    for cloth in dict.fromkeys(_cloth_of(point) for point in found):
-        whole = [p for p in found if _cloth_of(p) == cloth and is_whole(p)]
-        if whole:
-            said.append(f"{cloth}: {_nearest(whole)}")
+    whole = _cloths([point for point in found if point.is_whole])
     sentence = f"With some settings diverged: {listed(list(lost))}." if lost else "None diverged."
-    return Summary(f"{sentence} Nearest to the truth:", tuple(said))
+    return Summary(
+        f"{sentence} Nearest to the truth:",
+        tuple(f"{cloth}: {_nearest(of)}" for cloth, of in whole.items()),
+    )
 
 
 def _nearest(whole: Sequence[Point]) -> str:
@@ -252,134 +210,180 @@ def _nearest(whole: Sequence[Point]) -> str:
     close = [point for point in whole if point.values["true"] <= _NEAR]
     if not close:
         return said
-    first = min(close, key=_milliseconds)
+    first = min(close, key=_seconds)
     return (
         f"{said}; the fastest within {words(_NEAR)} m {first.solver} by {first.rung}, "
-        f"{words(_milliseconds(first))} ms a frame"
+        f"{words_in(_seconds(first), 'ms')} a frame"
     )
 
 
-def iterations(results: Results) -> Table:
-    """Return the iterations of our solvers to each power of ten."""
-    records = results.all("cloth", task=NEEDED)
+def _sizes(records: Sequence[Record]) -> str:
     size = records[0].settings["size"] if records else 0
-    return Table(
-        "cloth_iterations",
-        "Iterations needed in one step",
-        (
-            Column("stiffness", "N/m"), Column("solver", words=True),
-            *(Column(f"to {decade}") for decade in DECADES),
-            Column("tried"), Column("least error"),
-        ),
-        tuple(_needed_row(record) for record in records),
-        shows="Iterations until |x − x*| / |y − x*| is at most so much; nothing where all that "
-        "were tried did not suffice.",
-        measured=f"{_CLOTH}{size} × {size} particles. x* by Newton at the rounding floor.",
-        summary=_needed_summary(records),
-    )  # fmt: skip
+    return f"{size} × {size}"
 
 
-def _needed_row(record: Record) -> tuple[Cell, ...]:
-    needed = [None if np.isnan(n) else int(n) for n in record.arrays["needed"]]
-    return (
-        int(record.settings["stiffness"]), label(record.solver), *needed,
-        int(record.arrays["tried"]), float(record.arrays["least"]),
-    )  # fmt: skip
+def _needed(record: Record, decade: str) -> int | None:
+    needed = record.arrays["needed"][DECADES.index(decade)]
+    return None if np.isnan(needed) else int(needed)
 
 
 def _needed_summary(records: Sequence[Record]) -> Summary:
     said = []
     for stiffness in dict.fromkeys(record.settings["stiffness"] for record in records):
         mine = [record for record in records if record.settings["stiffness"] == stiffness]
-        counts = [f"{label(r.solver)} {_count_to(r, DECADES.index('1e-6'))}" for r in mine]
+        counts = [f"{label(r.solver)} {_count_to(r, '1e-6')}" for r in mine]
         said.append(f"{words(int(stiffness))} N/m: {listed(counts)}")
-    return Summary("Iterations to an error of 1e-6:", tuple(said)) if said else Summary()
+    return Summary("Iterations to an error of 1e-6:", tuple(said))
 
 
-def _count_to(record: Record, i: int) -> str:
-    needed = record.arrays["needed"][i]
-    return (
-        f"more than {words(int(record.arrays['tried']))}"
-        if np.isnan(needed)
-        else words(int(needed))
+def _count_to(record: Record, decade: str) -> str:
+    needed = _needed(record, decade)
+    return f"more than {words(int(record.arrays['tried']))}" if needed is None else words(needed)
+
+
+class Limit(NamedTuple):
+    """The longest stable step of a solver on one cloth [s], and 2 / ω there."""
+
+    record: Record
+    stiffness: int
+    step: float | None
+    theory: float
+
+    @property
+    def share(self) -> float | None:
+        """The step in units of 2 / ω."""
+        return None if self.step is None else metrics.ratio(self.step, self.theory)
+
+
+def _limits(record: Record) -> Iterator[Limit]:
+    columns = (record.arrays[name] for name in ("stiffness", "limit", "frequency"))
+    for stiffness, limit, frequency in zip(*columns, strict=True):
+        theory = metrics.ratio(2.0, float(frequency))
+        yield Limit(record, int(stiffness), _number_or_none(float(limit)), theory)
+
+
+def _stability_summary(limits: Sequence[Limit]) -> Summary:
+    shares = {limit.record.solver: limit.share for limit in limits if limit.step is not None}
+    points = (f"{solver}: {words(share)} × 2 / ω" for solver, share in shares.items())
+    return listing("The longest stable step:", points)
+
+
+motion = WithMissing(
+    "And frame after frame, near implicit Euler and near the truth?",
+    "cloth_peers_motion",
+    "A falling cloth by every solver, frame after frame",
+    columns=(
+        text("cloth", _cloth_of),
+        text("solver", lambda point: point.solver),
+        text("a frame by", lambda point: point.rung),
+        Column("frames", read=lambda point: int(point.values["frames"])),
+        _known("distance from implicit Euler", "implicit", "m"),
+        _known("distance from the truth", "true", "m"),
+        _known("time for a frame", "seconds", "ms"),
+        Column("time for a simulated second", "s", read=_simulated_second),
+        text("remark", _fate),
+    ),
+    subjects=lambda results: points(results, MOTION),
+    shows="Distances are root mean squares over the particles after the last frame. Diverged "
+    "means that a particle was farther from its true place than the cloth is wide.",
+    measured=lambda found: f"{_CLOTH}{_FAIR}{_TRUTH}: {_certainty(found)}.",
+    summary=_motion_summary,
+    figures=(figures.to_implicit_euler, figures.to_the_truth),
+)
+
+
+iterations = Layout(
+    "How many iterations does an error of 1e-8 take?",
+    "cloth_iterations",
+    "Iterations needed in one step",
+    columns=(
+        Column("stiffness", "N/m", read=lambda record: int(record.settings["stiffness"])),
+        SOLVER,
+        *(Column(f"to {decade}", read=partial(_needed, decade=decade)) for decade in DECADES),
+        number("tried"),
+        number("least error", "least"),
+    ),
+    subjects=lambda results: results.all("cloth", task=NEEDED),
+    shows="Iterations until |x − x*| / |y − x*| is at most so much; nothing where all that "
+    "were tried did not suffice.",
+    measured=lambda records: (
+        f"{_CLOTH}{_sizes(records)} particles. x* by Newton at the rounding floor."
+    ),
+    summary=_needed_summary,
+)
+
+
+stability = Layout(
+    "How long may the steps of explicit solvers be?",
+    "cloth_stability",
+    "The longest stable step of explicit solvers",
+    subjects=lambda results: [
+        limit for record in results.all("cloth", task=STABILITY) for limit in _limits(record)
+    ],
+    columns=(
+        text("solver", lambda limit: limit.record.solver),
+        Column("stiffness", "N/m", read=lambda limit: limit.stiffness),
+        Column("longest stable step", "ms", read=lambda limit: limit.step),
+        Column("2 / ω", "ms", read=lambda limit: limit.theory),
+        Column("of 2 / ω", read=lambda limit: limit.share),
+        text("remark", lambda limit: limit.record.notes["remark"]),
+    ),
+    shows="Symplectic Euler is stable up to h = 2 / ω, the classical Runge-Kutta method up to "
+    "2.828 / ω; ω² is the largest eigenvalue of M⁻¹ K at rest.",
+    measured="A cloth of 6 × 6 particles hangs at rest and is pushed by 1e-5 m along its "
+    "highest mode; a step is stable if that has not grown a hundredfold 400 steps later. Found "
+    "by bisection to two ten-thousandths.",
+    summary=_stability_summary,
+)
+
+
+def _as_published(results: Results) -> list[Record]:
+    records = results.all("cloth", task=LIU)
+    return [r for r in records if r.solver in published.LIU_2013 and "seconds" in r.arrays]
+
+
+def _vertices(records: Sequence[Record]) -> int:
+    return int(records[0].arrays["vertices"]) if records else 0
+
+
+def _median(record: Record) -> float:
+    return metrics.spread(record.arrays["seconds"]).median
+
+
+def _liu_summary(records: Sequence[Record]) -> Summary:
+    return Summary(
+        "A frame of 6,561 vertices:",
+        tuple(
+            f"{label(record.solver)}: {words_in(_median(record), 'ms')}, published "
+            f"{words_in(published.LIU_2013[record.solver].seconds, 'ms')}"
+            for record in records
+        ),
     )
 
 
-def stability(results: Results) -> Table:
-    """Return the longest stable steps, beside what theory has for them."""
-    rows: list[tuple[Cell, ...]] = []
-    for record in results.all("cloth", task=STABILITY):
-        arrays = record.arrays
-        for k, limit, frequency in zip(
-            arrays["stiffness"], arrays["limit"], arrays["frequency"], strict=True
-        ):
-            theory = metrics.ratio(2.0, float(frequency))
-            found = None if np.isnan(limit) else metrics.milliseconds(float(limit))
-            share = None if np.isnan(limit) else metrics.ratio(float(limit), theory)
-            rows.append(
-                (record.solver, int(k), found, metrics.milliseconds(theory), share,
-                 record.notes["remark"])
-            )  # fmt: skip
-    return Table(
-        "cloth_stability",
-        "The longest stable step of explicit solvers",
-        (
-            Column("solver", words=True), Column("stiffness", "N/m"),
-            Column("longest stable step", "ms"), Column("2 / ω", "ms"),
-            Column("of 2 / ω"), Column("remark", words=True),
-        ),
-        tuple(rows),
-        shows="Symplectic Euler is stable up to h = 2 / ω, the classical Runge-Kutta method up to "
-        "2.828 / ω; ω² is the largest eigenvalue of M⁻¹ K at rest.",
-        measured="A cloth of 6 × 6 particles hangs at rest and is pushed by 1e-5 m along its "
-        "highest mode; a step is stable if that has not grown a hundredfold 400 steps later. Found "
-        "by bisection to two ten-thousandths.",
-        summary=_stability_summary(rows),
-    )  # fmt: skip
+liu_2013 = Layout(
+    "What did Liu et al. (2013) measure, and what do we?",
+    "cloth_liu_2013",
+    "The times of Liu et al. (2013), and here",
+    columns=(
+        SOLVER,
+        text("a frame by", lambda record: published.LIU_2013[record.solver].done),
+        Column("published", "ms", read=lambda record: published.LIU_2013[record.solver].seconds),
+        Column("here", "ms", read=_median),
+        number("here, error left", "error"),
+    ),
+    subjects=_as_published,
+    shows="The error is |x − x*| / |y − x*| as above; the paper’s ten iterations leave most of it.",
+    measured=lambda records: (
+        "Published: 6,561 vertices; read in the abstract and captions, so springs, "
+        "stiffness, step and machine are not known to us. Here: "
+        f"{words(_vertices(records))} particles, 81 × 81, "
+        f"{words(int(published.LIU_2013_STIFFNESS))} N/m, one step of "
+        f"{words_in(published.LIU_2013_FRAME, 'ms')} from mid-fall, on one core; "
+        "Newton to a residual of 1e-6."
+    ),
+    summary=_liu_summary,
+)
 
 
-def _stability_summary(rows: Sequence[tuple[Cell, ...]]) -> Summary:
-    shares = {row[0]: row[4] for row in rows if row[4] is not None}
-    said = tuple(f"{solver}: {words(share)} × 2 / ω" for solver, share in shares.items())
-    return Summary("The longest stable step:", said) if said else Summary()
-
-
-def liu_2013(results: Results) -> Table:
-    """Return the published times of Liu et al. 2013, and ours for as many vertices."""
-    wanted = [r for r in results.all("cloth", task=LIU) if r.solver in published.LIU_2013]
-    records = [r for r in wanted if "seconds" in r.arrays]
-    rows = []
-    for record in records:
-        frame = published.LIU_2013[record.solver]
-        here = metrics.spread(record.arrays["seconds"]).median
-        rows.append(
-            (
-                label(record.solver), frame.done, metrics.milliseconds(frame.seconds),
-                metrics.milliseconds(here), float(record.arrays["error"]),
-            )
-        )  # fmt: skip
-    vertices = int(records[0].arrays["vertices"]) if records else 0
-    return Table(
-        "cloth_liu_2013",
-        "The times of Liu et al. (2013), and here",
-        (
-            Column("solver", words=True), Column("a frame by", words=True),
-            Column("published", "ms"), Column("here", "ms"), Column("here, error left"),
-        ),
-        tuple(rows),
-        shows="The error is |x − x*| / |y − x*| as above; the paper’s ten iterations leave most of "
-        "it.",
-        measured="Published: 6,561 vertices; read in the abstract and captions, so springs, "
-        f"stiffness, step and machine are not known to us. Here: {words(vertices)} particles, 81 × "
-        f"81, {words(int(published.LIU_2013_STIFFNESS))} N/m, "
-        f"one step of {words(metrics.milliseconds(published.LIU_2013_FRAME))} ms from mid-fall, on "
-        "one core; Newton to a residual of 1e-6.",
-        summary=_liu_summary(rows),
-    )  # fmt: skip
-
-
-def _liu_summary(rows: Sequence[tuple[Cell, ...]]) -> Summary:
-    if not rows:
-        return Summary()
-    said = tuple(f"{row[0]}: {words(row[3])} ms, published {words(row[2])} ms" for row in rows)
-    return Summary("A frame of 6,561 vertices:", said)
+LAYOUTS = (iterations, one_step, motion, stability, liu_2013)

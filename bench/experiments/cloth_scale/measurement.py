@@ -4,17 +4,17 @@ Each cloth is measured in a process of its own, since only a process can say how
 had.
 """
 
-import contextlib
 import importlib.util
 import resource
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from reference import ImplicitEuler, MassSpring, State, scenes
+from reference.arguments import FloatArray
 from reference.backend.compiled import Kernel
 from reference.implicit_euler.factor_cache import clear as clear_factor_cache
 from reference.implicit_euler.factor_cache import prefactored
@@ -23,10 +23,9 @@ from reference.sparse import CholeskyFactor
 from reference.sparse.linear_solver import factorize
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import WorkerProcess
+from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
 from ...harness.stopwatch import timed
-from ...harness.worker import Done, Found, Message, Unfit, said
 from ...peers import registry
 
 H = 1 / 60
@@ -36,7 +35,7 @@ ITERATIONS = 10
 SIZES = {32: 0.0, 100: 0.0, 316: 1.0, 1000: 1.0}
 OURS = registry.SUPERNODAL.name
 LIBRARIES = tuple(library.name for library in registry.FACTORS)
-# Rounds in which everything is timed in turn: so many particles in all, within limits.
+# Rounds in each of which everything is timed once: so many particles in all, within limits.
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
 # What the limit of memory reads again and again: more than any cache holds [bytes].
 STRETCH = 2**28
@@ -49,40 +48,25 @@ def blocks(scale: Scale) -> Iterator[Block]:
     for size, seconds in SIZES.items():
         if scale.seconds < seconds:
             continue
-        cloth = {"particles": size * size, "h": H, "stiffness": STIFFNESS}
+        settings: dict[str, Any] = {"particles": size * size, "h": H, "stiffness": STIFFNESS}
+        settings["iterations"] = ITERATIONS
         for library in LIBRARIES:
-            yield Block(
-                "cloth_scale", f"cloth/{size}x{size}", library,
-                partial(in_its_own_process, size, library), {**cloth, "iterations": ITERATIONS},
-            )  # fmt: skip
+            measure_it = partial(in_its_own_process, size, library)
+            yield Block("cloth_scale", f"cloth/{size}x{size}", library, measure_it, settings)
 
 
 def in_its_own_process(size: int, library: str) -> Measured:
     """Measure one cloth in a process that does nothing else; say so if there is no such library."""
     if library != OURS and importlib.util.find_spec(library) is None:
         return Measured({}, {"missing": f"{library} is not installed"})
-    with contextlib.closing(WorkerProcess(PATIENCE)) as worker:
-        outcome = worker.perform(LargeCloth(size, library))
-    if outcome.found is None:
-        raise RuntimeError(outcome.trouble)
-    return Measured(dict(outcome.found))
+    return Measured(in_a_fresh_process(PATIENCE, compiled_and_measured, size, library))
 
 
-class LargeCloth(NamedTuple):
-    """A cloth to be measured in a worker's process, by particles along a side and library."""
-
-    size: int
-    library: str
-
-    def perform(self) -> Iterator[Message]:
-        """Yield what is measured, after a small cloth for which everything is compiled."""
-        try:
-            measure(min(SIZES), self.library)
-            clear_factor_cache()
-            yield Found(measure(self.size, self.library))
-            yield Done()
-        except Exception as error:
-            yield Unfit(said(error))
+def compiled_and_measured(size: int, library: str) -> dict[str, Any]:
+    """Return what is measured after a small cloth, for which everything is compiled."""
+    measure(min(SIZES), library)
+    clear_factor_cache()
+    return measure(size, library)
 
 
 def _say(size: int, library: str, what: str) -> None:
@@ -143,11 +127,9 @@ def steps(
     used, result = memory(), integrator.step(state)
     twice = global_matrix(system, 2 * H)
     _, again = timed(lambda: factor.refactorize(twice))
-    return {
-        "assembly": assembly, "factor": seconds, "refactor": again, **times,
-        "entries": factor.entries, "matrix_entries": matrix.nnz, "residual": result.residual,
-        "history": result.history.tolist(), "memory": used,
-    }  # fmt: skip
+    sizes = {"entries": factor.entries, "matrix_entries": matrix.nnz, "memory": used}
+    found = {"residual": result.residual, "history": result.history.tolist()}
+    return {"assembly": assembly, "factor": seconds, "refactor": again, **times, **sizes, **found}
 
 
 def in_turn(
@@ -181,7 +163,7 @@ def reading(size: int) -> Callable[[], float]:
     return run
 
 
-def total(numbers):
+def total(numbers: FloatArray) -> float:
     """Return the sum, in whatever order is fastest."""
     result = 0.0
     for i in range(len(numbers)):

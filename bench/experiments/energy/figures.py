@@ -23,18 +23,18 @@ def energy(results: Results) -> Drawing | None:
             for record in group:
                 style = nth_style(shown.index(record.solver))
                 ax.plot(
-                    record.arrays["time"], record.arrays["left"],
-                    label=written(label(record.solver)), **style,
-                )  # fmt: skip
-            ax.set(
-                title=written(group[0].title),
-                xlabel="time [s]",
-                xlim=(0, None),
-            )
+                    record.arrays["time"],
+                    record.arrays["left"],
+                    label=written(label(record.solver)),
+                    **style,
+                )
+            ax.set(title=written(group[0].title), xlabel="time [s]", xlim=(0, None))
         axes[0].set(ylabel="energy above rest, of the start", ylim=(0, None))
         figure.legend(*every_handle(axes), loc="outside lower left", ncols=3)
         return finished(
-            figure, "energy", "Energy of a swinging cloth by integrator",
+            figure,
+            "energy",
+            "Energy of a swinging cloth by integrator",
             "Without dampers all energy should stay. Lines that cover each other are the same "
             "method.",
-        )  # fmt: skip
+        )

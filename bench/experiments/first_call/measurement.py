@@ -4,12 +4,11 @@ Each is measured in two fresh processes, the first with an empty folder for comp
 the second with what the first has left there.
 """
 
-import contextlib
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +18,8 @@ from reference.backend.compilation import on_compile
 from reference.jacobians import jacobian
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import WorkerProcess
+from ...harness.isolation import in_a_fresh_process
 from ...harness.stopwatch import timed_twice
-from ...harness.worker import Done, Found, Message, Unfit, said
 
 Call = Callable[[], Any]
 
@@ -54,34 +52,19 @@ def calls() -> list[tuple[str, str]]:
 def cold_and_warm(name: str, solver: str) -> Measured:
     """Measure a call in a process that has to compile, and in the next one."""
     with tempfile.TemporaryDirectory() as folder:
-        runs = {when: in_a_fresh_process(name, solver, folder) for when in ("cold", "warm")}
+        runs = {when: in_a_process(name, solver, folder) for when in ("cold", "warm")}
     return Measured({f"{when} {k}": v for when, run in runs.items() for k, v in run.items()})
 
 
-def in_a_fresh_process(name: str, solver: str, folder: str) -> Mapping[str, Any]:
-    """Measure a call, with compiled kernels kept in a folder."""
-    with contextlib.closing(WorkerProcess(PATIENCE)) as shop:
-        outcome = shop.perform(FirstCall(name, solver, os.fspath(folder)))
-    if outcome.found is None:
-        raise RuntimeError(outcome.trouble)
-    return outcome.found
+def in_a_process(name: str, solver: str, folder: str) -> Mapping[str, Any]:
+    """Measure a call in a process of its own, with compiled kernels kept in a folder."""
+    return in_a_fresh_process(PATIENCE, measure_with_cache, os.fspath(folder), name, solver)
 
 
-class FirstCall(NamedTuple):
-    """A call to be measured in a worker's process, with the folder for what it compiles."""
-
-    name: str
-    solver: str
-    folder: str
-
-    def perform(self) -> Iterator[Message]:
-        """Yield what is measured; the compiler reads its settings only now."""
-        os.environ["NUMBA_CACHE_DIR"] = self.folder
-        try:
-            yield Found(measure(self.name, self.solver))
-            yield Done()
-        except Exception as error:
-            yield Unfit(said(error))
+def measure_with_cache(folder: str, name: str, solver: str) -> dict[str, Any]:
+    """Measure a call in a process that has not compiled yet: its settings are read only then."""
+    os.environ["NUMBA_CACHE_DIR"] = folder
+    return measure(name, solver)
 
 
 def measure(name: str, solver: str) -> dict[str, Any]:
@@ -105,47 +88,42 @@ def robot() -> tuple[Articulation, np.ndarray]:
 
 def on_the_robot(solver: str) -> Call:
     """Reach for a position and a rotation."""
-    arm, start = robot()
     target = Target([0.4, 0.1, 0.5], [0.0, 1.0, 0.0, 0.0])
-    return lambda: reference.solve_ik(arm, start, target, solver)
+    return partial(reference.solve_ik, *robot(), target, solver)
 
 
 def on_the_chain(solver: str) -> Call:
     """Reach for a position."""
-    skeleton, start = scenes.ball_chain()
-    return lambda: reference.solve_ik(skeleton, start, [0.3, 0.4, 0.2], solver)
+    return partial(reference.solve_ik, *scenes.ball_chain(), [0.3, 0.4, 0.2], solver)
 
 
 def along_a_curve(solver: str) -> Call:
     """Follow a circle."""
-    skeleton, _ = scenes.ball_chain()
     circle = 0.5 + 0.2 * reference.curves["circle"](20)
-    return lambda: reference.track(skeleton, circle, solver)
+    return partial(reference.track, scenes.ball_chain()[0], circle, solver)
 
 
 def posed(solver: str, count: int = 0) -> Call:
     """Pose a skeleton, or many."""
     skeleton, local = scenes.ball_chain()
     poses = np.tile(local, (count, 1, 1)) if count else local
-    return lambda: reference.forward_kinematics(skeleton, poses)
+    return partial(reference.forward_kinematics, skeleton, poses)
 
 
 def posed_robot(solver: str) -> Call:
     """Pose a robot."""
-    arm, start = robot()
-    return lambda: reference.forward_kinematics(arm, start)
+    return partial(reference.forward_kinematics, *robot())
 
 
 def derived(solver: str) -> Call:
     """Derive a robot's pose."""
-    arm, start = robot()
-    return lambda: jacobian(arm, start)
+    return partial(jacobian, *robot())
 
 
 def evened(solver: str) -> Call:
     """Resample a curve."""
     points = reference.curves["heart"](100)
-    return lambda: reference.resample(points, min_spacing=0.01, max_spacing=0.02)
+    return partial(reference.resample, points, min_spacing=0.01, max_spacing=0.02)
 
 
 def stepped(solver: str) -> Call:
@@ -156,8 +134,7 @@ def stepped(solver: str) -> Call:
 
 def stepped_explicitly(solver: str) -> Call:
     """Step a cloth explicitly."""
-    system, state = scenes.lab_cloth()
-    return lambda: reference.symplectic_euler(system, state, h=H)
+    return partial(reference.symplectic_euler, *scenes.lab_cloth(), h=H)
 
 
 # Public function and what it works on: its solvers, and what makes the call.

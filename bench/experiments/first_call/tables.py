@@ -3,49 +3,13 @@
 from collections.abc import Sequence
 
 from ...harness.record import Record
-from ...presentation.results import Results, label
-from ...presentation.tables import Column, Summary, Table, words
-
-
-def first_calls(results: Results) -> Table:
-    """Return the times of first calls."""
-    records = results.all("first_call")
-    return Table(
-        "first_calls",
-        "The first call in a process",
-        (
-            Column("function", words=True),
-            Column("by", words=True),
-            Column("compiled"),
-            Column("nothing on disk, processor", "s"),
-            Column("nothing on disk, wall", "s"),
-            Column("compiled before, processor", "s"),
-            Column("compiled before, wall", "s"),
-        ),
-        tuple(
-            (
-                record.title,
-                label(record.solver),
-                int(record.arrays["cold compiled"]),
-                *(float(record.arrays[name]) for name in TIMES),
-            )
-            for record in records
-        ),
-        shows="A kernel is compiled by the first call that needs it, and kept on disk; importing "
-        "the compiler is part of the first call, importing Plumbob is not. The third column counts "
-        "the kernels compiled, each with all that it calls.",
-        measured="Each in two fresh processes, the first with an empty folder for what is "
-        "compiled.",
-        summary=_summary(records),
-    )
-
-
-TIMES = ("cold processor", "cold wall", "warm processor", "warm wall")
+from ...presentation.columns import number, text, titled
+from ...presentation.layout import Layout
+from ...presentation.results import label
+from ...presentation.tables import Summary, words
 
 
 def _summary(records: Sequence[Record]) -> Summary:
-    if not records:
-        return Summary()
     dearest = max(records, key=lambda record: float(record.arrays["cold processor"]))
     warm = max(float(record.arrays["warm processor"]) for record in records)
     return Summary(
@@ -53,3 +17,28 @@ def _summary(records: Sequence[Record]) -> Summary:
         f"{label(dearest.solver)}, takes {words(float(dearest.arrays['cold processor']))} s of the "
         f"processor; once compiled, no first call takes more than {words(warm)} s."
     )
+
+
+first_calls = Layout(
+    "What does the first call cost, which compiles?",
+    "first_calls",
+    "The first call in a process",
+    subjects=lambda results: results.all("first_call"),
+    columns=(
+        titled("function"),
+        text("by", lambda record: label(record.solver)),
+        number("compiled", "cold compiled"),
+        number("nothing on disk, processor", "cold processor", "s"),
+        number("nothing on disk, wall", "cold wall", "s"),
+        number("compiled before, processor", "warm processor", "s"),
+        number("compiled before, wall", "warm wall", "s"),
+    ),
+    shows="A kernel is compiled by the first call that needs it, and kept on disk; importing "
+    "the compiler is part of the first call, importing Plumbob is not. The third column counts "
+    "the kernels compiled, each with all that it calls.",
+    measured="Each in two fresh processes, the first with an empty folder for what is compiled.",
+    summary=_summary,
+)
+
+
+LAYOUTS = (first_calls,)

@@ -6,61 +6,30 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, counted, label, settings
-from ...presentation.tables import Cell, Column, Summary, Table, words
+from ...presentation.columns import SOLVER, number, text
+from ...presentation.layout import Layout
+from ...presentation.results import counted, settings
+from ...presentation.tables import Column, Summary, words
 
 
-def certified(results: Results) -> Table:
-    """Return every answer with its residuals, the proven distance or why there is none."""
-    records = results.all("newton")
-    return Table(
-        "newton_certified",
-        "One step of a cloth in mid-swing: which answers are proven",
-        (
-            Column("stiffness", "N/m"),
-            Column("solver", words=True),
-            Column("from", words=True),
-            Column("iterations"),
-            Column("residual"),
-            Column("residual in MuJoCo’s forces"),
-            Column("a minimiser within", "m"),
-            Column("bound", words=True),
-            Column("to Newton’s answer", "m"),
-            Column("error"),
-            Column("g above Newton’s", "kg m²"),
-            Column("Newton’s minimiser", words=True),
-        ),
-        tuple(_row(record) for record in records),
-        shows="Within the distance there is a minimiser of g, and only one: proven, with all "
-        "rounding allowed for, from the Newton step, the least eigenvalue of the Hessian and how "
-        "fast the Hessian may change. Where there is no bound the column says why, and error and g "
-        "are all there is. The error is |x − x*| / |y − x*| for Newton’s answer x*.",
-        measured=f"The lab’s cloth of {_sizes(records)} particles under 9.81 m/s², half a second "
-        f"after it was let go; one step of {settings(records, 'h')} s, to a residual of "
-        f"{settings(records, 'tolerance')}, the rounding floor, or the solver’s last iteration.",
-        summary=_summary(records),
-    )
+def _distance(record: Record) -> float | None:
+    distance = float(record.arrays["distance"])
+    return distance if np.isfinite(distance) else None
 
 
-def _row(record: Record) -> tuple[Cell, ...]:
-    found = record.arrays
-    distance = float(found["distance"])
-    return (
-        _stiffness(record),
-        label(record.solver),
-        record.settings["start"],
-        int(found["iterations"]),
-        *(float(found[name]) for name in ("residual", "balance")),
-        distance if np.isfinite(distance) else None,
-        "yes" if found["covered"] else record.notes["coverage"].lower().replace("_", " "),
-        *(float(found[name]) for name in ("apart", "error", "above")),
-        "yes" if found["same"] else "no" if found["different"] else "not proven",
-    )
+def _bound(record: Record) -> str:
+    if record.arrays["covered"]:
+        return "yes"
+    return record.notes["coverage"].lower().replace("_", " ")
+
+
+def _same(record: Record) -> str:
+    if record.arrays["same"]:
+        return "yes"
+    return "no" if record.arrays["different"] else "not proven"
 
 
 def _summary(records: Sequence[Record]) -> Summary:
-    if not records:
-        return Summary()
     newton = [record for record in records if record.solver == "newton"]
     others = [record for record in records if record.solver != "newton"]
     done = metrics.share(np.array([_is_solved(record) for record in newton]))
@@ -79,10 +48,41 @@ def _is_solved(record: Record) -> bool:
     return bool(found["at_floor"]) or float(found["residual"]) <= record.settings["tolerance"]
 
 
-def _stiffness(record: Record) -> float:
-    return float(record.facts["stiffness"])
-
-
 def _sizes(records: Sequence[Record]) -> str:
     sizes = sorted({int(record.arrays["size"]) for record in records})
     return " or ".join(f"{size} × {size}" for size in sizes) or "–"
+
+
+certified = Layout(
+    "Which answers to a hard step are proven?",
+    "newton_certified",
+    "One step of a cloth in mid-swing: which answers are proven",
+    subjects=lambda results: results.all("newton"),
+    columns=(
+        Column("stiffness", "N/m", read=lambda record: float(record.facts["stiffness"])),
+        SOLVER,
+        text("from", lambda record: record.settings["start"]),
+        number("iterations"),
+        number("residual"),
+        number("residual in MuJoCo’s forces", "balance"),
+        Column("a minimiser within", "m", read=_distance),
+        text("bound", _bound),
+        number("to Newton’s answer", "apart", "m"),
+        number("error"),
+        number("g above Newton’s", "above", "kg m²"),
+        text("Newton’s minimiser", _same),
+    ),
+    shows="Within the distance there is a minimiser of g, and only one: proven, with all "
+    "rounding allowed for, from the Newton step, the least eigenvalue of the Hessian and how "
+    "fast the Hessian may change. Where there is no bound the column says why, and error and g "
+    "are all there is. The error is |x − x*| / |y − x*| for Newton’s answer x*.",
+    measured=lambda records: (
+        f"The lab’s cloth of {_sizes(records)} particles under 9.81 m/s², half a second "
+        f"after it was let go; one step of {settings(records, 'h')} s, to a residual of "
+        f"{settings(records, 'tolerance')}, the rounding floor, or the solver’s last iteration."
+    ),
+    summary=_summary,
+)
+
+
+LAYOUTS = (certified,)

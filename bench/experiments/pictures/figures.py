@@ -1,11 +1,12 @@
 """Pictures of the scenes, seen in parallel projection: SVG for the report, GIF for `show`."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.colors import LogNorm, to_rgba
 from numpy.typing import NDArray
 
@@ -16,7 +17,7 @@ from . import ARM, CLOTH
 
 Floats = NDArray[np.float64]
 
-# Where the camera stands: turned about the vertical and lifted above the floor [rad].
+# Where the camera stands: rotated about the vertical and lifted above the floor [rad].
 ARM_VIEW = (np.radians(200.0), np.radians(50.0))
 CLOTH_VIEW = (np.radians(-38.0), np.radians(18.0))
 # Shades of the scale of spacings: few enough to be drawn as shapes rather than as an image.
@@ -42,10 +43,12 @@ def arm_draws(results: Results) -> Drawing | None:
         bar.set_label("distance to the next point [m], log scale")
         bar.outline.set_visible(False)
         return finished(
-            figure, "arm_draws", "The lab’s arm draws the custom curve",
+            figure,
+            "arm_draws",
+            "The lab’s arm draws the custom curve",
             "The arm hangs from its root above; the drawing lies in the plane y = 0. Fainter poses "
             "are earlier frames.",
-        )  # fmt: skip
+        )
 
 
 def falling_cloth(results: Results) -> Drawing | None:
@@ -62,9 +65,11 @@ def falling_cloth(results: Results) -> Drawing | None:
             draw_cloth(ax, positions, arrays["pinned"])
             ax.set_title(f"{time:.1f} s", fontweight="normal", loc="center")
         return finished(
-            figure, "falling_cloth", "The lab’s cloth swings from two corners",
+            figure,
+            "falling_cloth",
+            "The lab’s cloth swings from two corners",
             "Every step converged by Newton. The pinned corners are marked.",
-        )  # fmt: skip
+        )
 
 
 def draw_arm(ax: Axes, joints: Floats, alpha: float = 1.0) -> None:
@@ -109,13 +114,12 @@ def seen(points: Floats, view: tuple[float, float]) -> tuple[Floats, Floats, Flo
     return right, up, np.sin(height) * y + np.cos(height) * toward
 
 
-def _points_by_spacing(ax: Axes, record: Record):
+def _points_by_spacing(ax: Axes, record: Record) -> PathCollection:
     x, y, _ = seen(record.arrays["curve"][:-1], ARM_VIEW)
     shades = mpl.colormaps["viridis"].resampled(SHADES)
-    return ax.scatter(
-        x, y, c=record.arrays["spacing"], s=4, linewidths=0, cmap=shades, zorder=5,
-        norm=LogNorm(1e-4, 1),
-    )  # fmt: skip
+    dots: dict[str, Any] = {"s": 4, "linewidths": 0, "zorder": 5}
+    spacing, norm = record.arrays["spacing"], LogNorm(1e-4, 1)
+    return ax.scatter(x, y, c=spacing, cmap=shades, norm=norm, **dots)
 
 
 def _ghosts(ax: Axes, ghosts: Floats) -> None:

@@ -22,15 +22,11 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """Yield the drawings with the first solver, and the cloth; the same at every scale."""
     solver = next(iter(IK_SOLVERS))
     for evened in (False, True):
-        yield Block(
-            "pictures", f"arm/{CUSTOM}", solver, partial(drawing, solver, evened),
-            {"evened": evened, "min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING},
-            facts={"task": ARM},
-        )  # fmt: skip
-    yield Block(
-        "pictures", "cloth/x1", "newton", falling_cloth,
-        {"h": H, "frames": FRAMES}, facts={"task": CLOTH},
-    )  # fmt: skip
+        settings = {"evened": evened, "min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
+        measure, facts = partial(drawing, solver, evened), {"task": ARM}
+        yield Block("pictures", f"arm/{CUSTOM}", solver, measure, settings, facts=facts)
+    settings, facts = {"h": H, "frames": FRAMES}, {"task": CLOTH}
+    yield Block("pictures", "cloth/x1", "newton", falling_cloth, settings, facts=facts)
 
 
 def drawing(solver: str, evened: bool) -> Measured:
@@ -38,15 +34,15 @@ def drawing(solver: str, evened: bool) -> Measured:
     skeleton, rest = scenes.lab_arm()
     curve = evened_custom_curve() if evened else custom_curve()
     motion = track(skeleton, curve, solver, rest)
-    turns = metrics.rotation_angles(motion.local_rotations[:, :-1])
+    angles = metrics.rotation_angles(motion.local_rotations[:, :-1])
     ghosts = np.linspace(0, len(curve) - 1, GHOSTS).round().astype(int)
     return Measured(
         {
             "curve": curve,
             "residual": motion.residual,
             "iterations": motion.iterations,
-            "largest_angle": turns.max(axis=-1),
-            "mean_angle": turns.mean(axis=-1),
+            "largest_angle": angles.max(axis=-1),
+            "mean_angle": angles.mean(axis=-1),
             "spacing": np.linalg.norm(np.diff(curve, axis=0), axis=-1),
             "ghosts": motion.positions[ghosts],
         }

@@ -4,61 +4,60 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, label, listed, settings, solvers
-from ...presentation.tables import Cell, Column, Summary, Table, words
-from . import ARM
+from ...presentation.columns import LARGEST, MEDIAN, spread, spread_of, text, words_in
+from ...presentation.layout import Layout
+from ...presentation.results import label, listed, settings, solvers
+from ...presentation.tables import Column, Summary, words
+from . import ARM, figures
 
 
-def resampling(results: Results) -> Table:
-    """Return what resampling makes of the custom curve."""
-    records = results.all("pictures", task=ARM)
-    return Table(
-        "resampling",
-        "The custom curve before and after resampling",
-        (
-            Column("curve", words=True),
-            Column("points"),
-            Column("gap, least", "m"),
-            Column("gap, median", "m"),
-            Column("gap, largest", "m"),
-            Column("rotation of a joint, mean", "°"),
-            Column("rotation of a joint, largest", "°"),
-            Column("iterations, largest"),
-            Column("residual, largest", "m"),
-        ),
-        tuple(_resampling_row(record) for record in records),
-        shows="The gap is the distance between neighbouring points; rotations are geodesic angles "
-        "between neighbouring frames, a frame a point.",
-        measured=f"Gaps kept from {settings(records, 'min_spacing')} to "
-        f"{settings(records, 'max_spacing')} m; {listed([label(s) for s in solvers(records)])}, "
-        "each frame started from the last solution.",
-        summary=_resampling_summary(records),
-    )
+def _curve(record: Record) -> str:
+    return "resampled" if record.settings["evened"] else "as drawn"
 
 
-def _resampling_row(record: Record) -> tuple[Cell, ...]:
-    gap = metrics.spread(record.arrays["spacing"])
-    largest, mean = _rotations(record)
-    return (
-        "resampled" if record.settings["evened"] else "as drawn",
-        len(record.arrays["curve"]), metrics.extent(record.arrays["spacing"])[0], gap.median,
-        gap.largest, mean, largest, metrics.whole(record.arrays["iterations"])[2],
-        metrics.spread(record.arrays["residual"]).largest,
-    )  # fmt: skip
+def _least_gap(record: Record) -> float:
+    return metrics.extent(record.arrays["spacing"])[0]
 
 
-def _rotations(record: Record) -> tuple[float, float]:
-    """Return the largest and the mean rotation of a joint [°]."""
-    return (
-        metrics.degrees(metrics.spread(record.arrays["largest_angle"]).largest),
-        metrics.degrees(metrics.mean(record.arrays["mean_angle"])),
-    )
+def _mean_angle(record: Record) -> float:
+    return metrics.mean(record.arrays["mean_angle"])
 
 
-def _resampling_summary(records: Sequence[Record]) -> Summary:
+def _summary(records: Sequence[Record]) -> Summary:
     points = [
-        f"{row[0]}: {words(row[1])} points, {words(row[2])} to {words(row[4])} m apart; a joint "
-        f"rotates by up to {words(row[6])}° between frames"
-        for row in map(_resampling_row, records)
+        f"{_curve(record)}: {words(len(record.arrays['curve']))} points, "
+        f"{words(_least_gap(record))} to {words(spread_of(record, 'spacing')[2])} m apart; a joint "
+        f"rotates by up to {words_in(spread_of(record, 'largest_angle')[2], '°')} between frames"
+        for record in records
     ]
     return Summary("How evenly the points lie, and how smoothly the arm follows:", tuple(points))
+
+
+resampling = Layout(
+    "What does resampling the custom curve change?",
+    "resampling",
+    "The custom curve before and after resampling",
+    subjects=lambda results: results.all("pictures", task=ARM),
+    columns=(
+        text("curve", _curve),
+        Column("points", read=lambda record: len(record.arrays["curve"])),
+        Column("gap, least", "m", read=_least_gap),
+        *spread("gap", "spacing", "m", (MEDIAN, LARGEST)),
+        Column("rotation of a joint, mean", "°", read=_mean_angle),
+        *spread("rotation of a joint", "largest_angle", "°", [LARGEST]),
+        *spread("iterations", "iterations", of=[LARGEST]),
+        *spread("residual", "residual", "m", [LARGEST]),
+    ),
+    shows="The gap is the distance between neighbouring points; rotations are geodesic angles "
+    "between neighbouring frames, a frame a point.",
+    measured=lambda records: (
+        f"Gaps kept from {settings(records, 'min_spacing')} to "
+        f"{settings(records, 'max_spacing')} m; {listed([label(s) for s in solvers(records)])}, "
+        "each frame started from the last solution."
+    ),
+    summary=_summary,
+    figures=(figures.arm_draws,),
+)
+
+
+LAYOUTS = (resampling,)

@@ -24,7 +24,7 @@ from . import problem as published
 _TARGETS = 5
 _BUDGET = 15.0
 _SEED = 2011
-_ITERATIONS = 10_000
+_LIMITS: dict[str, Any] = {"tolerance": published.FABRIK_TOLERANCE, "max_iterations": 10_000}
 # The solvers fast enough for 10,000 targets, with restarts as TRAC-IK has them.
 _FAST = (registry.OURS, registry.TOOLBOX, registry.TRAC_IK)
 
@@ -48,12 +48,10 @@ def blocks(scale: Scale) -> Iterator[Block]:
             facts: dict[str, Any] = {"task": TOOLBOX, "title": "ur5", "infeasible": infeasible}
             yield _block("published/toolbox/ur5", run, count, facts)
     for stratum, distance in published.FABRIK_DISTANCES.items():
+        about = {"task": FABRIK, "stratum": stratum}
         for solver in published.FABRIK:
-            yield Block(
-                SUITE, f"published/fabrik/{stratum}", solver, partial(iterations, solver, distance),
-                {"tolerance": published.FABRIK_TOLERANCE, "max_iterations": _ITERATIONS},
-                facts={"task": FABRIK, "stratum": stratum},
-            )  # fmt: skip
+            measure = partial(iterations, solver, distance)
+            yield Block(SUITE, f"published/fabrik/{stratum}", solver, measure, _LIMITS, facts=about)
 
 
 def _toolbox() -> Iterator[tuple[Peer, Entry, float | None]]:
@@ -85,8 +83,5 @@ def iterations(solver: str, distance: float) -> Measured:
     skeleton, rest = scenes.ball_chain(links=published.FABRIK_LINKS)
     rng = np.random.default_rng(_SEED)
     targets = distance * unit(rng.standard_normal((published.FABRIK_RUNS, 3)))
-    solution = solve_ik(
-        skeleton, rest, targets, solver,
-        tolerance=published.FABRIK_TOLERANCE, max_iterations=_ITERATIONS,
-    )  # fmt: skip
+    solution = solve_ik(skeleton, rest, targets, solver, **_LIMITS)
     return Measured({"iterations": solution.iterations, "residual": solution.residual})

@@ -1,65 +1,42 @@
 """Robots and characters from files of others: how closely both engines agree with the reference."""
 
 from collections.abc import Sequence
+from functools import partial
 
 from ...harness.record import Record
-from ...presentation.results import Results, counted, listed, problems, settings
-from ...presentation.tables import Cell, Column, Summary, Table, words
+from ...presentation.columns import text
+from ...presentation.layout import Layout
+from ...presentation.results import by_problem, counted, listed, problems, settings
+from ...presentation.tables import Column, Summary, words
 
-SIZES = ("links", "joints", "freedoms")
-QUANTITIES = ("positions", "rotations", "jacobians")
-
-
-def agreement(results: Results) -> Table:
-    """Return a row a file: its size, the largest differences, and what an engine does otherwise."""
-    records = results.all("robot_models")
-    return Table(
-        "robot_models",
-        "Robots and characters from files, beside both engines",
-        (
-            Column("file", words=True),
-            Column("links"),
-            Column("moving joints"),
-            Column("freedoms"),
-            Column("positions, of the extent"),
-            Column("rotations"),
-            Column("Jacobians"),
-            Column("engines", words=True),
-            Column("but", words=True),
-        ),
-        tuple(_row([r for r in records if r.problem == name]) for name in problems(records)),
-        shows="The reference reads each file itself. Differences are the largest of all links in "
-        "all configurations; positions are measured against the extent of the links, "
-        "Jacobians against that and one radian. An engine that is known to place links elsewhere "
-        "is left out of the numbers, and the cause is given.",
-        measured=f"{settings(records, 'configurations') or 'No'} random configurations of each "
-        "file, within the limits; links and joints are matched by name.",
-        summary=_summary(records),
-    )
+SIZES = {"links": "links", "moving joints": "joints", "freedoms": "freedoms"}
+QUANTITIES = {
+    "positions, of the extent": "positions",
+    "rotations": "rotations",
+    "Jacobians": "jacobians",
+}
 
 
-def _row(records: Sequence[Record]) -> tuple[Cell, ...]:
-    agreeing = [record for record in records if _agrees(record)]
-    found: list[Cell] = [None] * (len(SIZES) + len(QUANTITIES))
-    if agreeing:  # an engine that leaves mimic joints free counts more joints than there are
-        fullest = min(agreeing, key=lambda record: (record.arrays["freedoms"], record.solver))
-        found = [int(fullest.arrays[name]) for name in SIZES]
-        found += [_largest(agreeing, name) for name in QUANTITIES]
-    return (
-        records[0].title,
-        *found,
-        listed([record.solver for record in agreeing]) or "none",
-        "; ".join(remark for record in records if (remark := _remark(record))),
-    )
+def _all(files: Sequence[Sequence[Record]]) -> list[Record]:
+    return [record for file in files for record in file]
 
 
-def _agrees(record: Record) -> bool:
-    """Return whether a record has numbers that a fault of the engine has no part in."""
-    return "links" in record.arrays and not record.notes["cause"]
+def _size(file: Sequence[Record], name: str) -> int | None:
+    """Return a size by the engine that counts fewest: one that leaves mimics free counts more."""
+    agreeing = _agreeing(file)
+    if not agreeing:
+        return None
+    fullest = min(agreeing, key=lambda record: (record.arrays["freedoms"], record.solver))
+    return int(fullest.arrays[name])
 
 
-def _largest(records: Sequence[Record], quantity: str) -> float:
-    return max(float(record.arrays[quantity]) for record in records)
+def _agreeing(file: Sequence[Record]) -> list[Record]:
+    """Return the records with numbers that a fault of the engine has no part in."""
+    return [r for r in file if "links" in r.arrays and not r.notes["cause"]]
+
+
+def _most(file: Sequence[Record], name: str) -> float | None:
+    return max((float(record.arrays[name]) for record in _agreeing(file)), default=None)
 
 
 def _remark(record: Record) -> str:
@@ -67,31 +44,56 @@ def _remark(record: Record) -> str:
     if "links" not in record.arrays:
         return record.notes["unread"]
     if record.notes["cause"]:
-        off = max(_largest([record], quantity) for quantity in QUANTITIES)
+        off = max(float(record.arrays[quantity]) for quantity in QUANTITIES.values())
         return f"{record.solver} is off by {words(off)}: {record.notes['cause']}"
     if record.notes["free mimics"]:
         return f"{record.solver} with mimic joints left free: {record.notes['free mimics']}"
     return ""
 
 
-def _summary(records: Sequence[Record]) -> Summary:
-    agreeing = [record for record in records if _agrees(record)]
+def _summary(files: Sequence[Sequence[Record]]) -> Summary:
+    records = _all(files)
+    agreeing = _agreeing(records)
     if not agreeing:
         return Summary()
-    worst = [words(_largest(agreeing, quantity)) for quantity in QUANTITIES]
-    points = []
-    for engine in dict.fromkeys(record.solver for record in records):
-        mine = [record for record in records if record.solver == engine]
-        read = [record for record in mine if "links" in record.arrays]
-        off = sum(bool(record.notes["cause"]) for record in read)
-        points.append(
-            f"{engine}: {words(len(read))} of {counted(len(mine), 'file')} read, "
-            f"{words(off)} of them otherwise than MuJoCo's documentation says"
-            if off
-            else f"{engine}: {words(len(read))} of {counted(len(mine), 'file')} read"
-        )
+    worst = [words(_most(agreeing, quantity)) for quantity in QUANTITIES.values()]
     return Summary(
         f"Over {counted(len(problems(agreeing)), 'file')} positions differ by at most {worst[0]} "
         f"of the extent, rotations by {worst[1]}, Jacobians by {worst[2]}:",
-        tuple(points),
+        tuple(_reads(records, engine) for engine in dict.fromkeys(r.solver for r in records)),
     )
+
+
+def _reads(records: Sequence[Record], engine: str) -> str:
+    mine = [record for record in records if record.solver == engine]
+    read = [record for record in mine if "links" in record.arrays]
+    off = sum(bool(record.notes["cause"]) for record in read)
+    otherwise = f", {words(off)} of them otherwise than MuJoCo's documentation says" if off else ""
+    return f"{engine}: {words(len(read))} of {counted(len(mine), 'file')} read{otherwise}"
+
+
+agreement = Layout(
+    "On which robots and characters do they agree?",
+    "robot_models",
+    "Robots and characters from files, beside both engines",
+    columns=(
+        text("file", lambda file: file[0].title),
+        *(Column(title, read=partial(_size, name=name)) for title, name in SIZES.items()),
+        *(Column(title, read=partial(_most, name=name)) for title, name in QUANTITIES.items()),
+        text("engines", lambda file: listed([r.solver for r in _agreeing(file)]) or "none"),
+        text("but", lambda file: "; ".join(filter(None, map(_remark, file)))),
+    ),
+    subjects=lambda results: by_problem(results.all("robot_models")).values(),
+    shows="The reference reads each file itself. Differences are the largest of all links in "
+    "all configurations; positions are measured against the extent of the links, "
+    "Jacobians against that and one radian. An engine that is known to place links elsewhere "
+    "is left out of the numbers, and the cause is given.",
+    measured=lambda files: (
+        f"{settings(_all(files), 'configurations') or 'No'} random configurations of each "
+        "file, within the limits; links and joints are matched by name."
+    ),
+    summary=_summary,
+)
+
+
+LAYOUTS = (agreement,)

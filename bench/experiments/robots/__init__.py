@@ -1,8 +1,4 @@
 """Robots and characters: every installed inverse-kinematics solver on the same targets."""
 
-from ...harness.experiment import Experiment
-
 # What a record is about: targets within reach of a robot, or out of it.
 REACHABLE, UNREACHABLE = "reachable", "unreachable"
-
-EXPERIMENT = Experiment(__package__, suite="ik", chapter="robots")

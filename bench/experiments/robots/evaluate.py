@@ -1,7 +1,7 @@
 """Evaluate solutions of inverse kinematics by MuJoCo's kinematics of the robot's own text.
 
 It shares no code with the reference, and measures the same for every solver: the distance and the
-angle of each tip from its target, and by how much a joint is beyond its limits.
+angle of each effector from its target, and by how much a joint is beyond its limits.
 """
 
 import functools
@@ -20,18 +20,18 @@ LIMIT_TOLERANCE = 1e-6
 
 
 class Tolerance(NamedTuple):
-    """When a tip has reached its target."""
+    """When an effector has reached its target."""
 
     position: float
     rotation: float
 
 
 class Targets(NamedTuple):
-    """Where tips are wanted.
+    """Where effectors are wanted.
 
     Attributes:
-        positions: [m], (target, tip, 3).
-        rotations: matrices, (target, tip, 3, 3).
+        positions: [m], (target, effector, 3).
+        rotations: matrices, (target, effector, 3, 3).
         starts: coordinates to start from, (target, coordinate).
         strata: the number of each target's stratum, (target,).
     """
@@ -46,8 +46,8 @@ class Evaluation(NamedTuple):
     """What the answers come to, one entry a target.
 
     Attributes:
-        position: the farthest tip's distance from its target [m]; NaN if there is no answer.
-        rotation: the largest angle of a tip from its target [rad]; zero where none is wanted.
+        position: the farthest effector's distance from its target [m]; NaN if there is no answer.
+        rotation: the largest angle of an effector from its target [rad]; zero where none is wanted.
         beyond: by how much the worst joint is beyond its limit [rad].
         solved: whether all three are within tolerance.
     """
@@ -74,32 +74,32 @@ class Evaluator:
         self.robot = robot
         self.model = mujoco_model(robot)
         self._data = mujoco.MjData(self.model)
-        self._tips = [self.model.body(tip).id for tip in robot.tips]
+        self._effectors = [self.model.body(effector).id for effector in robot.effectors]
 
     def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the tips' positions (..., tip, 3) [m] and rotations (..., tip, 3, 3)."""
+        """Return the effectors' positions [m], (..., effector, 3), and rotations, (..., 3, 3)."""
         rows = q.reshape(-1, q.shape[-1])
-        positions = np.empty((len(rows), len(self._tips), 3))
-        rotations = np.empty((len(rows), len(self._tips), 9))
+        positions = np.empty((len(rows), len(self._effectors), 3))
+        rotations = np.empty((len(rows), len(self._effectors), 9))
         for i, row in enumerate(rows):
-            self._place(row)
-            positions[i] = self._data.xpos[self._tips]
-            rotations[i] = self._data.xmat[self._tips]
+            self._update_kinematics(row)
+            positions[i] = self._data.xpos[self._effectors]
+            rotations[i] = self._data.xmat[self._effectors]
         batch = q.shape[:-1]
         return (
             positions.reshape(*batch, -1, 3),
-            rotations.reshape(*batch, len(self._tips), 3, 3),
+            rotations.reshape(*batch, len(self._effectors), 3, 3),
         )
 
     def jacobians(self, q: FloatArray) -> FloatArray:
-        """Return the Jacobians of the tips' positions and rotations, (row, 6 tip, freedom)."""
-        J = np.empty((len(q), 6 * len(self._tips), self.model.nv))
+        """Return the Jacobians of positions and rotations, (row, 6 effector, freedom)."""
+        J = np.empty((len(q), 6 * len(self._effectors), self.model.nv))
         for i, row in enumerate(q):
-            self._place(row)
+            self._update_kinematics(row)
             mujoco.mj_comPos(self.model, self._data)
-            for k, tip in enumerate(self._tips):
+            for k, effector in enumerate(self._effectors):
                 linear, angular = J[i, 6 * k : 6 * k + 3], J[i, 6 * k + 3 : 6 * k + 6]
-                mujoco.mj_jacBody(self.model, self._data, linear, angular, tip)
+                mujoco.mj_jacBody(self.model, self._data, linear, angular, effector)
         return J
 
     def evaluate(self, targets: Targets, q: FloatArray, tolerance: Tolerance) -> Evaluation:
@@ -118,7 +118,7 @@ class Evaluator:
         )
         return Evaluation(distance, angle, over, solved)
 
-    def _place(self, q: FloatArray) -> None:
+    def _update_kinematics(self, q: FloatArray) -> None:
         self._data.qpos[:] = q
         mujoco.mj_kinematics(self.model, self._data)
 

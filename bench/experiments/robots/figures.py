@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from ...harness.record import Record
-from ...presentation.entry import Figure
 from ...presentation.figures import Drawing, canvas, every_handle, finished, nth_style, written
+from ...presentation.layout import Figure
 from ...presentation.results import Results
-from . import tables as robots
+from . import readings
 
 PANELS = 3
 
@@ -26,7 +26,7 @@ def robot_curves(
     """
 
     def draw(results: Results) -> Drawing | None:
-        panels = curves(robots.records_of(results, kind), along)
+        panels = curves(readings.records_of(results, kind), along)
         if not panels:
             return None
         names = list(dict.fromkeys(solver for panel in panels.values() for solver in panel))
@@ -48,25 +48,17 @@ def robot_curves(
     return draw
 
 
-def _budget_curves(records: list[Record], along: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
-    panels: dict[str, dict[str, np.ndarray]] = {}
-    for record in robots.measured(records):
-        panel = panels.setdefault(record.title, {})
-        panel[record.solver] = robots.budget_curve(record, along)
-    return panels
-
-
 def budgets(kind: str) -> Figure:
     """Return the figure of the targets solved within a time, by solvers of one kind."""
     return robot_curves(
-        f"budget_{robots.KINDS[kind]}",
+        f"budget_{readings.KINDS[kind]}",
         kind,
         (
             f"Robots, {kind}: targets solved within a time",
             "time for each target [s]",
             "Share of the targets within reach that are solved within so much time for each.",
         ),
-        _budget_curves,
+        readings.budget_curves,
         np.logspace(-6, 0, 121),
     )
 
@@ -74,7 +66,7 @@ def budgets(kind: str) -> Figure:
 def profiles(kind: str) -> Figure:
     """Return the figure of performance profiles of solvers of one kind."""
     return robot_curves(
-        f"profile_{robots.KINDS[kind]}",
+        f"profile_{readings.KINDS[kind]}",
         kind,
         (
             f"Robots, {kind}: performance profiles",
@@ -82,6 +74,6 @@ def profiles(kind: str) -> Figure:
             "Share of the targets that a solver solves within so many times the time of the "
             "fastest on that target; where a line ends is what it solves at all.",
         ),
-        robots.profiles,
+        readings.profiles,
         np.logspace(0, 4, 121),
     )

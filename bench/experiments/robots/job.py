@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...harness.stopwatch import Budget, timed
-from ...harness.worker import Done, Message, Ready, Solved, Unfit, said
+from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
 from ...peers.ik.protocol import Ask, Solve, SolverOutput, UnableError
 from ...peers.ik.restarts import restarted
 from .evaluate import Targets, Tolerance
@@ -41,26 +41,26 @@ class Job(NamedTuple):
 
     def perform(self) -> Iterator[Message]:
         """Yield what comes of it, each part as soon as it is there."""
-        return perform(self)
+        try:
+            adapter = importlib.import_module(self.module)
+            ask, setup = timed(lambda: _prepared(adapter, self))
+            _solve(_asked(ask, self, 0), self)  # may compile
+        except UnableError as error:
+            yield Unfit(str(error))
+        except Exception as error:  # whatever an engine raises is its result
+            yield Unfit(describe(error))
+        else:
+            yield Ready(setup)
+            yield from _solved(ask, self)
+            yield Done()
 
 
-def perform(job: Job) -> Iterator[Message]:
-    """Yield what comes of a job, each part as soon as it is there."""
-    try:
-        adapter = importlib.import_module(job.module)
-        ask, setup = timed(lambda: _prepared(adapter, job))
-        _solve(_asked(ask, job, 0), job)  # may compile
-    except UnableError as error:
-        yield Unfit(str(error))
-        return
-    except Exception as error:  # whatever an engine raises is its result
-        yield Unfit(said(error))
-        return
-    yield Ready(setup)
+def _solved(ask: Ask, job: Job) -> Iterator[Solved]:
+    """Yield the targets one by one, for as long as the budget lasts."""
     budget, before = Budget(job.budget), None
     for i in range(len(job.targets.starts)):
         if budget.is_spent:
-            break
+            return
         solve = _asked(ask, job, i)
         if before is not None:  # so that caches are as in a loop of solves and nothing else
             with contextlib.suppress(Exception):
@@ -69,7 +69,6 @@ def perform(job: Job) -> Iterator[Message]:
         solved = _solve(solve, job)
         before = solve if solved.seconds < QUICK else None
         yield solved
-    yield Done()
 
 
 def _prepared(adapter: Any, job: Job) -> Ask:
@@ -85,15 +84,15 @@ def _asked(ask: Ask, job: Job, i: int) -> Solve:
 def _solve(solve: Solve, job: Job) -> Solved:
     trouble, starts = "", job.targets.starts
 
-    def attempt() -> SolverOutput:
+    def solve_once() -> SolverOutput:
         nonlocal trouble
         try:
             return solve()
         except Exception as error:  # one target lost, not the rest
-            trouble = said(error)
+            trouble = describe(error)
             return SolverOutput(None, False)
 
-    answer, seconds = timed(attempt)
+    answer, seconds = timed(solve_once)
     nothing = np.full(starts.shape[-1], np.nan)
     q = nothing if answer.q is None else np.array(answer.q, dtype=float)
     if q.shape != nothing.shape:

@@ -111,10 +111,8 @@ def solve(run: Run, targets: Targets) -> Measured:
     time until it was given up; targets never begun do not count.
     """
     robot = evaluator_of(run.robot).robot
-    job = Job(
-        run.peer.module, robot, targets, run.tolerance, run.entry.settings,
-        run.entry.restarts, run.budget,
-    )  # fmt: skip
+    asked, entry = (run.peer.module, robot, targets, run.tolerance), run.entry
+    job = Job(*asked, entry.settings, entry.restarts, run.budget)
     outcome = worker_process().perform(job)
     done = outcome.solved
     if outcome.lost and len(done) < len(targets.starts):
@@ -126,7 +124,7 @@ def solve(run: Run, targets: Targets) -> Measured:
         {"remark": outcome.trouble},
         {
             "strata": list(STRATA),
-            "tips": list(robot.tips),
+            "tips": list(robot.effectors),  # as the file of records calls them
             "joints": len(robot.joints),
             "freedom": int(evaluator_of(run.robot).model.nv),
             "wanted": "pose" if robot.posed else "position",

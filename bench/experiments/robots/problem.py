@@ -1,9 +1,9 @@
 """Robots: arms cut out of the URDFs of example-robot-data, one of our own making, a character.
 
-An arm is the chain of links from a root to a tip. Everything that is not kinematics is dropped from
-the file, and so are soft limits, which some readers take for the limits. Continuous joints are
-limited to two revolutions in either direction, so that every solver has one number a joint. All
-solvers and the evaluation read this same text.
+An arm is the chain of links from a root to an effector. Everything that is not kinematics is
+dropped from the file, and so are soft limits, which some readers take for the limits. Continuous
+joints are limited to two revolutions in either direction, so that every solver has one number a
+joint. All solvers and the evaluation read this same text.
 """
 
 import functools
@@ -21,7 +21,7 @@ from reference.arguments import FloatArray, choice
 
 PACKAGE = "example-robot-data"
 _FOLDER = "cmeel.prefix/share/example-robot-data/robots"
-TWO_TURNS = 4.0 * math.pi
+TWO_REVOLUTIONS = 4.0 * math.pi
 
 
 class AbsentError(Exception):
@@ -37,19 +37,19 @@ class Robot:
         title: how it is written.
         text: URDF of a chain, or MJCF of a tree.
         root: the link or body that stands still.
-        tips: the links or bodies that are to reach a target.
+        effectors: the links or bodies that are to reach a target.
         joints: the joints that move, in the order of the coordinates.
         lower: least coordinates [rad], (coordinate,); -inf for those of balls.
         upper: the greatest.
         balls: where the quaternions of balls, w first, begin among the coordinates.
-        posed: whether the tips' rotations are wanted as well as their positions.
+        posed: whether the effectors' rotations are wanted as well as their positions.
     """
 
     name: str
     title: str
     text: str
     root: str
-    tips: tuple[str, ...]
+    effectors: tuple[str, ...]
     joints: tuple[str, ...]
     lower: FloatArray
     upper: FloatArray
@@ -58,8 +58,8 @@ class Robot:
 
     @property
     def is_chain(self) -> bool:
-        """Whether it is a chain of hinges, as URDF says it, with one tip."""
-        return not self.balls and len(self.tips) == 1
+        """Whether it is a chain of hinges, as URDF says it, with one effector."""
+        return not self.balls and len(self.effectors) == 1
 
     def draw(self, rng: np.random.Generator, count: int) -> FloatArray:
         """Return random coordinates, (count, coordinate): hinges even, balls rotated by about 1."""
@@ -85,7 +85,7 @@ class _Arm(NamedTuple):
     title: str
     file: str
     root: str
-    tip: str
+    effector: str
 
 
 _ARMS = {
@@ -95,10 +95,12 @@ _ARMS = {
     "ur5": _Arm("UR5", "ur_description/urdf/ur5_robot.urdf", "base_link", "tool0"),
     "xarm7": _Arm("xArm7", "xarm_description/urdf/xarm7.urdf", "link_base", "link_eef"),
     "pr2": _Arm(
-        "PR2, right arm", "pr2_description/urdf/pr2.urdf", "torso_lift_link",
+        "PR2, right arm",
+        "pr2_description/urdf/pr2.urdf",
+        "torso_lift_link",
         "r_wrist_roll_link",
     ),
-}  # fmt: skip
+}
 # Heights of the joints above each other [m], axes and limits [°] of the KUKA LBR iiwa 14 R820, by
 # the maker's data sheet; the flange is 0.126 m above the wrist.
 _IIWA = (
@@ -143,7 +145,7 @@ def title(name: str) -> str:
 
 
 def links(chain: Robot) -> list[Link]:
-    """Return the steps of an arm from its root to its tip."""
+    """Return the steps of an arm from its root to its effector."""
     steps = []
     for joint in ElementTree.fromstring(chain.text).findall("joint"):
         origin = joint.find("origin")
@@ -166,21 +168,22 @@ def _folder() -> Path:
 
 
 def _chain(name: str, arm: _Arm, text: str) -> Robot:
-    joints = _joints_between(ElementTree.fromstring(text), arm.root, arm.tip)
+    joints = _joints_between(ElementTree.fromstring(text), arm.root, arm.effector)
     moving = [joint for joint in joints if joint.get("type") != "fixed"]
     limits = np.array([_limits(joint) for joint in moving])
-    return Robot(
-        name, arm.title, _urdf(name, arm.root, joints), arm.root, (arm.tip,),
-        tuple(joint.get("name", "") for joint in moving), limits[:, 0], limits[:, 1],
-    )  # fmt: skip
+    names = tuple(joint.get("name", "") for joint in moving)
+    text = _urdf(name, arm.root, joints)
+    return Robot(name, arm.title, text, arm.root, (arm.effector,), names, *limits.T)
 
 
-def _joints_between(tree: ElementTree.Element, root: str, tip: str) -> list[ElementTree.Element]:
+def _joints_between(
+    tree: ElementTree.Element, root: str, effector: str
+) -> list[ElementTree.Element]:
     above = {_link(joint, "child"): joint for joint in tree.findall("joint")}
     joints: list[ElementTree.Element] = []
-    while tip != root:
-        joints.insert(0, above[tip])
-        tip = _link(above[tip], "parent")
+    while effector != root:
+        joints.insert(0, above[effector])
+        effector = _link(above[effector], "parent")
     return joints
 
 
@@ -192,12 +195,12 @@ def _link(joint: ElementTree.Element, end: str) -> str:
 def _limits(joint: ElementTree.Element) -> tuple[float, float]:
     limit = joint.find("limit")
     if joint.get("type") == "continuous" or limit is None:
-        return -TWO_TURNS / 2, TWO_TURNS / 2
+        return -TWO_REVOLUTIONS / 2, TWO_REVOLUTIONS / 2
     return float(limit.get("lower", "0")), float(limit.get("upper", "0"))
 
 
 def _urdf(name: str, root: str, joints: Sequence[ElementTree.Element]) -> str:
-    """Return a URDF of these joints alone; every link has the mass that some readers insist on."""
+    """Return a URDF of only these joints; every link has the mass that some readers insist on."""
     tree = ElementTree.Element("robot", name=name)
     for link in (root, *(_link(joint, "child") for joint in joints)):
         inertial = ElementTree.SubElement(
@@ -269,11 +272,9 @@ def _character() -> Robot:
             balls.append(len(lower))
         lower += [-math.inf] * 4 if hinge is None else [hinge[1]]
         upper += [math.inf] * 4 if hinge is None else [hinge[2]]
-    return Robot(
-        CHARACTER, title(CHARACTER), _mjcf(), _PELVIS, tuple(hand for hand, _ in _HANDS.values()),
-        tuple(name for name, *_ in _BONES), np.array(lower), np.array(upper), tuple(balls),
-        posed=False,
-    )  # fmt: skip
+    hands, joints = (tuple(name for name, *_ in of) for of in (_HANDS.values(), _BONES))
+    known = (CHARACTER, title(CHARACTER), _mjcf(), _PELVIS, hands, joints)
+    return Robot(*known, np.array(lower), np.array(upper), tuple(balls), posed=False)
 
 
 def _mjcf() -> str:

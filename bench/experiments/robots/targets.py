@@ -1,4 +1,4 @@
-"""Where the tips of robots are wanted: strata, all from seeded poses, so that they can be reached.
+"""Targets for the effectors of robots: strata, all from seeded poses, so that they can be reached.
 
 Targets come from a pool of random poses within the limits. Those of a stratum are drawn from the
 poses of the pool that belong to it. Unreachable ones are made up: they lie farther from the first
@@ -17,7 +17,7 @@ from .problem import ALL, links
 
 STRATA = {
     "joint space": "uniform in joint space",
-    "space": "the tip uniform in the space that it reaches",
+    "space": "the effector uniform in the space that it reaches",
     "outer shell": "the twentieth of the poses that reach farthest from the root",
     "near the root": "the twentieth that stay nearest to it",
     "near singular": "the twentieth with the smallest least singular value of the Jacobian",
@@ -26,7 +26,7 @@ STRATA = {
 # Poses in the pool for each target of a stratum, and the share that makes an extreme stratum.
 _POOL = 40
 _EXTREME = 0.05
-# Cells a side of the grid by which tips are spread evenly over space.
+# Cells a side of the grid by which effectors are spread evenly over space.
 _CELLS = 12
 _SEED = 1986
 
@@ -53,13 +53,13 @@ def robot_targets(name: str, count: int) -> Targets:
 def stratum_poses(
     evaluator: Evaluator, rng: np.random.Generator, count: int
 ) -> dict[str, FloatArray]:
-    """Return the poses whose tips are the targets, (count, coordinate) for each stratum."""
+    """Return the poses whose effectors are the targets, (count, coordinate) for each stratum."""
     pool = evaluator.robot.draw(rng, _POOL * count)
-    tips, _ = evaluator.forward(pool)
-    distance = np.linalg.norm(tips - root(evaluator), axis=-1).max(axis=-1)
+    effectors, _ = evaluator.forward(pool)
+    distance = np.linalg.norm(effectors - root(evaluator), axis=-1).max(axis=-1)
     chosen = [
         pool[:count],
-        pool[spread(rng, tips, count)],
+        pool[spread(rng, effectors, count)],
         pool[_extreme(rng, -distance, count)],
         pool[_extreme(rng, distance, count)],
         pool[_extreme(rng, least_singular_values(evaluator, pool), count)],
@@ -103,9 +103,9 @@ def uniform_targets(name: str, count: int, middle: bool) -> Targets:
 
 def least_singular_values(evaluator: Evaluator, q: FloatArray) -> FloatArray:
     """Return the least singular value of each pose's Jacobian, lengths in units of the reach."""
-    J = evaluator.jacobians(q).reshape(len(q), len(evaluator.robot.tips), 2, 3, -1)
+    J = evaluator.jacobians(q).reshape(len(q), len(evaluator.robot.effectors), 2, 3, -1)
     J[:, :, 0] /= farthest(evaluator)
-    if not evaluator.robot.posed:  # the tips' rotations do not count
+    if not evaluator.robot.posed:  # the effectors' rotations do not count
         J = J[:, :, :1]
     values = np.linalg.svd(J.reshape(len(q), -1, J.shape[-1]), compute_uv=False)
     return np.asarray(values[:, -1], dtype=float)
@@ -116,12 +116,12 @@ def _extreme(rng: np.random.Generator, measure: FloatArray, count: int) -> Float
     return rng.choice(least, count, replace=False)
 
 
-def spread(rng: np.random.Generator, tips: FloatArray, count: int) -> FloatArray:
-    """Return the numbers of poses whose first tip is spread over all cells that any tip is in.
+def spread(rng: np.random.Generator, effectors: FloatArray, count: int) -> FloatArray:
+    """Return the numbers of poses whose first effector is spread over all cells that one is in.
 
     A cell is drawn first, then one of the poses within.
     """
-    points = tips[:, 0]
+    points = effectors[:, 0]
     edge = np.ptp(points, axis=0).max() / _CELLS
     cells = np.unique((points // edge).astype(int), axis=0, return_inverse=True)[1].ravel()
     order = rng.permutation(len(points))
@@ -144,10 +144,10 @@ def _at_a_limit(rng: np.random.Generator, evaluator: Evaluator, count: int) -> F
 def _unreachable(
     rng: np.random.Generator, evaluator: Evaluator, count: int
 ) -> tuple[FloatArray, FloatArray]:
-    tips = len(evaluator.robot.tips)
-    distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (count, tips, 1))
-    positions = root(evaluator) + distance * unit(rng.standard_normal((count, tips, 3)))
-    w, x, y, z = np.moveaxis(random_rotations(rng, count, tips), -1, 0)
+    effectors = len(evaluator.robot.effectors)
+    distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (count, effectors, 1))
+    positions = root(evaluator) + distance * unit(rng.standard_normal((count, effectors, 3)))
+    w, x, y, z = np.moveaxis(random_rotations(rng, count, effectors), -1, 0)
     rotations = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
@@ -164,10 +164,10 @@ def root(evaluator: Evaluator) -> FloatArray:
 
 
 def farthest(evaluator: Evaluator) -> float:
-    """Return a distance from the first joint that no tip exceeds [m]: all its links in a row."""
+    """Return a distance from the first joint that no effector exceeds [m]: its links in a row."""
     lengths = []
-    for tip in evaluator.robot.tips:
-        body, length = evaluator.model.body(tip).id, 0.0
+    for effector in evaluator.robot.effectors:
+        body, length = evaluator.model.body(effector).id, 0.0
         first = evaluator.model.jnt_bodyid[0]
         while body not in (first, 0):
             length += float(np.linalg.norm(evaluator.model.body_pos[body]))

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from reference.arguments import FloatArray
 from reference.backend.compiled import Kernel
 from reference.backend.threads import in_slices
 
@@ -101,7 +102,7 @@ def streaming(
     return Case(work, LIMIT, prepare, operations, read + 2 * written, cores=cores)
 
 
-def stream(source, sink):
+def stream(source: FloatArray, sink: FloatArray) -> None:
     """Fill a sink, longer than the source, by adding one to each number and going on with ones."""
     for i in range(len(source)):
         sink[i] = source[i] + 1.0

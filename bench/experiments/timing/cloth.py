@@ -26,7 +26,7 @@ MUJOCO = "MuJoCo"
 
 
 def cases() -> Iterator[Case]:
-    """Yield one frame of 1/60 s in four ways, at two stiffnesses, and of a larger cloth."""
+    """Yield one frame of 1/60 s by four methods, at two stiffnesses, and of a larger cloth."""
     for factor in FACTORS:
         problem = cloth_swing(factor)
         written = f"stiffness × {factor:g}"
@@ -47,10 +47,8 @@ def cases() -> Iterator[Case]:
 
 def local_global(problem: ClothSwing) -> Callable[[], Any]:
     """Return one step of a fixed number of local/global iterations, factorised beforehand."""
-    integrator = ImplicitEuler(
-        problem.system, h=problem.h, solver="local_global", tolerance=0.0,
-        max_iterations=ITERATIONS,
-    )  # fmt: skip
+    limits: dict[str, Any] = {"tolerance": 0.0, "max_iterations": ITERATIONS}
+    integrator = ImplicitEuler(problem.system, h=problem.h, solver="local_global", **limits)
     return partial(integrator.step, moving(problem))
 
 

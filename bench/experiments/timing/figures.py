@@ -1,11 +1,12 @@
 """Medians of the timing: a row for each work, a mark for each that does it."""
 
+from typing import Any
+
 from matplotlib.axes import Axes
 
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
-from ...presentation.entry import Figure
 from ...presentation.figures import (
     COLOURS,
     Drawing,
@@ -15,6 +16,7 @@ from ...presentation.figures import (
     plain_powers,
     written,
 )
+from ...presentation.layout import Figure
 from ...presentation.results import Results, by_problem, solvers
 
 
@@ -37,9 +39,11 @@ def timing(subject: str, unit: str, scale: float, title: str) -> Figure:
             axes[0].invert_yaxis()
             figure.legend(loc="outside upper right", ncols=3)
             return finished(
-                figure, f"timing_{subject}", title,
+                figure,
+                f"timing_{subject}",
+                title,
                 "Further left is faster; each line of the grid is ten times the one before.",
-            )  # fmt: skip
+            )
 
     return draw
 
@@ -51,15 +55,16 @@ def _timing_marks(ax: Axes, records: list[Record], works: list[str], scale: floa
         colour, _, marker = registry.find(solver).style
         filled = "none" if solver == registry.PLAIN.name else None
         mine = [record for record in records if record.solver == solver]
-        ax.plot(
-            [scale * metrics.timing(record.arrays["seconds"]).median for record in mine],
-            [works.index(record.problem) for record in mine],
-            marker, markersize=11 if solver == registry.LIMIT.name else 5.5, markeredgewidth=1.4,
-            color=COLOURS[colour], markerfacecolor=filled,
-            linestyle="none", label=written(solver),
-        )  # fmt: skip
+        style: dict[str, Any] = {"color": COLOURS[colour], "markerfacecolor": filled}
+        style |= {"linestyle": "none", "markeredgewidth": 1.4, "label": written(solver)}
+        size = 11 if solver == registry.LIMIT.name else 5.5
+        x = [scale * metrics.timing(record.arrays["seconds"]).median for record in mine]
+        y = [works.index(record.problem) for record in mine]
+        ax.plot(x, y, marker, markersize=size, **style)
 
 
-kinematics = timing("kinematics", "ns", 1e9, "Time of forward kinematics, for one pose")
-inverse_kinematics = timing("ik", "µs", 1e6, "Time of inverse kinematics, for one solve")
-cloth = timing("cloth", "µs", 1e6, "Time of a cloth step, for one frame")
+TIMINGS = {
+    "kinematics": timing("kinematics", "ns", 1e9, "Time of forward kinematics, for one pose"),
+    "ik": timing("ik", "µs", 1e6, "Time of inverse kinematics, for one solve"),
+    "cloth": timing("cloth", "µs", 1e6, "Time of a cloth step, for one frame"),
+}

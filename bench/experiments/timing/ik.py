@@ -30,10 +30,8 @@ def cases() -> Iterator[Case]:
         for solver in IK_SOLVERS:
             work = Work(f"ik/{stratum}/{solver}", "ik", stratum, registry.find(solver).label)
             yield Case(work, COMPILED, partial(one_by_one, stratum, solver, TARGETS), TARGETS)
-            yield Case(
-                work, PLAIN, partial(one_by_one, stratum, solver, FEW_TARGETS), FEW_TARGETS,
-                backend="python",
-            )  # fmt: skip
+            few = partial(one_by_one, stratum, solver, FEW_TARGETS)
+            yield Case(work, PLAIN, few, FEW_TARGETS, backend="python")
             calls = f"{TARGETS} targets a call"
             batch = work._replace(problem=f"{work.problem}/{calls}", title=f"{work.title}, {calls}")
             yield Case(batch, COMPILED, partial(at_once, stratum, solver), TARGETS)

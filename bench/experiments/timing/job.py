@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from ...harness.record import Key
-from ...harness.worker import Done, Found, Message, Unfit, said
+from ...harness.worker import Done, Found, Message, Unfit, describe
 from .case import Case
 from .cases import cases
 
@@ -35,7 +35,7 @@ class Timed:
     def pytest_exception_interact(self, call: pytest.CallInfo[Any]) -> None:
         """Keep what the case raised first."""
         if call.excinfo is not None and isinstance(call.excinfo.value, Exception):
-            self.trouble = self.trouble or said(call.excinfo.value)
+            self.trouble = self.trouble or describe(call.excinfo.value)
 
 
 class TimingJob(NamedTuple):
@@ -68,7 +68,7 @@ def _run(timed: Timed, options: list[str]) -> str:
 def arguments(seconds: float, storage: str) -> list[str]:
     """Return pytest's arguments: no configuration but ours, and so many seconds for the case.
 
-    pytest-benchmark makes a folder for results of its own, which `storage` keeps out of the way.
+    pytest-benchmark makes a folder for results of its own, which lies in `storage`.
     """
     here = Path(__file__).parent
     return [

@@ -30,10 +30,8 @@ def timed(case: Case, seconds: float) -> Measured:
     Raises:
         RuntimeError: if there are no rounds; the message says why.
     """
-    outcome = worker_process().perform(TimingJob(case.key, seconds))
-    if outcome.found is None:
-        raise RuntimeError(outcome.trouble)
-    rounds = np.array(outcome.found["seconds"]) / case.operations
+    found = worker_process().find(TimingJob(case.key, seconds))
+    rounds = np.array(found["seconds"]) / case.operations
     return Measured({"seconds": rounds, "moved": np.array(case.moved / case.operations)})
 
 

@@ -1,128 +1,99 @@
 """How long forward kinematics, solves and steps take, beside the engines and a limit."""
 
 from collections.abc import Sequence
+from functools import partial
+from typing import NamedTuple
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...presentation.columns import at, text
+from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem
-from ...presentation.tables import Cell, Column, Summary, Table, words
+from ...presentation.tables import Column, Summary, in_unit, words
+from . import figures
 from .case import COMPILED, LIMIT, PLAIN
 
 
-def kinematics(results: Results) -> Table:
-    """Return the time of forward kinematics."""
-    return _table(
-        results,
-        "kinematics",
-        "timing_kinematics",
-        "Time of forward kinematics, for one pose",
-        "ns",
-        1e9,
-        "All joints’ positions and rotations. We check and normalise the quaternions given and "
-        "return arrays; an engine’s results stay inside it. The limit reads as many bytes as the "
-        "rotations given have and writes as many as positions and rotations have, by a compiled "
-        "loop into memory that is there already; its bandwidth counts that memory is read before "
-        "it is written.",
-    )
+class Timed(NamedTuple):
+    """A time, beside those of the same work by our compiled source and by the limit."""
+
+    record: Record
+    ours: Record | None
+    limit: Record | None
+
+    @property
+    def timing(self) -> metrics.Timing:
+        """Where the rounds lie [s]."""
+        return metrics.timing(self.record.arrays["seconds"])
 
 
-def inverse_kinematics(results: Results) -> Table:
-    """Return the time of solves."""
-    return _table(
-        results,
-        "ik",
-        "timing_ik",
-        "Time of inverse kinematics, for one solve of the ten-ball chain",
-        "µs",
-        1e6,
-        "The same targets, random starts and tolerance as in the table of success. Beside our "
-        "Levenberg-Marquardt stands the same method as one Python loop on three kinematics.",
-    )
-
-
-def cloth(results: Results) -> Table:
-    """Return the time of cloth steps."""
-    return _table(
-        results,
-        "cloth",
-        "timing_cloth",
-        "Time of a cloth step, for one frame",
-        "µs",
-        1e6,
-        "The state is written into MuJoCo and read back, as a caller would. The limit of "
-        "local/global iterations counts their triangular solves alone: the factor’s nonzeros, read "
-        "twice an iteration.",
-    )
-
-
-def _table(
-    results: Results, subject: str, name: str, title: str, unit: str, scale: float, shows: str
-) -> Table:
+def _timed(subject: str, results: Results) -> list[Timed]:
     records = results.all("timing", subject=subject)
-    limits = {record.problem: record for record in records if record.solver == LIMIT}
-    ours = {record.problem: record for record in records if record.solver == COMPILED}
-    doers = [record for record in records if record.solver != LIMIT]
-    columns = (
-        Column("work", words=True),
-        Column("by", words=True),
-        Column("median", unit),
-        Column("10th percentile", unit),
-        Column("90th percentile", unit),
-        Column("rounds"),
-        Column("of our compiled time"),
+    ours, limits = (
+        {record.problem: record for record in records if record.solver == solver}
+        for solver in (COMPILED, LIMIT)
     )
-    return Table(
-        name,
-        title,
-        columns + (LIMIT_COLUMNS if limits else ()),
-        tuple(
-            _row(record, ours.get(record.problem), scale)
-            + (_limit_cells(record, limits.get(record.problem)) if limits else ())
-            for record in doers
-        ),
-        shows=shows + (LIMIT_SENTENCE if limits else ""),
-        measured="pytest-benchmark, one core unless all are named, after a first call that may "
-        "compile; each time is a call’s divided by what it does. Spread over rounds of many calls.",
-        summary=_summary(doers, limits, unit, scale),
-    )
+    return [
+        Timed(record, ours.get(record.problem), limits.get(record.problem))
+        for record in records
+        if record.solver != LIMIT
+    ]
 
 
-LIMIT_COLUMNS = (Column("times the limit"), Column("bandwidth at the limit", "GB/s"))
+def _median(record: Record) -> float:
+    return metrics.timing(record.arrays["seconds"]).median
+
+
+def _multiple(record: Record, other: Record | None) -> float | None:
+    """Return a time over another's of the same work, None if there is none."""
+    if other is None or other is record:
+        return None
+    return metrics.ratio(_median(record), _median(other))
+
+
+def _bandwidth(timed: Timed) -> float | None:
+    if timed.limit is None:
+        return None
+    moved = float(timed.limit.arrays["moved"])
+    return metrics.gigabytes_per_second(moved, _median(timed.limit))
+
+
 LIMIT_SENTENCE = (
     " The limit is the time of moving as many bytes as have to be read and written at the least, "
     "in memory as near as theirs."
 )
+LIMIT_COLUMNS = (
+    Column("times the limit", read=lambda timed: _multiple(timed.record, timed.limit)),
+    Column("bandwidth at the limit", "GB/s", read=_bandwidth),
+)
 
 
-def _row(record: Record, ours: Record | None, scale: float) -> tuple[Cell, ...]:
-    took = metrics.timing(record.arrays["seconds"])
+def _columns(unit: str, works: Sequence[Timed]) -> tuple[Column, ...]:
+    places = ("median", "10th percentile", "90th percentile")
     return (
-        record.title,
-        record.solver,
-        scale * took.median,
-        scale * took.low,
-        scale * took.high,
-        took.rounds,
-        None if ours is None or ours is record else _times(record, ours),
+        text("work", lambda timed: timed.record.title),
+        text("by", lambda timed: timed.record.solver),
+        *(Column(name, unit, read=at(i, _timing)) for i, name in enumerate(places)),
+        Column("rounds", read=lambda timed: timed.timing.rounds),
+        Column("of our compiled time", read=lambda timed: _multiple(timed.record, timed.ours)),
+        *(LIMIT_COLUMNS if any(timed.limit for timed in works) else ()),
     )
 
 
-def _limit_cells(record: Record, limit: Record | None) -> tuple[Cell, ...]:
-    return (None, None) if limit is None else (_times(record, limit), _bandwidth(limit))
+def _timing(timed: Timed) -> metrics.Timing:
+    return timed.timing
 
 
-def _summary(
-    doers: Sequence[Record], limits: dict[str, Record], unit: str, scale: float
-) -> Summary:
+def _summary(unit: str, works: Sequence[Timed]) -> Summary:
     """Say who takes how long for what, plain Python left out, a point for each group of works."""
+    limits = {timed.record.problem: timed.limit for timed in works}
     groups: dict[str, list[str]] = {}
-    for problem, records in by_problem(doers).items():
+    for problem, records in by_problem(timed.record for timed in works).items():
         group, work = records[0].facts["group"], records[0].facts["work"]
         mine = [record for record in records if record.solver != PLAIN]
-        times = ", ".join(f"{_short(r.solver)} {words(scale * _median(r))}" for r in mine)
-        beside = ""
-        if mine and problem in limits:
-            beside = f" ({words(_times(mine[0], limits[problem]))} times the limit)"
+        times = ", ".join(f"{_short(r.solver)} {words(in_unit(_median(r), unit))}" for r in mine)
+        multiple = _multiple(mine[0], limits[problem]) if mine else None
+        beside = "" if multiple is None else f" ({words(multiple)} times the limit)"
         groups.setdefault(group, []).append(f"{work}: {times} {unit}{beside}")
     points = (f"{group} – {'; '.join(works)}" for group, works in groups.items())
     return Summary("Medians, plain Python left out:", tuple(points))
@@ -132,13 +103,49 @@ def _short(solver: str) -> str:
     return "Plumbob" if solver == COMPILED else solver
 
 
-def _bandwidth(limit: Record) -> float:
-    return metrics.gigabytes_per_second(float(limit.arrays["moved"]), _median(limit))
+def _layout(question: str, subject: str, title: str, unit: str, shows: str) -> Layout:
+    return Layout(
+        question,
+        f"timing_{subject}",
+        title,
+        subjects=partial(_timed, subject),
+        columns=partial(_columns, unit),
+        shows=lambda works: shows + (LIMIT_SENTENCE if any(timed.limit for timed in works) else ""),
+        measured="pytest-benchmark, one core unless all are named, after a first call that may "
+        "compile; each time is a call’s divided by what it does. Spread over rounds of many calls.",
+        summary=partial(_summary, unit),
+        figures=(figures.TIMINGS[subject],),
+    )
 
 
-def _times(record: Record, other: Record) -> float:
-    return metrics.ratio(_median(record), _median(other))
+kinematics = _layout(
+    "Forward kinematics",
+    "kinematics",
+    "Time of forward kinematics, for one pose",
+    "ns",
+    "All joints’ positions and rotations. We check and normalise the quaternions given and "
+    "return arrays; an engine’s results stay inside it. The limit reads as many bytes as the "
+    "rotations given have and writes as many as positions and rotations have, by a compiled "
+    "loop into memory that is there already; its bandwidth counts that memory is read before "
+    "it is written.",
+)
+inverse_kinematics = _layout(
+    "Inverse kinematics",
+    "ik",
+    "Time of inverse kinematics, for one solve of the ten-ball chain",
+    "µs",
+    "The same targets, random starts and tolerance as in the table of success. Beside our "
+    "Levenberg-Marquardt stands the same method as one Python loop on three kinematics.",
+)
+cloth = _layout(
+    "A step of the cloth",
+    "cloth",
+    "Time of a cloth step, for one frame",
+    "µs",
+    "The state is written into MuJoCo and read back, as a caller would. The limit of "
+    "local/global iterations counts only their triangular solves: the factor’s nonzeros, read "
+    "twice an iteration.",
+)
 
 
-def _median(record: Record) -> float:
-    return metrics.timing(record.arrays["seconds"]).median
+LAYOUTS = (kinematics, inverse_kinematics, cloth)

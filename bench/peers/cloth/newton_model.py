@@ -78,7 +78,7 @@ def model(system: MassSpring, *, own_colours: bool = False) -> Any:
 def colours(springs: IndexArray, particle_count: int) -> list[IndexArray]:
     """Return groups of particles, no two of one group joined by a spring.
 
-    Each particle in turn takes the first colour that none of its neighbours has.
+    One after the other, each particle takes the first colour that none of its neighbours has.
     """
     neighbours: list[list[int]] = [[] for _ in range(particle_count)]
     for i, j in springs.tolist():

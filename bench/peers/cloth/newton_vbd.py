@@ -1,7 +1,7 @@
 """Newton, the engine: vertex block descent, which minimises the objective of implicit Euler.
 
-Chen et al. 2024, "Vertex Block Descent". Each particle in turn takes a Newton step of its own,
-those of one colour at once; so neighbours must differ in colour.
+Chen et al. 2024, "Vertex Block Descent". One after the other, each particle takes a Newton step of
+its own, those of one colour at once; so neighbours must differ in colour.
 """
 
 from functools import partial

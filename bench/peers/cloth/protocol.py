@@ -2,12 +2,13 @@
 
 An adapter is a module with one function, `prepare(system, frame, **settings)`: it sets the engine
 up once for particles and springs and returns what moves them on, a frame at a time. Only `advance`
-is timed, so conversions cost no solver anything, and set-up is timed apart.
+is timed, so conversions cost no solver anything, and set-up is timed apart. For a system that it
+cannot move `prepare` raises a `ValueError`.
 """
 
 from typing import Protocol
 
-from reference import MassSpring, State
+from reference import State
 from reference.arguments import FloatArray
 
 
@@ -26,14 +27,3 @@ class Mover(Protocol):
 
     def positions(self) -> FloatArray:
         """Return where the particles are now [m], (particle, 3), not finite if they blew up."""
-
-
-class Prepare(Protocol):
-    """Sets a solver up."""
-
-    def __call__(self, system: MassSpring, frame: float, **settings: float | str) -> Mover:
-        """Return the solver, set up for a system and frames of so many seconds.
-
-        Raises:
-            ValueError: if it cannot move this system; the message says why.
-        """

@@ -17,11 +17,14 @@ def prepare(
     """Return one of `STEP_SOLVERS`; without a tolerance, so many iterations in every step."""
     return _Steps(
         ImplicitEuler(
-            system, h=frame / substeps, solver=solver, tolerance=tolerance,
+            system,
+            h=frame / substeps,
+            solver=solver,
+            tolerance=tolerance,
             max_iterations=iterations,
         ),
         substeps,
-    )  # fmt: skip
+    )
 
 
 class _Steps:

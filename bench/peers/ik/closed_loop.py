@@ -1,6 +1,6 @@
 """Pinocchio's closed-loop inverse kinematics, as its documentation gives it.
 
-The error of the tip is the logarithm of the transform from it to its target, the velocity
+The error of the effector is the logarithm of the transform from it to its target, the velocity
 v = -J' (J J' + damping I)^-1 e, the step 0.1 s, at most 1,000 of them. It looks at no limits.
 """
 
@@ -24,7 +24,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 1000) -> Ask:
     """Return the loop, set up for a robot."""
     model = pinocchio_model(robot)
     data = model.createData()
-    frames = [model.getFrameId(tip) for tip in robot.tips]
+    frames = [model.getFrameId(effector) for effector in robot.effectors]
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
         targets = [pinocchio.SE3(R, x) for R, x in zip(rotations, positions, strict=True)]
@@ -54,7 +54,7 @@ def _error(
     targets: Sequence[pinocchio.SE3],
     posed: bool,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the error of all tips and its derivative, of positions alone unless posed."""
+    """Return the error of all effectors and its derivative, only of positions unless posed."""
     pinocchio.computeJointJacobians(model, data, q)
     pinocchio.updateFramePlacements(model, data)
     errors, slopes = [], []

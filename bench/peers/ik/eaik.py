@@ -59,7 +59,7 @@ def within(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 def axes_at_zero(robot: Robot) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return axes (joint, 3), offsets between them (joint + 1, 3), and the tip's rotation.
+    """Return axes (joint, 3), offsets between them (joint + 1, 3), and the effector's rotation.
 
     All are in the frame of the root, with every joint at zero.
     """

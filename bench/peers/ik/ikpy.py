@@ -1,6 +1,6 @@
 """ikpy: SciPy's least squares over the chain's transforms, within its limits.
 
-It solves for the last link of a chain, which is the tip here, and does not say whether it did.
+It solves for the last link of a chain, which is the effector here, and does not say whether it did.
 """
 
 import tempfile

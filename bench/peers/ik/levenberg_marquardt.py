@@ -19,7 +19,7 @@ class Kinematics(Protocol):
         """Return where `jacobian` has put a joint [m], (3,)."""
 
     def jacobian(self, q: FloatArray, joint: int) -> FloatArray:
-        """Place, and return the joint's velocity per velocity coordinate, (3, 3 joint)."""
+        """Update forward kinematics; return the joint's velocity per velocity, (3, 3 joint)."""
 
     def integrate(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Return the coordinates reached from q by moving with the velocity v for 1 s."""

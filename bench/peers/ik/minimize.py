@@ -1,7 +1,7 @@
 """mujoco.minimize: box-constrained nonlinear least squares (Gauss-Newton with damping).
 
-The residual is the tip's displacement and rotation vector from the target, with the Jacobians of
-both. It works on coordinates, not on rotations, so it takes hinges only.
+The residual is the effector's displacement and rotation vector from the target, with the Jacobians
+of both. It works on coordinates, not on rotations, so it takes hinges only.
 """
 
 import mujoco
@@ -14,6 +14,8 @@ from ...experiments.robots.evaluate import Tolerance, mujoco_model
 from ...experiments.robots.problem import Robot
 from .protocol import Ask, Solve, SolverOutput, needs_a_chain
 
+SILENT = minimize.Verbosity.SILENT
+
 
 def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
     """Return the solver, set up for a robot."""
@@ -24,10 +26,8 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
         def solve() -> SolverOutput:
             reach.aim(positions[0], rotations[0])
-            q, _ = minimize.least_squares(
-                start[:, None], reach.residuals, bounds, reach.jacobian, max_iter=iterations,
-                verbose=minimize.Verbosity.SILENT,
-            )  # fmt: skip
+            asked = (start[:, None], reach.residuals, bounds, reach.jacobian)
+            q, _ = minimize.least_squares(*asked, max_iter=iterations, verbose=SILENT)
             left = np.linalg.norm(reach.residual(q.ravel()).reshape(2, 3), axis=-1)
             return SolverOutput(q.ravel(), bool((left <= tolerance).all()))
 
@@ -37,12 +37,12 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
 
 
 class _Reach:
-    """The residual of the tip from the target last aimed at: displacement and rotation vector."""
+    """The displacement and rotation vector of the effector from the target last aimed at."""
 
     def __init__(self, robot: Robot) -> None:
         self._model = mujoco_model(robot)
         self._data = mujoco.MjData(self._model)
-        self._tip = self._model.body(robot.tips[0]).id
+        self._effector = self._model.body(robot.effectors[0]).id
         self._position, self._rotation = np.zeros(3), np.zeros(4)
 
     def aim(self, position: FloatArray, rotation: FloatArray) -> None:
@@ -51,10 +51,10 @@ class _Reach:
 
     def residual(self, q: FloatArray) -> FloatArray:
         """Return displacement [m] and rotation vector [rad], (6,)."""
-        self._place(q)
+        self._update_kinematics(q)
         rotation_vector = np.empty(3)
-        mujoco.mju_subQuat(rotation_vector, self._rotation, self._data.xquat[self._tip])
-        return np.concatenate([self._data.xpos[self._tip] - self._position, rotation_vector])
+        mujoco.mju_subQuat(rotation_vector, self._rotation, self._data.xquat[self._effector])
+        return np.concatenate([self._data.xpos[self._effector] - self._position, rotation_vector])
 
     def residuals(self, columns: FloatArray) -> FloatArray:
         """Return the residual of each column, (6, column)."""
@@ -62,15 +62,17 @@ class _Reach:
 
     def jacobian(self, q: FloatArray, _: FloatArray) -> FloatArray:
         """Return the residual's derivative, (6, coordinate)."""
-        self._place(q.ravel())
+        self._update_kinematics(q.ravel())
         mujoco.mj_comPos(self._model, self._data)
         linear, angular = np.empty((3, self._model.nv)), np.empty((3, self._model.nv))
-        mujoco.mj_jacBody(self._model, self._data, linear, angular, self._tip)
+        mujoco.mj_jacBody(self._model, self._data, linear, angular, self._effector)
         slope = np.empty((3, 3))
-        mujoco.mjd_subQuat(self._rotation, self._data.xquat[self._tip], None, slope)
-        # The derivative is by rotation vectors in the tip's frame, J gives them in the world's.
-        return np.vstack([linear, slope @ self._data.xmat[self._tip].reshape(3, 3).T @ angular])
+        mujoco.mjd_subQuat(self._rotation, self._data.xquat[self._effector], None, slope)
+        # The derivative is by rotation vectors in the effector's frame, J has them in the world's.
+        return np.vstack(
+            [linear, slope @ self._data.xmat[self._effector].reshape(3, 3).T @ angular]
+        )
 
-    def _place(self, q: FloatArray) -> None:
+    def _update_kinematics(self, q: FloatArray) -> None:
         self._data.qpos[:] = q
         mujoco.mj_kinematics(self._model, self._data)

@@ -21,7 +21,10 @@ def prepare(
     configuration = mink.Configuration(mujoco_model(robot))
     limits = [mink.ConfigurationLimit(configuration.model)]
     cost = 1.0 if robot.posed else 0.0
-    tasks = [mink.FrameTask(tip, "body", 1.0, cost, lm_damping=lm_damping) for tip in robot.tips]
+    tasks = [
+        mink.FrameTask(effector, "body", 1.0, cost, lm_damping=lm_damping)
+        for effector in robot.effectors
+    ]
 
     def solved() -> bool:
         errors = np.array([task.compute_error(configuration) for task in tasks])

@@ -1,7 +1,7 @@
 """pink: differential inverse kinematics by quadratic programs, iterated to a target.
 
-Each step asks for all of the error at once (gain 1 over 1 s) within the joint limits. A tip whose
-rotation is not wanted has no cost for it. Velocity limits are left out: there is no motion here.
+Each step asks for all of the error at once (gain 1 over 1 s) within the joint limits. An effector
+without a target rotation has no cost for it. Velocity limits are left out: there is no motion here.
 """
 
 import numpy as np
@@ -22,7 +22,11 @@ def prepare(
     model = pinocchio_model(robot)
     data = model.createData()
     limits = [pink.limits.ConfigurationLimit(model)]
-    tasks = [pink.FrameTask(tip, 1.0, 1.0 if robot.posed else 0.0) for tip in robot.tips]
+    tasks = [
+        pink.FrameTask(effector, 1.0, 1.0 if robot.posed else 0.0) for effector in robot.effectors
+    ]
+
+    options = {"solver": "daqp", "damping": damping, "limits": limits, "safety_break": False}
 
     def solved(configuration: pink.Configuration) -> bool:
         errors = np.array([task.compute_error(configuration) for task in tasks])
@@ -43,10 +47,7 @@ def prepare(
             for _ in range(iterations):
                 if solved(configuration):
                     break
-                velocity = pink.solve_ik(
-                    configuration, tasks, 1.0, solver="daqp", damping=damping, limits=limits,
-                    safety_break=False,
-                )  # fmt: skip
+                velocity = pink.solve_ik(configuration, tasks, 1.0, **options)
                 configuration.integrate_inplace(velocity, 1.0)
             return SolverOutput(from_pinocchio(robot, configuration.q), solved(configuration))
 

@@ -22,15 +22,22 @@ def prepare(
     read = urdf.parse if robot.is_chain else mjcf.parse
     articulation = read(robot.text).articulation
     settings: dict[str, Any] = {
-        "solver": solver, "restarts": restarts, "max_iterations": iterations,
-        "tolerance": tolerance.position, "tolerance_rotation": tolerance.rotation,
-    }  # fmt: skip
+        "solver": solver,
+        "restarts": restarts,
+        "max_iterations": iterations,
+        "tolerance": tolerance.position,
+        "tolerance_rotation": tolerance.rotation,
+    }
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        quaternions = rotation.from_matrix(rotations) if robot.posed else [None] * len(robot.tips)
+        quaternions = (
+            rotation.from_matrix(rotations) if robot.posed else [None] * len(robot.effectors)
+        )
         targets = [
-            Target(position, quaternion, tip)
-            for position, quaternion, tip in zip(positions, quaternions, robot.tips, strict=True)
+            Target(position, quaternion, effector)
+            for position, quaternion, effector in zip(
+                positions, quaternions, robot.effectors, strict=True
+            )
         ]
 
         def solve() -> SolverOutput:

@@ -3,7 +3,8 @@
 An adapter is a module with one function, `prepare(robot, tolerance, **settings)`: it sets the
 engine up once for a robot and returns a function `ask(positions, rotations, start)`. That puts one
 target in the engine's own types and returns the call to be timed, which returns a `SolverOutput`:
-neither conversions nor set-up count as time of a solve.
+neither conversions nor set-up count as time of a solve. For a robot that it cannot solve `prepare`
+raises `UnableError`.
 """
 
 from collections.abc import Callable
@@ -11,7 +12,6 @@ from typing import NamedTuple, Protocol
 
 from reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
 
 
@@ -37,20 +37,9 @@ class Ask(Protocol):
         """Return the call that solves one target.
 
         Args:
-            positions: of the tips [m], (tip, 3).
-            rotations: of the tips, (tip, 3, 3).
+            positions: of the effectors [m], (effector, 3).
+            rotations: of the effectors, (effector, 3, 3).
             start: coordinates, (coordinate,).
-        """
-
-
-class Prepare(Protocol):
-    """Sets a solver up."""
-
-    def __call__(self, robot: Robot, tolerance: Tolerance, **settings: float | str) -> Ask:
-        """Return the solver, set up for a robot.
-
-        Raises:
-            ValueError: if it cannot solve this robot; the message says why.
         """
 
 
@@ -59,7 +48,7 @@ class UnableError(ValueError):
 
 
 def needs_a_chain(robot: Robot) -> None:
-    """Raise unless the robot is a chain of hinges with one tip.
+    """Raise unless the robot is a chain of hinges with one effector.
 
     Raises:
         UnableError: if it is not.

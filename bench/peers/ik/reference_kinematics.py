@@ -18,9 +18,9 @@ class ReferenceKinematics:
         return self._positions[joint]
 
     def jacobian(self, q: FloatArray, joint: int) -> FloatArray:
-        """Place, and return the joint's velocity per velocity coordinate, (3, 3 joint).
+        """Update forward kinematics; return the joint's velocity per velocity, (3, 3 joint).
 
-        A joint i of the path turns the arm r = x - x_i, and with it the effector, by R_i w x r:
+        A joint i of the path rotates the arm r = x - x_i, and with it the effector, by R_i w x r:
         its column for the axis a is (R_i a) x r.
         """
         self._positions, rotations = forward_kinematics(self.skeleton, q[self.columns])
@@ -33,5 +33,5 @@ class ReferenceKinematics:
 
     def integrate(self, q: FloatArray, v: FloatArray) -> FloatArray:
         """Return the coordinates reached from q by moving with the velocity v for 1 s."""
-        turned = rotation.multiply(q.reshape(-1, 4), rotation.exponential(v.reshape(-1, 3)))
-        return turned.ravel()
+        rotated = rotation.multiply(q.reshape(-1, 4), rotation.exponential(v.reshape(-1, 3)))
+        return rotated.ravel()

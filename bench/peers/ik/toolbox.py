@@ -41,9 +41,11 @@ def prepare(
     needs_a_chain(robot)
     chain = chain_of_transforms(robot)
     shared: dict[str, Any] = {
-        "ilimit": iterations, "slimit": searches, "joint_limits": limits,
+        "ilimit": iterations,
+        "slimit": searches,
+        "joint_limits": limits,
         "tol": HALF * min(tolerance) ** 2,
-    }  # fmt: skip
+    }
     run: Any = {"LM": chain.ik_LM, "NR": chain.ik_NR, "GN": chain.ik_GN}[method]
     if method == "LM":
         shared |= {"method": damping, "k": factor}

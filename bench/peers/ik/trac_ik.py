@@ -22,7 +22,7 @@ def prepare(robot: Robot, tolerance: Tolerance, seconds: float = 0.005) -> Ask:
     needs_a_chain(robot)
     eps = min(tolerance) / math.sqrt(3.0)
     engine = pytracik.TRAC_IK(
-        robot.root, robot.tips[0], robot.text, seconds, eps, pytracik.SolveType.Speed
+        robot.root, robot.effectors[0], robot.text, seconds, eps, pytracik.SolveType.Speed
     )
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:

@@ -9,7 +9,7 @@ import operator
 
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.typeconv import Conversion
+from numba.core.typeconv.castgraph import Conversion
 from numba.extending import (
     intrinsic,
     lower_builtin,

@@ -5,7 +5,8 @@ share, such as a skeleton's offsets, it reads as ever.
 """
 
 from ...quaternion import load_quaternion, load_vector, made_unit, store_quaternion, store_vector
-from ..compiled import PythonKernel, bind
+from ..compiled import bind
+from ..digest import PythonKernel
 from .lanes import (
     LANES,
     all_within,

@@ -169,7 +169,7 @@ class _Tree:
 
 def _check_free(body: Element, joints: list[_Joint], parent: int) -> None:
     if any(joint.kind == "free" for joint in joints) and (len(joints) > 1 or parent != 0):
-        raise body.error("expected a free joint alone, in a body that hangs on the world")
+        raise body.error("expected a single free joint, in a body of the world")
 
 
 def _chain(

@@ -168,7 +168,7 @@ def _from_axes(element: Element, axes: Sequence[float]) -> Quaternion:
     x = direction(element, "xyaxes", (axes[0], axes[1], axes[2]))
     y = direction(element, "xyaxes", (axes[3], axes[4], axes[5]))
     y = direction(element, "xyaxes", subtract(y, scale(dot(x, y), x)))
-    w, i, j, k = rotation.from_matrix(np.column_stack([x, y, cross(x, y)]))
+    w, i, j, k = rotation.from_matrix(np.transpose([x, y, cross(x, y)]))
     return float(w), float(i), float(j), float(k)
 
 

@@ -4,6 +4,7 @@ import gc
 
 import numpy as np
 import pytest
+from numba.core.compiler import Flags
 from numba.core.errors import TypingError
 
 from reference import IK_SOLVERS
@@ -92,6 +93,25 @@ def test_a_callee_is_not_made_machine_code_by_itself():
     (result,) = callee_of(fresh(polynomial)).overloads.values()
     assert isinstance(result.library, linking.LinkedLibrary)
     assert result.library.get_pointer_to_function(result.fndesc.llvm_func_name) == 0
+
+
+def twice(x):
+    return polynomial(x) + power(x, 4)
+
+
+def test_what_several_callees_call_is_linked_once():
+    dispatcher = compiled.compile_kernel(twice)
+    assert dispatcher(2.0) == twice(2.0)
+    (result,) = dispatcher.overloads.values()
+    linked = result.library._linking_libraries
+    callees = {one for one in linked if isinstance(one, linking.LinkedLibrary)}
+    assert sorted(len(list(one.get_defined_functions())) for one in callees) == [1, 1]
+
+
+def test_kernels_with_equal_options_share_them():
+    """Numba looks implementations up by them."""
+    one, other = (compiled.compile_kernel(fresh(plain))._compiler for plain in (once, twice))
+    assert one._customize_flags(Flags()) is other._customize_flags(Flags())
 
 
 @pytest.mark.parametrize(("large", "inlined"), [(10**6, True), (0, False)])

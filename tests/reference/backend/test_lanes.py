@@ -103,7 +103,7 @@ def test_a_row_of_a_tile_is_read_and_written_whole_and_no_other(copy, count, num
     assert (tile == before).all()
 
 
-def test_a_tile_in_the_middle_of_a_batch_leaves_its_neighbours_alone(numbers, backend):
+def test_a_tile_in_the_middle_of_a_batch_leaves_its_neighbours_as_they_are(numbers, backend):
     batch, given = numbers(3 * LANES, JOINTS, 3), numbers(LANES, JOINTS, 3)
     expected = batch.copy()
     expected[LANES : 2 * LANES, 1] = given[:, 2]

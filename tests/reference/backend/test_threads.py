@@ -56,10 +56,10 @@ def test_threads_are_kept_and_only_used_for_more_than_one_slice():
     with set_num_threads(2):
         several = set(in_slices(who, 100, lambda part: (), least=1))
         again = set(in_slices(who, 100, lambda part: (), least=1))
-        (alone,) = in_slices(who, 100, lambda part: (), least=100)
-    assert alone == who()
+        (single,) = in_slices(who, 100, lambda part: (), least=100)
+    assert single == who()
     assert len(several | again) <= 2
-    assert alone not in several | again
+    assert single not in several | again
 
 
 def test_threads_run_at_the_speed_in_force():

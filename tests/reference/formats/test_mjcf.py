@@ -359,8 +359,8 @@ WRONG = {
     "not a number": ('<body pos="nan 0 0"/>', "expected 3 numbers in 'pos', got 'nan 0 0'"),
     "another type": ('<body><joint type="screw"/></body>', "one of hinge, slide, ball, free"),
     "a joint of the world": ("<joint/>", "expected no joint in the world"),
-    "a free joint inside": ("<body><body><freejoint/></body></body>", "a free joint alone"),
-    "a free joint and another": ("<body><freejoint/><joint/></body>", "a free joint alone"),
+    "a free joint inside": ("<body><body><freejoint/></body></body>", "a single free joint"),
+    "a free joint and another": ("<body><freejoint/><joint/></body>", "a single free joint"),
     "an aligned joint": ('<body><freejoint align="true"/></body>', "not aligned"),
     "no class": ('<body childclass="c"/>', "expected a default class, got 'c'"),
     "no class of a joint": ('<body><joint class="c"/></body>', "expected a default class, got 'c'"),
@@ -383,7 +383,7 @@ WRONG = {
     "too many": ("<body/>" * 10_001, "expected at most 10,000 joints, got 10,002"),
 }  # fmt: skip
 WRONG_HEADS = {
-    "another unit": ('<compiler angle="turn"/>', "one of degree, radian for angle, got 'turn'"),
+    "another unit": ('<compiler angle="grad"/>', "one of degree, radian for angle, got 'grad'"),
     "another sequence": ('<compiler eulerseq="xy"/>', "expected three axes"),
     "global coordinates": ('<compiler coordinate="global"/>', "one of local for coordinate"),
     "limits left open": (

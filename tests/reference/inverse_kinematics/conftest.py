@@ -14,7 +14,7 @@ from reference import (
     rotation,
 )
 from reference.inverse_kinematics.box_step import new_task_system
-from reference.inverse_kinematics.fabrik import BACKWARD
+from reference.inverse_kinematics.fabrik import new_fabrik_workspace
 from reference.inverse_kinematics.mechanism import (
     TARGET,
     gather,
@@ -22,7 +22,6 @@ from reference.inverse_kinematics.mechanism import (
     update_forward_kinematics,
 )
 from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.solve_mechanism import Workspace
 
 
 @pytest.fixture(params=IK_SOLVERS)
@@ -52,7 +51,7 @@ def reachable():
     return targets_by_pose
 
 
-def joints_on_the_way(model, targets):
+def joints_that_move(model, targets):
     """Return the joints that may be moved: those above the effectors, and leaders of those."""
     found = set()
     for target in targets:
@@ -64,9 +63,9 @@ def joints_on_the_way(model, targets):
 
 
 @pytest.fixture(scope="session")
-def on_the_way():
+def moving_joints():
     """Return the function that tells which joints may be moved."""
-    return joints_on_the_way
+    return joints_that_move
 
 
 def outside(model, rng, *shape):
@@ -104,24 +103,33 @@ class Machine(NamedTuple):
     """What a kernel that updates a mechanism is given."""
 
     mechanism: Any
-    goal: np.ndarray
+    target: np.ndarray
     data: Any
-    room: Any
+    workspace: Any
+
+
+class Workspace(NamedTuple):
+    """The arrays of every solver."""
+
+    system: Any
+    backward: Any
+    eigen: Any
 
 
 def machine_of(model, q, targets):
-    """Return the mechanism that moves some effectors, placed, and room for solvers."""
+    """Return the mechanism that moves some effectors, placed, and a workspace for every solver."""
     oriented = tuple(target.rotation is not None for target in targets)
     mechanism = prepare(model, tuple(target.effector for target in targets), oriented).mechanism
-    goal = np.zeros(len(targets), TARGET)
-    for e, (position, turn, _, weight) in enumerate(targets):
-        goal[e] = position, rotation.identity() if turn is None else turn, weight
+    target_rows = np.zeros(len(targets), TARGET)
+    for e, (position, Q, _, weight) in enumerate(targets):
+        target_rows[e] = position, rotation.identity() if Q is None else Q, weight
     data = new_data(mechanism)
     gather(mechanism, np.array(q), data.q)
     update_forward_kinematics(mechanism, data)
-    count = len(mechanism.joints)
-    room = Workspace(new_task_system(mechanism), np.empty(count, BACKWARD), np.empty((2, 4, 4)))
-    return Machine(mechanism, goal, data, room)
+    workspace = Workspace(
+        new_task_system(mechanism), new_fabrik_workspace(mechanism).backward, np.empty((2, 4, 4))
+    )
+    return Machine(mechanism, target_rows, data, workspace)
 
 
 @pytest.fixture(scope="session")

@@ -77,16 +77,18 @@ def test_joints_off_the_path_and_the_effector_keep_their_local_rotations(
     assert not np.allclose(solution.local_rotations, local)
 
 
-def test_solving_in_a_turned_world_turns_the_answer(skeleton, local, target, solver, rng, backend):
-    turn, root = rotation.random(rng), skeleton.offsets[0]
+def test_solving_in_a_rotated_world_rotates_the_answer(
+    skeleton, local, target, solver, rng, backend
+):
+    Q, root = rotation.random(rng), skeleton.offsets[0]
     turned = local.copy()
-    turned[0] = rotation.multiply(turn, local[0])
-    there = solve_ik(skeleton, turned, root + rotation.rotate(turn, target - root), solver)
+    turned[0] = rotation.multiply(Q, local[0])
+    there = solve_ik(skeleton, turned, root + rotation.rotate(Q, target - root), solver)
     here = solve_ik(skeleton, local, target, solver)
     assert there.iterations == here.iterations
     # Each sweep may amplify rounding; tens of them stay far below this.
     np.testing.assert_allclose(
-        there.positions, root + rotation.rotate(turn, here.positions - root), rtol=0, atol=1e-10
+        there.positions, root + rotation.rotate(Q, here.positions - root), rtol=0, atol=1e-10
     )
 
 
@@ -163,7 +165,7 @@ def test_an_effector_exactly_on_its_target_is_left_there_even_at_tolerance_zero(
 
 
 @pytest.mark.parametrize("solver", ["levenberg_marquardt"], indirect=True)
-def test_where_rounding_bars_the_way_the_solve_ends_stalled(skeleton, rng, solver, backend):
+def test_where_rounding_bars_progress_the_solve_ends_stalled(skeleton, rng, solver, backend):
     """Targets that some pose reaches, asked for exactly; a few happen to be met to the last bit."""
     local, poses = rotation.random(rng, 6), rotation.random(rng, 10, 6)
     targets = forward_kinematics(skeleton, poses).positions[:, -1]
@@ -199,9 +201,9 @@ def test_fabrik_lays_the_chain_straight_to_a_target_beyond_reach_at_once(
     skeleton, local, distance, rng, backend
 ):
     root, reach = skeleton.offsets[0], skeleton.reach()
-    way = np.array([0.6, 0.0, -0.8])
-    solution = solve_ik(skeleton, local, root + distance * reach * way, "fabrik")
-    along = (solution.positions[skeleton.path()] - root) @ way
+    direction = np.array([0.6, 0.0, -0.8])
+    solution = solve_ik(skeleton, local, root + distance * reach * direction, "fabrik")
+    along = (solution.positions[skeleton.path()] - root) @ direction
     straight = np.cumsum(skeleton.link_lengths[skeleton.path()])
     np.testing.assert_allclose(along, straight, rtol=0, atol=ROUNDING)
     assert solution.iterations == 1
@@ -240,7 +242,7 @@ def test_beyond_reach_the_residual_tends_to_the_distance_less_the_reach(solver, 
 @pytest.mark.parametrize("solver", SETTLING, indirect=True)
 @pytest.mark.parametrize("depth", [0.0, 0.3, 1.0])
 def test_in_the_hole_of_the_longest_link_the_rim_is_the_nearest(solver, depth, backend):
-    """Links of 3, 0.5 and 0.5 leave a hole of radius 2 about the root."""
+    """Links of 3, 0.5 and 0.5 leave an inner radius of 2 about the root."""
     claw = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [0.5, 0, 0], [0, 3.0, 0], [0, 0, 0.5]])
     target = np.array([0.0, 0.0, 2.0 * (1.0 - depth)])
     solution = solve_ik(claw, rotation.identity(4), target, solver, max_iterations=3000)
@@ -300,7 +302,7 @@ def test_two_equal_links_fold_onto_the_root(backend):
 
 
 @pytest.mark.parametrize("target", [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-def test_one_link_turns_even_to_its_opposite(target, solver, backend):
+def test_one_link_rotates_even_to_its_opposite(target, solver, backend):
     chain, rest = scenes.ball_chain(links=1, link_length=1.0)
     solution = solve_ik(chain, rest, target, solver, tolerance=1e-9)
     assert solution.outcome is Outcome.CONVERGED
@@ -308,7 +310,7 @@ def test_one_link_turns_even_to_its_opposite(target, solver, backend):
         assert solution.iterations == 1
 
 
-def test_a_straight_chain_turns_round_to_a_target_behind_it(solver, backend):
+def test_a_straight_chain_rotates_to_a_target_behind_it(solver, backend):
     chain, rest = scenes.ball_chain(links=3)
     for distance, outcome in ((0.25, Outcome.CONVERGED), (0.5, Outcome.UNREACHABLE)):
         solution = solve_ik(chain, rest, [-distance, 0.0, 0.0], solver, max_iterations=1000)
@@ -371,15 +373,15 @@ def test_there_is_always_an_answer_and_it_is_true(links, target, solver):
 
 
 def textbook_sweep(skeleton, local, target):
-    """Turn the joints one after another, all positions recomputed after each, in matrices."""
+    """Rotate the joints one after another, all positions recomputed after each, in matrices."""
     distances = []
     for j in skeleton.path()[-2::-1]:
         pose = forward_kinematics(skeleton, local)
         to_tip, to_target = pose.positions[-1] - pose.positions[j], target - pose.positions[j]
         rotations = np.array(pose.rotations)
-        turn = rotation.between(to_tip, to_target)
+        Q = rotation.between(to_tip, to_target)
         below = [k for k in range(skeleton.joint_count) if j in skeleton.path(k)]
-        rotations[below] = rotation.multiply(turn, rotations[below])
+        rotations[below] = rotation.multiply(Q, rotations[below])
         local = local_from_global(skeleton, rotations)
         tip = forward_kinematics(skeleton, local).positions[-1]
         distances.append(np.linalg.norm(tip - target))
@@ -395,13 +397,13 @@ def test_one_ccd_iteration_is_the_textbook_s(skeleton, local, target, backend):
 
 
 @pytest.mark.parametrize("angle", [1.0, 1e-4])
-def test_a_chain_off_its_target_s_line_in_the_last_link_alone_is_not_bent(angle, backend):
+def test_a_chain_off_its_target_s_line_in_only_the_last_link_is_not_bent(angle, backend):
     arm, local = scenes.lab_arm()
     local[-2] = rotation.exponential([angle, 0.0, 0.0])
     target = np.array([0.0, 0.0, 0.0])
     expected, _ = textbook_sweep(arm, local, target)
     solution = solve_ik(arm, local, target, "ccd", tolerance=0.0, max_iterations=1)
-    # The turns' axes are quotients of numbers as small as the angle.
+    # The rotations' axes are quotients of numbers as small as the angle.
     np.testing.assert_allclose(
         np.abs(np.vecdot(solution.local_rotations, expected)), np.ones(5), rtol=0, atol=1e-9
     )
@@ -416,7 +418,7 @@ def test_ccd_never_moves_away_in_a_joint_update(skeleton, local, target):
 
 
 @given(joint=points, effector=points, target=points)
-def test_a_ccd_turn_never_moves_the_effector_away(joint, effector, target):
+def test_a_ccd_rotation_never_moves_the_effector_away(joint, effector, target):
     _, moved = pointing(tuple(joint), tuple(effector), tuple(target))
     before = np.linalg.norm(np.subtract(effector, target))
     assert np.linalg.norm(np.subtract(moved, target)) <= before + ROUNDING
@@ -448,7 +450,7 @@ def test_one_fabrik_iteration_is_the_paper_s(skeleton, local, target, backend):
     np.testing.assert_allclose(solution.positions[path], expected, rtol=0, atol=ROUNDING)
 
 
-def test_fabrik_turns_links_by_the_shortest_arc_so_that_twist_is_kept(
+def test_fabrik_rotates_links_by_the_shortest_arc_so_that_twist_is_kept(
     skeleton, local, target, backend
 ):
     solution = solve_ik(skeleton, local, target, "fabrik")
@@ -457,8 +459,8 @@ def test_fabrik_turns_links_by_the_shortest_arc_so_that_twist_is_kept(
     path = skeleton.path()
     for j, child in pairwise(path):
         link = before.positions[child] - before.positions[j]
-        turn = rotation.multiply(after.rotations[j], rotation.conjugate(before.rotations[j]))
-        assert turn[1:] @ link == pytest.approx(0.0, abs=1e-13)
+        Q = rotation.multiply(after.rotations[j], rotation.conjugate(before.rotations[j]))
+        assert Q[1:] @ link == pytest.approx(0.0, abs=1e-13)
 
 
 # ---- the lab

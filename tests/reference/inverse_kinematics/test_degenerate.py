@@ -21,7 +21,7 @@ from reference.articulation import KINDS
 shared = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 # A target on a straight chain's line is reached within few hundred iterations by all but FABRIK on
-# hinges, whose turns are bound to axes that the points it wishes for know nothing of.
+# hinges, whose rotations are bound to axes that the backward positions know nothing of.
 ITERATIONS = 500
 
 
@@ -51,8 +51,8 @@ def test_a_straight_chain_is_freed_from_a_target_on_its_own_line(direction, kind
     assert (again.coordinates == solution.coordinates).all()
 
 
-def test_a_hinge_at_its_limit_is_bent_the_other_way(solver, backend):
-    """The target is straight behind, half a turn in the one direction that the limits leave."""
+def test_a_hinge_at_its_limit_is_bent_oppositely(solver, backend):
+    """The target is straight behind, pi away in the one direction that the limits leave."""
     arm = Articulation(
         Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"], lower=-3.2, upper=0.0
     )
@@ -106,19 +106,19 @@ def test_without_freedom_the_start_is_the_answer(solver, backend):
     assert (off.outcome == Outcome.UNREACHABLE).all()
     assert (off.residual == 3.0).all()
     assert off.coordinates.shape == (2, 0)
-    turned = Target([1.0, 1.0, 0.0], rotation.exponential([0.5, 0, 0]))
-    wrong = solve_ik(statue, [], turned, solver, restarts=1)
+    rotated = Target([1.0, 1.0, 0.0], rotation.exponential([0.5, 0, 0]))
+    wrong = solve_ik(statue, [], rotated, solver, restarts=1)
     assert wrong.outcome is Outcome.STALLED
     assert wrong.residual_rotation == pytest.approx(0.5, abs=1e-15)
 
 
 @pytest.mark.parametrize("kind", ["hinge", "ball"])
-def test_the_root_as_effector_can_turn_but_not_move(kind, solver, backend):
+def test_the_root_as_effector_can_rotate_but_not_move(kind, solver, backend):
     model = Articulation(Skeleton([-1, 0], [[1.0, 0, 0], [0, 1.0, 0]]), kind)
     off = solve_ik(model, model.zero(), [1.0, 3.0, 4.0], solver, effector=0)
     assert (off.residual, off.outcome) == (5.0, Outcome.UNREACHABLE)
-    turn = rotation.exponential([0.0, 0.0, 0.7])
-    posed = solve_ik(model, model.zero(), Target([1.0, 0, 0], turn, 0), solver, max_iterations=300)
+    Q = rotation.exponential([0.0, 0.0, 0.7])
+    posed = solve_ik(model, model.zero(), Target([1.0, 0, 0], Q, 0), solver, max_iterations=300)
     assert posed.outcome is Outcome.CONVERGED
 
 
@@ -130,9 +130,9 @@ def test_limits_without_width_hold_fast(solver, backend, rng, beyond_limits):
         upper=[0.3, 0.2, -0.1, 2.0, 0],
         cones=0.0,
     )
-    goal = forward_kinematics(model, model.clamp(model.random(rng)))
+    there = forward_kinematics(model, model.clamp(model.random(rng)))
     q = beyond_limits(model, rng)
-    solution = solve_ik(model, q, goal.positions[-1], solver, max_iterations=200)
+    solution = solve_ik(model, q, there.positions[-1], solver, max_iterations=200)
     twist = rotation.exponential([0.0, 0.0, 0.2])
     np.testing.assert_allclose(solution.coordinates[:1], [0.3], rtol=0, atol=1e-15)
     assert rotation.angle(solution.coordinates[1:5], twist) < 1e-12
@@ -142,7 +142,7 @@ def test_limits_without_width_hold_fast(solver, backend, rng, beyond_limits):
 
 
 def test_no_iterations_leave_the_start_within_its_limits(
-    articulated, reachable, beyond_limits, on_the_way, rng, solver, backend
+    articulated, reachable, beyond_limits, moving_joints, rng, solver, backend
 ):
     model = articulated(["hinge", "ball", "slide", "ball"], 3)
     targets, _ = reachable(model, rng, 2)
@@ -150,7 +150,7 @@ def test_no_iterations_leave_the_start_within_its_limits(
     solution = solve_ik(model, q, targets, solver, max_iterations=0)
     assert solution.iterations == 0
     expected, clamped = q.copy(), model.clamp(q)
-    for j in on_the_way(model, targets):
+    for j in moving_joints(model, targets):
         expected[model.coordinates_of(j)] = clamped[model.coordinates_of(j)]
     np.testing.assert_allclose(solution.coordinates, expected, rtol=0, atol=1e-12)
 
@@ -171,7 +171,7 @@ def test_tolerance_zero_ends(solver, chain_of_joints, rng):
             assert not limit.any()
 
 
-def test_what_rounding_alone_keeps_from_its_target_is_stalled(rng):
+def test_what_only_rounding_keeps_from_its_target_is_stalled(rng):
     """Some arrive where fixed joints are merged, and are a rounding off where they are not."""
     model = Articulation(
         Skeleton(range(-1, 6), rng.standard_normal((7, 3))),
@@ -203,9 +203,12 @@ def test_the_lab_s_arm_of_hinges_draws_in_its_plane(solver, backend):
 
 coordinate = st.sampled_from([0.0, 0.5, 1.0, -1.0, 2.0]) | st.floats(-3.0, 3.0)
 point = st.lists(coordinate, min_size=3, max_size=3)
-turn = point.map(rotation.exponential)
+quaternion = point.map(rotation.exponential)
 wanted = st.tuples(
-    point, st.none() | turn, st.integers(-5, 4), st.sampled_from([1.0, 1e-75, 1e75, 1e-6, 7.0])
+    point,
+    st.none() | quaternion,
+    st.integers(-5, 4),
+    st.sampled_from([1.0, 1e-75, 1e75, 1e-6, 7.0]),
 )
 
 
@@ -265,8 +268,8 @@ def answer_is_true(model, asked, solver, tolerance, seed, restarts):
         record=True,
     )  # fmt: skip
     pose = forward_kinematics(model, solution.coordinates)
-    ways = [np.linalg.norm(pose.positions[t.effector] - t.position) for t in targets.values()]
-    assert solution.residual == pytest.approx(max(ways), abs=1e-12)
+    distances = [np.linalg.norm(pose.positions[t.effector] - t.position) for t in targets.values()]
+    assert solution.residual == pytest.approx(max(distances), abs=1e-12)
     assert np.isfinite(solution.history).all()
     assert solution.iterations <= 15 * (2 * restarts + 1)
     assert model.within_limits(solution.coordinates, 1e-7)

@@ -34,11 +34,11 @@ def figure(kind="ball", **limits):
 
 def hands(model, rng):
     """Return targets for both hands that one pose reaches."""
-    goal = forward_kinematics(model, model.random(rng)).positions
-    return [Target(goal[5], effector=5), Target(goal[8], effector=8)]
+    positions = forward_kinematics(model, model.random(rng)).positions
+    return [Target(positions[5], effector=5), Target(positions[8], effector=8)]
 
 
-# Of 40 pairs; alternating projections need not converge, and limits bar the way of single joints.
+# Of 40 pairs; alternating projections need not converge, and limits stop single joints.
 REACHED = {
     ("levenberg_marquardt", "ball", False): 40,
     ("damped_least_squares", "ball", False): 40,
@@ -60,18 +60,18 @@ def test_pairs_of_targets_that_a_pose_reaches_are_reached(solver, kind, limits, 
         options = {"max_iterations": 1000, "restarts": 0 if kind == "ball" else 5}
         solution = solve_ik(model, model.random(rng), targets, solver, **options)
         reached += solution.outcome is Outcome.CONVERGED
-        ways = [solution.positions[t.effector] - t.position for t in targets]
-        assert solution.residual == pytest.approx(np.linalg.norm(ways, axis=1).max(), abs=1e-14)
+        errors = [solution.positions[t.effector] - t.position for t in targets]
+        assert solution.residual == pytest.approx(np.linalg.norm(errors, axis=1).max(), abs=1e-14)
     assert reached >= REACHED[solver, kind, limits]
 
 
 def test_an_effector_above_another_has_its_own_target(solver, backend, rng):
     chain = Articulation(Skeleton(range(-1, 6), np.outer([0.0] + [0.3] * 6, [1.0, 0, 0])))
-    goal = forward_kinematics(chain, chain.random(rng)).positions
-    targets = [Target(goal[3], effector=3), Target(goal[6], effector=6)]
+    there = forward_kinematics(chain, chain.random(rng)).positions
+    targets = [Target(there[3], effector=3), Target(there[6], effector=6)]
     solution = solve_ik(chain, chain.random(rng), targets, solver, max_iterations=300)
     assert solution.outcome is Outcome.CONVERGED
-    np.testing.assert_allclose(solution.positions[[3, 6]], goal[[3, 6]], rtol=0, atol=1e-4)
+    np.testing.assert_allclose(solution.positions[[3, 6]], there[[3, 6]], rtol=0, atol=1e-4)
 
 
 def test_targets_in_another_order_give_the_same_answer(solver, backend, rng):
@@ -87,7 +87,7 @@ def test_targets_in_another_order_give_the_same_answer(solver, backend, rng):
 
 @pytest.mark.parametrize("solver", ["ccd", "fabrik", "levenberg_marquardt"], indirect=True)
 def test_the_heavier_target_is_missed_by_less(solver, backend):
-    """Both ends of a T are wanted up, where one turn cannot bring both."""
+    """Both ends of a T are wanted up, where one rotation cannot bring both."""
     tee = Articulation(Skeleton([-1, 0, 0], [[0, 0, 0], [1.0, 0, 0], [-1.0, 0.5, 0]]))
     misses = []
     for weight in (0.1, 1.0, 10.0):
@@ -110,8 +110,8 @@ def test_only_the_ratio_of_weights_counts(solver, backend, rng):
         solve_ik(model, q, heavy, solver, max_iterations=5).coordinates == here.coordinates
     ).all()
     one = solve_ik(model, q, targets[0], solver, max_iterations=5)
-    alone = solve_ik(model, q, heavy[0], solver, max_iterations=5)
-    assert (alone.coordinates == one.coordinates).all()
+    single = solve_ik(model, q, heavy[0], solver, max_iterations=5)
+    assert (single.coordinates == one.coordinates).all()
 
 
 @pytest.mark.parametrize("solver", ["ccd", "fabrik", "damped_least_squares"], indirect=True)
@@ -129,11 +129,11 @@ def test_a_target_out_of_reach_does_not_keep_another_arm_from_its_own(solver, or
 
 
 def test_targets_that_exclude_each_other_are_not_called_unreachable(solver, backend):
-    """Each could be reached alone: geometry proves nothing about one."""
+    """Each could be reached by itself: geometry proves nothing about one."""
     model = figure()
     targets = [Target([1.2, 0.8, 0.0], effector=5), Target([-1.2, 0.8, 0.0], effector=8)]
-    alone = [solve_ik(model, model.zero(), t, solver, max_iterations=200) for t in targets]
-    assert all(one.outcome is Outcome.CONVERGED for one in alone)
+    singly = [solve_ik(model, model.zero(), t, solver, max_iterations=200) for t in targets]
+    assert all(one.outcome is Outcome.CONVERGED for one in singly)
     solution = solve_ik(model, model.zero(), targets, solver, max_iterations=50)
     assert solution.outcome in (Outcome.STALLED, Outcome.ITERATION_LIMIT)
     assert solution.residual > 0.1
@@ -158,8 +158,8 @@ def test_what_some_pose_reaches_is_never_called_too_far(
             q[model.coordinates_of(j)] = model.upper[j]
     pose = forward_kinematics(model, q)
     targets = [Target(x, None, j) for j, x in enumerate(pose.positions)]
-    mechanism, goal, _, _ = machine(model, q, targets)
-    assert least_residual(mechanism, goal) <= 0.0
+    mechanism, target, _, _ = machine(model, q, targets)
+    assert least_residual(mechanism, target) <= 0.0
 
 
 @pytest.mark.parametrize("links", [2, 30])
@@ -169,11 +169,11 @@ def test_full_reach_is_not_too_far_however_long_or_far_off(links, away, machine,
     offsets = directions * rng.uniform(0.1, 1.0, (links + 1, 1))
     offsets[0] = away
     model = Articulation(Skeleton(range(-1, links), offsets))
-    for turn in rotation.random(rng, 20):
-        q = np.vstack([turn, rotation.identity(links)]).ravel()
+    for Q in rotation.random(rng, 20):
+        q = np.vstack([Q, rotation.identity(links)]).ravel()
         tip = forward_kinematics(model, q).positions[-1]
-        mechanism, goal, _, _ = machine(model, q, [Target(tip, effector=links)])
-        assert least_residual(mechanism, goal) <= 0.0
+        mechanism, target, _, _ = machine(model, q, [Target(tip, effector=links)])
+        assert least_residual(mechanism, target) <= 0.0
 
 
 @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ def test_without_an_end_nothing_is_too_far(kind, solver, backend):
     assert not solution.outcome.unreachable
 
 
-def test_a_leader_off_the_way_is_moved_and_all_above_it_is_not(solver, backend):
+def test_a_leader_beside_the_path_is_moved_and_all_above_it_is_not(solver, backend):
     """The finger's hinge follows a motor in another branch, below a joint that moves no effector.
 
     That joint mimics another one yet.
@@ -227,7 +227,9 @@ def test_a_leader_off_the_way_is_moved_and_all_above_it_is_not(solver, backend):
     q = np.array([0.2, 0.3])
     solution = solve_ik(model, q, Target(target, effector=5), solver, restarts=1)
     assert solution.coordinates[1] == 0.3
-    if solver != "fabrik":  # which turns joints to what hangs on them, and nothing hangs here
+    if (
+        solver != "fabrik"
+    ):  # which rotates joints to what is attached to them, and nothing is attached here
         assert solution.outcome is Outcome.CONVERGED
         assert solution.coordinates[0] == pytest.approx(1.4, abs=1e-3)
 
@@ -238,8 +240,8 @@ def star(root, links=3):
     for _ in range(5):
         parent = 0
         for _ in range(links):
-            way = rotation.rotate(rotation.random(rng), [0.0, 0.0, rng.uniform(0.2, 0.5)])
-            parents, offsets = [*parents, parent], [*offsets, way]
+            offset = rotation.rotate(rotation.random(rng), [0.0, 0.0, rng.uniform(0.2, 0.5)])
+            parents, offsets = [*parents, parent], [*offsets, offset]
             parent = len(parents) - 1
         ends.append(parent)
     return Articulation(Skeleton(parents, offsets), [root, *["ball"] * (len(parents) - 1)]), ends
@@ -247,12 +249,12 @@ def star(root, links=3):
 
 @pytest.mark.parametrize("links", [2, 3])
 def test_a_free_root_reaches_no_fewer_targets_than_a_fixed_one(links):
-    """By FABRIK; a root that went to its wish and then turned about it swung for ever."""
+    """By FABRIK; a root put at its backward position and then rotated about it oscillated."""
     (fixed, ends), (free, _) = star("ball", links), star("free", links)
     rng, reached = np.random.default_rng(1), np.zeros(2)
     for _ in range(40):
-        goal = forward_kinematics(fixed, fixed.random(rng)).positions
-        targets, q = [Target(goal[e], None, e) for e in ends], fixed.random(rng)
+        there = forward_kinematics(fixed, fixed.random(rng)).positions
+        targets, q = [Target(there[e], None, e) for e in ends], fixed.random(rng)
         held = solve_ik(fixed, q, targets, "fabrik", max_iterations=1000)
         loose = solve_ik(
             free, np.concatenate([np.zeros(3), q]), targets, "fabrik", max_iterations=1000
@@ -266,8 +268,8 @@ def test_with_a_free_root_and_five_effectors_the_merit_does_not_grow():
     free, ends = star("free", 2)
     for seed in range(8):
         rng = np.random.default_rng(seed)
-        goal = forward_kinematics(free, free.random(rng)).positions + rng.normal(0, 0.1, (11, 3))
-        targets = [Target(goal[e], None, e) for e in ends]
+        there = forward_kinematics(free, free.random(rng)).positions + rng.normal(0, 0.1, (11, 3))
+        targets = [Target(there[e], None, e) for e in ends]
         q = free.random(rng)
         merits = [
             solve_ik(free, q, targets, "fabrik", max_iterations=n).merit

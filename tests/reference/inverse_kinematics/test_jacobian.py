@@ -31,16 +31,16 @@ def matrix(A):
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def turned(skeleton, local, joint, turn):
-    """Return the effector's position after a joint and all below it turn in the world."""
+def turned(skeleton, local, joint, rotation_vector):
+    """Return the effector's position after a joint and all below it rotate in the world."""
     rotations = np.array(forward_kinematics(skeleton, local).rotations)
     below = [k for k in range(skeleton.joint_count) if joint in skeleton.path(k)]
-    rotations[below] = rotation.multiply(rotation.exponential(turn), rotations[below])
+    rotations[below] = rotation.multiply(rotation.exponential(rotation_vector), rotations[below])
     return forward_kinematics(skeleton, local_from_global(skeleton, rotations)).positions[-1]
 
 
 def jacobian(skeleton, local):
-    """Return the effector's derivative by all joints' turns, by differences, (3, 3 joint)."""
+    """Return the effector's derivative by all joints' rotations, by differences, (3, 3 joint)."""
     at = forward_kinematics(skeleton, local).positions[-1]
     columns = [
         (turned(skeleton, local, joint, STEP * axis) - at) / STEP
@@ -56,7 +56,7 @@ def test_the_task_matrix_is_the_jacobian_times_its_transpose(skeleton, local, ch
     assert np.abs(J @ J.T).max() > 0.1
 
 
-def test_joints_turn_along_the_transposed_jacobian(skeleton, local, chain, rng):
+def test_joints_rotate_along_the_transposed_jacobian(skeleton, local, chain, rng):
     z = rng.standard_normal(3)
     before = chain.positions[-1].copy()
     rotate_joints(chain, tuple(STEP * z))
@@ -88,17 +88,17 @@ STEPS = {
 
 @pytest.mark.parametrize("solver", STEPS)
 def test_one_iteration_is_the_textbook_s(skeleton, local, solver, rng, backend):
-    """J is dense here, by the arms; a joint turns by its part of J^T z, seen from its parent."""
+    """J is dense here, by the arms; a joint rotates by its part of J^T z, seen from its parent."""
     pose, path = forward_kinematics(skeleton, local), skeleton.path()
     target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
     arms = pose.positions[-1] - pose.positions[path[:-1]]
     J = np.concatenate([np.cross(np.eye(3), arm) for arm in arms]).T
-    turns = J.T @ STEPS[solver](J @ J.T, target - pose.positions[-1], skeleton.reach())
+    rotations = J.T @ STEPS[solver](J @ J.T, target - pose.positions[-1], skeleton.reach())
     expected = local.copy()
-    for joint, turn in zip(path[:-1], turns.reshape(-1, 3), strict=True):
+    for joint, rotation_vector in zip(path[:-1], rotations.reshape(-1, 3), strict=True):
         parent = skeleton.parents[joint]
         above = pose.rotations[parent] if parent >= 0 else rotation.identity()
-        in_parent = rotation.rotate(rotation.conjugate(above), turn)
+        in_parent = rotation.rotate(rotation.conjugate(above), rotation_vector)
         expected[joint] = rotation.multiply(rotation.exponential(in_parent), local[joint])
     solution = solve_ik(skeleton, local, target, solver, tolerance=0.0, max_iterations=1)
     cosines = np.abs(np.vecdot(solution.local_rotations, expected))

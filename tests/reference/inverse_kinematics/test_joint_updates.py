@@ -1,4 +1,4 @@
-"""What CCD and FABRIK do joint by joint: never worse, limits on the way, one turn at a branch."""
+"""What CCD and FABRIK do joint by joint: never worse, limits kept, one rotation at a branch."""
 
 import numpy as np
 import pytest
@@ -20,12 +20,12 @@ from reference.inverse_kinematics.fabrik import (
     backward_pass,
     fabrik_update,
     forward_joint,
-    put_joint,
+    update_joint_pose,
 )
 from reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
 from reference.inverse_kinematics.reduce import prepare
 
-# Squared distances of a few metres, and quaternions normalised after a turn.
+# Squared distances of a few metres, and quaternions normalised after a rotation.
 ROUNDING = 1e-12
 
 shared = drawn(max_examples=40)
@@ -42,16 +42,16 @@ def planar(links, **limits):
 
 def updates(machine):
     """Update joint after joint as CCD does; yield the joint and the cost before and after."""
-    mechanism, goal, data, room = machine
+    mechanism, target, data, workspace = machine
     joints = mechanism.joints
     for j in range(len(joints) - 1, -1, -1):
-        before = cost(mechanism, goal, data)
+        before = cost(mechanism, target, data)
         if mechanism.joints["followed"][j]:
-            descend(mechanism, goal, data, room, j)
+            descend(mechanism, target, data, workspace, j)
         elif joints["leader"][j] == j:
-            update_joint(mechanism, goal, data, room, j)
+            update_joint(mechanism, target, data, workspace, j)
         tips = data.positions.copy(), data.rotations.copy()
-        yield j, before, cost(mechanism, goal, data), tips
+        yield j, before, cost(mechanism, target, data), tips
     update_forward_kinematics(mechanism, data)
 
 
@@ -95,7 +95,7 @@ def _units(quaternions):
 
 @pytest.mark.parametrize("kind", ["hinge", "slide", "ball", "free"])
 def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, machine, rng):
-    """No small move of the joint alone, in any direction, lowers the cost."""
+    """No small move of only the joint, in any direction, lowers the cost."""
     model = chain_of_joints(kind, rng, links=3)
     pose = forward_kinematics(model, model.random(rng))
     targets = [
@@ -114,16 +114,16 @@ def test_an_unlimited_joint_goes_to_the_best_there_is(kind, chain_of_joints, mac
         if width > 1:
             own[-4:] /= np.linalg.norm(own[-4:])
         update_forward_kinematics(ready.mechanism, ready.data)
-        # A free joint turns first and then shifts, so that its optimum is one of each alone.
+        # A free joint rotates first and then shifts, so that its optimum is one of each apart.
         if kind != "free":
             assert cost(*ready[:3]) >= least - 1e-9
 
 
 def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, backend):
-    """By turns and shifts in alternation."""
+    """By rotations and shifts in alternation."""
     body = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0.3, 0.4, 0.5]]), ["free", "fixed"])
-    goal, q = forward_kinematics(body, body.random(rng)), body.random(rng)
-    target = Target(goal.positions[1], goal.rotations[1])
+    target, q = forward_kinematics(body, body.random(rng)), body.random(rng)
+    target = Target(target.positions[1], target.rotations[1])
     solution = solve_ik(body, q, target, "ccd", tolerance=1e-5, tolerance_rotation=1e-5)
     assert solution.outcome is Outcome.CONVERGED
 
@@ -131,10 +131,10 @@ def test_a_free_joint_takes_a_rigid_body_to_its_pose(rng, backend):
 @pytest.mark.parametrize(
     ("start", "upper", "wanted", "expected"),
     [
-        (-1.0, 0.5, 0.3, 0.3),  # the way is free
-        (-1.0, 0.5, 1.2, 0.5),  # the limit stops it on the way
+        (-1.0, 0.5, 0.3, 0.3),  # nothing stops it
+        (-1.0, 0.5, 1.2, 0.5),  # the limit stops it on its path
         (0.5, 0.5, 1.2, 0.5),  # it is there already
-        (-3.0, 0.5, 2.9, -3.0),  # the short way leads through half a turn, where the lower limit is
+        (-3.0, 0.5, 2.9, -3.0),  # the smaller angle leads past pi, where the lower limit is
     ],
 )
 def test_a_hinge_stops_at_its_limit_along_the_arc(start, upper, wanted, expected, backend):
@@ -152,7 +152,7 @@ def test_a_slide_goes_as_far_as_its_limit_allows(upper, expected, backend):
 
 
 def test_inside_a_cone_an_update_that_would_be_worse_is_refused(machine, rng):
-    """Cutting the swing of the best turn down to the cone may lead away from the target."""
+    """Cutting the swing of the best rotation down to the cone may lead away from the target."""
     refused = taken = 0
     for _ in range(200):
         ball = Articulation(
@@ -208,14 +208,15 @@ def test_backward_a_branch_takes_the_weighted_mean_of_what_its_children_ask(mach
         Target([1.0, 1.2, 0.0], effector=3, weight=1.0),
     ]
     ready = machine(model, rotation.identity(4).ravel(), targets)
-    backward_pass(*ready[:3], ready.room.backward)
+    backward = ready.workspace.backward
+    backward_pass(*ready[:3], backward)
     expected = (3.0 * np.array([1.5, 0.0, 0.0]) + np.array([1.0, 0.2, 0.0])) / 4.0
-    np.testing.assert_allclose(ready.room.backward["position"][1], expected, rtol=0, atol=1e-15)
-    assert ready.room.backward["weight"][1] == 4.0
+    np.testing.assert_allclose(backward["position"][1], expected, rtol=0, atol=1e-15)
+    assert backward["weight"][1] == 4.0
 
 
-def test_forward_a_branch_turns_all_its_children_alike(machine, rng):
-    """A ball with three arms: one iteration turns it as singular values say, weights regarded."""
+def test_forward_a_branch_rotates_all_its_children_alike(machine, rng):
+    """A ball with three arms: one iteration rotates it as singular values say, weights regarded."""
     arms = rng.standard_normal((3, 3))
     tree = Skeleton([-1, 0, 0, 0], np.vstack([np.zeros(3), arms]))
     model, R, weights = Articulation(tree), rotation.random(rng), np.array([0.5, 1.0, 3.0])
@@ -235,7 +236,7 @@ def test_forward_a_branch_turns_all_its_children_alike(machine, rng):
 def test_a_pose_that_reaches_all_targets_is_a_fixed_point(
     kind, oriented, chain_of_joints, machine, rng
 ):
-    """The hand is a fixed joint with a frame of its own, which hangs on the last one that moves."""
+    """The hand is a fixed joint with a frame of its own, attached to the last one that moves."""
     chain = chain_of_joints(kind, rng)
     model = Articulation(
         chain.skeleton, [*[kind] * 4, "fixed"], chain.axes, frames=rotation.random(rng, 5)
@@ -264,12 +265,12 @@ def test_forward_each_joint_is_left_where_the_coordinates_put_it(
         lower=drawn.lower, upper=drawn.upper, cones=drawn.cones,
     )  # fmt: skip
     targets, _ = reachable(model, rng, 2)
-    mechanism, goal, data, room = machine(model, model.random(rng), targets)
-    backward_pass(mechanism, goal, data, room.backward)
+    mechanism, target, data, workspace = machine(model, model.random(rng), targets)
+    backward_pass(mechanism, target, data, workspace.backward)
     count = len(mechanism.joints)
     for j in range(count):
-        put_joint(mechanism.joints, data, room.backward, j)
-        forward_joint(mechanism, goal, data, room, j)
+        update_joint_pose(mechanism.joints, data, workspace.backward, j)
+        forward_joint(mechanism, target, data, workspace, j)
     positions, rotations = data.positions[:count].copy(), data.rotations[:count].copy()
     update_forward_kinematics(mechanism, data)
     np.testing.assert_allclose(positions, data.positions[:count], rtol=0, atol=ROUNDING)

@@ -22,6 +22,7 @@ from reference import (
 from reference.arguments import frozen
 from reference.backend.threads import set_num_threads
 from reference.inverse_kinematics.problem import checked_targets
+from reference.inverse_kinematics.reduce import prepare
 from reference.inverse_kinematics.settings import checked_settings
 from reference.inverse_kinematics.solve import solve_checked
 
@@ -50,13 +51,13 @@ def problem(articulated, reachable, beyond_limits):
 def residuals(model, q, targets):
     """Return the largest distance and angle from effectors to targets, by forward kinematics."""
     pose = forward_kinematics(model, q)
-    ways = [np.linalg.norm(pose.positions[t.effector] - t.position) for t in targets]
-    turns = [
+    distances = [np.linalg.norm(pose.positions[t.effector] - t.position) for t in targets]
+    angles = [
         rotation.angle(pose.rotations[t.effector], t.rotation)
         for t in targets
         if t.rotation is not None
     ]
-    return max(ways), max(turns, default=0.0)
+    return max(distances), max(angles, default=0.0)
 
 
 # ---- the same as chains
@@ -72,23 +73,23 @@ def test_on_balls_without_limits_the_path_is_that_of_chains(skeleton, local, rng
     assert general.iterations == chain.iterations > 1
     np.testing.assert_allclose(general.history, chain.history, rtol=0, atol=1e-11)
     np.testing.assert_allclose(general.positions, chain.positions, rtol=0, atol=1e-11)
-    if solver != "fabrik":  # whose chains are turned once, after the last sweep: another twist
-        turned = rotation.angle(general.local_rotations, chain.local_rotations)
-        np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-11)
+    if solver != "fabrik":  # whose chains are rotated once, after the last sweep: another twist
+        angles = rotation.angle(general.local_rotations, chain.local_rotations)
+        np.testing.assert_allclose(angles, 0.0, rtol=0, atol=1e-11)
     assert general.coordinates.shape == (24,)
     assert (general.coordinates.reshape(6, 4) == general.local_rotations).all()
     assert (chain.coordinates == chain.local_rotations).all()
 
 
-def test_one_iteration_on_balls_turns_them_as_it_does_a_chain_s(
+def test_one_iteration_on_balls_rotates_them_as_it_does_a_chain_s(
     skeleton, local, rng, solver, backend
 ):
     """FABRIK's twist included: of each link the shortest arc."""
     target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
     chain = solve_ik(skeleton, local, target, solver, max_iterations=1)
     general = solve_ik(Articulation(skeleton), local.ravel(), target, solver, -1, max_iterations=1)
-    turned = rotation.angle(general.local_rotations, chain.local_rotations)
-    np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-12)
+    angles = rotation.angle(general.local_rotations, chain.local_rotations)
+    np.testing.assert_allclose(angles, 0.0, rtol=0, atol=1e-12)
 
 
 def test_fixed_joints_are_parts_of_their_links(rng, solver, backend):
@@ -105,8 +106,8 @@ def test_fixed_joints_are_parts_of_their_links(rng, solver, backend):
         [1.0, 2.0, 2.0],
         frames=[frames[0], *R],
     )
-    goal = forward_kinematics(merged, merged.random(rng))
-    target, q = Target(goal.positions[-1], goal.rotations[-1]), merged.random(rng)
+    there = forward_kinematics(merged, merged.random(rng))
+    target, q = Target(there.positions[-1], there.rotations[-1]), merged.random(rng)
     there = solve_ik(whole, q, target, solver, max_iterations=10)
     here = solve_ik(merged, q, target, solver, max_iterations=10)
     assert there.iterations == here.iterations
@@ -137,15 +138,15 @@ def test_the_answer_is_forward_kinematics_of_its_coordinates(problem, solver, ba
 @at_both_speeds
 @with_examples
 @given(**TREES)
-def test_limits_are_kept_and_joints_off_the_way_left_alone(
-    problem, on_the_way, solver, backend, kinds, seed
+def test_limits_are_kept_and_other_joints_left_as_they_are(
+    problem, moving_joints, solver, backend, kinds, seed
 ):
     model, q, targets = problem(kinds, seed)
     found = solve_ik(model, q, targets, solver, max_iterations=5).coordinates
-    clamped, way = model.clamp(found), on_the_way(model, targets)
+    clamped, moving = model.clamp(found), moving_joints(model, targets)
     for j in set(range(len(kinds))) - set(model.mimics):
         own = model.coordinates_of(j)
-        expected = clamped if j in way else q
+        expected = clamped if j in moving else q
         np.testing.assert_allclose(found[own], expected[own], rtol=0, atol=LIMIT)
 
 
@@ -189,17 +190,17 @@ def test_inputs_are_unchanged_and_answers_read_only(problem, solver, backend):
     before = q.copy(), [(t.position.copy(), t.rotation.copy()) for t in targets]
     solution = solve_ik(model, q, targets, solver, max_iterations=3)
     assert (q == before[0]).all()
-    for target, (position, turn) in zip(targets, before[1], strict=True):
+    for target, (position, Q) in zip(targets, before[1], strict=True):
         assert (target.position == position).all()
-        assert (target.rotation == turn).all()
+        assert (target.rotation == Q).all()
     arrays = solution.coordinates, solution.local_rotations, solution.positions, solution.history
     for values in arrays:
         assert not values.flags.writeable
 
 
 def test_a_skeleton_s_coordinates_are_its_local_rotations(skeleton, local, solver, backend):
-    goal = forward_kinematics(skeleton, local[::-1])
-    target = Target(goal.positions[-1], goal.rotations[-1], -1)
+    there = forward_kinematics(skeleton, local[::-1])
+    target = Target(there.positions[-1], there.rotations[-1], -1)
     pose = solve_ik(skeleton, local, target, solver, max_iterations=5)
     balls = solve_ik(Articulation(skeleton), local.ravel(), target, solver, max_iterations=5)
     assert pose.coordinates.shape == pose.local_rotations.shape == (6, 4)
@@ -223,9 +224,9 @@ def test_a_skeleton_that_was_solved_for_is_let_go_of(local):
 def many(articulated, rng):
     """Return a model, starts (2, 1), and two targets, one of them (3,)."""
     model = articulated(["hinge", "ball", "slide", "ball", "hinge", "fixed", "ball"], 3)
-    goal = forward_kinematics(model, model.random(rng, 3))
-    near = Target(goal.positions[:, -1], goal.rotations[0, -1], -1)
-    return model, model.random(rng, 2, 1), [near, Target(goal.positions[0, 2], effector=2)]
+    there = forward_kinematics(model, model.random(rng, 3))
+    near = Target(there.positions[:, -1], there.rotations[0, -1], -1)
+    return model, model.random(rng, 2, 1), [near, Target(there.positions[0, 2], effector=2)]
 
 
 def test_a_batch_is_its_solves(many, solver, backend):
@@ -248,17 +249,17 @@ def test_a_batch_is_its_solves(many, solver, backend):
             assert (batch.history[i, j, one.iterations :] == one.history[-1]).all()
 
 
-def test_rotations_alone_make_a_batch_too(many, solver, backend):
+def test_rotations_make_a_batch_too(many, solver, backend):
     model, starts, (near, _) = many
-    turns = rotation.random(np.random.default_rng(4), 4)
+    rotations = rotation.random(np.random.default_rng(4), 4)
     batch = solve_ik(
-        model, starts[0, 0], Target(near.position[0], turns, -1), solver, max_iterations=2
+        model, starts[0, 0], Target(near.position[0], rotations, -1), solver, max_iterations=2
     )
     assert batch.residual_rotation.shape == (4,)
     for i in range(4):
-        one = Target(near.position[0], turns[i], -1)
-        alone = solve_ik(model, starts[0, 0], one, solver, max_iterations=2)
-        assert (batch.coordinates[i] == alone.coordinates).all()
+        one = Target(near.position[0], rotations[i], -1)
+        single = solve_ik(model, starts[0, 0], one, solver, max_iterations=2)
+        assert (batch.coordinates[i] == single.coordinates).all()
 
 
 def test_a_batch_in_another_order_gives_the_same(many, solver, rng):
@@ -302,13 +303,13 @@ def test_whatever_comes_in_the_kernel_is_compiled_once(many, solver):
     solve_ik(model, starts[0, 0].tolist(), near._replace(position=near.position[0]), solver)
     solve_ik(model, np.repeat(starts, 2, axis=-1)[..., ::2], [near, far], solver, restarts=1)
     solve_ik(model, np.float32(model.neutral()), np.float32([1, 2, 3]), solver, 6, tolerance=1)
-    alone = near._replace(position=frozen(near.position[0]), rotation=frozen(near.rotation))
-    solve_ik(model, frozen(starts[0, 0]), alone, solver)
+    one = near._replace(position=frozen(near.position[0]), rotation=frozen(near.rotation))
+    solve_ik(model, frozen(starts[0, 0]), one, solver)
     assert len(IK_SOLVERS[solver].mechanism.compiled.signatures) == 1
 
 
 def test_however_arguments_come_the_answer_is_the_same(many, skeleton, local, solver, backend):
-    """Plain arrays take a shorter way to the kernel than lists, arrays to convert, or batches."""
+    """Plain arrays take a shorter path to the kernel than lists, arrays to convert, or batches."""
     model, starts, (near, far) = many
     chain_target = far.position
     pose = Target(near.position[0], near.rotation, weight=3.0)
@@ -351,19 +352,19 @@ def test_no_targets_give_no_solutions(many, solver, backend):
 # ---- the same world seen otherwise
 
 
-def moved(model, targets, turn, shift):
-    """Return the model and the targets turned about the origin and shifted."""
+def moved(model, targets, Q, shift):
+    """Return the model and the targets rotated about the origin and shifted."""
     offsets, frames = model.skeleton.offsets.copy(), model.frames.copy()
-    offsets[0] = shift + rotation.rotate(turn, offsets[0])
-    frames[0] = rotation.multiply(turn, frames[0])
+    offsets[0] = shift + rotation.rotate(Q, offsets[0])
+    frames[0] = rotation.multiply(Q, frames[0])
     there = Articulation(
         Skeleton(model.skeleton.parents, offsets), model.kinds, model.axes, frames=frames,
         lower=model.lower, upper=model.upper, cones=model.cones, mimics=model.mimics,
     )  # fmt: skip
     return there, [
         t._replace(
-            position=shift + rotation.rotate(turn, t.position),
-            rotation=None if t.rotation is None else rotation.multiply(turn, t.rotation),
+            position=shift + rotation.rotate(Q, t.position),
+            rotation=None if t.rotation is None else rotation.multiply(Q, t.rotation),
         )
         for t in targets
     ]
@@ -372,14 +373,14 @@ def moved(model, targets, turn, shift):
 @at_both_speeds
 @with_examples
 @given(**TREES)
-# Arms almost on one line below a free joint: FABRIK takes the least of the best rotations.
+# Arms almost collinear below a free joint: FABRIK takes the least of the best rotations.
 @example(kinds=["free", "slide", "free", "fixed", "fixed", "hinge"], seed=237332365)
 def test_a_moved_world_changes_nothing(problem, solver, backend, kinds, seed):
     model, q, targets = problem(kinds, seed)
     rng = np.random.default_rng(seed)
-    there, goals = moved(model, targets, rotation.random(rng), rng.standard_normal(3))
+    there, targets_there = moved(model, targets, rotation.random(rng), rng.standard_normal(3))
     here = solve_ik(model, q, targets, solver, max_iterations=4, record=True)
-    again = solve_ik(there, q, goals, solver, max_iterations=4, record=True)
+    again = solve_ik(there, q, targets_there, solver, max_iterations=4, record=True)
     same = min(len(here.history), len(again.history))
     assert same == len(here.history) or here.outcome is not Outcome.CONVERGED
     np.testing.assert_allclose(again.history[:same], here.history[:same], rtol=0, atol=PATH)
@@ -387,14 +388,14 @@ def test_a_moved_world_changes_nothing(problem, solver, backend, kinds, seed):
 
 def scaled(model, q, targets, s):
     """Return the model, coordinates and targets with all lengths s times as large."""
-    worth = np.array([s if kind == "slide" else 1.0 for kind in model.kinds])
+    factors = np.array([s if kind == "slide" else 1.0 for kind in model.kinds])
     mimics = {
-        j: Mimic(m.leader, m.multiplier * worth[j] / worth[m.leader], m.shift * worth[j])
+        j: Mimic(m.leader, m.multiplier * factors[j] / factors[m.leader], m.shift * factors[j])
         for j, m in model.mimics.items()
     }
     large = Articulation(
         Skeleton(model.skeleton.parents, s * model.skeleton.offsets), model.kinds, model.axes,
-        frames=model.frames, lower=worth * model.lower, upper=worth * model.upper,
+        frames=model.frames, lower=factors * model.lower, upper=factors * model.upper,
         cones=model.cones, mimics=mimics,
     )  # fmt: skip
     return large, to_scale(model, q, s), [t._replace(position=s * t.position) for t in targets]
@@ -408,16 +409,22 @@ def to_scale(model, q, s):
     return q
 
 
+def reach(model, targets):
+    """Return the length that solvers measure by [m]: one metre where free joints leave none."""
+    oriented = tuple(t.rotation is not None for t in targets)
+    return prepare(model, tuple(t.effector for t in targets), oriented).mechanism.reach
+
+
 @at_both_speeds
 @with_examples
 @given(**TREES)
 def test_another_unit_of_length_changes_nothing(problem, solver, backend, kinds, seed):
     """The unit is a power of two, so that nothing is rounded otherwise."""
     model, q, targets = problem(kinds, seed)
-    large, start, goals = scaled(model, q, targets, 1024.0)
+    large, start, targets_there = scaled(model, q, targets, 1024.0)
     here = solve_ik(model, q, targets, solver, max_iterations=6)
-    there = solve_ik(large, start, goals, solver, max_iterations=6, tolerance=1024e-4)
-    if any(len(model.skeleton.path(t.effector)) > 1 for t in targets):  # there is some length
+    there = solve_ik(large, start, targets_there, solver, max_iterations=6, tolerance=1024e-4)
+    if reach(large, targets) == 1024.0 * reach(model, targets):  # there is some length
         assert there.iterations == here.iterations
         expected = to_scale(model, here.coordinates, 1024.0)
         np.testing.assert_allclose(there.coordinates, expected, rtol=1e-9, atol=1e-9)
@@ -431,9 +438,9 @@ def test_another_unit_changes_nothing_where_all_length_is_in_the_slides(solver, 
         [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 1]], lower=-1.0, upper=1.0,
     )  # fmt: skip
     target = [Target(np.array([0.3, -0.2, 0.4]), effector=3)]
-    large, start, goals = scaled(gantry, gantry.zero(), target, 1024.0)
+    large, start, targets_there = scaled(gantry, gantry.zero(), target, 1024.0)
     here = solve_ik(gantry, gantry.zero(), target, solver)
-    there = solve_ik(large, start, goals, solver, tolerance=1024e-4)
+    there = solve_ik(large, start, targets_there, solver, tolerance=1024e-4)
     assert here.outcome is Outcome.CONVERGED
     assert there.iterations == here.iterations
     np.testing.assert_allclose(there.coordinates, 1024.0 * here.coordinates, rtol=1e-12, atol=0)
@@ -445,8 +452,8 @@ def test_another_unit_changes_nothing_where_all_length_is_in_the_slides(solver, 
 def as_arrays(value):
     """Return numbers as float64 arrays, in targets too."""
     if isinstance(value, Target):
-        turn = value.rotation if value.rotation is None else np.array(value.rotation, dtype=float)
-        return value._replace(position=np.array(value.position, dtype=float), rotation=turn)
+        Q = value.rotation if value.rotation is None else np.array(value.rotation, dtype=float)
+        return value._replace(position=np.array(value.position, dtype=float), rotation=Q)
     numbers = isinstance(value, list) and not any(isinstance(one, Target) for one in value)
     return np.array(value, dtype=float) if numbers else value
 
@@ -510,7 +517,7 @@ def as_arrays(value):
 @pytest.mark.parametrize("plain", [False, True])
 def test_bad_input_is_named(change, message, plain, backend):
     kinds = ["hinge", "ball", "slide", "fixed"]
-    if plain:  # what is a float64 array already takes a shorter way
+    if plain:  # what is a float64 array already takes a shorter path
         change = {name: as_arrays(value) for name, value in change.items()}
     arguments = {
         "skeleton": Articulation(Skeleton([-1, 0, 1, 2], np.eye(4, 3)), kinds),
@@ -526,9 +533,9 @@ def test_bad_input_is_named(change, message, plain, backend):
 def test_lengths_on_the_edge_of_the_unit_tolerance_are_unit(
     skeleton, local, solver, excess, backend
 ):
-    goal = forward_kinematics(skeleton, local[::-1])
-    target, long = Target(goal.positions[-1], goal.rotations[-1]), 1.0 + excess
-    edge = target._replace(rotation=long * goal.rotations[-1])
+    there = forward_kinematics(skeleton, local[::-1])
+    target, long = Target(there.positions[-1], there.rotations[-1]), 1.0 + excess
+    edge = target._replace(rotation=long * there.rotations[-1])
     exact = solve_ik(skeleton, local, target, solver, max_iterations=2)
     for start, wanted in ((local, edge), (long * local, target), (long * local, edge)):
         there = solve_ik(skeleton, start, wanted, solver, max_iterations=2)

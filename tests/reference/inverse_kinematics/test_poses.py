@@ -38,8 +38,8 @@ def test_poses_that_can_be_reached_are(solver, kind, starts, chain_of_joints, rn
     links = {"ball": 4, "hinge": 7}[kind]
     model, reached = chain_of_joints(kind, rng, links), 0
     for _ in range(20):
-        goal = forward_kinematics(model, model.random(rng))
-        target = Target(goal.positions[-1], goal.rotations[-1])
+        there = forward_kinematics(model, model.random(rng))
+        target = Target(there.positions[-1], there.rotations[-1])
         solution = solve_ik(
             model, model.random(rng), target, solver, max_iterations=500,
             tolerance=1e-3, tolerance_rotation=2e-3, restarts=5 if starts == "more" else 0,
@@ -53,25 +53,25 @@ def test_poses_that_can_be_reached_are(solver, kind, starts, chain_of_joints, rn
     assert reached >= REACHED[solver, kind, starts]
 
 
-def test_a_skeleton_s_effector_turns_where_its_rotation_is_asked_for(
+def test_a_skeleton_s_effector_rotates_where_its_rotation_is_asked_for(
     skeleton, local, solver, rng, backend
 ):
-    goal = forward_kinematics(skeleton, rotation.random(rng, 6))
-    alone = solve_ik(skeleton, local, Target(goal.positions[-1]), solver, max_iterations=3)
+    there = forward_kinematics(skeleton, rotation.random(rng, 6))
+    single = solve_ik(skeleton, local, Target(there.positions[-1]), solver, max_iterations=3)
     posed = solve_ik(
-        skeleton, local, Target(goal.positions[-1], goal.rotations[-1]), solver, max_iterations=3
+        skeleton, local, Target(there.positions[-1], there.rotations[-1]), solver, max_iterations=3
     )
-    np.testing.assert_allclose(alone.local_rotations[-1], local[-1], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(single.local_rotations[-1], local[-1], rtol=0, atol=1e-15)
     assert rotation.angle(posed.local_rotations[-1], local[-1]) > 1e-3
-    before = rotation.angle(forward_kinematics(skeleton, local).rotations[-1], goal.rotations[-1])
+    before = rotation.angle(forward_kinematics(skeleton, local).rotations[-1], there.rotations[-1])
     assert posed.residual_rotation < before
-    assert alone.residual_rotation == 0.0
+    assert single.residual_rotation == 0.0
 
 
 def test_the_sign_of_the_target_s_quaternion_does_not_matter(solver, backend, articulated, rng):
     model = articulated(["ball", "hinge", "ball", "slide", "hinge", "ball"], 5)
-    goal, q = forward_kinematics(model, model.random(rng)), model.random(rng)
-    target = Target(goal.positions[-1], goal.rotations[-1], -1)
+    there, q = forward_kinematics(model, model.random(rng)), model.random(rng)
+    target = Target(there.positions[-1], there.rotations[-1], -1)
     here = solve_ik(model, q, target, solver, max_iterations=5)
     there = solve_ik(model, q, target._replace(rotation=-target.rotation), solver, max_iterations=5)
     assert (there.coordinates == here.coordinates).all()
@@ -79,19 +79,19 @@ def test_the_sign_of_the_target_s_quaternion_does_not_matter(solver, backend, ar
 
 
 def test_the_sign_of_the_start_s_quaternions_does_not_matter(solver, backend, skeleton, local, rng):
-    goal = forward_kinematics(skeleton, rotation.random(rng, 6))
-    target = Target(goal.positions[-1], goal.rotations[-1])
+    there = forward_kinematics(skeleton, rotation.random(rng, 6))
+    target = Target(there.positions[-1], there.rotations[-1])
     here = solve_ik(skeleton, local, target, solver, max_iterations=5)
     there = solve_ik(skeleton, -local, target, solver, max_iterations=5)
     np.testing.assert_allclose(there.positions, here.positions, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("angle", [np.pi, np.pi - 1e-9, 3.0])
-def test_half_a_turn_is_made_good(solver, angle, backend):
-    """Where both ways round are as long, one is taken."""
+def test_a_rotation_by_pi_is_made_good(solver, angle, backend):
+    """Where both directions are as long, one is taken."""
     joint = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0.5, 0, 0]]), ["ball", "fixed"])
-    turn = rotation.exponential([0.0, 0.0, angle])
-    target = Target(rotation.rotate(turn, [0.5, 0, 0]), turn)
+    Q = rotation.exponential([0.0, 0.0, angle])
+    target = Target(rotation.rotate(Q, [0.5, 0, 0]), Q)
     solution = solve_ik(joint, joint.zero(), target, solver, max_iterations=300)
     assert solution.outcome is Outcome.CONVERGED
     assert solution.residual_rotation <= 1e-4
@@ -100,8 +100,8 @@ def test_half_a_turn_is_made_good(solver, angle, backend):
 def test_both_tolerances_must_be_kept(solver, backend):
     """A hinge far off the axis: position and rotation are met together, at different pace."""
     arm = Articulation(Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"])
-    turn = rotation.exponential([0.0, 0.0, 1e-3])
-    near = Target([np.cos(1e-3), np.sin(1e-3), 0.0], turn)
+    Q = rotation.exponential([0.0, 0.0, 1e-3])
+    near = Target([np.cos(1e-3), np.sin(1e-3), 0.0], Q)
     for tolerances, iterations in (((1e-2, 1e-2), 0), ((1e-2, 1e-4), 1), ((1e-4, 1e-2), 1)):
         solution = solve_ik(
             arm, [0.0], near, solver, tolerance=tolerances[0], tolerance_rotation=tolerances[1]
@@ -126,22 +126,22 @@ def test_rotations_count_by_lever_and_reach(chain_of_joints, machine, rng):
         Target(pose.positions[2] + 1.0, pose.rotations[2], 2, 2.0),
     ]
     q = model.random(rng)
-    mechanism, goal, data, _ = machine(model, q, targets)
-    goal["weight"] = [t.weight for t in targets]
+    mechanism, rows, data, _ = machine(model, q, targets)
+    rows["weight"] = [t.weight for t in targets]
     here, lever = forward_kinematics(model, q), LEVER * mechanism.reach
     total = largest = furthest = nearness = 0.0
-    for e, (position, turn, joint, weight) in enumerate(targets):
-        way = np.linalg.norm(position - here.positions[joint])
-        angle = rotation.angle(here.rotations[joint], turn)
-        matrices = rotation.to_matrix(np.stack([here.rotations[joint], turn]))
-        total += weight * (way**2 + lever**2 * (3.0 - np.trace(matrices[0].T @ matrices[1])))
-        largest, furthest = max(largest, angle), max(furthest, way)
-        nearness += way + lever * angle
-        turned = rotation.multiply(rotation_error(mechanism, goal, data, e), here.rotations[joint])
-        assert rotation.angle(turned, turn) < 1e-13
-    assert cost(mechanism, goal, data) == pytest.approx(total, rel=1e-13)
+    for e, (position, Q, joint, weight) in enumerate(targets):
+        distance = np.linalg.norm(position - here.positions[joint])
+        angle = rotation.angle(here.rotations[joint], Q)
+        matrices = rotation.to_matrix(np.stack([here.rotations[joint], Q]))
+        total += weight * (distance**2 + lever**2 * (3.0 - np.trace(matrices[0].T @ matrices[1])))
+        largest, furthest = max(largest, angle), max(furthest, distance)
+        nearness += distance + lever * angle
+        turned = rotation.multiply(rotation_error(mechanism, rows, data, e), here.rotations[joint])
+        assert rotation.angle(turned, Q) < 1e-13
+    assert cost(mechanism, rows, data) == pytest.approx(total, rel=1e-13)
     assert rotation_weight(mechanism) == pytest.approx(0.5 * lever**2, rel=1e-15)
-    found = residuals(mechanism, goal, data)
+    found = residuals(mechanism, rows, data)
     np.testing.assert_allclose(found, [furthest, largest, nearness], rtol=1e-13, atol=0)
 
 
@@ -159,7 +159,7 @@ def test_a_solve_is_the_same_wherever_its_arrays_come_from(change, articulated):
 
 @pytest.mark.parametrize("weight", [1e80, 0.0, -1.0, np.inf, np.nan])
 def test_one_target_s_weight_is_checked_as_those_of_several(weight, skeleton, local):
-    """Alone it counts for nothing, but it is an argument all the same."""
+    """By itself it counts for nothing, but it is an argument all the same."""
     for model, start in ((skeleton, local), (Articulation(skeleton, "hinge"), np.zeros(6))):
         with pytest.raises(ValueError, match="weight: expected"):
             solve_ik(model, start, Target(np.ones(3), None, 5, weight), max_iterations=1)

@@ -91,10 +91,10 @@ def problem(name, seed):
     model, effectors, oriented = MODELS[name]()
     rng = np.random.default_rng([seed, len(name)])
     if isinstance(model, Skeleton):
-        q, goal = rotation.random(rng, 2, model.joint_count)
+        q, other = rotation.random(rng, 2, model.joint_count)
     else:
-        q, goal = model.random(rng, 2)
-    pose, stretch = forward_kinematics(model, goal), [1.0, 1.6, 4.0][seed % 3]
+        q, other = model.random(rng, 2)
+    pose, stretch = forward_kinematics(model, other), [1.0, 1.6, 4.0][seed % 3]
     targets = [
         Target(
             stretch * pose.positions[j],

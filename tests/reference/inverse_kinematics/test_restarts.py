@@ -21,8 +21,8 @@ def arm(chain_of_joints, rng):
 @pytest.fixture
 def poses(arm, rng):
     """Return 30 poses that the arm can take."""
-    goal = forward_kinematics(arm, arm.random(rng, 30))
-    return Target(goal.positions[:, -1], goal.rotations[:, -1])
+    pose = forward_kinematics(arm, arm.random(rng, 30))
+    return Target(pose.positions[:, -1], pose.rotations[:, -1])
 
 
 def reached(solution):
@@ -41,8 +41,8 @@ def test_more_restarts_reach_more_targets(arm, poses, rng, solver):
 def test_what_one_start_reaches_soon_takes_no_restart(arm, rng, solver, backend):
     """A start near the target: the very same answer."""
     q = 0.9 * arm.random(rng)
-    goal = forward_kinematics(arm, q + 1e-3)
-    target = Target(goal.positions[-1], goal.rotations[-1])
+    there = forward_kinematics(arm, q + 1e-3)
+    target = Target(there.positions[-1], there.rotations[-1])
     options = {"tolerance": 2e-3, "tolerance_rotation": 2e-3, "record": True}
     one = solve_ik(arm, q, target, solver, **options)
     more = solve_ik(arm, q, target, solver, restarts=5, **options)
@@ -53,12 +53,12 @@ def test_what_one_start_reaches_soon_takes_no_restart(arm, rng, solver, backend)
         assert solver in ("fabrik", "ccd", "jacobian_transpose")
 
 
-def test_one_restart_from_the_very_goal_arrives(arm, solver, backend, rng):
-    """The start is bent the wrong way and given no iterations, so that restarts alone count."""
+def test_one_restart_from_the_very_answer_arrives(arm, solver, backend, rng):
+    """The start is bent wrongly and given no iterations, so that only restarts count."""
     random = prepare(arm, (7,), (True,), 3, 11).restarts
     assert random.shape == (3, 8)
-    goal = forward_kinematics(arm, random[1])
-    target = Target(goal.positions[-1], goal.rotations[-1])
+    there = forward_kinematics(arm, random[1])
+    target = Target(there.positions[-1], there.rotations[-1])
     solution = solve_ik(arm, arm.random(rng), target, solver, restarts=3, seed=11, max_iterations=0)
     assert solution.outcome is Outcome.CONVERGED
     assert solution.iterations == 0
@@ -73,19 +73,21 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
         Target(poses.position[0], poses.rotation[0], 7),
         Target(poses.position[1] / 2.0, None, 3),
     ]
-    goal = machine(arm, arm.neutral(), targets).goal
+    target = machine(arm, arm.neutral(), targets).target
     state = SimpleNamespace(
         mechanism=prepared.mechanism,
         restarts=prepared.restarts,
-        tips=prepared.tips,
+        effector_frames=prepared.effector_frames,
         progress=new_progress(10),
     )
-    rank_restarts(state, goal)
+    rank_restarts(state, target)
     full = np.hstack([prepared.restarts, np.zeros((9, arm.coordinate_count))])[:, :8]
     pose = forward_kinematics(arm, full)
-    ways = [np.linalg.norm(pose.positions[:, t.effector] - t.position, axis=1) for t in targets]
+    errors = [pose.positions[:, t.effector] - t.position for t in targets]
+    distances = np.linalg.norm(errors, axis=2)
     angles = rotation.angle(pose.rotations[:, 7], targets[0].rotation)
-    expected = np.max(ways, axis=0) + LEVER * prepared.mechanism.reach * 4.0 * np.sin(angles / 4.0)
+    lever = LEVER * prepared.mechanism.reach
+    expected = np.max(distances, axis=0) + lever * 4.0 * np.sin(angles / 4.0)
     np.testing.assert_allclose(state.progress[1:10, RANK], expected, rtol=1e-12, atol=0)
     taken = np.empty((9, prepared.mechanism.coordinates))
     for q in taken:
@@ -99,8 +101,8 @@ def test_the_best_of_all_attempts_is_returned(arm, poses, rng, solver, backend):
     random = prepare(arm, (7,), (False,), 6, 5).restarts
     starts = np.vstack([q[:7], random])
     full = np.hstack([starts, np.full((7, 1), q[7])])
-    ways = forward_kinematics(arm, full).positions[:, -1] - wanted.position
-    best = np.linalg.norm(ways, axis=1)
+    errors = forward_kinematics(arm, full).positions[:, -1] - wanted.position
+    best = np.linalg.norm(errors, axis=1)
     solution = solve_ik(arm, q, wanted, solver, restarts=6, seed=5, max_iterations=0)
     assert solution.residual == pytest.approx(best.min(), abs=1e-14)
     np.testing.assert_allclose(solution.coordinates, full[best.argmin()], rtol=0, atol=1e-15)
@@ -115,7 +117,7 @@ def test_restarts_follow_from_the_seed(arm, poses, rng):
     assert (first.coordinates != other.coordinates).any()
 
 
-def test_restarts_are_the_same_alone_and_in_a_batch(arm, poses, rng, solver):
+def test_restarts_are_the_same_one_by_one_and_in_a_batch(arm, poses, rng, solver):
     q = arm.random(rng)
     batch = solve_ik(arm, q, poses, solver, restarts=3, max_iterations=20)
     for i in (0, 7, 29):
@@ -125,8 +127,8 @@ def test_restarts_are_the_same_alone_and_in_a_batch(arm, poses, rng, solver):
         assert batch.iterations[i] == one.iterations
 
 
-def test_restarts_keep_limits_and_leave_joints_off_the_way(
-    articulated, reachable, on_the_way, rng, solver, backend
+def test_restarts_keep_limits_and_leave_other_joints(
+    articulated, reachable, moving_joints, rng, solver, backend
 ):
     for seed in range(4):
         model = articulated(["ball", "hinge", "ball", "slide", "hinge", "ball", "hinge"], seed)
@@ -134,7 +136,7 @@ def test_restarts_keep_limits_and_leave_joints_off_the_way(
         q = model.random(rng)
         solution = solve_ik(model, q, targets, solver, restarts=3, max_iterations=3)
         assert model.within_limits(solution.coordinates, 1e-7)
-        for j in set(range(7)) - on_the_way(model, targets) - set(model.mimics):
+        for j in set(range(7)) - moving_joints(model, targets) - set(model.mimics):
             own = model.coordinates_of(j)
             np.testing.assert_allclose(solution.coordinates[own], q[own], rtol=0, atol=1e-15)
 

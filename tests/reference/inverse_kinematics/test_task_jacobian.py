@@ -51,29 +51,29 @@ def problem(articulated, reachable, unlimited):
 
 
 def worth_of_freedoms(model, reach):
-    """Return what a unit of each freedom is worth: 1 rad, or the reach [m]."""
-    worth = np.ones(model.freedom_count)
+    """Return what a unit of each freedom stands for: 1 rad, or the reach [m]."""
+    scale = np.ones(model.freedom_count)
     for j, kind in enumerate(model.kinds):
         if j not in model.mimics and kind in ("slide", "free"):
-            worth[model.freedoms_of(j)][:3] = reach
-    return worth
+            scale[model.freedoms_of(j)][:3] = reach
+    return scale
 
 
 def stacked(model, q, targets, reach):
     """Return e (equation,) and J (equation, freedom) of all targets, by `jacobians.jacobian`."""
     pose, errors, rows = forward_kinematics(model, q), [], []
-    for position, turn, joint, weight in targets:
+    for position, Q, joint, weight in targets:
         root, J = np.sqrt(weight), jacobian(model, q, joint)
         errors.append(root * (position - pose.positions[joint]))
         rows.append(root * J[:3])
-        if turn is not None:
-            wrong = rotation.multiply(turn, rotation.conjugate(pose.rotations[joint]))
+        if Q is not None:
+            wrong = rotation.multiply(Q, rotation.conjugate(pose.rotations[joint]))
             errors.append(root * LEVER * reach * rotation.logarithm(wrong))
             rows.append(root * LEVER * reach * J[3:])
     return np.concatenate(errors), np.concatenate(rows) * worth_of_freedoms(model, reach)
 
 
-def freedoms_on_the_way(model, joints):
+def freedoms_of_moving(model, joints):
     """Return the freedoms of some joints, in their order."""
     return np.concatenate([np.r_[model.freedoms_of(j)] for j in sorted(joints)] + [[]]).astype(int)
 
@@ -81,14 +81,14 @@ def freedoms_on_the_way(model, joints):
 @at_both_speeds
 @with_examples
 @given(**TREES)
-def test_errors_and_rows_are_those_of_the_jacobians(problem, machine, on_the_way, kinds, seed):
+def test_errors_and_rows_are_those_of_the_jacobians(problem, machine, moving_joints, kinds, seed):
     model, q, targets = problem(kinds, seed)
-    mechanism, goal, data, room = machine(model, q, targets)
-    linearise_task(mechanism, goal, data, room.system)
+    mechanism, target, data, workspace = machine(model, q, targets)
+    linearise_task(mechanism, target, data, workspace.system)
     e, J = stacked(model, q, targets, mechanism.reach)
-    own = freedoms_on_the_way(model, on_the_way(model, targets))
-    np.testing.assert_allclose(room.system.e, e, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(room.system.J, J[:, own].T, rtol=0, atol=ROUNDING)
+    own = freedoms_of_moving(model, moving_joints(model, targets))
+    np.testing.assert_allclose(workspace.system.e, e, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(workspace.system.J, J[:, own].T, rtol=0, atol=ROUNDING)
     others = np.setdiff1d(np.arange(model.freedom_count), own)
     assert not J[:, others].any()  # whoever is left out moves no effector
 
@@ -101,10 +101,10 @@ def test_a_follower_of_another_kind_adds_to_its_leader_s_row(machine):
         mimics={1: Mimic(0, 0.3, 0.1), 3: Mimic(2, -2.0)},
     )  # fmt: skip
     q, targets = np.array([0.4, -0.3]), [Target([1.0, 2.0, 0.5], rotation.identity(), 4)]
-    mechanism, goal, data, room = machine(model, q, targets)
-    linearise_task(mechanism, goal, data, room.system)
+    mechanism, target, data, workspace = machine(model, q, targets)
+    linearise_task(mechanism, target, data, workspace.system)
     _, J = stacked(model, q, targets, mechanism.reach)
-    np.testing.assert_allclose(room.system.J, J.T, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(workspace.system.J, J.T, rtol=0, atol=ROUNDING)
 
 
 def damped(J, e, damping):
@@ -157,8 +157,8 @@ def test_levenberg_marquardt_converges_quadratically_to_poses(
 ):
     model = chain_of_joints("hinge", rng, links=7)
     q = model.random(rng)
-    goal = forward_kinematics(model, q + 0.3)
-    target = Target(goal.positions[-1], goal.rotations[-1])
+    target = forward_kinematics(model, q + 0.3)
+    target = Target(target.positions[-1], target.rotations[-1])
     history = solve_ik(model, q, target, solver, tolerance=1e-13, record=True).history
     errors = history[(history > 1e-13) & (history < 1e-2)]
     assert len(errors) >= 2
@@ -177,66 +177,66 @@ def limited(rng, machine, chain_of_joints, targets=1):
         model.skeleton, list(kinds), model.axes,
         lower=q - rng.uniform(0.0, 0.3, 6), upper=q + rng.uniform(0.0, 0.3, 6),
     )  # fmt: skip
-    goal = forward_kinematics(model, q + rng.standard_normal(6))
-    wanted = [Target(goal.positions[j], effector=j) for j in (5, 3)[:targets]]
+    target = forward_kinematics(model, q + rng.standard_normal(6))
+    wanted = [Target(target.positions[j], effector=j) for j in (5, 3)[:targets]]
     return model, q, wanted, machine(model, q, wanted)
 
 
 def bounds(model, q, reach):
-    worth = worth_of_freedoms(model, reach)[: len(q)]
-    return (model.lower[: len(q)] - q) / worth, (model.upper[: len(q)] - q) / worth
+    scale = worth_of_freedoms(model, reach)[: len(q)]
+    return (model.lower[: len(q)] - q) / scale, (model.upper[: len(q)] - q) / scale
 
 
 def test_a_held_step_is_the_least_squares_solution_within_the_limits(rng, machine, chain_of_joints):
     active = 0
     for _ in range(60):
-        model, _, _, (mechanism, goal, data, room) = limited(rng, machine, chain_of_joints)
+        model, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)
         own = data.q.copy()
-        linearise_task(mechanism, goal, data, room.system)
-        J, e = room.system.J.T.copy(), room.system.e.copy()
+        linearise_task(mechanism, target, data, workspace.system)
+        J, e = workspace.system.J.T.copy(), workspace.system.e.copy()
         damping = 0.1 * mechanism.reach**2
-        damped_step(mechanism, data, room.system, damping)
+        damped_step(mechanism, data, workspace.system, damping)
         lower, upper = bounds(model, own, mechanism.reach)
         system = np.vstack([J, np.sqrt(damping) * np.eye(len(own))])
         wanted = np.concatenate([e, np.zeros(len(own))])
         best = lsq_linear(system, wanted, (lower, upper + 1e-15), tol=1e-14)
-        step = room.system.step
+        step = workspace.system.step
         assert (step >= lower - ROUNDING).all()
         assert (step <= upper + ROUNDING).all()
         cost = 0.5 * np.sum((system @ step - wanted) ** 2)
         assert cost == pytest.approx(best.cost, rel=1e-9)
-        active += np.count_nonzero(room.system.active)
+        active += np.count_nonzero(workspace.system.active)
     assert active > 100
 
 
 def test_a_transposed_step_leaves_out_what_limits_stop(rng, machine, chain_of_joints):
     for _ in range(20):
-        _, _, _, (mechanism, goal, data, room) = limited(rng, machine, chain_of_joints)
+        _, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)
         joints = mechanism.joints
         data.q[:] = np.where(rng.random(len(data.q)) < 0.5, joints["lower"], joints["upper"])
-        linearise_task(mechanism, goal, data, room.system)
-        J, e = room.system.J.T.copy(), room.system.e.copy()
-        transposed_step(mechanism, data, room.system)
+        linearise_task(mechanism, target, data, workspace.system)
+        J, e = workspace.system.J.T.copy(), workspace.system.e.copy()
+        transposed_step(mechanism, data, workspace.system)
         g = J.T @ e
         free = np.where(data.q == joints["lower"], g > 0.0, g < 0.0)
         expected = np.zeros(len(g))
         expected[free] = transposed(J[:, free], e, None, None)
-        np.testing.assert_allclose(room.system.step, expected, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(workspace.system.step, expected, rtol=0, atol=ROUNDING)
 
 
 def test_steps_end_within_the_limits(rng, machine, chain_of_joints):
     for _ in range(20):
-        model, _, _, (mechanism, goal, data, room) = limited(rng, machine, chain_of_joints)
-        linearise_task(mechanism, goal, data, room.system)
-        damped_step(mechanism, data, room.system, 1e-6)
-        take_step(mechanism, data, room.system)
+        model, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)
+        linearise_task(mechanism, target, data, workspace.system)
+        damped_step(mechanism, data, workspace.system, 1e-6)
+        take_step(mechanism, data, workspace.system)
         assert (data.q >= mechanism.joints["lower"]).all()
         assert (data.q <= mechanism.joints["upper"]).all()
 
 
 @pytest.mark.parametrize("solver", STEPS)
-def test_a_hinge_of_whole_turns_goes_round_where_it_must(solver, backend):
-    """From near its upper limit the short way to the target leads beyond it."""
+def test_a_hinge_that_covers_the_circle_goes_round_where_it_must(solver, backend):
+    """From near its upper limit the smaller angle to the target leads beyond it."""
     arm = Articulation(
         Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), ["hinge", "fixed"], lower=-4.0, upper=4.0
     )
@@ -250,7 +250,9 @@ def test_a_hinge_of_whole_turns_goes_round_where_it_must(solver, backend):
 @pytest.mark.parametrize(
     ("lower", "upper"), [(-4.0, 4.0), (-1.0, 9.0), (-np.inf, 2.0), (0, np.inf)]
 )
-def test_beyond_its_limits_a_hinge_takes_the_nearest_angle_of_the_same_turn(lower, upper, machine):
+def test_beyond_its_limits_a_hinge_takes_the_nearest_angle_of_the_same_period(
+    lower, upper, machine
+):
     arm = Articulation(
         Skeleton([-1, 0], np.eye(2, 3)), ["hinge", "fixed"], lower=lower, upper=upper
     )
@@ -274,11 +276,11 @@ def test_beyond_its_limits_a_hinge_takes_the_nearest_angle_of_the_same_turn(lowe
 @pytest.mark.parametrize("rank", [0, 1, 2, 3])
 @pytest.mark.parametrize("damping", [0.0, 1e-30, 1e-12, 1.0])
 def test_a_singular_system_has_a_finite_answer(chain_of_joints, machine, rng, rank, damping):
-    """Rows of low rank in a turned world; the damping is held above rounding, whatever is asked."""
+    """Rows of low rank in a rotated world; the damping is above rounding, whatever is asked."""
     for _ in range(20):
         model = chain_of_joints("ball", rng, links=3)
         target = Target([1.0, 2.0, 3.0], rotation.identity(), 3)
-        system = machine(model, model.random(rng), [target]).room.system
+        system = machine(model, model.random(rng), [target]).workspace.system
         span = rng.standard_normal((rank, 6))
         system.J[:] = rng.standard_normal((len(system.J), rank)) @ span
         system.e[:] = rng.standard_normal(rank) @ span
@@ -300,9 +302,9 @@ def test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly(rng, size, back
         across = np.cross(axis, [0.6, 0.0, 0.8])
         offsets = size * np.outer([0, 1, 1, 1], across / np.linalg.norm(across))
         arm = Articulation(Skeleton(range(-1, 3), offsets), ["hinge"] * 3 + ["fixed"], axis)
-        goal = forward_kinematics(arm, rng.uniform(-1.0, 1.0, 3))
+        target = forward_kinematics(arm, rng.uniform(-1.0, 1.0, 3))
         solution = solve_ik(
-            arm, [0.3, 0.2, 0.1], goal.positions[-1], "levenberg_marquardt", tolerance=0.0
+            arm, [0.3, 0.2, 0.1], target.positions[-1], "levenberg_marquardt", tolerance=0.0
         )
         assert solution.residual <= 1e-14 * size
 
@@ -310,10 +312,10 @@ def test_arms_that_move_in_a_plane_reach_what_lies_in_it_exactly(rng, size, back
 @pytest.mark.parametrize("solver", STEPS)
 def test_huge_and_tiny_weights_do_no_harm(chain_of_joints, rng, solver, backend):
     model = chain_of_joints("ball", rng)
-    goal, q = forward_kinematics(model, model.random(rng)), model.random(rng)
+    target, q = forward_kinematics(model, model.random(rng)), model.random(rng)
     for weights in ((1e-20, 1e20), (1e20, 1e20), (1e-20, 1e-20), (1e-75, 1e75)):
         targets = [
-            Target(goal.positions[j], effector=j, weight=weight)
+            Target(target.positions[j], effector=j, weight=weight)
             for j, weight in zip((2, 4), weights, strict=True)
         ]
         solution = solve_ik(model, q, targets, solver, max_iterations=10)

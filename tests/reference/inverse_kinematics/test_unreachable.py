@@ -64,8 +64,8 @@ def test_by_default_a_robot_settles(solver, chain_of_joints, rng):
     """Where more iterations change nothing; what they have not reached is above the bound."""
     model = chain_of_joints("hinge", rng, links=5, lower=-1.8, upper=1.8)
     for _ in range(5):
-        way = rotation.rotate(rotation.random(rng), [0.0, 0.0, 1.0])
-        target = model.skeleton.offsets[0] + 1.5 * model.skeleton.reach() * way
+        direction = rotation.rotate(rotation.random(rng), [0.0, 0.0, 1.0])
+        target = model.skeleton.offsets[0] + 1.5 * model.skeleton.reach() * direction
         q = model.random(rng)
         solution = solve_ik(model, q, target, solver)
         assert solution.outcome is Outcome.UNREACHABLE

@@ -1,4 +1,4 @@
-"""Wahba's problem: the turn that brings arms nearest to where they are wanted."""
+"""Wahba's problem: the rotation that brings arms nearest to where they are wanted."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ ROUNDING = 1e-14
 numbers = st.floats(-1.0, 1.0)
 vectors = st.lists(numbers, min_size=3, max_size=3)
 matrices = st.lists(numbers, min_size=9, max_size=9).map(tuple)
-turns = vectors.map(lambda v: rotation.exponential(3.0 * np.array(v)))
+rotations = vectors.map(lambda v: rotation.exponential(3.0 * np.array(v)))
 axes = vectors.filter(lambda v: np.linalg.norm(v) > 0.1).map(lambda v: v / np.linalg.norm(v))
 
 
@@ -49,7 +49,7 @@ def value(M, S):
     return np.einsum("...ij,ij->...", rotation.to_matrix(S), np.reshape(M, (3, 3)))
 
 
-def test_outer_products_and_turns_are_added_by_weight(rng):
+def test_outer_products_and_rotations_are_added_by_weight(rng):
     b, a, R = rng.standard_normal(3), rng.standard_normal(3), rotation.random(rng)
     M = add_rotation(add_outer(ZERO_MATRIX, 2.0, tuple(b), tuple(a)), 3.0, tuple(R))
     expected = 2.0 * np.outer(b, a) + 3.0 * rotation.to_matrix(R)
@@ -57,8 +57,8 @@ def test_outer_products_and_turns_are_added_by_weight(rng):
     assert magnitude(M) == pytest.approx(np.linalg.norm(expected), rel=ROUNDING)
 
 
-@given(M=matrices, S=turns)
-def test_the_value_of_a_turn_is_the_trace_with_its_matrix(M, S):
+@given(M=matrices, S=rotations)
+def test_the_value_of_a_rotation_is_the_trace_with_its_matrix(M, S):
     assert alignment(M, tuple(S)) == pytest.approx(value(M, S), abs=ROUNDING)
 
 
@@ -70,7 +70,7 @@ def test_the_value_of_a_turn_is_the_trace_with_its_matrix(M, S):
 @example(M=(-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0))
 @example(M=(0.0, 0.0, 0.0, 1e-150, 0.0, 0.0, 0.0, 0.0, 0.0))
 def test_no_rotation_is_better_than_the_best(M):
-    """The least turn's share of M's size can cost no more than itself times the four of a trace."""
+    """The least rotation's share of M's size can cost itself times the four of a trace."""
     S = best(M)
     assert np.linalg.norm(S) == pytest.approx(1.0, abs=ROUNDING)
     assert S[0] >= 0.0
@@ -80,7 +80,7 @@ def test_no_rotation_is_better_than_the_best(M):
 
 @given(M=matrices)
 def test_the_best_rotation_is_never_worse_than_none(M):
-    """Whatever the least turn is worth: this is why CCD never moves away."""
+    """Whatever the least rotation adds: this is why CCD never moves away."""
     assert value(M, best(M)) >= value(M, rotation.identity()) - ROUNDING * np.abs(M).sum()
 
 
@@ -93,7 +93,7 @@ def test_noisy_arms_are_fitted_as_by_singular_values(seed, count):
     U, s, Vt = np.linalg.svd(np.reshape(M, (3, 3)))
     sign = np.sign(np.linalg.det(U @ Vt))
     kabsch = rotation.from_matrix(U @ np.diag([1.0, 1.0, sign]) @ Vt)
-    # The least turn shifts the optimum by its share of M over the curvature there.
+    # The least rotation shifts the optimum by its share of M over the curvature there.
     allowed = 10.0 * LEAST_ROTATION * np.abs(M).sum() / (s[1] + sign * s[2])
     assert rotation.angle(best(M), kabsch) <= allowed + ROUNDING
 
@@ -105,16 +105,16 @@ def test_arms_that_are_there_already_are_not_turned(arms):
 
 
 @given(a=axes, b=axes, lengths=st.lists(st.floats(0.1, 3.0), min_size=1, max_size=3))
-def test_arms_on_one_line_take_the_least_turn(a, b, lengths):
+def test_collinear_arms_take_the_least_rotation(a, b, lengths):
     """Any twist about the line fits as well; the share of M's size that picks one shortens it."""
     M = outer([1.0] * len(lengths), np.outer(lengths, b), np.outer(lengths, a))
-    turn, shortest = best(M), rotation.between(a, b)
+    Q, shortest = best(M), rotation.between(a, b)
     if np.dot(a, b) > -0.99:
-        assert rotation.angle(turn, shortest) <= 1e-3
-    assert np.dot(rotation.rotate(turn, a), b) >= 1.0 - 1e-5
+        assert rotation.angle(Q, shortest) <= 1e-3
+    assert np.dot(rotation.rotate(Q, a), b) >= 1.0 - 1e-5
 
 
-def test_nothing_to_fit_is_no_turn():
+def test_nothing_to_fit_is_no_rotation():
     assert (best(ZERO_MATRIX) == rotation.identity()).all()
 
 
@@ -134,7 +134,7 @@ def test_arms_along_the_axis_are_not_turned_about_it(height):
     assert best_angle(outer([1.0], [end], [arm]), (0.0, 0.0, 1.0)) == 0.0
 
 
-def test_rounding_about_the_axis_turns_nothing(rng):
+def test_rounding_about_the_axis_rotates_nothing(rng):
     for axis in rotation.rotate(rotation.random(rng, 50), [0.0, 0.0, 1.0]):
         arms = np.outer(rng.uniform(-2.0, 2.0, 2), axis)
         M = outer([1.0, 1.0], rng.standard_normal((2, 3)), arms)

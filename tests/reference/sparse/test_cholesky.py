@@ -151,14 +151,14 @@ def test_a_factor_too_large_for_a_near_cache_solves_as_well(rng):
 def test_threads_may_solve_with_one_factor_side_by_side(rng):
     A, sides = definite(grid(40, 40)), rng.standard_normal((64, 1600, 3))
     factor = factorize(A)
-    alone = [factor.solve(b) for b in sides]
+    single = [factor.solve(b) for b in sides]
     with ThreadPoolExecutor(4) as pool:
-        for together, expected in zip(pool.map(factor.solve, sides), alone, strict=True):
+        for together, expected in zip(pool.map(factor.solve, sides), single, strict=True):
             np.testing.assert_array_equal(together, expected)
 
 
 @pytest.mark.parametrize("sides", [(), (1,), (2,), (3,), (4,), (6,), (7,)])
-def test_any_number_of_right_hand_sides_gives_what_each_gives_alone(rng, sides):
+def test_any_number_of_right_hand_sides_gives_what_each_gives_by_itself(rng, sides):
     matrix = definite(PATTERNS["cloth"])
     factor = CholeskyFactor(matrix)
     b = rng.standard_normal((matrix.shape[0], *sides))

@@ -1,0 +1,1 @@
+"""The judge of `plumbob verify` itself: known faults and honest solvers."""

@@ -1,0 +1,54 @@
+"""A table as data: the question it answers, what its rows are about, its columns and figures."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from .results import Results
+from .tables import NO_SUMMARY, Column, Summary, Table
+
+if TYPE_CHECKING:
+    from .figures import Drawing
+
+Figure = Callable[[Results], "Drawing | None"]
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A table before it has rows, called with results to fill it.
+
+    Attributes:
+        question: what it answers, in the report.
+        name: the stem of its files.
+        title: what it is called.
+        subjects: what the rows are about, one each, such as records.
+        columns: how the cells are read from a subject, or what makes the columns from all.
+        shows: one sentence on what can be read off, or what makes it from all subjects.
+        measured: one sentence on how the numbers came about, likewise.
+        summary: what the numbers say, asked for only where there are subjects.
+        figures: what stands beside it.
+    """
+
+    question: str
+    name: str
+    title: str
+    subjects: Callable[[Results], Iterable[Any]]
+    columns: Sequence[Column] | Callable[[Any], Sequence[Column]]
+    shows: str | Callable[[Any], str]
+    measured: str | Callable[[Any], str]
+    summary: Callable[[Any], Summary] = lambda subjects: NO_SUMMARY
+    figures: tuple[Figure, ...] = ()
+
+    def __call__(self, results: Results) -> Table:
+        """Return the table with a row for each subject."""
+        subjects = list(self.subjects(results))
+        columns = tuple(self.columns(subjects) if callable(self.columns) else self.columns)
+        return Table(
+            self.name,
+            self.title,
+            columns,
+            tuple(tuple(column.cell(subject) for column in columns) for subject in subjects),
+            self.shows if isinstance(self.shows, str) else self.shows(subjects),
+            self.measured if isinstance(self.measured, str) else self.measured(subjects),
+            self.summary(subjects) if subjects else NO_SUMMARY,
+        )

@@ -1,0 +1,1 @@
+"""The command `plumbob verify`: its terminal, its files, its page."""

@@ -1,0 +1,170 @@
+"""Any program as a contestant: JSON lines on its standard input and output."""
+
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from .. import message
+from ..case import Case
+from ..contestant import Answer, Failure, FailureKind, NoGreetingError
+from ..greeting import Greeting
+from ..sentence import Sentence, sentence
+from ..task import TASKS
+from .line_process import LIMITS, Limits, LineProcess, LostError
+
+
+class ProgramContestant:
+    """A program, started when it is first asked, and anew after a loss.
+
+    Attributes:
+        remarks: what was odd apart from the answers: how it left, what it left running.
+    """
+
+    def __init__(
+        self, command: Sequence[str], folder: Path | None = None, limits: Limits = LIMITS
+    ) -> None:
+        if not command:
+            raise ValueError("command: expected a program and its arguments, got nothing")
+        self.remarks: tuple[Sentence, ...] = ()
+        self._command = tuple(map(str, command))
+        self._folder = folder
+        self._limits = limits
+        self._process: LineProcess | None = None
+        self._greeting: Greeting | None = None
+        self._number = 0
+        self._warm: set[object] = set()
+        self._print: bytes | None = None
+
+    @property
+    def greeting(self) -> Greeting:
+        """What it says of itself.
+
+        Raises:
+            NoGreetingError: if it cannot be started, or greets as nobody should.
+        """
+        if self._greeting is None:
+            try:
+                self._ready()
+            except LostError as lost:
+                self._lose()
+                raise NoGreetingError(lost.failure) from None
+        assert self._greeting is not None
+        return self._greeting
+
+    def answer(self, case: Case) -> Answer | Failure:
+        """Ask it; a program that is lost is started again when the next case comes."""
+        try:
+            process = self._ready()
+            return self._ask(process, case)
+        except LostError as lost:
+            self._lose()
+            return lost.failure
+
+    def close(self) -> None:
+        """End its input, then it and whatever it has started."""
+        process, self._process = self._process, None
+        if process is not None:
+            odd = process.leave()
+            self.remarks += tuple(one for one in odd if one not in self.remarks)
+
+    def _ready(self) -> LineProcess:
+        if self._process is None:
+            self._number, self._warm, self._print = 0, set(), None
+            self._process = LineProcess(self._command, self._folder, self._limits)
+            self._greet(self._process)
+        return self._process
+
+    def _greet(self, process: LineProcess) -> None:
+        fields, _ = self._exchange(process, message.encode_greeting(), self._limits.first)
+        if fields.get("error") is not None:
+            raise LostError.of(message.decode_error(fields))
+        try:
+            greeting = message.decode_greeting(fields)
+        except ValueError as error:
+            raise LostError(FailureKind.GARBAGE, sentence("{why}", why=str(error))) from None
+        if isinstance(fields.get("printed"), str):
+            self._print = fields["printed"].encode()
+        self._greeting = self._greeting or greeting
+
+    def _ask(self, process: LineProcess, case: Case) -> Answer | Failure:
+        kind = (case.task, case.inputs.get("method"))
+        patience = self._limits.request if kind in self._warm else self._limits.first
+        self._number += 1
+        line = message.encode_case(self._number, case)
+        fields, seconds = self._exchange(process, line, patience)
+        self._warm.add(kind)
+        answer = message.decode_answer(fields, TASKS[case.task], case.inputs, seconds)
+        printed, self._print = self._print, None
+        if isinstance(answer, Answer) and printed is not None and "printed" not in fields:
+            remarks = (*answer.remarks, message.prints(printed))
+            return Answer(answer.values, answer.seconds, remarks)
+        return answer
+
+    def _exchange(
+        self, process: LineProcess, line: bytes, patience: float
+    ) -> tuple[Mapping[str, Any], float]:
+        """Send a request; return the answer with its number, and how long it took."""
+        start = time.monotonic()
+        process.send(line)
+        for _ in range(self._limits.prints + 1):
+            try:
+                answer = process.receive(start + patience - time.monotonic(), patience)
+            except LostError as lost:
+                raise self._with_prints(lost) from None
+            seconds = time.monotonic() - start
+            fields = self._decode(answer)
+            if fields is not None:
+                return fields, seconds
+        raise LostError(
+            FailureKind.GARBAGE,
+            sentence(
+                "It printed more than {count} lines that are no answers, for example: {line}",
+                count=self._limits.prints,
+                line=message.shown(self._print or b"", 80),
+            ),
+        )
+
+    def _decode(self, line: bytes) -> Mapping[str, Any] | None:
+        """Return the answer of a line, or None for a print."""
+        try:
+            fields = message.decode_object(line)
+        except ValueError as error:
+            raise LostError(
+                FailureKind.GARBAGE,
+                sentence("It answered with a broken line: {why}", why=str(error)),
+            ) from None
+        if fields is None or not line.lstrip(b"\xef\xbb\xbf \t").startswith(b"{"):
+            self._print = self._print or line.strip() or None
+        if fields is not None and not self._is_mine(fields):
+            raise LostError(
+                FailureKind.GARBAGE,
+                sentence(
+                    "It answered request {number} with the id {id}: each request is answered "
+                    "once, with its own id.",
+                    number=self._number,
+                    id=message.shown(repr(fields.get("id")), 40),
+                ),
+            )
+        return fields
+
+    def _is_mine(self, fields: Mapping[str, Any]) -> bool:
+        number = fields.get("id")
+        return not isinstance(number, bool) and number == self._number
+
+    def _with_prints(self, lost: LostError) -> LostError:
+        if self._print is None:
+            return lost
+        return LostError(
+            lost.failure.kind,
+            sentence(
+                "{what} Before it had printed lines that are no answers, for example: {line}",
+                what=lost.failure.sentence,
+                line=message.shown(self._print, 80),
+            ),
+        )
+
+    def _lose(self) -> None:
+        process, self._process = self._process, None
+        if process is not None:
+            process.end()

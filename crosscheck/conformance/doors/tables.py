@@ -1,0 +1,131 @@
+"""Arrays as CSV: one file an array, written plainly, and read as spreadsheets and C write it."""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from itertools import accumulate
+from operator import mul
+from typing import Any
+
+import numpy as np
+
+from ..functions import checked
+from ..message import plain, shown
+from ..task import Field
+
+_BOMS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+# As C, JavaScript and spreadsheets write what is no number.
+_NO_NUMBER = re.compile(r"[+-]?(nan(\(\w*\))?|1\.#(ind|qnan|snan)\d*|n/a|null)", re.IGNORECASE)
+_WORDS = {"true": 1.0, "false": 0.0}
+# What separates cells, None for white space, and the other decimal sign that it allows.
+_DIALECTS = ((";", ","), ("\t", ","), (",", "."), (None, ","))
+
+
+def write_table(value: Any) -> str:
+    """Return an array as CSV: the last axis along a row, the others down; 1-D ones in a column."""
+    if isinstance(value, str):
+        return value + "\n"
+    array = np.asarray(value)
+    rows = array.reshape(-1, array.shape[-1] if array.ndim > 1 else 1)
+    return "".join(",".join(_digits(cell) for cell in plain(row)) + "\n" for row in rows)
+
+
+def _digits(cell: float | bool) -> str:
+    return str(int(cell)) if isinstance(cell, bool) else repr(cell)
+
+
+def read_table(field: Field, counts: Mapping[str, int], data: bytes) -> Any:
+    """Return an array, or a single number, from CSV.
+
+    Cells stand between commas, semicolons, tabs or spaces; the decimal sign may be a comma where
+    that is clear. Names in the first line, a comma at the end of each line, lines that begin with
+    # and empty ones are left aside. The numbers run along rows, the last index fastest, and a row
+    holds the last axis, or the last ones, or one number.
+
+    Args:
+        field: what it is to be.
+        counts: what the words of its shape stand for; one may be missing.
+        data: the file.
+
+    Raises:
+        ValueError: if it is not understood.
+    """
+    lines = [(i, line.strip()) for i, line in enumerate(_text(field, data).splitlines(), 1)]
+    lines = [(i, line) for i, line in lines if line.strip(";,\t ") and not line.startswith("#")]
+    if not lines:
+        return checked(field, counts, [])
+    errors = []
+    for separator, decimal in _dialects([line for _, line in lines]):
+        try:
+            rows = list(_rows(field, lines, separator, decimal))
+            return checked(field, counts, _shaped(field, counts, rows))
+        except ValueError as error:
+            errors.append(error)
+    raise errors[0]
+
+
+def _text(field: Field, data: bytes) -> str:
+    encoding = next((name for bom, name in _BOMS.items() if data.startswith(bom)), "utf-8")
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        raise ValueError(f"{field.name}: expected a text file in UTF-8, got other bytes") from None
+
+
+def _dialects(lines: list[str]) -> Iterator[tuple[str | None, str]]:
+    for separator, decimal in _DIALECTS:
+        if separator is None or any(separator in line for line in lines):
+            yield separator, decimal
+
+
+def _rows(
+    field: Field, lines: list[tuple[int, str]], separator: str | None, decimal: str
+) -> Iterator[list[float]]:
+    cells = [(i, [cell.strip(' "') for cell in line.split(separator)]) for i, line in lines]
+    if all(row[-1] == "" for _, row in cells):
+        cells = [(i, row[:-1]) for i, row in cells]
+    if len(cells) > 1 and all(_number(cell, decimal) is None for cell in cells[0][1]):
+        cells = cells[1:]
+    width = len(cells[0][1])
+    for i, row in cells:
+        numbers = [_number(cell, decimal) for cell in row]
+        if len(row) != width:
+            raise ValueError(
+                f"{field.name}: expected {width} numbers in line {i} as before, got {len(row)}"
+            )
+        if None in numbers:
+            wrong = row[numbers.index(None)]
+            raise ValueError(
+                f"{field.name}: expected a number in line {i}, got {shown(repr(wrong), 40)}"
+            )
+        yield [number for number in numbers if number is not None]
+
+
+def _number(cell: str, decimal: str) -> float | None:
+    """Return the number of a cell, or None."""
+    if decimal in cell and "." not in cell:
+        cell = cell.replace(decimal, ".")
+    if cell.lower() in _WORDS:
+        return _WORDS[cell.lower()]
+    if _NO_NUMBER.fullmatch(cell):
+        return math.nan
+    try:
+        return float(cell) if "_" not in cell else None
+    except ValueError:
+        return None
+
+
+def _shaped(field: Field, counts: Mapping[str, int], rows: list[list[float]]) -> Any:
+    """Return rows in the shape that is expected, or as they are if they cannot have it."""
+    shape = [counts.get(n, -1) if isinstance(n, str) else n for n in field.shape]
+    widths = sorted({1, *(abs(n) for n in accumulate(reversed(shape), mul))})
+    array = np.array(rows)
+    if array.shape[1] not in widths:
+        raise ValueError(
+            f"{field.name}: expected {' or '.join(map(str, widths))} numbers a line, "
+            f"got {array.shape[1]}"
+        )
+    try:
+        return array.reshape(shape)
+    except ValueError:
+        return array

@@ -1,0 +1,1 @@
+"""Judge forward and inverse kinematics, tracking and resampling: cases, laws and faults."""

@@ -1,0 +1,122 @@
+"""The report of a task: its diagnosis, the smallest failure, the reference's time."""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from ..case import Case
+from ..contestant import Answer, Asked
+from ..explain import explain
+from ..greeting import Greeting
+from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
+from ..sentence import Sentence, sentence
+from .faults import describe
+from .predictions import variants
+
+Returned = TypeVar("Returned")
+# So many cases are compared with every variant: the small and wrong ones first.
+COMPARED = 12
+# The reference's call is timed so often, for the least time.
+TIMED = 3
+
+
+def timed(function: Callable[[], Returned]) -> tuple[Returned, float]:
+    """Return what the reference answers and the least time it took [s]."""
+    least = np.inf
+    for _ in range(TIMED):
+        start = time.perf_counter()
+        answer = function()
+        least = min(least, time.perf_counter() - start)
+    return answer, least
+
+
+def diagnosed(
+    method: str,
+    asked: Sequence[Asked],
+    wrong: Sequence[Asked],
+    tolerance: Callable[[Case], float],
+    behaviour: Sentence | None = None,
+    *,
+    most_faults: int = 3,
+) -> Diagnosis:
+    """Return which faults reproduce the answers; nothing where none is wrong."""
+    told = [one for one in wrong if isinstance(one.answer, Answer)]
+    if not told:
+        return Diagnosis(behaviour=behaviour)
+    right = [one for one in asked if isinstance(one.answer, Answer) and one not in told]
+    compared = (sorted(told, key=numbers) + sorted(right, key=numbers))[:COMPARED]
+    found, tried = explain(
+        variants(method, most_faults), compared, tolerance, lambda keys: describe(method, keys)
+    )
+    named = tuple(one for one in found if one.faults != ("",))
+    return Diagnosis(named, behaviour, tried=tried)
+
+
+def numbers(one: Asked) -> int:
+    """Return how many numbers a request holds."""
+    return sum(int(np.size(value)) for value in one.case.inputs.values())
+
+
+def report(
+    task: str,
+    method: str,
+    asked: Sequence[Asked],
+    judgements: Sequence[CaseJudgement],
+    diagnosis: Diagnosis,
+    greeting: Greeting,
+) -> TaskReport:
+    """Return the report, with what a diagnosis without explanations has to say."""
+    by_size = sorted(zip(asked, judgements, strict=True), key=lambda pair: numbers(pair[0]))
+    failing = [told for _, told in by_size if told.verdict >= Verdict.WRONG]
+    smallest = failing[0] if failing else None
+    hints = _hints(judgements)
+    broken = None
+    if smallest is not None and not diagnosis.explanations:
+        broken = _first_broken(smallest)
+    told = Diagnosis(diagnosis.explanations, diagnosis.behaviour, broken, hints, diagnosis.tried)
+    return TaskReport(task, method, judgements, told, smallest)
+
+
+def _first_broken(smallest: CaseJudgement) -> Sentence | None:
+    """Return which law broke first along the computation, in the smallest failing case."""
+    for finding in smallest.findings:
+        if finding.verdict >= Verdict.WRONG and finding.where is not None:
+            return sentence(
+                "The first law to break is '{law}', at joint {joint} of the case '{case}': {why}",
+                law=finding.law, joint=finding.where, case=smallest.case.name,
+                why=finding.sentence,
+            )  # fmt: skip
+        if finding.verdict >= Verdict.WRONG:
+            return sentence(
+                "The first law to break is '{law}', in the case '{case}': {why}",
+                law=finding.law, case=smallest.case.name, why=finding.sentence,
+            )  # fmt: skip
+    return None
+
+
+def _hints(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
+    broken = {
+        finding.law
+        for told in judgements
+        for finding in told.findings
+        if finding.verdict >= Verdict.WRONG
+    }
+    hints = []
+    if "equal answers" in broken:
+        hints.append(
+            sentence(
+                "Equal requests get different answers. Look for state that is left over from the "
+                "request before, and for memory that is read before it is written; a sanitizer "
+                "(-fsanitize=address,undefined, or valgrind) finds the latter."
+            )
+        )
+    if "untouched inputs" in broken:
+        hints.append(
+            sentence(
+                "The solver writes into the skeleton that it is given, so that every later answer "
+                "is about another skeleton. Copy what you change."
+            )
+        )
+    return tuple(hints)

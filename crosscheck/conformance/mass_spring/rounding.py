@@ -1,0 +1,81 @@
+"""How far rounding may take an answer from what exact arithmetic gives."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .model import Model
+from .problem import Problem
+
+# A sum of some ten terms, a few products and a square root, each rounded by half an epsilon, as
+# the inputs themselves are in single precision.
+ROUNDINGS = 4.0
+# What an iterative linear solver may leave of a displacement, and a velocity, without being taken
+# for another model.
+SOLVED = 1e-6
+
+
+class Rounding(NamedTuple):
+    """What rounding may change.
+
+    Attributes:
+        positions: [m].
+        velocities: [m/s].
+    """
+
+    positions: float
+    velocities: float
+
+
+def rounding(p: Problem, model: Model, epsilon: float) -> Rounding:
+    """Return bounds for an honest solver of that precision.
+
+    A coordinate is rounded by epsilon of its size in each substep, always to the same side where
+    the increments are alike. Lengths are rounded as coordinates are, and h² k / m of them enters
+    the right-hand side of a step; M + h² L is conditioned by 1 + h² k / m. An unstable explicit
+    step multiplies what came before by hs² k / m.
+    """
+    stiffest, n = _stiffest(p), model.substeps
+    growth = 1.0
+    if model.integrator.explicit:
+        growth = min(max(1.0, stiffest * (p.h / n) ** 2) ** (n - 1), 1e12)
+    steps = p.steps or 1
+    size = np.abs(p.positions).max() + p.h * steps * np.abs(p.velocities).max()
+    size += (p.h * steps) ** 2 * float(np.linalg.norm(p.gravity))
+    x = ROUNDINGS * epsilon * size * (1.0 + n + p.h * p.h * stiffest) * growth * steps**2
+    v = 2.0 * x / p.h + ROUNDINGS * epsilon * float(np.abs(p.velocities).max())
+    return Rounding(float(x), float(v))
+
+
+def _stiffest(p: Problem) -> float:
+    """Return a bound of the largest eigenvalue of M^-1 L, dampers included [1/s²]."""
+    stiffness = np.abs(p.stiffnesses) + np.abs(p.dampings) / p.h
+    return float((2.0 * np.abs(p.incidence).T @ stiffness / p.masses).max(initial=0.0))
+
+
+def apart(
+    p: Problem, predicted: Mapping[str, Any], answered: Mapping[str, Any], allowed: Rounding
+) -> float:
+    """Return the largest difference of positions and velocities, over what they changed by.
+
+    Rounding counts as no difference; so a value above SOLVED means another step. Velocities of
+    pins are left out: they are nobody's.
+    """
+    moved = np.abs(np.asarray(predicted["positions"]) - p.positions).max(initial=0.0)
+    fastest = np.abs(predicted["velocities"]).max(initial=0.0)
+    scales = {
+        "positions": moved + allowed.positions / SOLVED,
+        "velocities": fastest + allowed.velocities / SOLVED,
+    }
+    worst = [difference(p, name, predicted[name], answered[name]) / scales[name]
+             for name in scales if name in answered]  # fmt: skip
+    return max(worst) if worst and np.isfinite(worst).all() else np.inf
+
+
+def difference(p: Problem, name: str, one: Any, other: Any) -> float:
+    """Return the largest difference of a coordinate, the velocities of pins left out."""
+    gap = np.abs(np.asarray(one) - np.asarray(other))
+    if name == "velocities":
+        gap[..., p.pinned, :] = 0.0
+    return float(gap.max(initial=0.0))

@@ -1,0 +1,339 @@
+"""Judge steps and motions: against what is declared, or else inferred, and against laws."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from reference.explicit import symplectic_euler
+from reference.implicit_euler import ImplicitEuler
+
+from ..contestant import Answer, Asked
+from ..greeting import Greeting, Step
+from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..sentence import Sentence, sentence
+from . import laws
+from .cases import numbers
+from .faults import ASPECTS, Option, apply
+from .honest import domains
+from .laws import Context
+from .model import Model
+from .problem import Problem, problem_of, state_of, system_of
+from .rounding import SOLVED, apart, rounding
+from .search import Found, Search, probes_of
+
+MOST_TOLD = 3
+LAWS: tuple[Callable[[Context], Finding | None], ...] = (
+    laws.pins, laws.declared_step, laws.velocities, laws.momentum, laws.minimiser,
+)  # fmt: skip
+
+
+def judge(task: str, asked: Sequence[Asked], greeting: Greeting) -> TaskReport:
+    """Hold the answers of a stepping solver against what it declares, and name its faults."""
+    problems = problems_of(asked, greeting)
+    search = Search(probes_of(asked, problems), greeting.step, greeting.epsilon)
+    found = search.run()
+    right = honest_options(found, greeting.step)
+    known = greeting.step.method is not None or bool(found and not found[0].faults)
+    judgements = [
+        _judge_case(one, asked, problems[one.case.name], greeting, right, known) for one in asked
+    ]
+    diagnosis = _diagnose(asked, problems, judgements, search, found, greeting)
+    judgements = _with_faults(judgements, diagnosis, known)
+    failing = [one for one in judgements if one.verdict >= Verdict.WRONG]
+    smallest = min(failing, key=lambda one: numbers(one.case), default=None)
+    return TaskReport(task, "", judgements, diagnosis, smallest)
+
+
+def problems_of(asked: Sequence[Asked], greeting: Greeting) -> dict[str, Problem]:
+    """Return the problem of each case; a solver that goes on starts from its own answer."""
+    by_name = {one.case.name: one for one in asked}
+    problems: dict[str, Problem] = {}
+    for one in asked:
+        before = by_name.get(one.case.follows)
+        h_before = before.case.inputs["h"] if before is not None else None
+        inputs = dict(one.case.inputs)
+        if greeting.system.continues and before is not None and isinstance(before.answer, Answer):
+            inputs |= _state(before.answer.values)
+        problems[one.case.name] = problem_of(inputs, h_before)
+    return problems
+
+
+def _state(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the last frame of an answer."""
+    return {
+        name: values[name].reshape(-1, *values[name].shape[-2:])[-1]
+        for name in ("positions", "velocities")
+        if name in values
+    }
+
+
+def honest_options(found: Sequence[Found], step: Step) -> tuple[Option, ...]:
+    """Return what was found of a solver, its faults replaced by what it declares."""
+    chosen = {one.aspect: one for one in found[0].options} if found else {}
+    wrong = {one.aspect for one in found[0].faults} if found else set()
+    choices = domains(step)
+    options = {
+        aspect: choices[aspect][0][0] if aspect in wrong or aspect not in chosen
+        else chosen[aspect]
+        for aspect in ASPECTS
+    }  # fmt: skip
+    explicit = options["integrator"].fields["integrator"].explicit
+    usual = {"damper": "explicit", "velocity": "separate"} if explicit else {}
+    for aspect, value in usual.items():
+        if aspect in wrong or aspect not in chosen:
+            fits = [o for o, cost in choices[aspect] if not cost and o.fields.get(aspect) == value]
+            options[aspect] = fits[0] if fits else options[aspect]
+    return tuple(options[aspect] for aspect in ASPECTS)
+
+
+def describe_model(options: Sequence[Option]) -> Sentence:
+    """Return a model in words."""
+    parts = {one.aspect: one.sentence for one in options}
+    names = ("integrator", "substeps", "damper", "pins", "velocity")
+    return sentence(
+        "{integrator} ({substeps}, {damper}, {pins}, {velocity})",
+        **{name: parts[name] for name in names},
+    )
+
+
+def _judge_case(
+    one: Asked,
+    asked: Sequence[Asked],
+    p: Problem,
+    greeting: Greeting,
+    options: tuple[Option, ...],
+    known: bool,
+) -> CaseJudgement:
+    _, model = apply(options, p, Model())
+    if not isinstance(one.answer, Answer):
+        return CaseJudgement(one.case, one.answer, (), {})
+    expected = laws.predicted(p, model)
+    allowed = rounding(p, model, greeting.epsilon)
+    context = Context(
+        p, one.answer.values, allowed, model, known, describe_model(options), expected
+    )
+    findings = _findings(one, asked, context)
+    digits = _digits(expected, one.answer.values) if known else None
+    return CaseJudgement(
+        one.case, one.answer, tuple(findings), expected if known else {}, digits,
+        _reference_seconds(p, model),
+    )  # fmt: skip
+
+
+def _findings(one: Asked, asked: Sequence[Asked], context: Context) -> list[Finding]:
+    """Return what all laws that apply say."""
+    broken = laws.finite(context)
+    if broken is not None:
+        return [broken]
+    found = [law(context) for law in LAWS]
+    if one.case.facts.get("consistent"):
+        found.append(laws.consistency(context))
+    allowed = {
+        "positions": 4.0 * context.allowed.positions + _slack(context, "positions"),
+        "velocities": 4.0 * context.allowed.velocities + _slack(context, "velocities"),
+    }
+    bases = [other.answer for other in asked if other.case.name == one.case.facts.get("of")]
+    if bases and isinstance(bases[0], Answer):
+        found.append(laws.symmetry(one, bases[0], allowed))
+    found.append(laws.equal_requests(one, ("positions", "velocities"), allowed))
+    assert isinstance(one.answer, Answer)
+    remarks = [Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", said) for said in one.answer.remarks]
+    return [finding for finding in found if finding is not None] + remarks
+
+
+def _slack(context: Context, name: str) -> float:
+    """Return what an iterative solver may leave of two answers that should be alike."""
+    before = context.problem.positions if name == "positions" else 0.0
+    changed = np.abs(np.asarray(context.answered.get(name, before)) - before)
+    return SOLVED * float(changed.max(initial=0.0))
+
+
+def _digits(expected: Mapping[str, Any], answered: Mapping[str, Any]) -> float | None:
+    """Return the correct digits of the largest coordinate."""
+    if not expected or "positions" not in answered:
+        return None
+    x = np.asarray(expected["positions"])
+    gap = float(np.abs(x - answered["positions"]).max())
+    if not np.isfinite(gap):
+        return None
+    return float(min(16.0, max(0.0, -np.log10(max(gap / np.abs(x).max(), 1e-16)))))
+
+
+def _reference_seconds(p: Problem, model: Model) -> float:
+    """Return the compiled reference's time for as many steps of the same kind [s]."""
+    system, state = system_of(p), state_of(p)
+    best = np.inf
+    for _ in range(2):
+        start = time.perf_counter()
+        if model.integrator.explicit:
+            symplectic_euler(system, state, p.h)
+            scale = model.substeps * (p.steps or 1)
+        else:
+            ImplicitEuler(system, h=p.h).step(state)
+            scale = p.steps or 1
+        best = min(best, (time.perf_counter() - start) * scale)
+    return best
+
+
+def _diagnose(
+    asked: Sequence[Asked],
+    problems: Mapping[str, Problem],
+    judgements: Sequence[CaseJudgement],
+    search: Search,
+    found: Sequence[Found],
+    greeting: Greeting,
+) -> Diagnosis:
+    wrong = any(one.verdict >= Verdict.WRONG for one in judgements)
+    explanations: tuple[Explanation, ...] = ()
+    if found and found[0].faults:
+        explanations = _explanations(found, asked, problems, greeting)
+    undeclared = any(
+        getattr(greeting.step, name) is None
+        for name in ("method", "substeps", "damper", "pins", "velocity")
+    )
+    behaviour = None
+    if found and not found[0].faults and undeclared:
+        behaviour = sentence(
+            "It behaves like {model}.", model=describe_model(honest_options(found, greeting.step))
+        )
+    unexplained = wrong and not explanations
+    first = _first_broken(judgements, search) if unexplained else None
+    return Diagnosis(explanations, behaviour, first, _hints(judgements, wrong), search.tried)
+
+
+def _explanations(
+    found: Sequence[Found],
+    asked: Sequence[Asked],
+    problems: Mapping[str, Problem],
+    greeting: Greeting,
+) -> tuple[Explanation, ...]:
+    """Return the faults found with the share of all answers that they reproduce, in classes."""
+    scored = sorted(
+        (_score(one, asked, problems, greeting) for one in found),
+        key=lambda score: (-score[0], score[1]),
+    )
+    best = [score for score in scored if score[0] == scored[0][0]]
+    keys = tuple(dict.fromkeys(_key(score[2].faults) for score in best))[:MOST_TOLD]
+    said = [_describe(score[2].faults) for score in best]
+    together = said[0]
+    if len(keys) > 1:
+        together = sentence(
+            "One of these, which no answer tells apart: {one} Or: {other}",
+            one=said[0], other=said[1],
+        )  # fmt: skip
+    share, distance, _ = best[0]
+    return (Explanation(keys, together, share, distance),)
+
+
+def _key(faults: Sequence[Option]) -> str:
+    return " + ".join(one.key for one in faults)
+
+
+def _score(
+    one: Found, asked: Sequence[Asked], problems: Mapping[str, Problem], greeting: Greeting
+) -> tuple[float, float, Found]:
+    """Return the share of answers that are reproduced, and the largest difference of those."""
+    hits, distance, count = 0, 0.0, 0
+    for each in asked:
+        if not isinstance(each.answer, Answer):
+            continue
+        count += 1
+        p, model = apply(one.options, problems[each.case.name], Model(damper="none"))
+        expected = laws.predicted(p, model)
+        if not expected:
+            continue
+        plain = problems[each.case.name]
+        error = apart(plain, expected, each.answer.values, rounding(plain, model, greeting.epsilon))
+        if error <= SOLVED:
+            hits, distance = hits + 1, max(distance, error)
+    return hits / max(count, 1), distance, one
+
+
+def _describe(faults: Sequence[Option]) -> Sentence:
+    """Return the sentences of up to three faults; honest choices that were denied as such."""
+    said = [_fault_sentence(one) for one in faults]
+    if len(said) == 1:
+        return said[0]
+    if len(said) == 2:
+        return sentence("Two faults. {first} {second}", first=said[0], second=said[1])
+    return sentence(
+        "Three faults. {first} {second} {third}", first=said[0], second=said[1], third=said[2]
+    )
+
+
+def _fault_sentence(one: Option) -> Sentence:
+    from .honest import honest
+
+    if any(one.key == other.key for other in honest(Step()).get(one.aspect, ())):
+        return sentence("Other than declared, it behaves like this: {what}.", what=one.sentence)
+    return one.sentence
+
+
+def _first_broken(judgements: Sequence[CaseJudgement], search: Search) -> Sentence | None:
+    """Return the first case and law that broke, the cases adding one aspect after another."""
+    for one in judgements:
+        for finding in one.findings:
+            if finding.verdict >= Verdict.WRONG:
+                return sentence(
+                    "The law that broke first is {law}, in the case {case}: {said} {trace}",
+                    law=finding.law, case=one.case.name, said=finding.sentence,
+                    trace=_TRACES.get(one.case.family, _TRACES["cloth"]),
+                )  # fmt: skip
+    return None
+
+
+_TRACES: Mapping[str, Sentence] = {
+    "flight": sentence("Look at gravity, h and the velocity: no spring acts there."),
+    "springs": sentence("Free flight is right: look at the spring's force and the system matrix."),
+    "rest": sentence("Nothing should move there: look at rest lengths."),
+    "dampers": sentence("Undamped springs are right: look at the damper."),
+    "pins": sentence("Without pins all is right: look at how particles are held."),
+    "gravity": sentence("Gravity along y is right: look at its other components."),
+    "external forces": sentence("Look at how external forces are added."),
+    "tension only": sentence("Look at springs shorter than at rest."),
+    "h changes": sentence("A single h is right: look at what is kept from one request to another."),
+    "system changes": sentence("Look at what is kept from one request to another."),
+    "cloth": sentence("Small systems are right: look at indices and at what larger ones add."),
+}
+
+
+def _hints(judgements: Sequence[CaseJudgement], wrong: bool) -> tuple[Sentence, ...]:
+    """Return hints at what no variant explains."""
+    unequal = any(
+        finding.law == "equal requests" and finding.verdict >= Verdict.WRONG
+        for one in judgements
+        for finding in one.findings
+    )
+    if not unequal or not wrong:
+        return ()
+    return (
+        sentence(
+            "Equal requests differ: state is left over from the request before, or a value is "
+            "never initialised or dangles (in Eigen, a product kept with auto). Build with "
+            "-fsanitize=address,undefined, or run valgrind."
+        ),
+    )
+
+
+def _with_faults(
+    judgements: Sequence[CaseJudgement], diagnosis: Diagnosis, known: bool
+) -> list[CaseJudgement]:
+    """Return the judgements, undecided steps wrong where a fault explains them."""
+    if known or not diagnosis.explanations:
+        return list(judgements)
+    return [
+        CaseJudgement(
+            one.case, one.answer, tuple(_wrong(finding) for finding in one.findings),
+            one.expected, one.digits, one.reference_seconds,
+        )
+        for one in judgements
+    ]  # fmt: skip
+
+
+def _wrong(finding: Finding) -> Finding:
+    if finding.law != "declared step" or finding.verdict is not Verdict.UNDECIDED:
+        return finding
+    said = sentence("No honest step gives these positions; a faulty one does.")
+    return Finding(finding.law, Verdict.WRONG, finding.error, finding.tolerance, "", said)

@@ -1,0 +1,288 @@
+"""The command `plumbob verify`: three doors, exit codes, files, and what misuse is told."""
+
+import json
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pytest
+from small_discipline import SMALL
+
+from bench import cli
+from bench.verify import saved
+from crosscheck.conformance import verify
+from crosscheck.conformance.case import Case
+from crosscheck.conformance.sentence import sentence
+
+RIGHT = """
+import numpy as np
+
+def rotated(q, v):
+    w, u = q[0], q[1:]
+    return v + 2.0 * np.cross(u, np.cross(u, v) + w * v)
+
+def product(a, b):
+    w = a[0] * b[0] - a[1:] @ b[1:]
+    return np.array([w, *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
+
+def forward_kinematics(parents, offsets, local_rotations):
+    positions, rotations = [], []
+    for parent, offset, local in zip(parents, offsets, local_rotations):
+        if parent < 0:
+            positions.append(offset)
+            rotations.append(local)
+        else:
+            rotations.append(product(rotations[parent], local))
+            positions.append(positions[parent] + rotated(rotations[PLACE], offset))
+    return np.array(positions)
+"""
+SOLVERS = {
+    "right.py": RIGHT.replace("PLACE", "parent"),
+    "wrong.py": RIGHT.replace("PLACE", "-1"),
+    "broken.py": "def forward_kinematics(parents):\n    raise RuntimeError('no <b>luck</b>')\n",
+    "syntax.py": "def forward_kinematics(:\n",
+}
+# Speaks the protocol and answers every request with the request's offsets.
+PROGRAM = """
+import json, sys
+for line in sys.stdin:
+    asked = json.loads(line)
+    answer = {"id": asked["id"]}
+    if asked["task"] == "greeting":
+        answer |= {"protocol": 1, "tasks": ["forward_kinematics"], "name": " ".join(sys.argv[1:])}
+    else:
+        answer["positions"] = asked["offsets"]
+    print(json.dumps(answer), flush=True)
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Run every test in a folder of solvers, by disciplines of four cases, in English."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
+        monkeypatch.delenv(name, raising=False)
+    for task, one in SMALL.items():
+        monkeypatch.setitem(verify.DISCIPLINES, task, one)
+    for name, text in SOLVERS.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "program.py").write_text(PROGRAM)
+    return tmp_path
+
+
+def plumbob(capsys, *arguments):
+    """The exit code, stdout and stderr of `plumbob verify`."""
+    code = cli.run_command(["verify", *map(str, arguments)])
+    return code, *capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("solver", "code", "words"),
+    [
+        ("right.py", 0, "forward_kinematics  RIGHT "),
+        ("wrong.py", 1, "applied to a joint's own offset. (explains 100%"),
+        ("wrong.py:forward_kinematics", 1, "forward_kinematics  WRONG "),
+        ("broken.py", 1, "It raised RuntimeError in line 2 of broken.py: no <b>luck</b>"),
+    ],
+)
+def test_a_python_file_gets_its_verdict(capsys, solver, code, words):
+    found, out, err = plumbob(capsys, solver)
+    assert words in " ".join(out.split()) or words in out
+    assert (found, err) == (code, "")
+
+
+def test_a_program_stands_behind_two_hyphens_with_its_own_options(capsys):
+    code, out, _ = plumbob(
+        capsys, "--json", "a.json", "--", sys.executable, "program.py", "--lang", "zh", "--fast"
+    )
+    assert code == 1
+    assert "--lang zh --fast" in out
+    assert f"forward_kinematics.json -- {sys.executable} program.py --lang zh --fast" in out
+    assert json.loads(Path("a.json").read_text())["solver"]["name"] == "--lang zh --fast"
+
+
+def test_answers_are_judged_in_files(capsys, folder):
+    code, out, _ = plumbob(capsys, "--export-cases", "cases", "--task", "forward_kinematics",
+                           "--seed", "3")  # fmt: skip
+    assert code == 0
+    assert "4 cases are in cases" in out
+    assert "plumbob verify --answers cases" in out
+    code, out, _ = plumbob(capsys, "--answers", "cases")
+    assert code == 1
+    assert "forward_kinematics  BROKEN" in out
+    for path in (folder / "cases").glob("*/*/request.json"):
+        asked = json.loads(path.read_text())
+        case = Case("", asked["task"], {k: np.array(v) for k, v in asked.items() if k != "task"},
+                    "", sentence(""))  # fmt: skip
+        expected = SMALL["forward_kinematics"].right(case)["positions"]
+        answer = {"positions": expected.tolist()}
+        (path.parent / "answer.json").write_text(json.dumps(answer))
+    code, out, _ = plumbob(capsys, "--answers", "cases")
+    assert "forward_kinematics  RIGHT" in out
+    assert code == 0
+
+
+def test_a_failing_case_is_saved_and_asked_again(capsys, folder):
+    plumbob(capsys, "wrong.py", "--seed", "5")
+    path = folder / "plumbob_failures" / "forward_kinematics.json"
+    stored = json.loads(path.read_text())
+    assert stored["name"] == "forward_kinematics, pose 0"
+    assert stored["request"]["task"] == "forward_kinematics"
+    assert len(stored["request"]["offsets"]) == 2
+    assert np.shape(stored["answer"]["positions"]) == np.shape(stored["expected"]["positions"])
+    code, out, _ = plumbob(capsys, "wrong.py", "--rerun", path)
+    assert code == 1
+    assert "0/1" in out
+    assert f"--rerun {path} wrong.py" in out
+    code, out, _ = plumbob(capsys, "right.py", "--rerun", path)
+    assert code == 0
+    assert "1/1" in out
+
+
+def test_a_case_is_asked_again_after_those_that_it_follows():
+    cases = SMALL["forward_kinematics"].cases(None, "", 0, False)
+    like = Case("like", "energy", {}, "", sentence(""), facts={"like": cases[3].name, "n": 1})
+    one = saved.Saved("energy", "", 0, False, "like")
+    wanted = saved.cases_of(one, [*cases, like])
+    assert [case.name for case in wanted] == [cases[0].name, cases[3].name, "like"]
+    with pytest.raises(ValueError, match="'gone' of energy is not asked of this solver any more"):
+        saved.cases_of(saved.Saved("energy", "", 0, False, "gone"), cases)
+
+
+def test_all_files_are_written(capsys, folder):
+    code, out, _ = plumbob(capsys, "wrong.py", "-o", "out", "--lang", "zh")
+    assert code == 1
+    assert "判定" in out
+    assert {path.name for path in (folder / "out").iterdir()} == {
+        "index.html", "verdict.json", "verdict.xml", "failures",
+    }  # fmt: skip
+    assert '<html lang="zh-CN">' in (folder / "out" / "index.html").read_text()
+    assert ET.parse(folder / "out" / "verdict.xml").getroot().get("failures") == "4"
+    assert json.loads((folder / "out" / "verdict.json").read_text())["verdict"] == "wrong"
+    assert not (folder / "plumbob_failures").exists()
+
+
+def test_the_locale_chooses_the_language(capsys, monkeypatch):
+    monkeypatch.setenv("LANG", "zh_CN.UTF-8")
+    assert "正确" in plumbob(capsys, "right.py")[1]
+    assert "正确" not in plumbob(capsys, "right.py", "--lang", "en")[1]
+    assert "需要一个 Python 文件" in plumbob(capsys)[2]
+
+
+def test_tasks_are_listed_with_what_they_ask(capsys):
+    code, out, _ = plumbob(capsys, "--list")
+    assert code == 0
+    assert "forward_kinematics(parents, offsets, local_rotations)" in out
+    assert "Returns some of: positions, rotations" in out
+    code, out, _ = plumbob(capsys, "--list", "--task", "mass_spring_step")
+    assert "[tension_only] (spring): springs that resist no compression" in out
+    assert "forward_kinematics" not in out
+
+
+@pytest.fixture
+def templates(monkeypatch):
+    """Starters in two languages."""
+    languages = {
+        "cpp": SimpleNamespace(files=("solver.cpp", "plumbob.hpp"),
+                               build="g++ -o solver solver.cpp",
+                               run="./solver"),
+        "python": SimpleNamespace(files=("solver.py",), build="", run="python3 solver.py"),
+    }  # fmt: skip
+    made = ModuleType("templates")
+    made.LANGUAGES = languages
+    made.template = lambda language: {one: f"// {one}\n" for one in languages[language].files}
+    monkeypatch.setitem(sys.modules, "crosscheck.conformance.templates", made)
+
+
+def test_a_template_is_written_and_says_what_comes_next(capsys, folder, templates):
+    code, out, _ = plumbob(capsys, "--template", "cpp")
+    assert code == 0
+    assert (folder / "solver.cpp").read_text() == "// solver.cpp\n"
+    assert (folder / "plumbob.hpp").exists()
+    for words in ("Build: g++ -o solver solver.cpp", "Then: plumbob verify -- ./solver"):
+        assert words in out
+    assert "Then: plumbob verify solver.py" in plumbob(capsys, "--template", "python")[1]
+
+
+def test_a_template_overwrites_nothing(capsys, folder, templates):
+    (folder / "plumbob.hpp").write_text("mine")
+    code, out, err = plumbob(capsys, "--template", "cpp")
+    assert (code, out) == (2, "")
+    assert "plumbob.hpp is here already and stays as it is" in err
+    assert (folder / "plumbob.hpp").read_text() == "mine"
+    assert not (folder / "solver.cpp").exists()
+
+
+def test_help_has_examples(capsys):
+    code, out, _ = plumbob(capsys, "--help")
+    assert code == 0
+    assert "plumbob verify my_ik.py" in out
+    assert "plumbob verify -- ./my_solver --flag" in out
+
+
+MISUSE = {
+    "no solver": ([], "plumbob verify --template python writes a starter"),
+    "nothing behind --": (["--"], "expected a Python file, module:object, or -- and a program"),
+    "two solvers": (["a.py", "b.py"], "plumbob verify -- a.py b.py"),
+    "no such file": (["gone.py"], "gone.py, which does not exist"),
+    "no such module": (["gone:x"], "gone"),
+    "no such program": (["--", "./gone"], "There is no command ./gone."),
+    "syntax": (["syntax.py"], "SyntaxError in line 1 of syntax.py"),
+    "task": (["right.py", "--task", "energy"], "expected one that the solver offers"),
+    "task of the list": (["--list", "--task", "fk"], "expected one of forward_kinematics"),
+    "language": (["right.py", "--lang", "fr"], "lang: expected one of en, zh"),
+    "time": (["right.py", "--time-limit", "0"], "time-limit: expected seconds above 0"),
+    "memory": (["right.py", "--memory-limit", "0"], "--memory-limit"),
+    "rerun": (["right.py", "--rerun", "right.py"], "expected a case that verify saved"),
+    "rerun of nothing": (["right.py", "--rerun", "gone.json"], "gone.json"),
+    "answers": (["--answers", "."], "expected a folder of exported cases"),
+    "answers and solver": (["--answers", ".", "right.py"], "got right.py as well"),
+    "output": (["right.py", "--json", "."], "expected a file, got a folder"),
+    "output folder": (["right.py", "-o", "right.py"], "right.py"),
+    "option": (["right.py", "--jsn", "a"], "--json"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "words"), MISUSE.values(), ids=MISUSE)
+def test_misuse_exits_2_with_one_sentence(capsys, folder, arguments, words):
+    before = set(folder.iterdir())
+    code, out, err = plumbob(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("plumbob: ")
+    assert err.count("\n") == 1
+    assert words in err
+    assert {path for path in folder.iterdir() if path.name != "__pycache__"} <= before
+
+
+LAWS = """
+from plumbob.testing import laws
+import right, wrong
+from crosscheck.conformance import verify
+from small_discipline import SMALL
+
+verify.DISCIPLINES.update(SMALL)
+test_right = laws(right)
+test_wrong = laws(forward_kinematics=wrong.forward_kinematics, seed=1)
+"""
+
+
+def test_laws_run_under_plain_pytest(folder):
+    (folder / "test_mine.py").write_text(LAWS)
+    root = str(cli.__file__).removesuffix("bench/cli.py")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([root, f"{root}tests", "."])}
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-rA", "test_mine.py"],
+        capture_output=True, text=True, env=environment, timeout=120,
+    )  # fmt: skip
+    assert run.returncode == 1, run.stdout
+    assert "4 failed, 4 passed" in run.stdout
+    assert "PASSED test_mine.py::test_right[forward_kinematics forward_kinematics, pose 0]" in (
+        run.stdout
+    )
+    assert "positions differ by" in run.stdout
+    assert "Its own rotation is applied to a joint's own offset." in run.stdout
+    assert "raceback" not in run.stdout

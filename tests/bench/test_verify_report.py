@@ -1,0 +1,398 @@
+"""What is told about a solver: one screen, JSON, JUnit XML, a page, in two languages."""
+
+import html.parser
+import json
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_discipline import SMALL, own_rotation
+
+from bench.verify import comparison, drawing, geometry, json_file, junit, page, terminal
+from bench.verify.words import GOOD, Presentation, complaints, explanations, speaker
+from crosscheck.conformance import verify
+from crosscheck.conformance.case import Case
+from crosscheck.conformance.contestant import Answer, Failure, FailureKind
+from crosscheck.conformance.functions import FunctionContestant
+from crosscheck.conformance.greeting import Greeting
+from crosscheck.conformance.judgement import (
+    CaseJudgement,
+    Diagnosis,
+    Finding,
+    Report,
+    TaskReport,
+    Verdict,
+)
+from crosscheck.conformance.language import translator
+from crosscheck.conformance.sentence import Sentence, sentence
+from reference import Skeleton, forward_kinematics
+
+HOSTILE = '<script>alert(1)</script>\x1b[31m\u202e & "quotes" \' ]]>'
+TASKS = tuple(SMALL)
+
+
+def right_positions(parents, offsets, local_rotations):
+    return forward_kinematics(Skeleton(parents, offsets), local_rotations).positions
+
+
+def fallen_too_far(positions, h, gravity):
+    return positions + 1.5 * h * h * gravity
+
+
+def raises(**_):
+    raise RuntimeError(HOSTILE)
+
+
+def solver(forward=own_rotation, name=HOSTILE):
+    functions = {
+        "forward_kinematics": forward,
+        "inverse_kinematics": raises,
+        "mass_spring_step": fallen_too_far,
+    }
+    return FunctionContestant(functions, Greeting(1, TASKS, name=name, methods=("ccd",)))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def disciplines():
+    with pytest.MonkeyPatch.context() as patch:
+        for task, one in SMALL.items():
+            patch.setitem(verify.DISCIPLINES, task, one)
+        yield
+
+
+@pytest.fixture(scope="module")
+def wrong():
+    """A report in which everything is wrong."""
+    return verify.verify(solver())
+
+
+@pytest.fixture(scope="module")
+def right():
+    """A report in which all is right."""
+    return verify.verify(solver(right_positions, "mine"), ["forward_kinematics"])
+
+
+def shown(language="en", files=None):
+    return Presentation(speaker(language), language, ["my_ik.py"], files or {})
+
+
+def every_sentence(report):
+    """All that a report says, untranslated."""
+    for task in report.tasks:
+        yield from explanations(task)
+        for one in task.judgements:
+            yield from complaints(one)
+            yield one.case.about
+
+
+def normal(text):
+    return " ".join(text.split())
+
+
+class Page(html.parser.HTMLParser):
+    """The tags of a page, those left open, and its text."""
+
+    VOID = ("meta", "link", "br")
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.open, self.texts, self.links = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.links += [value for name, value in attributes if name in ("href", "src")]
+        assert not any(name.startswith("on") for name, _ in attributes)
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attributes):
+        self.handle_starttag(tag, attributes)
+        if tag not in self.VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.texts.append(data)
+
+
+FILES = {("forward_kinematics", ""): Path("plumbob_failures/forward_kinematics.json")}
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+@pytest.mark.parametrize("which", ["wrong", "right"])
+def test_a_result_fits_one_screen(request, which, language):
+    lines = terminal.lines(request.getfixturevalue(which), shown(language, FILES))
+    assert len(lines) <= terminal.HEIGHT
+    assert [line for line in lines if terminal.width(line) > terminal.WIDTH] == []
+
+
+def test_the_screen_says_what_is_wrong_where_and_what_next(wrong):
+    text = normal(" ".join(terminal.lines(wrong, shown(files=FILES))))
+    task = wrong.tasks[0]
+    for told in explanations(task):
+        assert normal(str(told)) in text
+    assert "(explains 100% of the answers compared)" in text
+    assert normal(str(complaints(task.smallest_failure)[0])) in text
+    assert "plumbob verify --rerun plumbob_failures/forward_kinematics.json my_ik.py" in text
+    assert "forward_kinematics WRONG" in text
+    assert "inverse_kinematics ccd BROKEN" in text
+    assert "Next: mend forward_kinematics first" in text
+
+
+def test_the_screen_shows_their_numbers_beside_ours(wrong):
+    text = "\n".join(terminal.lines(wrong, shown(files=FILES)))
+    row = comparison.rows(wrong.tasks[0].smallest_failure)[0]
+    for side in comparison.written(row):
+        assert side in text
+    assert "yours" in text
+    assert "expected" in text
+
+
+def test_a_right_solver_is_told_so(right):
+    text = "\n".join(terminal.lines(right, shown()))
+    assert re.search(r"forward_kinematics  RIGHT +1\d\.\d +4/4", text)
+    assert "Next: keep it so." in text
+    assert "saved" not in text
+
+
+def test_no_control_character_is_printed(wrong, right):
+    for report in (wrong, right):
+        for text in (
+            "".join(terminal.lines(report, shown())),
+            json_file.text(report, speaker("en")).replace("\n", ""),
+            junit.text(report, speaker("en")).replace("\n", ""),
+            page.render(report, shown()).replace("\n", ""),
+        ):
+            assert [one for one in text if not one.isprintable()] == []
+
+
+def undecided(verdict, digits=None):
+    """A report of one case with such a verdict, and a reservation."""
+    case = Case("one", "energy", {}, "x", sentence("It is all."))
+    words = sentence("It behaves as if it had {count} dampers.", count=2)
+    finding = Finding("a law", verdict, np.nan, np.inf, "m", words)
+    judged = CaseJudgement(case, Answer({"total": 1.0}, 1e-3), (finding,), {}, digits, 1e-3)
+    diagnosis = Diagnosis(behaviour=sentence("Damping is explicit."))
+    return Report(
+        Greeting(1, ("energy",)), [TaskReport("energy", "", [judged], diagnosis, None)], 0
+    )
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_each_verdict_has_its_words_and_its_reason(verdict):
+    report = undecided(verdict)
+    text = "\n".join(terminal.lines(report, shown()))
+    assert f"energy  {verdict.name.replace('_', ' ')} " in text
+    assert "Damping is explicit." in text
+    if verdict is Verdict.RIGHT_BUT:
+        assert "It behaves as if it had 2 dampers." in text
+    assert json.loads(json_file.text(report, speaker("en")))["passed"] is (verdict in GOOD)
+
+
+def test_json_holds_every_sentence_verdict_and_number(wrong):
+    text = json_file.text(wrong, speaker("en"))
+    found = json.loads(text, parse_constant=lambda word: pytest.fail(word))
+    assert (found["format"], found["version"]) == ("plumbob verify", 1)
+    told = normal(json.dumps(found, ensure_ascii=False).replace('\\"', '"').replace("\\\\", "\\"))
+    for one in every_sentence(wrong):
+        assert speaker("en")(one).removesuffix(" of the answers compared)")[:40] in told
+    for task, record in zip(wrong.tasks, found["tasks"], strict=True):
+        assert record["verdict"] == task.verdict.name.lower()
+        assert [one["name"] for one in record["cases"]] == [
+            one.case.name for one in task.judgements
+        ]
+    assert found["tasks"][1]["cases"][0]["failure"] == "raised"
+    assert found["tasks"][0]["explanations"][0]["share"] == 1.0
+
+
+def texts_of(value):
+    """Every text in a value that JSON holds."""
+    if isinstance(value, str):
+        yield value
+    for one in (
+        value if isinstance(value, list) else value.values() if isinstance(value, dict) else ()
+    ):
+        yield from texts_of(one)
+
+
+def test_no_text_of_json_holds_a_control_character():
+    greeting = Greeting(1, TASKS, HOSTILE, HOSTILE, HOSTILE, methods=(HOSTILE,))
+    one = undecided(Verdict.RIGHT).tasks[0]
+    report = Report(greeting, [TaskReport("energy", HOSTILE, one.judgements, Diagnosis(), None)], 0)
+    found = json.loads(json_file.text(report, speaker("en")))
+    assert [text for text in texts_of(found) if not text.isprintable()] == []
+    assert found["solver"]["methods"] == [found["tasks"][0]["method"]]
+
+
+def test_numbers_that_json_does_not_have_are_null():
+    record = json.loads(json_file.text(undecided(Verdict.RIGHT), speaker("en")))
+    finding = record["tasks"][0]["cases"][0]["findings"][0]
+    assert finding["error"] is None
+    assert finding["tolerance"] is None
+
+
+def test_junit_counts_what_it_holds(wrong):
+    root = ET.fromstring(junit.text(wrong, speaker("en")).encode())
+    assert root.tag == "testsuites"
+    assert len(root) == len(wrong.tasks)
+    for element in (root, *root):
+        cases = list(element.iter("testcase"))
+        assert int(element.get("tests")) == len(cases)
+        for count, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+            assert int(element.get(count)) == len(list(element.iter(tag)))
+    assert int(root.get("failures")) == 8
+    assert int(root.get("errors")) == 4
+    texts = "".join(root.itertext())
+    for one in every_sentence(wrong):
+        if one.template != "A random one.":
+            assert speaker("en")(one) in texts
+
+
+def test_junit_skips_what_nobody_can_tell_and_passes_reservations():
+    for verdict, tag in ((Verdict.UNDECIDED, "skipped"), (Verdict.RIGHT_BUT, "system-out")):
+        case = ET.fromstring(junit.text(undecided(verdict), speaker("en")).encode())[0][0]
+        assert [child.tag for child in case] == [tag]
+        assert "2 dampers" in "".join(case.itertext())
+
+
+def test_the_page_is_whole_and_needs_nothing_else(wrong):
+    text = page.render(wrong, shown(files=FILES))
+    found = Page(text)
+    assert found.open == []
+    assert all(link.startswith("#") for link in found.links)
+    assert "url(" not in text
+    told = normal(" ".join(found.texts))
+    for one in every_sentence(wrong):
+        assert normal(speaker("en")(one)) in told
+    for task in wrong.tasks:
+        for one in task.judgements:
+            assert one.case.name in told
+
+
+def test_nothing_that_a_solver_says_stands_unescaped_in_the_page(wrong):
+    text = page.render(wrong, shown())
+    assert "<script" not in text.lower()
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in text
+    assert "script" not in Page(text).tags
+
+
+def test_the_page_draws_theirs_and_ours(wrong):
+    forward, inverse, cloth = (Page(page.render(Report(wrong.greeting, [task], 0), shown()))
+                               for task in wrong.tasks)  # fmt: skip
+    assert forward.tags.count("svg") == cloth.tags.count("svg") == 2  # one is the bob
+    assert inverse.tags.count("svg") == 2  # where ours goes, as there is no answer
+    assert cloth.tags.count("circle") == 2 * 121
+
+
+@pytest.mark.parametrize("make", ["terminal", "page", "junit", "json"])
+def test_chinese_leaves_no_english_sentence(right, make):
+    context = shown("zh")
+    made = {
+        "terminal": lambda: "\n".join(terminal.lines(right, context)),
+        "page": lambda: " ".join(Page(page.render(right, context)).texts),
+        "junit": lambda: "".join(ET.fromstring(junit.text(right, context.say).encode()).itertext()),
+        "json": lambda: json.loads(json_file.text(right, context.say))["advice"],
+    }[make]()
+    names = ("A random one", "positions differ", "pose", "junit FILE", "plumbob.testing")
+    for name in names:  # of cases, of options, and what the tests say
+        made = made.replace(name, "")
+    made = re.sub(r"--[a-z-]+", "", made)
+    assert re.findall(r"[a-z]{2,}(?: [a-z]{2,}){2,}", made) == []
+    assert re.search(r"[\u4e00-\u9fff]{2}", made) or make == "junit"
+
+
+def test_every_word_of_the_page_has_a_translation():
+    translate = translator("zh")
+    for words in page.WORDS.values():
+        assert words.text(translate) != str(words)
+
+
+@pytest.mark.parametrize(
+    ("text", "size", "expected"),
+    [
+        ("", 10, []),
+        ("one two three", 7, ["one two", "three"]),
+        ("正运动学是错的，请改。", 8, ["正运动学", "是错的，", "请改。"]),
+        ("正运动，学", 6, ["正运", "动，学"]),
+        ("正运（动学）", 6, ["正运", "（动", "学）"]),
+        ("abcdefghij", 4, ["abcd", "efgh", "ij"]),
+        ("in 正运动学 only", 8, ["in 正运", "动学", "only"]),
+    ],
+)
+def test_lines_are_broken_where_they_may_be(text, size, expected):
+    assert terminal.wrapped(text, size) == expected
+
+
+def answered(task, inputs, theirs, ours):
+    case = Case("one", task, inputs, "x", sentence("It is all."))
+    answer = (
+        Answer(theirs, 1e-3) if theirs is not None else Failure(FailureKind.HUNG, Sentence("", {}))
+    )
+    return CaseJudgement(case, answer, (), ours)
+
+
+def test_numbers_are_shown_from_where_answers_part():
+    ours = np.zeros((5, 3))
+    theirs = ours.copy()
+    theirs[2:, 1] = [0.1, 0.2, np.nan]
+    theirs[1, 0] = 1e-9  # rounding
+    one = answered("forward_kinematics", {}, {"positions": theirs}, {"positions": ours})
+    assert [row.label for row in comparison.rows(one)] == ["positions[4]"]
+    theirs[4] = 0.0
+    assert [row.label for row in comparison.rows(one)] == ["positions[2]", "positions[3]"]
+
+
+def test_quaternions_of_opposite_sign_do_not_part():
+    ours = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]])
+    one = answered("forward_kinematics", {}, {"rotations": -ours}, {"rotations": ours})
+    assert comparison.rows(one) == []
+
+
+@pytest.mark.parametrize("apart", [1.0, 1e-6, 1e-14])
+def test_numbers_have_digits_enough_to_differ(apart):
+    theirs, ours = comparison.written(comparison.Row("x", [1.0, 2.0], [1.0, 2.0 + apart]))
+    assert theirs != ours
+
+
+def test_answers_of_other_shapes_are_counted():
+    one = answered("resample", {}, {"points": np.zeros((4, 3))}, {"points": np.zeros((5, 3))})
+    assert comparison.rows(one) == [comparison.Row("len(points)", [4.0], [5.0])]
+
+
+ARM = {"parents": np.array([-1, 0]), "offsets": np.eye(3)[:2]}
+DRAWN = {
+    "positions": {"positions": np.eye(3)[:2]},
+    "NaN": {"positions": np.full((2, 3), np.nan)},
+    "huge": {"positions": np.full((2, 3), 1e300)},
+    "no rotation": {"local_rotations": np.zeros((2, 4))},
+    "global rotations": {"rotations": np.eye(4)[:2]},
+    "nothing": {},
+    "no answer": None,
+}
+
+
+@pytest.mark.parametrize("theirs", DRAWN.values(), ids=DRAWN)
+def test_any_answer_is_drawn_without_a_number_that_svg_does_not_have(theirs):
+    one = answered("forward_kinematics", ARM, theirs, {"positions": np.eye(3)[:2]})
+    drawn = drawing.svg(geometry.scene(one), "an <arm>")
+    assert not re.search(r"nan|inf|e\+", str(drawn), re.IGNORECASE)
+    assert ET.fromstring(drawn).find("title").text == "an <arm>"
+
+
+def test_a_small_difference_is_drawn_larger():
+    ours = {"positions": np.eye(3)[:2]}
+    theirs = {"positions": np.eye(3)[:2] + 1e-9}
+    seen = geometry.scene(answered("forward_kinematics", ARM, theirs, ours))
+    larger, factor = drawing.magnified(seen)
+    assert factor == pytest.approx(0.2 / (3**0.5 * 1e-9), rel=0.5)
+    assert drawing.apart(larger) == pytest.approx(0.2, rel=0.5)
+    theirs["positions"][:] += 1.0
+    assert (
+        drawing.magnified(geometry.scene(answered("forward_kinematics", ARM, theirs, ours)))[1] == 1
+    )
