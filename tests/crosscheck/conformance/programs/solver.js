@@ -261,13 +261,13 @@ function substitute(factor, b) {
 const factors = new Map();
 
 function factorOf(system, h, free, k) {
-  const { masses, springs } = system;
-  const kept = planted("step_stale_factor") ? 0 : h;
-  const key = JSON.stringify([masses, springs, k.map((one) => (kept ? one : 0)), kept, free]);
+  const { masses, springs, stiffnesses, dampings } = system;
+  const step = planted("step_stale_factor") ? 0 : h;
+  const key = JSON.stringify([masses, springs, stiffnesses, dampings, step, free]);
   if (factors.has(key)) return factors.get(key);
   const row = new Map(free.map((particle, i) => [particle, i]));
   const A = free.map((i) => new Float64Array(free.length));
-  free.forEach((particle, i) => { A[i][i] = planted("step_laplacian") ? 1e-6 : masses[particle]; });
+  free.forEach((particle, i) => { A[i][i] = planted("step_laplacian") ? 0 : masses[particle]; });
   springs.forEach(([i, j], s) => {
     const [a, b, stiffness] = [row.get(i), row.get(j), h * h * k[s]];
     if (a !== undefined) A[a][a] += stiffness;
