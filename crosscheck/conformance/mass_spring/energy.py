@@ -128,7 +128,9 @@ def _findings(one: Asked, asked: Sequence[Asked], p: Problem, allowed: float) ->
     found += [] if p.h else _sum_laws(given, allowed)
     before = [other for other in asked if other.case.name == one.case.facts.get("from")]
     if before and isinstance(before[0].answer, Answer):
-        found += _work(problem_of(before[0].case.inputs), p, before[0].answer.values, given, allowed)
+        found += _work(
+            problem_of(before[0].case.inputs), p, before[0].answer.values, given, allowed
+        )
     found.append(laws.equal_requests(one, PARTS, dict.fromkeys(PARTS, allowed)))
     return found + [
         Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", said) for said in one.answer.remarks
@@ -216,7 +218,7 @@ SLIPS = (
          sentence("The kinetic energy is missing."), None, (0.0, 1.0, 1.0)),
     Slip("kinetic without mass", "kinetic",
          sentence("The kinetic energy lacks the mass: it is m/2 v²."),
-         lambda p: p.changed(masses=np.ones(p.count), weights=p.masses[:, None] * p.gravity)),
+         lambda p: p.changed(masses=np.ones(p.count), weighing=p.masses)),
     Slip("kinetic subtracted", "kinetic",
          sentence("The kinetic energy is subtracted."), None, (-1.0, 1.0, 1.0)),
     Slip("elastic without 1/2", "elastic",
@@ -267,9 +269,7 @@ def _diagnose(
     return Diagnosis(first_broken=_first(judgements), tried=tried)
 
 
-def _matches(
-    slips: Sequence[Slip], p: Problem, given: Mapping[str, Any], epsilon: float
-) -> bool:
+def _matches(slips: Sequence[Slip], p: Problem, given: Mapping[str, Any], epsilon: float) -> bool:
     expected = predict(slips, p)
     limit = 8.0 * tolerance(p, epsilon)
     return all(abs(given[name] - expected[name]) <= limit for name in PARTS if name in given)

@@ -90,7 +90,7 @@ def _findings(
         found.append(laws.symmetry(one, bases[0], limits))
     found.append(laws.equal_requests(one, ("forces",), limits))
     found += [Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", said) for said in one.answer.remarks]
-    return [finding for finding in found if finding is not None]
+    return found
 
 
 def _formula(p: Problem, given: Any, expected: Any, allowed: float) -> Finding:

@@ -173,8 +173,7 @@ def _with_pins(p: Problem, model: Model) -> Problem:
     if kind in ("heavy", "falling", "one"):
         masses = p.masses.copy()
         masses[pinned] = PIN_STRENGTHS[model.pins]
-        weights = p.masses if kind == "heavy" else masses
-        return p.changed(masses=masses, weights=weights[:, None] * p.gravity)
+        return p.changed(masses=masses, weighing=p.weighed if kind == "heavy" else masses)
     if kind == "unattached":
         kept = ~np.isin(p.springs, pinned).any(axis=1)
         return p.changed(
@@ -188,9 +187,7 @@ def _with_pins(p: Problem, model: Model) -> Problem:
     return p
 
 
-def _step(
-    p: Problem, model: Model, x: FloatArray, v: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def _step(p: Problem, model: Model, x: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
     whole = p.h if isinstance(model.time, str) else model.time
     h = whole if model.time == "undivided" else whole / model.substeps
     pins = x[p.pinned]

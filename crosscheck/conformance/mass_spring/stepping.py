@@ -111,7 +111,9 @@ def _judge_case(
         return CaseJudgement(one.case, one.answer, (), {})
     expected = laws.predicted(p, model)
     allowed = rounding(p, model, greeting.epsilon)
-    context = Context(p, one.answer.values, allowed, model, known, describe_model(options), expected)
+    context = Context(
+        p, one.answer.values, allowed, model, known, describe_model(options), expected
+    )
     findings = _findings(one, asked, context)
     digits = _digits(expected, one.answer.values) if known else None
     return CaseJudgement(

@@ -267,7 +267,7 @@ def test_noise_is_named():
     rng = np.random.default_rng(3)
     right = Stepper(LINEARISED)
 
-    def step(masses, springs, rest_lengths, stiffnesses, dampings, pinned, gravity, positions,  # noqa: E501
+    def step(masses, springs, rest_lengths, stiffnesses, dampings, pinned, gravity, positions,
              velocities, h):  # fmt: skip
         found = right(masses=masses, springs=springs, rest_lengths=rest_lengths, h=h,
                       stiffnesses=stiffnesses, dampings=dampings, pinned=pinned, gravity=gravity,
