@@ -243,7 +243,7 @@ def _gap(one: Any, other: Any) -> float:
     return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
 
 
-def symmetry(asked: Asked, base: Answer, allowed: Mapping[str, float]) -> Finding | None:
+def symmetry(asked: Asked, base: Answer, allowed: Mapping[str, float]) -> Finding:
     """Return how far the answer is from the transformed answer to the untransformed case."""
     facts = asked.case.facts
     assert isinstance(asked.answer, Answer)

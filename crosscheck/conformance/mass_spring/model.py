@@ -24,7 +24,7 @@ from .problem import (
 
 # Newton's method ends in rounding long before this on systems of this size.
 MOST_ITERATIONS = 200
-# Stiffness of springs to the pins, weight of a penalty, and mass of heavy pins, as solvers have them.
+# Stiffness of springs to the pins, weight of a penalty, and mass of heavy pins.
 PIN_STRENGTHS: Mapping[str, float] = {
     "penalty 1e10": 1e10,
     "penalty 1e8": 1e8,

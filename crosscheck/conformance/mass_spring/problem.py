@@ -1,7 +1,8 @@
 """A small mass-spring system as dense arrays, with the changes that a wrong solver makes to it.
 
 Its forces are written from the formulas, apart from `reference`: a spring pulls its first end with
--(k (l - r) + c (v_i - v_j)·u) u. What differs in a faulty solver, such as a missing end, is a field.
+-(k (l - r) + c (v_i - v_j)·u) u. What a faulty solver does otherwise, as to forget an end, is a
+field.
 """
 
 import dataclasses

@@ -24,6 +24,8 @@ MOST_FAULTS = 3
 PATIENCE = 8.0
 # Integrators with more iterations are not combined with faults.
 MOST_ITERATIONS = 10
+# Matrices that are singular without pins, where they predict nothing.
+SINGULAR = ("matrix L", "matrix L without h²")
 FAULTY = frozenset(id(one) for one in INTEGRATORS)
 # Aspects that matter in any step; the others where there are springs, dampers, pins.
 ALWAYS = (
@@ -67,6 +69,7 @@ class Search:
             for option, cost in pairs
         }
         self.epsilon = epsilon
+        self._class_costs: dict[Integrator, int] = {}
         self.classes, self.members = _classes(self.domains["integrator"])
         self.tried = 0
         self._misplaced: set[tuple[Any, ...]] = set()
@@ -147,7 +150,8 @@ class Search:
         else:
             options = self.domains[aspect]
         for option, cost in options:
-            tedious = cost and budget > 1 and _tedious(option)
+            tedious = bool(cost) and budget > 1 and _tedious(option)
+            tedious |= budget > 2 and option.key in SINGULAR
             if cost <= left and not tedious:
                 yield from self._choices(chosen | {aspect: option}, others, budget, springs)
 
@@ -160,8 +164,11 @@ class Search:
         )
 
     def _class_cost(self, option: Option) -> int:
-        members = self.members[option.fields["integrator"]]
-        return min(self.costs["integrator", one.key, _how(one)] for one in members)
+        how = option.fields["integrator"]
+        if how not in self._class_costs:
+            costs = [self.costs["integrator", one.key, _how(one)] for one in self.members[how]]
+            self._class_costs[how] = min(costs)
+        return self._class_costs[how]
 
     def _explains(self, chosen: Chosen, index: int) -> bool | None:
         """Return whether choices reproduce an answer; None where their matrix is singular."""
@@ -263,7 +270,7 @@ def _classes(
 
 def _in_flight_only(chosen: Chosen) -> Chosen:
     """Return those choices that matter where no spring acts."""
-    mattering = ("matrix L", "matrix L without h²", "matrix 2M + h²L")
+    mattering = (*SINGULAR, "matrix 2M + h²L")
     return {
         aspect: option
         for aspect, option in chosen.items()
