@@ -200,21 +200,15 @@ def momentum(one: Context) -> Finding | None:
 def consistency(one: Context) -> Finding | None:
     """Return how far the mean acceleration of a small step is from f / m."""
     p = one.problem
-    v, x = one.answered.get("velocities"), one.answered.get("positions")
-    if v is not None:
-        moved = v
-    elif x is not None:
-        moved = 2.0 * (x - p.positions) / p.h - p.velocities
-    else:
-        return None
-    a = (moved - p.velocities) / p.h
+    v = one.answered.get("velocities")
+    if v is None or one.model.damper == "none" or one.model.scaling != 1.0:
+        return None  # without velocities explicit and implicit steps part at the first order
+    a = (v - p.velocities) / p.h
     wanted = accelerations(p, p.positions, p.velocities)
     free = np.setdiff1d(np.arange(p.count), p.pinned)
     gap = float(np.abs(a - wanted)[free].max())
     scale = float(np.abs(wanted[free]).max())
     tolerance = CONSISTENT * scale + 2.0 * one.allowed.velocities / p.h
-    if v is None or one.model.damper == "none" or one.model.scaling != 1.0:
-        return None  # without velocities explicit and implicit steps part at the first order
     said = sentence(
         "In a small step the acceleration is {gap:.2g} m/s² off f / m, of {scale:.2g} m/s².",
         gap=gap, scale=scale,
@@ -249,7 +243,7 @@ def _gap(one: Any, other: Any) -> float:
     return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
 
 
-def symmetry(asked: Asked, base: Answer, allowed: Mapping[str, float]) -> Finding | None:
+def symmetry(asked: Asked, base: Answer, allowed: Mapping[str, float]) -> Finding:
     """Return how far the answer is from the transformed answer to the untransformed case."""
     facts = asked.case.facts
     assert isinstance(asked.answer, Answer)

@@ -24,7 +24,7 @@ from .problem import (
 
 # Newton's method ends in rounding long before this on systems of this size.
 MOST_ITERATIONS = 200
-# Stiffness of springs to the pins, weight of a penalty, and mass of heavy pins, as in solvers.
+# Stiffness of springs to the pins, weight of a penalty, and mass of heavy pins.
 PIN_STRENGTHS: Mapping[str, float] = {
     "penalty 1e10": 1e10,
     "penalty 1e8": 1e8,
@@ -173,8 +173,7 @@ def _with_pins(p: Problem, model: Model) -> Problem:
     if kind in ("heavy", "falling", "one"):
         masses = p.masses.copy()
         masses[pinned] = PIN_STRENGTHS[model.pins]
-        weights = p.masses if kind == "heavy" else masses
-        return p.changed(masses=masses, weights=weights[:, None] * p.gravity)
+        return p.changed(masses=masses, weighing=p.weighed if kind == "heavy" else masses)
     if kind == "unattached":
         kept = ~np.isin(p.springs, pinned).any(axis=1)
         return p.changed(
