@@ -1,0 +1,60 @@
+// A starter for `plumbob verify -- dotnet out/Solver.dll`. Offer only what you have: see Main.
+// Build: dotnet build -o out Solver.csproj
+using System.Text.Json;
+using System.Text.Json.Serialization;
+
+class Request { // positions are x, y, z [m]; rotations are unit quaternions w, x, y, z
+    public int id, effector, max_iterations;
+    public string task = "", method = "";
+    public int[] parents = null!, pinned = null!; // parents precede children, the root's is -1
+    public int[][] springs = null!; // pairs of particles
+    public double[][] offsets = null!, local_rotations = null!;
+    public double[][] positions = null!, velocities = null!;
+    public double[] masses = null!, rest_lengths = null!, stiffnesses = null!, dampings = null!;
+    public double[] target = null!, gravity = null!; // gravity is an acceleration
+    public double tolerance, h;
+}
+
+static class Solver {
+    // Fill in "positions" and "rotations", global, of all joints, as double[][].
+    static void ForwardKinematics(Request ask, Dictionary<string, object> answer) =>
+        throw new Exception("forward_kinematics is not written yet");
+
+    // Fill in "local_rotations" that bring the joint `effector` to the target.
+    static void InverseKinematics(Request ask, Dictionary<string, object> answer) =>
+        throw new Exception("inverse_kinematics is not written yet");
+
+    // Fill in "positions" and "velocities" a time h later.
+    static void MassSpringStep(Request ask, Dictionary<string, object> answer) =>
+        throw new Exception("mass_spring_step is not written yet");
+
+    static void Main() {
+        var tasks = new Dictionary<string, Action<Request, Dictionary<string, object>>> {
+            ["forward_kinematics"] = ForwardKinematics,
+            ["inverse_kinematics"] = InverseKinematics,
+            ["mass_spring_step"] = MassSpringStep,
+        };
+        var offered = new List<string>(tasks.Keys);
+        tasks["greeting"] = (ask, answer) => {
+            (answer["protocol"], answer["tasks"], answer["language"]) = (1, offered, "C#");
+        };
+        using var answers = new StreamWriter(Console.OpenStandardOutput()) { AutoFlush = true };
+        Console.SetOut(Console.Error); // what else is printed does no harm
+        var options = new JsonSerializerOptions { IncludeFields = true };
+        options.Converters.Add(new NullIsNaN());
+        while (Console.ReadLine() is string line) {
+            var ask = JsonSerializer.Deserialize<Request>(line, options)!;
+            var reply = new Dictionary<string, object> { ["id"] = ask.id };
+            try { tasks[ask.task](ask, reply); } catch (Exception e) { reply["error"] = e.Message; }
+            answers.WriteLine(JsonSerializer.Serialize(reply, options));
+        }
+    }
+}
+
+class NullIsNaN : JsonConverter<double> {
+    public override bool HandleNull => true;
+    public override double Read(ref Utf8JsonReader reader, Type type, JsonSerializerOptions _) =>
+        reader.TokenType == JsonTokenType.Null ? double.NaN : reader.GetDouble();
+    public override void Write(Utf8JsonWriter to, double value, JsonSerializerOptions _)
+    { if (double.IsFinite(value)) to.WriteNumberValue(value); else to.WriteNullValue(); }
+}

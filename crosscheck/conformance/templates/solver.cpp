@@ -1,0 +1,58 @@
+// A starter for `plumbob verify -- ./solver`; plumbob.hpp speaks the protocol.
+// Build: g++ -std=c++17 -O2 solver.cpp -o solver     Offer only what you have: see main.
+#include "plumbob.hpp"
+using Vec3 = std::array<double, 3>;  // [m]
+using Quat = std::array<double, 4>;  // unit quaternion, w first
+using Positions = std::vector<Vec3>;
+using Rotations = std::vector<Quat>;
+
+// Parents precede children, the root's is -1. An offset is in the parent's frame, the root's is
+// its global position. Fill in the global positions and rotations of all joints.
+void forward_kinematics(const std::vector<int>& parents, const Positions& offsets,
+                        const Rotations& local_rotations, Positions& x, Rotations& r) {
+    throw plumbob::missing("forward_kinematics");
+}
+
+// Change local_rotations so that the joint `effector` comes within `tolerance` of the target.
+void inverse_kinematics(const std::vector<int>& parents, const Positions& offsets,
+                        Rotations& local_rotations, const Vec3& target, int effector,
+                        double tolerance, int max_iterations) {
+    throw plumbob::missing("inverse_kinematics");
+}
+
+struct System {
+    std::vector<double> masses, rest_lengths, stiffnesses, dampings;
+    std::vector<std::array<int, 2>> springs;  // the two particles of each
+    std::vector<int> pinned;                  // particles that do not move
+    Vec3 gravity;                             // an acceleration
+};
+
+// Replace positions and velocities by those a time h later.
+void mass_spring_step(const System& system, Positions& x, Positions& v, double h) {
+    throw plumbob::missing("mass_spring_step");
+}
+
+void solve(const plumbob::Request& in, plumbob::Answer& out) {
+    if (in.task == "mass_spring_step") {
+        System s{in["masses"], in["rest_lengths"], in["stiffnesses"], in["dampings"],
+                 in["springs"], in["pinned"], in["gravity"]};
+        Positions x = in["positions"], v = in["velocities"];
+        mass_spring_step(s, x, v, in["h"]);
+        return out.set("positions", x), out.set("velocities", v);
+    }
+    std::vector<int> parents = in["parents"];
+    Positions offsets = in["offsets"], x(parents.size());
+    Rotations local_rotations = in["local_rotations"], r(parents.size());
+    if (in.task == "forward_kinematics") {
+        forward_kinematics(parents, offsets, local_rotations, x, r);
+        return out.set("positions", x), out.set("rotations", r);
+    }
+    inverse_kinematics(parents, offsets, local_rotations, in["target"], in["effector"],
+                       in["tolerance"], in["max_iterations"]);
+    out.set("local_rotations", local_rotations);
+}
+
+int main() {
+    return plumbob::serve(R"("name": "my solver", "language": "C++", "precision": "double",
+        "tasks": ["forward_kinematics", "inverse_kinematics", "mass_spring_step"])", solve);
+}

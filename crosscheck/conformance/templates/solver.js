@@ -1,0 +1,57 @@
+// A starter for `plumbob verify -- node solver.js` (docs/protocol.md). Offer only what you have.
+const readline = require("node:readline");
+const greeting = {
+  protocol: 1, name: "my solver", language: "JavaScript", precision: "double",
+  tasks: ["forward_kinematics", "inverse_kinematics", "mass_spring_step"],
+};
+
+// Answers go where they are read; what else is printed goes to the errors and does no harm.
+const send = process.stdout.write.bind(process.stdout);
+process.stdout.write = process.stderr.write.bind(process.stderr);
+
+function missing(what) {
+  throw new Error(`${what} is not written yet`);
+}
+
+const tasks = {
+  // Parents precede children, the root's is -1. An offset [x, y, z] is in the parent's frame, the
+  // root's is its global position; rotations are unit quaternions [w, x, y, z].
+  forward_kinematics({ parents, offsets, local_rotations }) {
+    const positions = parents.map(() => new Float64Array(3)); // global, of all joints
+    const rotations = parents.map(() => new Float64Array(4));
+    missing("forward_kinematics");
+    return { positions, rotations };
+  },
+
+  // Change local_rotations so that the joint `effector` comes within `tolerance` of the target.
+  inverse_kinematics(request) {
+    const { parents, offsets, local_rotations, target, effector } = request;
+    const { tolerance, max_iterations, method } = request;
+    missing("inverse_kinematics");
+    return { local_rotations };
+  },
+
+  // Replace positions and velocities by those a time h later. Springs are pairs of particles,
+  // pinned are particles that do not move, gravity is an acceleration.
+  mass_spring_step(request) {
+    const { masses, springs, rest_lengths, stiffnesses, dampings, pinned, gravity } = request;
+    const { positions, velocities, h } = request;
+    missing("mass_spring_step");
+    return { positions, velocities };
+  },
+};
+
+function answer(request) {
+  if (request.task === "greeting") return greeting;
+  try {
+    return tasks[request.task](request);
+  } catch (error) {
+    return { error: error.message };
+  }
+}
+
+const plain = (key, value) => (ArrayBuffer.isView(value) ? Array.from(value) : value);
+readline.createInterface({ input: process.stdin }).on("line", (line) => {
+  const request = JSON.parse(line, (key, value) => (value === null ? NaN : value));
+  send(JSON.stringify({ id: request.id, ...answer(request) }, plain) + "\n"); // NaN becomes null
+});

@@ -1,0 +1,56 @@
+"""A starter for `plumbob verify solver.py`, or `plumbob verify -- python3 solver.py`.
+
+Delete the functions that you do not have. The first command passes NumPy arrays for the lists.
+"""
+
+import json
+import os
+import sys
+from typing import Any
+
+Vectors = list[list[float]]  # positions [x, y, z] [m], or unit quaternions [w, x, y, z]
+
+
+def forward_kinematics(parents: list[int], offsets: Vectors, local_rotations: Vectors) -> Any:
+    """Return {"positions": global ones of all joints, "rotations": likewise}.
+
+    Parents precede children, the root's is -1; an offset is in the parent's frame.
+    """
+    raise RuntimeError("forward_kinematics is not written yet")
+
+
+def inverse_kinematics(target: list[float], effector: int, tolerance: float, **others: Any) -> Any:
+    """Return {"local_rotations": those that bring the joint `effector` to the target}.
+
+    Others are parents, offsets, local_rotations, max_iterations and method.
+    """
+    raise RuntimeError("inverse_kinematics is not written yet")
+
+
+def mass_spring_step(positions: Vectors, velocities: Vectors, h: float, **system: Any) -> Any:
+    """Return {"positions": a time h later, "velocities": likewise}.
+
+    The system has masses, springs (pairs of particles), rest_lengths, stiffnesses, dampings,
+    pinned (particles that do not move) and gravity (an acceleration).
+    """
+    raise RuntimeError("mass_spring_step is not written yet")
+
+
+def _answer(task: str, **inputs: Any) -> dict[str, Any]:
+    known = {name: one for name, one in globals().items() if name.count("_") and name[0] != "_"}
+    if task == "greeting":
+        return {"protocol": 1, "name": "my solver", "language": "Python", "tasks": list(known)}
+    try:
+        returned: dict[str, Any] = known[task](**inputs)
+        return returned
+    except Exception as error:
+        return {"error": str(error)}
+
+
+if __name__ == "__main__":
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")  # what else is printed
+    os.dup2(2, 1)  # goes to the errors and does no harm
+    for line in sys.stdin:
+        request = json.loads(line)
+        reply = {"id": request.pop("id"), **_answer(**request)}
+        print(json.dumps(reply).replace("NaN", "null"), file=answers, flush=True)

@@ -1,0 +1,54 @@
+// A starter for `plumbob verify -- ./solver`; plumbob.rs speaks the protocol.
+// Build: rustc -O solver.rs     Offer only what you have: see GREETING.
+#![allow(unused)]
+mod plumbob;
+use plumbob::{member, Request, System};
+
+type Vec3 = [f64; 3]; // [m]
+type Quat = [f64; 4]; // unit quaternion, w first
+
+const GREETING: &str = r#""name": "my solver", "language": "Rust", "precision": "double",
+    "tasks": ["forward_kinematics", "inverse_kinematics", "mass_spring_step"]"#;
+
+// Parents precede children, the root's is -1. An offset is in the parent's frame, the root's is
+// its global position. Return the global positions and rotations of all joints.
+fn forward_kinematics(parents: &[i64], offsets: &[Vec3], local_rotations: &[Quat])
+    -> Result<(Vec<Vec3>, Vec<Quat>), String> {
+    Err("forward_kinematics is not written yet".into())
+}
+
+// Return local rotations with which the joint `effector` is within `tolerance` of the target.
+fn inverse_kinematics(parents: &[i64], offsets: &[Vec3], local_rotations: &[Quat], target: Vec3,
+    effector: usize, tolerance: f64, max_iterations: usize) -> Result<Vec<Quat>, String> {
+    Err("inverse_kinematics is not written yet".into())
+}
+
+// The system has masses, springs (the two particles of each), rest_lengths, stiffnesses, dampings,
+// pinned (particles that do not move) and gravity (an acceleration): see plumbob.rs.
+// Return positions and velocities a time h later.
+fn mass_spring_step(system: &System, positions: Vec<Vec3>, velocities: Vec<Vec3>, h: f64)
+    -> Result<(Vec<Vec3>, Vec<Vec3>), String> {
+    Err("mass_spring_step is not written yet".into())
+}
+
+fn solve(task: &str, ask: &Request) -> Result<String, String> {
+    if task == "mass_spring_step" {
+        let system = ask.system()?;
+        let (x, v) = (ask.get("positions")?, ask.get("velocities")?);
+        let (x, v) = mass_spring_step(&system, x, v, ask.get("h")?)?;
+        return Ok(member("positions", &x) + &member("velocities", &v));
+    }
+    let (parents, offsets): (Vec<_>, Vec<_>) = (ask.get("parents")?, ask.get("offsets")?);
+    let local: Vec<_> = ask.get("local_rotations")?;
+    if task == "forward_kinematics" {
+        let (x, r) = forward_kinematics(&parents, &offsets, &local)?;
+        return Ok(member("positions", &x) + &member("rotations", &r));
+    }
+    let solved = inverse_kinematics(&parents, &offsets, &local, ask.get("target")?,
+        ask.get("effector")?, ask.get("tolerance")?, ask.get("max_iterations")?)?;
+    Ok(member("local_rotations", &solved))
+}
+
+fn main() {
+    plumbob::serve(GREETING, solve)
+}

@@ -1,0 +1,29 @@
+"""Programs of other languages, built once a session."""
+
+import functools
+
+import planted_programs
+import pytest
+
+
+@pytest.fixture(scope="session")
+def program(tmp_path_factory):
+    """Return what runs a right program by language; skip where its compiler is missing."""
+    build = functools.cache(planted_programs.command)
+    folder = tmp_path_factory.mktemp("programs")
+
+    def built(language):
+        run = build(language, folder)
+        if run is None:
+            pytest.skip(f"no compiler or interpreter for {language} on this machine")
+        return run
+
+    return built
+
+
+@pytest.fixture(scope="session")
+def right_answers(program):
+    """Return the answers of a right program to `planted_programs.requests()`, by language."""
+    return functools.cache(
+        lambda language: planted_programs.ask(program(language), planted_programs.requests())[0]
+    )
