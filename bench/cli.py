@@ -3,6 +3,7 @@
 import difflib
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
@@ -267,6 +268,8 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
     if fresh:
         run.forget(suites, output)
     done, failures = {run.KEPT: 0, run.MEASURED: 0, run.FAILED: 0}, []
+    not_run: list[str] = []
+    again: Counter[str] = Counter()
     with progress() as bar:
         task = bar.add_task("starting", total=run.count(suites, scale))
         with listening(lambda progress: bar.update(task, description=visible(progress.what))):
@@ -275,10 +278,16 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
                 if event.state in done:
                     done[event.state] += 1
                     bar.advance(task)
+                if event.state == run.MEASURING and event.message:
+                    again[event.message] += 1
+                if event.state == run.NOT_RUN:
+                    not_run.append(f"{event.suite}: {event.message}")
                 if event.state == run.FAILED:
                     failures.append(f"{event.suite}: {event.what}: {event.message}")
     kept = visible(f"{done[run.KEPT]} kept as on record, in {output}")
     print(f"{done[run.MEASURED]} measured, {kept}")
+    for sentence in (*(f"measured again: {n}, for {why}" for why, n in again.items()), *not_run):
+        print(visible(sentence))
     if warning := RecordFile(output).read().warning:
         print(f"plumbob: {visible(warning)}", file=sys.stderr)
     for failure in [*failures, *run.missed_claims(suites, output)]:

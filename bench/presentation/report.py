@@ -35,7 +35,7 @@ def write(folder: Path) -> Written:
     stored, warning = RecordFile(folder).read()
     if not stored:
         raise ValueError(f"no records in {folder}: run `plumbob bench` first")
-    shown, left_out = sound([plain(record) for record in stored])
+    shown, left_out = sound([plain(record) for record in stored if not record.superseded])
     missing = [*([warning] if warning else []), *left_out, *_missing(shown.records)]
     _write_files(folder, shown.tables.values(), shown.drawings.values())
     page = folder / "index.html"
