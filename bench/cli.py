@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import compile_notice
+from . import compile_notice, records_command
+from .comparison import command as comparison
 from .experiments import SUITES
 from .harness.progress import listening
+from .help_text import block as _block
 from .presentation.text import visible
 
 if TYPE_CHECKING:
@@ -27,11 +29,6 @@ SUCCESS, MISSED, MISUSED, INTERRUPTED, UNREAD = 0, 1, 2, 130, 141
 _UsageError: Any = typer.BadParameter.__base__
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-
-
-def _block(title: str, *lines: str) -> str:
-    """Return lines for the end of a help text, kept as they are."""
-    return "\n".join(["\b", f"{title}:", *(f"  {line}" for line in lines)])
 
 
 Output = Annotated[
@@ -244,6 +241,11 @@ def show(
         )  # fmt: skip
     print(visible(str(path)))
     return SUCCESS
+
+
+app.command(epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)
+app.command(epilog=comparison.HISTORY_EXAMPLES)(comparison.history)
+app.add_typer(records_command.app, name="records")
 
 
 def main_job(output: Path, fresh: bool) -> int:

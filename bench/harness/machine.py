@@ -27,10 +27,17 @@ PACKAGES = (
     "pytest-benchmark",
     "matplotlib",
 )
-_ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("reference", "crosscheck", "bench")
 # What only shows numbers; all else may change one. None of these is imported by what measures.
-PRESENTATION = ("bench/cli.py", "bench/show.py", "bench/presentation")
+PRESENTATION = (
+    "bench/cli.py",
+    "bench/comparison",
+    "bench/help_text.py",
+    "bench/presentation",
+    "bench/records_command.py",
+    "bench/show.py",
+)
 # Likewise in every experiment.
 PRESENTATION_FILES = ("tables.py", "figures.py", "entries.py", "files.py")
 
@@ -73,7 +80,7 @@ def pace() -> float:
 
 @functools.cache
 def _our_commit() -> str:
-    return commit_of(_ROOT)
+    return commit_of(ROOT)
 
 
 def commit_of(root: Path) -> str:
@@ -117,7 +124,7 @@ def source_digest() -> str:
     """Return twelve hex digits over every file that can change a number."""
     digest = hashlib.sha256()
     for path in source_files():
-        digest.update(str(path.relative_to(_ROOT)).encode() + b"\0" + path.read_bytes())
+        digest.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:12]
 
 
@@ -125,8 +132,8 @@ def source_files() -> list[Path]:
     """Return all files of the three packages but those that only show numbers."""
     found = [
         Path(folder, file)
-        for name in _PACKAGES for folder, _, files in os.walk(_ROOT / name) for file in files
-        if not _is_left_out(os.path.relpath(os.path.join(folder, file), _ROOT).split(os.sep))
+        for name in _PACKAGES for folder, _, files in os.walk(ROOT / name) for file in files
+        if not _is_left_out(os.path.relpath(os.path.join(folder, file), ROOT).split(os.sep))
     ]  # fmt: skip
     return sorted(found)
 

@@ -133,6 +133,12 @@ class Record:
         """Whether its block is now asked for under other settings: it is kept, but not shown."""
         return "superseded" in self.notes
 
+    @property
+    def commit(self) -> str:
+        """The commit of the sources as git shortens it, with a plus where they were changed."""
+        commit, _, changes = str(self.conditions.get("commit", "")).partition(" ")
+        return commit[:7] + ("+" if changes else "")
+
 
 class Reading(NamedTuple):
     """What a result file holds: its records, and a sentence on the lines that are none, else ""."""

@@ -87,7 +87,7 @@ def _finished(suite: str, scale: str, count: int, seconds: float) -> Record:
     """Return the record that says that a suite was gone through to its end."""
     return Record(
         FINISHED, suite, "", size=count, notes={"scale": scale},
-        stamp=stamp(), when=now(), seconds=seconds,
+        stamp=stamp(), when=now(), seconds=seconds, conditions=conditions(),
     )  # fmt: skip
 
 
