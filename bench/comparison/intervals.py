@@ -107,8 +107,8 @@ def _signed_rank_quantile(count: int) -> int:
 
 
 def pairs_needed(rows: int) -> int:
-    """Return how many pairs let one of so many rows be called, three of luck included."""
-    return math.ceil(math.log2(2 * max(rows, 1) / ERROR_RATE)) + 3
+    """Return how many pairs let one of so many rows be called though some of them disagree."""
+    return math.ceil(math.log2(2 * max(rows, 1) / ERROR_RATE)) + 6
 
 
 def adjusted(chances: Sequence[float]) -> Floats:

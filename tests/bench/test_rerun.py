@@ -105,12 +105,12 @@ def test_a_revision_beside_itself_is_neither_faster_nor_slower(repository, repet
 
 def test_a_planted_fifth_is_found_and_a_planted_digit_is_first_of_all(repository):
     write(repository, loops=LOOPS * 6 // 5, digit=np.nextafter(0.5, 1.0))
-    made = side_by_side(repository)
+    made = side_by_side(repository, pairs=20)
     assert [row.verdict for row in made.rows[:2]] == [Verdict.LESS_RIGHT] * 2
     assert made.rows[0].quantity == "residual"
     assert called(made) == {("ours", "seconds"): Verdict.SLOWER}
     assert made.rows[2].ratio.low < 1.2 < 1.1 * made.rows[2].ratio.high
-    assert "10 times each" in made.how
+    assert "20 times each" in made.how
 
 
 def test_only_what_is_asked_for_is_measured(repository):
