@@ -268,7 +268,7 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
 
     RecordFile(output).read()  # before anything is measured that could not be kept
     if fresh:
-        run.forget(suites, output)
+        run.forget(suites, scale, output)
     done, failures = {run.KEPT: 0, run.MEASURED: 0, run.FAILED: 0}, []
     not_run: list[str] = []
     again: Counter[str] = Counter()

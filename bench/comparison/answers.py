@@ -70,12 +70,11 @@ def _compared(key: RowKey, name: str, pair: Pair) -> Row:
         return Row(key, name, Verdict.SAME)
     if old.shape != new.shape:
         return Row(key, name, Verdict.CHANGED, 1.0, f"shape {old.shape}, now {new.shape}")
-    before, after = (np.asarray(values, dtype=float).ravel() for values in (old, new))
-    differs = ~((before == after) | (np.isnan(before) & np.isnan(after)))
-    before, after = before[differs], after[differs]
+    differs = ~((old == new) | ((old != old) & (new != new)))
+    before, after = (np.asarray(values[differs], dtype=float) for values in (old, new))
     sign = worse_sign(key[0], name)
     worse = int(np.sum(_is_worse(before, after, sign)))
-    why = f"{before[0]:.17g}, now {after[0]:.17g}"
+    why = f"{before[0].item()!r}, now {after[0].item()!r}"
     if old.size > 1:
         why += f" ({len(before)} of {old.size} differ" + (f", {worse} worse)" if sign else ")")
     verdict = _verdict(sign, worse, len(before))

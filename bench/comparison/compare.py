@@ -19,11 +19,13 @@ class Comparison(NamedTuple):
         rows: the worst first.
         drift: by how much the machine differs from itself.
         how: a sentence on how times were decided.
+        is_rerun: whether both were measured side by side.
     """
 
     rows: list[Row]
     drift: Drift
     how: str
+    is_rerun: bool = False
 
 
 class Limits(NamedTuple):

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 # The chance that any row at all is called faster or slower though none is.
 ERROR_RATE = 0.05
 CONFIDENCE = 0.95
-RESAMPLES = 400
+RESAMPLES = 200
 
 
 class Ratio(NamedTuple):

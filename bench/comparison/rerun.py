@@ -178,7 +178,7 @@ def _measured(folders: tuple[Path, Path], plan: Plan, tell: Callable[[str], None
         ratios |= _confirmed(called, _ratios(_take_pairs(folders, again, few, tell)))
     count = max((len(values) for values in taken.values()), default=0)
     decided = [*come_and_gone(old, new), *decide(rows, ratios)]
-    return Comparison(worst_first(decided), _drift(taken, count), HOW.format(pairs=count))
+    return Comparison(worst_first(decided), _drift(taken, count), HOW.format(pairs=count), True)
 
 
 def _ratios(taken: Taken) -> Ratios:

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..harness.record import FINISHED, Record
 from .intervals import Ratio
@@ -65,6 +65,11 @@ class Row:
         """Problem, solver and quantity in one."""
         return ", ".join(filter(None, [*self.key[1:3], self.quantity]))
 
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings by which the row is joined."""
+        return json.loads(self.key[3])
+
 
 def row_key(record: Record) -> RowKey:
     """Return what makes two records of two runs the same row."""
@@ -102,6 +107,21 @@ def come_and_gone(old: dict[RowKey, Record], new: dict[RowKey, Record]) -> Itera
             yield Row(key, "", Verdict.NEW, why="measured in the new run only")
         elif after is None:
             yield Row(key, "", Verdict.GONE, why="measured in the old run only")
+
+
+def distinguishing(rows: Iterable[Row]) -> dict[RowKey, str]:
+    """Return the settings that tell a row from others of its problem and solver, as words."""
+    groups: dict[tuple[str, ...], dict[RowKey, dict[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault(row.key[:3], {})[row.key] = row.settings
+    return {
+        key: ", ".join(f"{n} {json.dumps(v)}" for n, v in settings.items() if _varies(group, n))
+        for group in groups.values() for key, settings in group.items()
+    }  # fmt: skip
+
+
+def _varies(group: dict[RowKey, dict[str, Any]], name: str) -> bool:
+    return len({json.dumps(settings.get(name)) for settings in group.values()}) > 1
 
 
 def worst_first(rows: Iterable[Row]) -> list[Row]:

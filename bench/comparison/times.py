@@ -66,10 +66,8 @@ def _by_controls(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
 
 
 def _by_paces(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
-    paces = [
-        record.conditions["pace"] for pair in rows.values() for record in pair
-        if record.conditions.get("pace")
-    ]  # fmt: skip
+    found = [record.conditions.get("pace") for pair in rows.values() for record in pair]
+    paces = [pace for pace in found if isinstance(pace, float) and 0 < pace < math.inf]
     if len(paces) > 1:  # of two moments, hence the root of two
         deviation = math.sqrt(2) * float(np.std(np.log(paces), ddof=1))
         yield Drift(
@@ -112,7 +110,7 @@ def _why_not(pair: Pair, name: str) -> str:
     old, new = pair.old.arrays[name], pair.new.arrays[name]
     if pair.old.stamp.get("machine") != pair.new.stamp.get("machine"):
         return "measured on different machines"
-    if not (np.all(old > 0) and np.all(new > 0)):
+    if not all(np.all((values > 0) & np.isfinite(values)) for values in (old, new)):
         return "times of zero or none"
     return ""
 

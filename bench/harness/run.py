@@ -119,15 +119,18 @@ def missed_claims(suites: Sequence[str], folder: Path) -> list[str]:
     ]  # fmt: skip
 
 
-def forget(suites: Sequence[str], folder: Path) -> None:
-    """Remove the records of some suites.
+def forget(suites: Sequence[str], scale: str, folder: Path) -> None:
+    """Remove the records of what is to be measured; those that nothing asks for stay.
 
     Raises:
         ValueError: if the result file cannot be read, or a run writes to it.
     """
+    asked = {key for suite in suites for key in keys(suite, scale)}
     with locked(folder):
         RecordFile(folder).drop(
-            lambda record: (record.problem if record.suite == FINISHED else record.suite) in suites
+            lambda record: (
+                record.key in asked or (record.suite == FINISHED and record.problem in suites)
+            )
         )
 
 

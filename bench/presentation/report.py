@@ -125,7 +125,7 @@ def _missing(records: Sequence[Record]) -> list[str]:
     if others:
         sentences.append(
             f"{others} of {len(records)} records are from other sources, versions or another "
-            "machine than the head of this page says; `plumbob bench` measures them again."
+            "machine than the head of this page says; `plumbob bench` measures again what it runs."
         )
     return sentences
 

@@ -106,11 +106,14 @@ def test_a_larger_block_stands_for_a_smaller_one_but_not_the_reverse(
     assert bool(second.measured) is again
 
 
-def test_forget_leaves_other_suites_alone(suite, tmp_path, make):
+def test_forget_leaves_other_suites_and_what_nothing_asks_for(suite, tmp_path, make):
     go(tmp_path)
-    RecordFile(tmp_path).append([make.record("ik", "p", "a"), make.record("finished", "ik", "")])
-    run.forget(["arm"], tmp_path)
-    assert {r.suite for r in RecordFile(tmp_path).read().records} == {"ik", "finished"}
+    theirs = make.record("arm", "p", "My solver", arrays={"x": [1.0]})
+    others = [make.record("ik", "p", "a"), make.record("finished", "ik", ""), theirs]
+    RecordFile(tmp_path).append(others)
+    run.forget(["arm"], "quick", tmp_path)
+    left = {(r.suite, r.solver) for r in RecordFile(tmp_path).read().records}
+    assert left == {("ik", "a"), ("finished", ""), ("arm", "My solver")}
 
 
 def test_a_suite_is_finished_only_when_it_went_through(suite, tmp_path):
