@@ -99,10 +99,10 @@ def _ratio(middle: float, low: float, high: float, chance: float) -> Ratio:
 
 def _signed_rank_quantile(count: int) -> int:
     """Return how many of the sorted means lie below the interval, -1 if all pairs are too few."""
-    ways = np.ones(1)
+    subsets = np.ones(1)
     for rank in range(1, count + 1):
-        ways = np.convolve(ways, [1, *[0] * (rank - 1), 1])
-    below = np.cumsum(ways) / ways.sum()
+        subsets = np.convolve(subsets, [1, *[0] * (rank - 1), 1])
+    below = np.cumsum(subsets) / subsets.sum()
     return int(np.count_nonzero(below <= (1 - CONFIDENCE) / 2)) - 1
 
 

@@ -1,4 +1,4 @@
-"""What the arrays of a record are: times by a clock, answers, or neither; and which way is better.
+"""What the arrays of a record are: times by a clock, answers, or neither; and what is better.
 
 Reruns of the same sources give the same answers to the bit, unless a clock cuts them.
 """
