@@ -9,7 +9,7 @@ import typer
 from .help_text import block
 
 if TYPE_CHECKING:
-    from .harness.record import Record
+    from .harness.record import Key, Record
     from .presentation.tables import Table
 
 app = typer.Typer(rich_markup_mode=None)
@@ -142,9 +142,9 @@ def _selection(
     return wanted
 
 
-def _newer(present: "dict[tuple, Record]", given: "Iterable[Record]") -> "dict[tuple, Record]":
+def _newer(present: "dict[Key, Record]", given: "Iterable[Record]") -> "dict[Key, Record]":
     """Return the records that are later than those of their key, or measured where it failed."""
-    added: dict[tuple, Record] = {}
+    added: dict[Key, Record] = {}
     for record in given:
         other = added.get(record.key, present.get(record.key))
         if other is None or _rank(record) > _rank(other):
