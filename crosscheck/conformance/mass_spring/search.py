@@ -62,6 +62,7 @@ class Search:
     def __init__(self, probes: Sequence[Probe], step: Step, epsilon: float) -> None:
         """Set up the domains of all choices."""
         self.probes = probes
+        self.step = step
         self.domains = domains(step)
         self.costs = {
             (aspect, option.key, _how(option)): cost
@@ -106,7 +107,7 @@ class Search:
         for more in self._choices(chosen, new, budget, springs):
             if self._told(more):
                 continue
-            if time.process_time() > self._until and budget > 1:
+            if time.process_time() > self._until and budget > 0:
                 return
             explained = self._explains(more, index)
             if explained:
@@ -152,8 +153,13 @@ class Search:
         for option, cost in options:
             tedious = bool(cost) and budget > 1 and _tedious(option)
             tedious |= budget > 2 and option.key in SINGULAR
+            tedious |= budget > 0 and self._guessed(option)
             if cost <= left and not tedious:
                 yield from self._choices(chosen | {aspect: option}, others, budget, springs)
+
+    def _guessed(self, option: Option) -> bool:
+        """Return whether it is a factor of velocities that nobody declared."""
+        return self.step.damper is None and option.fields.get("scaling", 1.0) != 1.0
 
     def _cost(self, chosen: Chosen) -> int:
         return sum(
@@ -270,7 +276,7 @@ def _classes(
 
 def _in_flight_only(chosen: Chosen) -> Chosen:
     """Return those choices that matter where no spring acts."""
-    mattering = (*SINGULAR, "matrix 2M + h²L")
+    mattering = (*SINGULAR, "matrix 2M+h²L")
     return {
         aspect: option
         for aspect, option in chosen.items()
