@@ -113,7 +113,7 @@ def _excused(one: Context) -> Verdict:
         return Verdict.UNDECIDED
     if how.method == "newton" and _indefinite(one):
         return Verdict.UNDECIDED
-    if how.method == "converged":
+    if how.method == "converged" and one.model.substeps == 1 and one.model.scaling == 1.0:
         found = minimum(one)
         if found is not None and found.certificate.covered:
             near = found.certificate.distance <= IMPRECISE * found.displacement
@@ -139,7 +139,7 @@ def minimum(one: Context) -> Any:
         return None
     if model.damper != "length_rate":
         p = p.changed(dampings=np.zeros_like(p.dampings))
-    if model.substeps > 1 or p.steps or model.scaling != 1.0:
+    if p.steps:
         return None
     return judge_step(system_of(p), state_of(p), p.h, one.answered["positions"], None, external)
 

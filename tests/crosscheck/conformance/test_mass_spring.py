@@ -236,6 +236,7 @@ def test_mujoco_is_not_accused(integrator):
     assert found.diagnosis.explanations == ()
 
 
+@pytest.mark.slow
 def test_a_float_explicit_step_of_a_thousand_substeps_is_not_accused():
     """The sum of 1,000 increments, each rounded, is 5e-5 m off."""
 
@@ -260,9 +261,39 @@ def test_a_float_explicit_step_of_a_thousand_substeps_is_not_accused():
 
 def test_one_iteration_is_not_taken_for_convergence():
     one = Model(Integrator("local_global", "x_n", 1))
-    found = report(Stepper(one), step=Step("converged"))
+    found = report(Stepper(one), step=DECLARED["converged"][1])
     assert found.verdict is Verdict.WRONG
     assert any("local_global x_n 1" in key or "newton x_n 1" in key for key in named(found))
+
+
+ONE_ITERATION = Model(Integrator("local_global", "x_n", 1), damper="none")
+THOUSAND = Model(Integrator("explicit"), 1000, "explicit", velocity="separate")
+LAB = System("one", "one", "one", "measured", "number")
+# What public programs do that declare nothing: model, faults, system, precision.
+UNDECLARED = {
+    "linearised, pins overwritten": (
+        LINEARISED._replace(pins="overwritten"), ("gravity g/m",), LAB, "single",
+    ),
+    "one iteration, penalty": (
+        ONE_ITERATION._replace(pins="penalty 1e10"), ("gravity doubled",), System(), "double",
+    ),
+    "one iteration, springs": (
+        ONE_ITERATION._replace(pins="springs 5e5"), ("gravity of its own 0.3",), LAB, "single",
+    ),
+    "factor kept": (ONE_ITERATION, ("factor kept",), System(), "single"),
+    "a thousand substeps": (THOUSAND, ("pins free until the end",), System(), "double"),
+    "two faults": (LINEARISED, ("gravity g/m", "velocity kept"), System(), "double"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", mark(UNDECLARED, ("one iteration, penalty",)))
+def test_faults_of_a_solver_that_declares_nothing_are_named(name):
+    model, keys, system, precision = UNDECLARED[name]
+    kind = np.float32 if precision == "single" else np.float64
+    step = Stepper(model, [BY_KEY[key] for key in keys], kind)
+    found = report(step, system=system, precision=precision)
+    assert found.verdict is Verdict.WRONG
+    assert any(set(one.split(" + ")) == set(keys) for one in named(found))
 
 
 def test_noise_is_named():
