@@ -359,18 +359,18 @@ MATRIX = (
     _matrix("doubled beside", sentence("The entries of the system matrix off its diagonal are "
                                        "doubled: each spring adds -h² k once to each of the "
                                        "two.")),
-    _matrix("M - h²L", sentence("The system matrix is M - h² L: the springs' part has the wrong "
+    _matrix("M-h²L", sentence("The system matrix is M - h² L: the springs' part has the wrong "
                                 "sign.")),
     _matrix("L", sentence("The system is solved with h² L; the matrix is M + h² L: the masses are "
                           "missing.")),
     _matrix("L without h²", sentence("The system is solved with L in place of M + h² L.")),
-    _matrix("M + hL", sentence("The system matrix is M + h L; the springs' part needs h².")),
-    _matrix("M + L", sentence("The system matrix is M + L; the springs' part needs its h².")),
+    _matrix("M+hL", sentence("The system matrix is M + h L; the springs' part needs h².")),
+    _matrix("M+L", sentence("The system matrix is M + L; the springs' part needs its h².")),
     _matrix("positive beside", sentence("The entries of the system matrix off its diagonal have "
                                         "the wrong sign: each is -h² k.")),
     _matrix("diagonal", sentence("The system matrix has nothing off its diagonal.")),
     _matrix("M", sentence("The system matrix is M, without the springs' part h² L.")),
-    _matrix("2M + h²L", sentence("The masses stand twice in the system matrix.")),
+    _matrix("2M+h²L", sentence("The masses stand twice in the system matrix.")),
 )  # fmt: skip
 PINS = (
     Option(

@@ -15,7 +15,7 @@ from ..contestant import Answer, Asked
 from ..greeting import Step
 from .faults import ASPECTS, INTEGRATORS, Option, apply
 from .honest import compatible, domains
-from .model import Integrator, Model, simulate
+from .model import PIN_STRENGTHS, Integrator, Model, simulate
 from .problem import Problem
 from .rounding import SOLVED, Rounding, apart, rounding
 
@@ -26,7 +26,14 @@ PATIENCE = 8.0
 MOST_ITERATIONS = 10
 # Matrices that are singular without pins, where they predict nothing.
 SINGULAR = ("matrix L", "matrix L without h²")
+# Positions beyond this [m] come from dividing by zero; those of the probes are some metres.
+ABSURD = 1e4
 FAULTY = frozenset(id(one) for one in INTEGRATORS)
+# Of what is not declared, only these are tried together with faults.
+FREQUENT = (
+    1, 2, 3, 5, 10, 100, 1000, "penalty 1e10", "springs 5e5", "heavy 1e8", "falling 1e8",
+    "one kilogram",
+)  # fmt: skip
 # Aspects that matter in any step; the others where there are springs, dampers, pins.
 ALWAYS = (
     "time", "inertia", "masses", "gravity", "integrator", "matrix", "substeps", "velocity",
@@ -62,6 +69,7 @@ class Search:
     def __init__(self, probes: Sequence[Probe], step: Step, epsilon: float) -> None:
         """Set up the domains of all choices."""
         self.probes = probes
+        self.step = step
         self.domains = domains(step)
         self.costs = {
             (aspect, option.key, _how(option)): cost
@@ -106,7 +114,7 @@ class Search:
         for more in self._choices(chosen, new, budget, springs):
             if self._told(more):
                 continue
-            if time.process_time() > self._until and budget > 1:
+            if time.process_time() > self._until and budget > 0:
                 return
             explained = self._explains(more, index)
             if explained:
@@ -132,7 +140,9 @@ class Search:
         if springs and "class" in chosen:
             for option in self.members[chosen["class"].fields["integrator"]]:
                 denied = self.costs["integrator", option.key, _how(option)]
-                if denied and budget > 1 and _tedious(option):
+                if (denied and budget > 1 and _tedious(option)) or (
+                    budget > 0 and self._guessed(option)
+                ):
                     continue
                 rest = {key: value for key, value in chosen.items() if key != "class"}
                 yield from self._choices(rest | {"integrator": option}, new, budget, springs)
@@ -152,8 +162,26 @@ class Search:
         for option, cost in options:
             tedious = bool(cost) and budget > 1 and _tedious(option)
             tedious |= budget > 2 and option.key in SINGULAR
+            tedious |= budget > 0 and self._guessed(option)
             if cost <= left and not tedious:
                 yield from self._choices(chosen | {aspect: option}, others, budget, springs)
+
+    def _guessed(self, option: Option) -> bool:
+        """Return whether a choice is honest, rare, and nowhere declared."""
+        fields, step = option.fields, self.step
+        match option.aspect:
+            case "scaling":
+                return step.damper is None and fields["scaling"] != 1.0
+            case "substeps":
+                return step.substeps is None and fields["substeps"] not in FREQUENT
+            case "damper":
+                return step.damper is None and fields["damper"] in ("diagonal", "blocks", "matrix")
+            case "pins":
+                return fields["pins"] in PIN_STRENGTHS and fields["pins"] not in FREQUENT
+            case "integrator":
+                how = fields["integrator"]
+                return how.method in ("taylor", "runge_kutta") or how.hessian == "projected"
+        return False
 
     def _cost(self, chosen: Chosen) -> int:
         return sum(
@@ -171,7 +199,7 @@ class Search:
         return self._class_costs[how]
 
     def _explains(self, chosen: Chosen, index: int) -> bool | None:
-        """Return whether choices reproduce an answer; None where their matrix is singular."""
+        """Return whether choices reproduce an answer; None where neither is a number of use."""
         probe = self.probes[index]
         matters = chosen
         if not _has_springs(probe.problem):
@@ -222,8 +250,10 @@ class Search:
         with np.errstate(all="ignore"):
             try:
                 predicted = simulate(problem, model)
-            except np.linalg.LinAlgError:  # a singular matrix predicts nothing
-                return None, True
+            except np.linalg.LinAlgError:
+                predicted = {}
+        if _absurd(predicted):  # a singular matrix predicts nothing but that
+            return (None if _absurd(probe.answered) else False), True
         allowed = self._rounding(probe, model)
         same = apart(probe.problem, predicted, probe.answered, allowed) <= SOLVED
         if same or problem.steps or "positions" not in probe.answered:
@@ -238,6 +268,11 @@ class Search:
         options = tuple(chosen[one] for one in ASPECTS if one in chosen)
         faults = tuple(one for one in options if self.costs[one.aspect, one.key, _how(one)])
         return Found(options, faults)
+
+
+def _absurd(values: Mapping[str, Any]) -> bool:
+    """Return whether positions are those that a singular matrix gives."""
+    return "positions" not in values or not np.abs(values["positions"]).max() < ABSURD
 
 
 def _once(chosen: Chosen) -> bool:
@@ -270,7 +305,7 @@ def _classes(
 
 def _in_flight_only(chosen: Chosen) -> Chosen:
     """Return those choices that matter where no spring acts."""
-    mattering = (*SINGULAR, "matrix 2M + h²L")
+    mattering = (*SINGULAR, "matrix 2M+h²L")
     return {
         aspect: option
         for aspect, option in chosen.items()
