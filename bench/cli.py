@@ -3,6 +3,7 @@
 import difflib
 import os
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -10,9 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import compile_notice
+from . import compile_notice, records_command
+from .comparison import command as comparison
 from .experiments import SUITES
 from .harness.progress import listening
+from .help_text import block as _block
 from .presentation.text import visible
 from .verify import command as verify_command
 
@@ -27,11 +30,6 @@ SUCCESS, MISSED, MISUSED, INTERRUPTED, UNREAD = 0, 1, 2, 130, 141
 _UsageError: Any = typer.BadParameter.__base__
 
 app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-
-
-def _block(title: str, *lines: str) -> str:
-    """Return lines for the end of a help text, kept as they are."""
-    return "\n".join(["\b", f"{title}:", *(f"  {line}" for line in lines)])
 
 
 Output = Annotated[
@@ -248,6 +246,11 @@ def _drawn(bar: Any, task: Any, done: int, total: int) -> None:
     bar.update(task, completed=done, total=total)
 
 
+app.command(epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)
+app.command(epilog=comparison.HISTORY_EXAMPLES)(comparison.history)
+app.add_typer(records_command.app, name="records")
+
+
 def main_job(output: Path, fresh: bool) -> int:
     """Say what comes, then check, measure quickly and report."""
     print(
@@ -268,8 +271,10 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
 
     RecordFile(output).read()  # before anything is measured that could not be kept
     if fresh:
-        run.forget(suites, output)
+        run.forget(suites, scale, output)
     done, failures = {run.KEPT: 0, run.MEASURED: 0, run.FAILED: 0}, []
+    not_run: list[str] = []
+    again: Counter[str] = Counter()
     with progress() as bar:
         task = bar.add_task("starting", total=run.count(suites, scale))
         with listening(lambda progress: bar.update(task, description=visible(progress.what))):
@@ -278,10 +283,16 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
                 if event.state in done:
                     done[event.state] += 1
                     bar.advance(task)
+                if event.state == run.MEASURING and event.message:
+                    again[event.message] += 1
+                if event.state == run.NOT_RUN:
+                    not_run.append(f"{event.suite}: {event.message}")
                 if event.state == run.FAILED:
                     failures.append(f"{event.suite}: {event.what}: {event.message}")
     kept = visible(f"{done[run.KEPT]} kept as on record, in {output}")
     print(f"{done[run.MEASURED]} measured, {kept}")
+    for sentence in (*(f"measured again: {n}, for {why}" for why, n in again.items()), *not_run):
+        print(visible(sentence))
     if warning := RecordFile(output).read().warning:
         print(f"plumbob: {visible(warning)}", file=sys.stderr)
     for failure in [*failures, *run.missed_claims(suites, output)]:

@@ -5,8 +5,13 @@ import hashlib
 import importlib.metadata
 import os
 import platform
+import statistics
+import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+from .stopwatch import timed
 
 PACKAGES = (
     "plumbob",
@@ -22,10 +27,18 @@ PACKAGES = (
     "pytest-benchmark",
     "matplotlib",
 )
-_ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("reference", "crosscheck", "bench")
 # What only shows numbers; all else may change one. None of these is imported by what measures.
-PRESENTATION = ("bench/cli.py", "bench/show.py", "bench/presentation")
+PRESENTATION = (
+    "bench/cli.py",
+    "bench/comparison",
+    "bench/help_text.py",
+    "bench/presentation",
+    "bench/records_command.py",
+    "bench/show.py",
+    "bench/verify",
+)
 # Likewise in every experiment.
 PRESENTATION_FILES = ("tables.py", "figures.py", "readings.py", "files.py")
 
@@ -40,12 +53,61 @@ def machine() -> dict[str, Any]:
     """Return what the speed depends on; nothing that names the machine or its owner."""
     return {
         "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count(),
+        "cores": os.cpu_count(),
         "memory_gib": _memory_gib(),
         "system": f"{platform.system()} {platform.machine()}",
     }
+
+
+def conditions() -> dict[str, Any]:
+    """Return what may bear on a measurement at this moment, and does not make it another one.
+
+    "commit" is that of our sources; "affinity" is on how many cores this process may run, "load"
+    the system's over the last minute, "pace" how long a fixed piece of work takes [s]: the drift of
+    a machine shows in it.
+    """
+    found = {"commit": _our_commit(), "pace": pace()}
+    if hasattr(os, "sched_getaffinity"):
+        found["affinity"] = len(os.sched_getaffinity(0))
+    if hasattr(os, "getloadavg"):
+        found["load"] = round(os.getloadavg()[0], 2)
+    return found
+
+
+def pace() -> float:
+    """Return how long a fixed loop takes [s], the median of nine."""
+    return statistics.median(timed(lambda: sum(range(10_000)))[1] for _ in range(9))
+
+
+@functools.cache
+def _our_commit() -> str:
+    return commit_of(ROOT)
+
+
+def commit_of(root: Path) -> str:
+    """Return the commit of sources, and whether they were changed since; "" outside of git."""
+    if not (root / ".git").exists():
+        return ""
+    git = ["git", "-C", str(root)]
+    try:
+        head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, check=True)
+        status = [*git, "status", "--porcelain", "--", *_PACKAGES]
+        changed = subprocess.run(status, capture_output=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):  # no git, or no commit yet
+        return ""
+    return head.stdout.decode().strip() + (" with changes" if changed else "")
+
+
+def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Return in what one stamp differs from another, "" if in nothing."""
+    for part, title in (("machine", "another machine"), ("versions", "other versions")):
+        old, new = before.get(part, {}), now.get(part, {})
+        names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
+        if names:
+            changes = (f"{n} {old.get(n) or 'none'}, now {new.get(n) or 'none'}" for n in names)
+            return f"{title} ({'; '.join(changes)})"
+    old, new = before.get("source", "none"), now.get("source", "none")
+    return f"other sources ({old}, now {new})" if old != new else ""
 
 
 def versions() -> dict[str, str]:
@@ -63,14 +125,14 @@ def source_digest() -> str:
     """Return twelve hex digits over every file that can change a number."""
     digest = hashlib.sha256()
     for path in source_files():
-        digest.update(str(path.relative_to(_ROOT)).encode() + b"\0" + path.read_bytes())
+        digest.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:12]
 
 
 def source_files() -> list[Path]:
     """Return all files of the three packages but those that only show numbers."""
-    every = (path for name in _PACKAGES for path in (_ROOT / name).rglob("*") if path.is_file())
-    return sorted(path for path in every if not _is_left_out(path.relative_to(_ROOT).parts))
+    every = (path for name in _PACKAGES for path in (ROOT / name).rglob("*") if path.is_file())
+    return sorted(path for path in every if not _is_left_out(path.relative_to(ROOT).parts))
 
 
 def _is_left_out(parts: tuple[str, ...]) -> bool:

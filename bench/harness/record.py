@@ -4,10 +4,13 @@ This is the only file of the bench that opens a result file. A record is one blo
 solved, by what, with which settings, the arrays that came out, and where it was measured.
 """
 
+import contextlib
+import io
 import json
+import mmap
 import os
 import stat
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, TypedDict
@@ -15,9 +18,10 @@ from typing import Annotated, Any, Literal, NamedTuple, TypedDict
 import msgspec
 import numpy as np
 
-FORMAT = 2
-# What lines of earlier formats lack is empty.
-_FORMATS = (1, FORMAT)
+FORMAT = 3
+# Those that are read: what lines of the two formats before lack is empty. Format 1 has no facts,
+# formats 1 and 2 have no conditions.
+_FORMATS = (1, 2, FORMAT)
 FILE_NAME = "records.jsonl"
 # The suite of the records that say of each other suite that it was gone through to its end.
 FINISHED = "finished"
@@ -51,7 +55,7 @@ class _Stamp(TypedDict, total=False):
 class _Line(msgspec.Struct):
     """What a line has to hold."""
 
-    format: Literal[1, 2]
+    format: Literal[1, 2, 3]
     suite: str
     problem: str
     solver: str
@@ -63,6 +67,13 @@ class _Line(msgspec.Struct):
     when: _Moment
     seconds: float
     facts: dict[str, str | int | float | bool | list[str] | None] = {}
+    conditions: dict[str, str | int | float | None] = {}
+
+
+class _Head(msgspec.Struct):
+    """What a line of any format has."""
+
+    format: int
 
 
 _FIELDS = tuple(name for name in _Line.__struct_fields__ if name != "format")
@@ -85,6 +96,8 @@ class Record:
         when: the moment it was produced, ISO 8601 with time zone.
         seconds: how long it took to produce.
         facts: what tables select and sort by: numbers, words, truth values and lists of words.
+        conditions: what it was measured under that makes it no other measurement: the commit of
+            the sources, affinity, load, pace.
     """
 
     suite: str
@@ -98,6 +111,7 @@ class Record:
     when: str = ""
     seconds: float = 0.0
     facts: Mapping[str, Any] = field(default_factory=dict)
+    conditions: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -113,6 +127,17 @@ class Record:
     def failed(self) -> str:
         """Why it could not be measured, "" if it was."""
         return self.notes.get("failed", "")
+
+    @property
+    def superseded(self) -> bool:
+        """Whether its block is now asked for under other settings: it is kept, but not shown."""
+        return "superseded" in self.notes
+
+    @property
+    def commit(self) -> str:
+        """The commit of the sources as git shortens it, with a plus where they were changed."""
+        commit, _, changes = str(self.conditions.get("commit", "")).partition(" ")
+        return commit[:7] + ("+" if changes else "")
 
 
 class Reading(NamedTuple):
@@ -149,18 +174,26 @@ class RecordFile:
         return Reading(list(records.values()), " ".join(sentences))
 
     def append(self, records: Iterable[Record]) -> None:
-        """Write the records to the end of the file and to the disk, in one piece.
+        """Write the records to the end of the file and to the disk: all of them, or none.
 
         An unfinished record, left by a run that was killed, is cut off first; whatever else is in
         the file stays.
+
+        Raises:
+            OSError: naming the file, if it cannot be written to, as on a full disk.
         """
         text = "".join(encode(record) + "\n" for record in records).encode()
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        self._mend()
-        with self.path.open("ab") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
+        check_regular(self.path)
+        with _naming(self.path), self.path.open("ab", buffering=0) as file:
+            text = self._mend() + text
+            end = file.tell()
+            try:
+                _write(file, text)
+            except OSError:
+                with contextlib.suppress(OSError):
+                    file.truncate(end)
+                raise
 
     def drop(self, unwanted: Callable[[Record], bool]) -> None:
         """Remove records; the old file stays whole until the new one is, and all else stays in it.
@@ -189,19 +222,52 @@ class RecordFile:
             raise ValueError(f"{self.path}, line {lines[0].number}: not a record ({lines[0].why})")
         return lines, unfinished
 
-    def _mend(self) -> None:
-        content = self._bytes()
-        end = content.rfind(b"\n") + 1
-        if _is_begun(content[end:]):
-            self._replace(content[:end])
-        elif content[end:]:
-            self._replace(content + b"\n")
+    def _mend(self) -> bytes:
+        """Cut off an unfinished record; return what ends the last line if it is something else."""
+        begin, last = self._last_line()
+        if _is_begun(last):
+            os.truncate(self.path, begin)
+            return b""
+        return b"\n" if last else b""
+
+    def _last_line(self) -> tuple[int, bytes]:
+        """Return where the line after the last end of a line begins, and what it holds."""
+        if not self.path.stat().st_size:
+            return 0, b""
+        with (
+            self.path.open("rb") as file,
+            mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content,
+        ):
+            begin = content.rfind(b"\n") + 1
+            return begin, content[begin:]
 
     def _replace(self, content: bytes) -> None:
         beside = self.path.with_suffix(".new")
         check_regular(beside)
-        beside.write_bytes(content)
-        beside.replace(self.path)
+        try:
+            with _naming(self.path), beside.open("wb", buffering=0) as file:
+                _write(file, content)
+            beside.replace(self.path)
+        finally:
+            beside.unlink(missing_ok=True)
+
+
+def _write(file: io.FileIO, content: bytes) -> None:
+    """Write all of the content to the disk."""
+    rest = memoryview(content)
+    while rest:
+        rest = rest[file.write(rest) :]
+    os.fsync(file.fileno())
+
+
+@contextlib.contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Let a failure to write name the file, and say that nothing is lost."""
+    try:
+        yield
+    except OSError as error:
+        why = f"{error.strerror}; what was finished before is on record"
+        raise OSError(error.errno, why, str(path)) from None
 
 
 class _Decoded(NamedTuple):
@@ -293,9 +359,19 @@ def decode(line: bytes | str) -> Record:
         content = _DECODER.decode(line)
     except RecursionError:
         raise ValueError("nested too deeply") from None
+    except msgspec.ValidationError as error:
+        raise ValueError(_of_later_format(line) or str(error)) from None
     fields = {name: getattr(content, name) for name in _FIELDS}
     fields["arrays"] = {name: _numbers(name, values) for name, values in content.arrays.items()}
     return Record(**fields)
+
+
+def _of_later_format(line: bytes | str) -> str:
+    """Return what to say of a line of a format that is not known yet, "" if it is none."""
+    with contextlib.suppress(msgspec.MsgspecError):
+        if (found := msgspec.json.decode(line, type=_Head).format) > FORMAT:
+            return f"format {found} of a newer Plumbob; this one reads 1 to {FORMAT}"
+    return ""
 
 
 def _in_unicode(text: str) -> str:

@@ -35,7 +35,7 @@ def write(folder: Path) -> Written:
     stored, warning = RecordFile(folder).read()
     if not stored:
         raise ValueError(f"no records in {folder}: run `plumbob bench` first")
-    shown, left_out = sound([plain(record) for record in stored])
+    shown, left_out = sound([plain(record) for record in stored if not record.superseded])
     missing = [*([warning] if warning else []), *left_out, *_missing(shown.records)]
     _write_files(folder, shown.tables.values(), shown.drawings.values())
     page = folder / "index.html"
@@ -125,7 +125,7 @@ def _missing(records: Sequence[Record]) -> list[str]:
     if others:
         sentences.append(
             f"{others} of {len(records)} records are from other sources, versions or another "
-            "machine than the head of this page says; `plumbob bench` measures them again."
+            "machine than the head of this page says; `plumbob bench` measures again what it runs."
         )
     return sentences
 

@@ -14,8 +14,8 @@ class Results:
     """The records that hold numbers, in the order of the file, to be asked for by what they are."""
 
     def __init__(self, records: Iterable[Record]) -> None:
-        """Leave out those that say why there are none."""
-        self.records = [record for record in records if not record.failed]
+        """Leave out those that say why there are none, and those under settings of before."""
+        self.records = [r for r in records if not r.failed and not r.superseded]
 
     def all(self, suite: str, **wanted: Any) -> list[Record]:
         """Return the records of a suite whose facts and settings are these."""

@@ -143,7 +143,7 @@ WRONG = {
     **dict.fromkeys([("stamp", "machine"), ("stamp", "versions")], MAP),
     ("settings", "tolerance"): ([], {}, [1.0]),
     ("arrays", "residual"): NO_NUMBERS,
-    ("format",): (None, 0, 3, 99, "1", True, [], 1.5),
+    ("format",): (None, 0, 4, 99, "1", True, [], 1.5),
 }
 FIELDS = [path for path in WRONG if len(path) == 1 and path != ("facts",)]
 DAMAGED = {

@@ -84,7 +84,7 @@ def test_a_block_that_fails_costs_no_other_and_is_tried_again(suite, tmp_path):
     assert [event.state for event in go(tmp_path)] == [run.KEPT, run.MEASURED, run.KEPT]
 
 
-def test_other_sources_are_measured_again_and_their_leftovers_dropped(suite, tmp_path, make):
+def test_other_sources_are_measured_again_and_what_nothing_asks_for_stays(suite, tmp_path, make):
     old = make.record("arm", "p", "a", stamp={**stamp(), "source": "old"})
     gone = make.record("arm", "renamed since", "a", stamp={**stamp(), "source": "old"})
     elsewhere = make.record("ik", "p", "a", stamp={**stamp(), "source": "old"})
@@ -92,7 +92,7 @@ def test_other_sources_are_measured_again_and_their_leftovers_dropped(suite, tmp
     go(tmp_path)
     assert suite.measured == ["a", "b", "c"]
     kept = {(r.suite, r.problem) for r in RecordFile(tmp_path).read().records}
-    assert kept == {("arm", "p"), ("ik", "p"), ("finished", "arm")}
+    assert kept == {("arm", "p"), ("arm", "renamed since"), ("ik", "p"), ("finished", "arm")}
 
 
 @pytest.mark.parametrize(("before", "after", "again"), [(200, 2000, True), (2000, 200, False)])
@@ -106,11 +106,14 @@ def test_a_larger_block_stands_for_a_smaller_one_but_not_the_reverse(
     assert bool(second.measured) is again
 
 
-def test_forget_leaves_other_suites_alone(suite, tmp_path, make):
+def test_forget_leaves_other_suites_and_what_nothing_asks_for(suite, tmp_path, make):
     go(tmp_path)
-    RecordFile(tmp_path).append([make.record("ik", "p", "a"), make.record("finished", "ik", "")])
-    run.forget(["arm"], tmp_path)
-    assert {r.suite for r in RecordFile(tmp_path).read().records} == {"ik", "finished"}
+    theirs = make.record("arm", "p", "My solver", arrays={"x": [1.0]})
+    others = [make.record("ik", "p", "a"), make.record("finished", "ik", ""), theirs]
+    RecordFile(tmp_path).append(others)
+    run.forget(["arm"], "quick", tmp_path)
+    left = {(r.suite, r.solver) for r in RecordFile(tmp_path).read().records}
+    assert left == {("ik", "a"), ("finished", ""), ("arm", "My solver")}
 
 
 def test_a_suite_is_finished_only_when_it_went_through(suite, tmp_path):

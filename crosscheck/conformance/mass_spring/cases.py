@@ -139,8 +139,10 @@ def scenes(seed: int, thorough: bool) -> list[Scene]:
 G = np.array([0.0, -9.81, 0.0])
 PAIR = np.array([[0.1, 1.5, 0.0], [0.55, 1.3, 0.3]])
 PAIR_AT_REST = np.array([[0.1, 1.5, 0.0], [0.5, 1.5, 0.2]])
+PAIR_COMPRESSED = np.array([[0.18, 1.52, 0.03], [0.45, 1.51, 0.18]])
 PAIR_VELOCITIES = np.array([[0.6, -0.4, 0.2], [-0.5, 1.1, 0.9]])
 PAIR_MASSES = np.array([0.7, 1.9])
+HEIGHT = np.array([0.0, 1.6, 0.0])
 STEPS = ("mass_spring_step", "mass_spring_motion")
 
 
@@ -170,7 +172,7 @@ def _particles() -> list[Scene]:
         _pair(
             "one spring, compressed", "springs",
             sentence("One spring a third shorter than at rest."),
-            positions=PAIR_AT_REST + np.array([[0.08, 0.02, 0.03], [-0.05, 0.01, -0.02]]),
+            positions=PAIR_COMPRESSED,
         ),
         _pair(
             "one damped spring", "dampers",
@@ -195,8 +197,7 @@ def _random(name: str, family: str, about: Sentence, seed: int, n: int, **change
     """Return a triangle or a chain of triangles with values of its own for each spring."""
     rng = np.random.default_rng([11, seed, n])
     springs = [(i, j) for i in range(n) for j in range(i + 1, min(i + 3, n))]
-    steps = rng.uniform(0.2, 0.4, (n, 3)) * [1.0, -0.6, 0.5]
-    rest = np.array([0.0, 1.6, 0.0]) + np.cumsum(steps, axis=0)
+    rest = np.cumsum(rng.uniform(0.2, 0.4, (n, 3)) * [1.0, -0.6, 0.5], axis=0) + HEIGHT
     s = len(springs)
     scene = Scene(
         name, family, about, rest, springs,
@@ -239,9 +240,7 @@ def _small(seed: int) -> list[Scene]:
             "slack springs", "tension only",
             sentence("Springs that resist no compression, some of them slack."), seed, 4,
             tension_only=np.ones(5, dtype=bool),
-            positions=np.array(
-                [[0.0, 1, 0], [0.2, 0.9, 0.1], [0.7, 0.7, 0.2], [0.8, 0.6, 0.5]]
-            ),
+            positions=np.array([[0, 1, 0], [0.2, 0.9, 0.1], [0.7, 0.7, 0.2], [0.8, 0.6, 0.5]]),
             needs=("tension_only",), tasks=STEPS,
         ),
         _random(

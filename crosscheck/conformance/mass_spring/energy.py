@@ -218,7 +218,7 @@ SLIPS = (
          sentence("The kinetic energy is missing."), None, (0.0, 1.0, 1.0)),
     Slip("kinetic without mass", "kinetic",
          sentence("The kinetic energy lacks the mass: it is m/2 v²."),
-         lambda p: p.changed(masses=np.ones(p.count), weights=p.masses[:, None] * p.gravity)),
+         lambda p: p.changed(masses=np.ones(p.count), weighing=p.masses)),
     Slip("kinetic subtracted", "kinetic",
          sentence("The kinetic energy is subtracted."), None, (-1.0, 1.0, 1.0)),
     Slip("elastic without 1/2", "elastic",

@@ -74,7 +74,7 @@ GRAVITY = (
     Option(
         "gravity doubled", "gravity",
         sentence("Gravity acts twice, as 2 h² g in a step. Add m g once."),
-        _weights(lambda p: 2.0 * p.masses[:, None] * p.gravity),
+        _weights(lambda p: 2.0 * p.weighed[:, None] * p.gravity),
     ),
     Option(
         "gravity of its own 9.81", "gravity",
@@ -109,12 +109,12 @@ GRAVITY = (
     Option(
         "gravity m² g", "gravity",
         sentence("Gravity is multiplied by the mass twice. The force is m g."),
-        _weights(lambda p: p.masses[:, None] ** 2 * p.gravity),
+        _weights(lambda p: p.weighed[:, None] ** 2 * p.gravity),
     ),
     Option(
         "gravity halved", "gravity",
         sentence("Gravity acts by half, as in h²/2 g. A step of Euler moves a particle by h² g."),
-        _weights(lambda p: 0.5 * p.masses[:, None] * p.gravity),
+        _weights(lambda p: 0.5 * p.weighed[:, None] * p.gravity),
     ),
     Option(
         "gravity along z", "gravity",
@@ -133,7 +133,7 @@ GRAVITY = (
     Option(
         "external forces as accelerations", "gravity",
         sentence("External forces are multiplied by the mass. They are forces in newton already."),
-        lambda p: p.changed(external=p.masses[:, None] * p.external),
+        lambda p: p.changed(external=p.weighed[:, None] * p.external),
     ),
 )  # fmt: skip
 STEP_GRAVITY = (
@@ -141,24 +141,24 @@ STEP_GRAVITY = (
         "gravity without h²", "gravity",
         sentence("Gravity lacks its factor h² in the equation of the step. The right-hand side is "
                  "M y + h² (m g) + h² J d."),
-        lambda p: p.changed(weights=p.masses[:, None] * p.gravity / p.h**2),
+        lambda p: p.changed(weights=p.weighed[:, None] * p.gravity / p.h**2),
     ),
     Option(
         "gravity with h", "gravity",
         sentence("Gravity has the factor h instead of h² in the equation of the step."),
-        lambda p: p.changed(weights=p.masses[:, None] * p.gravity / p.h),
+        lambda p: p.changed(weights=p.weighed[:, None] * p.gravity / p.h),
     ),
 )  # fmt: skip
 MASSES = (
     Option(
         "mass inverse missing", "masses",
         sentence("Forces are not divided by the mass, or M is missing: a = f / m."),
-        lambda p: p.changed(masses=np.ones(p.count), weights=p.masses[:, None] * p.gravity),
+        lambda p: p.changed(masses=np.ones(p.count), weighing=p.masses),
     ),
     Option(
         "mass inverse squared", "masses",
         sentence("Forces are divided by the mass twice. a = f / m."),
-        lambda p: p.changed(masses=p.masses**2, weights=p.masses[:, None] * p.gravity),
+        lambda p: p.changed(masses=p.masses**2, weighing=p.masses),
     ),
     Option(
         "mass 1 for all", "masses",
@@ -359,18 +359,18 @@ MATRIX = (
     _matrix("doubled beside", sentence("The entries of the system matrix off its diagonal are "
                                        "doubled: each spring adds -h² k once to each of the "
                                        "two.")),
-    _matrix("M - h²L", sentence("The system matrix is M - h² L: the springs' part has the wrong "
+    _matrix("M-h²L", sentence("The system matrix is M - h² L: the springs' part has the wrong "
                                 "sign.")),
     _matrix("L", sentence("The system is solved with h² L; the matrix is M + h² L: the masses are "
                           "missing.")),
     _matrix("L without h²", sentence("The system is solved with L in place of M + h² L.")),
-    _matrix("M + hL", sentence("The system matrix is M + h L; the springs' part needs h².")),
-    _matrix("M + L", sentence("The system matrix is M + L; the springs' part needs its h².")),
+    _matrix("M+hL", sentence("The system matrix is M + h L; the springs' part needs h².")),
+    _matrix("M+L", sentence("The system matrix is M + L; the springs' part needs its h².")),
     _matrix("positive beside", sentence("The entries of the system matrix off its diagonal have "
                                         "the wrong sign: each is -h² k.")),
     _matrix("diagonal", sentence("The system matrix has nothing off its diagonal.")),
     _matrix("M", sentence("The system matrix is M, without the springs' part h² L.")),
-    _matrix("2M + h²L", sentence("The masses stand twice in the system matrix.")),
+    _matrix("2M+h²L", sentence("The masses stand twice in the system matrix.")),
 )  # fmt: skip
 PINS = (
     Option(

@@ -83,17 +83,14 @@ def _findings(
     if not np.isfinite(given).all():
         said = sentence("Forces hold NaN or infinity.")
         return [Finding("finite numbers", Verdict.BROKEN, np.inf, 0.0, "", said)]
-    found: list[Finding | None] = [
-        _formula(p, given, expected, allowed),
-        _balance(p, given, allowed),
-    ]
+    found = [_formula(p, given, expected, allowed), _balance(p, given, allowed)]
     limits = {"forces": 2.0 * allowed}
     bases = [other.answer for other in asked if other.case.name == one.case.facts.get("of")]
     if bases and isinstance(bases[0], Answer):
         found.append(laws.symmetry(one, bases[0], limits))
     found.append(laws.equal_requests(one, ("forces",), limits))
     found += [Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", said) for said in one.answer.remarks]
-    return [finding for finding in found if finding is not None]
+    return found
 
 
 def _formula(p: Problem, given: Any, expected: Any, allowed: float) -> Finding:

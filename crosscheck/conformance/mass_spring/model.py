@@ -24,7 +24,7 @@ from .problem import (
 
 # Newton's method ends in rounding long before this on systems of this size.
 MOST_ITERATIONS = 200
-# Stiffness of springs to the pins, weight of a penalty, and mass of heavy pins, as in solvers.
+# Stiffness of springs to the pins, weight of a penalty, and mass of heavy pins.
 PIN_STRENGTHS: Mapping[str, float] = {
     "penalty 1e10": 1e10,
     "penalty 1e8": 1e8,
@@ -93,7 +93,7 @@ class Model(NamedTuple):
     scaling: float = 1.0
     pins: str = "eliminated"
     velocity: str = "displacement"
-    matrix: str = "M + h²L"
+    matrix: str = "M+h²L"
     inertia: str = "y"
     time: str | float = "divided"
 
@@ -116,19 +116,19 @@ class Matrix(NamedTuple):
 
 
 MATRICES: Mapping[str, Matrix] = {
-    "M + h²L": Matrix(),
+    "M+h²L": Matrix(),
     "L": Matrix(masses=False),
     "L without h²": Matrix(masses=False, power=0),
-    "M + hL": Matrix(power=1),
-    "M + L": Matrix(power=0),
-    "M - h²L": Matrix(sign=-1.0),
+    "M+hL": Matrix(power=1),
+    "M+L": Matrix(power=0),
+    "M-h²L": Matrix(sign=-1.0),
     "without k": Matrix(stiffness=False),
     "without k, minus": Matrix(stiffness=False, sign=-1.0),
     "doubled beside": Matrix(beside=2.0),
     "positive beside": Matrix(beside=-1.0),
     "diagonal": Matrix(beside=0.0),
     "M": Matrix(sign=0.0),
-    "2M + h²L": Matrix(sign=0.5),
+    "2M+h²L": Matrix(sign=0.5),
 }
 
 
@@ -173,8 +173,7 @@ def _with_pins(p: Problem, model: Model) -> Problem:
     if kind in ("heavy", "falling", "one"):
         masses = p.masses.copy()
         masses[pinned] = PIN_STRENGTHS[model.pins]
-        weights = p.masses if kind == "heavy" else masses
-        return p.changed(masses=masses, weights=weights[:, None] * p.gravity)
+        return p.changed(masses=masses, weighing=p.weighed if kind == "heavy" else masses)
     if kind == "unattached":
         kept = ~np.isin(p.springs, pinned).any(axis=1)
         return p.changed(
@@ -345,7 +344,7 @@ class Equation:
     def uncoupled(self) -> bool:
         """Whether no spring acts and the matrix is M: one Newton step arrives."""
         p, model = self.start.p, self.start.model
-        return not (p.stiff or self.damped or len(self.pins)) and model.matrix == "M + h²L"
+        return not (p.stiff or self.damped or len(self.pins)) and model.matrix == "M+h²L"
 
     @cached_property
     def length_n(self) -> FloatArray:
@@ -432,8 +431,8 @@ class Equation:
         if how.beside != 1.0:
             cells = np.kron(np.eye(p.count), np.ones((size, size)))
             springs = np.where(cells, springs, how.beside * springs)
-        masses = np.repeat(p.masses, size) * (2.0 if model.matrix == "2M + h²L" else 1.0)
-        if model.matrix == "2M + h²L":
+        masses = np.repeat(p.masses, size) * (2.0 if model.matrix == "2M+h²L" else 1.0)
+        if model.matrix == "2M+h²L":
             factor = h**how.power
         return factor * springs + (np.diag(masses) if how.masses else 0.0)
 

@@ -1,7 +1,7 @@
 """A small mass-spring system as dense arrays, with the changes that a wrong solver makes to it.
 
 Its forces are written from the formulas, apart from `reference`: a spring pulls its first end with
--(k (l - r) + c (v_i - v_j)·u) u. What a faulty solver does otherwise, such as a missing end, is a
+-(k (l - r) + c (v_i - v_j)·u) u. What a faulty solver does otherwise, as to forget an end, is a
 field.
 """
 
@@ -31,6 +31,7 @@ class Problem:
         h: time step [s]; h_before: that of the request before; both 0 for forces and energies.
         steps: number of steps, or None for a task of one step.
         weights: the force of gravity if it is not m gravity [N], shape (particle, 3).
+        weighing: the masses m in m gravity, if they are others than those of inertia.
         ends: what share of its force a spring exerts on its first and on its second end.
         damping: what the dampers see: the velocity along the spring, all of the relative velocity,
             the particle's own velocity, or the particle's own along the spring.
@@ -52,6 +53,7 @@ class Problem:
     h_before: float = 0.0
     steps: int | None = None
     weights: FloatArray | None = None
+    weighing: FloatArray | None = None
     ends: tuple[float, float] = (1.0, 1.0)
     damping: str = "along"
     normalised: bool = True
@@ -90,8 +92,13 @@ class Problem:
     @cached_property
     def constant(self) -> FloatArray:
         """Gravity and external forces [N], shape (particle, 3)."""
-        weights = self.masses[:, None] * self.gravity if self.weights is None else self.weights
+        weights = self.weighed[:, None] * self.gravity if self.weights is None else self.weights
         return weights + self.external
+
+    @property
+    def weighed(self) -> FloatArray:
+        """The masses that gravity pulls."""
+        return self.masses if self.weighing is None else self.weighing
 
     def changed(self, **fields: Any) -> "Problem":
         """Return the problem with other fields."""
@@ -105,9 +112,9 @@ def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> Prob
     velocities = np.array(inputs["velocities"], dtype=float)
     velocities[pinned] = 0.0
     h = float(inputs.get("h", 0.0))
-    numbers: dict[str, Any] = {name: np.asarray(inputs[name], dtype=float) for name in _NUMBERS}
+    given: dict[str, Any] = {name: np.asarray(inputs[name], dtype=float) for name in _NUMBERS}
     return Problem(
-        **numbers,
+        **given,
         springs=np.asarray(inputs["springs"], dtype=int).reshape(-1, 2),
         velocities=velocities,
         pinned=pinned,

@@ -13,17 +13,27 @@ import numpy as np
 
 from ..contestant import Answer, Asked
 from ..greeting import Step
-from .faults import ASPECTS, Option, apply
+from .faults import ASPECTS, INTEGRATORS, Option, apply
 from .honest import compatible, domains
-from .model import Integrator, Model, simulate
+from .model import PIN_STRENGTHS, Integrator, Model, simulate
 from .problem import Problem
 from .rounding import SOLVED, Rounding, apart, rounding
 
 MOST_FAULTS = 3
 # Seconds of the processor after which no further faults are combined; what was begun is finished.
-PATIENCE = 6.0
+PATIENCE = 8.0
 # Integrators with more iterations are not combined with faults.
 MOST_ITERATIONS = 10
+# Matrices that are singular without pins, where they predict nothing.
+SINGULAR = ("matrix L", "matrix L without h²")
+# Positions beyond this [m] come from dividing by zero; those of the probes are some metres.
+ABSURD = 1e4
+FAULTY = frozenset(id(one) for one in INTEGRATORS)
+# Of what is not declared, only these are tried together with faults.
+FREQUENT = (
+    1, 2, 3, 5, 10, 100, 1000, "penalty 1e10", "springs 5e5", "heavy 1e8", "falling 1e8",
+    "one kilogram",
+)  # fmt: skip
 # Aspects that matter in any step; the others where there are springs, dampers, pins.
 ALWAYS = (
     "time", "inertia", "masses", "gravity", "integrator", "matrix", "substeps", "velocity",
@@ -59,6 +69,7 @@ class Search:
     def __init__(self, probes: Sequence[Probe], step: Step, epsilon: float) -> None:
         """Set up the domains of all choices."""
         self.probes = probes
+        self.step = step
         self.domains = domains(step)
         self.costs = {
             (aspect, option.key, _how(option)): cost
@@ -66,8 +77,10 @@ class Search:
             for option, cost in pairs
         }
         self.epsilon = epsilon
+        self._class_costs: dict[Integrator, int] = {}
         self.classes, self.members = _classes(self.domains["integrator"])
         self.tried = 0
+        self._misplaced: set[tuple[Any, ...]] = set()
         self._roundings: dict[tuple[Any, ...], Rounding] = {}
         self._known: dict[tuple[Any, ...], bool | None] = {}
         self.farthest = -1
@@ -101,7 +114,7 @@ class Search:
         for more in self._choices(chosen, new, budget, springs):
             if self._told(more):
                 continue
-            if time.process_time() > self._until and budget > 1:
+            if time.process_time() > self._until and budget > 0:
                 return
             explained = self._explains(more, index)
             if explained:
@@ -126,6 +139,11 @@ class Search:
         """Yield the choices extended by those of the aspects that now matter."""
         if springs and "class" in chosen:
             for option in self.members[chosen["class"].fields["integrator"]]:
+                denied = self.costs["integrator", option.key, _how(option)]
+                if (denied and budget > 1 and _tedious(option)) or (
+                    budget > 0 and self._guessed(option)
+                ):
+                    continue
                 rest = {key: value for key, value in chosen.items() if key != "class"}
                 yield from self._choices(rest | {"integrator": option}, new, budget, springs)
             return
@@ -137,13 +155,33 @@ class Search:
             return
         aspect, *others = new
         if aspect == "integrator" and not springs:
-            options, aspect = [(one, 0) for one in self.classes], "class"
+            options, aspect = [(one, self._class_cost(one)) for one in self.classes], "class"
             others = [one for one in others if one != "integrator"]
         else:
             options = self.domains[aspect]
         for option, cost in options:
-            if cost <= left and not (cost and budget > 1 and _tedious(option)):
+            tedious = bool(cost) and budget > 1 and _tedious(option)
+            tedious |= budget > 2 and option.key in SINGULAR
+            tedious |= budget > 0 and self._guessed(option)
+            if cost <= left and not tedious:
                 yield from self._choices(chosen | {aspect: option}, others, budget, springs)
+
+    def _guessed(self, option: Option) -> bool:
+        """Return whether a choice is honest, rare, and nowhere declared."""
+        fields, step = option.fields, self.step
+        match option.aspect:
+            case "scaling":
+                return step.damper is None and fields["scaling"] != 1.0
+            case "substeps":
+                return step.substeps is None and fields["substeps"] not in FREQUENT
+            case "damper":
+                return step.damper is None and fields["damper"] in ("diagonal", "blocks", "matrix")
+            case "pins":
+                return fields["pins"] in PIN_STRENGTHS and fields["pins"] not in FREQUENT
+            case "integrator":
+                how = fields["integrator"]
+                return how.method in ("taylor", "runge_kutta") or how.hessian == "projected"
+        return False
 
     def _cost(self, chosen: Chosen) -> int:
         return sum(
@@ -154,21 +192,29 @@ class Search:
         )
 
     def _class_cost(self, option: Option) -> int:
-        members = self.members[option.fields["integrator"]]
-        return min(self.costs["integrator", one.key, _how(one)] for one in members)
+        how = option.fields["integrator"]
+        if how not in self._class_costs:
+            costs = [self.costs["integrator", one.key, _how(one)] for one in self.members[how]]
+            self._class_costs[how] = min(costs)
+        return self._class_costs[how]
 
     def _explains(self, chosen: Chosen, index: int) -> bool | None:
-        """Return whether choices reproduce an answer; None where their matrix is singular."""
+        """Return whether choices reproduce an answer; None where neither is a number of use."""
         probe = self.probes[index]
         matters = chosen
         if not _has_springs(probe.problem):
             matters = _in_flight_only(chosen)
             if chosen["matrix"].key.startswith("matrix without k"):
                 return self._centre_explained(matters, index)
-        key = (index, *sorted((aspect, id(option)) for aspect, option in matters.items()))
+        key = ((index,), *sorted((aspect, id(option)) for aspect, option in matters.items()))
+        place = tuple(one for one in key if one[:1] != ("velocity",)) if _once(matters) else key
+        if place in self._misplaced:
+            return False
         if key not in self._known:
             self.tried += 1
-            self._known[key] = self._compare(tuple(matters.values()), probe)
+            self._known[key], there = self._compare(tuple(matters.values()), probe)
+            if not there:
+                self._misplaced.add(place)
         return self._known[key]
 
     def _centre_explained(self, chosen: Chosen, index: int) -> bool | None:
@@ -177,7 +223,7 @@ class Search:
         A matrix without stiffness joins particles even where their spring has none, differently
         for each integrator, but leaves their centre where it is.
         """
-        key = (-1 - index, *sorted((aspect, id(option)) for aspect, option in chosen.items()))
+        key = ((-1 - index,), *sorted((aspect, id(option)) for aspect, option in chosen.items()))
         if key not in self._known:
             probe = self.probes[index]
             problem, model = apply(tuple(chosen.values()), probe.problem, Model(damper="none"))
@@ -198,15 +244,22 @@ class Search:
             self._roundings[key] = rounding(probe.problem, model, self.epsilon)
         return self._roundings[key]
 
-    def _compare(self, options: tuple[Option, ...], probe: Probe) -> bool | None:
+    def _compare(self, options: tuple[Option, ...], probe: Probe) -> tuple[bool | None, bool]:
+        """Return whether an answer is reproduced, and whether its positions may be."""
         problem, model = apply(options, probe.problem, Model(damper="none"))
         with np.errstate(all="ignore"):
             try:
                 predicted = simulate(problem, model)
-            except np.linalg.LinAlgError:  # a singular matrix predicts nothing
-                return None
+            except np.linalg.LinAlgError:
+                predicted = {}
+        if _absurd(predicted):  # a singular matrix predicts nothing but that
+            return (None if _absurd(probe.answered) else False), True
         allowed = self._rounding(probe, model)
-        return bool(apart(probe.problem, predicted, probe.answered, allowed) <= SOLVED)
+        same = apart(probe.problem, predicted, probe.answered, allowed) <= SOLVED
+        if same or problem.steps or "positions" not in probe.answered:
+            return bool(same), True
+        places = {"positions": probe.answered["positions"]}
+        return False, bool(apart(probe.problem, predicted, places, allowed) <= SOLVED)
 
     def _found(self, chosen: Chosen) -> Found:
         if "class" in chosen:
@@ -217,10 +270,27 @@ class Search:
         return Found(options, faults)
 
 
+def _absurd(values: Mapping[str, Any]) -> bool:
+    """Return whether positions are those that a singular matrix gives."""
+    return "positions" not in values or not np.abs(values["positions"]).max() < ABSURD
+
+
+def _once(chosen: Chosen) -> bool:
+    """Return whether there is one substep, so that velocities do not enter positions."""
+    return "substeps" in chosen and chosen["substeps"].fields["substeps"] == 1
+
+
 def _tedious(option: Option) -> bool:
-    """Return whether an integrator takes too long to be tried together with other faults."""
+    """Return whether a choice is not tried together with other faults.
+
+    These are integrators that take long, and those, as well as numbers of substeps, that are honest
+    but denied by the greeting.
+    """
     how = _how(option)
-    return how is not None and (how.method == "descent" or how.iterations > MOST_ITERATIONS)
+    if how is None:
+        return option.aspect in ("substeps", "scaling")
+    denied = id(option) not in FAULTY
+    return denied or how.method == "descent" or how.iterations > MOST_ITERATIONS
 
 
 def _classes(
@@ -235,7 +305,7 @@ def _classes(
 
 def _in_flight_only(chosen: Chosen) -> Chosen:
     """Return those choices that matter where no spring acts."""
-    mattering = ("matrix L", "matrix L without h²", "matrix 2M + h²L")
+    mattering = (*SINGULAR, "matrix 2M+h²L")
     return {
         aspect: option
         for aspect, option in chosen.items()

@@ -112,8 +112,9 @@ def _judge_case(
     expected = laws.predicted(p, model)
     allowed = rounding(p, model, greeting.epsilon)
     context = Context(
-        p, one.answer.values, allowed, model, known, describe_model(options), expected
-    )
+        p, one.answer.values, allowed, model, known, describe_model(options), expected,
+        greeting.step.pins is not None,
+    )  # fmt: skip
     findings = _findings(one, asked, context)
     digits = _digits(expected, one.answer.values) if known else None
     return CaseJudgement(
@@ -135,7 +136,7 @@ def _findings(one: Asked, asked: Sequence[Asked], context: Context) -> list[Find
         "velocities": 4.0 * context.allowed.velocities + _slack(context, "velocities"),
     }
     bases = [other.answer for other in asked if other.case.name == one.case.facts.get("of")]
-    if bases and isinstance(bases[0], Answer):
+    if bases and isinstance(bases[0], Answer) and context.model.damper != "diagonal":
         found.append(laws.symmetry(one, bases[0], allowed))
     found.append(laws.equal_requests(one, ("positions", "velocities"), allowed))
     assert isinstance(one.answer, Answer)

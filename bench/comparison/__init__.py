@@ -1,0 +1,1 @@
+"""Compare two revisions or two runs: what got faster, slower, more or less right; and over time."""

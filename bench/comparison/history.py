@@ -1,0 +1,132 @@
+"""A quantity over many runs: a line of blocks on a terminal, and a figure."""
+
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..harness.record import Record, RecordFile
+from ..presentation.text import shortened, visible
+from .rows import RowKey, by_row
+
+BLOCKS = "▁▂▃▄▅▆▇█"
+# Rows on a terminal; curves of a figure that are labelled, the others are grey.
+LINES, LABELLED = 20, 6
+WIDTH = 70
+
+
+class Run(NamedTuple):
+    """The rows of a folder, and what it is called: its name and the commit of the sources."""
+
+    name: str
+    when: str
+    rows: dict[RowKey, Record]
+
+
+class Course(NamedTuple):
+    """The medians of a quantity of a row over runs, NaN where it was not measured."""
+
+    title: str
+    values: np.ndarray
+
+    @property
+    def change(self) -> float:
+        """The last value over the first, as a logarithm; 0 if there is but one."""
+        known = self.values[np.isfinite(self.values) & (self.values > 0)]
+        return math.log(known[-1] / known[0]) if len(known) > 1 else 0.0
+
+
+def read_runs(folders: Iterable[Path]) -> list[Run]:
+    """Return the runs of folders, the oldest first.
+
+    Raises:
+        ValueError: if a folder has no records, or they cannot be read.
+    """
+    return sorted((_read(folder) for folder in folders), key=lambda run: run.when)
+
+
+def _read(folder: Path) -> Run:
+    records = RecordFile(folder).read().records
+    if not records:
+        raise ValueError(f"no records in {folder}: run `plumbob bench` first")
+    newest = max(records, key=lambda record: record.when)
+    commit = newest.commit or newest.stamp.get("source", "")
+    return Run(visible(f"{folder.name} {commit}".strip()), newest.when, by_row(records))
+
+
+def courses(runs: Sequence[Run], quantity: str, words: Sequence[str] = ()) -> list[Course]:
+    """Return the course of a quantity in each row, the greatest change first.
+
+    Only problems or solvers that contain one of the words are followed; all if there are none.
+
+    Raises:
+        ValueError: if no row has it; the message lists what rows have.
+    """
+    keys = list(dict.fromkeys(key for run in runs for key in run.rows if _is_meant(key, words)))
+    found = [_course(runs, key, quantity) for key in keys]
+    known = [course for course in found if np.isfinite(course.values).any()]
+    if not known:
+        names = {n for run in runs for key in keys if key in run.rows for n in run.rows[key].arrays}
+        valid = ", ".join(sorted(names)) or "nothing by these words"
+        raise ValueError(f"quantity: expected one of {valid}, got {quantity!r}")
+    return sorted(known, key=lambda course: -abs(course.change))
+
+
+def _is_meant(key: RowKey, words: Sequence[str]) -> bool:
+    return not words or any(word in part for word in words for part in key[1:3])
+
+
+def _course(runs: Sequence[Run], key: RowKey, quantity: str) -> Course:
+    values = [_median(run.rows.get(key), quantity) for run in runs]
+    return Course(", ".join(key[1:3]), np.array(values))
+
+
+def _median(record: Record | None, quantity: str) -> float:
+    values = None if record is None else record.arrays.get(quantity)
+    return float(np.median(values)) if values is not None and values.size else math.nan
+
+
+def sparkline(values: np.ndarray) -> str:
+    """Return a block for each value, the least lowest and a space for none."""
+    known = values[np.isfinite(values)]
+    low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
+    span = (high - low) or 1.0
+    return "".join(
+        BLOCKS[int((value - low) / span * (len(BLOCKS) - 1) + 0.5)] if np.isfinite(value) else " "
+        for value in values
+    )
+
+
+def lines(made: Sequence[Course]) -> list[str]:
+    """Return a line for each of the courses that changed most."""
+    told = [
+        f"{sparkline(course.values)}  {_ends(course)}  {shortened(visible(course.title), WIDTH)}"
+        for course in made[:LINES]
+    ]
+    return told + ([f"and {len(made) - LINES} more"] if len(made) > LINES else [])
+
+
+def _ends(course: Course) -> str:
+    known = course.values[np.isfinite(course.values)]
+    return f"{known[0]:9.3g} → {known[-1]:<9.3g} × {math.exp(course.change):<6.3g}"
+
+
+def draw(runs: Sequence[Run], made: Sequence[Course], quantity: str) -> str:
+    """Return the courses as SVG: those that changed most in colour, the others grey."""
+    from ..presentation.figures import COLOURS, canvas, finished, nth_style, written
+
+    with canvas(4.2, 1) as (figure, (ax,)):
+        for i, course in reversed(list(enumerate(made))):
+            grey = {"color": COLOURS["rule"], "linewidth": 0.8, "zorder": 1}
+            style = {**nth_style(i), "label": written(course.title)} if i < LABELLED else grey
+            ax.plot(range(len(runs)), course.values, marker=".", **style)
+        if all((c.values[np.isfinite(c.values)] > 0).all() for c in made):
+            ax.set_yscale("log")
+        ax.set_xticks(range(len(runs)), [written(run.name) for run in runs], rotation=30)
+        ax.set_ylabel(written(quantity))
+        handles, labels = ax.get_legend_handles_labels()
+        figure.legend(handles[::-1], labels[::-1], loc="outside lower center")
+        title = f"{quantity} over {len(runs)} runs"
+        return finished(figure, "history", title, "").svg

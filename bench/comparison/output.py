@@ -1,0 +1,104 @@
+"""A comparison in words: ten lines for a terminal, a table for a pull request, JSON."""
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+
+from ..presentation.tables import Column, Summary, Table
+from ..presentation.text import shortened, visible
+from .compare import Comparison
+from .rows import ORDER, Row, Verdict, distinguishing
+
+# Lines of the summary on a terminal, its rows among them; rows of the table in a pull request.
+LINES, MOST = 10, 50
+_HEADINGS = ("verdict", "problem", "solver", "settings", "quantity", "what")
+WIDTH = 160
+
+
+def headline(comparison: Comparison, stopped: Sequence[Row]) -> str:
+    """Return the answer in one sentence."""
+    if stopped:
+        return f"STOP: {_rows(len(stopped))} beyond the limits of --fail"
+    worse = [row for row in comparison.rows if row.verdict in (Verdict.LESS_RIGHT, Verdict.SLOWER)]
+    return f"{_rows(len(worse))} worse" if worse else "nothing is less right or slower"
+
+
+def counts(comparison: Comparison) -> str:
+    """Return how many rows there are of each verdict, the worst first."""
+    found = Counter(row.verdict for row in comparison.rows)
+    return ", ".join(f"{found[verdict]} {verdict}" for verdict in ORDER if found[verdict])
+
+
+def summary(comparison: Comparison, stopped: Sequence[Row]) -> list[str]:
+    """Return at most ten lines, the worst rows first."""
+    told = [row for row in comparison.rows if row.verdict != Verdict.SAME]
+    room = LINES - 3
+    shown = told if len(told) <= room else told[: room - 1]
+    names = distinguishing(comparison.rows)
+    lines = [shortened(_line(row, names[row.key]), WIDTH) for row in shown]
+    if len(shown) < len(told):
+        lines.append(f"  and {len(told) - len(shown)} more: --markdown FILE or --json FILE has all")
+    drift = f"the machine's drift: {comparison.drift.sentence}"
+    if any(row.verdict == Verdict.UNDECIDED for row in told) and not comparison.is_rerun:
+        drift += "; --rerun REV decides"
+    return [headline(comparison, stopped), counts(comparison) or "no rows in common", *lines, drift]
+
+
+def _line(row: Row, settings: str) -> str:
+    what = f"{row.title} ({settings})" if settings else row.title
+    return f"  {row.verdict:<11}" + visible(f"{what}: {row.why}")
+
+
+def table(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) -> Table:
+    """Return the rows that are not known to be the same, with what decides them."""
+    told = [row for row in comparison.rows if row.verdict != Verdict.SAME]
+    names = distinguishing(comparison.rows)
+    points = [f"{_rows(len(told) - MOST)} more are in the JSON"] if len(told) > MOST else []
+    return Table(
+        "compare",
+        f"plumbob compare: {headline(comparison, stopped)}",
+        tuple(Column(heading, words=True) for heading in _HEADINGS),
+        tuple(
+            (str(row.verdict), *row.key[1:3], names[row.key], row.quantity, row.why)
+            for row in told[:MOST]
+        ),
+        shows=f"{old} beside {new}.",
+        measured=f"{comparison.how} The machine's drift: {comparison.drift.sentence}.",
+        summary=Summary(counts(comparison) or "No rows in common", tuple(points)),
+    )
+
+
+def as_json(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) -> str:
+    """Return all rows as standard JSON."""
+    content = {
+        "format": 1,
+        "old": old,
+        "new": new,
+        "stop": len(stopped),
+        "drift": comparison.drift.value,
+        "drift_source": comparison.drift.source,
+        "how": comparison.how,
+        "counts": Counter(str(row.verdict) for row in comparison.rows),
+        "rows": [_as_json(row, row in stopped) for row in comparison.rows],
+    }
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def _as_json(row: Row, stops: bool) -> dict[str, object]:
+    suite, problem, solver, _ = row.key
+    ratio = row.ratio
+    return {
+        "verdict": str(row.verdict), "stops": stops, "suite": suite, "problem": problem,
+        "solver": solver, "settings": row.settings, "quantity": row.quantity,
+        "change": row.change, "why": row.why,
+        "ratio": ratio and _finite(ratio.value), "low": ratio and _finite(ratio.low),
+        "high": ratio and _finite(ratio.high), "chance": ratio and ratio.chance,
+    }  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    return value if abs(value) < float("inf") else None
+
+
+def _rows(count: int) -> str:
+    return f"{count} row{'' if count == 1 else 's'}"

@@ -1,0 +1,268 @@
+"""Measure another revision and ours side by side, the order of each pair drawn by lot.
+
+Both run in processes of their own, which are fresh for each round of pairs, since a process is
+fast or slow by the accident of its addresses too.
+"""
+
+import contextlib
+import json
+import math
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..harness.isolation import one_thread
+from ..harness.record import Record, decode
+from . import revision_process
+from .compare import Comparison, decide
+from .intervals import ERROR_RATE, Deviation, Ratio, adjusted, pairs_needed, ratio_of_pairs
+from .quantities import is_clocked
+from .rows import Pair, RowKey, by_row, come_and_gone, pairs, row_key, worst_first
+from .times import FLOOR, Drift, known_drift
+
+# Pairs of median times, old and new, of each time of each row.
+Taken = dict[tuple[RowKey, str], list[tuple[float, float]]]
+Ratios = dict[tuple[RowKey, str], Ratio]
+
+SEED = 20130
+HOW = (
+    "Both revisions are measured side by side in fresh processes, {pairs} times each, the order "
+    "drawn by lot. Answers are compared to the bit. Times are decided by Wilcoxon's signed-rank "
+    "test, exact by that lot; the chance of calling any row wrongly is held at "
+    f"{100 * ERROR_RATE:g} % over all rows (Holm), and what is called is measured a second time."
+)
+
+
+class Plan(NamedTuple):
+    """What is measured again.
+
+    Attributes:
+        revision: what git knows the other revision by.
+        suites: the suites.
+        words: only problems or solvers that contain one of these; all if there are none.
+        pairs: how many pairs; 0 for as many as the number of rows needs.
+        scale: how much is measured each time.
+        seed: of the order.
+    """
+
+    revision: str
+    suites: tuple[str, ...]
+    words: tuple[str, ...] = ()
+    pairs: int = 0
+    scale: str = "quick"
+    seed: int = SEED
+
+
+def rerun(plan: Plan, root: Path, tell: Callable[[str], None] = lambda _: None) -> Comparison:
+    """Return what the working copy at a root does otherwise than another revision of it.
+
+    Raises:
+        ValueError: if there is no such revision, nothing to measure in both, or a process ends
+            before it has measured all.
+    """
+    with (
+        tempfile.TemporaryDirectory(prefix="plumbob-") as folder,
+        checked_out(root, plan.revision, Path(folder, "old")) as old,
+    ):
+        new = Path(folder, "new")
+        new.symlink_to(root, target_is_directory=True)  # so that both paths are as long
+        return _measured((old, new), plan, tell)
+
+
+@contextlib.contextmanager
+def checked_out(root: Path, revision: str, folder: Path) -> Iterator[Path]:
+    """Yield a folder that holds a revision for as long as the block lasts.
+
+    Raises:
+        ValueError: if there is no such revision, or no repository.
+    """
+    _git(root, "rev-parse", "--verify", "--quiet", f"{revision}^{{commit}}")
+    _git(root, "worktree", "add", "--detach", "--quiet", str(folder), revision)
+    try:
+        yield folder
+    finally:
+        _git(root, "worktree", "remove", "--force", str(folder))
+
+
+def _git(root: Path, *arguments: str) -> None:
+    done = subprocess.run(["git", "-C", str(root), *arguments], capture_output=True, check=False)
+    if done.returncode:
+        said = " ".join(done.stderr.decode(errors="replace").split())
+        what = arguments[-1].removesuffix("^{commit}")
+        raise ValueError(
+            f"--rerun: expected a revision that git can check out, got {what!r} {said}"
+        )
+
+
+class Revision:
+    """A process that measures blocks of one revision, by the sources in a folder."""
+
+    def __init__(self, folder: Path, suites: Sequence[str], scale: str) -> None:
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (open as long as the process)
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", revision_process.__file__, str(folder), scale, *suites],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, cwd=folder.parent,
+            env={**one_thread(), "PYTHONPATH": str(folder)}, text=True, encoding="utf-8",
+        )  # fmt: skip
+
+    def blocks(self) -> list[list[str]]:
+        """Return the keys of what there is to be measured: suite, problem, solver, settings."""
+        return json.loads(self._answer())
+
+    def measure(self, key: Sequence[str]) -> Record:
+        """Return a fresh record of a block."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(BrokenPipeError):  # what ended it is said by the answer
+            print(json.dumps(key), file=self._process.stdin, flush=True)
+        return decode(self._answer())
+
+    def _answer(self) -> str:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            self._process.wait()
+            self._said.seek(0)
+            last = self._said.read().decode(errors="replace").strip().splitlines()[-1:]
+            raise ValueError(f"a process of the rerun ended: {' '.join(last) or 'without a word'}")
+        return line
+
+    def close(self) -> None:
+        """End the process; what it has started ends with it."""
+        self._process.kill()
+        self._process.communicate()
+        self._said.close()
+
+
+@contextlib.contextmanager
+def _both(
+    folders: tuple[Path, Path], plan: Plan, new_first: bool = False
+) -> Iterator[tuple[Revision, Revision]]:
+    """Yield a process of each revision, begun in this order: the first may find a cold machine."""
+    with contextlib.ExitStack() as stack:
+        made: dict[int, Revision] = {}
+        for i in _order(new_first):
+            made[i] = Revision(folders[i], plan.suites, plan.scale)
+            stack.callback(made[i].close)
+        yield made[0], made[1]
+
+
+def _order(new_first: bool) -> tuple[int, int]:
+    """Return the order of old, 0, and new, 1."""
+    return (1, 0) if new_first else (0, 1)
+
+
+def _measured(folders: tuple[Path, Path], plan: Plan, tell: Callable[[str], None]) -> Comparison:
+    """Measure once for the answers, which also compiles, and then pair by pair for the times."""
+    with _both(folders, plan) as both:
+        keys = [_chosen(one.blocks(), plan.words) for one in both]
+        if not any(keys):
+            raise ValueError(
+                "--rerun: expected something to measure in both revisions, got nothing"
+            )
+        found = []
+        for one, blocks in zip(both, keys, strict=True):
+            tell(f"answers of {len(blocks)} rows")
+            found.append([one.measure(key) for key in blocks])
+    old, new = by_row(found[0]), by_row(found[1])
+    rows = dict(pairs(old, new))
+    taken = _take_pairs(folders, plan, rows, tell)
+    ratios = _ratios(taken)
+    if called := _called(ratios):
+        again = plan._replace(seed=plan.seed + 1, pairs=max(map(len, taken.values())))
+        few = {key: rows[key] for key, _ in called}
+        ratios |= _confirmed(called, _ratios(_take_pairs(folders, again, few, tell)))
+    count = max((len(values) for values in taken.values()), default=0)
+    decided = [*come_and_gone(old, new), *decide(rows, ratios)]
+    return Comparison(worst_first(decided), _drift(taken, count), HOW.format(pairs=count), True)
+
+
+def _ratios(taken: Taken) -> Ratios:
+    return {at: _floored(ratio_of_pairs(*np.array(values).T)) for at, values in taken.items()}
+
+
+def _called(ratios: Ratios) -> Ratios:
+    """Return what would be called faster or slower."""
+    chances = adjusted([ratio.chance for ratio in ratios.values()])
+    return {
+        at: ratio for (at, ratio), chance in zip(ratios.items(), chances, strict=True)
+        if chance <= ERROR_RATE
+    }  # fmt: skip
+
+
+def _confirmed(called: Ratios, again: Ratios) -> Ratios:
+    """Return what was called as it was measured again; where that says otherwise, as chance.
+
+    The second estimate is not one of those that were chosen for being large.
+    """
+    known = _called({at: ratio for at, ratio in again.items() if at in called})
+    return {
+        at: again[at]._replace(chance=first.chance)
+        if at in known and (again[at].value > 1) == (first.value > 1)
+        else first._replace(chance=1.0)
+        for at, first in called.items()
+    }
+
+
+def _floored(ratio: Ratio) -> Ratio:
+    """Return a ratio that counts as chance if it is too near to 1 to matter."""
+    return ratio._replace(chance=1.0) if abs(math.log(ratio.value)) < FLOOR else ratio
+
+
+def _drift(taken: Taken, count: int) -> Drift:
+    """Return by how much the old revision's times differ among themselves."""
+    logs = [np.log(np.array(values)[:, 0]) for values in taken.values()]
+    if not logs:
+        return known_drift(0.0, "no times were compared")
+    spread = math.sqrt(2 * np.mean([np.var(values, ddof=1) for values in logs]))
+    freedom = len(logs) * (count - 1)
+    return Drift(Deviation(spread, freedom), f"the old revision beside itself, {count} times")
+
+
+def _chosen(keys: Sequence[Sequence[str]], words: Sequence[str]) -> list[Sequence[str]]:
+    """Return the keys whose problem or solver contains one of the words."""
+    return [key for key in keys if not words or any(w in part for w in words for part in key[1:3])]
+
+
+def _take_pairs(
+    folders: tuple[Path, Path], plan: Plan, rows: dict[RowKey, Pair], tell: Callable[[str], None]
+) -> Taken:
+    """Return pairs of median times, old and new, of each time of each row."""
+    clocked = {key: pair for key, pair in rows.items() if _times(pair.old) and _times(pair.new)}
+    quantities = sum(len(_times(pair.old)) for pair in clocked.values())
+    count = plan.pairs or pairs_needed(quantities)
+    lot = np.random.default_rng(plan.seed)
+    taken: Taken = {}
+    for i in range(count if clocked else 0):
+        tell(f"pair {i + 1} of {count}, {len(clocked)} rows")
+        with _both(folders, plan, bool(lot.integers(2))) as both:
+            for one in both:
+                one.blocks()
+            for key in [list(clocked)[j] for j in lot.permutation(len(clocked))]:
+                _take_pair(both, clocked[key], bool(lot.integers(2)), taken)
+    return taken
+
+
+def _take_pair(
+    both: tuple[Revision, Revision], pair: Pair, new_first: bool,
+    taken: Taken,
+) -> None:  # fmt: skip
+    found: dict[int, dict[str, float]] = {}
+    for i in _order(new_first):
+        record = pair[i]
+        found[i] = _times(both[i].measure(record.key))
+    for name in found[0].keys() & found[1].keys():
+        taken.setdefault((row_key(pair.old), name), []).append((found[0][name], found[1][name]))
+
+
+def _times(record: Record) -> dict[str, float]:
+    """Return the medians of the times of a record."""
+    medians: dict[str, Any] = {
+        name: float(np.median(values)) for name, values in record.arrays.items()
+        if is_clocked(record.suite, name) and values.size
+    }  # fmt: skip
+    return {name: value for name, value in medians.items() if value > 0}

@@ -1,0 +1,34 @@
+"""Measure blocks of the revision in a folder, as lines of a program's input ask for them.
+
+This is a program of its own, run by path: it imports the revision's bench, whatever revision it is,
+and uses only what the bench had from its first records on.
+"""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+
+def main(folder: str, scale: str, *suites: str) -> None:
+    """Write the keys of all blocks, and then a record for each key that is read."""
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what an engine prints is no answer
+    from bench import experiments
+    from bench.harness import record, run
+
+    if not Path(run.__file__).is_relative_to(folder):
+        sys.exit(f"expected the bench of {folder}, got {run.__file__}")
+    blocks = {
+        run.block_key(block): block
+        for suite in suites if suite in experiments.SUITES
+        for block in experiments.blocks(suite, experiments.SCALES[scale])
+    }  # fmt: skip
+    print(json.dumps(list(blocks)), file=answers, flush=True)
+    for line in sys.stdin:
+        key = tuple(json.loads(line))
+        print(record.encode(run.measure(blocks[key])), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,318 @@
+"""The gate: a wrong digit is seen first, noise is not called a change, a slowdown is."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench import cli
+from bench.comparison import compare as comparing
+from bench.comparison import intervals, times
+from bench.comparison.compare import Limits, compare, limits, stops_at
+from bench.comparison.rows import ORDER, Verdict
+from bench.harness.record import RecordFile
+
+
+def changed(record, **arrays):
+    """The record with other arrays."""
+    return replace(record, arrays={**record.arrays, **{k: np.array(v) for k, v in arrays.items()}})
+
+
+def verdicts(old, new):
+    return [(row.verdict, row.quantity) for row in compare(old, new).rows]
+
+
+def test_a_run_beside_itself_differs_in_nothing(records):
+    made = compare(records, records)
+    assert {row.verdict for row in made.rows} <= {Verdict.SAME, Verdict.UNDECIDED}
+    assert sum(row.verdict == Verdict.SAME for row in made.rows) > 30
+    assert stops_at(made.rows, Limits(accuracy=0.0, time=0.0, gone=True)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "step", "verdict"),
+    [("residual", 1, Verdict.LESS_RIGHT), ("residual", -1, Verdict.MORE_RIGHT),
+     ("largest_angle", 1, Verdict.CHANGED)],
+)  # fmt: skip
+def test_the_last_digit_of_one_number_is_seen_whatever_else_changed(
+    records, make, name, step, verdict
+):
+    one = make.drawn("ccd", False, 1.0)
+    values = one.arrays[name].copy()
+    values[1] = np.nextafter(values[1], step * np.inf)
+    slow = make.timed("My solver", 1e-6, work="more")
+    new = [changed(one, **{name: values}), changed(slow, seconds=[1.0, 1.1, 1.0, 1.1, 1.0])]
+    old = [one, changed(slow, seconds=[1e-3, 1.1e-3, 1e-3, 1.1e-3, 1e-3])]
+    rows = compare([*records, *old], [*records, *new]).rows
+    found = next(row for row in rows if row.quantity == name)
+    assert found.verdict == verdict
+    assert found.key[1:3] == ("arm/circle", "ccd")
+    assert Verdict.SLOWER in {row.verdict for row in rows}
+    if step > 0:
+        assert rows[0] == found
+        assert stops_at(rows, Limits(accuracy=0.0)) == [found]
+
+
+WORSE = {
+    "a number that is none": {"position": [1e-9, np.nan, 0.1, 1e-7]},
+    "one solved less": {"solved": [False, False, False, True]},
+    "an error more": {"position": [1e-9, 0.5, 0.2, 1e-7]},
+}
+
+
+@pytest.mark.parametrize("arrays", WORSE.values(), ids=WORSE)
+def test_what_is_worse_is_less_right_and_the_reverse_more(make, arrays):
+    old = make.raced("lm", "one start")
+    new = changed(old, **arrays)
+    (name,) = arrays
+    assert verdicts([old], [new])[0] == (Verdict.LESS_RIGHT, name)
+    assert verdicts([new], [old])[0] == (Verdict.MORE_RIGHT, name)
+
+
+def test_rows_come_go_and_fail(make):
+    a, b = make.drawn("a", False, 1.0), make.drawn("b", False, 1.0)
+    failed = replace(b, arrays={}, notes={"failed": "no engine"})
+    assert verdicts([a], [b]) == [(Verdict.GONE, ""), (Verdict.NEW, "")]
+    assert verdicts([b], [failed])[0] == (Verdict.LESS_RIGHT, "")
+    assert verdicts([failed], [b])[0] == (Verdict.NEW, "")
+    rows = compare([a], [b]).rows
+    assert [row.verdict for row in stops_at(rows, Limits(gone=True))] == [Verdict.GONE]
+
+
+def test_versions_do_not_part_what_is_one_row(make):
+    old = make.raced("peer", "one start")
+    new = replace(old, settings={**old.settings, "version": "2"})
+    assert {verdict for verdict, _ in verdicts([old], [new])} == {Verdict.SAME}
+
+
+def test_a_run_cut_sooner_is_compared_over_what_both_came_to(make):
+    old = make.raced("peer", "one start")
+    new = replace(old, arrays={k: v[:2] if v.ndim else v for k, v in old.arrays.items()})
+    assert {verdict for verdict, _ in verdicts([old], [new])} == {Verdict.SAME}
+    new = changed(new, solved=[True, True])
+    assert verdicts([old], [new])[0] == (Verdict.MORE_RIGHT, "solved")
+
+
+def test_runs_of_other_sizes_are_not_compared(make):
+    old = make.drawn("ccd", False, 1.0)
+    assert verdicts([old], [replace(old, size=20)]) == [(Verdict.UNDECIDED, "")]
+
+
+@pytest.mark.parametrize(
+    ("lost", "verdict"),
+    [(0, Verdict.SAME), (3, Verdict.UNDECIDED), (30, Verdict.LESS_RIGHT)],
+)
+def test_answers_cut_by_a_clock_are_decided_by_chance(make, lost, verdict):
+    solved = np.ones(200, dtype=bool)
+    old = make.record("ik", "p", "TRAC-IK", {"seconds": 0.005}, {"solved": solved}, size=200)
+    solved = solved.copy()
+    solved[:lost] = False
+    new = replace(old, arrays={"solved": solved})
+    assert verdicts([old], [new]) == [(verdict, "solved")]
+
+
+def rounds(rng, median, count=40, noise=0.05):
+    """Times of rounds that follow each other and are alike."""
+    steps = rng.normal(size=count)
+    for i in range(1, count):
+        steps[i] = 0.5 * steps[i - 1] + steps[i]
+    return median * np.exp(noise * steps)
+
+
+def two_runs(make, rng, *, rows=12, drift=0.05, factor=1.0):
+    """Two runs of rows and of engines; each row drifts, and the first is slower by a factor."""
+    runs = []
+    for new in (0, 1):
+        solvers = [f"s{i}" for i in range(rows)] + ["Pinocchio"] * 8
+        runs.append([
+            replace(
+                changed(
+                    make.timed(solver, 1.0, work=f"w{i}"),
+                    seconds=rounds(rng, np.exp(drift / 2 * rng.normal())
+                                   * (factor if new and i == 0 else 1.0)),
+                ),
+            )
+            for i, solver in enumerate(solvers)
+        ])  # fmt: skip
+    return runs
+
+
+def false_calls(make, repetitions, rate=lambda chances: intervals.adjusted(chances)):
+    rng, count = np.random.default_rng(5), 0
+    for _ in range(repetitions):
+        rows = compare(*two_runs(make, rng)).rows
+        count += any(row.verdict in (Verdict.FASTER, Verdict.SLOWER) for row in rows)
+    return count
+
+
+def test_of_twenty_runs_beside_their_like_at_most_one_calls_anything(make):
+    assert false_calls(make, 20) <= 1
+
+
+def test_without_one_rate_over_all_rows_and_the_drift_far_more_would_be_called(make, monkeypatch):
+    """The law above can fail: by no adjustment and no drift it does."""
+    monkeypatch.setattr(comparing, "adjusted", np.asarray)
+    monkeypatch.setattr(comparing, "drift", lambda rows: times.known_drift(1e-9, ""))
+    assert false_calls(make, 20) > 10
+
+
+def test_a_slowdown_beyond_the_drift_is_called_and_one_within_is_undecided(make):
+    rng = np.random.default_rng(1)
+    old, new = two_runs(make, rng, drift=0.01, factor=1.2)
+    made = compare(old, new)
+    assert made.rows[0].verdict == Verdict.SLOWER
+    assert made.rows[0].key[2] == "s0"
+    assert made.rows[0].ratio.low < 1.2 < made.rows[0].ratio.high
+    assert stops_at(made.rows, Limits(time=0.1)) == made.rows[:1]
+    assert stops_at(made.rows, Limits(time=0.5)) == []
+    back = compare(new, old).rows
+    assert [row.key[2] for row in back if row.verdict == Verdict.FASTER] == ["s0"]
+    old, new = two_runs(make, rng, drift=0.3, factor=1.2)
+    made = compare(old, new)
+    assert made.drift.value > 0.2
+    assert not {Verdict.SLOWER, Verdict.FASTER} & {row.verdict for row in made.rows}
+
+
+def test_the_pace_beside_records_tells_the_drift_where_no_engine_does(make):
+    record = changed(make.timed("mine", 1.0), seconds=[1.0, 1.01] * 10)
+    calm = [replace(record, conditions={"pace": p}) for p in (1.0, 1.001)]
+    wild = [replace(record, conditions={"pace": p}) for p in (1.0, 1.5)]
+    assert compare(*([r] for r in calm)).drift.value < 0.02
+    assert compare(*([r] for r in wild)).drift.value > np.log(1.5)
+    assert "assumed" in compare([record], [record]).drift.source
+
+
+def test_times_of_two_machines_are_not_compared(make):
+    old = changed(make.timed("mine", 1.0), seconds=[1.0] * 10)
+    stamp = {**old.stamp, "machine": {**old.stamp["machine"], "processor": "abacus"}}
+    new = replace(changed(old, seconds=[9.0] * 10), stamp=stamp)
+    assert verdicts([old], [new])[0] == (Verdict.UNDECIDED, "seconds")
+
+
+def test_pairs_by_lot_call_nothing_by_chance_and_find_a_fifth():
+    """The machine drifts by half in the course of the pairs, and is at times three times slower."""
+    rng, called, found = np.random.default_rng(7), 0, 0
+    rows, count = 15, intervals.pairs_needed(15)
+    for _ in range(20):
+        pace = np.exp(np.linspace(0, 0.4, count))[:, None, None]
+        noise = 0.03 * rng.standard_t(3, size=(count, rows, 2))
+        times = pace * np.exp(noise)
+        times[..., 1][rng.random((count, rows)) < 0.02] *= 3.0
+        order = rng.random((count, rows)) < 0.5
+        times[order] = times[order][:, ::-1]
+        times[:, 0, 1] *= 1.2
+        chances = intervals.adjusted(
+            [intervals.ratio_of_pairs(*times[:, row].T).chance for row in range(rows)]
+        )
+        found += chances[0] <= intervals.ERROR_RATE
+        called += (chances[1:] <= intervals.ERROR_RATE).any()
+    assert called <= 2  # of 20 at 5 %: 1, and as many again by chance
+    assert found >= 15
+
+
+def test_the_interval_of_pairs_is_that_of_the_tables():
+    """Of ten pairs the 95 % interval leaves out the eight least means of two (Wilcoxon's table)."""
+    assert intervals._signed_rank_quantile(10) == 8
+    assert intervals._signed_rank_quantile(5) == -1
+    new = np.exp(np.arange(1.0, 11.0))
+    ratio = intervals.ratio_of_pairs(np.ones(10), new)
+    means = sorted((i + j) / 2 for i in range(1, 11) for j in range(i, 11))
+    assert np.log([ratio.low, ratio.high]) == pytest.approx([means[8], means[-9]])
+    assert ratio.chance == pytest.approx(2 / 2**10)
+
+
+def test_chances_over_all_rows_are_those_of_holm():
+    assert intervals.adjusted([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+    assert intervals.adjusted([]).size == 0
+
+
+LIMITS = {
+    "accuracy": Limits(accuracy=0.0),
+    "accuracy,time:10%": Limits(accuracy=0.0, time=0.1),
+    "time:0.25, gone": Limits(time=0.25, gone=True),
+    "accuracy:1e-9": Limits(accuracy=1e-9),
+    "": Limits(),
+}
+
+
+@pytest.mark.parametrize(("text", "expected"), LIMITS.items())
+def test_limits_are_read(text, expected):
+    assert limits(text) == expected
+
+
+@pytest.mark.parametrize("text", ["speed", "time:fast", "time:-1", "gone:1", "time:nan", "time:"])
+def test_what_is_no_limit_is_refused(text):
+    if text == "time:":
+        assert limits(text) == Limits(time=0.0)
+        return
+    with pytest.raises(ValueError, match="--fail: expected"):
+        limits(text)
+
+
+def test_numbers_of_any_kind_are_compared(make):
+    """Integers beyond those of floating point, infinite times, a pace that is none."""
+    old = make.record("x", "p", "a", arrays={"i": [2**62], "seconds": [1.0] * 9, "b": [True]},
+                      conditions={"pace": "slow"})  # fmt: skip
+    new = changed(old, i=[2**62 + 1], seconds=[np.inf] * 9, b=[False])
+    assert verdicts([old], [new]) == [(Verdict.CHANGED, "i"), (Verdict.UNDECIDED, "seconds")]
+
+
+@pytest.fixture
+def folders(tmp_path, monkeypatch, records, make):
+    """Two folders, the second with a digit off and much else gone."""
+    monkeypatch.chdir(tmp_path)
+    RecordFile("old").append(records)
+    bad = changed(make.drawn("ccd", False, 1.0), residual=[1e-5, 2e-5, 3.0000001e-4])
+    RecordFile("new").append([bad, *records[len(records) // 2 :]])
+    return tmp_path
+
+
+def plumbob(capsys, *arguments):
+    code = cli.run_command(list(arguments))
+    return code, *capsys.readouterr()
+
+
+def test_the_terminal_shows_ten_lines_the_worst_first_and_exits_1(capsys, folders):
+    code, out, err = plumbob(capsys, "compare", "old", "new", "--fail", "accuracy")
+    assert (code, err) == (1, "")
+    lines = out.splitlines()
+    assert len(lines) <= 10
+    assert lines[0] == "STOP: 1 row beyond the limits of --fail"
+    assert "LESS RIGHT arm/circle, ccd, residual (warm false): 0.0003" in lines[2]
+    assert plumbob(capsys, "compare", "old", "new")[0] == 0
+    assert plumbob(capsys, "compare", "old", "old", "--fail", "accuracy,time:0%,gone")[0] == 0
+
+
+def test_markdown_and_json_hold_what_was_found(capsys, folders):
+    files = ["--markdown", "out/comment.md", "--json", "out/rows.json"]
+    assert plumbob(capsys, "compare", "old", "new", *files, "--fail", "accuracy")[0] == 1
+    comment = (folders / "out" / "comment.md").read_text()
+    assert comment.startswith("# plumbob compare: STOP: 1 row")
+    assert "| LESS RIGHT | arm/circle | ccd | warm false | residual |" in comment
+    content = json.loads((folders / "out" / "rows.json").read_text())
+    assert content["stop"] == 1
+    assert [row["verdict"] for row in content["rows"] if row["stops"]] == ["LESS RIGHT"]
+    assert sum(content["counts"].values()) == len(content["rows"])
+    ranks = [ORDER.index(Verdict(row["verdict"])) for row in content["rows"]]
+    assert ranks == sorted(ranks)
+
+
+MISUSE = {
+    "one folder": (["old"], "expected OLD and NEW, or --rerun REV, got 1 folders"),
+    "nothing": ([], "expected OLD and NEW, or --rerun REV, got 0 folders"),
+    "both": (["old", "new", "--rerun", "HEAD"], "expected OLD and NEW, or --rerun REV"),
+    "no records": (["old", "nowhere"], "no records in nowhere"),
+    "limits": (["old", "new", "--fail", "speed"], "--fail: expected accuracy"),
+    "suite": (["--rerun", "HEAD", "--suite", "x"], "unknown suite 'x': expected one of check"),
+    "revision": (["--rerun", "no-such-rev"], "--rerun: expected a revision that git can check"),
+    "option": (["--rerun", "--force"], "--rerun: expected a revision that git can check out"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), MISUSE.values(), ids=MISUSE)
+def test_misuse_of_compare_exits_2_with_one_sentence(capsys, folders, arguments, sentence):
+    code, out, err = plumbob(capsys, "compare", *arguments)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert sentence in err
