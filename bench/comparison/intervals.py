@@ -81,8 +81,8 @@ def ratio_of_pairs(old: Floats, new: Floats) -> Ratio:
     """Return the ratio over pairs measured side by side, the order of each pair drawn by lot.
 
     By that lot old and new may be exchanged if they are alike, whatever the machine does, so
-    Wilcoxon's signed-rank test (1945) is exact. Estimate and interval are those of Hodges & Lehmann
-    (1963): order statistics of the means of all pairs of differences.
+    the signed-rank test (Wilcoxon 1945) is exact. Estimate and interval are order
+    statistics of the means of all pairs of differences (Hodges & Lehmann 1963).
     """
     apart = np.log(new / old)
     means = np.sort([(a + b) / 2 for i, a in enumerate(apart) for b in apart[i:]])

@@ -171,6 +171,14 @@ def swung(solver, cloth="undamped", left=(1.0, 0.5)):
     return record("energy", f"swing/{cloth}", solver, settings, arrays, facts=facts)
 
 
+def judged(family, fault, laws=("positions",)):
+    """What the judge of solvers says of one with a fault, or of an honest one."""
+    facts = {"title": fault or "reference", "family": family, "faulty": bool(fault),
+             "verdict": "WRONG" if fault else "RIGHT", "laws": list(laws)}  # fmt: skip
+    arrays = {"caught": bool(laws), "named": True, "passed": True}
+    return record("self_test", f"{family}/{fault}", "verify", {}, arrays, facts=facts)
+
+
 def certified(solver="newton", settings=None, arrays=None, notes=None):
     """One step of a cloth in mid-swing, its answer covered unless Newton colours them itself."""
     usual = {"h": 1 / 30, "start": "y", "iterations": 100, "tolerance": 1e-10}
@@ -343,6 +351,8 @@ def records():
     arm = [drawn(s, warm, angles[s][warm]) for s in angles for warm in (False, True)]
     return [
         claim(),
+        judged("CCD", "root to tip"),
+        judged("honest solvers", "", ()),
         first_called("solve_ik/chain", "fabrik", 2.0),
         *arm,
         *followed("ccd", cold=1.0, warm=0.5, coherent=0.25),
