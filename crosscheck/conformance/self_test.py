@@ -128,14 +128,14 @@ def _kinematic_faults() -> Iterator[Subject]:
                 yield Subject(fault.key, FAMILIES[kind], task, function, greeting, fault.key)
 
 
-def _textbook(method: str, switched: Switches, **inputs: Any) -> Mapping[str, Any]:
+def _textbook(method: str, switched: Switches, /, **inputs: Any) -> Mapping[str, Any]:
     if not method:
         return predict_forward(switched, Case("", "", inputs, "", _NOTHING))
     local, positions, _ = solve(method, inputs, switched)
     return {"local_rotations": local, "positions": positions}
 
 
-def _followed(method: str, **inputs: Any) -> Mapping[str, Any]:
+def _followed(method: str, /, **inputs: Any) -> Mapping[str, Any]:
     return predict_track(method, switches([]), Case("", "", inputs, "", _NOTHING))
 
 
@@ -224,7 +224,7 @@ def _once(options: Sequence[Option]) -> list[Option]:
     return list({option.key: option for option in reversed(options)}.values())[::-1]
 
 
-def _evaluated(option: Option, **inputs: Any) -> Mapping[str, Any]:
+def _evaluated(option: Option, /, **inputs: Any) -> Mapping[str, Any]:
     p, _ = apply((option,), problem_of(inputs), CONVERGED)
     return {"forces": all_forces(p)}
 
@@ -314,7 +314,7 @@ def _right_steps() -> Iterator[Subject]:
         yield Subject(name, HONEST, task, partial(_stepped, function), greeting)
 
 
-def _stepped(function: Callable[..., Any], **inputs: Any) -> dict[str, Any]:
+def _stepped(function: Callable[..., Any], /, **inputs: Any) -> dict[str, Any]:
     p = problem_of(inputs)
     state = function(system_of(p), state_of(p), p.h)
     return {"positions": state.positions, "velocities": state.velocities}
