@@ -60,7 +60,7 @@ NAMES = {
     "step_from_x_n": "local_global x_n 10 exact 1.0",
     "step_stale_factor": "factor kept",
     "step_laplacian": "matrix L",
-    "step_matrix_sign": "matrix M - h²L",
+    "step_matrix_sign": "matrix M-h²L",
     "step_off_diagonals_doubled": "matrix doubled beside",
     "step_geometric_sign": "geometric term with the wrong sign",
 }
