@@ -172,6 +172,8 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
     if off[worst] <= bound:
         at = line.parameters(points, bound)
         found += [_order(at, line, bound), _gaps(points, at, case, bound)]
+        if case.inputs["closed"] and len(points) > 1:
+            found.append(_closing(points, at, line, bound))
     return found
 
 
@@ -233,6 +235,20 @@ def _gaps(points: FloatArray, at: FloatArray, case: Case, bound: float) -> Findi
         verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else Verdict.WRONG
         return laws.bounded("spacing", error, UNEVEN, "", told, verdict=verdict)
     return _widest(kinds, case, bound)
+
+
+def _closing(points: FloatArray, at: FloatArray, line: Line, bound: float) -> Finding:
+    """Return whether the gap that closes the curve is no wider than the others."""
+    back = float(np.linalg.norm(points[-1] - points[0])) > bound
+    gap = line.length - float(at[-1]) if back else 0.0
+    widest = float(np.diff(at).max()) * (1.0 + UNEVEN)
+    told = sentence(
+        "The side that closes the curve is left out: from the last point to the start it is "
+        "{gap:.3g} m, between others at most {widest:.3g} m.",
+        gap=gap,
+        widest=widest,
+    )
+    return laws.bounded("closing side", gap, widest + 2.0 * bound, "m", told)
 
 
 def _spread(gaps: FloatArray) -> float:
