@@ -20,8 +20,8 @@ from .problem import Problem
 from .rounding import SOLVED, Rounding, apart, rounding
 
 MOST_FAULTS = 3
-# Seconds of the processor after which no further faults are combined; what was begun is finished.
-PATIENCE = 8.0
+# Seconds of the processor for honest choices, one fault, two, and three.
+PATIENCE = (6.0, 6.0, 3.0, 3.0)
 # Integrators with more iterations are not combined with faults.
 MOST_ITERATIONS = 10
 # Matrices that are singular without pins, where they predict nothing.
@@ -85,18 +85,17 @@ class Search:
         self._known: dict[tuple[Any, ...], bool | None] = {}
         self.farthest = -1
         self._seen: set[tuple[str, ...]] = set()
-        self._until = time.process_time() + PATIENCE
+        self._until = 0.0
 
     def run(self) -> list[Found]:
         """Return what explains all probes with the fewest faults; none if nothing does."""
         if not self.probes:
             return []
         for budget in range(MOST_FAULTS + 1):
+            self._until = time.process_time() + PATIENCE[budget]
             found = [one for one in self._extend({}, 0, budget) if len(one.faults) == budget]
             if found:
                 return found
-            if time.process_time() > self._until:
-                break
         return []
 
     def _extend(self, chosen: Chosen, index: int, budget: int) -> Iterator[Found]:
@@ -114,7 +113,7 @@ class Search:
         for more in self._choices(chosen, new, budget, springs):
             if self._told(more):
                 continue
-            if time.process_time() > self._until and budget > 0:
+            if time.process_time() > self._until:
                 return
             explained = self._explains(more, index)
             if explained:
