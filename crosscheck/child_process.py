@@ -203,3 +203,9 @@ def perform_calls(descriptor: int) -> None:
         except EOFError:
             return
         connection.send(function(*arguments))
+
+
+def one_thread() -> dict[str, str]:
+    """Return an environment in which the linear algebra of NumPy and SciPy keeps to one core."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    return {**os.environ, **dict.fromkeys(names, "1")}

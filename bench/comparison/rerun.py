@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..harness.isolation import one_thread
+from crosscheck.child_process import one_thread
+
 from ..harness.record import Record, decode
 from . import revision_process
 from .compare import Comparison, decide

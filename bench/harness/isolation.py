@@ -2,12 +2,11 @@
 
 import atexit
 import contextlib
-import os
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from crosscheck.child_process import PipedProcess
+from crosscheck.child_process import PipedProcess, one_thread
 
 from .progress import Progress, announce
 from .worker import LAST, Begun, Calculation, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
@@ -160,9 +159,3 @@ def raised(solved: list[Solved]) -> str:
         return ""
     what, times = counts.most_common(1)[0]
     return f"{what}, on {times} of {len(solved)} targets"
-
-
-def one_thread() -> dict[str, str]:
-    """Return an environment in which the linear algebra of NumPy and SciPy keeps to one core."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    return {**os.environ, **dict.fromkeys(names, "1")}

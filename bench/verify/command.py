@@ -1,11 +1,14 @@
 """The command `plumbob verify`."""
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
+
+from crosscheck.child_process import one_thread
 
 if TYPE_CHECKING:
     from .words import Say
@@ -86,6 +89,10 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 
     Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 for a wrong command.
     """
+    # Solver and reference are timed beside each other on one thread, and the dense systems of the
+    # search are too small for more; NumPy reads this when it is imported.
+    os.environ |= {**one_thread(), **os.environ}
+
     from crosscheck.conformance.contestant import NoGreetingError
     from crosscheck.conformance.language import language_of
     from crosscheck.conformance.sentence import sentence
