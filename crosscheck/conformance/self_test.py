@@ -163,7 +163,7 @@ def _declared(model: Model, method: Method, iterations: int | None = None) -> St
 DECLARED: dict[str, tuple[Model, Step]] = {
     "linearised": (LINEARISED, _declared(LINEARISED, "linearised", 1)),
     "converged": (CONVERGED, _declared(CONVERGED, "converged")),
-    "local_global": (LOCAL_GLOBAL, _declared(LOCAL_GLOBAL, "local_global", 10)),
+    "local/global": (LOCAL_GLOBAL, _declared(LOCAL_GLOBAL, "local_global", 10)),
     "symplectic": (SYMPLECTIC, _declared(SYMPLECTIC, "symplectic")),
 }
 # A fault that a request for forces does not let one have: it marks no tension-only springs.
@@ -174,7 +174,7 @@ _BASES = {
     "pins free until the end": "symplectic",
     "velocity over the whole h": "symplectic",
     "moved in place": "symplectic",
-    "pins at the origin": "local_global",
+    "pins at the origin": "local/global",
 }
 
 
