@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand
 
-from crosscheck.child_process import one_thread
-
 if TYPE_CHECKING:
     from .words import Say
 
@@ -89,6 +87,8 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 
     Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 for a wrong command.
     """
+    from crosscheck.child_process import one_thread
+
     # Solver and reference are timed beside each other on one thread, and the dense systems of the
     # search are too small for more; NumPy reads this when it is imported.
     os.environ |= {**one_thread(), **os.environ}
