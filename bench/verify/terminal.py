@@ -43,9 +43,11 @@ def lines(report: Report, context: Presentation) -> list[str]:
     for remark in report.remarks:
         shown += wrapped(say(remark), WIDTH)
     end = wrapped(say(advice(report.tasks)), WIDTH)
-    for task in report.tasks:
-        if task.verdict in GOOD and (words := list(_reservations(task))):
-            shown += _reserved(task, words, say)
+    reserved = [(task, list(_reservations(task))) for task in report.tasks if task.verdict in GOOD]
+    reserved = [(task, words) for task, words in reserved if words]
+    free = 0 if bad else HEIGHT - len(shown) - len(end) - 1
+    for task, words in reserved:
+        shown += _reserved(task, words, say, max(_COMPLAINT, free // len(reserved)))
     others = [line for task in bad[1:] for line in _brief(task, say)]
     if bad:
         room = HEIGHT - len(shown) - len(end) - len(others) - 2
@@ -90,9 +92,9 @@ def _reservations(task: TaskReport) -> list[Sentence]:
     return [*found, *explanations(task)]
 
 
-def _reserved(task: TaskReport, words: Sequence[Sentence], say: Say) -> list[str]:
+def _reserved(task: TaskReport, words: Sequence[Sentence], say: Say, most: int) -> list[str]:
     told = f"{title(task)}: " + " ".join(dict.fromkeys(map(say, words)))
-    return _cut(wrapped(told, WIDTH, "  "), 3)
+    return _cut(wrapped(told, WIDTH, "  "), most)
 
 
 def _brief(task: TaskReport, say: Say) -> list[str]:
