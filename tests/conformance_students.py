@@ -143,9 +143,9 @@ def _dead(options):
 
 
 def towards(a, b):
-    way = b - a
-    length = np.linalg.norm(way)
-    return way / length if length > 0 else np.zeros_like(way)
+    direction = b - a
+    length = np.linalg.norm(direction)
+    return direction / length if length > 0 else np.zeros_like(direction)
 
 
 def in_single(function, **options):

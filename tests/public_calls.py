@@ -322,7 +322,7 @@ def _solves():
     model, balls = robot(), tree()
     local, q = rotation.random(RNG(), 6), model.random(RNG())
     points = RNG().uniform(-0.5, 0.5, (4, 3))
-    turns = rotation.random(RNG(), 4)
+    rotations = rotation.random(RNG(), 4)
     numbers = {"tolerance": 1e-4, "tolerance_rotation": 1e-4, "max_iterations": 4}
     settings = {"solver": "ccd", "effector": "f", **numbers}
     drawn = {"restarts": 1, "seed": 3, "record": True}
@@ -330,19 +330,19 @@ def _solves():
     j = "reference.judging.pose.judge_pose"
 
     def posed(position, rotation, effector, weight):
-        goal = Target(position, rotation, effector, weight), Target([0.1, 0.2, 0.3], None, "c")
-        return reference.solve_ik(model, q, goal, "levenberg_marquardt", max_iterations=4)
+        target = Target(position, rotation, effector, weight), Target([0.1, 0.2, 0.3], None, "c")
+        return reference.solve_ik(model, q, target, "levenberg_marquardt", max_iterations=4)
 
     def one_pose(position, rotation, effector, weight):
-        goal = Target(position, rotation, effector, weight)
-        return reference.solve_ik(model, q, goal, "levenberg_marquardt", max_iterations=4)
+        target = Target(position, rotation, effector, weight)
+        return reference.solve_ik(model, q, target, "levenberg_marquardt", max_iterations=4)
 
     def follow(position, rotation, weight):
-        goal = Target(position, rotation, "f", weight)
-        return reference.track(model, [goal], "levenberg_marquardt", q, max_iterations=4)
+        target = Target(position, rotation, "f", weight)
+        return reference.track(model, [target], "levenberg_marquardt", q, max_iterations=4)
 
-    goal = {"position": points[0], "rotation": turns[0], "effector": "f", "weight": 2.0}
-    goals = {"position": points, "rotation": turns, "weight": 2.0}
+    target = {"position": points[0], "rotation": rotations[0], "effector": "f", "weight": 2.0}
+    targets = {"position": points, "rotation": rotations, "weight": 2.0}
     table = {
         i: Call(reference.solve_ik,
                 {"skeleton": balls, "local_rotations": local, "target": points[0], **settings,
@@ -356,13 +356,13 @@ def _solves():
                             {"skeleton": model, "local_rotations": q, "target": points, **settings,
                              **drawn},
                             free="local_rotations target", names="q effector"),
-        i + ", poses": Call(posed, goal, free="position rotation", names="target"),
-        i + ", pose": Call(one_pose, goal, free="position rotation", names="target"),
+        i + ", poses": Call(posed, target, free="position rotation", names="target"),
+        i + ", pose": Call(one_pose, target, free="position rotation", names="target"),
         t: Call(reference.track,
                 {"skeleton": balls, "curve": points, "start": local, **settings, "warm": True,
                  "coherent": True, "closed": True, "record": True},
                 free="curve", names="q effector"),
-        t + ", poses": Call(follow, goals, free="position rotation",
+        t + ", poses": Call(follow, targets, free="position rotation",
                             names="target curve"),
     }  # fmt: skip
     place = reference.forward_kinematics(balls, local).positions

@@ -71,7 +71,7 @@ def a_pose(seed, i, method):
 
 
 def own_rotation(parents, offsets, local_rotations):
-    """Forward kinematics in which a joint's own rotation turns its own offset."""
+    """Forward kinematics in which a joint's own rotation rotates its own offset."""
     pose = forward_kinematics(Skeleton(parents, offsets), local_rotations)
     positions = pose.positions.copy()
     for j, parent in enumerate(parents):

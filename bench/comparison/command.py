@@ -14,31 +14,40 @@ if TYPE_CHECKING:
 SUCCESS, STOPPED = 0, 1
 
 
+_File = Path | None
+_Words = list[str] | None
+Folders = Annotated[
+    list[Path] | None, typer.Argument(metavar="[OLD NEW]", help="Two folders with records.")
+]
+Fail = Annotated[
+    str, typer.Option(metavar="LIMITS", help="Exit 1 beyond these: accuracy,time:10%,gone.")
+]
+Rerun = Annotated[
+    str, typer.Option(metavar="REV", help="Measure this revision and ours side by side.")
+]
+Suites = Annotated[_Words, typer.Option("--suite", help="With --rerun: only these suites.")]
+Only = Annotated[
+    _Words,
+    typer.Option(metavar="TEXT", help="With --rerun: problems or solvers that contain it."),
+]
+Pairs = Annotated[
+    int, typer.Option(min=0, help="With --rerun: pairs of each; 0 for as many as rows need.")
+]
+Markdown = Annotated[
+    _File, typer.Option(metavar="FILE", help="Write a comment for a pull request.")
+]
+Json = Annotated[_File, typer.Option(metavar="FILE", help="Write every row.")]
+
+
 def compare(
-    folders: Annotated[
-        list[Path] | None, typer.Argument(metavar="[OLD NEW]", help="Two folders with records.")
-    ] = None,
-    fail: Annotated[
-        str,
-        typer.Option(metavar="LIMITS", help="Exit 1 beyond these: accuracy,time:10%,gone."),
-    ] = "",
-    rerun: Annotated[
-        str, typer.Option(metavar="REV", help="Measure this revision and ours side by side.")
-    ] = "",
-    suites: Annotated[
-        list[str] | None, typer.Option("--suite", help="With --rerun: only these suites.")
-    ] = None,
-    only: Annotated[
-        list[str] | None,
-        typer.Option(metavar="TEXT", help="With --rerun: problems or solvers that contain it."),
-    ] = None,
-    pairs: Annotated[
-        int, typer.Option(min=0, help="With --rerun: pairs of each; 0 for as many as rows need.")
-    ] = 0,
-    markdown: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write a comment for a pull request.")
-    ] = None,
-    json: Annotated[Path | None, typer.Option(metavar="FILE", help="Write every row.")] = None,
+    folders: Folders = None,
+    fail: Fail = "",
+    rerun: Rerun = "",
+    suites: Suites = None,
+    only: Only = None,
+    pairs: Pairs = 0,
+    markdown: Markdown = None,
+    json: Json = None,
 ) -> int:
     """Say what got faster, slower, more or less right between two runs or revisions.
 

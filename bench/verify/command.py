@@ -9,6 +9,10 @@ import typer
 from typer.core import TyperCommand
 
 if TYPE_CHECKING:
+    from crosscheck.conformance.doors import Limits
+
+    from .files import Files
+    from .question import Question
     from .words import Say
 
 RIGHT, WRONG = 0, 1
@@ -37,77 +41,76 @@ class SolverCommand(TyperCommand):
         return super().parse_args(ctx, args)
 
 
+_File = Path | None
+Solver = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="SOLVER", help="my_ik.py, module:object, or -- and a program."),
+]
+Task = Annotated[list[str] | None, typer.Option(metavar="NAME", help="Only this task; repeatable.")]
+Names = Annotated[bool, typer.Option("--list", help="List the tasks and stop.")]
+Template = Annotated[
+    str | None,
+    typer.Option(metavar="LANGUAGE", help="Write a starter: cpp, rust, javascript, ..."),
+]
+Export = Annotated[
+    _File,
+    typer.Option("--export-cases", metavar="DIR", help="Write cases, to be answered by files."),
+]
+Answers = Annotated[_File, typer.Option(metavar="DIR", help="Judge the answers in such a folder.")]
+Rerun = Annotated[_File, typer.Option(metavar="FILE", help="Ask a saved failing case again.")]
+Thorough = Annotated[bool, typer.Option("--thorough", help="Ask the long list.")]
+Seed = Annotated[int, typer.Option(min=0, help="Of the random cases.")]
+TimeLimit = Annotated[float | None, typer.Option(metavar="SECONDS", help="For one request.")]
+MemoryLimit = Annotated[int | None, typer.Option(metavar="MIB", min=1, help="For the solver.")]
+Json = Annotated[_File, typer.Option(metavar="FILE", help="Write JSON.")]
+Junit = Annotated[_File, typer.Option(metavar="FILE", help="Write JUnit XML.")]
+Html = Annotated[_File, typer.Option(metavar="FILE", help="Write a page.")]
+Output = Annotated[
+    _File, typer.Option("--output", "-o", metavar="DIR", help="Write all three, and failing cases.")
+]
+Lang = Annotated[
+    str | None, typer.Option(metavar="LANG", help="en or zh; else as the locale says.")
+]
+SelfTest = Annotated[
+    bool, typer.Option("--self-test", help="Show that every known fault is found.")
+]
+
+
 def verify(  # noqa: PLR0913 -- one parameter an option
     context: typer.Context,
-    solver: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="SOLVER", help="my_ik.py, module:object, or -- and a program."),
-    ] = None,
-    task: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Only this task; repeatable.")
-    ] = None,
-    names: Annotated[bool, typer.Option("--list", help="List the tasks and stop.")] = False,
-    template: Annotated[
-        str | None,
-        typer.Option(metavar="LANGUAGE", help="Write a starter: cpp, rust, javascript, ..."),
-    ] = None,
-    export: Annotated[
-        Path | None,
-        typer.Option("--export-cases", metavar="DIR", help="Write cases, to be answered by files."),
-    ] = None,
-    answers: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Judge the answers in such a folder.")
-    ] = None,
-    rerun: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Ask a saved failing case again.")
-    ] = None,
-    thorough: Annotated[bool, typer.Option("--thorough", help="Ask the long list.")] = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of the random cases.")] = 0,
-    time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="For one request.")
-    ] = None,
-    memory_limit: Annotated[
-        int | None, typer.Option(metavar="MIB", min=1, help="For the solver.")
-    ] = None,
-    json: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JSON.")] = None,
-    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
-    html: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a page.")] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="DIR", help="Write all three, and failing cases."),
-    ] = None,
-    lang: Annotated[
-        str | None, typer.Option(metavar="LANG", help="en or zh; else as the locale says.")
-    ] = None,
-    self_test: Annotated[
-        bool, typer.Option("--self-test", help="Show that every known fault is found.")
-    ] = False,
+    solver: Solver = None,
+    task: Task = None,
+    names: Names = False,
+    template: Template = None,
+    export: Export = None,
+    answers: Answers = None,
+    rerun: Rerun = None,
+    thorough: Thorough = False,
+    seed: Seed = 0,
+    time_limit: TimeLimit = None,
+    memory_limit: MemoryLimit = None,
+    json: Json = None,
+    junit: Junit = None,
+    html: Html = None,
+    output: Output = None,
+    lang: Lang = None,
+    self_test: SelfTest = False,
 ) -> int:
     """Judge your solver: is it right, how far off is it, and which mistake is it?
 
     Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 for a wrong command.
     """
-    from crosscheck.child_process import one_thread
-
-    # Solver and reference are timed beside each other on one thread, and the dense systems of the
-    # search are too small for more; NumPy reads this when it is imported.
-    os.environ |= {**one_thread(), **os.environ}
-
-    from crosscheck.conformance.contestant import NoGreetingError
+    _keep_to_one_thread()
     from crosscheck.conformance.language import language_of
-    from crosscheck.conformance.sentence import sentence
 
     from . import starter, tasks
     from .files import Files
-    from .question import Question, ask, suited
-    from .solver import ANSWERS, exported, limits, opened
-    from .words import Presentation, speaker
+    from .question import Question
+    from .solver import ANSWERS, exported, limits
+    from .words import speaker
 
     language = lang or language_of()
     say = speaker(language)
-    words = [*(solver or ()), *context.meta.get(_PROGRAM, ())]
-    if answers:
-        words = [ANSWERS, str(answers), *words]
     if names:
         return _print(tasks.described(task or (), say))
     if template:
@@ -116,12 +119,39 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         return _print(exported(export, task or (), seed, thorough, say))
     if self_test:
         return _self_test(say)
-    if time_limit is not None and not 0.0 < time_limit < float("inf"):
-        raise ValueError(f"time-limit: expected seconds above 0, got {time_limit}")
+    folder = [ANSWERS, str(answers)] if answers else []
+    words = [*folder, *(solver or ()), *context.meta.get(_PROGRAM, ())]
+    question = Question(tuple(task or ()), rerun, thorough, seed)
     files = Files(json, junit, html, output)
+    return _judge(words, limits(time_limit, memory_limit), question, files, language)
+
+
+def _keep_to_one_thread() -> None:
+    """Let NumPy, not yet imported, keep to one thread.
+
+    Solver and reference are timed beside each other on one thread each, and the dense systems of
+    the search are too small for more.
+    """
+    from crosscheck.child_process import one_thread
+
+    os.environ |= {**one_thread(), **os.environ}
+
+
+def _judge(
+    words: list[str], limits: "Limits", question: "Question", files: "Files", language: str
+) -> int:
+    """Ask a solver, print the verdict, and write the files that are wanted."""
+    from crosscheck.conformance.contestant import NoGreetingError
+    from crosscheck.conformance.sentence import sentence
+
+    from .question import ask, suited
+    from .solver import opened
+    from .words import Presentation, speaker
+
+    say = speaker(language)
     files.check()
-    contestant = opened(words, limits(time_limit, memory_limit), say)
-    question = suited(Question(tuple(task or ()), rerun, thorough, seed), contestant)
+    contestant = opened(words, limits, say)
+    question = suited(question, contestant)
     try:
         report = ask(contestant, question)
     except NoGreetingError as error:

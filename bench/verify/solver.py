@@ -18,8 +18,14 @@ PROGRAM, ANSWERS = "--", "--answers"
 
 
 def limits(seconds: float | None, mebibytes: int | None) -> Limits:
-    """Return the limits of a program; the first request of a task may take longer, to compile."""
+    """Return the limits of a program; the first request of a task may take longer, to compile.
+
+    Raises:
+        ValueError: if the time is none.
+    """
     chosen = LIMITS
+    if seconds is not None and not 0.0 < seconds < float("inf"):
+        raise ValueError(f"time-limit: expected seconds above 0, got {seconds}")
     if seconds is not None:
         chosen = chosen._replace(request=seconds, first=max(seconds, chosen.first))
     if mebibytes is not None:

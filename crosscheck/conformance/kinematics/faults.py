@@ -215,14 +215,14 @@ _CCD = (
         ),
     ),
     Fault(
-        "conjugated the wrong way", "ccd", "applied", 3,
+        "conjugated in reverse", "ccd", "applied", 3,
         sentence(
             "Your CCD takes the world rotation d into the wrong frame, R_parent d conj(R_parent). "
             "The inverse stands on the left: Q := conj(R_parent) d R_parent Q."
         ),
     ),
     Fault(
-        "conjugated by the joint, wrong way", "ccd", "applied", 5,
+        "conjugated by the joint, in reverse", "ccd", "applied", 5,
         sentence(
             "Your CCD applies R d conj(R) with the joint's own rotation R. A world rotation d "
             "comes into the parent's frame: Q := conj(R_parent) d R_parent Q."

@@ -12,7 +12,7 @@ from reference.arguments import FloatArray, IndexArray
 from ..case import Case
 from ..explain import Variant
 from .faults import Switches, combinations, switches
-from .textbook import Damping, ccd_all, fabrik_all, place_all
+from .textbook import Chain, Damping, Ending, Pose, ccd_all, fabrik_all, place_all
 
 UNDAMPED = Damping()
 RIGHT = Switches()
@@ -31,9 +31,14 @@ def forward(
 ) -> tuple[FloatArray, FloatArray]:
     """Return positions and global rotations of all joints."""
     local = _read(inputs["local_rotations"], switched) if local is None else local
-    positions, rotations = np.empty((len(local), 3)), np.empty((len(local), 4))
-    place_all(inputs["parents"], inputs["offsets"], local, switched.forward, positions, rotations)
-    return positions, rotations
+    pose = _unplaced(local)
+    chain = Chain(inputs["parents"], inputs["offsets"], np.zeros(0, dtype=np.int64))
+    place_all(chain, switched.forward, pose)
+    return pose.positions, pose.rotations
+
+
+def _unplaced(local: FloatArray) -> Pose:
+    return Pose(local, np.empty((len(local), 3)), np.empty((len(local), 4)))
 
 
 def solve(
@@ -43,23 +48,18 @@ def solve(
     damping: Damping = UNDAMPED,
 ) -> tuple[FloatArray, FloatArray, int]:
     """Return local rotations, positions as the solver has them, and the number of sweeps."""
-    local = np.array(_read(inputs["local_rotations"], switched))
-    positions, rotations = np.empty((len(local), 3)), np.empty((len(local), 4))
+    parents = inputs["parents"]
+    pose = _unplaced(np.array(_read(inputs["local_rotations"], switched)))
     last = switched.ccd.effector == 1 or switched.fabrik.effector == 1
-    model = (
-        inputs["parents"],
-        inputs["offsets"],
-        path_to(inputs["parents"], len(local) - 1 if last else inputs["effector"]),
-        tuple(inputs["target"].tolist()),
-        float(inputs["tolerance"]),
-        int(inputs["max_iterations"]),
-        switched.forward,
-    )
+    path = path_to(parents, len(parents) - 1 if last else inputs["effector"])
+    chain = Chain(parents, inputs["offsets"], path)
+    target = tuple(inputs["target"].tolist())
+    ending = Ending(float(inputs["tolerance"]), int(inputs["max_iterations"]), switched.stop)
     if method == "ccd":
-        made = ccd_all(*model, switched.ccd, switched.stop, damping, local, positions, rotations)
+        made = ccd_all(chain, target, ending, switched.forward, switched.ccd, damping, pose)
     else:
-        made = fabrik_all(*model, switched.fabrik, switched.stop, local, positions, rotations)
-    return _written(local, switched), positions, made
+        made = fabrik_all(chain, target, ending, switched.forward, switched.fabrik, pose)
+    return _written(pose.local, switched), pose.positions, made
 
 
 def _read(local: FloatArray, switched: Switches) -> FloatArray:

@@ -2,7 +2,7 @@
 
 The targets of whole solves are such that both textbook solvers reach them with iterations to
 spare, so that an honest solver does; those of single sweeps such that no rotation of the sweep is
-close to 0 or pi, where honest ways to compute it part.
+close to 0 or pi, where honest computations of it differ.
 """
 
 from collections.abc import Callable, Mapping

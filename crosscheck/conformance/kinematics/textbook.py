@@ -122,31 +122,46 @@ class Stop(NamedTuple):
     budget: int = 0
 
 
-def place(
-    parents: IndexArray,
-    offsets: FloatArray,
-    local: FloatArray,
-    faults: Forward,
-    positions: FloatArray,
-    rotations: FloatArray,
-) -> None:
+class Chain(NamedTuple):
+    """A skeleton, and the joints from its root to the effector, both included."""
+
+    parents: IndexArray
+    offsets: FloatArray
+    path: IndexArray
+
+
+class Pose(NamedTuple):
+    """Local rotations, and the global positions and rotations of all joints."""
+
+    local: FloatArray
+    positions: FloatArray
+    rotations: FloatArray
+
+
+class Ending(NamedTuple):
+    """When a solve ends: at a distance [m], after so many sweeps, with the faults of `stop`."""
+
+    tolerance: float
+    sweeps: int
+    stop: Stop
+
+
+def place(chain: Chain, faults: Forward, pose: Pose) -> None:
     """Fill positions and global rotations of all joints."""
-    for j in range(len(parents)):
-        Q, offset = load_quaternion(local, j), load_vector(offsets, j)
-        p = j - 1 if faults.parent == 1 else parents[j]
+    for j in range(len(chain.parents)):
+        Q, offset = load_quaternion(pose.local, j), load_vector(chain.offsets, j)
+        p = j - 1 if faults.parent == 1 else chain.parents[j]
         if p < 0:
             if faults.product == 2:
                 Q = conjugate(Q)
             R = IDENTITY if faults.root == 2 else Q
             x = ORIGIN if faults.root == 1 else rotate(R, offset) if faults.root == 3 else offset
         else:
-            R = global_rotation(load_quaternion(rotations, p), Q, faults.product)
-            x = add(
-                base_of(parents, offsets, positions, p, faults.base),
-                rotate(frame_of_offset(parents, local, rotations, p, R, Q, faults.frame), offset),
-            )
-        store_vector(positions, j, x)
-        store_quaternion(rotations, j, R)
+            R = global_rotation(load_quaternion(pose.rotations, p), Q, faults.product)
+            frame = frame_of_offset(chain, pose, p, R, Q, faults.frame)
+            x = add(base_of(chain, pose, p, faults.base), rotate(frame, offset))
+        store_vector(pose.positions, j, x)
+        store_quaternion(pose.rotations, j, R)
 
 
 def global_rotation(R_parent: Any, Q: Any, fault: int) -> Any:
@@ -162,95 +177,64 @@ def global_rotation(R_parent: Any, Q: Any, fault: int) -> Any:
     return multiply(R_parent, Q)
 
 
-def frame_of_offset(
-    parents: IndexArray,
-    local: FloatArray,
-    rotations: FloatArray,
-    p: int,
-    R: Any,
-    Q: Any,
-    fault: int,
-) -> Any:
+def frame_of_offset(chain: Chain, pose: Pose, p: int, R: Any, Q: Any, fault: int) -> Any:
     """Return what rotates an offset into the world."""
+    grandparent = chain.parents[p]
     if fault == 1:
         return IDENTITY
     if fault == 2:
         return R
     if fault == 3:
-        return conjugate(load_quaternion(rotations, p))
+        return conjugate(load_quaternion(pose.rotations, p))
     if fault == 4:
-        return load_quaternion(rotations, parents[p]) if parents[p] >= 0 else IDENTITY
+        return load_quaternion(pose.rotations, grandparent) if grandparent >= 0 else IDENTITY
     if fault == 5:
-        return load_quaternion(local, p)
+        return load_quaternion(pose.local, p)
     if fault == 6:
         return Q
-    return load_quaternion(rotations, p)
+    return load_quaternion(pose.rotations, p)
 
 
-def base_of(
-    parents: IndexArray, offsets: FloatArray, positions: FloatArray, p: int, fault: int
-) -> Any:
+def base_of(chain: Chain, pose: Pose, p: int, fault: int) -> Any:
     """Return what a rotated offset is added to."""
     if fault == 1:
-        x = load_vector(offsets, p)
-        while parents[p] >= 0:
-            p = parents[p]
-            x = add(x, load_vector(offsets, p))
+        x = load_vector(chain.offsets, p)
+        while chain.parents[p] >= 0:
+            p = chain.parents[p]
+            x = add(x, load_vector(chain.offsets, p))
         return x
-    if fault == 2:
-        return load_vector(positions, 0)
-    return load_vector(positions, p)
+    return load_vector(pose.positions, 0 if fault == 2 else p)
+
+
+def begin(chain: Chain, forward: Forward, from_rest: bool, pose: Pose) -> None:
+    """Place all joints at the start, or at rest."""
+    if from_rest:
+        for j in range(len(chain.parents)):
+            store_quaternion(pose.local, j, IDENTITY)
+    place(chain, forward, pose)
 
 
 def solve_ccd(
-    parents: IndexArray,
-    offsets: FloatArray,
-    path: IndexArray,
-    target: Any,
-    tolerance: float,
-    sweeps: int,
-    forward: Forward,
-    ccd: Ccd,
-    stop: Stop,
-    damping: Damping,
-    local: FloatArray,
-    positions: FloatArray,
-    rotations: FloatArray,
-) -> int:
-    """Sweep until the end of the solve; `local` is the start and becomes the result.
+    chain: Chain, target: Any, ending: Ending, forward: Forward, ccd: Ccd, damping: Damping,
+    pose: Pose,
+) -> int:  # fmt: skip
+    """Sweep until the end of the solve; `pose.local` is the start and becomes the result.
 
     Returns the number of sweeps made.
     """
-    if ccd.start == 1:
-        for j in range(len(parents)):
-            store_quaternion(local, j, IDENTITY)
-    place(parents, offsets, local, forward, positions, rotations)
-    end, links = path[-1], len(path) - 1
+    begin(chain, forward, ccd.start == 1, pose)
+    links, stop = len(chain.path) - 1, ending.stop
     before, i = math.inf, 0
-    while i < allowed(sweeps, stop.budget):
-        distance = norm(subtract(load_vector(positions, end), target))
-        if is_reached(distance, before, tolerance, i, stop.test):
+    while i < allowed(ending.sweeps, stop.budget):
+        distance = norm(subtract(load_vector(pose.positions, chain.path[-1]), target))
+        if is_reached(distance, before, ending.tolerance, i, stop.test):
             break
         before = distance
         if stop.budget == 3:
             k = links - 1 - i % links
-            rotate_joint(
-                parents,
-                offsets,
-                path,
-                k,
-                target,
-                forward,
-                ccd,
-                damping,
-                local,
-                positions,
-                rotations,
-            )
+            rotate_joint(chain, k, target, forward, ccd, damping, pose)
         else:
-            sweep_ccd(
-                parents, offsets, path, target, forward, ccd, damping, local, positions, rotations
-            )
+            sweep_ccd(chain, target, forward, ccd, damping, pose)
         i += 1
     return i
 
@@ -278,57 +262,37 @@ def is_reached(distance: float, before: float, tolerance: float, made: int, faul
 
 
 def sweep_ccd(
-    parents: IndexArray,
-    offsets: FloatArray,
-    path: IndexArray,
-    target: Any,
-    forward: Forward,
-    ccd: Ccd,
-    damping: Damping,
-    local: FloatArray,
-    positions: FloatArray,
-    rotations: FloatArray,
+    chain: Chain, target: Any, forward: Forward, ccd: Ccd, damping: Damping, pose: Pose
 ) -> None:
     """Rotate each joint from the effector's parent to the root."""
-    links = len(path) - 1
+    links = len(chain.path) - 1
     for i in range(links):
         k = i if ccd.order == 1 else links - 1 - i
         if (ccd.joints == 1 and k == 0) or (ccd.joints == 2 and k == links - 1):
             continue
-        rotate_joint(
-            parents, offsets, path, k, target, forward, ccd, damping, local, positions, rotations
-        )
-    place(parents, offsets, local, forward, positions, rotations)
+        rotate_joint(chain, k, target, forward, ccd, damping, pose)
+    place(chain, forward, pose)
 
 
 def rotate_joint(
-    parents: IndexArray,
-    offsets: FloatArray,
-    path: IndexArray,
-    k: int,
-    target: Any,
-    forward: Forward,
-    ccd: Ccd,
-    damping: Damping,
-    local: FloatArray,
-    positions: FloatArray,
-    rotations: FloatArray,
+    chain: Chain, k: int, target: Any, forward: Forward, ccd: Ccd, damping: Damping, pose: Pose
 ) -> None:
     """Rotate joint k of the path so that the effector comes nearest to the target."""
-    joint, effector = load_vector(positions, path[k]), load_vector(positions, path[-1])
+    joint = load_vector(pose.positions, chain.path[k])
+    effector = load_vector(pose.positions, chain.path[-1])
     arm, direction = subtract(effector, joint), subtract(target, joint)
     if ccd.aim == 1:
         direction = target
     elif ccd.aim == 2:
         arm = effector
     elif ccd.aim == 3:
-        direction = add(direction, load_vector(positions, 0))
+        direction = add(direction, load_vector(pose.positions, 0))
     elif ccd.aim == 4:
         direction = subtract(target, effector)
     d = damped(between(arm, direction), ccd.angle, damping)
-    apply_rotation(parents, path, k, d, ccd.applied, local, rotations)
+    apply_rotation(chain, k, d, ccd.applied, pose)
     if ccd.update == 0:
-        place(parents, offsets, local, forward, positions, rotations)
+        place(chain, forward, pose)
 
 
 def damped(d: Any, fault: int, damping: Damping) -> Any:
@@ -347,23 +311,16 @@ def damped(d: Any, fault: int, damping: Damping) -> Any:
     return rotation_about(scale(1.0 / angle, v), min(factor * angle, damping.most))
 
 
-def apply_rotation(
-    parents: IndexArray,
-    path: IndexArray,
-    k: int,
-    d: Any,
-    fault: int,
-    local: FloatArray,
-    rotations: FloatArray,
-) -> None:
+def apply_rotation(chain: Chain, k: int, d: Any, fault: int, pose: Pose) -> None:
     """Give a joint the world rotation d."""
-    j = path[k]
-    R, Q = load_quaternion(rotations, j), load_quaternion(local, j)
-    R_parent = load_quaternion(rotations, parents[j]) if parents[j] >= 0 else IDENTITY
+    j = chain.path[k]
+    p = chain.parents[j]
+    R = load_quaternion(pose.rotations, j)
+    R_parent = load_quaternion(pose.rotations, p) if p >= 0 else IDENTITY
     if fault >= 10:
-        j = path[k + 1]
-        Q = load_quaternion(local, j)
-    store_quaternion(local, j, renormalised(rotated(R_parent, R, d, Q, fault)))
+        j = chain.path[k + 1]
+    Q = load_quaternion(pose.local, j)
+    store_quaternion(pose.local, j, renormalised(rotated(R_parent, R, d, Q, fault)))
 
 
 def rotated(R_parent: Any, R: Any, d: Any, Q: Any, fault: int) -> Any:
@@ -395,134 +352,92 @@ def turned(R: Any, d: Any) -> Any:
 
 
 def solve_fabrik(
-    parents: IndexArray,
-    offsets: FloatArray,
-    path: IndexArray,
-    target: Any,
-    tolerance: float,
-    sweeps: int,
-    forward: Forward,
-    fabrik: Fabrik,
-    stop: Stop,
-    local: FloatArray,
-    positions: FloatArray,
-    rotations: FloatArray,
+    chain: Chain, target: Any, ending: Ending, forward: Forward, fabrik: Fabrik, pose: Pose
 ) -> int:
-    """Move the joints of the path, then find their rotations; `local` as for CCD.
+    """Move the joints of the path, then find their rotations; `pose.local` as for CCD.
 
-    `positions` are those that the passes leave on the path, and below it what the rotations give.
+    The positions are those that the passes leave on the path, and below it what the rotations give.
     """
-    if fabrik.start == 1:
-        for j in range(len(parents)):
-            store_quaternion(local, j, IDENTITY)
-    place(parents, offsets, local, forward, positions, rotations)
+    begin(chain, forward, fabrik.start == 1, pose)
     before, i = math.inf, 0
-    while i < allowed(sweeps, stop.budget):
-        distance = norm(subtract(load_vector(positions, path[-1]), target))
-        if is_reached(distance, before, tolerance, i, stop.test):
+    while i < allowed(ending.sweeps, ending.stop.budget):
+        distance = norm(subtract(load_vector(pose.positions, chain.path[-1]), target))
+        if is_reached(distance, before, ending.tolerance, i, ending.stop.test):
             break
         before = distance
-        sweep_fabrik(offsets, path, target, fabrik, positions)
+        sweep_fabrik(chain, target, fabrik, pose.positions)
         i += 1
-    moved = positions.copy()
+    moved = pose.positions.copy()
     if i > 0:
-        follow(
-            parents, offsets, path, moved, forward, fabrik.rotations, local, positions, rotations
-        )
-    place(parents, offsets, local, forward, positions, rotations)
-    for k in range(len(path)):
-        store_vector(positions, path[k], load_vector(moved, path[k]))
+        follow(chain, moved, forward, fabrik.rotations, pose)
+    place(chain, forward, pose)
+    for j in chain.path:
+        store_vector(pose.positions, j, load_vector(moved, j))
     return i
 
 
-def sweep_fabrik(
-    offsets: FloatArray, path: IndexArray, target: Any, fabrik: Fabrik, positions: FloatArray
-) -> None:
+def sweep_fabrik(chain: Chain, target: Any, fabrik: Fabrik, positions: FloatArray) -> None:
     """Pull the joints to the target, then back to the root."""
-    root = load_vector(offsets, path[0])
     if fabrik.passes == 0:
-        pull_backward(offsets, path, target, fabrik, positions)
-    pull_forward(offsets, path, root, fabrik, positions)
+        pull_backward(chain, target, fabrik, positions)
+    pull_forward(chain, fabrik, positions)
 
 
-def pull_backward(
-    offsets: FloatArray, path: IndexArray, target: Any, fabrik: Fabrik, positions: FloatArray
-) -> None:
+def pull_backward(chain: Chain, target: Any, fabrik: Fabrik, positions: FloatArray) -> None:
     """Put the effector on the target and the others after it."""
-    last = len(path) - 1
-    old = positions.copy()
-    store_vector(positions, path[last], target)
+    last = len(chain.path) - 1
+    store_vector(positions, chain.path[last], target)
     for k in range(last - 1, -1, -1):
-        length = link_length(offsets, path, k, fabrik.lengths, positions, old)
-        pull(positions, path[k + 1], path[k], length)
+        length = link_length(chain, k, fabrik.lengths, positions)
+        pull(positions, chain.path[k + 1], chain.path[k], length)
 
 
-def pull_forward(
-    offsets: FloatArray, path: IndexArray, root: Any, fabrik: Fabrik, positions: FloatArray
-) -> None:
+def pull_forward(chain: Chain, fabrik: Fabrik, positions: FloatArray) -> None:
     """Put the root back and the others after it."""
-    old = positions.copy()
+    root = chain.path[0]
     if fabrik.root == 0:
-        store_vector(positions, path[0], root)
+        store_vector(positions, root, load_vector(chain.offsets, root))
     elif fabrik.root == 2:
-        store_vector(positions, path[0], ORIGIN)
-    for k in range(len(path) - 1):
-        length = link_length(offsets, path, k, fabrik.lengths, positions, old)
-        pull(positions, path[k], path[k + 1], length)
+        store_vector(positions, root, ORIGIN)
+    for k in range(len(chain.path) - 1):
+        length = link_length(chain, k, fabrik.lengths, positions)
+        pull(positions, chain.path[k], chain.path[k + 1], length)
 
 
-def link_length(
-    offsets: FloatArray,
-    path: IndexArray,
-    k: int,
-    fault: int,
-    positions: FloatArray,
-    old: FloatArray,
-) -> float:
+def link_length(chain: Chain, k: int, fault: int, positions: FloatArray) -> float:
     """Return the length of link k, from joint k of the path to the next."""
-    last = len(path) - 2
+    last = len(chain.path) - 2
     if fault == 3:
-        a, b = load_vector(positions, path[k]), load_vector(positions, path[k + 1])
-        return norm(subtract(b, a))
+        start = load_vector(positions, chain.path[k])
+        return norm(subtract(load_vector(positions, chain.path[k + 1]), start))
     if fault == 1:
         k = min(k + 1, last)
     elif fault == 2:
         k = max(k - 1, 0)
-    return norm(load_vector(offsets, path[k + 1]))
+    return norm(load_vector(chain.offsets, chain.path[k + 1]))
 
 
 def pull(positions: FloatArray, fixed: int, moved: int, length: float) -> None:
     """Bring a joint to a distance from another, along the line between them."""
     start = load_vector(positions, fixed)
-    way = subtract(load_vector(positions, moved), start)
-    distance = norm(way)
+    direction = subtract(load_vector(positions, moved), start)
+    distance = norm(direction)
     if distance > 0.0:
-        store_vector(positions, moved, add(start, scale(length / distance, way)))
+        store_vector(positions, moved, add(start, scale(length / distance, direction)))
 
 
-def follow(
-    parents: IndexArray,
-    offsets: FloatArray,
-    path: IndexArray,
-    moved: FloatArray,
-    forward: Forward,
-    fault: int,
-    local: FloatArray,
-    positions: FloatArray,
-    rotations: FloatArray,
-) -> None:
+def follow(chain: Chain, moved: FloatArray, forward: Forward, fault: int, pose: Pose) -> None:
     """Rotate each joint of the path so that its link points to where the next one has moved."""
-    start = rotations.copy()
-    for k in range(len(path) - 1):
-        place(parents, offsets, local, forward, positions, rotations)
-        j = path[k]
-        offset, Q = load_vector(offsets, path[k + 1]), load_quaternion(local, j)
-        R, R_parent = load_quaternion(rotations, j), IDENTITY
-        if parents[j] >= 0:
-            R_parent = load_quaternion(start if fault == 4 else rotations, parents[j])
-        if fault == 4:
-            R = load_quaternion(start, j)
-        link = subtract(load_vector(moved, path[k + 1]), load_vector(moved, j))
+    start = pose.rotations.copy()
+    for k in range(len(chain.path) - 1):
+        place(chain, forward, pose)
+        j, child = chain.path[k], chain.path[k + 1]
+        p = chain.parents[j]
+        seen = start if fault == 4 else pose.rotations
+        offset, Q = load_vector(chain.offsets, child), load_quaternion(pose.local, j)
+        R = load_quaternion(seen, j)
+        R_parent = load_quaternion(seen, p) if p >= 0 else IDENTITY
+        link = subtract(load_vector(moved, child), load_vector(moved, j))
         arc = between(rotate(R, offset), link)
         if fault == 1:
             Q = between(offset, link)
@@ -530,7 +445,7 @@ def follow(
             Q = multiply(arc, Q)
         else:
             Q = multiply(turned(conjugate(R_parent), arc), Q)
-        store_quaternion(local, path[k + 1] if fault == 3 else j, renormalised(Q))
+        store_quaternion(pose.local, child if fault == 3 else j, renormalised(Q))
 
 
 place_all = Kernel(place, label="forward kinematics with faults")

@@ -20,7 +20,7 @@ NAMES = {
     "fk_w_last": "xyzw read",
     "ccd_world_left": "world rotation on the left",
     "ccd_world_right": "world rotation on the right",
-    "ccd_conjugated": "conjugated the wrong way",
+    "ccd_conjugated": "conjugated in reverse",
     "ccd_child": "given to the child, in its frame",
     "ccd_stale": "joints not placed anew",
     "ccd_root_to_tip": "root to tip",
