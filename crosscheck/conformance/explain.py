@@ -13,7 +13,7 @@ import numpy as np
 from .case import Case
 from .contestant import Answer, Asked
 from .judgement import Explanation
-from .sentence import Sentence
+from .sentence import Sentence, sentence
 
 # A variant is compared with all answers only if it reproduces one of so many, the telling ones.
 TRIAL = 4
@@ -154,3 +154,35 @@ def _indistinguishable(
 def _explanation(matches: Sequence[Match], describe: Callable[[Sequence[str]], Sentence]) -> Any:
     keys = [" + ".join(match.variant.faults) for match in matches]
     return Explanation(tuple(keys), describe(keys), matches[0].share, matches[0].distance)
+
+
+def together(said: Sequence[Sentence]) -> Sentence:
+    """Return the sentences of up to three faults that a solver has at once, as one."""
+    if len(said) == 1:
+        return said[0]
+    if len(said) == 2:
+        return sentence("Two faults at once. {one} And: {other}", one=said[0], other=said[1])
+    return sentence(
+        "Three faults at once. {one} And: {other} And: {another}",
+        one=said[0],
+        other=said[1],
+        another=said[2],
+    )
+
+
+def either(said: Sequence[Sentence]) -> Sentence:
+    """Return the sentences of faults that no answer tells apart, up to three of them, as one."""
+    if len(said) == 1:
+        return said[0]
+    if len(said) == 2:
+        return sentence(
+            "One of two, which the answers do not tell apart. {one} Or: {other}",
+            one=said[0],
+            other=said[1],
+        )
+    return sentence(
+        "One of several, which the answers do not tell apart. {one} Or: {other} Or: {another}",
+        one=said[0],
+        other=said[1],
+        another=said[2],
+    )

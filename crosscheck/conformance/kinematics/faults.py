@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import NamedTuple
 
+from ..explain import either, together
 from ..sentence import Sentence, sentence
 from .textbook import Ccd, Fabrik, Forward, Stop
 
@@ -601,34 +602,10 @@ def _is_likely(three: Sequence[Fault]) -> bool:
 
 def describe(method: str, keys: Sequence[str]) -> Sentence:
     """Return the sentences of a class of faults that no answer tells apart."""
-    told = [_describe_one(method, key) for key in keys[:3]]
-    if len(told) == 1:
-        return told[0]
-    if len(told) == 2:
-        return sentence(
-            "One of two, which the answers do not tell apart. {one} Or: {other}",
-            one=told[0],
-            other=told[1],
-        )
-    return sentence(
-        "One of several, which the answers do not tell apart. {one} Or: {other} Or: {another}",
-        one=told[0],
-        other=told[1],
-        another=told[2],
-    )
+    return either([_describe_one(method, key) for key in keys])
 
 
 def _describe_one(method: str, key: str) -> Sentence:
     if not key:
         return sentence("It does what the textbook does.")
-    told = [by_key(method)[one].sentence for one in key.split(" + ")]
-    if len(told) == 1:
-        return told[0]
-    if len(told) == 2:
-        return sentence("Two faults at once. {one} And: {other}", one=told[0], other=told[1])
-    return sentence(
-        "Three faults at once. {one} And: {other} And: {another}",
-        one=told[0],
-        other=told[1],
-        another=told[2],
-    )
+    return together([by_key(method)[one].sentence for one in key.split(" + ")])

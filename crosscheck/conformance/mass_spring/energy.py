@@ -16,6 +16,7 @@ from reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
 from ..contestant import Answer, Asked
+from ..explain import either, together
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -195,7 +196,7 @@ def works(p: Problem, q: Problem) -> dict[str, float]:
     }
 
 
-class Slip(NamedTuple):
+class Fault(NamedTuple):
     """A fault of an energy: a change of the problem, or of the three parts."""
 
     key: str
@@ -205,40 +206,40 @@ class Slip(NamedTuple):
     parts: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
-def _from_option(option: Option) -> Slip:
-    return Slip(option.key, option.aspect, option.sentence, option.change)
+def _from_option(option: Option) -> Fault:
+    return Fault(option.key, option.aspect, option.sentence, option.change)
 
 
 _OF_FORCES = ("first end only", "second end only", "both ends alike", "direction not normalised",
               "springs push", "springs twice", "tension only ignored")  # fmt: skip
-SLIPS = (
-    Slip("kinetic without 1/2", "kinetic",
+FAULTS = (
+    Fault("kinetic without 1/2", "kinetic",
          sentence("The kinetic energy lacks its 1/2: it is m/2 v²."), None, (2.0, 1.0, 1.0)),
-    Slip("kinetic missing", "kinetic",
+    Fault("kinetic missing", "kinetic",
          sentence("The kinetic energy is missing."), None, (0.0, 1.0, 1.0)),
-    Slip("kinetic without mass", "kinetic",
+    Fault("kinetic without mass", "kinetic",
          sentence("The kinetic energy lacks the mass: it is m/2 v²."),
          lambda p: p.changed(masses=np.ones(p.count), weighing=p.masses)),
-    Slip("kinetic subtracted", "kinetic",
+    Fault("kinetic subtracted", "kinetic",
          sentence("The kinetic energy is subtracted."), None, (-1.0, 1.0, 1.0)),
-    Slip("elastic without 1/2", "elastic",
+    Fault("elastic without 1/2", "elastic",
          sentence("The elastic energy lacks its 1/2: it is k/2 (l - r)²."), None,
          (1.0, 2.0, 1.0)),
-    Slip("elastic missing", "elastic",
+    Fault("elastic missing", "elastic",
          sentence("The elastic energy is missing."), None, (1.0, 0.0, 1.0)),
-    Slip("elastic subtracted", "elastic",
+    Fault("elastic subtracted", "elastic",
          sentence("The elastic energy is subtracted."), None, (1.0, -1.0, 1.0)),
     *(_from_option(one) for one in SPRINGS if one.key not in _OF_FORCES),
     *(_from_option(one) for one in GRAVITY[:-3]),
 )  # fmt: skip
 
 
-def predict(slips: Sequence[Slip], p: Problem) -> dict[str, float]:
+def predict(faults: Sequence[Fault], p: Problem) -> dict[str, float]:
     """Return the energies that a solver with these faults answers."""
     factors = np.ones(3)
-    for slip in slips:
-        factors = factors * slip.parts
-        p = slip.change(p) if slip.change is not None else p
+    for fault in faults:
+        factors = factors * fault.parts
+        p = fault.change(p) if fault.change is not None else p
     values = right(p)
     parts = (values["kinetic"], values["elastic"], values["gravitational"])
     return _sums(*(float(f * part) for f, part in zip(factors, parts, strict=True)))
@@ -258,50 +259,24 @@ def _diagnose(
     tried = 0
     for count in (1, 2, 3):
         matches = []
-        for slips in combinations(SLIPS, count):
-            if len({one.aspect for one in slips}) < count:
+        for faults in combinations(FAULTS, count):
+            if len({one.aspect for one in faults}) < count:
                 continue
             tried += 1
-            if all(_matches(slips, *one, greeting.epsilon) for one in answered):
-                matches.append(slips)
+            if all(_matches(faults, *one, greeting.epsilon) for one in answered):
+                matches.append(faults)
         if matches:
             return Diagnosis((_explanation(matches),), tried=tried)
-    return Diagnosis(first_broken=_first(judgements), tried=tried)
+    return Diagnosis(first_broken=laws.first_broken(judgements), tried=tried)
 
 
-def _matches(slips: Sequence[Slip], p: Problem, given: Mapping[str, Any], epsilon: float) -> bool:
-    expected = predict(slips, p)
+def _matches(faults: Sequence[Fault], p: Problem, given: Mapping[str, Any], epsilon: float) -> bool:
+    expected = predict(faults, p)
     limit = 8.0 * tolerance(p, epsilon)
     return all(abs(given[name] - expected[name]) <= limit for name in PARTS if name in given)
 
 
-def _explanation(matches: Sequence[Sequence[Slip]]) -> Explanation:
-    keys = tuple(" + ".join(one.key for one in slips) for slips in matches)[:3]
-    said = [_together([one.sentence for one in slips]) for slips in matches]
-    if len(said) == 1:
-        return Explanation(keys, said[0], 1.0, 0.0)
-    both = sentence(
-        "One of these, which no answer tells apart: {one} Or: {other}", one=said[0], other=said[1]
-    )
-    return Explanation(keys, both, 1.0, 0.0)
-
-
-def _together(said: Sequence[Sentence]) -> Sentence:
-    if len(said) == 1:
-        return said[0]
-    if len(said) == 2:
-        return sentence("Two faults. {first} {second}", first=said[0], second=said[1])
-    return sentence(
-        "Three faults. {first} {second} {third}", first=said[0], second=said[1], third=said[2]
-    )
-
-
-def _first(judgements: Sequence[CaseJudgement]) -> Sentence | None:
-    for one in judgements:
-        for finding in one.findings:
-            if finding.verdict >= Verdict.WRONG:
-                return sentence(
-                    "The law that broke first is {law}, in the case {case}: {said}",
-                    law=finding.law, case=one.case.name, said=finding.sentence,
-                )  # fmt: skip
-    return None
+def _explanation(matches: Sequence[Sequence[Fault]]) -> Explanation:
+    keys = tuple(" + ".join(one.key for one in faults) for faults in matches)[:3]
+    said = [together([one.sentence for one in faults]) for faults in matches]
+    return Explanation(keys, either(said), 1.0, 0.0)

@@ -12,7 +12,7 @@ from reference.mass_spring import forces as reference_forces
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import Variant, explain
+from ..explain import Variant, either, explain, together
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -152,23 +152,7 @@ _BY_KEY = {one.key: one.sentence for one in FORCE_FAULTS}
 
 def describe(keys: Sequence[str]) -> Sentence:
     """Return the sentences of faults, given the keys of a class that no answer tells apart."""
-    said = [_together(key) for key in keys]
-    if len(said) == 1:
-        return said[0]
-    return sentence(
-        "One of these, which no answer tells apart: {one} Or: {other}", one=said[0], other=said[1]
-    )
-
-
-def _together(key: str) -> Sentence:
-    said = [_BY_KEY[one] for one in key.split(" + ")]
-    if len(said) == 1:
-        return said[0]
-    if len(said) == 2:
-        return sentence("Two faults. {first} {second}", first=said[0], second=said[1])
-    return sentence(
-        "Three faults. {first} {second} {third}", first=said[0], second=said[1], third=said[2]
-    )
+    return either([together([_BY_KEY[one] for one in key.split(" + ")]) for key in keys])
 
 
 def _diagnose(
@@ -181,21 +165,10 @@ def _diagnose(
     explanations, tried = explain(
         variants(), [one for one, _ in order], partial(_relative, greeting.epsilon), describe
     )
-    first = None if explanations else _first(judgements)
+    first = None if explanations else laws.first_broken(judgements)
     return Diagnosis(explanations, None, first, (), tried)
 
 
 def _relative(epsilon: float, case: Case) -> float:
     p = problem_of(case.inputs)
     return tolerance(p, epsilon) / max(float(np.abs(all_forces(p)).max()), 1e-3)
-
-
-def _first(judgements: Sequence[CaseJudgement]) -> Sentence | None:
-    for one in judgements:
-        for finding in one.findings:
-            if finding.verdict >= Verdict.WRONG:
-                return sentence(
-                    "The law that broke first is {law}, in the case {case}: {said}",
-                    law=finding.law, case=one.case.name, said=finding.sentence,
-                )  # fmt: skip
-    return None

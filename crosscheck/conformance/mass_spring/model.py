@@ -1,4 +1,4 @@
-"""One step of every model that a solver may declare, and of the slips that occur in them, dense.
+"""One step of every model that a solver may declare, and of the faults that occur in them, dense.
 
 An implicit step seeks x with M (x - y) = h² f(x), y = x_n + h v_n; with f = -grad E that is the
 minimum of g(x) = 1/2 (x - y)' M (x - y) + h² E(x) (Liu et al. 2013). Everything is a dense array of

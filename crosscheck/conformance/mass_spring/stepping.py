@@ -10,6 +10,7 @@ from reference.explicit import symplectic_euler
 from reference.implicit_euler import ImplicitEuler
 
 from ..contestant import Answer, Asked
+from ..explain import together
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -254,14 +255,7 @@ def _score(
 
 def _describe(faults: Sequence[Option]) -> Sentence:
     """Return the sentences of up to three faults; honest choices that were denied as such."""
-    said = [_fault_sentence(one) for one in faults]
-    if len(said) == 1:
-        return said[0]
-    if len(said) == 2:
-        return sentence("Two faults. {first} {second}", first=said[0], second=said[1])
-    return sentence(
-        "Three faults. {first} {second} {third}", first=said[0], second=said[1], third=said[2]
-    )
+    return together([_fault_sentence(one) for one in faults])
 
 
 def _fault_sentence(one: Option) -> Sentence:

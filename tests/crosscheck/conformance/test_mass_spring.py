@@ -417,9 +417,9 @@ def test_right_forces_are_not_accused(precision):
     assert found.verdict is Verdict.RIGHT
 
 
-def energies(slips, shift=0.0):
+def energies(faults, shift=0.0):
     def function(**inputs):
-        found = energy.predict(slips, problem_of(inputs))
+        found = energy.predict(faults, problem_of(inputs))
         for name in ("total", "potential", "gravitational"):
             found[name] += shift
         return found
@@ -427,12 +427,12 @@ def energies(slips, shift=0.0):
     return function
 
 
-@pytest.mark.parametrize("slip", [one for one in energy.SLIPS if one.key not in NO_FORCES],
+@pytest.mark.parametrize("fault", [one for one in energy.FAULTS if one.key not in NO_FORCES],
                          ids=lambda one: one.key)  # fmt: skip
-def test_every_fault_of_energies_is_caught_and_named(slip):
-    found = report(energies([slip]), "energy")
+def test_every_fault_of_energies_is_caught_and_named(fault):
+    found = report(energies([fault]), "energy")
     assert found.verdict is Verdict.WRONG
-    assert slip.key in named(found)
+    assert fault.key in named(found)
 
 
 def test_the_zero_of_gravity_is_free():
