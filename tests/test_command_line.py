@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import cli
+from bench import cli, terminal
+from bench.commands import bench, report
 from bench.harness.record import Record, RecordFile
 from crosscheck.claims import CLAIMS
 from crosscheck.verdict import Verdict
@@ -25,7 +26,7 @@ def empty_folder(tmp_path, monkeypatch):
 def main_job(monkeypatch):
     """The calls of the main job, which is not done."""
     calls = []
-    monkeypatch.setattr(cli, "main_job", lambda *arguments: calls.append(arguments) or 0)
+    monkeypatch.setattr(bench, "main_job", lambda *arguments: calls.append(arguments) or 0)
     return calls
 
 
@@ -176,8 +177,8 @@ def test_hostile_names_are_data_on_the_terminal(capsys, empty_folder):
 
     records = [a_record(name) for name in HOSTILE]
     RecordFile("out").append(records)
-    for command in (lambda: cli.print_tables(["timing"], empty_folder / "out"),
-                    lambda: cli.write_report(empty_folder / "out")):  # fmt: skip
+    for command in (lambda: terminal.print_tables(["timing"], empty_folder / "out"),
+                    lambda: report.write_report(empty_folder / "out")):  # fmt: skip
         command()
         out = capsys.readouterr().out
         assert all(line.isprintable() for line in out.splitlines())
@@ -222,8 +223,8 @@ def test_alone_it_does_the_main_job(capsys, main_job):
 
 
 def test_the_main_job_says_first_what_it_does_and_where(capsys, monkeypatch):
-    monkeypatch.setattr(cli, "run_suites", lambda *_: 1)
-    monkeypatch.setattr(cli, "write_report", lambda *_: 0)
+    monkeypatch.setattr(bench, "run_suites", lambda *_: 1)
+    monkeypatch.setattr(bench, "write_report", lambda *_: 0)
     code, out, _ = plumbob(capsys, "--output", "here")
     assert "Pinocchio and MuJoCo" in out
     assert "here/index.html" in out
@@ -235,7 +236,7 @@ def test_ctrl_c_exits_130_and_says_what_is_kept(capsys, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "main_job", interrupted)
+    monkeypatch.setattr(bench, "main_job", interrupted)
     code, out, err = plumbob(capsys)
     assert code == 130
     assert out == ""

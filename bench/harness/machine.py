@@ -32,11 +32,12 @@ _PACKAGES = ("reference", "crosscheck", "bench")
 # What only shows numbers; all else may change one. None of these is imported by what measures.
 PRESENTATION = (
     "bench/cli.py",
+    "bench/commands",
     "bench/comparison",
     "bench/help_text.py",
     "bench/presentation",
-    "bench/records_command.py",
     "bench/show.py",
+    "bench/terminal.py",
     "bench/verify",
 )
 # Likewise in every experiment.

@@ -27,6 +27,8 @@ class Layout:
         measured: one sentence on how the numbers came about, likewise.
         summary: what the numbers say, asked for only where there are subjects.
         figures: what stands beside it.
+        compared: rows whose first so many cells agree are compared with one another; 0: all are.
+        ranked: whether a subject may be best in its group.
     """
 
     question: str
@@ -38,6 +40,8 @@ class Layout:
     measured: str | Callable[[Any], str]
     summary: Callable[[Any], Summary] = lambda subjects: NO_SUMMARY
     figures: tuple[Figure, ...] = ()
+    compared: int = 1
+    ranked: Callable[[Any], bool] = lambda subject: True
 
     def __call__(self, results: Results) -> Table:
         """Return the table with a row for each subject."""
@@ -51,4 +55,6 @@ class Layout:
             self.shows if isinstance(self.shows, str) else self.shows(subjects),
             self.measured if isinstance(self.measured, str) else self.measured(subjects),
             self.summary(subjects) if subjects else NO_SUMMARY,
+            self.compared,
+            frozenset(i for i, subject in enumerate(subjects) if not self.ranked(subject)),
         )

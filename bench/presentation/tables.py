@@ -47,7 +47,9 @@ class Column:
 
     The note says how a cell is written, such as `INTERVAL`; it is left out where parts of the cell
     have columns of their own. `read` takes the cell from what a row is about, in SI units or as a
-    share of one; `cell` converts it to the column's unit, or multiplies it by `factor`.
+    share of one; `cell` converts it to the column's unit, or multiplies it by `factor`. `best` says
+    whether the "least" or the "greatest" is best, "" where neither is; neighbours of one `group`
+    stand under a heading in common; a `folded` column is shown only to those who ask for it.
     """
 
     title: str
@@ -56,6 +58,9 @@ class Column:
     note: str = ""
     read: Callable[[Any], Any] = field(default=_itself, compare=False)
     factor: float | None = None
+    best: str = ""
+    group: str = ""
+    folded: bool = False
 
     def cell(self, subject: Any) -> Cell:
         """Return the cell of the row that is about this subject."""
@@ -88,6 +93,8 @@ class Table:
         shows: one sentence on what can be read off.
         measured: one sentence on how the numbers came about.
         summary: what the numbers say, generated from them.
+        compared: rows whose first so many cells agree are compared with one another; 0: all are.
+        unranked: the numbers of rows that are never best, such as those of a solver cut short.
     """
 
     name: str
@@ -97,6 +104,8 @@ class Table:
     shows: str = ""
     measured: str = ""
     summary: Summary = NO_SUMMARY
+    compared: int = 1
+    unranked: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
         """Refuse ragged rows and headings that stand twice."""
@@ -107,6 +116,47 @@ class Table:
                 raise ValueError(
                     f"rows: expected {len(self.columns)} cells in table {self.name}, got {len(row)}"
                 )
+
+
+def best_cells(table: Table) -> set[tuple[int, int]]:
+    """Return row and column of each cell that is best among the rows it is compared with.
+
+    Ties are all best: shares whose intervals overlap with that of the best, numbers that are
+    written alike. A cell that nothing is compared with is not best.
+    """
+    groups: dict[tuple[Cell, ...], list[int]] = {}
+    for i, row in enumerate(table.rows):
+        groups.setdefault(row[: table.compared], []).append(i)
+    return {
+        (i, j)
+        for members in groups.values()
+        for j, column in enumerate(table.columns)
+        if column.best
+        for i in _best(table, [i for i in members if i not in table.unranked], j, column.best)
+    }
+
+
+def _best(table: Table, members: list[int], j: int, which: str) -> list[int]:
+    """Return those of some rows whose cell in column j is best, ties included."""
+    sign = 1.0 if which == "least" else -1.0
+    values = {i: sign * _rank(table.rows[i][j]) for i in members}
+    known = {i: value for i, value in values.items() if not math.isnan(value)}
+    if len(known) < 2:
+        return []
+    first = table.rows[min(known, key=lambda i: known[i])][j]
+    return [i for i in known if _ties(table.rows[i][j], first)]
+
+
+def _rank(cell: Cell) -> float:
+    if isinstance(cell, Share):
+        return cell.hits / cell.total if cell.total else math.nan
+    return math.nan if cell is None or isinstance(cell, str) else float(cell)
+
+
+def _ties(cell: Cell, best: Cell) -> bool:
+    if isinstance(cell, Share) and isinstance(best, Share):
+        return cell.low <= best.high and best.low <= cell.high
+    return words(cell) == words(best)
 
 
 def listing(sentence: str, points: Iterable[str]) -> Summary:

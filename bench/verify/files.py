@@ -30,7 +30,7 @@ class Files(NamedTuple):
         Raises:
             ValueError, OSError: naming the file or folder that cannot.
         """
-        from ..cli import writable
+        from ..commands.options import writable
 
         for path in filter(None, self._paths()):
             check_regular(path)

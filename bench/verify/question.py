@@ -37,7 +37,7 @@ def suited(question: Question, contestant: Contestant) -> Question:
 
 def ask(contestant: Contestant, question: Question) -> Report:
     """Return what was found; the solver is ended then, whatever happens."""
-    from ..cli import progress
+    from ..terminal import progress
 
     try:
         with progress() as bar:

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import itertools
 import re
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from bench.harness.metrics import Share, share
 from bench.presentation import tables
-from bench.presentation.tables import Column, Summary, Table, words
+from bench.presentation.tables import Column, Summary, Table, best_cells, words
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
 
@@ -162,3 +163,32 @@ def test_a_share_is_all_or_nothing_only_where_it_is(total):
     assert percent(0) == "0"
     assert percent(total - 1) != "100"
     assert percent(1) != "0"
+
+
+def ranked(cells, best, **more):
+    """Return the rows that are best in a column, of rows that are all compared."""
+    columns = (Column("solver", words=True), Column("value", best=best))
+    rows = tuple((f"solver {i}", cell) for i, cell in enumerate(cells))
+    return {i for i, _ in best_cells(Table("t", "", columns, rows, compared=0, **more))}
+
+
+@pytest.mark.parametrize("best", ["least", "greatest"])
+def test_the_best_cell_is_the_extreme_one_and_whatever_is_written_like_it(best):
+    for cells in itertools.product([None, "absent", 1.0, 1.0001, 2, float("nan")], repeat=3):
+        numbers = [c for c in cells if isinstance(c, int | float) and c == c]
+        extreme = {"least": min, "greatest": max}[best](numbers, default=0)
+        wanted = {i for i, c in enumerate(cells) if c in numbers and words(c) == words(extreme)}
+        assert ranked(cells, best) == (wanted if len(numbers) > 1 else set())
+
+
+def test_shares_tie_where_their_intervals_overlap():
+    near, far = (share(np.arange(100) < hits) for hits in (95, 50))
+    assert ranked([near, share(np.arange(100) < 97), far], "greatest") == {0, 1}
+
+
+def test_a_row_that_is_cut_short_is_never_best():
+    assert ranked([1.0, 2.0, 3.0], "least", unranked=frozenset([0])) == {1}
+
+
+def test_a_column_without_a_best_has_none():
+    assert ranked([1.0, 2.0], "") == set()

@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .help_text import block
+from ..help_text import block
+from .options import REPORT, SUCCESS
 
 if TYPE_CHECKING:
-    from .harness.record import Key, Record
-    from .presentation.tables import Table
+    from ..harness.record import Key, Record
+    from ..presentation.tables import Table
 
 app = typer.Typer(rich_markup_mode=None)
-SUCCESS = 0
-REPORT = Path("report")
 
 Folder = Annotated[Path, typer.Argument(metavar="[FOLDER]", help="A folder of records.")]
 Suites = Annotated[list[str] | None, typer.Option("--suite", help="Of these suites.")]
@@ -48,9 +47,9 @@ def list_records(
     superseded: Superseded = False,
 ) -> int:
     """Count what is on record, by suite and solver, and where it was measured."""
-    from .cli import print_table
-    from .harness.record import FINISHED
-    from .presentation.results import plain
+    from ..harness.record import FINISHED
+    from ..presentation.results import plain
+    from ..terminal import print_table
 
     wanted = _selection(suites, solvers, problems, failed, superseded)
     measured = (record for record in _read(folder) if record.suite != FINISHED)
@@ -70,8 +69,8 @@ def merge(
 
     One that failed never takes the place of one that did not. The folders stay as they are.
     """
-    from .harness.folder_lock import locked
-    from .harness.record import RecordFile, check_folder
+    from ..harness.folder_lock import locked
+    from ..harness.record import RecordFile, check_folder
 
     given = [record for folder in folders for record in _read(folder)]
     check_folder(into)
@@ -100,8 +99,8 @@ def drop(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would go.")] = False,
 ) -> int:
     """Remove records for good: those that fit all that is given."""
-    from .harness.folder_lock import locked
-    from .harness.record import RecordFile
+    from ..harness.folder_lock import locked
+    from ..harness.record import RecordFile
 
     if not (suites or solvers or problems or failed or superseded):
         raise ValueError("drop: expected --suite, --solver, --problem, --failed or --superseded")
@@ -115,7 +114,7 @@ def drop(
 
 
 def _read(folder: Path) -> "list[Record]":
-    from .harness.record import RecordFile, check_folder
+    from ..harness.record import RecordFile, check_folder
 
     check_folder(folder)
     found = RecordFile(folder).read().records
@@ -158,14 +157,14 @@ def _rank(record: "Record") -> tuple[bool, str]:
 
 def _machines(found: "Iterable[Record]") -> set[str]:
     """Return the machines that records were measured on, in words."""
-    from .presentation.text import visible
+    from ..presentation.text import visible
 
     made = (record.stamp.get("machine", {}) for record in found if record.stamp)
     return {visible(", ".join(map(str, machine.values()))) for machine in made if machine}
 
 
 def _table(folder: Path, found: "list[Record]") -> "Table":
-    from .presentation.tables import Column, Summary, Table
+    from ..presentation.tables import Column, Summary, Table
 
     groups: dict[tuple[str, str], list[Record]] = {}
     for record in found:
