@@ -15,6 +15,7 @@ from reference import IK_SOLVERS, STEP_SOLVERS
 from . import environments
 
 PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
+BULLET = "PyBullet"
 
 
 class Style(NamedTuple):
@@ -32,7 +33,7 @@ FOURTH = Style("purple", (0, (1, 1)), "v")
 FIFTH = Style("brass", (0, (4, 1, 1, 1, 1, 1)), "D")
 OTHER = Style("faint", ":", "P")
 # The markers of solvers for cloths, by whose they are.
-ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^"}
+ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^", BULLET: "D"}
 
 
 @dataclass(frozen=True)
@@ -355,6 +356,15 @@ CLOTH_ENGINES = (
     _newton("VBD, its own colours", "vbd", ITERATED, SOME, own=1),
     _newton("XPBD", "xpbd", ITERATED, SOME),
     _newton("XPBD, substeps", "xpbd", EXPLICIT, iterations=1),
+    ClothPeer(
+        *(
+            "PyBullet deformable, Euler",
+            BULLET,
+            "bench.peers.cloth.pybullet_deformable",
+            "pybullet",
+        ),
+        EXPLICIT,
+    ),
 )
 
 
