@@ -25,14 +25,14 @@ def shares(table, heading):
 def run(make):
     """What makes a record of the first `begun` of all targets, `hits` of them solved."""
 
-    def made(solver, hits, begun=MANY, size=MANY, seconds=1e-4, **more):
+    def made(solver, hits, begun=MANY, size=MANY, seconds=1e-4, robot="arm", **more):
         solved = np.arange(begun) < hits
         arrays = {
             "solved": solved, "claimed": solved.astype(int), "stratum": np.arange(begun) % 2,
             "seconds": np.full(begun, seconds), "position": np.where(solved, 1e-9, 0.5),
             "rotation": np.zeros(begun), "beyond": np.zeros(begun),
         } | {name: np.resize(values, begun) for name, values in more.items()}  # fmt: skip
-        return make.raced(solver, KIND, size=size, **arrays)
+        return make.raced(solver, KIND, robot=robot, size=size, **arrays)
 
     return made
 
@@ -126,7 +126,7 @@ def test_a_solvers_own_false_claims_stand_in_the_main_table(run):
 @pytest.mark.parametrize("name", robots.Tables._fields)
 def test_no_more_than_six_columns_are_shown_unasked(run, name):
     table = getattr(ONE, name)(Results([run("a", 100)]))
-    limit = 8 if name in ("outcomes", "profiles") else 6
+    limit = 8 if name in ("outcomes", "profiles") else 6  # these are no main tables
     assert sum(not c.folded for c in table.columns) <= limit
 
 
@@ -174,3 +174,60 @@ def test_out_of_reach_the_best_known_answer_is_that_of_any_solver_within_limits(
     assert column(table, "beyond the best known, largest [m]") == pytest.approx([0.3, 0.3])
     assert column(table, "beyond the lower bound, median [m]") == pytest.approx([0.4, 0.45])
     assert column(table, "answers within limits") == [3, 2]
+
+
+def test_over_all_robots_every_target_counts_once(run):
+    table = ONE.overall(Results([run("a", 118), run("a", 60, robot="leg"), run("b", 119),
+                                 run("b", 20, robot="leg")]))  # fmt: skip
+    assert column(table, "over") == ["all 2 robots"] * 2
+    assert shares(table, "solved") == [(178, 240), (139, 240)]
+    # 178 of 1e-4 s and 62 of the penalty of 0.1 s, each and the result shifted by 1e-5 s
+    mean = np.exp((178 * np.log(1.1e-4) + 62 * np.log(0.10001)) / 240) - 1e-5
+    assert column(table, "time, geometric mean [µs]")[0] == pytest.approx(1e6 * mean, rel=1e-12)
+    low, high = (column(table, f"time, 95 % {end} [µs]")[0] for end in ("from", "to"))
+    assert low < 1e6 * mean < high
+    (point,) = table.summary.points
+    assert point.startswith("all 2 robots: a, 178/240 = 74.2 % (68.3–79.3); least time a, ")
+    assert point.endswith("n = 240)")
+    assert column(table, "mark") == ["most solved, least time", ""]
+
+
+def test_solvers_are_compared_over_robots_that_all_of_them_take(run):
+    table = ONE.overall(Results([run("a", 100), run("a", 9, robot="leg"), run("b", 120)]))
+    rows = list(zip(column(table, "over"), column(table, "solver"), strict=True))
+    assert rows == [("all 2 robots", "a"), ("the arm", "a"), ("the arm", "b")]
+    assert table.summary.points[1].startswith("the arm: b, 120/120")
+
+
+def test_who_is_cut_on_one_robot_is_not_ranked_over_all(cut, run):
+    table = ONE.overall(Results([*cut.records, run("fine", 50)]))
+    row = column(table, "solver").index("slow")
+    assert column(table, "mark")[row] == "cut or other targets on 1 of 1 robots"
+    assert shares(table, "solved")[row] == (2, MANY)
+    assert "slow" not in table.summary.points[0]
+    assert row in table.unranked
+
+
+def test_a_tie_over_all_robots_is_marked_as_one(run):
+    table = ONE.overall(Results([run("a", 118), run("b", 117), run("c", 20)]))
+    marks = dict(zip(column(table, "solver"), column(table, "mark"), strict=True))
+    assert "most solved (tie)" in marks["a"]
+    assert "most solved (tie)" in marks["b"]
+    assert marks["c"] == ""
+
+
+def test_the_map_has_a_field_for_each_robot_that_a_solver_takes(run):
+    results = Results([run("a", MANY), run("a", MANY, robot="leg"),
+                       run("b", MANY, seconds=1e-2)])  # fmt: skip
+    table = ONE.map(results)
+    assert [row[0] for row in table.rows] == ["a", "b"]
+    assert [share and share.hits for share in table.rows[1][1:3]] == [MANY, None]
+    assert column(table, "the arm, times the least time") == pytest.approx([1.0, 100.0])
+    assert column(table, "the leg, times the least time")[1] is None
+    (draw,) = ONE_MAP.figures
+    svg = draw(results).svg
+    assert svg.count(">100<") == 4  # three shares of 100 %, and 100 times the least time
+    assert draw(Results([])) is None
+
+
+ONE_MAP = robots.OF_KIND[KIND].map

@@ -248,6 +248,15 @@ def test_the_intervals_of_the_bootstrap_hold_the_truth(rng):
     assert held >= 0.89 * 200  # 0.94 of these; 200 draws err by 0.017
 
 
+def test_of_very_many_targets_the_interval_is_the_same_without_draws(rng, monkeypatch):
+    values = np.concatenate([rng.lognormal(0.0, 1.0, 3000), rng.lognormal(3.0, 0.1, 3000)])
+    drawn = metrics.shifted_geometric_mean(values, 1e-5, (3000, 3000))
+    monkeypatch.setattr(metrics, "LARGE", 5000)
+    np.testing.assert_allclose(
+        metrics.shifted_geometric_mean(values, 1e-5, (3000, 3000)), drawn, rtol=0.01
+    )
+
+
 def test_the_interval_of_a_timing_is_that_of_its_sweeps():
     """Rounds of one sweep are alike: ten sweeps are ten values, however many rounds they have."""
     sweeps = np.repeat(np.arange(1.0, 11.0)[:, None], 50, axis=1)

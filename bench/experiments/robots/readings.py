@@ -16,7 +16,8 @@ from ...harness.metrics import Floats, Ranking
 from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
-from ...presentation.results import Results
+from ...presentation.columns import words_in
+from ...presentation.results import Results, settings
 from . import LIMIT_TOLERANCE, REACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}
@@ -27,6 +28,31 @@ SHIFT = 1e-5
 MARK = "mark"
 # What can become of a target; each counts under the first that is so.
 OUTCOMES = ("solved", "beyond a limit", "wrong claim", "missed", "no answer", "not begun")
+
+_MEASURED = (
+    "Every solver has the same text of the robot, the same targets and the same seeded random "
+    "starts. It works in a process of its own, on one core (TRAC-IK on two), and is timed target "
+    "by target, as in a loop of solves: after the target before, solved again without counting "
+    "where that takes less than a millisecond; conversions are left out. The solvers of a robot "
+    "follow each other in an order drawn by lot. What one returns is "
+    "evaluated by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a "
+    "busy machine. Solved means: "
+)
+# The rule for solvers that a budget of time cut short.
+RULE = (
+    "All shares are of all targets given: a solver whose budget of time ran out is marked “cut "
+    "at”, the targets that it never began count as not solved, and it is not ranked."
+)
+TIES = (
+    "Solvers tie unless one does better on so many of the same targets that chance would do as "
+    "much in less than 5 % of cases (McNemar’s exact test for success, lots for the signs of "
+    "differences for times; Holm’s correction over rivals)."
+)
+# What a geometric mean of times is.
+SCORE = (
+    f"The geometric mean is of times plus {words_in(SHIFT, 'µs')}, less that in the end; a target "
+    f"that is not solved counts as {words_in(PENALTY, 'ms')}, or as what it took if that is longer."
+)
 
 
 def records_of(results: Results, kind: str, task: str = REACHABLE) -> list[Record]:
@@ -216,3 +242,11 @@ def _of_same_targets(records: Sequence[Record]) -> list[Record]:
     """Return the records of as many targets as most are of."""
     size = _commonest(records)
     return [record for record in records if total(record) == size]
+
+
+def how(records: Sequence[Record]) -> str:
+    """Return how the numbers of records came about."""
+    return (
+        f"{_MEASURED}within {settings(records, 'tolerance')} m and "
+        f"{settings(records, 'tolerance_rotation')} rad, every limit kept to 1e-6 rad."
+    )

@@ -1,7 +1,7 @@
 """Robots: who solves how many targets, how fast, and how far what is claimed is so.
 
-Solvers that make one attempt and those that start again are never in one table: each of the first
-five tables exists for either kind.
+Solvers that make one attempt and those that start again are never in one table: each of the
+tables of `Tables` exists for either kind.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,15 +28,18 @@ from ...presentation.columns import (
     words_in,
 )
 from ...presentation.layout import Layout
-from ...presentation.results import Results, leaders, listed, settings
+from ...presentation.results import Results, leaders, listed
 from ...presentation.tables import Cell, Column, Summary, in_unit, listing, words
 from . import REACHABLE, UNREACHABLE, figures
+from .overall.tables import aggregate, problem_map
 from .readings import (
     KINDS,
     MARK,
     OUTCOMES,
-    PENALTY,
+    RULE,
+    SCORE,
     SHIFT,
+    TIES,
     best_known,
     beyond_best,
     budget_curve,
@@ -44,6 +47,7 @@ from .readings import (
     distances_within_limits,
     false_claims,
     fastest,
+    how,
     is_ranked,
     measured,
     outcomes,
@@ -62,31 +66,14 @@ BUDGETS = np.array([1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 1e-1])
 # Those that a narrow table shows.
 WHOLE = (1e-4, 1e-3, 1e-2, 1e-1)
 RATIOS = np.array([1.0, 2.0, 5.0, 10.0, 100.0, 1000.0])
-_MEASURED = (
-    "Every solver has the same text of the robot, the same targets and the same seeded random "
-    "starts. It works in a process of its own, on one core (TRAC-IK on two), and is timed target "
-    "by target, as in a loop of solves: after the target before, solved again without counting "
-    "where that takes less than a millisecond; conversions are left out. The solvers of a robot "
-    "follow each other in an order drawn by lot. What one returns is "
-    "evaluated by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a "
-    "busy machine. Solved means: "
-)
-# The rule for solvers that a budget of time cut short.
-RULE = (
-    "All shares are of all targets given: a solver whose budget of time ran out is marked “cut "
-    "at”, the targets that it never began count as not solved, and it is not ranked."
-)
-TIES = (
-    "Solvers tie unless one does better on so many of the same targets that chance would do as "
-    "much in less than 5 % of cases (McNemar’s exact test for success, lots for the signs of "
-    "differences for times; Holm’s correction over rivals)."
-)
 NAMES = (titled("robot"), text("solver", lambda record: record.solver))
 
 
 class Tables(NamedTuple):
     """The tables that exist for either kind."""
 
+    overall: Layout
+    map: Layout
     success: Layout
     outcomes: Layout
     strata: Layout
@@ -171,13 +158,6 @@ def _measured(kind: str, results: Results, task: str = REACHABLE) -> list[Record
     return measured(records_of(results, kind, task))
 
 
-def _how(records: Sequence[Record]) -> str:
-    return (
-        f"{_MEASURED}within {settings(records, 'tolerance')} m and "
-        f"{settings(records, 'tolerance_rotation')} rad, every limit kept to 1e-6 rad."
-    )
-
-
 def success(kind: str) -> Layout:
     """Return how many targets are solved, how soon, and how closely."""
     columns = (
@@ -214,17 +194,10 @@ def success(kind: str) -> Layout:
         "are of those solved, not cut off at the tolerance. “Claimed but not so” counts "
         "answers that the solver calls solved and the evaluation does not. "
         f"{SCORE} {TIES}",
-        measured=_how,
+        measured=how,
         summary=_success_summary,
         ranked=is_ranked,
     )
-
-
-# What a geometric mean of times is.
-SCORE = (
-    f"The geometric mean is of times plus {words_in(SHIFT, 'µs')}, less that in the end; a target "
-    f"that is not solved counts as {words_in(PENALTY, 'ms')}, or as what it took if that is longer."
-)
 
 
 def _if_measured(column: Column) -> Column:
@@ -298,7 +271,7 @@ def outcome(kind: str) -> Layout:
         "limit: the target is met, but by a pose that no joint may take. Wrong claim: off the "
         "target though called solved. Missed: off the target, and not called solved. Not begun: "
         "the budget of time ran out before.",
-        measured=_how,
+        measured=how,
         summary=_outcome_summary,
         ranked=is_ranked,
     )
@@ -333,7 +306,7 @@ def strata(kind: str) -> Layout:
         "effector is farthest from and nearest to the first joint; near singular: the twentieth "
         "with the smallest least singular value of the Jacobian; at a limit: one joint put at "
         f"one of its limits. {RULE}",
-        measured=_how,
+        measured=how,
         summary=_strata_summary,
         ranked=is_ranked,
     )
@@ -430,7 +403,7 @@ def unreachable(kind: str) -> Layout:
         "or more; the lower bound is how much farther a target is than all links in a row. A "
         "solver of poses may trade distance for angle. Answers beyond a limit have no distance. "
         f"{RULE}",
-        measured=lambda rows: _how([missed.record for missed in rows]),
+        measured=lambda rows: how([missed.record for missed in rows]),
         summary=_unreachable_summary,
         ranked=lambda missed: is_ranked(missed.record),
     )
@@ -494,7 +467,7 @@ def budgets(kind: str) -> Layout:
         ),
         shows="Share of the targets within reach that are solved within so much time for each. "
         f"{RULE} {TIES}",
-        measured=_how,
+        measured=how,
         summary=_leaders,
         figures=(figures.budgets(kind),),
         ranked=is_ranked,
@@ -558,7 +531,7 @@ def profile(kind: str) -> Layout:
         shows="Share of the targets, among those within reach that any of these solvers "
         "solves, that a solver solves within so many times the time of the fastest on that "
         f"target (Dolan and Moré 2002). {RULE}",
-        measured=lambda rows: _how(rows[0].records if rows else []),
+        measured=lambda rows: how(rows[0].records if rows else []),
         summary=_profile_summary,
         figures=(figures.profiles(kind),),
     )
@@ -586,7 +559,14 @@ def _duration(seconds: float) -> str:
 
 OF_KIND = {
     kind: Tables(
-        success(kind), outcome(kind), strata(kind), unreachable(kind), budgets(kind), profile(kind)
+        aggregate(kind),
+        problem_map(kind),
+        success(kind),
+        outcome(kind),
+        strata(kind),
+        unreachable(kind),
+        budgets(kind),
+        profile(kind),
     )
     for kind in KINDS
 }
