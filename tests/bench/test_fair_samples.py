@@ -202,7 +202,7 @@ def test_solvers_are_compared_over_robots_that_all_of_them_take(run):
 def test_who_is_cut_on_one_robot_is_not_ranked_over_all(cut, run):
     table = ONE.overall(Results([*cut.records, run("fine", 50)]))
     row = column(table, "solver").index("slow")
-    assert column(table, "mark")[row] == "cut or other targets on 1 of 1 robots"
+    assert column(table, "mark")[row] == "cut at 3 of 120"
     assert shares(table, "solved")[row] == (2, MANY)
     assert "slow" not in table.summary.points[0]
     assert row in table.unranked

@@ -24,9 +24,10 @@ from .targets import STRATA, least_distances, robot_targets, unreachable_targets
 
 SUITE = "ik"
 TOLERANCE = Tolerance(1e-3, 1e-3)
-# Targets in a stratum, and seconds that a solver has for a robot, for those of a scale.
+# Targets in a stratum, and seconds that a solver has for a robot within reach and beyond, for
+# those of a scale.
 _TARGETS = 0.1
-_BUDGET = 3.0
+_BUDGET, _BUDGET_BEYOND = 5.0, 3.0
 # Targets out of reach are no fewer than these, however few are asked for in a stratum.
 OUT_OF_REACH = 100
 EVERY_SOLVER = "all solvers"
@@ -58,8 +59,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
             facts = {"task": REACHABLE, "title": title(name)}
             yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"}, 0, facts)
     entries = ((peer, entry) for peer in registry.PEERS for entry in peer.entries)
-    budget = _BUDGET * scale.seconds
-    made = [block for each in entries for block in _entry_blocks(*each, here, count, budget)]
+    made = [block for one in entries for block in _entry_blocks(*one, here, count, scale.seconds)]
     yield from by_lot(made)
 
 
@@ -79,7 +79,7 @@ def _lot(block: Block) -> int:
 
 
 def _entry_blocks(
-    peer: Peer, entry: Entry, robots: list[str], count: int, budget: float
+    peer: Peer, entry: Entry, robots: list[str], count: int, seconds: float
 ) -> Iterator[Block]:
     solver = peer.called(entry)
     settings = settings_of(peer, entry, TOLERANCE)
@@ -90,10 +90,11 @@ def _entry_blocks(
         return
     beyond = max(OUT_OF_REACH, count)
     for name in robots:
-        run = Run(name, peer, entry, TOLERANCE, budget)
+        run = Run(name, peer, entry, TOLERANCE, _BUDGET * seconds)
         measure = partial(_solve_strata, run, count)
         facts = {"task": REACHABLE, "title": title(name)}
         yield Block(SUITE, f"robots/{name}", solver, measure, settings, count * len(STRATA), facts)
+        run = run._replace(budget=_BUDGET_BEYOND * seconds)
         measure = partial(_solve_unreachable, run, beyond)
         facts = {"task": UNREACHABLE, "title": title(name)}
         yield Block(SUITE, f"unreachable/{name}", solver, measure, settings, beyond, facts)

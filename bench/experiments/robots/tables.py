@@ -479,14 +479,14 @@ def _within_budgets(record: Record) -> np.ndarray:
 
 
 def _leaders(records: Sequence[Record]) -> Summary:
-    """Say who is ahead at each budget, robot by robot."""
+    """Say who is ahead at some budgets, robot by robot."""
     points = (f"{name}: {_ahead(mine)}" for name, mine in by_robot(records).items())
     return listing("Ahead:", (point for point in points if not point.endswith(": ")))
 
 
 def _ahead(records: Sequence[Record]) -> str:
     said = []
-    for budget in BUDGETS.tolist():
+    for budget in WHOLE:
         hits = {r.solver: solved_within(r, budget) for r in records if is_ranked(r)}
         ranking = metrics.ranking(hits)
         if ranking.order and hits[ranking.order[0]].any():

@@ -24,7 +24,7 @@ def heat_map(kind: str) -> Figure:
         if not made:
             return None
         robots = list(dict.fromkeys(robot for line in made for robot in line.records))
-        with canvas(0.9 + 0.27 * len(made), 2, sharey=True) as (figure, axes):
+        with canvas(1.3 + 0.27 * len(made), 2, sharey=True) as (figure, axes):
             _panel(axes[0], made, robots, "solved [%]", _success)
             _panel(axes[1], made, robots, "times the least time", _slowness)
             axes[0].set_yticks(range(len(made)), [written(line.solver) for line in made])
@@ -76,7 +76,8 @@ def _panel(
             ax.add_patch(box)
             ax.text(j, i, said, ha="center", va="center", fontsize=8)
     ax.set(title=title, xlim=(-0.5, len(robots) - 0.5), ylim=(-0.5, len(made) - 0.5))
-    ax.set_xticks(range(len(robots)), [written(robot) for robot in robots])
+    names = [written(robot) for robot in robots]
+    ax.set_xticks(range(len(robots)), names, rotation=25, ha="right", rotation_mode="anchor")
     ax.tick_params(length=0)
     ax.grid(visible=False)
     for spine in ax.spines.values():

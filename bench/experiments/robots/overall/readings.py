@@ -9,6 +9,7 @@ from ....harness import metrics
 from ....harness.metrics import Floats, Interval, Ranking, Share
 from ....harness.record import Record
 from ....presentation.results import Results, listed
+from ....presentation.tables import words
 from ..readings import (
     SHIFT,
     by_robot,
@@ -81,10 +82,11 @@ class Overall(NamedTuple):
 
     @property
     def marks(self) -> str:
-        """Where it is first or ties with the first, and on how many robots it was cut short."""
+        """Where it is first or ties with the first, and where it was cut short."""
         if not self.is_ranked:
-            count = sum(not is_ranked(record) for record in self.records)
-            return f"cut or other targets on {count} of {len(self.records)} robots"
+            begun = sum(record.arrays["solved"].size for record in self.records)
+            asked = sum(map(total, self.records))
+            return f"cut at {words(begun)} of {words(asked)}" if begun < asked else "other targets"
         said = (("most solved", self.success), ("least time", self.time))
         return ", ".join(f"{what}{_tie(of)}" for what, of in said if self.solver in of.first)
 
