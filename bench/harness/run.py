@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +16,17 @@ from .machine import conditions
 from .measure import block_key, measure, now
 from .record import FINISHED, Key, Record, RecordFile
 
-__all__ = ["Event", "count", "forget", "keys", "measure", "missed_claims", "now", "run"]
+__all__ = [
+    "Event",
+    "block_key",
+    "count",
+    "forget",
+    "keys",
+    "measure",
+    "missed_claims",
+    "now",
+    "run",
+]
 
 KEPT, MEASURING, MEASURED, FAILED = "kept", "measuring", "measured", "failed"
 NOT_RUN = "not run"
@@ -45,8 +55,8 @@ def run(
     """Measure suites, yielding what happens; records already there are kept.
 
     A block is measured again where its record is from other sources, versions or another machine,
-    smaller than asked for, or failed. Records that nothing asks for are kept. In this process suites
-    are measured in order.
+    smaller than asked for, or failed. Records that nothing asks for are kept. In this process
+    suites are measured in order.
 
     Raises:
         ValueError: if the result file cannot be read, or another run writes to it; or if the
@@ -62,7 +72,7 @@ def run(
             for suite in together:
                 spent = time.perf_counter() - begin
                 end = _finished(suite, scale, spent, executor.stamp())
-                yield from _finish(end, keys(suite, scale), file)
+                yield from _finish(end, [b for b in wanted if b.suite == suite], file)
 
 
 def _run_blocks(
@@ -95,11 +105,13 @@ def _what(named: Block | Record) -> str:
     return f"{named.problem}, {named.solver}"
 
 
-def _finish(finished: Record, asked: set[Key], file: RecordFile) -> Iterator[Event]:
+def _finish(finished: Record, blocks: Sequence[Block], file: RecordFile) -> Iterator[Event]:
     """Put on record that a suite was gone through, and say what it did not ask for."""
+    asked = dict.fromkeys(map(block_key, blocks))
+    file.arrange(asked)
     suite, finished = finished.problem, replace(finished, size=len(asked))
     records = {record.key: record for record in file.read().records}
-    if asked <= records.keys() and not _says_the_same(records.get(finished.key), finished):
+    if asked.keys() <= records.keys() and not _says_the_same(records.get(finished.key), finished):
         file.append([finished])
     extra = [r for r in records.values() if r.suite == suite and r.key not in asked]
     old = [record for record in extra if _is_superseded(record, asked)]
@@ -129,7 +141,7 @@ def _says_the_same(record: Record | None, other: Record) -> bool:
     )  # fmt: skip
 
 
-def _is_superseded(record: Record, asked: set[Key]) -> bool:
+def _is_superseded(record: Record, asked: Iterable[Key]) -> bool:
     """Return whether a record that is not asked for belongs to what is, or to nothing measured.
 
     Its problem and solver are asked for under other settings, or it says only that something was
