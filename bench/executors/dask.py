@@ -287,7 +287,8 @@ def _connected(address: str, patience: float) -> Any:
         from distributed import Client
     except ImportError:
         raise ValueError(_NO_EXTRA) from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client", "asyncio"):  # what they say is said by us
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         return Client(address, timeout=patience, set_as_default=False, name="plumbob")
     except (OSError, TimeoutError):
