@@ -83,13 +83,19 @@ class Convergence(NamedTuple):
 
 def share(hits: NDArray[np.bool_]) -> Share:
     """Return how many of the entries are true, with Wilson's interval (Wilson 1927)."""
-    count, total, z = int(np.count_nonzero(hits)), int(np.size(hits)), _NORMAL
+    count, total = int(np.count_nonzero(hits)), int(np.size(hits))
     if total == 0:
         return Share(0, 0, 0.0, 1.0)
-    rate = count / total
-    centre = (rate + z**2 / (2 * total)) / (1 + z**2 / total)
-    half = z * math.sqrt(rate * (1 - rate) / total + (z / (2 * total)) ** 2) / (1 + z**2 / total)
-    return Share(count, total, max(0.0, centre - half), min(1.0, centre + half))
+    low, high = wilson(np.array(count / total), total)
+    return Share(count, total, float(low), float(high))
+
+
+def wilson(rates: Floats, total: int) -> tuple[Floats, Floats]:
+    """Return between what the true rates lie in 95 % of samples of this size (Wilson 1927)."""
+    z = _NORMAL
+    centre = (rates + z**2 / (2 * total)) / (1 + z**2 / total)
+    half = z * np.sqrt(rates * (1 - rates) / total + (z / (2 * total)) ** 2) / (1 + z**2 / total)
+    return np.maximum(0.0, centre - half), np.minimum(1.0, centre + half)
 
 
 def spread(values: Floats) -> Spread:
