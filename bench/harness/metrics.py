@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from reference import rotation
 
@@ -71,6 +72,15 @@ RESAMPLES, _SEED, LARGE = 400, 1979, 20_000
 _NORMAL = 1.959963984540054
 # The signs of so few differences are gone through one and all.
 _FEW = 12
+
+
+class Ratio(NamedTuple):
+    """By what factor one of two samples of pairs exceeds the other, with its 95 % interval."""
+
+    mean: float
+    low: float
+    high: float
+    pairs: int
 
 
 class Convergence(NamedTuple):
@@ -247,6 +257,21 @@ def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Flo
         return np.full((len(taken), len(ratios)), math.nan)
     slower = np.sort(taken / best, axis=-1)
     return np.array([np.searchsorted(row, ratios, side="right") for row in slower]) / len(best)
+
+
+def paired_ratio(values: Floats, others: Floats) -> Ratio:
+    """Return the geometric mean of values / others over the pairs in which both are numbers.
+
+    The interval is Student's, of the logarithms; a single pair leaves the factor open.
+    """
+    logs = np.log(np.asarray(values) / np.asarray(others))
+    logs = logs[np.isfinite(logs)]
+    count = int(logs.size)
+    if count < 2:
+        return Ratio(float(np.exp(logs[0])) if count else math.nan, 0.0, math.inf, count)
+    half = stdtrit(count - 1, 0.975) * logs.std(ddof=1) / math.sqrt(count)
+    mean, low, high = np.exp(logs.mean() + np.array([0.0, -half, half]))
+    return Ratio(float(mean), float(low), float(high), count)
 
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
