@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from reference import rotation
 
@@ -73,6 +74,15 @@ _NORMAL = 1.959963984540054
 _FEW = 12
 
 
+class Ratio(NamedTuple):
+    """By what factor one of two samples of pairs exceeds the other, with its 95 % interval."""
+
+    mean: float
+    low: float
+    high: float
+    pairs: int
+
+
 class Convergence(NamedTuple):
     """Quantiles over the targets of the residual before and after each iteration."""
 
@@ -83,13 +93,19 @@ class Convergence(NamedTuple):
 
 def share(hits: NDArray[np.bool_]) -> Share:
     """Return how many of the entries are true, with Wilson's interval (Wilson 1927)."""
-    count, total, z = int(np.count_nonzero(hits)), int(np.size(hits)), _NORMAL
+    count, total = int(np.count_nonzero(hits)), int(np.size(hits))
     if total == 0:
         return Share(0, 0, 0.0, 1.0)
-    rate = count / total
-    centre = (rate + z**2 / (2 * total)) / (1 + z**2 / total)
-    half = z * math.sqrt(rate * (1 - rate) / total + (z / (2 * total)) ** 2) / (1 + z**2 / total)
-    return Share(count, total, max(0.0, centre - half), min(1.0, centre + half))
+    low, high = wilson(np.array(count / total), total)
+    return Share(count, total, float(low), float(high))
+
+
+def wilson(rates: Floats, total: int) -> tuple[Floats, Floats]:
+    """Return between what the true rates lie in 95 % of samples of this size (Wilson 1927)."""
+    z = _NORMAL
+    centre = (rates + z**2 / (2 * total)) / (1 + z**2 / total)
+    half = z * np.sqrt(rates * (1 - rates) / total + (z / (2 * total)) ** 2) / (1 + z**2 / total)
+    return np.maximum(0.0, centre - half), np.minimum(1.0, centre + half)
 
 
 def spread(values: Floats) -> Spread:
@@ -241,6 +257,21 @@ def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Flo
         return np.full((len(taken), len(ratios)), math.nan)
     slower = np.sort(taken / best, axis=-1)
     return np.array([np.searchsorted(row, ratios, side="right") for row in slower]) / len(best)
+
+
+def paired_ratio(values: Floats, others: Floats) -> Ratio:
+    """Return the geometric mean of values / others over the pairs in which both are numbers.
+
+    The interval is Student's, of the logarithms; a single pair leaves the factor open.
+    """
+    logs = np.log(np.asarray(values) / np.asarray(others))
+    logs = logs[np.isfinite(logs)]
+    count = int(logs.size)
+    if count < 2:
+        return Ratio(float(np.exp(logs[0])) if count else math.nan, 0.0, math.inf, count)
+    half = stdtrit(count - 1, 0.975) * logs.std(ddof=1) / math.sqrt(count)
+    mean, low, high = np.exp(logs.mean() + np.array([0.0, -half, half]))
+    return Ratio(float(mean), float(low), float(high), count)
 
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:

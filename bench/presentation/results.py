@@ -18,6 +18,11 @@ class Results:
         """Leave out those that say why there are none, and those under settings of before."""
         self.records = [r for r in records if not r.failed and not r.superseded]
 
+    @property
+    def entrants(self) -> frozenset[str]:
+        """The solvers that a user has entered."""
+        return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
+
     def all(self, suite: str, **wanted: Any) -> list[Record]:
         """Return the records of a suite whose facts and settings are these."""
         return [record for record in self.records if record.suite == suite and _has(record, wanted)]

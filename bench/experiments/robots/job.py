@@ -107,6 +107,7 @@ def _solve(solve: Solve, job: Job) -> Solved:
             return SolverOutput(None, False)
 
     answer, seconds = timed(solve_once)
+    seconds = seconds if answer.seconds is None else answer.seconds
     nothing = np.full(starts.shape[-1], np.nan)
     q = nothing if answer.q is None else np.array(answer.q, dtype=float)
     if q.shape != nothing.shape:

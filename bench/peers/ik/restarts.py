@@ -20,20 +20,25 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
     the clock runs.
     """
 
-    def keeps_limits(q: FloatArray) -> bool:
-        return bool((q >= robot.lower).all() and (q <= robot.upper).all())
+    def good(answer: SolverOutput) -> bool:
+        if not answer.claimed or answer.q is None:
+            return False
+        return bool((answer.q >= robot.lower).all() and (answer.q <= robot.upper).all())
 
     def again(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
         poses = robot.draw(generator_of(positions, rotations, start), restarts)
 
         def solve() -> SolverOutput:
             answer = ask(positions, rotations, start)()
+            seconds = answer.seconds
             for pose in poses:
-                if answer.claimed and answer.q is not None and keeps_limits(answer.q):
-                    return answer
+                if good(answer):
+                    break
                 answer = ask(positions, rotations, pose.copy())()
-            good = answer.claimed and answer.q is not None and keeps_limits(answer.q)
-            return SolverOutput(answer.q, good if answer.claimed is not None else None)
+                if seconds is not None and answer.seconds is not None:
+                    seconds += answer.seconds
+            claimed = good(answer) if answer.claimed is not None else None
+            return SolverOutput(answer.q, claimed, seconds)
 
         return solve
 
