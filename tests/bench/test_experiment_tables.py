@@ -132,6 +132,52 @@ def test_times_are_medians_beside_ours(records):
     assert column(table, "of our compiled time") == [None, 0.5]
 
 
+def swept(make, solver, seconds, noise=0.01):
+    """Nine sweeps of three rounds, and how noisy the machine was."""
+    made = make.timed(solver, 1.0)
+    rounds = np.repeat(np.asarray(seconds)[:, None], 3, axis=1)
+    return replace(made, arrays=made.arrays | {"seconds": rounds},
+                   facts={**made.facts, "noise": noise})  # fmt: skip
+
+
+def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_so(make, rng):
+    drift = rng.lognormal(0.0, 0.5, 9)
+    ours, rival = (
+        swept(make, "Plumbob, compiled", 1e-6 * drift),
+        swept(make, "MuJoCo", 2e-6 * drift),
+    )
+    table = timing.kinematics(Results([ours, rival]))
+    known = column(table, "median known to ± [%]")
+    assert known[0] == pytest.approx(known[1])
+    assert known[0] == pytest.approx(
+        50.0 * (np.sort(drift)[7] - np.sort(drift)[1]) / np.median(drift)
+    )
+    (point,) = table.summary.points
+    assert point.endswith("first: Plumbob")
+    again = swept(make, "MuJoCo", 1e-6 * rng.permutation(drift))
+    (point,) = timing.kinematics(Results([ours, again])).summary.points
+    assert "in a tie with" in point
+
+
+@pytest.mark.parametrize(("noise", "mark"), [(0.049, ""), (0.12, "noisy")])
+def test_a_machine_too_noisy_for_the_precision_aimed_at_is_said_to_be_so(make, noise, mark):
+    table = timing.kinematics(Results([swept(make, "MuJoCo", np.ones(9), noise)]))
+    assert column(table, "mark") == [mark]
+    assert ("too noisy for the 5 %" in table.measured) == bool(mark)
+    assert table.summary.sentence.startswith("The machine was too noisy") == bool(mark)
+
+
+def test_the_paces_beside_the_records_tell_whether_robots_were_timed_in_peace(make):
+    def how(paces):
+        made = [make.raced(s, "one start") for s in "abc"]
+        noted = [replace(r, conditions={"pace": p}) for r, p in zip(made, paces, strict=True)]
+        return ONE.success(Results(noted)).measured
+
+    assert "steady within the 5 %" in how([1e-4, 1.01e-4, 1e-4])
+    assert "too noisy for the 5 %" in how([1e-4, 1.5e-4, 1e-4])
+    assert "noisy" not in ONE.success(Results([make.raced("a", "one start")])).measured
+
+
 def test_a_limit_stands_in_a_column_and_not_in_a_row(make):
     limit = make.timed("limit: copying as many bytes", 1e-7)
     table = timing.kinematics(Results([make.timed("Plumbob, compiled", 1e-6), limit]))

@@ -143,6 +143,14 @@ def test_a_group_is_timed_once_and_what_is_left_of_another_run_is_not_used(monke
     with pytest.raises(RuntimeError, match="broken"):
         again[1].measure()
     assert len(asked) == 3
+    assert again[0].measure().arrays["seconds"].tolist() == [[4.0]]
+    with pytest.raises(RuntimeError, match="broken"):
+        again[1].measure()
+    monkeypatch.setattr(measurement, "FRESH", -1.0)  # as if found long ago
+    with pytest.raises(RuntimeError, match="broken"):
+        again[1].measure()
+    assert again[0].measure().arrays["seconds"].tolist() == [[7.0]]
+    assert len(asked) == 6
 
 
 def test_the_limit_moves_as_many_bytes_as_it_says(monkeypatch):

@@ -5,6 +5,7 @@ never began count as not solved. It has a mark, and is not ranked; nor is one wh
 other targets than those of most solvers.
 """
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +18,7 @@ from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
 from ...presentation.columns import words_in
-from ...presentation.results import Results, settings
+from ...presentation.results import Results, settings, steadiness
 from . import LIMIT_TOLERANCE, REACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}
@@ -245,8 +246,11 @@ def _of_same_targets(records: Sequence[Record]) -> list[Record]:
 
 
 def how(records: Sequence[Record]) -> str:
-    """Return how the numbers of records came about."""
+    """Return how the numbers of records came about, and whether the machine was steady."""
+    paces = [float(r.conditions["pace"]) for r in records if r.conditions.get("pace")]
+    noise = metrics.relative_spread(np.array(paces)) if len(paces) > 1 else math.nan
     return (
         f"{_MEASURED}within {settings(records, 'tolerance')} m and "
-        f"{settings(records, 'tolerance_rotation')} rad, every limit kept to 1e-6 rad."
-    )
+        f"{settings(records, 'tolerance_rotation')} rad, every limit kept to 1e-6 rad. "
+        f"{steadiness(noise)}"
+    ).rstrip()

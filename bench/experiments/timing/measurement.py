@@ -11,6 +11,7 @@ from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import WorkerProcess
 from ...harness.record import Key
+from ...harness.stopwatch import Budget
 from .case import TIMING, Case
 from .cases import cases
 from .job import TimingJob
@@ -31,8 +32,10 @@ def blocks(scale: Scale) -> Iterator[Block]:
         yield Block(TIMING, name, case.solver, measure, settings, scale.seconds, case.facts)
 
 
-# What was found for cases that were measured together with another: by the run and the case.
-_found: dict[tuple[str, Key], Measured | str] = {}
+# What was found for cases that were measured together with another, by the run and the case; it is
+# handed out for so long [s].
+_found: dict[tuple[str, Key], tuple[Measured | str, Budget]] = {}
+FRESH = 600.0
 
 
 def timed(run: str, case: Case, seconds: float) -> Measured:
@@ -45,11 +48,12 @@ def timed(run: str, case: Case, seconds: float) -> Measured:
     Raises:
         RuntimeError: if there are no rounds; the message says why.
     """
+    for key in [key for key, (_, fresh) in _found.items() if key[0] != run or fresh.is_spent]:
+        del _found[key]
     if (run, case.key) not in _found:
-        for other in [key for key in _found if key[0] != run]:
-            del _found[other]
-        _found.update({(run, key): found for key, found in _together(case, seconds).items()})
-    found = _found.pop((run, case.key))
+        together = _together(case, seconds).items()
+        _found.update({(run, key): (found, Budget(FRESH)) for key, found in together})
+    found, _ = _found.pop((run, case.key))
     if isinstance(found, str):
         raise RuntimeError(found)
     return found
