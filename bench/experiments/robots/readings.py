@@ -19,6 +19,7 @@ from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
 from ...presentation.columns import words_in
 from ...presentation.results import Results, settings, steadiness
+from ...presentation.tables import words
 from . import LIMIT_TOLERANCE, REACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}
@@ -79,10 +80,15 @@ def _commonest(records: Sequence[Record]) -> int:
 def _marked(record: Record, size: int) -> Record:
     if "solved" not in record.arrays:
         return record
+    others = f"other targets, {total(record)}" if total(record) != size else ""
+    marks = "; ".join(filter(None, (cut(record), others)))
+    return replace(record, notes={**record.notes, MARK: marks})
+
+
+def cut(record: Record) -> str:
+    """Return where a budget of time ended a record's targets, "" if there was enough of it."""
     asked, begun = total(record), record.arrays["solved"].size
-    marks = [f"cut at {begun} of {asked}"] if begun < asked else []
-    marks += [f"other targets, {asked}"] if asked != size else []
-    return replace(record, notes={**record.notes, MARK: "; ".join(marks)})
+    return f"cut at {words(begun)} of {words(asked)}" if begun < asked else ""
 
 
 def is_ranked(record: Record) -> bool:
