@@ -22,9 +22,11 @@ from .tables import words
 # So near to the converged step a solver has solved it.
 TARGET = "1e-6"
 NEAR = float(TARGET)
+# Who solves less than this part of what the leader solves, a half, is no rival in speed.
+ABLE = 2
 # Ties of more solvers than this are counted, not listed.
 MOST_NAMED = 2
-SUBJECTS = {"kinematics": "Forward kinematics", "ik": "An IK solve", "cloth": "A cloth step"}
+SUBJECTS = {"kinematics": "Forward kinematics", "ik": "Inverse kinematics", "cloth": "Cloth step"}
 _OURS = registry.COMPILED.name
 _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
 
@@ -201,7 +203,7 @@ def _tied(names: Sequence[str]) -> str:
     """Return who leads: one name, or those that tie."""
     if len(names) <= 1:
         return "".join(names)
-    return f"{listed(names)} tie" if len(names) <= MOST_NAMED else f"{len(names)} solvers tie"
+    return f"Tie: {', '.join(names) if len(names) <= MOST_NAMED else f'{len(names)} solvers'}"
 
 
 def _fastest(results: Results) -> Headline | None:
@@ -211,12 +213,14 @@ def _fastest(results: Results) -> Headline | None:
     taken = np.where(poses.solved, poses.seconds, np.nan)
     first = metrics.performance_profiles(taken, poses.solved, np.array([1.0]))[:, 0]
     leader = int(np.argmax(first))
-    rivals = {s: taken[i] for i, s in enumerate(poses.solvers) if i != leader}
+    solved = poses.solved.sum(axis=1)
+    able = [i for i in range(len(solved)) if i != leader and ABLE * solved[i] >= solved[leader]]
+    rivals = {poses.solvers[i]: taken[i] for i in able}
     closest = _closest(taken[leader], rivals)
     if closest is None:
         return None
     answer, factor = _leads(poses.solvers[leader], *closest)
-    detail = f"{factor} on {words(closest[1].pairs)} poses both solve"
+    detail = f"{factor}, {words(closest[1].pairs)} poses"
     return Headline("kinematics", "Fastest", answer, detail, "robots_success_one_start")
 
 
@@ -234,10 +238,11 @@ def _leads(leader: str, rival: str, ratio: metrics.Ratio) -> tuple[str, str]:
     """Return who leads, or ties, and by what factor."""
     interval = f"({words(ratio.low)}–{words(ratio.high)})"
     if ratio.low <= 1.0 <= ratio.high:
-        return f"{leader} and {rival} tie", f"time ratio {words(ratio.mean)} {interval}"
+        return _tied((leader, rival)), f"factor {words(ratio.mean)} {interval}"
     if ratio.mean < 1.0:
-        return rival, f"{words(1 / ratio.mean)} × as fast as {leader}"
-    return leader, f"{words(ratio.mean)} × {rival}’s speed {interval}"
+        inverse = f"({words(1 / ratio.high)}–{words(1 / ratio.low)})"
+        return rival, f"{words(1 / ratio.mean)} × {leader} {inverse}"
+    return leader, f"{words(ratio.mean)} × {rival} {interval}"
 
 
 class Time(NamedTuple):
@@ -270,7 +275,7 @@ def _arrived(results: Results) -> Headline | None:
     if not most:
         return None
     ties = [solver for solver, count in arrivals.items() if count == most]
-    detail = f"within {TARGET} of the converged step on {most} of {len(times)} cloths"
+    detail = f"{TARGET} near on {most}/{len(times)} cloths"
     return Headline("cloth", "Most accurate", _tied(ties), detail, "cloth_peers_step")
 
 
@@ -280,7 +285,7 @@ def _soonest(results: Results) -> Headline | None:
     for cloth, times in _arrival_times(results).items():
         for solver in sorted(times, key=lambda solver: times[solver]):
             best.setdefault(cloth, {}).setdefault(registry.find(solver).engine, times[solver])
-    return _first("cloth", "Fastest there", "cloths", best, "cloth_peers_step")
+    return _first("cloth", "Fastest", "cloths", best, "cloth_peers_step")
 
 
 def _timed(results: Results, subject: str) -> Headline | None:
@@ -310,7 +315,7 @@ def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headl
     firsts = Counter(ranked[0][0] for ranked in decided)
     most = max(firsts.values())
     leaders = [name for name, count in firsts.items() if count == most]
-    detail = f"first in {most} of {len(works)} {of}"
+    detail = f"first in {most}/{len(works)} {of}"
     if len(leaders) == 1:
         detail += _ahead([ranked for ranked in decided if ranked[0][0] == leaders[0]])
     return Headline(chapter, asked, _tied(leaders), detail, table)
@@ -319,7 +324,7 @@ def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headl
 def _ahead(won: Sequence[Sequence[tuple[str, Time]]]) -> str:
     """Say by what factors the works were won."""
     factors = [ranked[1][1].median / ranked[0][1].median for ranked in won if len(ranked) > 1]
-    return f", {_range(factors)} × the next" if factors else "; no other engine arrives"
+    return f", {_range(factors)} × the next" if factors else "; no rival arrives"
 
 
 def _is_tie(ranked: Sequence[tuple[str, Time]]) -> bool:

@@ -9,11 +9,15 @@ from typing import Any, NamedTuple
 from ..experiments import SUITES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
 from .figures import Drawing
+from .headlines import absent, answers
 from .layout import Figure, Layout
-from .page import FORMATS, Shown, render, rows
-from .results import Results, plain, sift
+from .page import Shown, render
+from .results import Results, listed, plain, sift
 from .sections import SECTIONS
-from .tables import Table
+from .tables import Table, best_cells, comma_separated, latex, markdown
+
+# The forms that a table is written in, by the suffix of the file.
+FORMATS = {"md": markdown, "tex": latex, "csv": comma_separated}
 
 
 class Written(NamedTuple):
@@ -58,7 +62,8 @@ def _shown(records: Sequence[Record]) -> Shown:
     results = Results(records)
     made = {layout: _checked(layout, results) for section in SECTIONS for layout in section.layouts}
     drawn = {draw: draw(results) for draw in all_figures()}
-    return Shown(records, made, {draw: drawing for draw, drawing in drawn.items() if drawing})
+    drawings = {draw: drawing for draw, drawing in drawn.items() if drawing}
+    return Shown(records, made, drawings, answers(results))
 
 
 def all_figures() -> list[Figure]:
@@ -71,14 +76,15 @@ def _makers() -> Iterator[Callable[[Results], Any]]:
     for section in SECTIONS:
         yield from (partial(_checked, layout) for layout in section.layouts)
     yield from all_figures()
+    yield answers
 
 
 def _checked(layout: Layout, results: Results) -> Table:
     """Return a table that can be written in every form."""
     table = layout(results)
-    rows(table)
-    for form in FORMATS.values():
-        form.write(table)
+    best_cells(table)
+    for write_as in FORMATS.values():
+        write_as(table)
     return table
 
 
@@ -86,9 +92,8 @@ def _write_files(folder: Path, made: Iterable[Table], drawings: Iterable[Drawing
     for name in ("tables", "figures"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     for table in made:
-        for suffix, form in FORMATS.items():
-            path = folder / "tables" / f"{table.name}.{suffix}"
-            _write(path, form.write(table))
+        for suffix, write_as in FORMATS.items():
+            _write(folder / "tables" / f"{table.name}.{suffix}", write_as(table))
     for drawing in drawings:
         _write(folder / "figures" / f"{drawing.name}.svg", drawing.svg)
 
@@ -121,6 +126,11 @@ def _missing(records: Sequence[Record]) -> list[str]:
         for package, version in newest.stamp.get("versions", {}).items()
         if not version
     ]
+    if names := absent(Results(records)):
+        sentences.append(
+            f"Absent peers: {listed(names)}. `make peers` (or `pip install -e .[peers]`) adds those"
+            " that have a wheel for this Python; `plumbob bench ik cloth` then measures them."
+        )
     others = sum(record.stamp != newest.stamp for record in records)
     if others:
         sentences.append(

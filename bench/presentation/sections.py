@@ -16,6 +16,7 @@ class Section(NamedTuple):
 
     Attributes:
         name: what experiments and addresses within the page call it.
+        short: what links to it say.
         title: its heading.
         about: what it is about.
         main: the name of its main table, shown unfolded; "" if it has none.
@@ -23,6 +24,7 @@ class Section(NamedTuple):
     """
 
     name: str
+    short: str
     title: str
     about: str
     main: str = ""
@@ -47,12 +49,14 @@ class Section(NamedTuple):
 SECTIONS = (
     Section(
         "right",
+        "Right?",
         "Is it right?",
         "Nothing below counts unless the reference itself is right. Each claim computes one "
         "quantity twice, by Plumbob and by a physics engine that shares no code with it.",
     ),
     Section(
         "kinematics",
+        "Kinematics",
         "Inverse kinematics",
         "Real arms and a character with two hands to place: the same targets, starts and "
         "evaluation for every solver. The lab’s arm of five joints draws curves, and a chain of "
@@ -62,6 +66,7 @@ SECTIONS = (
     ),
     Section(
         "cloth",
+        "Cloth",
         "Cloth by implicit Euler",
         "A cloth falls from rest and swings from two corners, as it is and stiffer. A step "
         "minimises the objective g of Liu et al. (2013).",
@@ -70,6 +75,7 @@ SECTIONS = (
     ),
     Section(
         "speed",
+        "Speed",
         "Speed",
         "The same work by the compiled and the plain source, and by both engines, in one run on "
         "one core.",

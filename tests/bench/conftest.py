@@ -315,7 +315,7 @@ def as_liu(solver, seconds):
     return record("cloth", "peers/liu2013", solver, {"size": 81}, arrays, facts=facts)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make():
     """The makers of records, by name."""
     return SimpleNamespace(
