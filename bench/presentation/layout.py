@@ -9,9 +9,9 @@ from .results import Results
 from .tables import NO_SUMMARY, Column, Source, Summary, Table
 
 if TYPE_CHECKING:
-    from .figures import Drawing
+    from .figures import Sketch
 
-Figure = Callable[[Results], "Drawing | None"]
+Figure = Callable[[Results], "Sketch | None"]
 
 
 @dataclass(frozen=True, eq=False)
