@@ -1,6 +1,7 @@
 """The first screen’s answers: is it right, who is most accurate and fastest, who is absent.
 
-All are made from the records. Who leads by less than the interval allows ties with who is led.
+All are made from the records. Who is not told from the first ties with it: over robots by the pairs
+of `metrics.ranking`, among timed works where intervals overlap.
 """
 
 from collections import Counter
@@ -169,8 +170,10 @@ def _fastest(results: Results) -> Headline | None:
     first, second = (rows[solver].penalised + SHIFT for solver in ranking.order[:2])
     ratio = metrics.paired_ratio(second, first)
     interval = f"({words(ratio.low)}–{words(ratio.high)})"
-    detail = f"{words(ratio.mean)} × {ranking.order[1]} {interval}, misses penalised"
-    return Headline("kinematics", "Fastest", _tied(ranking.first), detail, OVERALL)
+    detail = f"{words(ratio.mean)} × {ranking.order[1]} {interval}, {words(ratio.pairs)} poses"
+    return Headline(
+        "kinematics", "Fastest, misses penalised", _tied(ranking.first), detail, OVERALL
+    )
 
 
 def _tied(names: Sequence[str]) -> str:
@@ -181,7 +184,10 @@ def _tied(names: Sequence[str]) -> str:
 
 
 class Time(NamedTuple):
-    """What a work takes a solver [s], and where 80 % of the rounds lie."""
+    """The median of what a work takes a solver [s], and its interval.
+
+    Of too few rounds for an interval these are the 10th and the 90th percentile.
+    """
 
     median: float
     low: float
@@ -235,6 +241,8 @@ def _timed(results: Results, subject: str) -> Headline | None:
 
 def _time(record: Record) -> Time:
     timing = metrics.timing(record.arrays["seconds"])
+    if np.isfinite(timing.interval).all():
+        return Time(*timing.interval)
     return Time(timing.median, timing.low, timing.high)
 
 
@@ -263,7 +271,7 @@ def _ahead(won: Sequence[Sequence[tuple[str, Time]]]) -> str:
 
 
 def _is_tie(ranked: Sequence[tuple[str, Time]]) -> bool:
-    """Return whether the rounds of the first two overlap."""
+    """Return whether the intervals of the first two overlap."""
     return len(ranked) > 1 and ranked[0][1].high >= ranked[1][1].low
 
 

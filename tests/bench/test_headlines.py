@@ -13,6 +13,7 @@ from bench.presentation.layout import source
 from bench.presentation.results import Results
 
 N = 200
+FASTEST = "Fastest, misses penalised"
 
 
 def raced(make, solver, solved, seconds=1e-5, robot="arm", size=N):
@@ -30,7 +31,7 @@ def asked(records, question, chapter="kinematics"):
     return found
 
 
-def test_the_most_accurate_leads_alone_only_beyond_the_interval(make):
+def test_the_most_accurate_leads_alone_only_where_chance_would_not_do_as_much(make):
     far = [raced(make, "a", 190), raced(make, "b", 100)]
     assert asked(far, "Most accurate")[2:4] == ("a", "solves 95 % of 200 poses (91–97.3)")
     near = [raced(make, "a", 190), raced(make, "b", 188), raced(make, "c", 20)]
@@ -38,39 +39,38 @@ def test_the_most_accurate_leads_alone_only_beyond_the_interval(make):
     assert asked([*near, raced(make, "d", 189)], "Most accurate").answer == "Tie: 3 solvers"
 
 
-def test_a_solver_cut_short_is_scored_over_the_full_number(make):
-    """Two of three solved before its time was over are two of all."""
-    cut = raced(make, "slow", 2, seconds=[1.0, 1.0, 1.0])
-    found = asked([raced(make, "a", 150), cut], "Most accurate")
-    assert found.answer == "a"
-    assert "of 200 poses" in found.detail
+def test_a_solver_cut_short_is_not_ranked(make):
+    cut = raced(make, "slow", 3, seconds=[1.0, 1.0, 1.0])
+    records = [raced(make, "a", 150), raced(make, "b", 20), cut]
+    assert asked(records, "Most accurate").answer == "a"
+    assert "slow" not in asked(records, FASTEST).detail
+    assert headlines.headlines(Results([records[0], cut])) == []
 
 
-def test_solvers_are_compared_on_robots_that_all_of_them_took(make):
+def test_solvers_are_compared_on_robots_on_which_most_of_them_can_be(make):
     records = [raced(make, s, 150, robot=r) for s in ("a", "b") for r in ("arm", "ur5", "hand")]
+    assert "of 600 poses" in asked(records, "Most accurate").detail
     chains = [raced(make, "c", 199, robot=r) for r in ("arm", "ur5")]
     assert "of 400 poses" in asked([*records, *chains], "Most accurate").detail
-    lone = raced(make, "d", 200, robot="arm")
-    assert "of 600 poses" in asked([*records, lone], "Most accurate").detail
 
 
 def test_the_fastest_leads_by_a_factor_with_its_interval_and_count(make):
     spread = np.geomspace(1.0, 1.2, N)
-    records = [raced(make, "a", N, 1e-5 * spread), raced(make, "b", 150, 4e-5 * spread[::-1])]
-    answer, detail = asked(records, "Fastest")[2:4]
+    records = [raced(make, "a", N, 1e-3 * spread), raced(make, "b", N, 4e-3 * spread[::-1])]
+    answer, detail = asked(records, FASTEST)[2:4]
     assert answer == "a"
-    assert detail == "4.19 × b (4.13–4.24), 150 poses"  # 4 · 1.2^(1 − 2 · 0.374)
+    assert detail == "3.97 × b (3.91–4.03), 200 poses"  # 4, but for the shift of 10 µs
 
 
-def test_who_is_no_faster_beyond_the_interval_ties(make):
+def test_who_is_no_faster_beyond_chance_ties(make):
     noise = np.exp(np.random.default_rng(0).normal(0.0, 1.0, (2, N)))
     records = [raced(make, s, N, 1e-5 * of) for s, of in zip("ab", noise, strict=True)]
-    assert asked(records, "Fastest").answer.startswith("Tie: ")
+    assert asked(records, FASTEST).answer.startswith("Tie: ")
 
 
 def test_a_solver_that_fails_fast_is_not_the_fastest(make):
     records = [raced(make, "a", 190, 1e-4), raced(make, "hasty", 5, 1e-6), raced(make, "b", 190)]
-    assert asked(records, "Fastest").answer == "b"
+    assert asked(records, FASTEST).answer == "b"
 
 
 @pytest.mark.parametrize(("factor", "answer"), [(2.0, "Pinocchio"), (1.01, "Tie: ")])

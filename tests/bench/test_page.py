@@ -17,7 +17,7 @@ from bench.presentation.sections import SECTIONS
 
 DESK, PHONE = (1440, 900), (390, 844)
 ROBOTS = ("Panda", "UR5", "xArm7", "PR2", "character")
-MAIN = "robots_success_one_start"
+MAIN = "robots_success_restarts"
 # What a page keeps in place of the clipboard, which a test may not touch.
 CLIPBOARD = """window.copied = [];
 Object.defineProperty(navigator, "clipboard",
