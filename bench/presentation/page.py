@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..harness.record import Record
-from . import svg, tables
+from . import motion, svg, tables
 from .figures import Drawing
 from .layout import Figure, Layout
 from .sections import SECTIONS
@@ -40,6 +40,7 @@ class Shown(NamedTuple):
     records: Sequence[Record]
     tables: Mapping[Layout, Table]
     drawings: Mapping[Figure, Drawing]
+    scenes: Mapping[str, motion.Scene]
 
 
 class Row(NamedTuple):
@@ -74,6 +75,9 @@ def render(shown: Shown, newest: Record, missing: Sequence[str]) -> str:
         tables=shown.tables,
         drawings=shown.drawings,
         missing=missing,
+        motions={chapter: motion.fragment(scene) for chapter, scene in shown.scenes.items()},
+        motion_style=Markup(motion.STYLE if shown.scenes else ""),
+        motion_script=Markup(motion.SCRIPT if shown.scenes else ""),
     )
 
 

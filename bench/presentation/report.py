@@ -10,9 +10,10 @@ from ..experiments import SUITES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
 from .figures import Drawing, Sketch, drawn
 from .layout import Figure, Layout
+from .motion import Scene
 from .page import FORMATS, Shown, render, rows
 from .results import Results, plain, sift
-from .sections import SECTIONS
+from .sections import MOTIONS, SECTIONS
 from .tables import Table
 
 
@@ -61,19 +62,22 @@ class Sketched(NamedTuple):
     records: Sequence[Record]
     tables: Mapping[Layout, Table]
     sketches: Mapping[Figure, Sketch]
+    scenes: Mapping[str, Scene]
 
 
 def _sketched(records: Sequence[Record]) -> Sketched:
     results = Results(records)
     made = {layout: _checked(layout, results) for section in SECTIONS for layout in section.layouts}
     sketches = {figure: figure(results) for figure in all_figures()}
-    return Sketched(records, made, {figure: one for figure, one in sketches.items() if one})
+    drawn_ones = {figure: one for figure, one in sketches.items() if one}
+    scenes = {section: scene for section, make in MOTIONS.items() if (scene := make(results))}
+    return Sketched(records, made, drawn_ones, scenes)
 
 
 def _drawn(sketched: Sketched, folder: Path) -> Shown:
     """Draw the figures, but for those that the folder has already."""
     drawings = {figure: drawn(one, folder) for figure, one in sketched.sketches.items()}
-    return Shown(sketched.records, sketched.tables, drawings)
+    return Shown(sketched.records, sketched.tables, drawings, sketched.scenes)
 
 
 def all_figures() -> list[Figure]:
@@ -86,6 +90,7 @@ def _makers() -> Iterator[Callable[[Results], Any]]:
     for section in SECTIONS:
         yield from (partial(_checked, layout) for layout in section.layouts)
     yield from all_figures()
+    yield from MOTIONS.values()
 
 
 def _checked(layout: Layout, results: Results) -> Table:
