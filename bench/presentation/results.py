@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..harness.metrics import Ranking
 from ..harness.record import Record
 from ..peers import registry
 from .tables import words
@@ -115,3 +116,9 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 def counted(count: int, name: str) -> str:
     """Return a count of things: "1 iteration", "2 iterations"."""
     return f"{words(count)} {name}{'' if count == 1 else 's'}"
+
+
+def leaders(ranking: Ranking) -> str:
+    """Return who is first, and who is not told from that one: "a, in a tie with b and c"."""
+    first, *tied = ranking.first
+    return f"{first}, in a tie with {listed(tied)}" if tied else first
