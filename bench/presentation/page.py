@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..harness.record import Record
-from . import svg
+from . import motion, svg
 from .columns import words_in
 from .figures import Drawing
 from .headlines import Answers, Headline
@@ -23,6 +23,8 @@ from .shown_tables import ShownTable, rich, shown_table
 from .tables import Table
 
 _HERE = Path(__file__).parent
+# Without indents and comments, which a page need not carry.
+SCRIPT = motion.squeezed((_HERE / "page.js").read_text(encoding="utf-8"))
 # So many columns of a chapter's main table are unfolded.
 MOST_COLUMNS = 6
 # Absent peers that the first screen names.
@@ -36,6 +38,7 @@ class Shown(NamedTuple):
     tables: Mapping[Layout, Table]
     drawings: Mapping[Figure, Drawing]
     answers: Answers
+    scenes: Mapping[str, motion.Scene]
 
 
 class Unmeasured(NamedTuple):
@@ -43,6 +46,14 @@ class Unmeasured(NamedTuple):
 
     questions: list[str]
     command: str
+
+
+class Motion(NamedTuple):
+    """What can be seen moving in a chapter."""
+
+    title: str
+    shows: str
+    fragment: Markup
 
 
 class Chapter(NamedTuple):
@@ -56,17 +67,19 @@ class Chapter(NamedTuple):
     figure: Drawing | None
     main: ShownTable | None
     folds: list[ShownTable]
+    motion: Motion | None
     unmeasured: Unmeasured | None
 
 
 def render(shown: Shown, newest: Record, missing: Sequence[str]) -> str:
     """Return the page, whose head is that of the newest record."""
     template = _environment().get_template("page.html")
-    script = (_HERE / "page.js").read_text(encoding="utf-8")
+    scripts = [SCRIPT, *([motion.SCRIPT] if shown.scenes else [])]
     return template.render(
         style=Markup((_HERE / "page.css").read_text(encoding="utf-8")),
-        script=Markup(script),
-        policy=policy([script]),
+        motion_style=Markup(motion.STYLE if shown.scenes else ""),
+        scripts=list(map(Markup, scripts)),
+        policy=policy(scripts),
         date=newest.when.replace("T", " ").replace("+00:00", " UTC"),
         day=newest.when[:10],
         machine=_machine(newest),
@@ -127,8 +140,13 @@ def _chapter(section: Section, shown: Shown) -> Chapter:
         figure,
         _shown(main, shown, figure, MOST_COLUMNS) if main else None,
         [_shown(layout, shown, figure) for layout in layouts if layout is not main],
+        _motion(shown.scenes.get(section.name)),
         _unmeasured(section, shown),
     )
+
+
+def _motion(scene: motion.Scene | None) -> Motion | None:
+    return scene and Motion(scene.title, scene.shows, motion.fragment(scene))
 
 
 def _shown(

@@ -11,9 +11,10 @@ from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_r
 from .figures import Drawing, Sketch, drawn
 from .headlines import Answers, absent, answers
 from .layout import Figure, Layout
+from .motion import Scene
 from .page import Shown, render
 from .results import Results, listed, plain, sift
-from .sections import SECTIONS
+from .sections import MOTIONS, SECTIONS
 from .tables import Table, best_cells, comma_separated, latex, markdown
 
 # The forms that a table is written in, by the suffix of the file.
@@ -66,20 +67,22 @@ class Sketched(NamedTuple):
     tables: Mapping[Layout, Table]
     sketches: Mapping[Figure, Sketch]
     answers: Answers
+    scenes: Mapping[str, Scene]
 
 
 def _sketched(records: Sequence[Record]) -> Sketched:
     results = Results(records)
     made = {layout: _checked(layout, results) for section in SECTIONS for layout in section.layouts}
     sketches = {figure: figure(results) for figure in all_figures()}
+    scenes = {section: scene for section, make in MOTIONS.items() if (scene := make(results))}
     drawable = {figure: one for figure, one in sketches.items() if one}
-    return Sketched(records, made, drawable, answers(results))
+    return Sketched(records, made, drawable, answers(results), scenes)
 
 
 def _drawn(sketched: Sketched, folder: Path) -> Shown:
     """Draw the figures, but for those that the folder has already."""
     drawings = {figure: drawn(one, folder) for figure, one in sketched.sketches.items()}
-    return Shown(sketched.records, sketched.tables, drawings, sketched.answers)
+    return Shown(sketched.records, sketched.tables, drawings, sketched.answers, sketched.scenes)
 
 
 def all_figures() -> list[Figure]:
@@ -93,6 +96,7 @@ def _makers() -> Iterator[Callable[[Results], Any]]:
         yield from (partial(_checked, layout) for layout in section.layouts)
     yield from all_figures()
     yield answers
+    yield from MOTIONS.values()
 
 
 def _checked(layout: Layout, results: Results) -> Table:

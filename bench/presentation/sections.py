@@ -1,12 +1,14 @@
 """The chapters of the report, in order: each is made of what some experiments offer."""
 
 import importlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from ..experiments import EXPERIMENTS
+from ..experiments.pictures.readings import arm_motion, cloth_motion
 from ..harness.experiment import Experiment
 from .layout import Layout
+from .motion import Scene
 from .results import Results
 from .tables import Table
 
@@ -83,6 +85,13 @@ SECTIONS = (
         "timing_kinematics",
     ),
 )
+
+
+# What moves in a chapter.
+MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
+    "kinematics": arm_motion,
+    "cloth": cloth_motion,
+}
 
 
 def offered(experiment: Experiment) -> tuple[Layout, ...]:

@@ -65,7 +65,7 @@ def test_the_page_needs_nothing_from_outside(whole):
     assert all(link.startswith("#") for link in page.links)
     assert not re.search(r"https?://|//[a-z]+\.|@import|url\((?!#)", text)
     assert "xlink" not in text
-    assert page.scripts == 1
+    assert page.scripts <= 4  # ours, that of motions, and what two of them show
     assert not page.tags & {"link", "img", "iframe", "object"}
 
 
@@ -199,7 +199,7 @@ def look_into_everything(folder):
             page = Page(text)
             assert (page.wrong, page.open) == ([], [])
             assert len(page.ids) == len(set(page.ids))
-            assert page.scripts == 1
+            assert page.scripts <= 4  # ours, that of motions, and what two of them show
             assert not page.tags & {"link", "img", "iframe", "object"}
         if path.suffix == ".md":
             rows = [line for line in text.splitlines() if line.startswith("|")]
