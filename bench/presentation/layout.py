@@ -4,7 +4,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from .results import Results
+from .provenance import provenance
+from .results import Asked, Results
 from .tables import NO_SUMMARY, Column, Summary, Table
 
 if TYPE_CHECKING:
@@ -45,7 +46,8 @@ class Layout:
 
     def __call__(self, results: Results) -> Table:
         """Return the table with a row for each subject."""
-        subjects = list(self.subjects(results))
+        asked = Asked(results.records)
+        subjects = list(self.subjects(asked))
         columns = tuple(self.columns(subjects) if callable(self.columns) else self.columns)
         return Table(
             self.name,
@@ -57,4 +59,5 @@ class Layout:
             self.summary(subjects) if subjects else NO_SUMMARY,
             self.compared,
             frozenset(i for i, subject in enumerate(subjects) if not self.ranked(subject)),
+            provenance(asked.given),
         )

@@ -10,6 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..harness.record import Record
+from . import latex as tex
 from . import svg, tables
 from .figures import Drawing
 from .layout import Figure, Layout
@@ -29,7 +30,7 @@ class Format(NamedTuple):
 
 FORMATS = {
     "md": Format(tables.markdown, "Markdown", "text/markdown"),
-    "tex": Format(tables.latex, "LaTeX", "application/x-tex"),
+    "tex": Format(tex.latex, "LaTeX", "application/x-tex"),
     "csv": Format(tables.comma_separated, "CSV", "text/csv"),
 }
 

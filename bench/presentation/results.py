@@ -27,6 +27,21 @@ class Results:
         return next((r for r in found if (r.problem, r.solver) == (problem, solver)), None)
 
 
+class Asked(Results):
+    """Results that remember which records were asked for."""
+
+    def __init__(self, records: Iterable[Record]) -> None:
+        """Begin with none asked for."""
+        super().__init__(records)
+        self.given: list[Record] = []
+
+    def all(self, suite: str, **wanted: Any) -> list[Record]:
+        """Return the records of a suite whose facts and settings are these."""
+        found = super().all(suite, **wanted)
+        self.given += found
+        return found
+
+
 def _has(record: Record, wanted: dict[str, Any]) -> bool:
     known = {**record.settings, **record.facts}
     return all(known.get(name) == value for name, value in wanted.items())
