@@ -11,10 +11,14 @@ from .tables import Table, naming
 
 
 class Need(NamedTuple):
-    """How wide a column is at least, with its words broken into lines, and at best."""
+    """How wide a column is at least, with its words broken into lines, and at best.
+
+    One whose cells are words comes first where there is room to spare: only its cells suffer.
+    """
 
     least: float
     natural: float
+    is_words: bool = False
 
 
 def fits(needs: Sequence[Need], width: float, gap: float) -> bool:
@@ -31,6 +35,12 @@ def assigned(needs: Sequence[Need], width: float, gap: float) -> list[float]:
     if not fits(needs, width, gap):
         raise ValueError(f"width: expected more than {width:g} for {len(needs)} columns")
     room = width - gap * (len(needs) - 1)
+    first = [need if need.is_words else Need(need.least, need.least) for need in needs]
+    widths = _shared(first, room)
+    return _shared([Need(w, max(w, n.natural)) for w, n in zip(widths, needs, strict=True)], room)
+
+
+def _shared(needs: Sequence[Need], room: float) -> list[float]:
     low, high = 0.0, max((need.natural for need in needs), default=0.0)
     for _ in range(50):  # halve the interval of the common width below which nothing is shortened
         middle = (low + high) / 2
@@ -63,16 +73,22 @@ def _first_dropped(table: Table, names: int) -> list[int]:
     return sorted(numbers, key=lambda i: (bool(table.columns[i].best), -i))
 
 
-def parts(names: int, shown: Sequence[int], needs: Sequence[Need], width: float, gap: float) -> (
-    list[list[int]]
-):  # fmt: skip
-    """Return the columns in as few parts as fit, each with those that name a row before it."""
-    naming_columns = list(shown[:names])
+def parts(names: int, needs: Sequence[Need], width: float, gap: float) -> list[list[int]]:
+    """Return columns in as few parts as fit, each begun by those that name a row, evenly filled."""
+    count, low, high = len(_filled(names, needs, width, gap)), 0.0, width
+    for _ in range(20):  # halve the interval of the least width that still takes no more parts
+        middle = (low + high) / 2
+        more = len(_filled(names, needs, middle, gap)) > count
+        low, high = (middle, high) if more else (low, middle)
+    return _filled(names, needs, high, gap)
+
+
+def _filled(names: int, needs: Sequence[Need], width: float, gap: float) -> list[list[int]]:
+    """Return parts of which each takes all that fit, and one column at least."""
     made: list[list[int]] = []
-    for i in shown[names:]:
-        together = [needs[j] for j in [*(made[-1] if made else naming_columns), i]]
-        if made and fits(together, width, gap):
+    for i in range(names, len(needs)):
+        if made and fits([needs[j] for j in [*made[-1], i]], width, gap):
             made[-1].append(i)
         else:
-            made.append([*naming_columns, i])
-    return made or [naming_columns]
+            made.append([*range(names), i])
+    return made or [list(range(names))]

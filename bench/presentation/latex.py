@@ -5,6 +5,8 @@ fit in 8 points loses its folded columns, then stands in several parts of the sa
 would fit a page but no column, and could not be read beside the text. Nothing is scaled.
 """
 
+import functools
+import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -28,14 +30,16 @@ _LONGEST = 200
 # Half of what is between two columns [pt].
 _BETWEEN = 4.0
 _LEAD = 1.2
+# Words are set in smaller letters before their column is narrower than this, in units of the size.
+_COMFORT = 9.0
 _PACKAGES = r"% needs \usepackage{booktabs,longtable} and siunitx of 2021 or newer (version 3)"
 _NUMBERS = (
     r"\sisetup{mode=text, reset-text-series=false, reset-text-family=false, "
     r"reset-text-shape=false, group-digits=integer, group-minimum-digits=4, group-separator={,}, "
-    r"output-exponent-marker=e}"
+    r"output-exponent-marker=e, table-align-exponent=false}"
 )
 
-_NUMBER = re.compile(r"-?\d[\d,]*(\.\d+)?(e-?\d+)?")
+_NUMBER = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
 
 
 class Paper(NamedTuple):
@@ -67,8 +71,9 @@ def paper(width: str) -> Paper:
 def latex(table: Table, width: str = "page") -> str:
     """Return the table as LaTeX for a column, a page, or another width."""
     page = paper(width)
-    size, numbers = _size(table, page)
-    columns = [_Typeset(table, j, size) for j in range(len(table.columns))]
+    best = best_cells(table)
+    columns = [_Typeset(table, j, best) for j in range(len(table.columns))]
+    size, numbers = _size(table, columns, page.width)
     made = _parts(table, [columns[j] for j in numbers], page.width, size)
     is_long = len(table.rows) > MOST_ROWS or sum(part.height for part in made) > _HIGHEST
     about = [_PACKAGES, *_comments(table, len(numbers))]
@@ -76,17 +81,18 @@ def latex(table: Table, width: str = "page") -> str:
     return "\n".join([*about, *body, ""])
 
 
-def _size(table: Table, page: Paper) -> tuple[int, list[int]]:
+def _size(table: Table, columns: Sequence["_Typeset"], width: float) -> tuple[int, list[int]]:
     """Return the size of the text [pt] and the columns that are set in it."""
-    every = list(range(len(table.columns)))
+    needs, every = [column.need for column in columns], list(range(len(columns)))
+    comfortable = [
+        Need(min(n.natural, max(n.least, _COMFORT)), n.natural, n.is_words) for n in needs
+    ]
     for size in SIZES:
-        needs = [_Typeset(table, j, size).need for j in every]
-        comfortable = [Need(min(n.natural, max(n.least, 9.0 * size)), n.natural) for n in needs]
-        if fits(comfortable, page.width, 2 * _BETWEEN):
+        if fits(comfortable, width / size, 2 * _BETWEEN / size):
             return size, every
-    if fits(needs, page.width, 2 * _BETWEEN):
-        return SIZES[-1], every
-    return SIZES[-1], fitting(table, needs, float("inf"), 2 * _BETWEEN)
+    if fits(needs, width / size, 2 * _BETWEEN / size):
+        return size, every
+    return size, fitting(table, needs, math.inf, 0.0)
 
 
 def _comments(table: Table, shown: int) -> Iterator[str]:
@@ -97,14 +103,15 @@ def _comments(table: Table, shown: int) -> Iterator[str]:
 
 
 class _Typeset:
-    """A column as it is typeset: its cells with their widths, and how wide it has to be."""
+    """A column as it is typeset; all widths are in units of the size of its text."""
 
-    def __init__(self, table: Table, j: int, size: int) -> None:
-        self.j, self.size, self.column = j, size, table.columns[j]
-        self.bold = {row for row, column in best_cells(table) if column == j}
+    def __init__(self, table: Table, j: int, best: set[tuple[int, int]]) -> None:
+        self.column = table.columns[j]
+        self.bold = {row for row, column in best if column == j}
         self.cells = [row[j] for row in table.rows]
         self.of_all = _common_total(self.cells)
-        self.is_number = any(_is_number(cell) for cell in self.cells)
+        self.numbers = [_is_number(cell) for cell in self.cells]
+        self.is_number = any(self.numbers)
         self.texts = [self._text(cell) for cell in self.cells]
 
     def _text(self, cell: Cell) -> str:
@@ -127,63 +134,74 @@ class _Typeset:
         parts = (title, f"({note})" if note else "", f"[{unit}]" if unit else "")
         return " ".join(filter(None, parts))
 
-    @property
-    def format(self) -> str:
-        """What siunitx's column is told of its numbers: -3.4e-2."""
-        found = [split for text in self._numbers if (split := _split(text))]
-        sign = "-" if any(sign for sign, *_ in found) else ""
-        whole, decimals, exponent = (max(len(part[i]) for part in found) for i in (1, 2, 3))
-        exponents = [part[3] for part in found if part[3]]
-        sign_of_exponent = "-" if any(e.startswith("-") for e in exponents) else ""
-        exponent = max((len(e.lstrip("-")) for e in exponents), default=0)
-        return (
-            f"{sign}{whole}" + (f".{decimals}" if decimals else "")
-            + (f"e{sign_of_exponent}{exponent}" if exponent else "")
-        )  # fmt: skip
+    @functools.cached_property
+    def format(self) -> "_Format":
+        """What siunitx's column is told of its numbers."""
+        of = zip(self.texts, self.numbers, strict=True)
+        return _Format.of([text for text, is_number in of if is_number])
 
-    @property
-    def _numbers(self) -> list[str]:
-        return [text for text, cell in zip(self.texts, self.cells, strict=True) if _is_number(cell)]
-
-    @property
+    @functools.cached_property
     def body(self) -> float:
-        """How wide the cells are [pt], each in one line."""
+        """How wide the cells are, each in one line."""
         widths = [wide(text, i in self.bold) for i, text in enumerate(self.texts)]
-        if self.is_number:
-            widths.append(self._format_width(bool(self.bold)))
-        return self.size * max(widths, default=0.0)
+        numbers = wide(self.format.widest, bool(self.bold)) if self.is_number else 0.0
+        return max([*widths, numbers])
 
-    def _format_width(self, bold: bool) -> float:
-        found = re.fullmatch(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?", self.format)
-        assert found
-        whole, decimals, exponent = (int(found[i] or 0) for i in (2, 3, 5))
-        text = ("−" if found[1] else "") + "0" * whole + "," * ((whole - 1) // 3)
-        text += ("." + "0" * decimals if decimals else "") + ("e" if exponent else "")
-        return wide(text + ("−" if found[4] else "") + "0" * exponent, bold)
-
-    @property
+    @functools.cached_property
     def need(self) -> Need:
         """The widths at which it can be set, with head and texts broken into lines."""
-        head = self._head
-        two = self.size * _in_two(self.heading)
+        two = _in_two(self.heading)
         if not self.column.words or self.is_number:
-            return Need(max(head, self.body), max(two, self.body))
+            return Need(max(self._head, self.body), max(two, self.body))
         longest = max((wide(c) for text in self.texts for c in chunks(text)), default=0.0)
-        least = max(head, min(self.body, self.size * min(longest, 2 * NARROW)))
-        return Need(least, max(least, two, self.body))
+        least = max(self._head, min(self.body, longest, 2 * NARROW))
+        return Need(least, max(least, two, self.body), True)
 
     @property
     def narrow(self) -> Need:
         """The widths at which it can be set where words are broken between any two letters."""
-        least, natural = self.need
+        least, natural, _ = self.need
         if self.is_number or not self.column.words:
             return Need(least, natural)
-        return Need(max(self._head, min(least, NARROW * self.size)), natural)
+        return Need(max(self._head, min(least, NARROW)), natural, True)
 
     @property
     def _head(self) -> float:
-        """How wide the widest word of the head is [pt]."""
-        return self.size * max(map(wide, self.heading.split()), default=0.0)
+        """How wide the widest word of the head is."""
+        return max(map(wide, self.heading.split()), default=0.0)
+
+
+class _Format(NamedTuple):
+    """How many digits the numbers of a column have, before and after the point and as powers."""
+
+    sign: str
+    whole: int
+    decimals: int
+    sign_of_power: str
+    power: int
+
+    @staticmethod
+    def of(texts: Iterable[str]) -> "_Format":
+        """Return what suffices for all of these."""
+        found = [_NUMBER.fullmatch(text.replace(",", "")) for text in texts]
+        parts = [match.groups("") for match in found if match]
+        signs = ["-" if any(part[i] for part in parts) else "" for i in (0, 3)]
+        digits = [max((len(part[i]) for part in parts), default=0) for i in (1, 2, 4)]
+        return _Format(signs[0], digits[0], digits[1], signs[1], digits[2])
+
+    def __str__(self) -> str:
+        """As siunitx wants it: -3.4e-2."""
+        decimals = f".{self.decimals}" if self.decimals else ""
+        power = f"e{self.sign_of_power}{self.power}" if self.power else ""
+        return f"{self.sign}{self.whole}{decimals}{power}"
+
+    @property
+    def widest(self) -> str:
+        """A number with all these digits."""
+        whole = f"{10 ** (self.whole - 1):,}" if self.whole else ""
+        decimals = f".{'0' * self.decimals}" if self.decimals else ""
+        power = f"e{self.sign_of_power}{'0' * self.power}" if self.power else ""
+        return f"{self.sign}{whole}{decimals}{power}".replace("-", "−")
 
 
 class _Part:
@@ -205,7 +223,7 @@ class _Part:
             elif column.body <= width:
                 made.append("l")
             else:
-                made.append(rf">{{\raggedright\arraybackslash}}p{{{width:.1f}pt}}")
+                made.append(rf">{{\raggedright\arraybackslash}}p{{{self.size * width:.1f}pt}}")
         return f"@{{}}{' '.join(made)}@{{}}"
 
     @property
@@ -214,7 +232,7 @@ class _Part:
         lines = 4.0
         for i in range(len(self.table.rows)):
             high = [
-                1 + int(1.25 * self.size * wide(column.texts[i]) / width)
+                1 + int(1.25 * wide(column.texts[i]) / width)
                 for column, width in zip(self.columns, self.widths, strict=True)
                 if column.column.words and column.body > width
             ]
@@ -250,11 +268,11 @@ class _Part:
     def _groups(self) -> list[str]:
         if not any(self._in_group()):
             return []
-        cells, rules, begin = [], [], 0
+        cells, rules, begin, gap = [], [], 0, 2 * _BETWEEN / self.size
         for group, count in self._runs():
-            room = sum(self.widths[begin : begin + count]) + 2 * _BETWEEN * (count - 1)
+            room = sum(self.widths[begin : begin + count]) + gap * (count - 1)
             if count > 1:
-                stacked = _stacked(_lines(group, room / self.size), "c")
+                stacked = _stacked(_lines(group, room), "c")
                 cells.append(rf"\multicolumn{{{count}}}{{c}}{{{stacked}}}")
                 rules.append(rf"\cmidrule(lr){{{begin + 1}-{begin + count}}}")
             else:
@@ -265,7 +283,7 @@ class _Part:
     def _title(self, column: _Typeset, width: float, grouped: bool) -> str:
         heading = column.below if grouped else column.heading
         align = "l" if column.column.words else "r"
-        stacked = _stacked(_lines(heading, width / self.size), align)
+        stacked = _stacked(_lines(heading, width), align)
         return f"{{{stacked}}}" if align == "l" or column.is_number else stacked
 
     def rows(self) -> list[str]:
@@ -288,9 +306,9 @@ class _Part:
 
     def _cell(self, column: _Typeset, i: int, width: float) -> str:
         bold = r"\bfseries " if i in column.bold else ""
-        if column.is_number and _is_number(column.cells[i]):
+        if column.numbers[i]:
             return bold + column.texts[i].replace(",", "")
-        text = breakable(column.texts[i], width / column.size)
+        text = breakable(column.texts[i], width)
         return f"{bold}{{{text}}}" if column.is_number else bold + text
 
 
@@ -300,14 +318,14 @@ def _parts(table: Table, columns: Sequence[_Typeset], width: float, size: int) -
     Raises:
         ValueError: if the width does not suffice for one column beside those that name a row.
     """
-    names = min(naming(table), len(columns))
+    names, width, gap = min(naming(table), len(columns)), width / size, 2 * _BETWEEN / size
     for needs in ([c.need for c in columns], [c.narrow for c in columns]):
-        groups = parts(names, range(len(columns)), needs, width, 2 * _BETWEEN)
-        if all(fits([needs[j] for j in group], width, 2 * _BETWEEN) for group in groups):
-            chosen = ([columns[j] for j in group] for group in groups)
-            fitted = (assigned([needs[j] for j in g], width, 2 * _BETWEEN) for g in groups)
+        groups = parts(names, needs, width, gap)
+        if all(fits([needs[j] for j in group], width, gap) for group in groups):
+            chosen = [[columns[j] for j in group] for group in groups]
+            fitted = [assigned([needs[j] for j in group], width, gap) for group in groups]
             return [_Part(table, c, w, size) for c, w in zip(chosen, fitted, strict=True)]
-    raise ValueError(f"--width: expected more for a column of {table.name}, got {width:g}pt")
+    raise ValueError(f"--width: expected more for a column of {table.name}, got {width * size:g}pt")
 
 
 def _float(table: Table, made: Sequence[_Part], page: Paper, size: int) -> list[str]:
@@ -366,14 +384,7 @@ def _label(name: str) -> str:
 
 
 def _is_number(cell: Cell) -> bool:
-    is_number = isinstance(cell, int | float) and not isinstance(cell, bool)
-    return is_number and _NUMBER.fullmatch(words(cell)) is not None
-
-
-def _split(text: str) -> tuple[str, str, str, str] | None:
-    """Return sign, whole digits, decimals and exponent of a number."""
-    found = re.fullmatch(r"(-?)([\d,]+)(?:\.(\d+))?(?:e(-?\d+))?", text)
-    return found and (found[1], found[2].replace(",", ""), found[3] or "", found[4] or "")
+    return isinstance(cell, int | float) and not isinstance(cell, bool) and math.isfinite(cell)
 
 
 def _common_total(cells: Iterable[Cell]) -> int:

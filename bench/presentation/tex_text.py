@@ -1,12 +1,16 @@
 """Texts as data for TeX: escapes for what it takes for an instruction, and how wide texts are."""
 
+import functools
 import re
 import unicodedata
+from collections.abc import Sequence
 
 from .tables import POWER
 
 # A column of words may be as narrow as this, in units of its size.
 NARROW = 4.0
+# Where a word may be broken: after a dash and its like between letters, never in a number.
+_BREAK = re.compile(r"(?<=[^\W\d_][/_.-])(?=[^\W\d_])")
 # Between letters that TeX would join.
 _LIGATURE = re.compile(r"(?<=-)(?=-)|(?<=')(?=')|(?<=,)(?=,)")
 _SPECIAL = {
@@ -80,6 +84,7 @@ _WIDE = {letter: width / 1000.0 for width, letters in _GLYPHS.items() for letter
 _WIDEST, _BOLDER = 1.1, 1.2
 
 
+@functools.lru_cache(maxsize=10_000)
 def wide(text: str, bold: bool = False) -> float:
     """Return how wide a text is, in units of its size."""
     return (_BOLDER if bold else 1.0) * sum(_WIDE.get(letter, _WIDEST) for letter in _shown(text))
@@ -87,7 +92,10 @@ def wide(text: str, bold: bool = False) -> float:
 
 def _shown(text: str) -> str:
     """Return a text with what cannot be typeset everywhere written as an escape."""
-    return "".join(map(_written, " ".join(text.split())))
+    spaced = " ".join(text.split())
+    if spaced.isascii() and spaced.isprintable():
+        return spaced
+    return "".join(map(_written, spaced))
 
 
 def _written(letter: str) -> str:
@@ -139,9 +147,10 @@ def _with_powers(token: str) -> str:
     return escaped(begin) + "".join(rf"\num{{{x}e{n}}}{escaped(t)}" for x, n, t in powers)
 
 
-def chunks(text: str) -> list[str]:
+@functools.lru_cache(maxsize=10_000)
+def chunks(text: str) -> Sequence[str]:
     """Return a text in the parts between which a line may end: after spaces, dashes, slashes."""
-    return re.findall(r"[^\s/_-]+[/_-]*|[/_-]+", text)
+    return [part for token in text.split() for part in _BREAK.split(token)]
 
 
 def _pieces(word: str, most: float) -> list[str]:

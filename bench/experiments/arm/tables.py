@@ -5,7 +5,18 @@ from typing import Any
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import LARGEST, MEDIAN, P95, SOLVER, share, spread, text, titled
+from ...presentation.columns import (
+    LARGEST,
+    MEDIAN,
+    P95,
+    SOLVER,
+    folded,
+    least,
+    share,
+    spread,
+    text,
+    titled,
+)
 from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem, label, settings, solvers
 from ...presentation.tables import Summary, words
@@ -42,11 +53,11 @@ accuracy = Layout(
     "Success and residuals within reach",
     columns=(
         titled("problem"),
-        SOLVER,
         text("start", lambda record: STARTS[record.settings.get("warm")]),
-        share("within tolerance", _met),
-        *spread("residual", "residual", "m", (MEDIAN, P95, LARGEST)),
-        *spread("iterations", "iterations", of=(MEDIAN, P95, LARGEST)),
+        SOLVER,
+        share("within tolerance", _met, best="greatest"),
+        *least(spread("residual", "residual", "m", (MEDIAN, P95, LARGEST))),
+        *folded(spread("iterations", "iterations", of=(MEDIAN, P95, LARGEST))),
     ),
     subjects=_within_reach,
     shows=lambda records: (
@@ -60,6 +71,7 @@ accuracy = Layout(
     ),
     summary=_summary,
     figures=(chain.ik_residuals,),
+    compared=2,
 )
 
 
