@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ..harness.metrics import Share
 from .fitting import Need, assigned, fits, fitting, parts
 from .tables import Cell, Table, best_cells, naming, words
-from .tex_text import NARROW, breakable, chunks, escaped, wide
+from .tex_text import NARROW, breakable, chunks, escaped, fragments, wide
 from .text import shortened
 
 # A column and a page of most journals [pt], 84 and 177 mm.
@@ -24,7 +24,7 @@ NARROWEST = 160.0
 SIZES = (10, 9, 8)
 # More rows than these stand in a table that may break over pages, and so does what is higher [pt].
 MOST_ROWS = 40
-_HIGHEST = 430.0
+_HIGHEST = 540.0
 # Letters of a name, of which a paper needs no more.
 _LONGEST = 200
 # Half of what is between two columns [pt].
@@ -112,6 +112,8 @@ class _Typeset:
         self.of_all = _common_total(self.cells)
         self.numbers = [_is_number(cell) for cell in self.cells]
         self.is_number = any(self.numbers)
+        of_words = all(cell is None or isinstance(cell, str) for cell in self.cells)
+        self.is_words = not self.is_number and (self.column.words or of_words)
         self.texts = [self._text(cell) for cell in self.cells]
 
     def _text(self, cell: Cell) -> str:
@@ -129,6 +131,7 @@ class _Typeset:
         return self._headed(self.column.below)
 
     def _headed(self, title: str) -> str:
+        title = shortened(title, _LONGEST // 3)
         unit = "%" if self.of_all else self.column.unit
         note = f"of {self.of_all:,}" if self.of_all else self.column.note
         parts = (title, f"({note})" if note else "", f"[{unit}]" if unit else "")
@@ -151,7 +154,7 @@ class _Typeset:
     def need(self) -> Need:
         """The widths at which it can be set, with head and texts broken into lines."""
         two = _in_two(self.heading)
-        if not self.column.words or self.is_number:
+        if not self.is_words:
             return Need(max(self._head, self.body), max(two, self.body))
         longest = max((wide(c) for text in self.texts for c in chunks(text)), default=0.0)
         least = max(self._head, min(self.body, longest, 2 * NARROW))
@@ -161,14 +164,14 @@ class _Typeset:
     def narrow(self) -> Need:
         """The widths at which it can be set where words are broken between any two letters."""
         least, natural, _ = self.need
-        if self.is_number or not self.column.words:
+        if not self.is_words:
             return Need(least, natural)
         return Need(max(self._head, min(least, NARROW)), natural, True)
 
     @property
     def _head(self) -> float:
         """How wide the widest word of the head is."""
-        return max(map(wide, self.heading.split()), default=0.0)
+        return max(map(wide, fragments(self.heading)), default=0.0)
 
 
 class _Format(NamedTuple):
@@ -218,7 +221,7 @@ class _Part:
         for column, width in zip(self.columns, self.widths, strict=True):
             if column.is_number:
                 made.append(f"S[table-format={column.format}]")
-            elif not column.column.words:
+            elif not column.is_words:
                 made.append("r")
             elif column.body <= width:
                 made.append("l")
@@ -234,7 +237,7 @@ class _Part:
             high = [
                 1 + int(1.25 * wide(column.texts[i]) / width)
                 for column, width in zip(self.columns, self.widths, strict=True)
-                if column.column.words and column.body > width
+                if column.is_words and column.body > width
             ]
             lines += max(high, default=1)
         return _LEAD * self.size * lines
@@ -282,7 +285,7 @@ class _Part:
 
     def _title(self, column: _Typeset, width: float, grouped: bool) -> str:
         heading = column.below if grouped else column.heading
-        align = "l" if column.column.words else "r"
+        align = "l" if column.is_words else "r"
         stacked = _stacked(_lines(heading, width), align)
         return f"{{{stacked}}}" if align == "l" or column.is_number else stacked
 
@@ -350,7 +353,8 @@ def _long(table: Table, made: Sequence[_Part], page: Paper, size: int) -> list[s
         head = [r"\toprule", *part.head(), r"\midrule"]
         ordinal = f" (part {i + 1} of {len(made)})" if made[1:] else ""
         body += [r"\addtocounter{table}{-1}"] if i else []
-        again = rf"\caption[]{{{escaped(table.title)}{ordinal}}}"
+        title = breakable(shortened(table.title, _LONGEST), _narrowest_line(page))
+        again = rf"\caption[]{{{title}{ordinal}}}"
         caption = again if i else _caption(table, page, ordinal)
         body += [
             *(rf"\begin{{longtable}}{{{part.preamble}}}", rf"{caption}\\", *head, r"\endfirsthead"),
@@ -370,13 +374,19 @@ def _setting(size: int) -> list[str]:
 
 def _caption(table: Table, page: Paper, ordinal: str = "") -> str:
     """Return caption and label: set-up, samples, machine and versions."""
-    sentences = [f"{table.title}{ordinal}.", table.measured]
+    title = shortened(table.title, _LONGEST)
+    sentences = [f"{title}{ordinal}.", shortened(table.measured, 6 * _LONGEST)]
     if best_cells(table):
         sentences.append("Best in bold, ties too.")
     if table.provenance:
-        sentences.append(f"{table.provenance}.")
-    text = breakable(" ".join(filter(None, sentences)), 0.8 * page.width / SIZES[0])
-    return rf"\caption[{{{escaped(table.title)}}}]{{{text}}}\label{{tab:{_label(table.name)}}}"
+        sentences.append(f"{shortened(table.provenance, 3 * _LONGEST)}.")
+    text = breakable(" ".join(filter(None, sentences)), _narrowest_line(page))
+    return rf"\caption[{{{escaped(title)}}}]{{{text}}}\label{{tab:{_label(table.name)}}}"
+
+
+def _narrowest_line(page: Paper) -> float:
+    """Return how much of a line a word of a caption may take, in units of its size."""
+    return 0.8 * page.width / SIZES[0]
 
 
 def _label(name: str) -> str:
@@ -395,19 +405,19 @@ def _common_total(cells: Iterable[Cell]) -> int:
 
 def _in_two(heading: str) -> float:
     """Return how wide a heading is in at most two lines, as even as can be."""
-    tokens = heading.split()
-    lines = ((" ".join(tokens[:i]), " ".join(tokens[i:])) for i in range(1, len(tokens)))
+    of = fragments(heading)
+    lines = (("".join(of[:i]), "".join(of[i:])) for i in range(1, len(of)))
     return min((max(map(wide, both)) for both in lines), default=wide(heading))
 
 
 def _lines(text: str, most: float) -> list[str]:
     """Return a heading in lines that are no wider, but for words that are."""
     lines: list[str] = []
-    for token in text.split():
-        if lines and wide(f"{lines[-1]} {token}") <= most:
-            lines[-1] += f" {token}"
+    for fragment in fragments(text):
+        if lines and wide(lines[-1] + fragment) <= most:
+            lines[-1] += fragment
         else:
-            lines.append(token)
+            lines.append(fragment)
     return lines
 
 

@@ -153,6 +153,16 @@ def chunks(text: str) -> Sequence[str]:
     return [part for token in text.split() for part in _BREAK.split(token)]
 
 
+def fragments(text: str) -> list[str]:
+    """Return what a line of a heading may be made of: words with a space, parts of long ones."""
+    found: list[str] = []
+    for token in text.split():
+        parts = [token] if wide(token) <= 2 * NARROW else chunks(token)
+        pieces = [p for part in parts for p in _pieces(_shown(part), 2 * NARROW)]
+        found += [*pieces[:-1], f"{pieces[-1]} "]
+    return found
+
+
 def _pieces(word: str, most: float) -> list[str]:
     pieces = [""]
     for letter in word:
