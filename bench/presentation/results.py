@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..harness.metrics import Ranking
 from ..harness.record import Record
 from ..peers import registry
 from .tables import words
@@ -17,6 +18,11 @@ class Results:
         """Leave out those that say why there are none, and those under settings of before."""
         self.records = [r for r in records if not r.failed and not r.superseded]
 
+    @property
+    def entrants(self) -> frozenset[str]:
+        """The solvers that a user has entered."""
+        return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
+
     def all(self, suite: str, **wanted: Any) -> list[Record]:
         """Return the records of a suite whose facts and settings are these."""
         return [record for record in self.records if record.suite == suite and _has(record, wanted)]
@@ -25,21 +31,6 @@ class Results:
         """Return the record of exactly this problem and solver, or None."""
         found = self.all(suite, **wanted)
         return next((r for r in found if (r.problem, r.solver) == (problem, solver)), None)
-
-
-class Asked(Results):
-    """Results that remember which records were asked for."""
-
-    def __init__(self, records: Iterable[Record]) -> None:
-        """Begin with none asked for."""
-        super().__init__(records)
-        self.given: list[Record] = []
-
-    def all(self, suite: str, **wanted: Any) -> list[Record]:
-        """Return the records of a suite whose facts and settings are these."""
-        found = super().all(suite, **wanted)
-        self.given += found
-        return found
 
 
 def _has(record: Record, wanted: dict[str, Any]) -> bool:
@@ -125,3 +116,9 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 def counted(count: int, name: str) -> str:
     """Return a count of things: "1 iteration", "2 iterations"."""
     return f"{words(count)} {name}{'' if count == 1 else 's'}"
+
+
+def leaders(ranking: Ranking) -> str:
+    """Return who is first, and who is not told from that one: "a, in a tie with b and c"."""
+    first, *tied = ranking.first
+    return f"{first}, in a tie with {listed(tied)}" if tied else first

@@ -82,7 +82,10 @@ def _columns_to(target: str) -> tuple[Column, ...]:
             read=lambda group: (point := cheapest(group)) and point.values["seconds"],
             best="least",
         ),
-        *folded([text(f"{target} by", lambda group: (point := cheapest(group)) and point.rung)]),
+        replace(
+            text(f"{target} by", lambda group: (point := cheapest(group)) and point.rung),
+            folded=True,
+        ),
     )
 
 
@@ -147,7 +150,8 @@ one_step = WithMissing(
         text("solver", lambda group: group[0].solver),
         *(column for target in TARGETS for column in _columns_to(target)),
         Column("least error", read=lambda group: _best(group).values["error"], best="least"),
-        *folded([text("least by", lambda group: _best(group).rung), text("remark", _remark)]),
+        replace(text("least by", lambda group: _best(group).rung), folded=True),
+        text("remark", _remark),
     ),
     subjects=lambda results: _groups(points(results, ONE_STEP)),
     shows="The error is |x − x*| / |y − x*|, what is left of the distance between the inertial "
