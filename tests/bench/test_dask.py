@@ -21,6 +21,7 @@ from bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, block
 from bench.harness import run
 from bench.harness.machine import stamp
 from bench.harness.measure import block_key, measure
+from bench.harness.progress import Progress, listening
 from bench.harness.record import RecordFile, encode
 from bench.presentation.results import Results, plain
 from bench.presentation.sections import tables
@@ -142,6 +143,9 @@ class MadeUpCluster:
         return {"host": host, "stamp": {**stamp(), "machine": {"processor": machine}}}
 
     def close(self, timeout):
+        pass
+
+    def subscribe_topic(self, topic, handler):
         pass
 
     def submit(self, function, task, key, workers=None):
@@ -296,6 +300,23 @@ def test_a_machine_is_shared_by_answers_and_not_by_times(tmp_path, monkeypatch):
     assert waited
 
 
+def test_what_a_worker_does_is_heard(made_up, monkeypatch):
+    """Long steps are said while they last, as in one process."""
+    cluster = MadeUpCluster(w1="h1/x")
+    cluster.subscribe_topic = lambda topic, handler: setattr(cluster, "tell", handler)
+    submit = cluster.submit
+
+    def tell_and_submit(*given, **where):
+        cluster.tell((0.0, Progress(f"step {len(cluster.given)}")._asdict()))
+        return submit(*given, **where)
+
+    cluster.submit = tell_and_submit
+    heard = []
+    with listening(lambda progress: heard.append(progress.what)):
+        made_up(cluster)
+    assert heard == [f"step {i}" for i in range(9)]
+
+
 # A cluster that is real: two workers, each a process of this machine.
 
 
@@ -380,6 +401,7 @@ def pids(cluster):
     from distributed import Client
 
     with Client(cluster.scheduler_address, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=30)
         return list(client.run(os.getpid).values())
 
 
@@ -389,10 +411,12 @@ def pids(cluster):
 def test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none(
     cluster, executor, few, tmp_path, suite, count
 ):
-    asked, (worker, _) = few(**{suite: count}), pids(cluster)
-    for event in run.run([suite], "quick", tmp_path, executor):
-        if event.state == run.MEASURED and len(rows(tmp_path)) == 1:
-            os.kill(worker, signal.SIGKILL)
+    (asked, (worker, _)), heard = (few(**{suite: count}), pids(cluster)), []
+    with listening(heard.append):
+        for event in run.run([suite], "quick", tmp_path, executor):
+            if event.state == run.MEASURED and len(rows(tmp_path)) == 1:
+                os.kill(worker, signal.SIGKILL)
+    assert bool(heard) is (suite == "cloth_scale")
     assert worker not in pids(cluster)
     assert rows(tmp_path) == dict.fromkeys(asked, 1)
     assert not any(record.failed for record in records(tmp_path))
