@@ -3,8 +3,9 @@
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +17,9 @@ from ..terminal import print_tables, progress
 from .options import MISSED, REPORT, SUCCESS, Fresh, Output, known, writable
 from .report import write_report
 
+if TYPE_CHECKING:
+    from ..harness.executor import Executor
+
 # The width of the names of suites in the help.
 INDENT = 2 + max(map(len, SUITES))
 QUICK, FULL = "quick", "full"
@@ -25,6 +29,7 @@ EXAMPLES = (
         "plumbob bench                  everything, at full length",
         "plumbob bench --quick timing   one suite, quickly",
         "plumbob bench cloth --fresh    forget the cloth's records and measure anew",
+        "plumbob bench --executor dask://node1:8786    on a cluster, see docs/cluster.md",
     )
     + "\n\n"
     + block("Suites", *(f"{name:<{INDENT}}{about}" for name, about in SUITES.items()))
@@ -38,11 +43,20 @@ def bench(
     output: Output = REPORT,
     fresh: Fresh = False,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer targets, shorter timing.")] = False,
+    executor: Annotated[
+        str, typer.Option(metavar="local|dask://HOST:PORT", help="Where to measure.")
+    ] = "local",
+    mix_machines: Annotated[
+        bool, typer.Option("--mix-machines", help="With Dask: let one table hold times of several.")
+    ] = False,
 ) -> int:
     """Measure problems with solvers. What is on record is kept, so a run can be taken up again."""
+    from ..executors import executor_at
+
     chosen = tuple(dict.fromkeys(known("suite", name, SUITES) for name in suites or SUITES))
     writable(output)
-    code = run_suites(chosen, QUICK if quick else FULL, output, fresh)
+    with closing(executor_at(executor, mix_machines)) as where:
+        code = run_suites(chosen, QUICK if quick else FULL, output, fresh, where)
     if suites:
         print_tables(chosen, output)
     return code
@@ -61,9 +75,16 @@ def main_job(output: Path, fresh: bool) -> int:
     return max(failed, write_report(output))
 
 
-def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> int:
+def run_suites(
+    suites: Sequence[str],
+    scale: str,
+    output: Path,
+    fresh: bool,
+    executor: "Executor | None" = None,
+) -> int:
     """Run suites with a progress bar; return 1 if a claim is missed or a block failed."""
     from ..harness import run
+    from ..harness.executor import HERE
     from ..harness.record import RecordFile
 
     RecordFile(output).read()  # before anything is measured that could not be kept
@@ -75,7 +96,7 @@ def run_suites(suites: Sequence[str], scale: str, output: Path, fresh: bool) -> 
     with progress() as bar:
         task = bar.add_task("starting", total=run.count(suites, scale))
         with listening(lambda progress: bar.update(task, description=visible(progress.what))):
-            for event in run.run(suites, scale, output):
+            for event in run.run(suites, scale, output, executor or HERE):
                 bar.update(task, description=visible(f"{event.suite}: {event.what}"))
                 if event.state in done:
                     done[event.state] += 1

@@ -45,6 +45,7 @@ class Block:
         size: how much is measured, where that varies: targets, or seconds of a benchmark.
         facts: what the names say, as values: numbers, words, truth values and lists of words.
             "title" is how the problem is written, "task" which of the suite's kinds it is.
+        times: whether times are among the numbers, or end the work: see `Experiment`.
     """
 
     suite: str
@@ -54,3 +55,4 @@ class Block:
     settings: Mapping[str, Any] = field(default_factory=dict)
     size: float = 0
     facts: Mapping[str, Any] = field(default_factory=dict)
+    times: bool = True

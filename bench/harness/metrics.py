@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from reference import rotation
 
@@ -66,10 +67,20 @@ class Timing(NamedTuple):
 
 # All that is stated holds in so many of all samples, over all comparisons of one ranking at once.
 CONFIDENCE = 0.95
-# Resamples of a bootstrap, and its seed.
-RESAMPLES, _SEED = 400, 1979
+# Resamples of a bootstrap, and its seed; of more targets the normal distribution stands for it.
+RESAMPLES, _SEED, LARGE = 400, 1979, 20_000
+_NORMAL = 1.959963984540054
 # The signs of so few differences are gone through one and all.
 _FEW = 12
+
+
+class Ratio(NamedTuple):
+    """By what factor one of two samples of pairs exceeds the other, with its 95 % interval."""
+
+    mean: float
+    low: float
+    high: float
+    pairs: int
 
 
 class Convergence(NamedTuple):
@@ -82,13 +93,19 @@ class Convergence(NamedTuple):
 
 def share(hits: NDArray[np.bool_]) -> Share:
     """Return how many of the entries are true, with Wilson's interval (Wilson 1927)."""
-    count, total, z = int(np.count_nonzero(hits)), int(np.size(hits)), 1.959963984540054
+    count, total = int(np.count_nonzero(hits)), int(np.size(hits))
     if total == 0:
         return Share(0, 0, 0.0, 1.0)
-    rate = count / total
-    centre = (rate + z**2 / (2 * total)) / (1 + z**2 / total)
-    half = z * math.sqrt(rate * (1 - rate) / total + (z / (2 * total)) ** 2) / (1 + z**2 / total)
-    return Share(count, total, max(0.0, centre - half), min(1.0, centre + half))
+    low, high = wilson(np.array(count / total), total)
+    return Share(count, total, float(low), float(high))
+
+
+def wilson(rates: Floats, total: int) -> tuple[Floats, Floats]:
+    """Return between what the true rates lie in 95 % of samples of this size (Wilson 1927)."""
+    z = _NORMAL
+    centre = (rates + z**2 / (2 * total)) / (1 + z**2 / total)
+    half = z * np.sqrt(rates * (1 - rates) / total + (z / (2 * total)) ** 2) / (1 + z**2 / total)
+    return np.maximum(0.0, centre - half), np.minimum(1.0, centre + half)
 
 
 def spread(values: Floats) -> Spread:
@@ -132,6 +149,16 @@ def _coin(throws: int, heads: int) -> float:
     """Return how likely so many heads are."""
     logs = math.lgamma(throws + 1) - math.lgamma(heads + 1) - math.lgamma(throws - heads + 1)
     return math.exp(logs - throws * math.log(2.0))
+
+
+def mean_interval(values: Floats) -> Interval:
+    """Return the mean and its interval by Student; NaN bounds of fewer than two."""
+    count, middle = int(np.size(values)), mean(values)
+    if count < 2:
+        return Interval(middle, math.nan, math.nan)
+    half = float(stdtrit(count - 1, (1 + CONFIDENCE) / 2) * np.std(values, ddof=1))
+    half /= math.sqrt(count)
+    return Interval(middle, middle - half, middle + half)
 
 
 def ranking(scores: Mapping[str, Floats]) -> Ranking:
@@ -188,12 +215,18 @@ def penalised(seconds: Floats, solved: NDArray[np.bool_], penalty: float) -> Flo
 def shifted_geometric_mean(seconds: Floats, shift: float, groups: Sequence[int] = ()) -> Interval:
     """Return exp(mean(log(seconds + shift))) - shift and its interval by the bootstrap.
 
-    Targets are drawn again within each group, of which there are so many in order, such as the
-    targets of one robot; all are one group if none is given. The draws are seeded.
+    Targets are drawn again within each group; `groups` says how many targets each has, in order,
+    such as those of one robot. All are one group if none is given. The draws are seeded.
     """
     logs = np.log(np.asarray(seconds, dtype=float) + shift)
-    means = _resamples(tuple(groups) or (len(logs),)) @ logs / max(len(logs), 1)
-    low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    sizes = tuple(groups) or (len(logs),)
+    if len(logs) > LARGE:
+        parts = np.split(logs, np.cumsum(sizes)[:-1])
+        error = math.sqrt(sum(len(part) * float(np.var(part)) for part in parts)) / len(logs)
+        low, high = np.mean(logs) + _NORMAL * error * np.array([-1.0, 1.0])
+    else:
+        means = _resamples(sizes) @ logs / len(logs)
+        low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return Interval(*(float(np.exp(x) - shift) for x in (np.mean(logs), low, high)))
 
 
@@ -234,6 +267,21 @@ def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Flo
         return np.full((len(taken), len(ratios)), math.nan)
     slower = np.sort(taken / best, axis=-1)
     return np.array([np.searchsorted(row, ratios, side="right") for row in slower]) / len(best)
+
+
+def paired_ratio(values: Floats, others: Floats) -> Ratio:
+    """Return the geometric mean of values / others over the pairs in which both are numbers.
+
+    The interval is Student's, of the logarithms; a single pair leaves the factor open.
+    """
+    logs = np.log(np.asarray(values) / np.asarray(others))
+    logs = logs[np.isfinite(logs)]
+    count = int(logs.size)
+    if count < 2:
+        return Ratio(float(np.exp(logs[0])) if count else math.nan, 0.0, math.inf, count)
+    half = stdtrit(count - 1, 0.975) * logs.std(ddof=1) / math.sqrt(count)
+    mean, low, high = np.exp(logs.mean() + np.array([0.0, -half, half]))
+    return Ratio(float(mean), float(low), float(high), count)
 
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:

@@ -208,6 +208,26 @@ class RecordFile:
             stays = [line.text for line in lines if not line.record or id(line.record) in kept]
             self._replace(b"".join(text + b"\n" for text in stays))
 
+    def arrange(self, order: Iterable[Key]) -> None:
+        """Bring the records of these keys into order, each in the place of one of them.
+
+        Tables show rows as they are on record, and blocks that are measured at the same time may
+        end in any order. All else keeps its place, and the old file stays whole until the new one
+        is.
+
+        Raises:
+            ValueError: as `read` does.
+        """
+        lines, _ = self._lines()
+        rank = {key: i for i, key in enumerate(order)}
+        found = [(rank.get(line.record.key), i) for i, line in enumerate(lines) if line.record]
+        ranked = [(number, i) for number, i in found if number is not None]
+        if (shown := list(dict.fromkeys(number for number, _ in ranked))) != sorted(shown):
+            texts = [line.text for line in lines]
+            for (_, place), (_, source) in zip(ranked, sorted(ranked), strict=True):
+                texts[place] = lines[source].text
+            self._replace(b"".join(text + b"\n" for text in texts))
+
     def _bytes(self) -> bytes:
         check_regular(self.path)
         return self.path.read_bytes() if self.path.exists() else b""

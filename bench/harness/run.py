@@ -2,18 +2,31 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..experiments import SCALES, Block, blocks
+from .executor import HERE, Executor, NotMeasured
 from .folder_lock import locked
-from .machine import conditions, difference, stamp
-from .record import FINISHED, Key, Record, RecordFile, key
+from .machine import conditions
+from .measure import block_key, measure, now
+from .record import FINISHED, Key, Record, RecordFile
+
+__all__ = [
+    "Event",
+    "block_key",
+    "count",
+    "forget",
+    "keys",
+    "measure",
+    "missed_claims",
+    "now",
+    "run",
+]
 
 KEPT, MEASURING, MEASURED, FAILED = "kept", "measuring", "measured", "failed"
 NOT_RUN = "not run"
@@ -36,36 +49,67 @@ class Event(NamedTuple):
     message: str = ""
 
 
-def run(suites: Sequence[str], scale: str, folder: Path) -> Iterator[Event]:
-    """Measure suites in order, yielding what happens; records already there are kept.
+def run(
+    suites: Sequence[str], scale: str, folder: Path, executor: Executor = HERE
+) -> Iterator[Event]:
+    """Measure suites, yielding what happens; records already there are kept.
 
     A block is measured again where its record is from other sources, versions or another machine,
-    smaller than asked for, or failed. Records that nothing asks for are kept.
+    smaller than asked for, or failed. Records that nothing asks for are kept. In this process
+    suites are measured in order.
 
     Raises:
-        ValueError: if the result file cannot be read, or another run writes to it.
+        ValueError: if the result file cannot be read, or another run writes to it; or if the
+            executor cannot go on.
     """
     file = RecordFile(folder)
     with locked(folder):
         present = {record.key: record for record in file.read().records}
-        for suite in suites:
+        for together in [suites] if executor.takes_suites_together else [[s] for s in suites]:
             begin = time.perf_counter()
-            yield from _run_suite(suite, scale, file, present)
-            yield from _finish(suite, scale, file, begin)
+            wanted = [block for suite in together for block in blocks(suite, SCALES[scale])]
+            yield from _run_blocks(wanted, scale, file, present, executor)
+            file.arrange(block_key(block) for block in wanted)
+            for suite in together:
+                spent = time.perf_counter() - begin
+                end = _finished(suite, scale, spent, executor.stamp())
+                yield from _finish(end, keys(suite, scale), file)
 
 
-def _run_suite(
-    suite: str, scale: str, file: RecordFile, present: dict[Key, Record]
+def _run_blocks(
+    wanted: Sequence[Block],
+    scale: str,
+    file: RecordFile,
+    present: Mapping[Key, Record],
+    executor: Executor,
 ) -> Iterator[Event]:
-    for block in blocks(suite, SCALES[scale]):
-        yield from _run_block(block, file, present)
+    """Have the blocks measured that are not on record; write each record as it comes."""
+    executor.look_at(present.get(block_key(block)) for block in wanted if block.times)
+    again = {block_key(block): why_again(block, present, executor) for block in wanted}
+    for block in wanted:
+        if again[block_key(block)] is None:
+            yield Event(KEPT, block.suite, _what(block))
+    missing = [block for block in wanted if again[block_key(block)] is not None]
+    for step in executor.measure(missing, SCALES[scale]):
+        match step:
+            case Block():
+                yield Event(MEASURING, step.suite, _what(step), again[block_key(step)] or "")
+            case NotMeasured(block, why):
+                yield Event(FAILED, block.suite, _what(block), why)
+            case Record():
+                file.append([step])
+                state = FAILED if step.failed else MEASURED
+                yield Event(state, step.suite, _what(step), step.failed)
 
 
-def _finish(suite: str, scale: str, file: RecordFile, begin: float) -> Iterator[Event]:
+def _what(named: Block | Record) -> str:
+    return f"{named.problem}, {named.solver}"
+
+
+def _finish(finished: Record, asked: set[Key], file: RecordFile) -> Iterator[Event]:
     """Put on record that a suite was gone through, and say what it did not ask for."""
-    asked = keys(suite, scale)
+    suite, finished = finished.problem, replace(finished, size=len(asked))
     records = {record.key: record for record in file.read().records}
-    finished = _finished(suite, scale, len(asked), time.perf_counter() - begin)
     if asked <= records.keys() and not _says_the_same(records.get(finished.key), finished):
         file.append([finished])
     extra = [r for r in records.values() if r.suite == suite and r.key not in asked]
@@ -83,11 +127,11 @@ def _records(count: int) -> str:
     return f"{count} record{'' if count == 1 else 's'}"
 
 
-def _finished(suite: str, scale: str, count: int, seconds: float) -> Record:
+def _finished(suite: str, scale: str, seconds: float, where: Mapping[str, Any]) -> Record:
     """Return the record that says that a suite was gone through to its end."""
-    made: dict[str, Any] = {"stamp": stamp(), "when": now(), "seconds": seconds}
+    made: dict[str, Any] = {"stamp": where, "when": now(), "seconds": seconds}
     made["conditions"] = conditions()
-    return Record(FINISHED, suite, "", size=count, notes={"scale": scale}, **made)
+    return Record(FINISHED, suite, "", notes={"scale": scale}, **made)
 
 
 def _says_the_same(record: Record | None, other: Record) -> bool:
@@ -141,60 +185,15 @@ def keys(suite: str, scale: str) -> set[Key]:
     return {block_key(block) for block in blocks(suite, SCALES[scale])}
 
 
-def block_key(block: Block) -> Key:
-    """Return the key of a block's record."""
-    return key(block.suite, block.problem, block.solver, block.settings)
-
-
-def why_again(record: Record, size: float) -> str:
-    """Return why a block of this size is measured again beside its record, "" if it is not."""
+def why_again(block: Block, present: Mapping[Key, Record], executor: Executor) -> str | None:
+    """Return why a block is measured though there is a record, "" if there is none, or None."""
+    record = present.get(block_key(block))
+    if record is None:
+        return ""
     if record.failed:
         return "it failed before"
     if record.superseded:
         return "its settings are asked for again"
-    if record.size < size:
-        return f"a larger size ({record.size:g}, now {size:g})"
-    return difference(record.stamp, stamp())
-
-
-def now() -> str:
-    """Return the moment, ISO 8601, in UTC."""
-    return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-def _run_block(block: Block, file: RecordFile, present: dict[Key, Record]) -> Iterator[Event]:
-    what = f"{block.problem}, {block.solver}"
-    there = present.get(block_key(block))
-    again = why_again(there, block.size) if there else ""
-    if there and not again:
-        yield Event(KEPT, block.suite, what)
-        return
-    yield Event(MEASURING, block.suite, what, again)
-    record = measure(block)
-    file.append([record])
-    yield Event(FAILED if record.failed else MEASURED, block.suite, what, record.failed)
-
-
-def measure(block: Block) -> Record:
-    """Measure a block; one that raises becomes a record that says why, and costs no other."""
-    begin = time.perf_counter()
-    try:
-        arrays, notes, facts = block.measure()
-    except Exception as error:  # whatever a solver raises is a result of that solver
-        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
-            raise KeyboardInterrupt from None
-        arrays, notes, facts = {}, {"failed": f"{type(error).__name__}: {error}"}, {}
-    return Record(
-        block.suite,
-        block.problem,
-        block.solver,
-        block.settings,
-        block.size,
-        {name: np.asarray(values) for name, values in arrays.items()},
-        notes,
-        stamp(),
-        now(),
-        time.perf_counter() - begin,
-        {**block.facts, **facts},
-        conditions(),
-    )
+    if record.size < block.size:
+        return f"a larger size ({record.size:g}, now {block.size:g})"
+    return executor.difference(block, record) or None

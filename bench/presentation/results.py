@@ -1,13 +1,18 @@
 """The records of a report, and how problems and solvers are written."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..harness.metrics import Ranking
 from ..harness.record import Record
 from ..peers import registry
 from .tables import words
 from .text import all_visible, shortened, visible
+
+# So much may a time that is shown be off, in relative terms, by the drift of its machine.
+PRECISION = 0.05
 
 
 class Results:
@@ -16,6 +21,11 @@ class Results:
     def __init__(self, records: Iterable[Record]) -> None:
         """Leave out those that say why there are none, and those under settings of before."""
         self.records = [r for r in records if not r.failed and not r.superseded]
+
+    @property
+    def entrants(self) -> frozenset[str]:
+        """The solvers that a user has entered."""
+        return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
 
     def all(self, suite: str, **wanted: Any) -> list[Record]:
         """Return the records of a suite whose facts and settings are these."""
@@ -110,3 +120,23 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 def counted(count: int, name: str) -> str:
     """Return a count of things: "1 iteration", "2 iterations"."""
     return f"{words(count)} {name}{'' if count == 1 else 's'}"
+
+
+def leaders(ranking: Ranking) -> str:
+    """Return who is first, and who is not told from that one: "a, in a tie with b and c"."""
+    first, *tied = ranking.first
+    return f"{first}, in a tie with {listed(tied)}" if tied else first
+
+
+def steadiness(noise: float) -> str:
+    """Return whether a machine was steady enough for the precision that is stated, "" if unknown.
+
+    `noise` is half the width of the middle eight tenths of a fixed loop's times, over their median.
+    """
+    if math.isnan(noise):
+        return ""
+    said = f"a fixed loop timed meanwhile varied by ± {round(100 * noise, 1):g} %"
+    stated = f"{100 * PRECISION:g} %"
+    if noise > PRECISION:
+        return f"The machine was too noisy for the {stated} that are aimed at: {said}."
+    return f"The machine was steady within the {stated} that are aimed at: {said}."

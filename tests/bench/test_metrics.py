@@ -177,6 +177,14 @@ def test_the_interval_of_a_median_holds_it_as_often_as_it_says(rng):
     assert 0.92 <= np.mean(held) <= 0.99  # 0.962 by the binomial; 400 draws err by 0.01
 
 
+def test_the_interval_of_a_mean_is_students():
+    """Of 1, 2, 3: the quantile of two degrees of freedom is 4.3027, the deviation of the mean 1."""
+    mean, low, high = metrics.mean_interval(np.array([1.0, 2.0, 3.0]))
+    assert mean == 2.0
+    assert high - mean == mean - low == pytest.approx(4.302653 / math.sqrt(3.0), rel=1e-6)
+    assert math.isnan(metrics.mean_interval(np.ones(1)).low)
+
+
 def flags(hits, total):
     return np.arange(total) < hits
 
@@ -246,6 +254,15 @@ def test_the_intervals_of_the_bootstrap_hold_the_truth(rng):
         _, low, high = metrics.shifted_geometric_mean(rng.lognormal(0.0, 1.0, 60), 0.0)
         held += low <= 1.0 <= high
     assert held >= 0.89 * 200  # 0.94 of these; 200 draws err by 0.017
+
+
+def test_of_very_many_targets_the_interval_is_the_same_without_draws(rng, monkeypatch):
+    values = np.concatenate([rng.lognormal(0.0, 1.0, 3000), rng.lognormal(3.0, 0.1, 3000)])
+    drawn = metrics.shifted_geometric_mean(values, 1e-5, (3000, 3000))
+    monkeypatch.setattr(metrics, "LARGE", 5000)
+    np.testing.assert_allclose(
+        metrics.shifted_geometric_mean(values, 1e-5, (3000, 3000)), drawn, rtol=0.01
+    )
 
 
 def test_the_interval_of_a_timing_is_that_of_its_sweeps():

@@ -1,0 +1,55 @@
+"""Measure a block: what came of it, or why nothing did, becomes a record."""
+
+import time
+from datetime import UTC, datetime
+
+import numpy as np
+
+from .block import Block, Measured
+from .machine import conditions, stamp
+from .record import Key, Record, key
+
+
+def block_key(block: Block) -> Key:
+    """Return the key of a block's record."""
+    return key(block.suite, block.problem, block.solver, block.settings)
+
+
+def now() -> str:
+    """Return the moment, ISO 8601, in UTC."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def measure(block: Block) -> Record:
+    """Measure a block; one that raises becomes a record that says why, and costs no other."""
+    begin = time.perf_counter()
+    try:
+        measured = block.measure()
+    except Exception as error:  # whatever a solver raises is a result of that solver
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
+            raise KeyboardInterrupt from None
+        measured = failure(f"{type(error).__name__}: {error}")
+    return record_of(block, measured, time.perf_counter() - begin)
+
+
+def failure(why: str) -> Measured:
+    """Return a block without numbers that says why it could not be measured."""
+    return Measured({}, {"failed": why})
+
+
+def record_of(block: Block, measured: Measured, seconds: float) -> Record:
+    """Return the record of what was measured here and now."""
+    return Record(
+        block.suite,
+        block.problem,
+        block.solver,
+        block.settings,
+        block.size,
+        {name: np.asarray(values) for name, values in measured.arrays.items()},
+        measured.notes,
+        stamp(),
+        now(),
+        seconds,
+        {**block.facts, **measured.facts},
+        conditions(),
+    )

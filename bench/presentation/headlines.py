@@ -1,0 +1,284 @@
+"""The first screen’s answers: is it right, who is most accurate and fastest, who is absent.
+
+All are made from the records. Who is not told from the first ties with it: over robots by the pairs
+of `metrics.ranking`, among timed works where intervals overlap.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..experiments.cloth_peers import ONE_STEP
+from ..experiments.cloth_peers.readings import points
+from ..experiments.robots import REACHABLE
+from ..experiments.robots.overall.readings import Overall, overall
+from ..experiments.robots.readings import KINDS, SHIFT, measured
+from ..harness import metrics
+from ..harness.record import FINISHED, Record
+from ..peers import registry
+from .results import Results, by_problem, listed
+from .tables import words
+
+# So near to the converged step a solver has solved it.
+TARGET = "1e-6"
+NEAR = float(TARGET)
+# The table of solvers over all robots.
+OVERALL = "robots_overall_one_start"
+# Ties of more solvers than this are counted, not listed.
+MOST_NAMED = 2
+SUBJECTS = {"kinematics": "Forward kinematics", "ik": "Inverse kinematics", "cloth": "Cloth step"}
+_OURS = registry.COMPILED.name
+_NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
+
+
+class Headline(NamedTuple):
+    """An answer in a line.
+
+    Attributes:
+        chapter: the section of the report that it belongs to.
+        asked: what is asked.
+        answer: who.
+        detail: by how much, over how many.
+        table: the name of the table that it can be read in.
+    """
+
+    chapter: str
+    asked: str
+    answer: str
+    detail: str
+    table: str
+
+
+class Verdict(NamedTuple):
+    """How many claims of the cross-check hold, and which of them only just.
+
+    Attributes:
+        held: claims that hold.
+        total: claims.
+        narrowest: the claim that uses most of its tolerance.
+        used: how much of it, as a share.
+    """
+
+    held: int
+    total: int
+    narrowest: str
+    used: float
+
+
+class Answers(NamedTuple):
+    """What the first screen says.
+
+    Attributes:
+        verdict: of the cross-check, None if it was not run.
+        headlines: who is most accurate and who is fastest.
+        scale: at which scale was measured, "" if that is not known.
+        absent: peers that took no part.
+    """
+
+    verdict: Verdict | None
+    headlines: list[Headline]
+    scale: str
+    absent: list[str]
+
+
+def answers(results: Results) -> Answers:
+    """Return all that the first screen says."""
+    return Answers(verdict(results), headlines(results), scale(results), absent(results))
+
+
+def verdict(results: Results) -> Verdict | None:
+    """Return what the cross-check says, None if it was not run."""
+    claims = [record for record in results.all("check") if "held" in record.arrays]
+    if not claims:
+        return None
+    held = sum(bool(record.arrays["held"]) for record in claims)
+    narrowest = max(claims, key=_used)
+    return Verdict(held, len(claims), narrowest.title, _used(narrowest))
+
+
+def _used(claim: Record) -> float:
+    return metrics.ratio(float(claim.arrays["difference"]), float(claim.arrays["tolerance"]))
+
+
+def headlines(results: Results) -> list[Headline]:
+    """Return who is most accurate and who is fastest, chapter by chapter, as far as measured."""
+    made = [_most_accurate(results), _fastest(results), _arrived(results), _soonest(results)]
+    made += [_timed(results, subject) for subject in SUBJECTS]
+    return [headline for headline in made if headline]
+
+
+def scale(results: Results) -> str:
+    """Return at which scale was measured: "Quick run: 20 targets a stratum", "" if unknown."""
+    scales = dict.fromkeys(r.notes.get("scale", "") for r in results.all(FINISHED))
+    named = listed([name for name in scales if name])
+    counts = sorted({c for r in results.all("ik", task=REACHABLE) if (c := _in_a_stratum(r))})
+    targets = listed([words(count) for count in counts], "or")
+    said = f"{named} run".strip().capitalize()
+    return f"{said}: {targets} targets a stratum" if targets else said if named else ""
+
+
+def _in_a_stratum(record: Record) -> int:
+    return int(record.size) // max(1, len(record.facts.get("strata", ())))
+
+
+def absent(results: Results) -> list[str]:
+    """Return the peers that took no part in what was measured."""
+    return [*_absent_solvers(results), *_absent_engines(results)]
+
+
+def _absent_solvers(results: Results) -> list[str]:
+    records = results.all("ik", task=REACHABLE)
+    here = {record.solver for record in measured(records)}
+    peers = registry.PEERS if records else ()
+    return [p.title for p in peers if here.isdisjoint(p.called(entry) for entry in p.entries)]
+
+
+def _absent_engines(results: Results) -> list[str]:
+    here = {registry.find(point.solver).engine for point in points(results, ONE_STEP)}
+    engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers()) if here else ()
+    return [f"{engine} (cloth)" for engine in engines if engine not in here]
+
+
+def _compared(results: Results) -> dict[str, Overall]:
+    """Return the solvers over the set of robots on which most of them can be ranked."""
+    sets: dict[str, dict[str, Overall]] = {}
+    for row in overall(results, next(iter(KINDS))):
+        if row.is_ranked:
+            sets.setdefault(row.robots, {})[row.solver] = row
+    return max(sets.values(), key=len, default={})
+
+
+def _most_accurate(results: Results) -> Headline | None:
+    rows = _compared(results)
+    if len(rows) < 2:
+        return None
+    ranking = next(iter(rows.values())).success
+    share = rows[ranking.order[0]].share
+    rate, low, high = (f"{100 * x:.3g}" for x in (share.hits / share.total, share.low, share.high))
+    detail = f"solves {rate} % of {words(share.total)} poses ({low}–{high})"
+    return Headline("kinematics", "Most accurate", _tied(ranking.first), detail, OVERALL)
+
+
+def _fastest(results: Results) -> Headline | None:
+    """Return who takes the least time, unsolved poses with their penalty, and the next."""
+    rows = _compared(results)
+    if len(rows) < 2:
+        return None
+    ranking = next(iter(rows.values())).time
+    first, second = (rows[solver].penalised + SHIFT for solver in ranking.order[:2])
+    ratio = metrics.paired_ratio(second, first)
+    interval = f"({words(ratio.low)}–{words(ratio.high)})"
+    detail = f"{words(ratio.mean)} × {ranking.order[1]} {interval}, {words(ratio.pairs)} poses"
+    return Headline(
+        "kinematics", "Fastest, misses penalised", _tied(ranking.first), detail, OVERALL
+    )
+
+
+def _tied(names: Sequence[str]) -> str:
+    """Return who leads: one name, or those that tie."""
+    if len(names) <= 1:
+        return "".join(names)
+    return f"Tie: {', '.join(names) if len(names) <= MOST_NAMED else f'{len(names)} solvers'}"
+
+
+class Time(NamedTuple):
+    """The median of what a work takes a solver [s], and its interval.
+
+    Of too few rounds for an interval these are the 10th and the 90th percentile.
+    """
+
+    median: float
+    low: float
+    high: float
+
+
+# What each work takes each solver.
+Times = dict[str, dict[str, Time]]
+
+
+def _arrival_times(results: Results) -> Times:
+    """Return how long it takes to solve the step of each cloth [s], for those that solve it."""
+    found: Times = {}
+    for point in points(results, ONE_STEP):
+        times = found.setdefault(f"{point.particles}/{point.stiffness}", {})
+        seconds, before = point.values["seconds"], times.get(point.solver)
+        if point.values["error"] <= NEAR and (before is None or seconds < before.median):
+            times[point.solver] = Time(seconds, seconds, seconds)
+    return found
+
+
+def _arrived(results: Results) -> Headline | None:
+    times = _arrival_times(results)
+    arrivals = Counter(solver for mine in times.values() for solver in mine)
+    most = max(arrivals.values(), default=0)
+    if not most:
+        return None
+    ties = [solver for solver, count in arrivals.items() if count == most]
+    detail = f"{TARGET} near on {most}/{len(times)} cloths"
+    return Headline("cloth", "Most accurate", _tied(ties), detail, "cloth_peers_step")
+
+
+def _soonest(results: Results) -> Headline | None:
+    """Return whose engine solves a step first."""
+    best: Times = {}
+    for cloth, times in _arrival_times(results).items():
+        for solver in sorted(times, key=lambda solver: times[solver]):
+            best.setdefault(cloth, {}).setdefault(registry.find(solver).engine, times[solver])
+    return _first("cloth", "Fastest", "cloths", best, "cloth_peers_step")
+
+
+def _timed(results: Results, subject: str) -> Headline | None:
+    """Return who is first in the works of a subject that more than one can do."""
+    works: Times = {}
+    for problem, records in by_problem(results.all("timing", subject=subject)).items():
+        rivals = [record for record in records if record.solver not in _NOT_RIVALS]
+        if len(rivals) > 1:
+            works[problem] = {_short(record.solver): _time(record) for record in rivals}
+    return _first("speed", SUBJECTS[subject], "works", works, f"timing_{subject}")
+
+
+def _time(record: Record) -> Time:
+    timing = metrics.timing(record.arrays["seconds"])
+    if np.isfinite(timing.interval).all():
+        return Time(*timing.interval)
+    return Time(timing.median, timing.low, timing.high)
+
+
+def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headline | None:
+    """Return who is first most often, in how many works, and by what factors; ties are nobody's."""
+    order = [sorted(times.items(), key=lambda item: item[1]) for times in works.values() if times]
+    decided = [ranked for ranked in order if not _is_tie(ranked)]
+    if not order:
+        return None
+    if not decided:
+        tied = _tied([name for name, _ in order[0]])
+        return Headline(chapter, asked, tied, f"no lead in {len(order)} {of}", table)
+    firsts = Counter(ranked[0][0] for ranked in decided)
+    most = max(firsts.values())
+    leaders = [name for name, count in firsts.items() if count == most]
+    detail = f"first in {most}/{len(works)} {of}"
+    if len(leaders) == 1:
+        detail += _ahead([ranked for ranked in decided if ranked[0][0] == leaders[0]])
+    return Headline(chapter, asked, _tied(leaders), detail, table)
+
+
+def _ahead(won: Sequence[Sequence[tuple[str, Time]]]) -> str:
+    """Say by what factors the works were won."""
+    factors = [ranked[1][1].median / ranked[0][1].median for ranked in won if len(ranked) > 1]
+    return f", {_range(factors)} × the next" if factors else "; no rival arrives"
+
+
+def _is_tie(ranked: Sequence[tuple[str, Time]]) -> bool:
+    """Return whether the intervals of the first two overlap."""
+    return len(ranked) > 1 and ranked[0][1].high >= ranked[1][1].low
+
+
+def _range(factors: Sequence[float]) -> str:
+    low, high = metrics.extent(np.array(factors))
+    return "–".join(dict.fromkeys((words(low), words(high))))
+
+
+def _short(solver: str) -> str:
+    return "Plumbob" if solver == _OURS else solver
