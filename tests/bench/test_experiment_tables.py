@@ -196,6 +196,9 @@ def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_s
     )
     (point,) = table.summary.points
     assert point.endswith("first: Plumbob")
+    apart = replace(rival, facts={**rival.facts, "together": "another run"})
+    (point,) = timing.kinematics(Results([ours, apart])).summary.points
+    assert point.endswith("timed apart, and not ranked")
     again = swept(make, "MuJoCo", 1e-6 * rng.permutation(drift))
     (point,) = timing.kinematics(Results([ours, again])).summary.points
     assert "in a tie with" in point
