@@ -8,7 +8,16 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import LARGEST, MEDIAN, P95, SOLVER, share, spread, text, titled
+from ...presentation.columns import (
+    LARGEST,
+    MEDIAN,
+    P95,
+    SOLVER,
+    share,
+    spread,
+    text,
+    titled,
+)
 from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem, label, leaders, settings
 from ...presentation.tables import Summary, words
