@@ -36,7 +36,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 # What was found for cases that were measured together with another, by the run and the case; it is
 # handed out for so long [s].
 _found: dict[tuple[str, Key], tuple[Measured | str, Budget]] = {}
-FRESH = 600.0
+FRESH = 3600.0
 
 
 def timed(run: str, case: Case, seconds: float) -> Measured:
