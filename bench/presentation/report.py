@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from ..experiments import SUITES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
 from .figures import Drawing, Sketch, drawn
+from .headlines import Answers, answers
 from .layout import Figure, Layout
 from .page import FORMATS, Shown, render, rows
 from .results import Results, plain, sift
@@ -17,11 +18,12 @@ from .tables import Table
 
 
 class Written(NamedTuple):
-    """What a report came to: its page, its tables, and sentences on what is missing."""
+    """What a report came to: its page, its tables, what is missing, and who leads."""
 
     page: Path
     tables: list[Table]
     missing: list[str]
+    answers: Answers
 
 
 def write(folder: Path) -> Written:
@@ -41,7 +43,7 @@ def write(folder: Path) -> Written:
     _write_files(folder, shown.tables.values(), shown.drawings.values())
     page = folder / "index.html"
     _write(page, render(shown, _newest(shown.records), missing))
-    return Written(page, list(shown.tables.values()), missing)
+    return Written(page, list(shown.tables.values()), missing, answers(Results(shown.records)))
 
 
 def sound(records: Sequence[Record]) -> tuple["Sketched", list[str]]:
