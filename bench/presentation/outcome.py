@@ -57,9 +57,12 @@ def _verdict(verdict: Verdict | None) -> str:
 
 def three(headlines: Sequence[Headline]) -> list[Headline]:
     """Return those that are printed: who is accurate and fast at kinematics and cloths."""
-    order = {asked: rank for rank, asked in enumerate(_FIRST)}
-    ranked = sorted(headlines, key=lambda h: order.get((h.chapter, h.asked), len(order)))
-    return ranked[:HEADLINES]
+
+    def rank(headline: Headline) -> int:
+        wanted = (headline.chapter == c and headline.asked.startswith(a) for c, a in _FIRST)
+        return next((i for i, is_it in enumerate(wanted) if is_it), len(_FIRST))
+
+    return sorted(headlines, key=rank)[:HEADLINES]
 
 
 def _headline(headline: Headline) -> str:
