@@ -115,9 +115,9 @@ def test_a_published_table_counts_what_was_never_begun(make):
 def test_jitter_is_the_largest_angle_in_degrees_and_the_closing_one_stands_apart(make):
     table = tracking.jitter(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
     for mode, angle in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
-        assert column(table, f"{mode}, largest [°]") == [pytest.approx(math.degrees(angle))]
-        assert column(table, f"{mode}, mean [°]") == [pytest.approx(math.degrees(angle / 4))]
-    assert column(table, "coherent, last to first [°]") == [pytest.approx(math.degrees(0.125))]
+        assert column(table, f"largest, {mode} [°]") == [pytest.approx(math.degrees(angle))]
+        assert column(table, f"mean, {mode} [°]") == [pytest.approx(math.degrees(angle / 4))]
+    assert column(table, "last to first, coherent [°]") == [pytest.approx(math.degrees(0.125))]
     assert "in 1 of 1 cases, and in 1 the step" in table.summary.sentence
     assert table.summary.points[0] == "cold: 57.3° (arm, circle, CCD)"
 
@@ -135,7 +135,7 @@ def test_a_curve_that_was_not_followed_in_all_modes_has_no_row(make):
 def test_iterations_over_all_frames_are_those_that_every_frame_has_more(make):
     table = tracking.price(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
     assert column(table, "of these over all frames at once") == [7]
-    assert [share.hits for share in column(table, "coherent, within tolerance")] == [3]
+    assert [share.hits for share in column(table, "within tolerance, coherent")] == [3]
     assert "together 7 to 7 times" in table.summary.sentence
 
 
