@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+
+from ..help_text import Command
 
 if TYPE_CHECKING:
     from crosscheck.conformance.doors import Limits
@@ -29,7 +30,7 @@ EXAMPLES = (
 )
 
 
-class SolverCommand(TyperCommand):
+class SolverCommand(Command):
     """A command that leaves all behind -- as it is: a program and its own options."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
