@@ -20,6 +20,7 @@ from ..experiments import Block, Scale
 from ..harness.executor import NotMeasured, Step
 from ..harness.machine import stamp
 from ..harness.measure import block_key, failure, record_of
+from ..harness.progress import Progress, announce
 from ..harness.record import Record, decode
 from ..harness.stopwatch import Budget
 from . import DASK
@@ -98,6 +99,8 @@ class DaskExecutor:
         """
         self.address, self.mix_machines, self._patience = address, mix_machines, workers
         self._client, self._done = _connected(address, answer), queue.SimpleQueue[Any]()
+        self._topic = f"plumbob-{uuid.uuid4().hex}"
+        self._client.subscribe_topic(self._topic, self._heard)
         self._places: dict[str, Place] = {}
         self._machine = ""
         try:
@@ -213,15 +216,21 @@ class DaskExecutor:
                 line.host = ""
 
     def _submit(self, block: Block, scale: Scale, **where: Any) -> Any:
-        task = Task(block.suite, scale, block_key(block), block.times, stamp())
+        task = Task(block.suite, scale, block_key(block), block.times, stamp(), self._topic)
         future = self._client.submit(perform, task, key=f"plumbob-{uuid.uuid4().hex}", **where)
         future.add_done_callback(self._done.put)
         return future
 
+    def _heard(self, event: tuple[Any, Mapping[str, str]]) -> None:
+        self._done.put(Progress(**event[1]))
+
     def _next(self) -> Any:
-        """Return a future that is done, None if there is none for a while."""
+        """Return a future that is done, None if there is none for a while; pass on progress."""
         with contextlib.suppress(queue.Empty):
-            return self._done.get(timeout=_LOOK)
+            found = self._done.get(timeout=_LOOK)
+            if not isinstance(found, Progress):
+                return found
+            announce(*found)
         return None
 
     def _outcome(self, block: Block, future: Any) -> Step | None:

@@ -12,6 +12,7 @@ import socket
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +20,7 @@ from ..experiments import Block, Scale, blocks
 from ..harness.isolation import WorkerProcess
 from ..harness.machine import difference, stamp
 from ..harness.measure import block_key, measure
+from ..harness.progress import Progress, listening
 from ..harness.record import Key, check_regular, encode
 from ..harness.worker import Calculation
 
@@ -36,6 +38,7 @@ class Task(NamedTuple):
         key: the block's key.
         times: whether it is timed, so that nothing else may be measured meanwhile.
         stamp: that of the process that asks, whose versions and sources the worker must have.
+        topic: the events under which that process hears what is being done.
     """
 
     suite: str
@@ -43,6 +46,7 @@ class Task(NamedTuple):
     key: Key
     times: bool
     stamp: Mapping[str, Any]
+    topic: str = ""
 
 
 class Reply(NamedTuple):
@@ -58,11 +62,17 @@ def perform(task: Task) -> Reply:
     if refused := unlike(task.stamp, stamp()):
         return Reply(refused=refused)
     try:
-        with _machine_to_itself(task.times):
+        with _machine_to_itself(task.times), listening(partial(_tell, task.topic)):
             found = _process().find(Calculation(measured, (task.suite, task.scale, task.key)))
     except RuntimeError as error:
         return Reply(failed=str(error))
     return Reply(**found)
+
+
+def _tell(topic: str, progress: Progress) -> None:
+    from distributed import get_worker
+
+    get_worker().log_event(topic, progress._asdict())
 
 
 def measured(suite: str, scale: Scale, key: Key) -> Mapping[str, str]:

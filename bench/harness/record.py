@@ -220,12 +220,11 @@ class RecordFile:
         """
         lines, _ = self._lines()
         rank = {key: i for i, key in enumerate(order)}
-        places = [i for i, line in enumerate(lines) if line.record and line.record.key in rank]
-        ranks = [rank[line.record.key] for i in places if (line := lines[i]).record]
-        if ranks != sorted(ranks):
-            moved = sorted(zip(ranks, places, strict=True))
+        found = [(rank.get(line.record.key), i) for i, line in enumerate(lines) if line.record]
+        ranked = [(number, i) for number, i in found if number is not None]
+        if (shown := list(dict.fromkeys(number for number, _ in ranked))) != sorted(shown):
             texts = [line.text for line in lines]
-            for place, (_, source) in zip(places, moved, strict=True):
+            for (_, place), (_, source) in zip(ranked, sorted(ranked), strict=True):
                 texts[place] = lines[source].text
             self._replace(b"".join(text + b"\n" for text in texts))
 

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -69,10 +69,11 @@ def run(
             begin = time.perf_counter()
             wanted = [block for suite in together for block in blocks(suite, SCALES[scale])]
             yield from _run_blocks(wanted, scale, file, present, executor)
+            file.arrange(block_key(block) for block in wanted)
             for suite in together:
                 spent = time.perf_counter() - begin
                 end = _finished(suite, scale, spent, executor.stamp())
-                yield from _finish(end, [b for b in wanted if b.suite == suite], file)
+                yield from _finish(end, keys(suite, scale), file)
 
 
 def _run_blocks(
@@ -105,13 +106,11 @@ def _what(named: Block | Record) -> str:
     return f"{named.problem}, {named.solver}"
 
 
-def _finish(finished: Record, blocks: Sequence[Block], file: RecordFile) -> Iterator[Event]:
+def _finish(finished: Record, asked: set[Key], file: RecordFile) -> Iterator[Event]:
     """Put on record that a suite was gone through, and say what it did not ask for."""
-    asked = dict.fromkeys(map(block_key, blocks))
-    file.arrange(asked)
     suite, finished = finished.problem, replace(finished, size=len(asked))
     records = {record.key: record for record in file.read().records}
-    if asked.keys() <= records.keys() and not _says_the_same(records.get(finished.key), finished):
+    if asked <= records.keys() and not _says_the_same(records.get(finished.key), finished):
         file.append([finished])
     extra = [r for r in records.values() if r.suite == suite and r.key not in asked]
     old = [record for record in extra if _is_superseded(record, asked)]
@@ -141,7 +140,7 @@ def _says_the_same(record: Record | None, other: Record) -> bool:
     )  # fmt: skip
 
 
-def _is_superseded(record: Record, asked: Iterable[Key]) -> bool:
+def _is_superseded(record: Record, asked: set[Key]) -> bool:
     """Return whether a record that is not asked for belongs to what is, or to nothing measured.
 
     Its problem and solver are asked for under other settings, or it says only that something was

@@ -22,12 +22,15 @@ from .text import visible
 Floats = NDArray[np.float64]
 
 _HERE = Path(__file__).parent
-# Without indents and comments, which a page need not carry.
-SCRIPT = "".join(
-    f"{line.strip()}\n"
-    for line in (_HERE / "motion.js").read_text(encoding="utf-8").splitlines()
-    if line.strip() and not line.strip().startswith("//")
-)
+
+
+def squeezed(script: str) -> str:
+    """Return a script without indents and comments, which a page need not carry."""
+    lines = (line.strip() for line in script.splitlines())
+    return "".join(f"{line}\n" for line in lines if line and not line.startswith("//"))
+
+
+SCRIPT = squeezed((_HERE / "motion.js").read_text(encoding="utf-8"))
 STYLE = (_HERE / "motion.css").read_text(encoding="utf-8")
 # The largest whole number of 16 bits; the errors of points have 8.
 _FULL, _SHADES = 65535, 255

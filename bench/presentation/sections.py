@@ -18,6 +18,7 @@ class Section(NamedTuple):
 
     Attributes:
         name: what experiments and addresses within the page call it.
+        short: what links to it say.
         title: its heading.
         about: what it is about.
         main: the name of its main table, shown unfolded; "" if it has none.
@@ -25,6 +26,7 @@ class Section(NamedTuple):
     """
 
     name: str
+    short: str
     title: str
     about: str
     main: str = ""
@@ -49,21 +51,24 @@ class Section(NamedTuple):
 SECTIONS = (
     Section(
         "right",
+        "Right?",
         "Is it right?",
         "Nothing below counts unless the reference itself is right. Each claim computes one "
         "quantity twice, by Plumbob and by a physics engine that shares no code with it.",
     ),
     Section(
         "kinematics",
+        "Kinematics",
         "Inverse kinematics",
         "Real arms and a character with two hands to place: the same targets, starts and "
         "evaluation for every solver. The lab’s arm of five joints draws curves, and a chain of "
         "ten ball joints reaches for targets near, far, at the edge of its reach and beyond it.",
-        "robots_success_one_start",
+        "robots_overall_one_start",
         "budget_one_start",
     ),
     Section(
         "cloth",
+        "Cloth",
         "Cloth by implicit Euler",
         "A cloth falls from rest and swings from two corners, as it is and stiffer. A step "
         "minimises the objective g of Liu et al. (2013).",
@@ -72,6 +77,7 @@ SECTIONS = (
     ),
     Section(
         "speed",
+        "Speed",
         "Speed",
         "The same work by the compiled and the plain source, and by both engines, in one run on "
         "one core.",

@@ -31,6 +31,20 @@ def first_called(name, solver, cold, warm=0.3):
     return record("first_call", name, solver, {}, arrays, facts=facts)
 
 
+def in_parts(solver="Plumbob LM, 100 restarts", missed=((), (7,))):
+    """Parts of five targets each, of which some are missed, one falsely claimed to be solved."""
+    return [
+        record(
+            "many_targets", f"many/iiwa14/{part:06d}", solver,
+            {"tolerance": 1e-3, "tolerance_rotation": 1e-3},
+            {"targets": 5, "solved": 5 - len(which), "false": len(which), "position": 1e-5,
+             "rotation": 1e-6, "missed": np.array(which, dtype=int)},
+            size=5, facts={"title": "KUKA iiwa14", "robot": "iiwa14", "part": part},
+        )
+        for part, which in enumerate(missed)
+    ]  # fmt: skip
+
+
 def drawn(solver, warm, angle):
     """The arm drawing a curve, in three frames."""
     return record(
@@ -334,7 +348,7 @@ def as_liu(solver, seconds):
     return record("cloth", "peers/liu2013", solver, {"size": 81}, arrays, facts=facts)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make():
     """The makers of records, by name."""
     return SimpleNamespace(
@@ -345,6 +359,7 @@ def make():
         beyond=beyond,
         claim=claim,
         first_called=first_called,
+        in_parts=in_parts,
         timed=timed,
         stepped=stepped,
         swung=swung,
@@ -374,6 +389,7 @@ def records():
         judged("CCD", "root to tip"),
         judged("honest solvers", "", ()),
         first_called("solve_ik/chain", "fabrik", 2.0),
+        *in_parts(),
         *arm,
         *followed("ccd", cold=1.0, warm=0.5, coherent=0.25),
         *drifted("ccd"),
