@@ -221,8 +221,8 @@ class DaskExecutor:
         future.add_done_callback(self._done.put)
         return future
 
-    def _heard(self, event: tuple[Any, Mapping[str, str]]) -> None:
-        self._done.put(Progress(**event[1]))
+    def _heard(self, event: tuple[Any, Sequence[str]]) -> None:
+        self._done.put(Progress(*event[1]))
 
     def _next(self) -> Any:
         """Return a future that is done, None if there is none for a while; pass on progress."""

@@ -72,7 +72,7 @@ def perform(task: Task) -> Reply:
 def _tell(topic: str, progress: Progress) -> None:
     from distributed import get_worker
 
-    get_worker().log_event(topic, progress._asdict())
+    get_worker().log_event(topic, list(progress))
 
 
 def measured(suite: str, scale: Scale, key: Key) -> Mapping[str, str]:

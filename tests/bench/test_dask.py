@@ -307,7 +307,7 @@ def test_what_a_worker_does_is_heard(made_up, monkeypatch):
     submit = cluster.submit
 
     def tell_and_submit(*given, **where):
-        cluster.tell((0.0, Progress(f"step {len(cluster.given)}")._asdict()))
+        cluster.tell((0.0, list(Progress(f"step {len(cluster.given)}"))))
         return submit(*given, **where)
 
     cluster.submit = tell_and_submit
