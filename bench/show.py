@@ -27,7 +27,8 @@ from reference.formats import bvh
 from .experiments.arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING
 from .presentation.drawing import STYLE
 from .presentation.figures import COLOURS
-from .presentation.scene_drawing import ARM_VIEW, CLOTH_VIEW, draw_arm, draw_cloth, seen
+from .presentation.scene_drawing import draw_arm, draw_cloth
+from .presentation.view import ARM_VIEW, CLOTH_VIEW, seen
 
 ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *curves)

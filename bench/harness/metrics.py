@@ -151,6 +151,16 @@ def _coin(throws: int, heads: int) -> float:
     return math.exp(logs - throws * math.log(2.0))
 
 
+def mean_interval(values: Floats) -> Interval:
+    """Return the mean and its interval by Student; NaN bounds of fewer than two."""
+    count, middle = int(np.size(values)), mean(values)
+    if count < 2:
+        return Interval(middle, math.nan, math.nan)
+    half = float(stdtrit(count - 1, (1 + CONFIDENCE) / 2) * np.std(values, ddof=1))
+    half /= math.sqrt(count)
+    return Interval(middle, middle - half, middle + half)
+
+
 def ranking(scores: Mapping[str, Floats]) -> Ranking:
     """Return who has the greatest mean score, and who is not told from that one.
 

@@ -9,11 +9,16 @@ from typing import Any, NamedTuple
 from ..experiments import SUITES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
 from .figures import Drawing, Sketch, drawn
+from .headlines import Answers, absent, answers
 from .layout import Figure, Layout
-from .page import FORMATS, Shown, render, rows
-from .results import Results, plain, sift
-from .sections import SECTIONS
-from .tables import Table
+from .motion import Scene
+from .page import Shown, render
+from .results import Results, listed, plain, sift
+from .sections import MOTIONS, SECTIONS
+from .tables import Table, best_cells, comma_separated, latex, markdown
+
+# The forms that a table is written in, by the suffix of the file.
+FORMATS = {"md": markdown, "tex": latex, "csv": comma_separated}
 
 
 class Written(NamedTuple):
@@ -61,19 +66,23 @@ class Sketched(NamedTuple):
     records: Sequence[Record]
     tables: Mapping[Layout, Table]
     sketches: Mapping[Figure, Sketch]
+    answers: Answers
+    scenes: Mapping[str, Scene]
 
 
 def _sketched(records: Sequence[Record]) -> Sketched:
     results = Results(records)
     made = {layout: _checked(layout, results) for section in SECTIONS for layout in section.layouts}
     sketches = {figure: figure(results) for figure in all_figures()}
-    return Sketched(records, made, {figure: one for figure, one in sketches.items() if one})
+    scenes = {section: scene for section, make in MOTIONS.items() if (scene := make(results))}
+    drawable = {figure: one for figure, one in sketches.items() if one}
+    return Sketched(records, made, drawable, answers(results), scenes)
 
 
 def _drawn(sketched: Sketched, folder: Path) -> Shown:
     """Draw the figures, but for those that the folder has already."""
     drawings = {figure: drawn(one, folder) for figure, one in sketched.sketches.items()}
-    return Shown(sketched.records, sketched.tables, drawings)
+    return Shown(sketched.records, sketched.tables, drawings, sketched.answers, sketched.scenes)
 
 
 def all_figures() -> list[Figure]:
@@ -86,14 +95,16 @@ def _makers() -> Iterator[Callable[[Results], Any]]:
     for section in SECTIONS:
         yield from (partial(_checked, layout) for layout in section.layouts)
     yield from all_figures()
+    yield answers
+    yield from MOTIONS.values()
 
 
 def _checked(layout: Layout, results: Results) -> Table:
     """Return a table that can be written in every form."""
     table = layout(results)
-    rows(table)
-    for form in FORMATS.values():
-        form.write(table)
+    best_cells(table)
+    for write_as in FORMATS.values():
+        write_as(table)
     return table
 
 
@@ -101,9 +112,8 @@ def _write_files(folder: Path, made: Iterable[Table], drawings: Iterable[Drawing
     for name in ("tables", "figures"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     for table in made:
-        for suffix, form in FORMATS.items():
-            path = folder / "tables" / f"{table.name}.{suffix}"
-            _write(path, form.write(table))
+        for suffix, write_as in FORMATS.items():
+            _write(folder / "tables" / f"{table.name}.{suffix}", write_as(table))
     for drawing in drawings:
         _write(folder / "figures" / f"{drawing.name}.svg", drawing.svg)
         _write(folder / "figures" / f"{drawing.name}.pdf", drawing.pdf)
@@ -137,6 +147,11 @@ def _missing(records: Sequence[Record]) -> list[str]:
         for package, version in newest.stamp.get("versions", {}).items()
         if not version
     ]
+    if names := absent(Results(records)):
+        sentences.append(
+            f"Absent peers: {listed(names)}. `make peers` (or `pip install -e .[peers]`) adds those"
+            " that have a wheel for this Python; `plumbob bench ik cloth` then measures them."
+        )
     others = sum(record.stamp != newest.stamp for record in records)
     if others:
         sentences.append(

@@ -9,12 +9,10 @@ from matplotlib.colors import to_rgba
 from numpy.typing import NDArray
 
 from .figures import COLOURS
+from .view import ARM_VIEW, CLOTH_VIEW, seen
 
 Floats = NDArray[np.float64]
 
-# Where the camera stands: rotated about the vertical and lifted above the floor [rad].
-ARM_VIEW = (np.radians(200.0), np.radians(50.0))
-CLOTH_VIEW = (np.radians(-38.0), np.radians(18.0))
 LIGHT = np.array([0.4, 0.8, 0.45])
 
 
@@ -48,13 +46,3 @@ def draw_cloth(ax: Axes, positions: Floats, pinned: Sequence[int] | NDArray[np.i
     )
     ax.plot(x[pinned], y[pinned], "o", color=COLOURS["brass"], markersize=4, zorder=4)
     ax.autoscale_view()
-
-
-def seen(points: Floats, view: tuple[float, float]) -> tuple[Floats, Floats, Floats]:
-    """Return where points appear to the right and up, and how near, from an azimuth and height."""
-    azimuth, height = view
-    x, y, z = np.moveaxis(points, -1, 0)
-    right = np.cos(azimuth) * x + np.sin(azimuth) * z
-    toward = -np.sin(azimuth) * x + np.cos(azimuth) * z
-    up = np.cos(height) * y - np.sin(height) * toward
-    return right, up, np.sin(height) * y + np.cos(height) * toward

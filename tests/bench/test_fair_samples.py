@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bench.experiments.robots import tables as robots
+from bench.presentation.figures import drawn
 from bench.presentation.results import Results
 from bench.presentation.tables import best_cells
 
@@ -225,7 +226,7 @@ def test_the_map_has_a_field_for_each_robot_that_a_solver_takes(run):
     assert column(table, "the arm, times the least time") == pytest.approx([1.0, 100.0])
     assert column(table, "the leg, times the least time")[1] is None
     (draw,) = ONE_MAP.figures
-    svg = draw(results).svg
+    svg = drawn(draw(results)).svg
     assert svg.count(">100<") == 4  # three shares of 100 %, and 100 times the least time
     assert draw(Results([])) is None
 

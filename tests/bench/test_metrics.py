@@ -177,6 +177,14 @@ def test_the_interval_of_a_median_holds_it_as_often_as_it_says(rng):
     assert 0.92 <= np.mean(held) <= 0.99  # 0.962 by the binomial; 400 draws err by 0.01
 
 
+def test_the_interval_of_a_mean_is_students():
+    """Of 1, 2, 3: the quantile of two degrees of freedom is 4.3027, the deviation of the mean 1."""
+    mean, low, high = metrics.mean_interval(np.array([1.0, 2.0, 3.0]))
+    assert mean == 2.0
+    assert high - mean == mean - low == pytest.approx(4.302653 / math.sqrt(3.0), rel=1e-6)
+    assert math.isnan(metrics.mean_interval(np.ones(1)).low)
+
+
 def flags(hits, total):
     return np.arange(total) < hits
 
