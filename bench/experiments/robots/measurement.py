@@ -45,7 +45,6 @@ class Run(NamedTuple):
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield each solver on each robot; one block for a solver or a robot that is not installed."""
-    count = max(1, round(_TARGETS * scale.targets))
     here = [name for name in ROBOTS if is_installed(name)]
     for name in ROBOTS:
         if name not in here:
@@ -53,8 +52,14 @@ def blocks(scale: Scale) -> Iterator[Block]:
             facts = {"task": REACHABLE, "title": title(name)}
             yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"}, 0, facts)
     for peer in registry.PEERS:
-        for entry in peer.entries:
-            yield from _entry_blocks(peer, entry, here, count, _BUDGET * scale.seconds)
+        yield from blocks_of(peer, here, scale)
+
+
+def blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
+    """Yield a solver on robots that are installed, by each of its entries."""
+    count = max(1, round(_TARGETS * scale.targets))
+    for entry in peer.entries:
+        yield from _entry_blocks(peer, entry, robots, count, _BUDGET * scale.seconds)
 
 
 def _entry_blocks(
