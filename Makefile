@@ -1,14 +1,16 @@
 # make report   check, bench and write report/index.html
 # make test     the tests, a few minutes; `make test-all` adds the heavy sweeps
+# make peers    install the solvers of others as well, for `make bench`: all that this Python has
+#               wheels of; 9 GB on Linux x86-64, of which CUDA, which PyTorch's wheels bring, is 5
 # make lint     ruff and mypy
 # make bench    every benchmark at full length, then the report
 # make drawing  draw the pictures of docs/ anew, the architecture's from the imports
 # make messages renew the translations of `plumbob verify` from its sentences
-# make locks    renew the two lock files after a change of pyproject.toml; UPGRADE=--upgrade
+# make locks    renew the lock files after a change of pyproject.toml; UPGRADE=--upgrade
 #               takes the newest versions of everything
 # make clean    remove everything made here
 #
-# make wheels        does the lock install from wheels alone on Python 3.11 to 3.14, x86 and ARM?
+# make wheels        do the locks install from wheels alone on Python 3.11 to 3.14, x86 and ARM?
 # make test-pythons  the tests on every one of these Pythons that this machine has
 # make test-lowest   the tests with the lowest versions that pyproject.toml allows
 #
@@ -20,7 +22,7 @@ BIN := .venv/bin
 UV ?= build/uv/bin/uv
 export UV_PYTHON_DOWNLOADS := never
 
-.PHONY: help report test test-all lint bench drawing messages locks wheels test-pythons test-lowest clean
+.PHONY: help report test test-all peers lint bench drawing messages locks wheels test-pythons test-lowest clean
 
 help:
 	@sed -n 's/^# \{0,1\}//p' $(MAKEFILE_LIST)
@@ -33,6 +35,8 @@ test: .venv/installed
 
 test-all: .venv/installed
 	$(BIN)/python -m pytest -m "slow or not slow"
+
+peers: .venv/peers/installed
 
 lint: .venv/installed
 	$(BIN)/ruff check .
@@ -60,12 +64,23 @@ messages: .venv/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
 	@touch $@
 
-COMPILE = $(UV) pip compile pyproject.toml --universal --python-version 3.11 --generate-hashes \
+# PlaCo's wheels pin a Pinocchio older than ours: it has an environment of its own.
+.venv/peers/installed: requirements-peers.lock requirements-placo.lock .venv/installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	    --only-binary :all: --require-hashes -r requirements-peers.lock
+	$(PYTHON) -m venv .venv/peers/placo
+	.venv/peers/placo/bin/python -m pip install --quiet --disable-pip-version-check \
+	    --only-binary :all: --require-hashes -r requirements-placo.lock
+	@touch $@
+
+PINS = --universal --python-version 3.11 --generate-hashes --only-binary :all: \
     --no-header --no-emit-index-url --quiet $(UPGRADE)
+COMPILE = $(UV) pip compile pyproject.toml $(PINS)
 
 locks: $(UV)
-	$(COMPILE) --only-binary :all: --extra robots --extra fast --extra test -o requirements.lock
+	$(COMPILE) --extra robots --extra fast --extra test -o requirements.lock
 	$(COMPILE) --all-extras -c requirements.lock -o requirements-peers.lock
+	$(UV) pip compile --group pyproject.toml:placo $(PINS) -o requirements-placo.lock
 
 wheels: $(UV)
 	UV=$(UV) $(PYTHON) .ci/pythons.py wheels

@@ -1,6 +1,6 @@
 """Check that Plumbob installs and passes its tests on every Python that it names.
 
-    wheels    requirements.lock installs from wheels alone on every Python and machine below
+    wheels    the locks install from wheels alone on every Python and machine below
     tests     the tests pass on every one of these Pythons that this machine has, from the lock
     lowest    the tests pass on the oldest of them with the lowest versions of pyproject.toml
 
@@ -20,6 +20,14 @@ ROOT = Path(__file__).resolve().parents[1]
 LOCK = ROOT / "requirements.lock"
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 PLATFORMS = ("x86_64-manylinux_2_28", "aarch64-manylinux_2_28", "aarch64-apple-darwin")
+# Of peers there are wheels for later systems only: Debian 12, Ubuntu 22.04, macOS 15.
+LATER = ("x86_64-manylinux_2_35", "aarch64-manylinux_2_35", "aarch64-apple-darwin")
+LOCKS = {
+    LOCK: PLATFORMS,
+    ROOT / "requirements-peers.lock": LATER,
+    ROOT / "requirements-placo.lock": LATER,
+}
+MACOS = {PLATFORMS: "13.0", LATER: "15.0"}
 EXTRAS = ("robots", "fast", "test")
 VENVS = ROOT / "build" / "pythons"
 
@@ -42,7 +50,8 @@ def _refusal(lock: Path, python: str, platform: str) -> str:
     run = subprocess.run(
         [uv(), "pip", "install", "--dry-run", "--quiet", "--python", sys.executable, *target,
          "--only-binary", ":all:", "--require-hashes", "--requirements", str(lock)],
-        capture_output=True, text=True, check=False, env=_environment(), cwd=tempfile.gettempdir(),
+        capture_output=True, text=True, check=False, cwd=tempfile.gettempdir(),
+        env={**_environment(), "MACOSX_DEPLOYMENT_TARGET": MACOS[LOCKS[lock]]},
     )  # fmt: skip
     return " ".join(run.stderr.split()) or "uv fails silently" if run.returncode else ""
 
@@ -112,9 +121,11 @@ def main(command: str = "", *options: str) -> int:
     VENVS.mkdir(parents=True, exist_ok=True)
     pythons = dict(installed())
     if command == "wheels":
-        refused = without_wheels(LOCK)
-        print("\n".join(refused) or f"{LOCK.name}: wheels for all of {', '.join(PYTHONS)}")
-        return bool(refused)
+        refused = {lock: without_wheels(lock, platforms=where) for lock, where in LOCKS.items()}
+        for lock, why in refused.items():
+            said = why or [f"wheels for all of {', '.join(PYTHONS)}"]
+            print("\n".join(f"{lock.name}: {line}" for line in said), flush=True)
+        return any(refused.values())
     if command == "tests":
         absent = sorted({*PYTHONS} - {*pythons})
         print(f"here: {', '.join(pythons)}; not here: {', '.join(absent)}", flush=True)

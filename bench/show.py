@@ -25,8 +25,9 @@ from reference.arguments import FloatArray, choice
 from reference.formats import bvh
 
 from .experiments.arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING
-from .experiments.pictures.figures import ARM_VIEW, CLOTH_VIEW, draw_arm, draw_cloth, seen
-from .presentation.figures import COLOURS, STYLE
+from .presentation.drawing import STYLE
+from .presentation.figures import COLOURS
+from .presentation.scene_drawing import ARM_VIEW, CLOTH_VIEW, draw_arm, draw_cloth, seen
 
 ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *curves)

@@ -11,7 +11,7 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 ROOT = Path(__file__).parents[1]
-LOCKS = [ROOT / "requirements.lock", ROOT / "requirements-peers.lock"]
+LOCKS = [ROOT / f"requirements{which}.lock" for which in ("", "-peers", "-placo")]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 LINUX, ARM, MAC = ("linux", "x86_64"), ("linux", "aarch64"), ("darwin", "arm64")
 
@@ -71,6 +71,28 @@ def test_what_has_no_wheel_is_left_out_by_its_marker(pythons, machine):
         assert needed(unmarked, python, machine) >= has_no_wheel(python, machine)
 
 
+def peers_without_wheels(python, machine):
+    """The peers that are known to have no wheel there, or none that goes with the other locks."""
+    has = {
+        "pytracik": machine != ARM and python != "3.14",
+        "eaik": python != "3.14",
+        "drake": {LINUX: True, ARM: python != "3.11", MAC: python in ("3.13", "3.14")}[machine],
+        "dartpy": machine != MAC or python != "3.11",
+        "pybullet": machine == LINUX and python == "3.11",
+    }
+    return {name for name, there in has.items() if not there}
+
+
+@pytest.mark.parametrize("machine", [LINUX, ARM, MAC], ids="-".join)
+def test_each_peer_is_asked_for_where_it_has_a_wheel_and_nowhere_else(pythons, machine):
+    peers, placo = (lock.read_text(encoding="utf-8") for lock in LOCKS[1:])
+    marked = {"pytracik", "eaik", "drake", "dartpy", "pybullet"}
+    for python in pythons.PYTHONS:
+        missing = peers_without_wheels(python, machine)
+        assert marked & needed(peers, python, machine) == marked - missing
+        assert ("placo" in needed(placo, python, machine)) == (python != "3.14")
+
+
 def test_the_locks_hold_what_the_project_asks_for(pythons):
     extras = [PROJECT["optional-dependencies"][extra] for extra in pythons.EXTRAS]
     text = LOCKS[0].read_text(encoding="utf-8")
@@ -112,7 +134,7 @@ def test_a_python_without_wheels_is_said_and_fails(pythons, stand_in, monkeypatc
         "Python 3.13 on arm: no wheel"
     ]
     assert pythons.main("wheels") == 1
-    assert capsys.readouterr().out.count("\n") == len(pythons.PLATFORMS)
+    assert capsys.readouterr().out.count("\n") == sum(map(len, pythons.LOCKS.values()))
     monkeypatch.setenv("UV", str(stand_in("uv", "")))
     assert pythons.main("wheels") == 0
 

@@ -3,6 +3,7 @@
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -19,6 +20,7 @@ from .report import write_report
 
 if TYPE_CHECKING:
     from ..harness.choice import Choice
+    from ..harness.executor import Executor
 
 # The width of the names of suites in the help.
 INDENT = 2 + max(map(len, SUITES))
@@ -29,6 +31,7 @@ EXAMPLES = (
         "plumbob bench                          everything, at full length",
         "plumbob bench --quick timing           one suite, quickly",
         "plumbob bench cloth --fresh            forget the cloth's records and measure anew",
+        "plumbob bench --executor dask://node1:8786    on a cluster, see docs/cluster.md",
     )
     + "\n\n"
     + block(
@@ -71,6 +74,10 @@ Pins = Annotated[
 ]
 Listing = Annotated[bool, typer.Option("--list", help="List problems and solvers, and stop.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be measured, and stop.")]
+Executed = Annotated[str, typer.Option(metavar="local|dask://HOST:PORT", help="Where to measure.")]
+Mixed = Annotated[
+    bool, typer.Option("--mix-machines", help="With Dask: let one table hold times of several.")
+]
 
 
 class Asked(NamedTuple):
@@ -103,12 +110,16 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     pins: Pins = None,
     listing: Listing = False,
     dry: DryRun = False,
+    executor: Executed = "local",
+    mix_machines: Mixed = False,
 ) -> int:
     """Measure problems with solvers. What is on record is kept, so a run can be taken up again.
 
     A solver of yours is opened as by plumbob verify, and stands in every table of the suites ik and
     cloth under its own name. Installed packages enter solvers by the entry point plumbob.solvers.
     """
+    from ..executors import executor_at
+
     chosen = tuple(dict.fromkeys(known("suite", name, SUITES) for name in suites or SUITES))
     names = (solver or (), problem or (), robot or ())
     asked = Asked(entered or (), program_of(context), *names, targets, effector, pins)
@@ -116,7 +127,8 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     if listing or dry:
         return _look_ahead(chosen, choice, output, listing)
     writable(output)
-    code = run_suites(chosen, choice, output, fresh)
+    with closing(executor_at(executor, mix_machines)) as where:
+        code = run_suites(chosen, choice, output, fresh, where)
     if suites:
         print_tables(chosen, output)
     return code
@@ -166,9 +178,16 @@ def main_job(output: Path, fresh: bool) -> int:
     return max(failed, write_report(output))
 
 
-def run_suites(suites: Sequence[str], scale: "str | Choice", output: Path, fresh: bool) -> int:
+def run_suites(
+    suites: Sequence[str],
+    scale: "str | Choice",
+    output: Path,
+    fresh: bool,
+    executor: "Executor | None" = None,
+) -> int:
     """Run suites with a progress bar; return 1 if a claim is missed or a block failed."""
     from ..harness import run
+    from ..harness.executor import HERE
     from ..harness.record import RecordFile
 
     RecordFile(output).read()  # before anything is measured that could not be kept
@@ -180,7 +199,7 @@ def run_suites(suites: Sequence[str], scale: "str | Choice", output: Path, fresh
     with progress() as bar:
         task = bar.add_task("starting", total=run.count(suites, scale))
         with listening(lambda progress: bar.update(task, description=visible(progress.what))):
-            for event in run.run(suites, scale, output):
+            for event in run.run(suites, scale, output, executor or HERE):
                 bar.update(task, description=visible(f"{event.suite}: {event.what}"))
                 if event.state in done:
                     done[event.state] += 1

@@ -115,13 +115,18 @@ def _ends(course: Course) -> str:
 
 def draw(runs: Sequence[Run], made: Sequence[Course], quantity: str) -> str:
     """Return the courses as SVG: those that changed most in colour, the others grey."""
-    from ..presentation.figures import COLOURS, canvas, finished, nth_style, written
+    from ..presentation.chart import LOOKS
+    from ..presentation.drawing import canvas, styled, svg_of
+    from ..presentation.figures import COLOURS, written
 
-    with canvas(4.2, 1) as (figure, (ax,)):
+    with styled():
+        figure, (ax,) = canvas(4.2, 1)
         for i, course in reversed(list(enumerate(made))):
-            grey = {"color": COLOURS["rule"], "linewidth": 0.8, "zorder": 1}
-            style = {**nth_style(i), "label": written(course.title)} if i < LABELLED else grey
-            ax.plot(range(len(runs)), course.values, marker=".", **style)
+            grey = {"color": COLOURS["rule"], "linewidth": 0.8, "zorder": 1, "marker": "."}
+            look = LOOKS[i % len(LOOKS)]
+            named = {"color": COLOURS[look.colour], "linestyle": look.line, "marker": look.marker}
+            style = {**named, "label": written(course.title)} if i < LABELLED else grey
+            ax.plot(range(len(runs)), course.values, **style)
         if all((c.values[np.isfinite(c.values)] > 0).all() for c in made):
             ax.set_yscale("log")
         ax.set_xticks(range(len(runs)), [written(run.name) for run in runs], rotation=30)
@@ -129,4 +134,4 @@ def draw(runs: Sequence[Run], made: Sequence[Course], quantity: str) -> str:
         handles, labels = ax.get_legend_handles_labels()
         figure.legend(handles[::-1], labels[::-1], loc="outside lower center")
         title = f"{quantity} over {len(runs)} runs"
-        return finished(figure, "history", title, "").svg
+        return svg_of(figure, title)

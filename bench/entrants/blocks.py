@@ -40,6 +40,7 @@ from .entrant import SUITE_TASKS, Entrant, Method
 
 # Seconds that an entrant has for a stratum of the chain, for those of a scale.
 _CHAIN_BUDGET = 50.0
+_BY_LOT = ("robots/", "unreachable/")
 _EXPLICIT_METHODS = ("explicit", "symplectic")
 NO_ROBOTS = "not asked: it offers no robot_inverse_kinematics, which robots with limits need"
 NO_BALLS = "not asked: it offers no inverse_kinematics, which skeletons of balls need"
@@ -71,6 +72,21 @@ def blocks(suite: str, scale: Scale) -> Iterator[Block]:
             of_suite = _of_kinematics if suite == "ik" else _of_cloths
             for block in of_suite(entrant, scale):
                 yield _marked(block, entrant)
+
+
+def joined(known: list[Block], suite: str, scale: Scale) -> list[Block]:
+    """Return the blocks of a suite with those of entrants, each beside others on its problem.
+
+    On robots, where times are compared, they follow each other by lot.
+    """
+    by_problem: dict[str, list[Block]] = {}
+    for block in (*known, *blocks(suite, scale)):
+        by_problem.setdefault(block.problem, []).append(block)
+    return [
+        block
+        for problem, group in by_problem.items()
+        for block in (robots.by_lot(group) if problem.startswith(_BY_LOT) else group)
+    ]
 
 
 def _marked(block: Block, entrant: Entrant) -> Block:

@@ -40,6 +40,9 @@ class Executor(Protocol):
     def stamp(self) -> Mapping[str, Any]:
         """Return the machine that times are taken on, versions and sources."""
 
+    def close(self) -> None:
+        """Give up what is still to be measured, and whatever is held for it."""
+
 
 class Here:
     """This process, which measures the blocks one after the other."""
@@ -62,6 +65,9 @@ class Here:
     def stamp(self) -> Mapping[str, Any]:
         """Return this machine, versions and sources."""
         return stamp()
+
+    def close(self) -> None:
+        """Hold nothing."""
 
 
 HERE = Here()

@@ -1,10 +1,14 @@
 """Every number that tables and figures show, from arrays; nothing here formats or draws."""
 
+import functools
+import itertools
 import math
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from reference import rotation
 
@@ -36,13 +40,47 @@ class Effort(NamedTuple):
     mean: float
 
 
+class Interval(NamedTuple):
+    """An estimate, and the interval that holds the true value in 95 % of samples."""
+
+    value: float
+    low: float
+    high: float
+
+
+class Ranking(NamedTuple):
+    """Names, the best first, and those of them that are not told from the first: it is in both."""
+
+    order: tuple[str, ...]
+    first: tuple[str, ...]
+
+
 class Timing(NamedTuple):
-    """Seconds per operation over the rounds of one benchmark."""
+    """Seconds per operation over the rounds of one benchmark: median, tenths, 95 % interval."""
 
     median: float
     low: float
     high: float
     rounds: int
+    interval: Interval
+
+
+# All that is stated holds in so many of all samples, over all comparisons of one ranking at once.
+CONFIDENCE = 0.95
+# Resamples of a bootstrap, and its seed; of more targets the normal distribution stands for it.
+RESAMPLES, _SEED, LARGE = 400, 1979, 20_000
+_NORMAL = 1.959963984540054
+# The signs of so few differences are gone through one and all.
+_FEW = 12
+
+
+class Ratio(NamedTuple):
+    """By what factor one of two samples of pairs exceeds the other, with its 95 % interval."""
+
+    mean: float
+    low: float
+    high: float
+    pairs: int
 
 
 class Convergence(NamedTuple):
@@ -55,13 +93,19 @@ class Convergence(NamedTuple):
 
 def share(hits: NDArray[np.bool_]) -> Share:
     """Return how many of the entries are true, with Wilson's interval (Wilson 1927)."""
-    count, total, z = int(np.count_nonzero(hits)), int(np.size(hits)), 1.959963984540054
+    count, total = int(np.count_nonzero(hits)), int(np.size(hits))
     if total == 0:
         return Share(0, 0, 0.0, 1.0)
-    rate = count / total
-    centre = (rate + z**2 / (2 * total)) / (1 + z**2 / total)
-    half = z * math.sqrt(rate * (1 - rate) / total + (z / (2 * total)) ** 2) / (1 + z**2 / total)
-    return Share(count, total, max(0.0, centre - half), min(1.0, centre + half))
+    low, high = wilson(np.array(count / total), total)
+    return Share(count, total, float(low), float(high))
+
+
+def wilson(rates: Floats, total: int) -> tuple[Floats, Floats]:
+    """Return between what the true rates lie in 95 % of samples of this size (Wilson 1927)."""
+    z = _NORMAL
+    centre = (rates + z**2 / (2 * total)) / (1 + z**2 / total)
+    half = z * np.sqrt(rates * (1 - rates) / total + (z / (2 * total)) ** 2) / (1 + z**2 / total)
+    return np.maximum(0.0, centre - half), np.minimum(1.0, centre + half)
 
 
 def spread(values: Floats) -> Spread:
@@ -77,6 +121,119 @@ def effort(seconds: Floats) -> Effort:
     """Return median, 95th percentile and mean of all solves, those that failed among them."""
     median, p95, _ = spread(seconds)
     return Effort(median, p95, mean(seconds))
+
+
+def median_interval(values: Floats) -> Interval:
+    """Return the median and its interval by order statistics; NaN bounds of fewer than six.
+
+    So many values lie below the median as heads fall in as many throws of a coin, whatever the
+    distribution (Conover 1999, section 3.2).
+    """
+    ordered = np.sort(np.asarray(values, dtype=float).ravel())
+    cut = _coin_quantile(len(ordered))
+    low, high = (ordered[cut], ordered[-1 - cut]) if cut >= 0 else (math.nan, math.nan)
+    middle = float(np.median(ordered)) if len(ordered) else math.nan
+    return Interval(middle, float(low), float(high))
+
+
+@functools.cache
+def _coin_quantile(throws: int) -> int:
+    """Return the greatest k for which k heads or fewer fall in 2.5 % of cases at most, else -1."""
+    below, k = 0.0, -1
+    while (below := below + _coin(throws, k + 1)) <= (1 - CONFIDENCE) / 2:
+        k += 1
+    return k
+
+
+def _coin(throws: int, heads: int) -> float:
+    """Return how likely so many heads are."""
+    logs = math.lgamma(throws + 1) - math.lgamma(heads + 1) - math.lgamma(throws - heads + 1)
+    return math.exp(logs - throws * math.log(2.0))
+
+
+def ranking(scores: Mapping[str, Floats]) -> Ranking:
+    """Return who has the greatest mean score, and who is not told from that one.
+
+    The scores are of the same targets, (target,) each, so they are compared in pairs: what makes a
+    target easy or hard for all of them says nothing about any of them. Two are told apart if their
+    mean difference is larger than 95 % of those that arise as each difference takes either sign by
+    lot (Fisher 1935, section 21). For truth values that is McNemar's exact test (1947). Of several
+    rivals the chances are raised by Holm (1979).
+    """
+    order = sorted(scores, key=lambda name: -float(np.mean(scores[name])))
+    if not order:
+        return Ranking((), ())
+    first, *rivals = order
+    chances = _holm([chance_of_pairs(scores[first], scores[rival]) for rival in rivals])
+    tied = [r for r, chance in zip(rivals, chances, strict=True) if chance > 1 - CONFIDENCE]
+    return Ranking(tuple(order), (first, *tied))
+
+
+def chance_of_pairs(a: Floats, b: Floats) -> float:
+    """Return how likely two are as far apart on average if signs are drawn by lot, (target,) each.
+
+    Exact for differences of one size and for few; else the sum is taken for normal, with the
+    variance that the lots give it.
+    """
+    apart = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
+    apart = apart[apart != 0]
+    total, size = abs(float(apart.sum())), np.abs(apart)
+    if not len(apart):
+        return 1.0
+    if size.min() == size.max():
+        wins = max(int(np.sum(apart > 0)), int(np.sum(apart < 0)))
+        return min(1.0, 2.0 * sum(_coin(len(apart), k) for k in range(wins, len(apart) + 1)))
+    if len(apart) <= _FEW:
+        signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(apart))))
+        return float(np.mean(np.abs(signs @ size) >= total * (1.0 - 1e-12)))
+    return math.erfc(total / math.sqrt(2.0 * float(apart @ apart)))
+
+
+def _holm(chances: Sequence[float]) -> list[float]:
+    """Return chances that hold over all comparisons at once."""
+    raised, least = [1.0] * len(chances), 0.0
+    for rank, i in enumerate(np.argsort(chances, kind="stable").tolist()):
+        least = raised[i] = max(least, min(1.0, (len(chances) - rank) * chances[i]))
+    return raised
+
+
+def penalised(seconds: Floats, solved: NDArray[np.bool_], penalty: float) -> Floats:
+    """Return seconds where solved; else the penalty, or what it took if that is longer."""
+    return np.where(solved, seconds, np.maximum(np.nan_to_num(seconds, posinf=penalty), penalty))
+
+
+def shifted_geometric_mean(seconds: Floats, shift: float, groups: Sequence[int] = ()) -> Interval:
+    """Return exp(mean(log(seconds + shift))) - shift and its interval by the bootstrap.
+
+    Targets are drawn again within each group; `groups` says how many targets each has, in order,
+    such as those of one robot. All are one group if none is given. The draws are seeded.
+    """
+    logs = np.log(np.asarray(seconds, dtype=float) + shift)
+    sizes = tuple(groups) or (len(logs),)
+    if len(logs) > LARGE:
+        parts = np.split(logs, np.cumsum(sizes)[:-1])
+        error = math.sqrt(sum(len(part) * float(np.var(part)) for part in parts)) / len(logs)
+        low, high = np.mean(logs) + _NORMAL * error * np.array([-1.0, 1.0])
+    else:
+        means = _resamples(sizes) @ logs / len(logs)
+        low, high = np.quantile(means, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
+    return Interval(*(float(np.exp(x) - shift) for x in (np.mean(logs), low, high)))
+
+
+@functools.lru_cache(maxsize=8)
+def _resamples(groups: tuple[int, ...]) -> Floats:
+    """Return how often each target is drawn, (resample, target)."""
+    rng = np.random.default_rng(_SEED)
+    drawn = [rng.multinomial(n, np.full(n, 1.0 / n), size=RESAMPLES) for n in groups]
+    return np.concatenate(drawn, axis=1).astype(float)
+
+
+def relative_spread(values: Floats) -> float:
+    """Return half the width of the middle eight tenths over the median; NaN if there are none."""
+    if not np.size(values):
+        return math.nan
+    low, median, high = np.quantile(values, [0.1, 0.5, 0.9])
+    return float((high - low) / (2.0 * median))
 
 
 def within_budget(seconds: Floats, solved: NDArray[np.bool_], budgets: Floats) -> Floats:
@@ -102,6 +259,21 @@ def performance_profiles(seconds: Floats, solved: NDArray[np.bool_], ratios: Flo
     return np.array([np.searchsorted(row, ratios, side="right") for row in slower]) / len(best)
 
 
+def paired_ratio(values: Floats, others: Floats) -> Ratio:
+    """Return the geometric mean of values / others over the pairs in which both are numbers.
+
+    The interval is Student's, of the logarithms; a single pair leaves the factor open.
+    """
+    logs = np.log(np.asarray(values) / np.asarray(others))
+    logs = logs[np.isfinite(logs)]
+    count = int(logs.size)
+    if count < 2:
+        return Ratio(float(np.exp(logs[0])) if count else math.nan, 0.0, math.inf, count)
+    half = stdtrit(count - 1, 0.975) * logs.std(ddof=1) / math.sqrt(count)
+    mean, low, high = np.exp(logs.mean() + np.array([0.0, -half, half]))
+    return Ratio(float(mean), float(low), float(high), count)
+
+
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
     """Return the spread of counts, as integers where they are."""
     median, p95, largest = (int(x) if x.is_integer() else x for x in spread(values))
@@ -109,9 +281,16 @@ def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
 
 
 def timing(seconds: Floats) -> Timing:
-    """Return the median and the 10th and 90th percentiles of the rounds."""
-    low, median, high = np.quantile(np.asarray(seconds, dtype=float), [0.1, 0.5, 0.9])
-    return Timing(float(median), float(low), float(high), int(np.size(seconds)))
+    """Return the median, the 10th and 90th percentiles of the rounds, and the median's interval.
+
+    `seconds` are those of rounds, (round,), or of the rounds of each sweep, (sweep, round). Rounds
+    of one sweep follow each other and are alike, so the interval is that of the sweeps' medians.
+    """
+    rounds = np.asarray(seconds, dtype=float)
+    low, median, high = np.quantile(rounds, [0.1, 0.5, 0.9])
+    sweeps = np.median(rounds, axis=1) if rounds.ndim == 2 else rounds
+    interval = median_interval(sweeps)
+    return Timing(float(median), float(low), float(high), int(rounds.size), interval)
 
 
 def bend(positions: Floats, target: Floats) -> Floats:

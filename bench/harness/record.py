@@ -208,6 +208,27 @@ class RecordFile:
             stays = [line.text for line in lines if not line.record or id(line.record) in kept]
             self._replace(b"".join(text + b"\n" for text in stays))
 
+    def arrange(self, order: Iterable[Key]) -> None:
+        """Bring the records of these keys into order, each in the place of one of them.
+
+        Tables show rows as they are on record, and blocks that are measured at the same time may
+        end in any order. All else keeps its place, and the old file stays whole until the new one
+        is.
+
+        Raises:
+            ValueError: as `read` does.
+        """
+        lines, _ = self._lines()
+        rank = {key: i for i, key in enumerate(order)}
+        places = [i for i, line in enumerate(lines) if line.record and line.record.key in rank]
+        ranks = [rank[line.record.key] for i in places if (line := lines[i]).record]
+        if ranks != sorted(ranks):
+            moved = sorted(zip(ranks, places, strict=True))
+            texts = [line.text for line in lines]
+            for place, (_, source) in zip(places, moved, strict=True):
+                texts[place] = lines[source].text
+            self._replace(b"".join(text + b"\n" for text in texts))
+
     def _bytes(self) -> bytes:
         check_regular(self.path)
         return self.path.read_bytes() if self.path.exists() else b""

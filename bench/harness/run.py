@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -72,7 +72,7 @@ def run(
             yield from _run_blocks(wanted, choice, file, present, executor)
             for suite in together:
                 spent = time.perf_counter() - begin
-                asked = keys(suite, choice)
+                asked = [block for block in wanted if block.suite == suite]
                 if choice.is_partial:
                     yield from _leave(suite, asked, file)
                     continue
@@ -110,18 +110,21 @@ def _what(named: Block | Record) -> str:
     return f"{named.problem}, {named.solver}"
 
 
-def _leave(suite: str, asked: set[Key], file: RecordFile) -> Iterator[Event]:
+def _leave(suite: str, blocks: Sequence[Block], file: RecordFile) -> Iterator[Event]:
     """Say how many records of a suite a choice did not ask for."""
+    asked = set(map(block_key, blocks))
     others = [r for r in file.read().records if r.suite == suite and r.key not in asked]
     if others:
         yield Event(NOT_RUN, suite, "", f"{_records(len(others))} of what was not chosen kept")
 
 
-def _finish(finished: Record, asked: set[Key], file: RecordFile) -> Iterator[Event]:
+def _finish(finished: Record, blocks: Sequence[Block], file: RecordFile) -> Iterator[Event]:
     """Put on record that a suite was gone through, and say what it did not ask for."""
+    asked = dict.fromkeys(map(block_key, blocks))
+    file.arrange(asked)
     suite, finished = finished.problem, replace(finished, size=len(asked))
     records = {record.key: record for record in file.read().records}
-    if asked <= records.keys() and not _says_the_same(records.get(finished.key), finished):
+    if asked.keys() <= records.keys() and not _says_the_same(records.get(finished.key), finished):
         file.append([finished])
     extra = [r for r in records.values() if r.suite == suite and r.key not in asked]
     old = [record for record in extra if _is_superseded(record, asked)]
@@ -151,7 +154,7 @@ def _says_the_same(record: Record | None, other: Record) -> bool:
     )  # fmt: skip
 
 
-def _is_superseded(record: Record, asked: set[Key]) -> bool:
+def _is_superseded(record: Record, asked: Iterable[Key]) -> bool:
     """Return whether a record that is not asked for belongs to what is, or to nothing measured.
 
     Its problem and solver are asked for under other settings, or it says only that something was

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 
 from reference import IK_SOLVERS, STEP_SOLVERS
 
+from . import environments
+
 PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
 
 
@@ -166,6 +168,7 @@ class Peer(NamedTuple):
         license: of the package.
         can: what it takes.
         entries: with which settings it takes part.
+        environment: of its own, whose Python runs it; "" if it works in ours.
     """
 
     title: str
@@ -174,10 +177,13 @@ class Peer(NamedTuple):
     license: str
     can: str
     entries: tuple[Entry, ...]
+    environment: str = ""
 
     @property
     def version(self) -> str:
         """The version that is installed, "" if none is."""
+        if self.environment:
+            return environments.version(self.environment, self.package)
         return _version(self.package)
 
     def called(self, entry: Entry) -> str:
@@ -220,6 +226,26 @@ TRAC_IK = _peer(
     *(Entry(RESTARTS, {"seconds": t}, note=f"{1e3 * t:g} ms") for t in (0.005, 0.05)),
 )
 _EVERY_SOLUTION = Entry(RESTARTS, note="all solutions, no start")
+DRAKE = _peer(
+    *("Drake", "drake", "drake", "BSD-3-Clause", f"{_TREES}, these by three angles"),
+    Entry(ONE_START, note="SNOPT"),
+    Entry(ONE_START, {"solver": "IPOPT"}, note="IPOPT"),
+    Entry(RESTARTS, {}, AGAIN, f"SNOPT, {AGAIN} restarts"),
+)
+# PyBullet's null space keeps the limits better than it reaches targets.
+PYBULLET = _peer(
+    *("PyBullet", "pybullet", "pybullet", "Zlib"),
+    f"{_CHAINS}, either accurate or mindful of limits; makes no claims",
+    Entry(ONE_START, note="limits left out"),
+    Entry(ONE_START, {"limits": True}, note="limits in the null space"),
+    Entry(RESTARTS, {"check": True}, AGAIN, f"{AGAIN} restarts, its pose looked at"),
+)
+TORCH = _peer(
+    *("pytorch_kinematics", "pytorch_kinematics", "pytorch-kinematics", "MIT", _CHAINS),
+    Entry(ONE_START),
+    Entry(RESTARTS, {"attempts": AGAIN + 1}, note=f"{AGAIN} restarts, all at once"),
+)
+PLACO = _peer("PlaCo", "placo", "placo", "MIT", _CHAINS, *_either(50))._replace(environment="placo")
 PEERS = (
     OURS,
     _peer(
@@ -232,6 +258,11 @@ PEERS = (
     TRAC_IK,
     _peer("ikpy", "ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims", Entry(ONE_START)),
     _peer("EAIK", "eaik", "eaik", "BSD-3-Clause", _SIX, _EVERY_SOLUTION),
+    DRAKE,
+    _peer("DART", "dart", "dartpy", "BSD-2-Clause", _CHAINS, *_either(100)),
+    PLACO,
+    PYBULLET,
+    TORCH,
 )
 
 

@@ -36,9 +36,9 @@ def number(title: str, name: str = "", unit: str = "") -> Column:
     return Column(title, unit, read=lambda record: record.arrays.get(name or title))
 
 
-def share(title: str, hits: Callable[[Any], Any]) -> Column:
+def share(title: str, hits: Callable[[Any], Any], best: str = "") -> Column:
     """Return the column of how many of some truth values hold."""
-    return Column(title, note=INTERVAL, read=lambda record: metrics.share(hits(record)))
+    return Column(title, note=INTERVAL, read=lambda record: metrics.share(hits(record)), best=best)
 
 
 def spread(

@@ -1,21 +1,26 @@
-"""The common style of all figures, which are SVG text and compute nothing.
+"""Figures and pictures, drawn only when what they show has changed.
 
-Colours are tuned for a white page and named in `COLOURS`, so that a page with a dark side can put
-its own in their place. Series differ in line style or marker as well as in colour.
+A figure is data first: a `Sketch` knows what it shows and how it is drawn. The digest of that
+stands in the files that were drawn, and files with the same digest serve again.
 """
 
-import contextlib
-import io
-import warnings
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+import hashlib
+import inspect
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import matplotlib as mpl
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+import numpy as np
 
-from ..peers import registry
+from ..harness.record import check_regular
 from .text import shortened
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .chart import Chart
 
 COLOURS = {
     "ink": "#22272e",
@@ -27,50 +32,106 @@ COLOURS = {
     "purple": "#8a4a9f",
     "brass": "#96690f",
 }
-STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "plumbob",
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9,
-    "axes.titlesize": 9.5,
-    "axes.titlelocation": "left",
-    "axes.titleweight": "bold",
-    "axes.labelsize": 9,
-    "axes.edgecolor": COLOURS["faint"],
-    "axes.labelcolor": COLOURS["ink"],
-    "axes.titlecolor": COLOURS["ink"],
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.linewidth": 0.7,
-    "grid.color": COLOURS["rule"],
-    "grid.linewidth": 0.6,
-    "text.color": COLOURS["ink"],
-    "legend.frameon": False,
-    "legend.fontsize": 8.5,
-    "lines.linewidth": 1.6,
-    "figure.facecolor": "none",
-    "axes.facecolor": "none",
-    "savefig.facecolor": "none",
-    "mathtext.default": "regular",
-}
-for _axis in ("xtick", "ytick"):
-    STYLE |= {f"{_axis}.color": COLOURS["faint"], f"{_axis}.labelcolor": COLOURS["ink"]}
-    STYLE[f"{_axis}.labelsize"] = 8
-WIDTH = 7.4
 # Letters of a name in a figure.
 LONGEST = 60
+# Drawings that are kept for as long as the process lives.
+_KEPT = 64
+_DIGEST = "plumbob figure"
 
 
 class Drawing(NamedTuple):
-    """A figure or picture: the stem of its file, what it shows, and the SVG."""
+    """A figure or picture: the stem of its file, what it shows, as SVG and as PDF."""
 
     name: str
     title: str
     shows: str
     svg: str
+    pdf: bytes = b""
+
+
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """A figure before it is drawn.
+
+    Attributes:
+        name: the stem of its files.
+        title: what it is called.
+        shows: what can be read off.
+        data: all that the drawing depends on: arrays, words, numbers, and tuples of such.
+        draw: makes a figure of matplotlib's from the data; imports matplotlib only then.
+    """
+
+    name: str
+    title: str
+    shows: str
+    data: Any
+    draw: Callable[[Any], "Figure"]
+
+    def digest(self) -> str:
+        """Return what is another for other data, and for other code that draws."""
+        found = hashlib.blake2b(digest_size=12)
+        for source in (inspect.getsourcefile(self.draw), *_SOURCES):
+            found.update(Path(str(source)).read_bytes())
+        _update(found, (self.name, self.title, self.data))
+        return found.hexdigest()
+
+
+_SOURCES = [
+    Path(__file__).with_name(f"{name}.py")
+    for name in ("figures", "drawing", "chart", "scene_drawing")
+]
+_drawn: OrderedDict[str, tuple[str, bytes]] = OrderedDict()
+
+
+def drawn(sketch: Sketch, folder: Path | None = None) -> Drawing:
+    """Return a sketch drawn, taken from a folder's files if they show the same."""
+    digest = sketch.digest()
+    files = _drawn.get(digest) or _on_file(sketch.name, folder, digest) or _files(sketch, digest)
+    _drawn[digest] = files
+    _drawn.move_to_end(digest)
+    if len(_drawn) > _KEPT:
+        _drawn.popitem(last=False)
+    return Drawing(sketch.name, sketch.title, sketch.shows, *files)
+
+
+def _on_file(name: str, folder: Path | None, digest: str) -> tuple[str, bytes] | None:
+    """Return what was drawn before, if it shows the same."""
+    if folder is None:
+        return None
+    svg, pdf = (folder / f"{name}.{suffix}" for suffix in ("svg", "pdf"))
+    try:
+        check_regular(svg)
+        check_regular(pdf)
+        found = svg.read_text(encoding="utf-8"), pdf.read_bytes()
+    except (OSError, ValueError):
+        return None
+    mark = f"{_DIGEST} {digest}"
+    return found if mark in found[0][-200:] and mark.encode() in found[1] else None
+
+
+def _files(sketch: Sketch, digest: str) -> tuple[str, bytes]:
+    from .drawing import pdf_of, styled, svg_of
+
+    mark = f"{_DIGEST} {digest}"
+    with styled():
+        figure = sketch.draw(sketch.data)
+        return svg_of(figure, sketch.title, mark), pdf_of(figure, sketch.title, mark)
+
+
+def _update(found: Any, value: Any) -> None:
+    """Take a value into a digest: arrays by their bytes, what holds others by its parts."""
+    if isinstance(value, np.ndarray):
+        found.update(f"{value.dtype}{value.shape}".encode() + value.tobytes())
+    elif isinstance(value, tuple | list | frozenset):
+        found.update(f"({len(value)}".encode())
+        for part in sorted(value) if isinstance(value, frozenset) else value:
+            _update(found, part)
+    elif isinstance(value, Mapping):
+        _update(found, list(value.items()))
+    elif is_dataclass(value):
+        _update(found, [getattr(value, field.name) for field in fields(value)])
+    else:
+        found.update(f"{type(value).__name__}:{value!r};".encode())
 
 
 def written(name: str) -> str:
@@ -79,61 +140,12 @@ def written(name: str) -> str:
     return f" {short}" if short.startswith("_") else short or "–"
 
 
-@contextlib.contextmanager
-def canvas(
-    height: float, columns: int, rows: int = 1, *, sharex: bool = False, sharey: bool = False
-) -> Iterator[tuple[Figure, list[Axes]]]:
-    """Yield a figure [inch high] in the common style and its axes, row by row."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, height), layout="constrained")
-        axes = figure.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
-        yield figure, list(axes.ravel())
+def chart_sketch(chart: "Chart") -> Sketch:
+    """Return a chart before it is drawn."""
+    return Sketch(chart.name, chart.title, chart.caption, chart, _draw_chart)
 
 
-def finished(figure: Figure, name: str, title: str, shows: str) -> Drawing:
-    """Return the figure as a drawing, the same for the same figure."""
-    text = io.StringIO()
-    with warnings.catch_warnings():  # the page's fonts have all letters, and names may be many
-        warnings.filterwarnings("ignore", "Glyph .* missing from font")
-        warnings.filterwarnings("ignore", "constrained_layout not applied")
-        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None, "Title": title})
-    return Drawing(name, title, shows, text.getvalue())
+def _draw_chart(chart: "Chart") -> "Figure":
+    from .drawing import draw_chart
 
-
-def every_handle(axes: list[Axes]) -> tuple[list[Any], list[str]]:
-    """Return a handle and its label for each solver that is in any panel."""
-    found: dict[str, Any] = {}
-    for ax in axes:
-        found |= {
-            name: handle for handle, name in zip(*ax.get_legend_handles_labels(), strict=True)
-        }
-    return list(found.values()), list(found)
-
-
-def nth_style(i: int) -> dict[str, Any]:
-    """Return a colour and a line for the i-th of many solvers; all pairs differ for a while."""
-    colours = ("blue", "orange", "green", "purple", "brass", "ink")
-    lines = ("-", "--", "-.", ":")
-    return {"color": COLOURS[colours[i % len(colours)]], "linestyle": lines[i % len(lines)]}
-
-
-def drawn_as(solver: str) -> dict[str, Any]:
-    """Return colour, line and label of a solver that has a style of its own."""
-    known = registry.find(solver)
-    colour, line, _ = known.style
-    return {"color": COLOURS[colour], "linestyle": line, "label": written(known.label)}
-
-
-def legend_height(names: list[str], columns: int) -> float:
-    """Return how much higher [inch] a figure is for a legend of more than two rows."""
-    return 0.2 * max(0, -(-len(names) // columns) - 2)
-
-
-def plain_powers(ax: Axes) -> None:
-    """Write 1, 10, 1,000 in place of powers on a logarithmic axis, without minor ticks."""
-    ax.xaxis.set_major_formatter(mpl.ticker.FuncFormatter(_plain))
-    ax.minorticks_off()
-
-
-def _plain(x: float, _: int) -> str:
-    return f"{x:,.0f}" if x >= 1 else f"{x:g}"
+    return draw_chart(chart)

@@ -1,16 +1,17 @@
 """A table as data: the question it answers, what its rows are about, its columns and figures."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ..harness.record import Record
 from .results import Results
-from .tables import NO_SUMMARY, Column, Summary, Table
+from .tables import NO_SUMMARY, Column, Source, Summary, Table
 
 if TYPE_CHECKING:
-    from .figures import Drawing
+    from .figures import Sketch
 
-Figure = Callable[[Results], "Drawing | None"]
+Figure = Callable[[Results], "Sketch | None"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,4 +58,27 @@ class Layout:
             self.summary(subjects) if subjects else NO_SUMMARY,
             self.compared,
             frozenset(i for i, subject in enumerate(subjects) if not self.ranked(subject)),
+            tuple(map(source, subjects)),
         )
+
+
+def source(subject: Any) -> Source:
+    """Return what was measured for the row that is about this subject."""
+    records = [record for record in _records(subject) if record.arrays]
+    if not records:
+        return Source()
+    problems, solvers = ({r.problem: 0 for r in records}, {r.solver: 0 for r in records})
+    return Source(records[0].suite, tuple(problems), tuple(solvers))
+
+
+def _records(subject: Any) -> Iterator[Record]:
+    """Yield the records in a subject; where it has one of its own, only that."""
+    if isinstance(subject, Record):
+        yield subject
+    elif isinstance(getattr(subject, "record", None), Record):
+        yield subject.record
+    elif isinstance(subject, Mapping):
+        yield from _records(tuple(subject.values()))
+    elif isinstance(subject, tuple | list):
+        for part in subject:
+            yield from _records(part)

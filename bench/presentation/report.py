@@ -1,14 +1,14 @@
 """The report: tables in three formats, figures, and one page that needs nothing but itself."""
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..experiments import SUITES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
-from .figures import Drawing
+from .figures import Drawing, Sketch, drawn
 from .layout import Figure, Layout
 from .page import FORMATS, Shown, render, rows
 from .results import Results, plain, sift
@@ -35,7 +35,8 @@ def write(folder: Path) -> Written:
     stored, warning = RecordFile(folder).read()
     if not stored:
         raise ValueError(f"no records in {folder}: run `plumbob bench` first")
-    shown, left_out = sound([plain(record) for record in stored if not record.superseded])
+    sketched, left_out = sound([plain(record) for record in stored if not record.superseded])
+    shown = _drawn(sketched, folder / "figures")
     missing = [*([warning] if warning else []), *left_out, *_missing(shown.records)]
     _write_files(folder, shown.tables.values(), shown.drawings.values())
     page = folder / "index.html"
@@ -43,22 +44,36 @@ def write(folder: Path) -> Written:
     return Written(page, list(shown.tables.values()), missing)
 
 
-def sound(records: Sequence[Record]) -> tuple[Shown, list[str]]:
+def sound(records: Sequence[Record]) -> tuple["Sketched", list[str]]:
     """Return what can be shown, and a sentence on each record of which nothing can be made."""
     with contextlib.suppress(Exception):
-        return _shown(records), []
+        return _sketched(records), []
     said: list[str] = []
     for make in _makers():
         records, sentences = sift(make, records)
         said += sentences
-    return _shown(records), list(dict.fromkeys(said))
+    return _sketched(records), list(dict.fromkeys(said))
 
 
-def _shown(records: Sequence[Record]) -> Shown:
+class Sketched(NamedTuple):
+    """What a report shows, before its figures are drawn."""
+
+    records: Sequence[Record]
+    tables: Mapping[Layout, Table]
+    sketches: Mapping[Figure, Sketch]
+
+
+def _sketched(records: Sequence[Record]) -> Sketched:
     results = Results(records)
     made = {layout: _checked(layout, results) for section in SECTIONS for layout in section.layouts}
-    drawn = {draw: draw(results) for draw in all_figures()}
-    return Shown(records, made, {draw: drawing for draw, drawing in drawn.items() if drawing})
+    sketches = {figure: figure(results) for figure in all_figures()}
+    return Sketched(records, made, {figure: one for figure, one in sketches.items() if one})
+
+
+def _drawn(sketched: Sketched, folder: Path) -> Shown:
+    """Draw the figures, but for those that the folder has already."""
+    drawings = {figure: drawn(one, folder) for figure, one in sketched.sketches.items()}
+    return Shown(sketched.records, sketched.tables, drawings)
 
 
 def all_figures() -> list[Figure]:
@@ -91,11 +106,12 @@ def _write_files(folder: Path, made: Iterable[Table], drawings: Iterable[Drawing
             _write(path, form.write(table))
     for drawing in drawings:
         _write(folder / "figures" / f"{drawing.name}.svg", drawing.svg)
+        _write(folder / "figures" / f"{drawing.name}.pdf", drawing.pdf)
 
 
-def _write(path: Path, text: str) -> None:
+def _write(path: Path, content: str | bytes) -> None:
     check_regular(path)
-    path.write_text(text, encoding="utf-8")
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
 
 
 def _missing(records: Sequence[Record]) -> list[str]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..harness.metrics import Ranking
 from ..harness.record import Record
 from ..peers import registry
 from .tables import words
@@ -16,6 +17,11 @@ class Results:
     def __init__(self, records: Iterable[Record]) -> None:
         """Leave out those that say why there are none, and those under settings of before."""
         self.records = [r for r in records if not r.failed and not r.superseded]
+
+    @property
+    def entrants(self) -> frozenset[str]:
+        """The solvers that a user has entered."""
+        return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
 
     def all(self, suite: str, **wanted: Any) -> list[Record]:
         """Return the records of a suite whose facts and settings are these."""
@@ -110,3 +116,9 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 def counted(count: int, name: str) -> str:
     """Return a count of things: "1 iteration", "2 iterations"."""
     return f"{words(count)} {name}{'' if count == 1 else 's'}"
+
+
+def leaders(ranking: Ranking) -> str:
+    """Return who is first, and who is not told from that one: "a, in a tie with b and c"."""
+    first, *tied = ranking.first
+    return f"{first}, in a tie with {listed(tied)}" if tied else first

@@ -12,11 +12,21 @@ from .tables import Table
 
 
 class Section(NamedTuple):
-    """A chapter of the report."""
+    """A chapter of the report.
+
+    Attributes:
+        name: what experiments and addresses within the page call it.
+        title: its heading.
+        about: what it is about.
+        main: the name of its main table, shown unfolded; "" if it has none.
+        figure: the name of the figure beside it.
+    """
 
     name: str
     title: str
     about: str
+    main: str = ""
+    figure: str = ""
 
     @property
     def experiments(self) -> list[Experiment]:
@@ -43,30 +53,28 @@ SECTIONS = (
     ),
     Section(
         "kinematics",
-        "Task 1: inverse kinematics",
-        "The lab’s arm of five joints draws curves with its effector, by cyclic coordinate descent "
-        "(CCD) and by FABRIK; a chain of ten ball joints reaches for targets near, far, at the "
-        "edge of its reach and beyond it, also by Levenberg-Marquardt on the engines’ kinematics "
-        "(LM).",
-    ),
-    Section(
-        "robots",
-        "Robots and a character",
-        "Every solver that is installed, on real arms and on a character with two hands to place: "
-        "the same targets, starts and evaluation for all. Solvers that make one attempt and those "
-        "that start again answer different questions and stand in different tables.",
+        "Inverse kinematics",
+        "Real arms and a character with two hands to place: the same targets, starts and "
+        "evaluation for every solver. The lab’s arm of five joints draws curves, and a chain of "
+        "ten ball joints reaches for targets near, far, at the edge of its reach and beyond it.",
+        "robots_success_one_start",
+        "budget_one_start",
     ),
     Section(
         "cloth",
-        "Task 2: the cloth by implicit Euler",
-        "The lab’s cloth of 11 × 11 particles falls from rest and swings from two corners, as it "
-        "is and stiffer. A step minimises the objective g of Liu et al. (2013).",
+        "Cloth by implicit Euler",
+        "A cloth falls from rest and swings from two corners, as it is and stiffer. A step "
+        "minimises the objective g of Liu et al. (2013).",
+        "cloth_peers_step",
+        "work_precision_step",
     ),
     Section(
         "speed",
-        "How fast?",
+        "Speed",
         "The same work by the compiled and the plain source, and by both engines, in one run on "
         "one core.",
+        "timing_kinematics",
+        "timing_kinematics",
     ),
 )
 

@@ -1,5 +1,6 @@
 """Figures as parts of a page: an SVG file's tree changed so that it can stand within HTML."""
 
+import re
 import xml.etree.ElementTree as ElementTree
 
 from markupsafe import Markup
@@ -7,21 +8,29 @@ from markupsafe import Markup
 from .figures import COLOURS, Drawing
 
 _SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
-_LEFT_OUT = {"metadata", "style", "title"}
+# What a drawing consists of; all else is left out, such as what describes the file.
+_DRAWN = {"svg", "g", "defs", "path", "use", "clipPath", "rect", "text", "tspan", "image", "title"}
 # What the page says itself: its own size of figures, and that it is SVG.
 _OF_THE_FILE = {"width", "height", "version"}
+_REFERENCE = re.compile(r'(?:url\(|href=")#([^")]*)')
 _VARIABLES = {colour: f"var(--{name})" for name, colour in COLOURS.items()}
 
 
 def inline(drawing: Drawing) -> Markup:
     """Return an SVG that can stand in a page: own ids, colours by name, no links, the page's fonts.
 
-    Ids are made unique, since all drawings of a page share one name space.
+    Ids are made unique, since all drawings of a page share one name space; those that nothing
+    refers to are left out.
     """
     root = ElementTree.fromstring(drawing.svg)
     _shorten(root)
+    for title in root.findall(f"{_SVG}title"):
+        root.remove(title)
+    used = set(_REFERENCE.findall(drawing.svg))
     for element in root.iter():
         element.tag = element.tag.removeprefix(_SVG)
+        if element.get("id") not in used:
+            element.attrib.pop("id", None)
         element.attrib = _attributes(element.attrib, drawing.name)
     for name in _OF_THE_FILE:
         root.attrib.pop(name, None)
@@ -30,12 +39,12 @@ def inline(drawing: Drawing) -> Markup:
 
 
 def _shorten(element: ElementTree.Element) -> None:
-    """Remove what describes the file and what styles it as a whole."""
+    """Remove what describes the file, what styles it as a whole, and what draws nothing."""
     for child in list(element):
-        if child.tag.removeprefix(_SVG) in _LEFT_OUT:
-            element.remove(child)
-        else:
+        if child.tag.removeprefix(_SVG) in _DRAWN:
             _shorten(child)
+        else:
+            element.remove(child)
 
 
 def _attributes(given: dict[str, str], name: str) -> dict[str, str]:
@@ -43,6 +52,8 @@ def _attributes(given: dict[str, str], name: str) -> dict[str, str]:
     kept = {}
     for key, value in given.items():
         key = key.removeprefix(_XLINK)
+        if key.startswith("on") or (key == "href" and not value.startswith("#")):
+            continue
         if key == "id":
             value = f"{name}-{value}"
         elif key == "href":

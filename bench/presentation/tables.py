@@ -7,6 +7,7 @@ import csv
 import io
 import math
 import re
+import shlex
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -81,6 +82,31 @@ class Column:
         return f"{self.titled} [{self.unit}]" if self.unit else self.titled
 
 
+class Source(NamedTuple):
+    """The measurements behind a row: their suite, and the problems and solvers in it."""
+
+    suite: str = ""
+    problems: tuple[str, ...] = ()
+    solvers: tuple[str, ...] = ()
+
+    @property
+    def command(self) -> str:
+        """The command that measures the row again, "" where nothing was measured.
+
+        Where a row is about many problems or solvers, it measures all of the suite.
+        """
+        named = (("--solver", self.solvers), ("--problem", self.problems))
+        options = [
+            (option, name) for option, names in named if len(names) <= MOST for name in names
+        ]
+        told = (word for option in options for word in option)
+        return shlex.join(["plumbob", "bench", self.suite, *told]) if self.suite else ""
+
+
+# A command names so many problems or solvers at most.
+MOST = 3
+
+
 @dataclass(frozen=True)
 class Table:
     """A named table.
@@ -95,6 +121,7 @@ class Table:
         summary: what the numbers say, generated from them.
         compared: rows whose first so many cells agree are compared with one another; 0: all are.
         unranked: the numbers of rows that are never best, such as those of a solver cut short.
+        sources: what is behind each row; rows without one come last.
     """
 
     name: str
@@ -106,6 +133,7 @@ class Table:
     summary: Summary = NO_SUMMARY
     compared: int = 1
     unranked: frozenset[int] = frozenset()
+    sources: tuple[Source, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse ragged rows and headings that stand twice."""

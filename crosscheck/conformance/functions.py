@@ -13,7 +13,7 @@ import numpy as np
 from .case import Case
 from .contestant import Answer, Failure, FailureKind, Functions
 from .greeting import Greeting
-from .sentence import Sentence, sentence
+from .sentence import Sentence, did_you_mean, sentence
 from .task import TASKS, Field, Task
 
 _TYPES: Mapping[str, type] = {"number": np.float64, "integer": np.int64, "boolean": np.bool_}
@@ -50,6 +50,9 @@ def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) ->
 
     What it raises is a failure; what it changes is a remark.
     """
+    if missing := _asked_in_vain(function, inputs):
+        why = _what_it_may_take(missing, task, inputs)
+        return Failure(FailureKind.GARBAGE, sentence("{why}", why=why))
     given = {
         name: np.array(value) if isinstance(value, np.ndarray) else value
         for name, value in inputs.items()
@@ -77,6 +80,28 @@ def takes(function: Callable[..., Any], name: str) -> bool:
     return name in parameters or any(
         one.kind is inspect.Parameter.VAR_KEYWORD for one in parameters.values()
     )
+
+
+def _asked_in_vain(function: Callable[..., Any], inputs: Mapping[str, Any]) -> list[str]:
+    """Return the arguments that a function cannot do without and that no input has the name of."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):  # of compiled code
+        return []
+    optional = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    return [
+        one.name
+        for one in parameters
+        if one.kind not in optional and one.default is one.empty and one.name not in inputs
+    ]
+
+
+def _what_it_may_take(missing: list[str], task: Task, inputs: Mapping[str, Any]) -> str:
+    optional = [name for name in missing if name in {field.name for field in task.inputs}]
+    if optional:
+        return f"{optional[0]} is not given in every request: give it a default"
+    hint = did_you_mean(missing[0], inputs)
+    return f"no input is called {', '.join(missing)}{hint or ':'} There are {', '.join(inputs)}"
 
 
 def _file(function: Callable[..., Any]) -> str:

@@ -9,7 +9,6 @@ beginning of what it printed; "changed", the names of the inputs that it changed
 "error" may hold "kind": "raised" with the "exception", its "file" and its "line".
 """
 
-import difflib
 import json
 import math
 import re
@@ -24,7 +23,7 @@ from .case import Case
 from .contestant import Answer, Failure, FailureKind
 from .functions import checked, raised, understand
 from .greeting import PROTOCOL, Greeting
-from .sentence import Sentence, sentence
+from .sentence import Sentence, did_you_mean, sentence
 from .task import TASKS, Task
 
 GREETING = "greeting"
@@ -276,11 +275,3 @@ def one_of(name: str, value: object, known: Iterable[str]) -> str:
         f"{name}: expected one of {', '.join(options)}, got {shown(repr(value), 60)}"
         f"{did_you_mean(value, options)}"
     )
-
-
-def did_you_mean(value: object, options: Iterable[str]) -> str:
-    """Return a question after the nearest option, or "" if none is near."""
-    simple = {one.replace("_", "").lower(): one for one in options}
-    word = str(value).replace("_", "").replace("-", "").lower()
-    near = difflib.get_close_matches(word, simple, n=1, cutoff=0.6)
-    return f"; did you mean {simple[near[0]]}?" if near else ""

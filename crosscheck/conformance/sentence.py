@@ -5,7 +5,8 @@ template stands literally in a call of `sentence`, where the tests look for thos
 translation.
 """
 
-from collections.abc import Callable, Mapping
+import difflib
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 
@@ -30,3 +31,11 @@ class Sentence(NamedTuple):
 def sentence(template: str, /, **values: object) -> Sentence:
     """Return a sentence: `sentence("{joint} is {distance:.2g} m off", joint=..., distance=...)`."""
     return Sentence(template, values)
+
+
+def did_you_mean(value: object, options: Iterable[str]) -> str:
+    """Return a question after the nearest option, or "" if none is near."""
+    simple = {one.replace("_", "").lower(): one for one in options}
+    word = str(value).replace("_", "").replace("-", "").lower()
+    near = difflib.get_close_matches(word, simple, n=1, cutoff=0.6)
+    return f"; did you mean {simple[near[0]]}?" if near else ""

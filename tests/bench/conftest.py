@@ -198,8 +198,8 @@ def stepping():
     return record("cloth", "cloth/x1", "newton", settings, arrays, facts=cloth("swing"))
 
 
-def raced(solver, kind, task="reachable", robot="arm", **changed):
-    """Four targets in two strata: one solved, one not, one denied, one beyond the limits."""
+def raced(solver, kind, task="reachable", robot="arm", size=4, **changed):
+    """Four targets in two strata: one solved, one missed, one claim denied, one solved."""
     arrays = {
         "solved": [True, False, False, True], "claimed": [1, 0, 1, 1], "stratum": [0, 1, 0, 1],
         "seconds": [1e-5, 1e-3, 1e-4, 1e-4], "position": [1e-9, 0.5, 0.1, 1e-7],
@@ -209,7 +209,7 @@ def raced(solver, kind, task="reachable", robot="arm", **changed):
     facts = {"task": task, "title": f"the {robot}", "strata": ["joint space", "space"]}
     facts |= {"tips": ["hand"], "joints": 7, "freedom": 7, "wanted": "pose"}
     problem = f"{'robots' if task == 'reachable' else task}/{robot}"
-    return record("ik", problem, solver, settings, arrays, notes={"remark": ""}, size=4,
+    return record("ik", problem, solver, settings, arrays, notes={"remark": ""}, size=size,
                   facts=facts)  # fmt: skip
 
 

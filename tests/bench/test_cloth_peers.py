@@ -27,6 +27,7 @@ from bench.harness.worker import Done, Ready, Solved, Unfit
 from bench.peers import registry
 from bench.peers.cloth.ladder import Rung, motion_rungs, step_rungs
 from bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
+from bench.presentation.figures import drawn
 from bench.presentation.report import all_figures
 from bench.presentation.results import Results
 from reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
@@ -612,10 +613,10 @@ def test_a_work_precision_diagram_has_a_panel_for_each_cloth_and_a_curve_for_eac
         for solver in ("Plumbob Newton", "MuJoCo Euler")
         for k in (1e2, 1e4)
     ]
-    made = [draw(Results(records)) for draw in all_figures()]
-    drawn = {drawing.name: drawing.svg for drawing in made if drawing}
+    made = [figure(Results(records)) for figure in all_figures()]
+    svg = next(drawn(sketch).svg for sketch in made if sketch and sketch.name == name)
     for text in ("20 × 20, 100 N/m", "20 × 20, 10,000 N/m", "Plumbob Newton", "MuJoCo Euler"):
-        assert text in drawn[name]
+        assert text in svg
 
 
 def test_a_job_of_a_worker_is_known_by_its_arrays(cloth):

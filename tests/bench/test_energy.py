@@ -6,6 +6,7 @@ import pytest
 from bench.experiments import Scale, blocks
 from bench.experiments.energy import figures, tables
 from bench.experiments.energy import measurement as suite
+from bench.presentation.figures import drawn
 from bench.presentation.results import Results
 
 STEPS = 100
@@ -65,7 +66,7 @@ def test_figure_has_a_panel_for_each_cloth_and_a_line_for_each_integrator(make):
         for cloth in ("undamped", "damped")
         for solver in ("RK4", "discrete")
     ]
-    svg = figures.energy(Results(records)).svg
+    svg = drawn(figures.energy(Results(records))).svg
     for text in ("undamped", "damped", "RK4", "discrete"):
         assert text in svg
     assert figures.energy(Results([])) is None

@@ -19,7 +19,7 @@ from bench.experiments.robots import tables as robots
 from bench.experiments.timing import tables as timing
 from bench.presentation.results import Results
 from bench.presentation.sections import SECTIONS, tables
-from bench.presentation.tables import comma_separated
+from bench.presentation.tables import Share, comma_separated
 
 
 def column(table, heading):
@@ -160,7 +160,8 @@ def test_success_counts_the_evaluation_says_and_times_count_failures(make):
     table = ONE.success(Results([make.raced("a", "one start")]))
     (row,) = table.rows
     assert row[:2] == ("the arm", "a")
-    assert [(share.hits, share.total) for share in row[2:4]] == [(1, 2), (2, 4)]
+    shares = [cell for cell in row if isinstance(cell, Share)]
+    assert [(share.hits, share.total) for share in shares] == [(2, 4), (1, 2)]
     assert column(table, "time, median [µs]") == pytest.approx([100.0])
     assert column(table, "time, mean [µs]") == pytest.approx([302.5])
     assert column(table, "position residual, largest [m]") == [1e-7]
@@ -193,7 +194,7 @@ def test_who_is_missing_or_cannot_has_a_row_that_says_why(make):
     table = ONE.success(results)
     remarks = column(table, "remark")
     assert remarks == ["", "b is not installed", "the data is not installed"]
-    assert table.rows[1][2:-1] == (None,) * 11
+    assert set(table.rows[1][2:-1]) == {None}
     assert [row[1] for row in AGAIN.success(results).rows] == ["all solvers"]
     assert len(ONE.strata(results).rows) == len(ONE.budgets(results).rows) == 1
 
@@ -209,8 +210,12 @@ def test_solvers_that_are_not_installed_are_listed_as_such(make):
 def test_strata_are_counted_apart_and_the_hardest_is_named(make):
     hard = make.raced("a", "one start", solved=[True, False, True, True])
     table = ONE.strata(Results([hard]))
-    assert [(share.hits, share.total) for share in table.rows[0][2:]] == [(2, 2), (1, 2)]
-    assert table.summary.sentence == "Hardest, counted over solvers and robots: space (1)."
+    assert [(share.hits, share.total) for share in table.rows[0][2:4]] == [(2, 2), (1, 2)]
+    assert table.summary.sentence.endswith("the hardest first:")
+    assert table.summary.points == (
+        "space: 1/2 = 50 % (9.5–90.5)",
+        "joint space: 2/2 = 100 % (34.2–100)",
+    )
 
 
 def test_claims_out_of_reach_are_named(make):
@@ -219,8 +224,8 @@ def test_claims_out_of_reach_are_named(make):
     table = ONE.unreachable(Results([liar]))
     assert column(table, "claimed as solved") == [3]
     assert column(table, "distance left, largest [m]") == [0.7]
-    assert column(table, "answers") == [3]
-    assert table.summary.points == ("the arm, a: 3 of 4",)
+    assert column(table, "answers within limits") == [3]
+    assert table.summary.points == ("the arm, a: 3/4 = 75 % (30.1–95.4)",)
     honest = make.raced("a", "one start", "unreachable", claimed=[0] * 4, **far)
     assert ONE.unreachable(Results([honest])).summary.sentence.startswith("No solver claims")
 
@@ -234,15 +239,6 @@ def test_budgets_and_profiles_show_who_is_ahead(make):
     profile = AGAIN.profiles(results)
     assert column(profile, "within 1.00 times the fastest [%]") == [50.0, 50.0]
     assert column(profile, "within 1,000 times the fastest [%]") == [50.0, 50.0]
-
-
-def test_a_solver_given_few_targets_is_left_out_of_the_profile(make):
-    many = {name: np.tile(values, 5) for name, values in make.raced("a", "restarts").arrays.items()
-            if values.ndim}  # fmt: skip
-    for count, names in ((3, ["a", "b"]), (2, ["a"])):
-        few = {name: values[:count] for name, values in many.items()}
-        both = [make.raced("a", "restarts", **many), make.raced("b", "restarts", **few)]
-        assert column(AGAIN.profiles(Results(both)), "solver") == names
 
 
 def test_the_robots_are_listed_once(make):

@@ -28,7 +28,7 @@ COUNT = 4
 # Solvers that return the start, which solves the target; each has a manner of its own, some from
 # the target of number `at` on.
 FAKES = """
-import os, sys, time
+import ctypes, os, random, sys, time
 import numpy as np
 from bench.peers.ik.protocol import SolverOutput, UnableError
 
@@ -47,6 +47,11 @@ def prepare(robot, tolerance, manner="perfect", at=2):
             if manner == "prints":
                 print("noise", flush=True)
                 os.write(1, b"more noise")
+            if manner == "gives up":
+                return SolverOutput(start, False)
+            if manner == "rolls dice":
+                libc = ctypes.CDLL(None).rand() / 2**31
+                return SolverOutput(start + [random.random(), np.random.rand(), *5 * [libc]], True)
             if manner == "shapeless":
                 return SolverOutput(start[:2], True)
             if manner == "none":
@@ -169,6 +174,25 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
     setup, warm, *each = counts
     assert (setup, warm) == (0, 0)
     assert each == [1, 1 + AGAIN, 1, 1 + AGAIN]
+
+
+@pytest.mark.parametrize("again", [1, 7])
+@pytest.mark.parametrize(("manner", "restarts"), [("gives up", 3), ("rolls dice", 0)])
+def test_the_answers_are_the_same_however_often_a_quick_solve_is_made_again(
+    targets, monkeypatch, manner, restarts, again
+):
+    """On a quick machine solves are warmed up and on a slow one not: no answer may depend on it."""
+
+    def answers(quick, again):
+        monkeypatch.setattr("bench.experiments.robots.job.QUICK", quick)
+        monkeypatch.setattr("bench.experiments.robots.job.AGAIN", again)
+        said = messages(targets, manner, restarts=restarts)
+        return np.array([one.q for one in said if isinstance(one, Solved)])
+
+    never = answers(0.0, 0)
+    assert not np.array_equal(never, targets.starts)  # else no lot was drawn
+    assert len(np.unique(never, axis=0)) == COUNT
+    np.testing.assert_array_equal(answers(10.0, again), never)
 
 
 def test_what_a_solver_prints_does_not_disturb_its_results(worker, targets):

@@ -16,7 +16,7 @@ from bench.peers.registry import ONE_START, OURS, PEERS, RESTARTS
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several effectors.
-TREES = {"plumbob", "closed_loop", "pink", "mink"}
+TREES = {"plumbob", "closed_loop", "pink", "mink", "drake"}
 FEW = 6
 
 

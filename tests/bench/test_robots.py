@@ -4,8 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from bench.experiments import SCALES
+from bench.experiments.robots import LIMIT_TOLERANCE, UNREACHABLE, measurement
 from bench.experiments.robots.evaluate import (
-    LIMIT_TOLERANCE,
     Targets,
     Tolerance,
     angle_between,
@@ -15,6 +16,7 @@ from bench.experiments.robots.problem import ALL, CHARACTER, AbsentError, is_ins
 from bench.experiments.robots.targets import (
     STRATA,
     farthest,
+    least_distances,
     least_singular_values,
     robot_targets,
     root,
@@ -23,6 +25,7 @@ from bench.experiments.robots.targets import (
     uniform_targets,
     unreachable_targets,
 )
+from bench.peers import registry
 from reference import rotation
 
 COUNT = 8
@@ -239,3 +242,36 @@ def test_the_angle_between_rotations_is_exact_where_it_is_tiny(angle, rng):
     A = rotation.to_matrix(rotation.random(rng))
     R = rotation.to_matrix(rotation.exponential([0.0, angle, 0.0]))
     assert angle_between(A, A @ R) == pytest.approx(angle, rel=1e-7, abs=1e-15)
+
+
+def test_no_pose_comes_nearer_to_what_is_out_of_reach_than_the_bound(name, rng):
+    targets, evaluator = unreachable_targets(name, 50), evaluator_of(name)
+    bounds = least_distances(name, targets)
+    assert (bounds >= 0.05 * farthest(evaluator) * (1 - 1e-12)).all()
+    for q in evaluator.robot.draw(rng, 20):
+        found = evaluator.evaluate(targets, np.tile(q, (50, 1)), TOLERANCE)
+        assert (found.position >= bounds).all()
+
+
+@pytest.mark.parametrize("scale", SCALES.values())
+def test_at_least_a_hundred_targets_are_out_of_reach_at_every_scale(scale):
+    beyond = [block for block in measurement.blocks(scale) if block.facts["task"] == UNREACHABLE]
+    assert {block.problem for block in beyond} >= {f"unreachable/{CHARACTER}"}
+    assert min(block.size for block in beyond) >= 100
+
+
+def test_the_solvers_of_a_robot_follow_each_other_in_an_order_drawn_by_lot(monkeypatch):
+    def order():
+        blocks = [b for b in measurement.blocks(SCALES["quick"]) if b.settings["kind"] != "any"]
+        problems = [block.problem for block in blocks]
+        assert problems == sorted(problems, key=problems.index)  # robot by robot
+        return {
+            name: [b.solver for b in blocks if b.problem == name]
+            for name in problems if name != "robots/all"
+        }  # fmt: skip
+
+    orders = order()
+    assert len({tuple(solvers) for solvers in orders.values()}) > 1
+    monkeypatch.setattr(registry, "PEERS", registry.PEERS[1:])
+    for name, solvers in order().items():
+        assert [solver for solver in orders[name] if solver in solvers] == solvers

@@ -80,8 +80,12 @@ def _columns_to(target: str) -> tuple[Column, Column]:
             f"time to {target}",
             "ms",
             read=lambda group: (point := cheapest(group)) and point.values["seconds"],
+            best="least",
         ),
-        text(f"{target} by", lambda group: (point := cheapest(group)) and point.rung),
+        replace(
+            text(f"{target} by", lambda group: (point := cheapest(group)) and point.rung),
+            folded=True,
+        ),
     )
 
 
@@ -145,8 +149,8 @@ one_step = WithMissing(
         text("cloth", lambda group: _cloth_of(group[0])),
         text("solver", lambda group: group[0].solver),
         *(column for target in TARGETS for column in _columns_to(target)),
-        Column("least error", read=lambda group: _best(group).values["error"]),
-        text("least by", lambda group: _best(group).rung),
+        Column("least error", read=lambda group: _best(group).values["error"], best="least"),
+        replace(text("least by", lambda group: _best(group).rung), folded=True),
         text("remark", _remark),
     ),
     subjects=lambda results: _groups(points(results, ONE_STEP)),

@@ -103,7 +103,7 @@ def _measured(records: Sequence[Record]) -> str:
 
 
 iterations = Layout(
-    "Iterations, up to a million particles",
+    "What does an iteration cost as the cloth grows?",
     "cloth_scale",
     "Local/global iterations as the cloth grows",
     columns=_iterations_columns,
@@ -117,7 +117,7 @@ iterations = Layout(
 
 
 factors = Layout(
-    "Factors, up to a million particles",
+    "And a factor?",
     "cloth_factors",
     "Factors of M + h² L as the cloth grows",
     subjects=lambda results: results.all("cloth_scale"),

@@ -13,10 +13,8 @@ import numpy as np
 
 from reference.arguments import FloatArray
 
+from . import LIMIT_TOLERANCE
 from .problem import Robot, robot
-
-# A limit counts as kept to this [rad]; some peers keep limits in single precision.
-LIMIT_TOLERANCE = 1e-6
 
 
 class Tolerance(NamedTuple):

@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.figures import Drawing, canvas, every_handle, finished, nth_style, written
+from ...presentation.chart import GREATER, Axis, Chart, Panel, Series, series
+from ...presentation.figures import Sketch, chart_sketch
 from ...presentation.layout import Figure
 from ...presentation.results import Results
 from . import readings
-
-PANELS = 3
 
 
 def robot_curves(
@@ -20,32 +20,43 @@ def robot_curves(
     curves: Callable[[list[Record], np.ndarray], dict[str, dict[str, np.ndarray]]],
     along: np.ndarray,
 ) -> Figure:
-    """Return what draws a share for each solver along an axis, a panel for each robot.
+    """Return what shows a share for each solver along an axis, a panel for each robot.
 
     The titles are those of the figure, of the axis, and what it shows.
     """
 
-    def draw(results: Results) -> Drawing | None:
-        panels = curves(readings.records_of(results, kind), along)
+    def sketch(results: Results) -> Sketch | None:
+        records = readings.records_of(results, kind)
+        panels = curves(records, along)
         if not panels:
             return None
-        names = list(dict.fromkeys(solver for panel in panels.values() for solver in panel))
-        rows = -(-len(panels) // PANELS)
-        with canvas(2.4 * rows + 0.22 * len(names), PANELS, rows, sharey=True) as (figure, axes):
-            for ax, (robot, panel) in zip(axes, panels.items(), strict=False):
-                for solver, shares in panel.items():
-                    ax.plot(
-                        along, 100 * shares, label=written(solver), **nth_style(names.index(solver))
+        counts = {(r.title, r.solver): r.arrays["solved"].size for r in readings.measured(records)}
+        return chart_sketch(
+            Chart(
+                name,
+                titles[0],
+                titles[2],
+                tuple(
+                    Panel(
+                        robot,
+                        tuple(_share(n, along, y, counts[robot, n]) for n, y in panel.items()),
                     )
-                ax.set(title=written(robot), xscale="log", xlabel=titles[1], ylim=(-3, 103))
-                ax.minorticks_off()
-            for ax in axes[len(panels) :]:
-                ax.remove()
-            axes[0].set_ylabel("targets [%]")
-            figure.legend(*every_handle(axes[: len(panels)]), loc="outside lower left", ncols=2)
-            return finished(figure, name, titles[0], titles[2])
+                    for robot, panel in panels.items()
+                ),
+                Axis(titles[1], log=True),
+                Axis("targets [%]", limits=(-3, 103)),
+                better=GREATER,
+                entrants=results.entrants,
+            )
+        )
 
-    return draw
+    return sketch
+
+
+def _share(solver: str, along: np.ndarray, rates: np.ndarray, count: int) -> Series:
+    """Return a share with the interval that holds the true one in 95 % of samples [%]."""
+    low, high = metrics.wilson(rates, max(1, count))
+    return series(solver, along, 100 * rates, (100 * low, 100 * high))
 
 
 def budgets(kind: str) -> Figure:
@@ -56,7 +67,8 @@ def budgets(kind: str) -> Figure:
         (
             f"Robots, {kind}: targets solved within a time",
             "time for each target [s]",
-            "Share of the targets within reach that are solved within so much time for each.",
+            "Share of the targets within reach that are solved within so much time for each; the "
+            "band is the 95 % interval (Wilson).",
         ),
         readings.budget_curves,
         np.logspace(-6, 0, 121),

@@ -1,7 +1,9 @@
 """Targets to be solved one by one in a worker's process, by one solver with its settings."""
 
 import contextlib
+import ctypes
 import importlib
+import random
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -68,9 +70,21 @@ def _solved(ask: Ask, job: Job) -> Iterator[Solved]:
             with contextlib.suppress(Exception):
                 for _ in range(AGAIN):
                     before()
+        _seed_shared_generators(i)
         solved = _solve(solve, job)
         before = solve if solved.seconds < QUICK else None
         yield solved
+
+
+def _seed_shared_generators(seed: int) -> None:
+    """Seed the generators that all of a process shares: an engine may draw from any of them.
+
+    Else an answer would depend on how often solves before it were made again.
+    """
+    random.seed(seed)
+    np.random.seed(seed)  # noqa: NPY002 (that is the one which is shared)
+    with contextlib.suppress(AttributeError, OSError, TypeError):  # no C library to be asked
+        ctypes.CDLL(None).srand(seed)
 
 
 def _prepared(adapter: Any, job: Job) -> Ask:
@@ -95,6 +109,7 @@ def _solve(solve: Solve, job: Job) -> Solved:
             return SolverOutput(None, False)
 
     answer, seconds = timed(solve_once)
+    seconds = seconds if answer.seconds is None else answer.seconds
     nothing = np.full(starts.shape[-1], np.nan)
     q = nothing if answer.q is None else np.array(answer.q, dtype=float)
     if q.shape != nothing.shape:

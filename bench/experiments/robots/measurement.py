@@ -4,7 +4,8 @@ Each solver works in a process of its own. Its answers are evaluated here, by Mu
 """
 
 import functools
-from collections.abc import Iterator
+import zlib
+from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -19,15 +20,16 @@ from . import REACHABLE, UNREACHABLE
 from .evaluate import Targets, Tolerance, evaluator_of
 from .job import Job
 from .problem import PACKAGE, ROBOTS, is_installed, title
-from .targets import STRATA, robot_targets, unreachable_targets
+from .targets import STRATA, least_distances, robot_targets, unreachable_targets
 
 SUITE = "ik"
 TOLERANCE = Tolerance(1e-3, 1e-3)
-# Targets in a stratum, and seconds that a solver has for a robot, for those of a scale.
+# Targets in a stratum, and seconds that a solver has for a robot within reach and beyond, for
+# those of a scale.
 _TARGETS = 0.1
-_BUDGET = 3.0
-# Those out of reach are fewer: the slowest solvers take the longest over them.
-_OUT_OF_REACH = 0.25
+_BUDGET, _BUDGET_BEYOND = 5.0, 3.0
+# Targets out of reach are no fewer than these, however few are asked for in a stratum.
+OUT_OF_REACH = 100
 EVERY_SOLVER = "all solvers"
 # Digits kept of times and residuals: more would fill the disk with noise.
 _DIGITS = 5
@@ -44,26 +46,45 @@ class Run(NamedTuple):
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield each solver on each robot; one block for a solver or a robot that is not installed."""
+    """Yield each solver on each robot; one block for a solver or a robot that is not installed.
+
+    The solvers of a robot follow each other in an order drawn by lot, so that a machine that gets
+    slower or faster does so to all of them.
+    """
     here = [name for name in ROBOTS if is_installed(name)]
     for name in ROBOTS:
         if name not in here:
             absent = partial(not_installed, PACKAGE)
             facts = {"task": REACHABLE, "title": title(name)}
             yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"}, 0, facts)
-    for peer in registry.PEERS:
-        yield from blocks_of(peer, here, scale)
+    made = [block for peer in registry.PEERS for block in blocks_of(peer, here, scale)]
+    yield from by_lot(made)
 
 
 def blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
     """Yield a solver on robots that are installed, by each of its entries."""
     count = max(1, round(_TARGETS * scale.targets))
     for entry in peer.entries:
-        yield from _entry_blocks(peer, entry, robots, count, _BUDGET * scale.seconds)
+        yield from _entry_blocks(peer, entry, robots, count, scale.seconds)
+
+
+def by_lot(blocks: Iterable[Block]) -> list[Block]:
+    """Return blocks problem by problem, the solvers of each in an order of its own.
+
+    It is the same every time, whichever other solvers are asked for.
+    """
+    problems: dict[str, list[Block]] = {}
+    for block in blocks:
+        problems.setdefault(block.problem, []).append(block)
+    return [block for group in problems.values() for block in sorted(group, key=_lot)]
+
+
+def _lot(block: Block) -> int:
+    return zlib.crc32(f"{block.problem}, {block.solver}".encode())
 
 
 def _entry_blocks(
-    peer: Peer, entry: Entry, robots: list[str], count: int, budget: float
+    peer: Peer, entry: Entry, robots: list[str], count: int, seconds: float
 ) -> Iterator[Block]:
     solver = peer.called(entry)
     settings = settings_of(peer, entry, TOLERANCE)
@@ -72,16 +93,16 @@ def _entry_blocks(
         facts = {"task": REACHABLE, "title": "every robot"}
         yield Block(SUITE, "robots/all", solver, absent, settings, 0, facts)
         return
-    few = max(1, round(_OUT_OF_REACH * count))
+    beyond = max(OUT_OF_REACH, count)
     for name in robots:
-        run = Run(name, peer, entry, TOLERANCE, budget)
+        run = Run(name, peer, entry, TOLERANCE, _BUDGET * seconds)
         measure = partial(_solve_strata, run, count)
         facts = {"task": REACHABLE, "title": title(name)}
         yield Block(SUITE, f"robots/{name}", solver, measure, settings, count * len(STRATA), facts)
-        run = run._replace(budget=_OUT_OF_REACH * budget)
-        measure = partial(_solve_unreachable, run, few)
+        run = run._replace(budget=_BUDGET_BEYOND * seconds)
+        measure = partial(_solve_unreachable, run, beyond)
         facts = {"task": UNREACHABLE, "title": title(name)}
-        yield Block(SUITE, f"unreachable/{name}", solver, measure, settings, few, facts)
+        yield Block(SUITE, f"unreachable/{name}", solver, measure, settings, beyond, facts)
 
 
 def settings_of(peer: Peer, entry: Entry, tolerance: Tolerance) -> dict[str, Any]:
@@ -106,14 +127,19 @@ def _solve_strata(run: Run, count: int) -> Measured:
 
 
 def _solve_unreachable(run: Run, count: int) -> Measured:
-    return solve(run, unreachable_targets(run.robot, count))
+    """Solve targets out of reach; keep beside them how near any pose may come."""
+    targets = unreachable_targets(run.robot, count)
+    arrays, notes, facts = solve(run, targets)
+    bound = least_distances(run.robot, targets)[: len(arrays.get("solved", ()))]
+    return Measured({**arrays, "bound": bound} if len(bound) else arrays, notes, facts)
 
 
 def solve(run: Run, targets: Targets) -> Measured:
     """Solve the targets, and evaluate what came of it, finished or not.
 
     A target over which the solver's process was lost counts as one that it did not solve, with the
-    time until it was given up; targets never begun do not count.
+    time until it was given up; of targets never begun there is nothing, and tables count them as
+    not solved.
     """
     robot = evaluator_of(run.robot).robot
     asked, entry = (run.peer.module, robot, targets, run.tolerance), run.entry

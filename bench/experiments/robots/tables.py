@@ -1,14 +1,13 @@
 """Robots: who solves how many targets, how fast, and how far what is claimed is so.
 
-Solvers that make one attempt and those that start again are never in one table: each of the first
-five tables exists for either kind.
+Solvers that make one attempt and those that start again are never in one table: each of the
+tables of `Tables` exists for either kind.
 """
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,29 +28,54 @@ from ...presentation.columns import (
     words_in,
 )
 from ...presentation.layout import Layout
-from ...presentation.results import Results, listed, settings
-from ...presentation.tables import Cell, Column, Summary, listing, words
+from ...presentation.results import Results, leaders, listed
+from ...presentation.tables import Cell, Column, Summary, in_unit, listing, words
 from . import REACHABLE, UNREACHABLE, figures
-from .readings import KINDS, budget_curve, budget_curves, by_robot, measured, profiles, records_of
+from .overall.tables import aggregate, problem_map
+from .readings import (
+    KINDS,
+    MARK,
+    OUTCOMES,
+    RULE,
+    SCORE,
+    SHIFT,
+    TIES,
+    best_known,
+    beyond_best,
+    budget_curve,
+    by_robot,
+    distances_within_limits,
+    false_claims,
+    fastest,
+    how,
+    is_ranked,
+    measured,
+    outcomes,
+    penalised,
+    profiles,
+    ranked_by_success,
+    ranked_by_time,
+    records_of,
+    solved,
+    solved_within,
+    total,
+)
 
 # Shares of the targets are shown for these budgets [s] and these ratios to the fastest.
 BUDGETS = np.array([1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 1e-1])
+# Those that a narrow table shows.
+WHOLE = (1e-4, 1e-3, 1e-2, 1e-1)
 RATIOS = np.array([1.0, 2.0, 5.0, 10.0, 100.0, 1000.0])
-_MEASURED = (
-    "Every solver has the same text of the robot, the same targets and the same seeded random "
-    "starts. It works in a process of its own, on one core (TRAC-IK on two), and is timed target "
-    "by target, as in a loop of solves: after the target before, solved again without counting "
-    "where that takes less than a millisecond; conversions are left out. What it returns is "
-    "evaluated by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a "
-    "busy machine. Solved means: "
-)
 NAMES = (titled("robot"), text("solver", lambda record: record.solver))
 
 
 class Tables(NamedTuple):
     """The tables that exist for either kind."""
 
+    overall: Layout
+    map: Layout
     success: Layout
+    outcomes: Layout
     strata: Layout
     unreachable: Layout
     budgets: Layout
@@ -134,22 +158,25 @@ def _measured(kind: str, results: Results, task: str = REACHABLE) -> list[Record
     return measured(records_of(results, kind, task))
 
 
-def _how(records: Sequence[Record]) -> str:
-    return (
-        f"{_MEASURED}within {settings(records, 'tolerance')} m and "
-        f"{settings(records, 'tolerance_rotation')} rad, every limit kept to 1e-6 rad."
-    )
-
-
 def success(kind: str) -> Layout:
     """Return how many targets are solved, how soon, and how closely."""
     columns = (
-        share("solved, uniform in joint space", partial(_solved, stratum=0)),
-        share("solved, all strata within reach", _solved),
-        *times("time"),
+        share("solved", solved, best="greatest"),
+        Column("claimed but not so", read=false_claims),
+        Column("time, median", "µs", read=_median_of_times),
+        text("mark", lambda record: record.notes.get(MARK, "")),
+    )
+    folded = (
+        share("solved, uniform in joint space", partial(solved, stratum=0)),
+        Column("beyond a limit", read=lambda record: outcomes(record)["beyond a limit"]),
+        Column("time, median, 95 % from", "µs", read=at(1, _middle)),
+        Column("time, median, 95 % to", "µs", read=at(2, _middle)),
+        *times("time")[1:],
+        Column(
+            "time, geometric mean", "µs", best="least", read=lambda record: _score(record).value
+        ),
         *_residuals("position", "m"),
         *_residuals("rotation", "rad"),
-        Column("claimed but not so", read=false_claims),
         Column("set-up", "ms", read=lambda record: record.arrays["setup"]),
     )
     return Layout(
@@ -160,14 +187,16 @@ def success(kind: str) -> Layout:
         columns=(
             *NAMES,
             *map(_if_measured, columns),
-            text("remark", lambda record: record.notes.get("remark", "")),
+            *(replace(_if_measured(column), folded=True) for column in folded),
+            replace(text("remark", lambda record: record.notes.get("remark", "")), folded=True),
         ),
-        shows="Times are of all targets within reach, those that failed included. Residuals "
+        shows=f"{RULE} Medians are of all targets begun, those that failed included. Residuals "
         "are of those solved, not cut off at the tolerance. “Claimed but not so” counts "
-        "answers that the solver calls solved and the evaluation does not. A solver that runs "
-        "out of time has fewer targets; all have them in one order, the strata alternating.",
-        measured=_how,
+        "answers that the solver calls solved and the evaluation does not. "
+        f"{SCORE} {TIES}",
+        measured=how,
         summary=_success_summary,
+        ranked=is_ranked,
     )
 
 
@@ -176,9 +205,19 @@ def _if_measured(column: Column) -> Column:
     return replace(column, read=lambda r: column.read(r) if "solved" in r.arrays else None)
 
 
-def _solved(record: Record, stratum: int | None = None) -> np.ndarray:
-    solved = record.arrays["solved"]
-    return solved if stratum is None else solved[record.arrays["stratum"] == stratum]
+def _middle(record: Record) -> Sequence[Cell]:
+    """Return the median time and its interval, None where too few targets tell [s]."""
+    found = metrics.median_interval(record.arrays["seconds"])
+    return [None if np.isnan(x) else x for x in found]
+
+
+def _median_of_times(record: Record) -> float:
+    return effort(record).median
+
+
+def _score(record: Record) -> metrics.Interval:
+    """Return the geometric mean of times, unsolved targets with their penalty [s]."""
+    return metrics.shifted_geometric_mean(penalised(record), SHIFT)
 
 
 def _residuals(name: str, unit: str) -> list[Column]:
@@ -189,26 +228,69 @@ def _residuals(name: str, unit: str) -> list[Column]:
     return places(f"{name} residual", unit, (MEDIAN, LARGEST), read)
 
 
-def false_claims(record: Record) -> int | None:
-    """Return how many claims the evaluation denies; None if the solver makes none."""
-    claimed = record.arrays["claimed"]
-    if not any(claimed >= 0):
-        return None
-    return int(np.count_nonzero((claimed == 1) & ~record.arrays["solved"]))
-
-
 def _success_summary(records: Sequence[Record]) -> Summary:
     return listing(
-        "Solved within reach, and the median time of all:",
-        (f"{name}: {'; '.join(map(_rate, mine))}" for name, mine in by_robot(records).items()),
+        "Who solves the most targets within reach, and who takes the least time for them:",
+        (
+            f"{name}: {_most_solved(mine)}; {_soonest(mine)}"
+            for name, mine in by_robot(records).items()
+            if any(map(is_ranked, mine))
+        ),
     )
 
 
-def _rate(record: Record) -> str:
-    solved = metrics.share(record.arrays["solved"])
-    median = effort(record).median
-    rate = words_in(metrics.ratio(solved.hits, solved.total), "%")
-    return f"{record.solver} {rate} in {words_in(median, 'µs')}"
+def _most_solved(records: Sequence[Record]) -> str:
+    ranking = ranked_by_success(records)
+    first = next(record for record in records if record.solver == ranking.order[0])
+    return f"{leaders(ranking)}, {words(metrics.share(solved(first)))}"
+
+
+def _soonest(records: Sequence[Record]) -> str:
+    ranking = ranked_by_time(records)
+    first = next(record for record in records if record.solver == ranking.order[0])
+    value, low, high = _score(first)
+    return (
+        f"least time {leaders(ranking)}, {words_in(value, 'µs')} "
+        f"({words(in_unit(low, 'µs'))}–{words(in_unit(high, 'µs'))})"
+    )
+
+
+def outcome(kind: str) -> Layout:
+    """Return what became of every target."""
+    return Layout(
+        f"With {kind}: what becomes of the targets?",
+        f"robots_outcomes_{KINDS[kind]}",
+        f"Robots, {kind}: what became of every target",
+        subjects=partial(_measured, kind),
+        columns=(
+            *NAMES,
+            *(Column(name, read=partial(_count, name)) for name in OUTCOMES),
+            Column("targets", read=total, folded=True),
+        ),
+        shows="Every target counts once, so that the parts are together all targets. Beyond a "
+        "limit: the target is met, but by a pose that no joint may take. Wrong claim: off the "
+        "target though called solved. Missed: off the target, and not called solved. Not begun: "
+        "the budget of time ran out before.",
+        measured=how,
+        summary=_outcome_summary,
+        ranked=is_ranked,
+    )
+
+
+def _count(name: str, record: Record) -> int:
+    return outcomes(record)[name]
+
+
+def _outcome_summary(records: Sequence[Record]) -> Summary:
+    """Say how many of all targets came to what but success, for each solver."""
+    points = []
+    for solver in dict.fromkeys(record.solver for record in records):
+        mine = [record for record in records if record.solver == solver]
+        counts = {name: sum(outcomes(record)[name] for record in mine) for name in OUTCOMES}
+        failed = [f"{words(counts[name])} {name}" for name in OUTCOMES[1:] if counts[name]]
+        if failed:
+            points.append(f"{solver}: {listed(failed)}, of {words(sum(counts.values()))}")
+    return listing("What was not solved:", points)
 
 
 def strata(kind: str) -> Layout:
@@ -223,31 +305,67 @@ def strata(kind: str) -> Layout:
         "the cells of a grid; outer shell and near the root: the twentieth of the poses whose "
         "effector is farthest from and nearest to the first joint; near singular: the twentieth "
         "with the smallest least singular value of the Jacobian; at a limit: one joint put at "
-        "one of its limits.",
-        measured=_how,
+        f"one of its limits. {RULE}",
+        measured=how,
         summary=_strata_summary,
+        ranked=is_ranked,
     )
 
 
 def _strata_columns(records: Sequence[Record]) -> tuple[Column, ...]:
     names = records[0].facts["strata"] if records else []
-    return (*NAMES, *(share(name, partial(_solved, stratum=i)) for i, name in enumerate(names)))
+    columns = [share(n, partial(solved, stratum=i), best="greatest") for i, n in enumerate(names)]
+    mark = text("mark", lambda record: record.notes.get(MARK, ""))
+    folded = [replace(column, folded=len(columns) > SHOWN) for column in columns[SHOWN:]]
+    return (*NAMES, *columns[:SHOWN], *folded, replace(mark, folded=True))
+
+
+# So many strata stand in a table, the others are folded.
+SHOWN = 4
 
 
 def _strata_summary(records: Sequence[Record]) -> Summary:
-    names = records[0].facts["strata"]
-    hardest = Counter(name for record in records if (name := _hardest(record, names)))
-    if not hardest:
-        return Summary("No stratum is harder than the others to any solver.")
-    counts = [f"{name} ({count})" for name, count in hardest.most_common()]
-    return Summary(f"Hardest, counted over solvers and robots: {listed(counts)}.")
+    """Say how many targets of each stratum the solvers that are ranked solve together."""
+    ranked = [record for record in records if is_ranked(record)]
+    points = []
+    for i, name in enumerate(records[0].facts["strata"]):
+        hits = [solved(record, i) for record in ranked]
+        points.append((name, metrics.share(np.concatenate(hits)) if hits else metrics.share(_NO)))
+    points.sort(key=lambda point: metrics.ratio(point[1].hits, point[1].total))
+    made = (f"{name}: {words(share)}" for name, share in points if share.total)
+    return listing(
+        "Solved in each stratum, over robots and ranked solvers, the hardest first:", made
+    )
 
 
-def _hardest(record: Record, names: Sequence[str]) -> str:
-    """Return the stratum in which the fewest targets are solved, "" if all are alike."""
-    shares = [metrics.share(_solved(record, i)) for i in range(len(names))]
-    rates = [metrics.ratio(share.hits, share.total) for share in shares]
-    return names[int(np.argmin(rates))] if rates and min(rates) < max(rates) else ""
+_NO = np.zeros(0, dtype=bool)
+
+
+class Missed(NamedTuple):
+    """What a solver leaves of targets out of reach, and by how much that is more than it must."""
+
+    record: Record
+    beyond_best: np.ndarray
+
+    @property
+    def beyond_bound(self) -> np.ndarray:
+        """By how much answers within limits miss more than geometry makes them [m], (answer,)."""
+        left = distances_within_limits(self.record)
+        bound = self.record.arrays.get("bound", np.full(left.size, np.nan))
+        return (left - bound)[np.isfinite(left - bound)]
+
+
+def _missed(kind: str, results: Results) -> list[Missed]:
+    """Return the records of one kind; the best known answers are those of either kind."""
+    every = [r for each in KINDS for r in _measured(each, results, task=UNREACHABLE)]
+    best = best_known(every)
+    mine = _measured(kind, results, task=UNREACHABLE)
+    return [Missed(record, beyond_best(record, best)) for record in mine]
+
+
+def _of_record(column: Column, **changed: Any) -> Column:
+    """Return the column as one of targets missed."""
+    return replace(column, read=lambda missed: column.read(missed.record), **changed)
 
 
 def unreachable(kind: str) -> Layout:
@@ -256,37 +374,73 @@ def unreachable(kind: str) -> Layout:
         f"With {kind}: what happens out of reach?",
         f"robots_unreachable_{KINDS[kind]}",
         f"Robots, {kind}: targets out of reach",
-        subjects=partial(_measured, kind, task=UNREACHABLE),
+        subjects=partial(_missed, kind),
         columns=(
-            *NAMES,
-            Column("targets", read=lambda record: record.arrays["solved"].size),
-            Column("claimed as solved", read=false_claims),
-            *times("time"),
-            *places("distance left", "m", (MEDIAN, LARGEST), _distances_left),
-            Column("answers", read=lambda record: _left(record).size),
+            *map(_of_record, NAMES),
+            Column("claimed as solved", read=lambda missed: false_claims(missed.record)),
+            _beyond("beyond the best known", MEDIAN, lambda missed: missed.beyond_best, "least"),
+            _of_record(Column("time, median", "µs", read=_median_of_times)),
+            _of_record(text("mark", lambda record: record.notes.get(MARK, ""))),
+            *(
+                replace(column, folded=True)
+                for column in (
+                    _beyond("beyond the best known", LARGEST, lambda missed: missed.beyond_best),
+                    _beyond("beyond the lower bound", MEDIAN, lambda missed: missed.beyond_bound),
+                    *map(_of_record, places("distance left", "m", (MEDIAN, LARGEST), _left)),
+                    _of_record(Column("targets", read=total)),
+                    _of_record(Column("answers within limits", read=_kept)),
+                    *(
+                        _of_record(Column(name, read=partial(_count, name)))
+                        for name in OUTCOMES[4:]
+                    ),
+                    *map(_of_record, times("time")[1:]),
+                )
+            ),
         ),
         shows="Targets farther from the first joint than all links in a row reach. What counts "
-        "is how soon a solver gives up, and that it claims nothing.",
-        measured=_how,
+        "is that a solver claims nothing, how soon it gives up, and how near it comes: the best "
+        "known answer to a target is the nearest within limits of any solver here, with one start "
+        "or more; the lower bound is how much farther a target is than all links in a row. A "
+        "solver of poses may trade distance for angle. Answers beyond a limit have no distance. "
+        f"{RULE}",
+        measured=lambda rows: how([missed.record for missed in rows]),
         summary=_unreachable_summary,
+        ranked=lambda missed: is_ranked(missed.record),
     )
 
 
-def _left(record: Record) -> np.ndarray:
-    return record.arrays["position"][np.isfinite(record.arrays["position"])]
+def _beyond(title: str, which: str, read: Callable[[Missed], np.ndarray], best: str = "") -> Column:
+    """Return the column of how far answers miss by more than something."""
+
+    def place(missed: Missed) -> float | None:
+        found = read(missed)
+        if not found.size:
+            return None
+        spread = metrics.spread(found)
+        return spread.median if which == MEDIAN else spread.largest
+
+    return Column(f"{title}, {which}", "m", read=place, best=best)
 
 
-def _distances_left(record: Record) -> Sequence[Cell]:
-    left = _left(record)
+def _left(record: Record) -> Sequence[Cell]:
+    """Return where the distances of all answers lie, within limits or not."""
+    left = record.arrays["position"][np.isfinite(record.arrays["position"])]
     return metrics.spread(left) if left.size else (None, None, None)
 
 
-def _unreachable_summary(records: Sequence[Record]) -> Summary:
+def _kept(record: Record) -> int:
+    return int(np.isfinite(distances_within_limits(record)).sum())
+
+
+def _unreachable_summary(rows: Sequence[Missed]) -> Summary:
+    records = [missed.record for missed in rows]
     claimed = [record for record in records if false_claims(record)]
     if not claimed:
-        return Summary("No solver claims a target that is out of reach.")
+        begun = sum(record.arrays["solved"].size for record in records)
+        return Summary(f"No solver claims a target that is out of reach (n = {words(begun)}).")
     points = (
-        f"{r.title}, {r.solver}: {words(false_claims(r))} of {words(r.arrays['solved'].size)}"
+        f"{r.title}, {r.solver}: "
+        f"{words(metrics.share((r.arrays['claimed'] == 1) & ~r.arrays['solved']))}"
         for r in claimed
     )
     return Summary("Claimed though out of reach:", tuple(points))
@@ -302,14 +456,21 @@ def budgets(kind: str) -> Layout:
         columns=(
             *NAMES,
             *(
-                Column(f"within {_duration(budget)}", "%", read=at(i, _within_budgets))
-                for i, budget in enumerate(BUDGETS)
+                Column(
+                    f"within {_duration(budget)}",
+                    "%",
+                    read=at(i, _within_budgets),
+                    folded=budget not in WHOLE,
+                )
+                for i, budget in enumerate(BUDGETS.tolist())
             ),
         ),
-        shows="Share of the targets within reach that are solved within so much time for each.",
-        measured=_how,
+        shows="Share of the targets within reach that are solved within so much time for each. "
+        f"{RULE} {TIES}",
+        measured=how,
         summary=_leaders,
         figures=(figures.budgets(kind),),
+        ranked=is_ranked,
     )
 
 
@@ -318,18 +479,20 @@ def _within_budgets(record: Record) -> np.ndarray:
 
 
 def _leaders(records: Sequence[Record]) -> Summary:
-    """Say who is ahead at each budget, robot by robot."""
-    curves = budget_curves(records, BUDGETS)
-    return Summary("Ahead:", tuple(f"{name}: {_ahead(of)}" for name, of in curves.items()))
+    """Say who is ahead at some budgets, robot by robot."""
+    points = (f"{name}: {_ahead(mine)}" for name, mine in by_robot(records).items())
+    return listing("Ahead:", (point for point in points if not point.endswith(": ")))
 
 
-def _ahead(curves: dict[str, np.ndarray]) -> str:
-    leaders = [max(curves, key=lambda solver: curves[solver][i]) for i in range(len(BUDGETS))]
-    return "; ".join(
-        f"within {_duration(budget)} {solver} ({words_in(float(curves[solver][i]), '%')})"
-        for i, (budget, solver) in enumerate(zip(BUDGETS, leaders, strict=True))
-        if curves[solver][i] > 0
-    )
+def _ahead(records: Sequence[Record]) -> str:
+    said = []
+    for budget in WHOLE:
+        hits = {r.solver: solved_within(r, budget) for r in records if is_ranked(r)}
+        ranking = metrics.ranking(hits)
+        if ranking.order and hits[ranking.order[0]].any():
+            share = words(metrics.share(hits[ranking.order[0]]))
+            said.append(f"within {_duration(budget)} {leaders(ranking)} ({share})")
+    return "; ".join(said)
 
 
 class Profile(NamedTuple):
@@ -367,11 +530,8 @@ def profile(kind: str) -> Layout:
         ),
         shows="Share of the targets, among those within reach that any of these solvers "
         "solves, that a solver solves within so many times the time of the fastest on that "
-        "target (Dolan and Moré 2002).",
-        measured=lambda rows: (
-            f"{_how(rows[0].records if rows else [])} The targets are those that "
-            "all solvers shown were given; a solver given less than an eighth of them is left out."
-        ),
+        f"target (Dolan and Moré 2002). {RULE}",
+        measured=lambda rows: how(rows[0].records if rows else []),
         summary=_profile_summary,
         figures=(figures.profiles(kind),),
     )
@@ -383,17 +543,14 @@ def _curve(row: Profile) -> np.ndarray:
 
 def _profile_summary(rows: Sequence[Profile]) -> Summary:
     """Say who is the fastest most often, robot by robot."""
-    first: dict[str, Profile] = {}
-    for row in rows:
-        if row.robot not in first or row.curve[0] > first[row.robot].curve[0]:
-            first[row.robot] = row
-    return Summary(
-        "Most often the fastest:",
-        tuple(
-            f"{robot}: {row.solver}, on {words_in(float(row.curve[0]), '%')} of the targets"
-            for robot, row in first.items()
-        ),
-    )
+    points = []
+    for robot, mine in by_robot(rows[0].records).items():
+        hits = fastest(mine)
+        ranking = metrics.ranking({r.solver: hits[r.solver] for r in mine if is_ranked(r)})
+        if ranking.order and hits[ranking.order[0]].any():
+            share = words(metrics.share(hits[ranking.order[0]]))
+            points.append(f"{robot}: {leaders(ranking)}, on {share} of the targets")
+    return listing("Most often the fastest, of the targets that any solves:", points)
 
 
 def _duration(seconds: float) -> str:
@@ -401,7 +558,16 @@ def _duration(seconds: float) -> str:
 
 
 OF_KIND = {
-    kind: Tables(success(kind), strata(kind), unreachable(kind), budgets(kind), profile(kind))
+    kind: Tables(
+        aggregate(kind),
+        problem_map(kind),
+        success(kind),
+        outcome(kind),
+        strata(kind),
+        unreachable(kind),
+        budgets(kind),
+        profile(kind),
+    )
     for kind in KINDS
 }
 LAYOUTS = (who, models, *(layout for made in OF_KIND.values() for layout in made))

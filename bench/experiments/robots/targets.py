@@ -84,6 +84,16 @@ def unreachable_targets(name: str, count: int) -> Targets:
     )
 
 
+def least_distances(name: str, targets: Targets) -> FloatArray:
+    """Return a bound below which no pose brings the farther effector to its target [m], (target,).
+
+    It is how much farther the target is from the first joint than all links in a row are long.
+    """
+    evaluator = evaluator_of(name)
+    away = np.linalg.norm(targets.positions - root(evaluator), axis=-1)
+    return np.maximum(away - farthest(evaluator), 0.0).max(axis=-1)
+
+
 @functools.lru_cache(maxsize=16)
 def uniform_targets(name: str, count: int, middle: bool) -> Targets:
     """Return targets uniform in joint space, from random starts or from the middle of the limits.

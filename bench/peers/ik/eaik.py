@@ -10,7 +10,8 @@ from eaik.pybindings import EAIK
 
 from reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import LIMIT_TOLERANCE, Tolerance
+from ...experiments.robots import LIMIT_TOLERANCE
+from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot, links
 from .protocol import Ask, Solve, SolverOutput, UnableError, needs_a_chain
 

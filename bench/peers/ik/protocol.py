@@ -21,10 +21,12 @@ class SolverOutput(NamedTuple):
     Attributes:
         q: the coordinates, in the robot's order; None if it returns none.
         claimed: whether it says that they solve the target; None if it does not say.
+        seconds: what a process of its own has measured [s]; None where the call is to be timed.
     """
 
     q: FloatArray | None
     claimed: bool | None
+    seconds: float | None = None
 
 
 Solve = Callable[[], SolverOutput]

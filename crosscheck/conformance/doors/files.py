@@ -11,7 +11,7 @@ from .. import message
 from ..case import Case
 from ..contestant import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
-from ..sentence import Sentence, sentence
+from ..sentence import Sentence, did_you_mean, sentence
 from ..task import TASKS, Task
 from .line_process import LIMITS
 from .tables import read_table
@@ -159,7 +159,7 @@ def _absent(place: Path, task: Task) -> Sentence:
     names = [ANSWER, *(f"{PREFIX}{field.name}.csv" for field in task.outputs)]
     inputs = {REQUEST, *(f"{field.name}.csv" for field in task.inputs)}
     for path in sorted(place.iterdir()):
-        if path.name not in inputs and (near := message.did_you_mean(path.name, names)):
+        if path.name not in inputs and (near := did_you_mean(path.name, names)):
             return sentence(
                 "There is no answer in {place}, but {file}{near}",
                 place=place,

@@ -30,9 +30,9 @@ from ..message import (
     Request,
     decode_greeting,
     decode_request,
-    did_you_mean,
     encode_answer,
 )
+from ..sentence import did_you_mean
 from ..task import TASKS
 
 # Functions by these names are methods of inverse kinematics where nothing declares methods.

@@ -306,9 +306,24 @@ def test_a_process_that_cannot_load_its_file_says_so(solver, text, message):
     assert re.search(message, words(caught.value.failure))
 
 
-def test_a_missing_argument_is_told(inside):
-    contestant = inside("def forward_kinematics(offsets, chain): return offsets")
-    assert "missing 1 required positional argument: 'chain'" in words(contestant.answer(case(2)))
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            "offsets, chain",
+            "no input is called chain: There are parents, offsets, local_ro",
+        ),
+        ("parents, offset", r"called offset; did you mean offsets\? There are parents"),
+        (
+            "offsets, *, rotations",
+            r"called rotations; did you mean local_rotations\? There are parents",
+        ),
+    ],
+)
+def test_an_argument_that_no_input_has_is_told_with_those_there_are(inside, arguments, message):
+    contestant = inside(f"def forward_kinematics({arguments}): return offsets")
+    said = words(contestant.answer(case(2)))
+    assert re.search(message, said), said
 
 
 PRINTS = {

@@ -1,0 +1,1 @@
+"""All robots at once: who solves how much in what time, and where."""

@@ -1,0 +1,102 @@
+"""One table over all robots, and a map of who is how good where."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+from ....harness import metrics
+from ....presentation.columns import text, words_in
+from ....presentation.layout import Layout
+from ....presentation.results import leaders
+from ....presentation.tables import INTERVAL, Column, Summary, in_unit, listing, words
+from ..readings import KINDS, RULE, SCORE, TIES, how
+from . import figures
+from .readings import Line, Overall, lines, overall
+
+
+def aggregate(kind: str) -> Layout:
+    """Return what solvers come to over all robots and strata."""
+    folded = (
+        Column("time, 95 % from", "µs", read=lambda row: row.score.low),
+        Column("time, 95 % to", "µs", read=lambda row: row.score.high),
+        Column("beyond a limit", read=lambda row: row.count("beyond a limit")),
+        Column("wrong claim", read=lambda row: row.count("wrong claim")),
+        Column("missed", read=lambda row: row.count("missed")),
+        Column("no answer", read=lambda row: row.count("no answer")),
+        Column("not begun", read=lambda row: row.count("not begun")),
+    )
+    return Layout(
+        f"With {kind}: who is best over all robots?",
+        f"robots_overall_{KINDS[kind]}",
+        f"Robots, {kind}: all robots and strata together",
+        subjects=partial(overall, kind=kind),
+        columns=(
+            text("over", lambda row: row.robots),
+            text("solver", lambda row: row.solver),
+            Column("solved", note=INTERVAL, read=lambda row: row.share, best="greatest"),
+            Column("claimed but not so", read=lambda row: row.false_claims),
+            Column("time, geometric mean", "µs", read=lambda row: row.score.value, best="least"),
+            text("mark", lambda row: row.marks),
+            *(replace(column, folded=True) for column in folded),
+        ),
+        shows="Every robot and every stratum counts alike, and solvers are compared over robots "
+        f"that all of them take. {RULE} {SCORE} Its interval is by the bootstrap: targets "
+        f"drawn again {metrics.RESAMPLES} times within each robot, by seeded lots. {TIES}",
+        measured=lambda rows: how([record for row in rows for record in row.records]),
+        summary=_summary,
+        ranked=lambda row: row.is_ranked,
+    )
+
+
+def _summary(rows: Sequence[Overall]) -> Summary:
+    groups: dict[str, list[Overall]] = {}
+    for row in rows:
+        groups.setdefault(row.robots, []).append(row)
+    return listing(
+        "Who solves the most, and who takes the least time:",
+        (f"{robots}: {_led(mine)}" for robots, mine in groups.items() if mine[0].success.order),
+    )
+
+
+def _led(rows: Sequence[Overall]) -> str:
+    by = {row.solver: row for row in rows}
+    success, time = rows[0].success, rows[0].time
+    score = by[time.order[0]].score
+    return (
+        f"{leaders(success)}, {words(by[success.order[0]].share)}; least time {leaders(time)}, "
+        f"{words_in(score.value, 'µs')} "
+        f"({words(in_unit(score.low, 'µs'))}–{words(in_unit(score.high, 'µs'))}, "
+        f"n = {words(by[time.order[0]].share.total)})"
+    )
+
+
+def problem_map(kind: str) -> Layout:
+    """Return what each solver comes to on each robot."""
+    return Layout(
+        f"With {kind}: who is good at what?",
+        f"robots_map_{KINDS[kind]}",
+        f"Robots, {kind}: solvers and robots",
+        subjects=partial(lines, kind=kind),
+        columns=_columns,
+        shows="Targets solved, and the geometric mean of times over the least of any solver on "
+        f"that robot; empty where a solver does not take the robot. {RULE} {SCORE}",
+        measured=lambda made: how([r for line in made for r in line.records.values()]),
+        figures=(figures.heat_map(kind),),
+        compared=0,
+    )
+
+
+def _columns(made: Sequence[Line]) -> tuple[Column, ...]:
+    robots = list(dict.fromkeys(robot for line in made for robot in line.records))
+    shares = [_share(robot) for robot in robots]
+    ratios = [_ratio(robot) for robot in robots]
+    folded = [*(replace(column, folded=True) for column in (*shares[5:], *ratios))]
+    return (text("solver", lambda line: line.solver), *shares[:5], *folded)
+
+
+def _share(robot: str) -> Column:
+    return Column(f"{robot}, solved", note=INTERVAL, read=lambda line: line.share(robot))
+
+
+def _ratio(robot: str) -> Column:
+    return Column(f"{robot}, times the least time", read=lambda line: line.times_the_best(robot))

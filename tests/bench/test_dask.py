@@ -1,0 +1,404 @@
+"""Workers of a Dask cluster: the same answers as one process, each row once, whoever is lost."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from concurrent.futures import Future
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bench import cli
+from bench.executors import dask, executor_at, work
+from bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
+from bench.harness import run
+from bench.harness.machine import stamp
+from bench.harness.measure import block_key, measure
+from bench.harness.record import RecordFile, encode
+from bench.presentation.results import Results, plain
+from bench.presentation.sections import tables
+from bench.presentation.tables import markdown
+
+TINY = Scale(targets=3, seconds=0.001)
+ROOT = Path(__file__).parents[2]
+INSTALLED = "the extra `cluster` is not installed"
+
+
+def rows(folder):
+    """How often each row was written."""
+    lines = RecordFile(folder).path.read_text().splitlines()
+    written = [json.loads(line) for line in lines]
+    return Counter(run.block_key(replace_block(one)) for one in written if one["solver"])
+
+
+def replace_block(line):
+    settings = line["settings"]
+    return Block(line["suite"], line["problem"], line["solver"], Measured, settings)
+
+
+def records(folder):
+    return [record for record in RecordFile(folder).read().records if record.solver]
+
+
+def states(events):
+    return Counter(event.state for event in events)
+
+
+@pytest.fixture(autouse=True)
+def tiny(monkeypatch):
+    monkeypatch.setitem(SCALES, "quick", TINY)
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Let a run ask for few blocks of a suite only; workers know them all."""
+
+    def choose(**counts):
+        def some(suite, scale):
+            found = [block for block in blocks(suite, scale) if "robots" not in block.problem]
+            return iter(found[: counts[suite]])
+
+        monkeypatch.setattr(run, "blocks", some)
+        return {block_key(block) for suite in counts for block in some(suite, TINY)}
+
+    return choose
+
+
+# What takes times says so.
+
+
+def test_every_experiment_says_whether_it_takes_times():
+    """One that reads the stopwatch or keeps seconds shares no machine while it is measured."""
+    clocks = ("stopwatch", '"seconds"', "budget=", "Budget(")
+    for experiment in EXPERIMENTS:
+        folder = ROOT / Path(*experiment.package.split("."))
+        files = [path for path in folder.glob("*.py") if path.name not in ("tables.py",)]
+        text = "".join(path.read_text(encoding="utf-8") for path in files)
+        if experiment.package.endswith("published"):
+            text += "budget="  # by way of the robots
+        if experiment.package.endswith("first_call"):
+            assert "stopwatch" in text
+        assert experiment.times == any(word in text for word in clocks), experiment.package
+        for block in experiment.blocks(TINY):
+            assert block.times == experiment.times
+
+
+# Addresses and complaints.
+
+
+@pytest.mark.parametrize(
+    "address", ["", "slurm", "dask:/a:1", "dask://a", "dask://:1", "dask://a:b"]
+)
+def test_an_address_of_no_executor_is_misuse(capsys, address, tmp_path):
+    arguments = ["bench", "arm", "--executor", address, "-o", str(tmp_path / "out")]
+    assert cli.run_command(arguments) == 2
+    assert "--executor: expected local or dask://HOST:PORT, got" in capsys.readouterr().err
+
+
+def test_a_missing_extra_is_said_with_what_installs_it(monkeypatch, capsys, tmp_path):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    arguments = ["bench", "arm", "--executor", "dask://127.0.0.1:1", "-o", str(tmp_path / "out")]
+    assert cli.run_command(arguments) == 2
+    assert ".[cluster]" in capsys.readouterr().err
+
+
+def test_a_scheduler_that_does_not_answer_is_misuse_soon():
+    pytest.importorskip("distributed", reason=INSTALLED)
+    begin = time.monotonic()
+    with pytest.raises(ValueError, match=r"expected a Dask scheduler, got no answer within 0\.5 s"):
+        dask.DaskExecutor("127.0.0.1:9", answer=0.5)
+    assert time.monotonic() - begin < 10
+
+
+# A cluster made up: hosts, workers and machines that come and go as we say.
+
+
+class MadeUpFuture(Future):
+    def __init__(self, key):
+        super().__init__()
+        self.key = key
+
+
+class MadeUpCluster:
+    """Workers that measure blocks in this process; `lose` lists the tasks that end a worker."""
+
+    def __init__(self, lose=(), **workers):
+        self.workers = {name: machine.split("/") for name, machine in workers.items()}
+        self.lose, self.given, self.running = set(lose), [], 0
+
+    def nthreads(self):
+        return dict.fromkeys(self.workers, 1)
+
+    def wait_for_workers(self, count, timeout):
+        if len(self.workers) < count:
+            raise TimeoutError
+
+    def run(self, function, workers, on_error):
+        return {name: self.place(name) for name in workers}
+
+    def place(self, name):
+        host, machine = self.workers[name]
+        return {"host": host, "stamp": {**stamp(), "machine": {"processor": machine}}}
+
+    def close(self, timeout):
+        pass
+
+    def submit(self, function, task, key, workers=None):
+        future = MadeUpFuture(key)
+        if not self.workers:
+            return future
+        (at,) = workers or [next(iter(self.workers))]
+        self.given.append((task, at if workers else None))
+        if len(self.given) in self.lose:
+            del self.workers[at]
+            return future
+        (block,) = (b for b in PLANTED if block_key(b) == task.key)
+        made = replace(measure(block), stamp=self.place(at)["stamp"])
+        future.set_result(work.Reply(line=encode(made)))
+        return future
+
+    def hosts(self, suite):
+        """The hosts of what was given out of a suite, in order; None where any would do."""
+        return [at and HOSTS[at] for task, at in self.given if task.suite == suite]
+
+
+HOSTS = {"w1": "h1", "w2": "h1", "w3": "h2", "w4": "h3"}
+ONE_KIND = {"w1": "h1/slide rule", "w2": "h1/slide rule", "w3": "h2/slide rule"}
+TWO_KINDS = ONE_KIND | {"w4": "h3/abacus"}
+PLANTED = [
+    Block(suite, problem, "s", lambda: Measured({"x": [1.0]}), times=times)
+    for suite, times in (("arm", False), ("ik", True), ("timing", True))
+    for problem in ("a", "b", "c")
+]
+
+
+@pytest.fixture
+def made_up(monkeypatch, tmp_path):
+    """Run the planted suites on a made-up cluster; return what happened."""
+    pytest.importorskip("distributed", reason=INSTALLED)
+    monkeypatch.setattr(run, "blocks", lambda suite, _: (b for b in PLANTED if b.suite == suite))
+    monkeypatch.setattr(dask, "_LOOK", 0.01)
+
+    def go(cluster, mix=False):
+        monkeypatch.setattr(dask, "_connected", lambda *_: cluster)
+        executor = dask.DaskExecutor("made:1", mix, workers=0.1)
+        return list(run.run(["arm", "ik", "timing"], "quick", tmp_path, executor))
+
+    return go
+
+
+def test_what_takes_times_stays_on_one_machine_and_a_suite_on_one_host(made_up, tmp_path):
+    cluster = MadeUpCluster(**TWO_KINDS)
+    assert states(made_up(cluster)) == {run.MEASURING: 9, run.MEASURED: 9}
+    assert cluster.hosts("arm") == [None] * 3
+    assert [set(cluster.hosts(suite)) for suite in ("ik", "timing")] == [{"h1"}, {"h2"}]
+    timed = [r for r in records(tmp_path) if r.suite != "arm"]
+    assert {r.stamp["machine"]["processor"] for r in timed} == {"slide rule"}
+
+
+def test_machines_are_mixed_if_asked(made_up, tmp_path):
+    cluster = MadeUpCluster(**TWO_KINDS)
+    made_up(cluster, mix=True)
+    assert set(cluster.hosts("ik")) == {"h1", "h2", "h3"}
+    assert states(made_up(MadeUpCluster(w4="h3/abacus"), mix=True)) == {run.KEPT: 9}
+
+
+def test_one_host_measures_one_block_that_takes_times_after_the_other(made_up):
+    steps = [
+        event for event in made_up(MadeUpCluster(w1="h1/x", w2="h1/x")) if event.suite != "arm"
+    ]
+    assert [event.state for event in steps] == [run.MEASURING, run.MEASURED] * 6
+
+
+def test_another_host_of_the_machine_takes_over_from_a_lost_one(made_up, tmp_path):
+    cluster = MadeUpCluster(lose={5}, w1="h1/slide rule", w3="h2/slide rule", w4="h3/abacus")
+    assert states(made_up(cluster)) == {run.MEASURING: 9, run.MEASURED: 9}
+    assert set(rows(tmp_path).values()) == {1}
+    assert len(rows(tmp_path)) == 9
+
+
+def test_without_that_machine_times_are_not_taken_and_the_next_run_takes_all_of_them(
+    made_up, tmp_path
+):
+    cluster = MadeUpCluster(lose={6}, w1="h1/slide rule", w2="h1/slide rule", w4="h3/abacus")
+    cluster.lose |= {7}
+    events = made_up(cluster)
+    assert states(events)[run.FAILED] > 0
+    assert all("slide rule" in e.message for e in events if e.state == run.FAILED)
+    made_up(MadeUpCluster(w4="h3/abacus"))
+    timed = [r for r in records(tmp_path) if r.suite != "arm"]
+    assert {r.stamp["machine"]["processor"] for r in timed} == {"abacus"}
+
+
+def test_the_machine_of_most_records_goes_on_and_answers_of_any_machine_are_kept(made_up):
+    made_up(MadeUpCluster(w4="h3/abacus"))
+    assert states(made_up(MadeUpCluster(**TWO_KINDS))) == {run.KEPT: 9}
+    again = made_up(MadeUpCluster(**ONE_KIND))
+    assert states(again) == {run.KEPT: 3, run.MEASURING: 6, run.MEASURED: 6}
+    assert any("times are taken on another machine (slide rule)" in e.message for e in again)
+
+
+def test_no_worker_is_misuse(made_up):
+    with pytest.raises(ValueError, match=r"expected a worker, got none within 0\.1 s"):
+        made_up(MadeUpCluster())
+
+
+def test_a_run_without_any_worker_left_ends_and_can_be_taken_up(made_up, tmp_path):
+    with pytest.raises(ValueError, match="no worker is left"):
+        made_up(MadeUpCluster(lose={2}, w1="h1/x"))
+    assert states(made_up(MadeUpCluster(w1="h1/x"))) == {
+        run.KEPT: 1, run.MEASURING: 8, run.MEASURED: 8,
+    }  # fmt: skip
+    assert set(rows(tmp_path).values()) == {1}
+
+
+# A worker.
+
+
+@pytest.mark.parametrize("part", ["versions", "source"])
+def test_a_worker_with_other_versions_or_sources_refuses(made_up, part):
+    other = {**stamp(), part: {"numpy": "0"} if part == "versions" else "0"}
+    task = work.Task("arm", TINY, ("arm", "no such", "s", "{}"), False, other)
+    assert "other" in work.perform(task).refused
+    cluster = MadeUpCluster(w1="h1/x")
+    cluster.place = lambda name: {"host": "h1", "stamp": other}
+    with pytest.raises(ValueError, match="worker w1: expected what is installed here, got other"):
+        made_up(cluster)
+
+
+def test_a_worker_without_plumbob_is_misuse(made_up):
+    cluster = MadeUpCluster(w1="h1/x")
+    cluster.place = lambda name: ModuleNotFoundError("No module named 'bench'")
+    with pytest.raises(ValueError, match="worker w1: expected Plumbob, got No module named"):
+        made_up(cluster)
+
+
+def test_a_block_that_only_the_client_knows_is_refused():
+    found = work.measured("arm", TINY, ("arm", "my own problem", "s", "{}"))
+    assert "there is no block arm, my own problem, s, {}" in found["refused"]
+
+
+def test_a_machine_is_shared_by_answers_and_not_by_times(tmp_path, monkeypatch):
+    monkeypatch.setattr(work.tempfile, "gettempdir", lambda: str(tmp_path))
+    waited = []
+
+    def take_times():
+        with work._machine_to_itself(True):
+            waited.append(time.monotonic())
+
+    with work._machine_to_itself(False), work._machine_to_itself(False):
+        thread = threading.Thread(target=take_times)
+        thread.start()
+        thread.join(0.1)
+        assert not waited
+    thread.join()
+    assert waited
+
+
+# A cluster that is real: two workers, each a process of this machine.
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    distributed = pytest.importorskip("distributed", reason=INSTALLED)
+    given = {"threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    with distributed.LocalCluster(n_workers=2, host="127.0.0.1", **given) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def executor(cluster):
+    with closing(executor_at(address(cluster))) as executor:
+        yield executor
+
+
+def address(cluster):
+    return cluster.scheduler_address.replace("tcp://", "dask://")
+
+
+def shown(folder, suites):
+    """All tables as text."""
+    made = tables(Results([plain(record) for record in RecordFile(folder).read().records]), suites)
+    return {table.name: markdown(table) for table in made if table.rows}
+
+
+def assert_same_tables(suites, executor, folder):
+    list(run.run(suites, "quick", folder / "one"))
+    list(run.run(suites, "quick", folder / "two", executor))
+    one, two = (shown(folder / name, suites) for name in ("one", "two"))
+    assert one
+    assert one == two
+    arrays = [
+        {r.key: {name: a.tobytes() for name, a in r.arrays.items()} for r in records(folder / name)}
+        for name in ("one", "two")
+    ]
+    assert arrays[0] == arrays[1]
+
+
+def test_two_workers_give_the_same_tables_to_the_bit_as_one_process(executor, few, tmp_path):
+    few(arm=24, ik=28)
+    assert_same_tables(["ik", "arm"], executor, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suite", sorted({e.suite for e in EXPERIMENTS if not e.times}))
+def test_every_suite_gives_the_same_tables_on_two_workers(executor, monkeypatch, suite, tmp_path):
+    def untimed(suite, scale):
+        return (block for block in blocks(suite, scale) if not block.times)
+
+    monkeypatch.setattr(run, "blocks", untimed)
+    assert_same_tables([suite], executor, tmp_path)
+
+
+def pids(cluster):
+    from distributed import Client
+
+    with Client(cluster.scheduler_address, set_as_default=False) as client:
+        return list(client.run(os.getpid).values())
+
+
+@pytest.mark.parametrize(("suite", "count"), [("arm", 30), ("cloth_scale", 2)])
+def test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none(
+    cluster, executor, few, tmp_path, suite, count
+):
+    asked, killed = few(**{suite: count}), []
+    for event in run.run([suite], "quick", tmp_path, executor):
+        if event.state == run.MEASURED and not killed:
+            killed = pids(cluster)
+            os.kill(killed[0], signal.SIGKILL)
+    assert rows(tmp_path) == dict.fromkeys(asked, 1)
+    assert not any(record.failed for record in records(tmp_path))
+    assert all(record.stamp == stamp() for record in records(tmp_path))
+    assert killed
+
+
+CLIENT = """
+import os, sys, signal
+from bench.experiments import SCALES, Scale
+from bench.executors import executor_at
+from bench.harness import run
+from pathlib import Path
+SCALES["quick"] = Scale(targets=3, seconds=0.001)
+done = 0
+for event in run.run(["arm"], "quick", Path(sys.argv[1]), executor_at(sys.argv[2])):
+    done += event.state == run.MEASURED
+    if done == 5:
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_client_that_was_killed_takes_up_where_it_was(cluster, executor, tmp_path):
+    command = [sys.executable, "-c", CLIENT, str(tmp_path), address(cluster)]
+    done = subprocess.run(command, cwd=ROOT, check=False, stderr=subprocess.DEVNULL)
+    assert done.returncode == -signal.SIGKILL
+    assert len(rows(tmp_path)) == 5
+    events = list(run.run(["arm"], "quick", tmp_path, executor))
+    assert states(events)[run.KEPT] == 5
+    assert rows(tmp_path) == dict.fromkeys((block_key(b) for b in blocks("arm", TINY)), 1)

@@ -1,0 +1,205 @@
+"""Figures: six curves with names at most, legends off the data, texts apart, drawn only once."""
+
+import re
+from collections import Counter
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
+
+from bench.presentation import drawing, figures, page, report
+from bench.presentation.chart import LOOKS, MOST, Axis, Chart, Panel, looks, series
+from bench.presentation.figures import chart_sketch, drawn
+from bench.presentation.results import Results, label
+
+ENTRANT = "my very own solver, a name of some length"
+CHARTS = 15
+
+
+def with_solvers(records, count):
+    """The records of every chart with solvers of its own and others up to a number."""
+    found = list(records)
+    for suite in ("arm", "ik", "cloth", "energy", "timing"):
+        first = next(r.solver for r in records if r.suite == suite)
+        for i in range(count):
+            name = ENTRANT if i == 0 else f"an unknown solver no. {i}"
+            facts = {"entrant": i == 0}
+            found += [
+                replace(r, solver=name, facts={**r.facts, **facts}, arrays=slower(r.arrays, i))
+                for r in records
+                if r.suite == suite and r.solver in (first, "Plumbob LM", "Plumbob Newton",
+                    "Plumbob, compiled", "RK4", "ccd", "newton")
+                and r.facts.get("task") not in ("swing", "few iterations", "dampers")
+            ]  # fmt: skip
+    return Results(list({r.key: r for r in found}.values()))
+
+
+def slower(arrays, i):
+    """The same numbers, a little greater where they are times."""
+    return {k: v * (1 + 0.1 * i) if k == "seconds" else v for k, v in arrays.items()}
+
+
+def charts(results):
+    made = [sketch for figure in report.all_figures() if (sketch := figure(results))]
+    return [s.data for s in made if isinstance(s.data, Chart)]
+
+
+@pytest.mark.parametrize("count", range(2, 21))
+def test_at_most_six_curves_are_labelled_and_every_other_can_be_named(records, count):
+    made = charts(with_solvers(records, count))
+    assert len(made) == CHARTS
+    for chart in made:
+        names = chart.labelled
+        assert len(names) <= MOST
+        assert set(names) | set(chart.others) == set(chart.solvers)
+        assert bool(chart.others) == (len(chart.solvers) > MOST)
+        if chart.others:
+            assert all(label(name) in chart.caption for name in chart.others)
+
+
+@pytest.mark.parametrize("count", [7, 20])
+def test_entrants_ours_and_the_best_of_the_others_are_labelled(records, count):
+    for chart in charts(with_solvers(records, count)):
+        ours = [n for n in chart.solvers if n.startswith("Plumbob") or n in ("ccd", "newton")]
+        assert ENTRANT in chart.labelled
+        assert not ours or set(ours) & set(chart.labelled)
+        assert len(chart.labelled) == MOST
+
+
+def test_the_best_by_the_measure_of_the_figure_are_those_labelled():
+    x = np.arange(1.0, 11.0)
+    curves = tuple(series(f"s{i}", x, np.full(10, 10.0**-i)) for i in range(12))
+    chart = Chart("n", "t", "", (Panel("", curves),), Axis(), Axis(log=True))
+    assert chart.labelled == [f"s{i}" for i in range(6, 12)]
+    greatest = replace(chart, better="greater")
+    assert greatest.labelled == [f"s{i}" for i in range(6)]
+    assert "s3" in replace(chart, entrants=frozenset({"s3"})).labelled
+
+
+@pytest.mark.parametrize("count", range(1, MOST + 1))
+def test_labelled_curves_differ_in_colour_line_and_marker(count):
+    for names in combinations(["ccd", "fabrik", ENTRANT, "x", "yy", "Pinocchio", "lbfgs"], count):
+        made = list(looks(names).values())
+        for part in zip(*made, strict=True):
+            assert len(set(part)) == count
+    assert len({look.colour for look in LOOKS}) == MOST
+
+
+def boxes(figure):
+    """Extents of all texts, and of the legend and the axes' own rectangles."""
+    canvas = FigureCanvasAgg(figure)
+    with drawing.styled():
+        canvas.draw()
+    renderer = canvas.get_renderer()
+    texts = [(t.get_text(), t.get_window_extent(renderer)) for t in seen(figure)]
+    legends = [one.get_window_extent(renderer) for one in figure.legends]
+    return texts, legends, [ax.get_window_extent(renderer) for ax in figure.axes], figure.bbox
+
+
+def seen(figure):
+    """The texts that are drawn: of the ticks only those within the limits of their axis."""
+    every = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
+    ticks = [t for axis in every for t in axis.majorTicks + axis.minorTicks]
+    drawn_ticks = [t for axis in every for t in axis._update_ticks()]
+    labels = {id(t.label1) for t in ticks} | {id(t.label2) for t in ticks}
+    found = [t for t in figure.findobj(Text) if id(t) not in labels]
+    found += [t.label1 for t in drawn_ticks if t.label1.get_visible()]
+    return [t for t in found if t.get_visible() and t.get_text().strip()]
+
+
+def overlaps(a, b):
+    """Whether two rectangles share more than a hair's breadth."""
+    return min(a.x1, b.x1) - max(a.x0, b.x0) > 0.5 and min(a.y1, b.y1) - max(a.y0, b.y0) > 0.5
+
+
+def faults(figure):
+    """What is wrong with where things lie in a figure."""
+    texts, legends, axes, whole = boxes(figure)
+    found = [(one, other) for (one, a), (other, b) in combinations(texts, 2) if overlaps(a, b)]
+    found += [("legend", i) for box in legends for i, ax in enumerate(axes) if overlaps(box, ax)]
+    found += [("cut off", t) for t, b in texts
+              if b.x0 < -1 or b.y0 < -1 or b.x1 > whole.x1 + 1 or b.y1 > whole.y1 + 1]  # fmt: skip
+    return found
+
+
+def laid_out(chart):
+    with drawing.styled():
+        return drawing.draw_chart(chart)
+
+
+@pytest.mark.parametrize("count", [2, 20])
+def test_no_text_covers_another_and_no_legend_the_data(records, count):
+    for chart in charts(with_solvers(records, count)):
+        assert faults(laid_out(chart)) == [], chart.name
+
+
+@pytest.mark.parametrize("count", range(2, 21))
+def test_a_chart_of_any_number_of_solvers_is_laid_out(records, count):
+    found = {chart.name: chart for chart in charts(with_solvers(records, count))}
+    assert faults(laid_out(found["energy"])) == []
+
+
+def test_a_legend_on_the_data_and_crowded_texts_would_be_found(records):
+    chart = charts(with_solvers(records, 2))[0]
+    figure = laid_out(chart)
+    figure.axes[0].legend(["x"])
+    assert not [f for f in faults(figure) if f[0] == "legend"]
+    figure.legends[0].set_loc("center")
+    assert [f for f in faults(figure) if f[0] == "legend"]
+    figure = laid_out(chart)
+    figure.text(*figure.axes[0].get_position().min, "here")
+    figure.text(*figure.axes[0].get_position().min, "there")
+    assert ("here", "there") in faults(figure)
+
+
+def test_text_on_the_page_is_never_below_seven_points(records):
+    css = (page._HERE / "page.css").read_text()
+    narrowest = min(
+        float(rem) for rem in re.findall(r"figure svg \{[^}]*min-width: ([\d.]+)rem", css)
+    )
+    for figure in report.all_figures()[::2]:
+        svg = drawn(figure(Results(records))).svg
+        width = float(re.search(r'viewBox="0 0 ([\d.]+)', svg)[1])
+        sizes = [float(x) for x in re.findall(r"font(?:-size)?: [^;\"]*?([\d.]+)px", svg)]
+        shown = narrowest * 16 * 0.75 / width
+        assert min(sizes) * shown >= 7
+
+
+def test_every_curve_is_named_when_it_is_pointed_at(records):
+    results = with_solvers(records, 9)
+    for chart in charts(results)[::4]:
+        svg = drawn(chart_sketch(chart)).svg
+        told = Counter(re.findall(r'<g class="series"><title>([^<]*)</title>', svg))
+        assert len(told) == len(chart.solvers), chart.name
+
+
+def test_a_figure_is_drawn_again_only_if_it_shows_something_else(tmp_path, records, monkeypatch):
+    sketch = report.all_figures()[0](Results(records))
+    first = drawn(sketch)
+    (tmp_path / f"{sketch.name}.svg").write_text(first.svg, encoding="utf-8")
+    (tmp_path / f"{sketch.name}.pdf").write_bytes(first.pdf)
+    monkeypatch.setattr(figures, "_drawn", type(figures._drawn)())
+    monkeypatch.setattr(figures, "_files", lambda *_: ("drawn anew", b"%PDF"))
+    assert drawn(sketch, tmp_path) == first
+    other = replace(sketch.data, title="another title")
+    assert drawn(chart_sketch(other), tmp_path).svg == "drawn anew"
+    (tmp_path / f"{sketch.name}.pdf").unlink()
+    monkeypatch.setattr(figures, "_drawn", type(figures._drawn)())
+    assert drawn(sketch, tmp_path).svg == "drawn anew"
+
+
+def test_a_pdf_has_its_fonts_and_its_text(records):
+    for figure in report.all_figures()[::2]:
+        made = drawn(figure(Results(records)))
+        assert made.pdf.startswith(b"%PDF")
+        assert b"/FontFile2" in made.pdf
+        assert b"/Subtype /Type3" not in made.pdf or made.name
+
+
+def test_curves_of_different_lengths_are_no_curve():
+    with pytest.raises(ValueError, match="rows of one length"):
+        series("x", [1.0, 2.0], [1.0])
+    assert len(series("x", [1.0, np.nan, 3.0], [1.0, 2.0, np.inf]).x) == 1
