@@ -107,7 +107,7 @@ def plumbob(
 
 app.command(cls=verify.SolverCommand, epilog=block("Examples", *verify.EXAMPLES))(verify.verify)
 app.command(epilog=check.EXAMPLES)(check.check)
-app.command(epilog=bench.EXAMPLES)(bench.bench)
+app.command(cls=verify.SolverCommand, epilog=bench.EXAMPLES)(bench.bench)
 app.command(epilog=report.EXAMPLES)(report.report)
 app.command(epilog=show.EXAMPLES)(show.show)
 app.command(epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)
