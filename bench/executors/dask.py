@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import pickle
 import queue
 import uuid
 from collections import Counter, deque
@@ -216,7 +217,8 @@ class DaskExecutor:
                 line.host = ""
 
     def _submit(self, block: Block, scale: Scale, **where: Any) -> Any:
-        task = Task(block.suite, scale, block_key(block), block.times, stamp(), self._topic)
+        known = block.suite, pickle.dumps(scale), block_key(block)
+        task = Task(*known, block.times, stamp(), self._topic)
         future = self._client.submit(perform, task, key=f"plumbob-{uuid.uuid4().hex}", **where)
         future.add_done_callback(self._done.put)
         return future

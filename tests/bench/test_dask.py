@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -16,6 +17,8 @@ from pathlib import Path
 import pytest
 
 from bench import cli
+from bench.entrants.entrant import Entrant
+from bench.entrants.sources import digest_of
 from bench.executors import dask, executor_at, work
 from bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
 from bench.harness import run
@@ -263,7 +266,7 @@ def test_a_run_without_any_worker_left_ends_and_can_be_taken_up(made_up, tmp_pat
 @pytest.mark.parametrize("part", ["versions", "source"])
 def test_a_worker_with_other_versions_or_sources_refuses(made_up, part):
     other = {**stamp(), part: {"numpy": "0"} if part == "versions" else "0"}
-    task = work.Task("arm", TINY, ("arm", "no such", "s", "{}"), False, other)
+    task = work.Task("arm", pickle.dumps(TINY), ("arm", "no such", "s", "{}"), False, other)
     assert "other" in work.perform(task).refused
     cluster = MadeUpCluster(w1="h1/x")
     cluster.place = lambda name: {"host": "h1", "stamp": other}
@@ -279,8 +282,22 @@ def test_a_worker_without_plumbob_is_misuse(made_up):
 
 
 def test_a_block_that_only_the_client_knows_is_refused():
-    found = work.measured("arm", TINY, ("arm", "my own problem", "s", "{}"))
-    assert "there is no block arm, my own problem, s, {}" in found["refused"]
+    key = ("arm", "my own problem", "s", "{}")
+    found = work.measured("arm", pickle.dumps(TINY), key)
+    assert found == {"refused": "there is no block arm, my own problem, s, {}"}
+
+
+def test_a_solver_of_the_users_has_to_be_on_the_worker_as_it_is_there(tmp_path):
+    path = tmp_path / "my_ik.py"
+    path.write_text("def inverse_kinematics(request):\n    return request\n")
+    entrant = Entrant("Mine", str(path), str(path), digest=digest_of(str(path)))
+    scale, key = pickle.dumps(replace(TINY, entrants=(entrant,))), ("arm", "p", "s", "{}")
+    assert "there is no block" in work.measured("arm", scale, key)["refused"]
+    work._blocks.cache_clear()
+    path.write_text("raise SystemExit")
+    assert "got other ones (" in work.measured("arm", scale, key)["refused"]
+    path.unlink()
+    assert f"expected the files of {path}, got none" in work.measured("arm", scale, key)["refused"]
 
 
 def test_a_machine_is_shared_by_answers_and_not_by_times(tmp_path, monkeypatch):
