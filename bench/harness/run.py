@@ -68,7 +68,9 @@ def run(
         present = {record.key: record for record in file.read().records}
         for together in [suites] if executor.takes_suites_together else [[s] for s in suites]:
             begin = time.perf_counter()
-            wanted = [block for suite in together for block in _asked_for(suite, choice)]
+            every = [block for suite in together for block in blocks(suite, choice.scale)]
+            executor.look_at(present.get(block_key(block)) for block in every if block.times)
+            wanted = [block for block in every if choice.takes(block)]
             yield from _run_blocks(wanted, choice, file, present, executor)
             file.arrange(block_key(block) for block in wanted)
             for suite in together:
@@ -89,7 +91,6 @@ def _run_blocks(
     executor: Executor,
 ) -> Iterator[Event]:
     """Have the blocks measured that are not on record; write each record as it comes."""
-    executor.look_at(present.get(block_key(block)) for block in wanted if block.times)
     again = {block_key(block): why_again(block, present, executor) for block in wanted}
     for block in wanted:
         if again[block_key(block)] is None:

@@ -22,6 +22,7 @@ from bench.entrants.sources import digest_of
 from bench.executors import dask, executor_at, work
 from bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
 from bench.harness import run
+from bench.harness.choice import Choice
 from bench.harness.machine import stamp
 from bench.harness.measure import block_key, measure
 from bench.harness.progress import Progress, listening
@@ -246,6 +247,18 @@ def test_the_machine_of_most_records_goes_on_and_answers_of_any_machine_are_kept
     assert any("times are taken on another machine (slide rule)" in e.message for e in again)
 
 
+def test_some_rows_of_a_table_are_not_timed_elsewhere_than_the_others(made_up, monkeypatch):
+    made_up(MadeUpCluster(**ONE_KIND))
+    some = Choice("quick", TINY, problems=("a", "b"), is_partial=True)
+    monkeypatch.setattr(run, "chosen", lambda scale: some)
+    assert states(made_up(MadeUpCluster(**TWO_KINDS)))[run.KEPT] == 6
+    elsewhere = made_up(MadeUpCluster(w4="h3/abacus"))
+    assert states(elsewhere) == {run.KEPT: 2, run.FAILED: 4, run.NOT_RUN: 3}
+    assert "timed on another machine than is here (slide rule; here abacus)" in elsewhere[2].message
+    mixed = made_up(MadeUpCluster(w4="h3/abacus"), mix=True)
+    assert states(mixed)[run.KEPT] == 6
+
+
 def test_no_worker_is_misuse(made_up):
     with pytest.raises(ValueError, match=r"expected a worker, got none within 0\.1 s"):
         made_up(MadeUpCluster())
@@ -394,6 +407,7 @@ import os, sys, signal
 from bench.experiments import SCALES, Scale
 from bench.executors import executor_at
 from bench.harness import run
+from bench.harness.choice import Choice
 from pathlib import Path
 SCALES["quick"] = Scale(targets=3, seconds=0.001)
 done = 0
