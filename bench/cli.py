@@ -109,7 +109,7 @@ def plumbob(
 
 app.command(cls=verify.SolverCommand, epilog=block("Examples", *verify.EXAMPLES))(verify.verify)
 app.command(cls=Command, epilog=check.EXAMPLES)(check.check)
-app.command(cls=Command, epilog=bench.EXAMPLES)(bench.bench)
+app.command(cls=verify.SolverCommand, epilog=bench.EXAMPLES)(bench.bench)
 app.command(cls=Command, epilog=report.EXAMPLES)(report.report)
 app.command(cls=verify.SolverCommand, epilog=show.EXAMPLES)(show.show)
 app.command(cls=Command, epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)

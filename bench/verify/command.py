@@ -42,6 +42,11 @@ class SolverCommand(Command):
         return super().parse_args(ctx, args)
 
 
+def program_of(context: typer.Context) -> list[str]:
+    """Return the program behind --, without that; nothing if there is none."""
+    return list(context.meta.get(PROGRAM, ()))[1:]
+
+
 _File = Path | None
 Solver = Annotated[
     list[str] | None,
