@@ -17,6 +17,7 @@ from reference import IK_SOLVERS, STEP_SOLVERS
 from . import environments
 
 PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
+BULLET = "PyBullet"
 
 
 class Style(NamedTuple):
@@ -37,7 +38,7 @@ OTHER = Style("faint", ":", "P")
 _COLOURS = ("ink", "blue", "orange", "green", "purple", "brass")
 _LINES: tuple[Any, ...] = ((0, (8, 2)), (0, (3, 1, 1, 1)), (0, (8, 2, 2, 2)))
 # The markers of solvers for cloths, by whose they are.
-ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^"}
+ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^", BULLET: "D"}
 
 
 @dataclass(frozen=True)
@@ -363,6 +364,15 @@ CLOTH_ENGINES = (
     _newton("VBD, its own colours", "vbd", ITERATED, SOME, own=1),
     _newton("XPBD", "xpbd", ITERATED, SOME),
     _newton("XPBD, substeps", "xpbd", EXPLICIT, iterations=1),
+    ClothPeer(
+        *(
+            "PyBullet deformable, Euler",
+            BULLET,
+            "bench.peers.cloth.pybullet_deformable",
+            "pybullet",
+        ),
+        EXPLICIT,
+    ),
 )
 
 
