@@ -59,7 +59,7 @@ def solve_chain(
     arrays["claimed"] = np.array([one.claimed for one in outcome.solved])
     arrays["seconds"] = np.array([one.seconds for one in outcome.solved])
     remarks = [outcome.trouble, _cut(outcome, count, budget)]
-    if followed:
+    if followed and not outcome.lost:
         history = _followed(spec, method, problem, limits, budget)
         arrays |= history
         remarks += [] if history else ["not followed, for it counts no iterations"]
@@ -133,6 +133,8 @@ def _followed(
         targets=np.repeat(some.targets, len(allowed), axis=0),
     )
     outcome = _asked(spec, method, every, limits.tolerance, np.tile(allowed, few), budget)
+    if len(outcome.solved) < len(every.targets):
+        return {}
     positions, _ = _understood(outcome, every)
     after = _residuals(every, positions).reshape(few, len(allowed))
     if not np.isfinite(after).all() or (after == after[:, :1]).all():

@@ -49,6 +49,7 @@ class ChainJob(NamedTuple):
         solver = asked(self.spec)
         try:
             solver.answer(TASK, self._inputs(0) | {"max_iterations": 1})  # may compile
+            forward_kinematics(Skeleton(self.parents, self.offsets), self.starts[0])  # likewise
         except EntrantError as error:
             yield Unfit(str(error))
             return

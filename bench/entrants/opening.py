@@ -60,7 +60,7 @@ def installed() -> list[Entry]:
     return [
         Entry(
             f"{point.name} of {point.dist.name}" if point.dist else point.name,
-            point.value.replace(" ", ""),
+            point.value.replace(" ", "") + ("" if ":" in point.value else ":"),
             version=point.dist.version if point.dist else "",
         )
         for point in sorted(found, key=lambda point: (point.name, point.value))
