@@ -4,7 +4,7 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +114,7 @@ def spread(values: Floats) -> Spread:
     if values.size == 0:
         return Spread(math.nan, math.nan, math.nan)
     # Between two infinite values there is nothing to interpolate.
-    method = "higher" if np.isinf(values).any() else "linear"
+    method: Literal["higher", "linear"] = "higher" if np.isinf(values).any() else "linear"
     median, p95 = np.quantile(values, [0.5, 0.95], method=method)
     return Spread(float(median), float(p95), float(values.max()))
 
