@@ -16,8 +16,8 @@ def python(name: str) -> Path:
 
 def distribution(name: str, package: str) -> importlib.metadata.Distribution | None:
     """Return a package in a peer's environment, or in ours if its name is "", None if it lacks."""
-    here = {"path": [str(path) for path in _folder(name).glob("lib/python*/site-packages")]}
-    found = importlib.metadata.distributions(name=package, **(here if name else {}))
+    places = [str(path) for path in _folder(name).glob("lib/python*/site-packages")]
+    found = importlib.metadata.distributions(name=package, path=places if name else sys.path)
     return next(iter(found), None)
 
 

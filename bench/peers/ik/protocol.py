@@ -11,7 +11,7 @@ which returns a `Forward`.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from reference.arguments import FloatArray
 
@@ -50,6 +50,11 @@ class Ask(Protocol):
 
 # Coordinates to the effectors' positions [m], (effector, 3), and rotations, (effector, 3, 3).
 Forward = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+def remark_of(adapter: Any) -> str:
+    """Return what an adapter has to say of its numbers, by a function `remark`, else ""."""
+    return str(adapter.remark()) if hasattr(adapter, "remark") else ""
 
 
 class UnableError(ValueError):
