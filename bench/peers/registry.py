@@ -238,10 +238,10 @@ DRAKE = _peer(
     Entry(ONE_START, {"solver": "IPOPT"}, note="IPOPT"),
     Entry(RESTARTS, {}, AGAIN, f"SNOPT, {AGAIN} restarts"),
 )
-# PyBullet's null space keeps the limits better than it reaches targets.
 PYBULLET = _peer(
     *("PyBullet", "pybullet", "pybullet", "Zlib"),
-    f"{_CHAINS}, either accurate or mindful of limits; makes no claims",
+    "poses of one chain of hinges; limits only as a pull in the null space, with which it hardly "
+    "arrives and oversteps them all the same; makes no claims",
     Entry(ONE_START, note="limits left out"),
     Entry(ONE_START, {"limits": True}, note="limits in the null space"),
     Entry(RESTARTS, {"check": True}, AGAIN, f"{AGAIN} restarts, its pose looked at"),
