@@ -4,7 +4,7 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,7 +113,9 @@ def spread(values: Floats) -> Spread:
     values = np.asarray(values, dtype=float).ravel()
     if values.size == 0:
         return Spread(math.nan, math.nan, math.nan)
-    median, p95 = np.quantile(values, [0.5, 0.95])
+    # Between two infinite values there is nothing to interpolate.
+    method: Literal["higher", "linear"] = "higher" if np.isinf(values).any() else "linear"
+    median, p95 = np.quantile(values, [0.5, 0.95], method=method)
     return Spread(float(median), float(p95), float(values.max()))
 
 
@@ -349,9 +351,12 @@ def convergence(history: Floats) -> Convergence:
 
 
 def counts(values: Floats, edges: Floats) -> NDArray[np.int64]:
-    """Return how many values fall between neighbouring edges; the last bin takes all beyond."""
+    """Return how many values fall between neighbouring edges; the last bin takes all beyond.
+
+    What is not a number falls nowhere.
+    """
     values = np.asarray(values, dtype=float).ravel()
-    inside = np.clip(values, edges[0], edges[-1])
+    inside = np.clip(values[~np.isnan(values)], edges[0], edges[-1])
     return np.histogram(inside, bins=edges)[0].astype(np.int64)
 
 
