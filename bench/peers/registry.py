@@ -5,6 +5,7 @@ and a style, and limits other than the usual ones. A peer is an adapter of its o
 Nothing here imports an engine.
 """
 
+import functools
 import importlib.metadata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -125,6 +126,7 @@ CHOLMOD = Solver("cholespy", "CHOLMOD (cholespy)", "CHOLMOD")
 FACTORS = (SUPERNODAL, CHOLMOD)
 
 
+@functools.cache
 def _version(package: str) -> str:
     """Return the version of a package, "" if it is not installed."""
     try:
@@ -385,7 +387,14 @@ def cloth_peers() -> tuple[ClothPeer, ...]:
 
 def find(name: str) -> Solver:
     """Return the solver that records call so; one that nobody knows is written as it is called."""
-    return next((s for s in _solvers() if s.name == name), Solver(name, _spaced(name), ""))
+    known = _by_name(tuple(IK_SOLVERS), tuple(STEP_SOLVERS))
+    return known.get(name) or Solver(name, _spaced(name), "")
+
+
+@functools.cache
+def _by_name(*of_reference: tuple[str, ...]) -> Mapping[str, Solver]:
+    """Return the solvers by what records call them, the first of a name."""
+    return {solver.name: solver for solver in reversed(list(_solvers()))}
 
 
 def _solvers() -> Iterator[Solver]:
