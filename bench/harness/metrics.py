@@ -141,6 +141,8 @@ def median_interval(values: Floats) -> Interval:
 @functools.cache
 def _coin_quantile(throws: int) -> int:
     """Return the greatest k for which k heads or fewer fall in 2.5 % of cases at most, else -1."""
+    if throws > LARGE:  # by the normal distribution, with half a throw for continuity
+        return math.floor((throws - 1 - _NORMAL * math.sqrt(throws)) / 2)
     below, k = 0.0, -1
     while (below := below + _coin(throws, k + 1)) <= (1 - CONFIDENCE) / 2:
         k += 1
@@ -184,15 +186,15 @@ def ranking(scores: Mapping[str, Floats]) -> Ranking:
 def chance_of_pairs(a: Floats, b: Floats) -> float:
     """Return how likely two are as far apart on average if signs are drawn by lot, (target,) each.
 
-    Exact for differences of one size and for few; else the sum is taken for normal, with the
-    variance that the lots give it.
+    Exact for differences of one size, unless there are very many, and for few; else the sum is
+    taken for normal, with the variance that the lots give it.
     """
     apart = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
     apart = apart[apart != 0]
     total, size = abs(float(apart.sum())), np.abs(apart)
     if not len(apart):
         return 1.0
-    if size.min() == size.max():
+    if size.min() == size.max() and len(apart) <= LARGE:
         wins = max(int(np.sum(apart > 0)), int(np.sum(apart < 0)))
         return min(1.0, 2.0 * sum(_coin(len(apart), k) for k in range(wins, len(apart) + 1)))
     if len(apart) <= _FEW:
