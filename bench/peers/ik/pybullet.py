@@ -2,8 +2,9 @@
 
 Without limits it takes a damping; the default of 0.5 converges too slowly for our tolerance. With
 limits it pulls towards them in the null space of the effector's motion, does not take the damping,
-hardly arrives and oversteps them all the same. It never says whether it has arrived: a caller who starts it again must look at
-its forward kinematics, which `check` does. `IK_SDLS` ends the process, and is left out.
+hardly arrives and oversteps them all the same. It never says whether it has arrived: a caller who
+starts it again must look at its forward kinematics, which `check` does. `IK_SDLS` ends the process,
+and is left out.
 """
 
 import functools
