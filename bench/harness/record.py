@@ -5,6 +5,7 @@ solved, by what, with which settings, the arrays that came out, and where it was
 """
 
 import contextlib
+import functools
 import io
 import json
 import mmap
@@ -338,10 +339,17 @@ def _is_begun(line: bytes) -> bool:
 
 
 def _decoded(text: bytes, number: int) -> _Decoded:
+    return _Decoded(number, text, *_record_of(text))
+
+
+# A run reads its file again and again: so many lines are decoded once.
+@functools.lru_cache(maxsize=4096)
+def _record_of(text: bytes) -> tuple[Record | None, str]:
+    """Return the record of a line, or None and why it is none."""
     try:
-        return _Decoded(number, text, decode(text), "")
+        return decode(text), ""
     except ValueError as error:
-        return _Decoded(number, text, None, str(error)[:100])
+        return None, str(error)[:100]
 
 
 def _cut_off(path: Path) -> str:

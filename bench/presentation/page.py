@@ -88,6 +88,7 @@ def render(shown: Shown, newest: Record, missing: Sequence[str]) -> str:
         chapters=[_chapter(section, shown) for section in SECTIONS],
         missing=missing,
         most_named=MOST_NAMED,
+        suffixes=("csv", "tex", "md"),
     )
 
 

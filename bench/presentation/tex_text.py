@@ -3,14 +3,12 @@
 import functools
 import re
 import unicodedata
-from collections.abc import Sequence
 
 from .tables import POWER
+from .text import chunks
 
 # A column of words may be as narrow as this, in units of its size.
 NARROW = 4.0
-# Where a word may be broken: after a dash and its like between letters, never in a number.
-_BREAK = re.compile(r"(?<=[^\W\d_][/_.-])(?=[^\W\d_])")
 # Between letters that TeX would join.
 _LIGATURE = re.compile(r"(?<=-)(?=-)|(?<=')(?=')|(?<=,)(?=,)")
 _SPECIAL = {
@@ -45,6 +43,7 @@ _SPECIAL = {
     "³": r"\textthreesuperior{}",
     "⁻": r"\raisebox{0.6ex}{-}",
     "×": r"\texttimes{}",
+    "±": r"\textpm{}",
     "·": r"\textperiodcentered{}",
     "≤": r"\ensuremath{\leq}",
     "≥": r"\ensuremath{\geq}",
@@ -145,12 +144,6 @@ def _with_powers(token: str) -> str:
     begin, *others = POWER.split(token)
     powers = zip(others[::3], others[1::3], others[2::3], strict=True)
     return escaped(begin) + "".join(rf"\num{{{x}e{n}}}{escaped(t)}" for x, n, t in powers)
-
-
-@functools.lru_cache(maxsize=10_000)
-def chunks(text: str) -> Sequence[str]:
-    """Return a text in the parts between which a line may end: after spaces, dashes, slashes."""
-    return [part for token in text.split() for part in _BREAK.split(token)]
 
 
 def fragments(text: str) -> list[str]:

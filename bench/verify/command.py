@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+
+from ..help_text import Command
 
 if TYPE_CHECKING:
     from crosscheck.conformance.doors import Limits
@@ -29,7 +30,7 @@ EXAMPLES = (
 )
 
 
-class SolverCommand(TyperCommand):
+class SolverCommand(Command):
     """A command that leaves all behind -- as it is: a program and its own options."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -39,6 +40,11 @@ class SolverCommand(TyperCommand):
             ctx.meta[PROGRAM] = args[place:]
             args = args[:place]
         return super().parse_args(ctx, args)
+
+
+def program_of(context: typer.Context) -> list[str]:
+    """Return the program behind --, without that; nothing if there is none."""
+    return list(context.meta.get(PROGRAM, ()))[1:]
 
 
 _File = Path | None

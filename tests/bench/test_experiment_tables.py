@@ -20,6 +20,7 @@ from bench.experiments.timing import tables as timing
 from bench.presentation.results import Results
 from bench.presentation.sections import SECTIONS, tables
 from bench.presentation.tables import Share, comma_separated
+from bench.presentation.tex_text import escaped
 
 
 def column(table, heading):
@@ -42,6 +43,13 @@ def test_every_number_in_csv_is_one(records):
     for table in tables(Results(records)):
         for row in list(csv.reader(io.StringIO(comma_separated(table))))[1:]:
             assert not [cell for cell in row if cell.startswith(("np.", "array"))], table.name
+
+
+def test_every_letter_of_ours_can_be_typeset(records):
+    for table in tables(Results(records)):
+        texts = [column.heading for column in table.columns]
+        texts += [table.title, table.shows, table.measured, table.summary.sentence]
+        assert not [text for text in texts if r"\textbackslash" in escaped(text)], table.name
 
 
 def test_every_section_has_a_name_of_its_own():
@@ -115,9 +123,9 @@ def test_a_published_table_counts_what_was_never_begun(make):
 def test_jitter_is_the_largest_angle_in_degrees_and_the_closing_one_stands_apart(make):
     table = tracking.jitter(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
     for mode, angle in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
-        assert column(table, f"{mode}, largest [°]") == [pytest.approx(math.degrees(angle))]
-        assert column(table, f"{mode}, mean [°]") == [pytest.approx(math.degrees(angle / 4))]
-    assert column(table, "coherent, last to first [°]") == [pytest.approx(math.degrees(0.125))]
+        assert column(table, f"largest, {mode} [°]") == [pytest.approx(math.degrees(angle))]
+        assert column(table, f"mean, {mode} [°]") == [pytest.approx(math.degrees(angle / 4))]
+    assert column(table, "last to first, coherent [°]") == [pytest.approx(math.degrees(0.125))]
     assert "in 1 of 1 cases, and in 1 the step" in table.summary.sentence
     assert table.summary.points[0] == "cold: 57.3° (arm, circle, CCD)"
 
@@ -135,7 +143,7 @@ def test_a_curve_that_was_not_followed_in_all_modes_has_no_row(make):
 def test_iterations_over_all_frames_are_those_that_every_frame_has_more(make):
     table = tracking.price(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
     assert column(table, "of these over all frames at once") == [7]
-    assert [share.hits for share in column(table, "coherent, within tolerance")] == [3]
+    assert [share.hits for share in column(table, "within tolerance, coherent")] == [3]
     assert "together 7 to 7 times" in table.summary.sentence
 
 
@@ -196,6 +204,9 @@ def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_s
     )
     (point,) = table.summary.points
     assert point.endswith("first: Plumbob")
+    apart = replace(rival, facts={**rival.facts, "together": "another run"})
+    (point,) = timing.kinematics(Results([ours, apart])).summary.points
+    assert point.endswith("timed apart, and not ranked")
     again = swept(make, "MuJoCo", 1e-6 * rng.permutation(drift))
     (point,) = timing.kinematics(Results([ours, again])).summary.points
     assert "in a tie with" in point

@@ -18,7 +18,7 @@ from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, WorkerProcess
 from ...peers import registry
 from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
-from ...peers.registry import EXPLICIT, ClothPeer
+from ...peers.registry import EXPLICIT, UNDECLARED, ClothPeer
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
@@ -49,6 +49,9 @@ NEEDED_SIZE = 20
 STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
 STABILITY_DIGITS = 2e-4
 _DOUBLINGS = 30
+# A solver that does not say that it is explicit, and is stable at so many times symplectic Euler's
+# limit, is taken not to be.
+_FAR = 8.0
 
 # Numbers, and a label in the end.
 Row = tuple[Any, ...]
@@ -91,14 +94,15 @@ def blocks(scale: Scale) -> Iterator[Block]:
             measure = partial(iterations_needed, solver, stiffness)
             yield Block(SUITE, name, solver, measure, settings, facts=facts)
     for peer in (peer for peer in peers if peer.version):
-        yield from _peer_blocks(peer, sizes)
+        yield from blocks_of(peer, sizes)
     settings = {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME}
     for solver in published.LIU_2013 if sizes == FULL else ():
         measure, facts = partial(liu_2013, solver), {"task": LIU}
         yield Block(SUITE, "peers/liu2013", solver, measure, settings, facts=facts)
 
 
-def _peer_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
+def blocks_of(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
+    """Yield one step, a motion and, if it is explicit, the limit of a solver."""
     most = sum(level.size for level in sizes)
     for stiffness in STIFFNESSES:
         settings = {"stiffness": stiffness, "frame": FRAME, "version": peer.version}
@@ -106,7 +110,7 @@ def _peer_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
             call = partial(measure, peer, stiffness, sizes)
             problem, facts = f"peers/{name}/k{stiffness:g}", {"task": task}
             yield Block(SUITE, problem, peer.title, call, settings, most, facts)
-    if peer.kind == EXPLICIT and not peer.settings.get("iterations"):
+    if peer.kind in (EXPLICIT, UNDECLARED) and not peer.settings.get("iterations"):
         hung = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
         settings = {"size": STABILITY_SIZE, "version": peer.version}
         found, facts = partial(stability, peer, hung), {"task": STABILITY}
@@ -145,7 +149,7 @@ def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Mea
 
 def _tried(job: ClothJob) -> Outcome:
     """Return what came of a job; one that could not be set up in time is not set up again."""
-    what = job.module, len(job.start.positions)
+    what = job.module, job.settings.get("spec"), len(job.start.positions)
     if what in _given_up:
         return Outcome(0.0, [], _given_up[what])
     outcome = worker_process().perform(job)
@@ -154,7 +158,7 @@ def _tried(job: ClothJob) -> Outcome:
     return outcome
 
 
-_given_up: dict[tuple[str, int], str] = {}
+_given_up: dict[tuple[str, Any, int], str] = {}
 
 
 class Remark(NamedTuple):
@@ -249,7 +253,10 @@ def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
         frequencies.append(np.sqrt(largest))
         start = State(rest + AMPLITUDE * mode, np.zeros_like(rest))
         stable = partial(is_stable, peer, system, start, rest)
+        far = _FAR * 2.0 / np.sqrt(largest)
         try:
+            if peer.kind == UNDECLARED and stable(far):
+                raise ArithmeticError(f"stable at {far:.2g} s, as implicit steps are")
             limits.append(stability_limit(stable, FRAME))
         except ArithmeticError as error:
             limits.append(np.nan)

@@ -11,6 +11,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...presentation.columns import SOLVER, folded, least, number, text, words_in
+from ...presentation.entered import entered
 from ...presentation.layout import Layout
 from ...presentation.results import Results, label, listed
 from ...presentation.tables import Column, Summary, Table, listing, words
@@ -404,4 +405,4 @@ liu_2013 = Layout(
 )
 
 
-LAYOUTS = (iterations, one_step, motion, stability, liu_2013)
+LAYOUTS = (iterations, one_step, motion, stability, liu_2013, entered("cloth", "the cloth"))

@@ -8,7 +8,7 @@ raises `UnableError`.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from reference.arguments import FloatArray
 
@@ -43,6 +43,11 @@ class Ask(Protocol):
             rotations: of the effectors, (effector, 3, 3).
             start: coordinates, (coordinate,).
         """
+
+
+def remark_of(adapter: Any) -> str:
+    """Return what an adapter has to say of its numbers, by a function `remark`, else ""."""
+    return str(adapter.remark()) if hasattr(adapter, "remark") else ""
 
 
 class UnableError(ValueError):
