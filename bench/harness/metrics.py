@@ -114,8 +114,8 @@ def spread(values: Floats) -> Spread:
     if values.size == 0:
         return Spread(math.nan, math.nan, math.nan)
     # Between two infinite values there is nothing to interpolate.
-    method = "higher" if np.isinf(values).any() else "linear"
-    median, p95 = np.quantile(values, [0.5, 0.95], method=method)
+    infinite = bool(np.isinf(values).any())
+    median, p95 = np.quantile(values, [0.5, 0.95], method="higher" if infinite else "linear")
     return Spread(float(median), float(p95), float(values.max()))
 
 
