@@ -480,7 +480,8 @@ def test_an_obj_becomes_a_cloth_with_pins_by_a_rule(folder, rule, pinned):
 
 URDF = """<robot name="r"><link name="b"/><link name="l1"/><link name="l2"/><link name="t"/>
 <joint name="j1" type="revolute"><parent link="b"/><child link="l1"/>
-<origin xyz="0 0 .3" rpy=".1 .2 .3"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+<origin xyz="0 0 .3" rpy=".1 .2 .3"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
 <joint name="j2" type="continuous"><parent link="l1"/><child link="l2"/><origin xyz=".4 0 0"/>
 <axis xyz="0 1 0"/></joint>
 <joint name="j3" type="fixed"><parent link="l2"/><child link="t"/>
