@@ -12,13 +12,15 @@ from . import compile_notice
 from .commands import bench, check, records, report, show
 from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh
 from .comparison import command as comparison
-from .help_text import block
+from .help_text import Command, Group, block
 from .presentation.text import visible
 from .verify import command as verify
 
 _UsageError: Any = typer.BadParameter.__base__
 
-app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+app = typer.Typer(
+    cls=Group, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -106,12 +108,12 @@ def plumbob(
 
 
 app.command(cls=verify.SolverCommand, epilog=block("Examples", *verify.EXAMPLES))(verify.verify)
-app.command(epilog=check.EXAMPLES)(check.check)
+app.command(cls=Command, epilog=check.EXAMPLES)(check.check)
 app.command(cls=verify.SolverCommand, epilog=bench.EXAMPLES)(bench.bench)
-app.command(epilog=report.EXAMPLES)(report.report)
-app.command(epilog=show.EXAMPLES)(show.show)
-app.command(epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)
-app.command(epilog=comparison.HISTORY_EXAMPLES)(comparison.history)
+app.command(cls=Command, epilog=report.EXAMPLES)(report.report)
+app.command(cls=verify.SolverCommand, epilog=show.EXAMPLES)(show.show)
+app.command(cls=Command, epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)
+app.command(cls=Command, epilog=comparison.HISTORY_EXAMPLES)(comparison.history)
 app.add_typer(records.app, name="records")
 
 

@@ -1,12 +1,22 @@
 """The terminal: tables as text, the bar of a long run."""
 
+import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .presentation.report import Written
     from .presentation.tables import Table
+
+# How wide a table is in a pipe, where nobody says.
+IN_A_PIPE = 240
+
+
+def width() -> int:
+    """Return how many letters a line has: the terminal's, or many in a pipe."""
+    return shutil.get_terminal_size((IN_A_PIPE, 24)).columns
 
 
 def print_table(table: "Table") -> None:
@@ -14,7 +24,7 @@ def print_table(table: "Table") -> None:
     from .presentation.tables import markdown
 
     if sys.stdout.isatty():
-        print_aligned(table)
+        print_aligned(table, "a wider terminal, or a pipe")
     else:
         print(markdown(table))
 
@@ -29,43 +39,51 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
     records, _ = sift(lambda results: tables(results, suites), records)
     for made in tables(Results(records), suites):
         if made.rows:
-            print_aligned(made)
+            print_aligned(made, f"plumbob report {output} --table {made.name}")
 
 
 def print_summary(table: "Table") -> None:
     """Print what a table is called and says."""
-    print(f"\n{table.title}\n  {table.summary.sentence}".rstrip())
-    print("".join(f"    {point}\n" for point in table.summary.points), end="", flush=True)
+    from .presentation.aligned import filled
+
+    print()
+    for text in (table.title, table.summary.sentence):
+        print("\n".join(filled(text, width())) if text else "", end="\n" if text else "")
+    for point in table.summary.points:
+        print("\n".join(f"  {line}" for line in filled(point, width() - 2)))
 
 
-def print_aligned(table: "Table") -> None:
-    """Print a table with what it says; as wide as the terminal, or very wide in a pipe."""
+def print_aligned(table: "Table", shown_by: str) -> None:
+    """Print a table with what it says, as wide as the terminal; say what shows columns left out."""
+    from .presentation.aligned import filled, left_out
+
     print_summary(table)
-    _print(_aligned(table), 240)
+    missing = print_lines(table)
+    if missing:
+        print("\n".join(filled(left_out(table, missing, shown_by), width())))
 
 
-def _print(shown: Any, width: int) -> None:
+def print_lines(table: "Table") -> list[str]:
+    """Print the lines of a table; return the headings of the columns that had no place."""
     from rich.console import Console
-
-    Console(
-        width=None if sys.stdout.isatty() else width, highlight=False, markup=False, emoji=False
-    ).print(shown)
-
-
-def _aligned(table: "Table") -> Any:
-    """Return a table as rich prints it, rows that miss something in red."""
-    import rich.table
     from rich.text import Text
 
-    from .presentation.tables import words
+    from .presentation.aligned import aligned
 
-    shown = rich.table.Table(box=None, header_style="bold", pad_edge=False)
-    for column in table.columns:
-        shown.add_column(column.heading, justify="left" if column.words else "right")
-    for row in table.rows:
-        missed = any(str(cell).startswith("MISSED") for cell in row)
-        shown.add_row(*(Text(words(cell)) for cell in row), style="bold red" if missed else None)
-    return shown
+    made = aligned(table, width())
+    console = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
+    for line in made.lines:
+        text = Text.assemble(*((span.text, span.style) for span in line))
+        text.rstrip()
+        console.print(text)
+    return made.left_out
+
+
+def print_outcome(written: "Written") -> None:
+    """Print what a report came to, in ten lines."""
+    from .presentation.outcome import outcome
+
+    print("\n".join(outcome(written, width())), flush=True)
 
 
 def print_verdicts(verdicts: Sequence[Any]) -> None:
@@ -73,7 +91,7 @@ def print_verdicts(verdicts: Sequence[Any]) -> None:
     from .presentation.tables import Column, Table
 
     words = {name: Column(name, words=True) for name in ("claim", "verdict")}
-    numbers = map(Column, ("cases", "largest difference", "tolerance"))
+    numbers = (Column(n, folded=n == "cases") for n in ("cases", "largest difference", "tolerance"))
     rows = [
         (
             verdict.claim.name,
@@ -84,21 +102,49 @@ def print_verdicts(verdicts: Sequence[Any]) -> None:
         )
         for verdict in verdicts
     ]
-    table = Table("verdicts", "", (words["claim"], *numbers, words["verdict"]), tuple(rows))
-    _print(_aligned(table), 120)
+    table = Table("verdicts", "", (words["claim"], words["verdict"], *numbers), tuple(rows))
+    print_lines(table)
     print(f"{sum(verdict.holds for verdict in verdicts)} of {len(rows)} claims held")
 
 
 def progress() -> Any:
-    """Return a progress bar on a terminal, and nothing to see in a pipe."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    """Return a progress bar on a terminal, and nothing to see in a pipe.
 
-    text = TextColumn("{task.description}", markup=False)
+    Bar, count and time left keep their place at any width; what is being done takes the rest. The
+    field "kept" of its task counts steps that took no time.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn
+    from rich.table import Column
+    from rich.text import Text
+
+    class TimeLeft(ProgressColumn):
+        def render(self, task: Any) -> Text:
+            return Text(time_left(task.elapsed, task.completed, task.total, task.fields))
+
+    console = Console(stderr=True)
+    rigid, rest = Column(no_wrap=True), Column(no_wrap=True, overflow="ellipsis", ratio=1)
     return Progress(
-        *(BarColumn(24), MofNCompleteColumn(), TimeElapsedColumn(), text),
-        console=Console(stderr=True),
+        BarColumn(max(4, min(24, console.width // 6 - 1)), table_column=rigid.copy()),
+        MofNCompleteColumn(table_column=rigid.copy()),
+        TimeLeft(table_column=rigid.copy()),
+        TextColumn("{task.description}", markup=False, table_column=rest),
+        console=console,
         transient=True,
+        expand=True,
         refresh_per_second=2,
         disable=not sys.stderr.isatty(),
     )
+
+
+def time_left(
+    elapsed: float | None, completed: float, total: float | None, fields: Mapping[str, Any]
+) -> str:
+    """Return how long the rest takes if it goes on as it went: "1:05 left", "?" before it can."""
+    done = completed - fields.get("kept", 0)
+    if not elapsed or done <= 0 or total is None:
+        return "? left"
+    minutes, seconds = divmod(round(elapsed / done * (total - completed)), 60)
+    hours, minutes = divmod(minutes, 60)
+    clock = f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
+    return f"{clock} left"

@@ -9,7 +9,7 @@ import pytest
 from bench import cli
 
 DOCS = Path(__file__).parents[1] / "docs"
-SOURCES = [DOCS / "compare.md", DOCS / "gate" / "action.yml"]
+SOURCES = [DOCS / "cluster.md", DOCS / "compare.md", DOCS / "gate" / "action.yml"]
 COMMANDS = [
     line.strip()
     for source in SOURCES

@@ -203,7 +203,7 @@ def run_suites(
                 bar.update(task, description=visible(f"{event.suite}: {event.what}"))
                 if event.state in done:
                     done[event.state] += 1
-                    bar.advance(task)
+                    bar.update(task, advance=1, kept=done[run.KEPT])
                 if event.state == run.MEASURING and event.message:
                     again[event.message] += 1
                 if event.state == run.NOT_RUN:

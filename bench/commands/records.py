@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..help_text import block
+from ..help_text import Command, Group, block
 from .options import REPORT, SUCCESS
 
 if TYPE_CHECKING:
     from ..harness.record import Key, Record
     from ..presentation.tables import Table
 
-app = typer.Typer(rich_markup_mode=None)
+app = typer.Typer(cls=Group, rich_markup_mode=None)
 
 Folder = Annotated[Path, typer.Argument(metavar="[FOLDER]", help="A folder of records.")]
 Suites = Annotated[list[str] | None, typer.Option("--suite", help="Of these suites.")]
@@ -37,7 +37,7 @@ def records() -> None:
     """List, merge or drop what is on record; nothing else ever removes a record."""
 
 
-@app.command("list", epilog=block("Examples", "plumbob records list report"))
+@app.command("list", cls=Command, epilog=block("Examples", "plumbob records list report"))
 def list_records(
     folder: Folder = REPORT,
     suites: Suites = None,
@@ -58,7 +58,11 @@ def list_records(
     return SUCCESS
 
 
-@app.command("merge", epilog=block("Examples", "plumbob records merge laptop desktop --into both"))
+@app.command(
+    "merge",
+    cls=Command,
+    epilog=block("Examples", "plumbob records merge laptop desktop --into both"),
+)
 def merge(
     folders: Annotated[
         list[Path], typer.Argument(metavar="FOLDER...", help="Folders to take records from.")
@@ -88,7 +92,9 @@ def merge(
     return SUCCESS
 
 
-@app.command("drop", epilog=block("Examples", 'plumbob records drop --solver "My solver"'))
+@app.command(
+    "drop", cls=Command, epilog=block("Examples", 'plumbob records drop --solver "My solver"')
+)
 def drop(
     folder: Folder = REPORT,
     suites: Suites = None,

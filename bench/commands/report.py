@@ -1,31 +1,157 @@
-"""The command `report`: write tables, figures and the page from the records."""
+"""The command `report`: write tables, figures and the page from the records, or one table."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from ..help_text import block
 from ..presentation.text import visible
-from ..terminal import print_summary
-from .options import REPORT, SUCCESS, Output
+from ..terminal import print_outcome
+from .options import REPORT, SUCCESS, known
 
-EXAMPLES = block("Examples", "plumbob report", "plumbob report --output results/laptop")
+if TYPE_CHECKING:
+    from ..presentation.tables import Table
+
+EXAMPLES = block(
+    "Examples",
+    "plumbob report",
+    "plumbob report --output results/laptop",
+    "plumbob report --list",
+    "plumbob report --table cloth_stability --list",
+    "plumbob report --table cloth_stability --format tex --width column -o stable.tex",
+    "plumbob report --table accuracy --columns 'solver, within tolerance' --rows 'problem~circle'",
+)
+FORMATS = ("md", "tex", "csv", "html")
 
 
-def report(output: Output = REPORT) -> int:
-    """Write tables (Markdown, LaTeX, CSV), figures and one offline page from the records."""
-    return write_report(output)
+def report(  # noqa: PLR0913 -- one parameter an option
+    folder: Annotated[
+        Path | None, typer.Argument(metavar="[FOLDER]", help="Folder of records, else report.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", metavar="PATH", help="The folder as well; with --table, a file."
+        ),
+    ] = None,
+    name: Annotated[
+        str, typer.Option("--table", metavar="NAME", help="Print one table; see --list.")
+    ] = "",
+    form: Annotated[
+        str, typer.Option("--format", help=f"Of the table: {', '.join(FORMATS)}.")
+    ] = "md",
+    columns: Annotated[
+        list[str] | None,
+        typer.Option("--columns", metavar="COLUMNS", help="Headings or numbers: 'solver, 3-5'."),
+    ] = None,
+    rows: Annotated[
+        list[str] | None,
+        typer.Option("--rows", metavar="FILTER", help="solver=Newton, robot~UR, 'median<10' ..."),
+    ] = None,
+    order: Annotated[
+        str, typer.Option("--sort", metavar="COLUMN", help="The best or least first.")
+    ] = "",
+    width: Annotated[
+        str, typer.Option("--width", help="Of LaTeX: column, page, or a length such as 120mm.")
+    ] = "page",
+    names: Annotated[
+        bool, typer.Option("--list", help="List tables; with --table, its columns.")
+    ] = False,
+) -> int:
+    """Write tables (Markdown, LaTeX, CSV), figures and one offline page from the records.
+
+    With --table, print one table, or some of its columns and rows, for a paper.
+    """
+    known("format", form, FORMATS)
+    if not name and not names:
+        if columns or rows or order:
+            raise ValueError("--columns, --rows and --sort: expected --table, which they are of")
+        return write_report(_folder(folder, output))
+    if not name:
+        return _list_tables(folder or REPORT)
+    table = _table(folder or REPORT, name)
+    if names:
+        return _list_columns(table)
+    from ..presentation.selection import selected
+
+    text = _written(selected(table, columns or [], rows or [], order), form, width)
+    return _put(text, output)
+
+
+def _folder(folder: Path | None, output: Path | None) -> Path:
+    if folder and output:
+        raise ValueError(f"--output: expected --table, or no folder but this; got {folder} too")
+    return folder or output or REPORT
 
 
 def write_report(output: Path) -> int:
-    """Write the report and say where it is, what it found and what is missing."""
+    """Write the report and say what it found, what is missing and where it is."""
     from ..presentation.report import write
 
-    written = write(output)
-    for table in written.tables:
-        if table.rows:
-            print_summary(table)
-    print()
-    for sentence in written.missing:
-        print(f"Missing: {sentence}")
-    page = visible(str(written.page))
-    print(f"{page}: {len(written.tables)} tables, also as Markdown, LaTeX and CSV")
+    print_outcome(write(output))
+    return SUCCESS
+
+
+def _tables(folder: Path) -> list["Table"]:
+    """Return the tables of a folder's records.
+
+    Raises:
+        ValueError: if there are no records.
+    """
+    from ..harness.record import RecordFile, check_folder
+    from ..presentation.results import Results, plain, sift
+    from ..presentation.sections import tables
+
+    check_folder(folder)
+    stored, _ = RecordFile(folder).read()
+    if not stored:
+        raise ValueError(f"no records in {folder}: run `plumbob bench` first")
+    kept, _ = sift(lambda results: tables(results), [plain(record) for record in stored])
+    return tables(Results(kept))
+
+
+def _table(folder: Path, name: str) -> "Table":
+    of_name = {table.name: table for table in _tables(folder)}
+    return of_name[known("table", name, of_name)]
+
+
+def _list_tables(folder: Path) -> int:
+    for table in _tables(folder):
+        print(f"{table.name}: {table.title} ({len(table.rows)} × {len(table.columns)})")
+    return SUCCESS
+
+
+def _list_columns(table: "Table") -> int:
+    for number, column in enumerate(table.columns, 1):
+        best, folded = f"{column.best} is best" * bool(column.best), "folded" * column.folded
+        about = ", ".join(filter(None, (best, folded)))
+        print(f"{number} {column.heading}" + (f" ({about})" if about else ""))
+    return SUCCESS
+
+
+def _written(table: "Table", form: str, width: str) -> str:
+    from ..presentation.fragment import fragment
+    from ..presentation.latex import latex
+    from ..presentation.tables import comma_separated, markdown
+
+    forms = {"md": markdown, "csv": comma_separated, "html": fragment}
+    return latex(table, width) if form == "tex" else forms[form](table)
+
+
+def _put(text: str, output: Path | None) -> int:
+    """Write a text to standard output, or to a file."""
+    from ..harness.record import check_regular
+
+    if output is None:
+        print(text, end="")
+        return SUCCESS
+    if output.is_dir():
+        raise ValueError(
+            f"--output: expected a file for the table, got the folder {output}; the folder of the "
+            f"records stands first: plumbob report {output} --table ..."
+        )
+    check_regular(output)
+    output.write_text(text, encoding="utf-8")
+    print(f"{visible(str(output))} written")
     return SUCCESS

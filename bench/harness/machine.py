@@ -36,7 +36,7 @@ PRESENTATION = (
     "bench/comparison",
     "bench/help_text.py",
     "bench/presentation",
-    "bench/show.py",
+    "bench/show",
     "bench/terminal.py",
     "bench/verify",
 )

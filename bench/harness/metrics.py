@@ -4,7 +4,7 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,8 +114,8 @@ def spread(values: Floats) -> Spread:
     if values.size == 0:
         return Spread(math.nan, math.nan, math.nan)
     # Between two infinite values there is nothing to interpolate.
-    infinite = bool(np.isinf(values).any())
-    median, p95 = np.quantile(values, [0.5, 0.95], method="higher" if infinite else "linear")
+    method: Literal["higher", "linear"] = "higher" if np.isinf(values).any() else "linear"
+    median, p95 = np.quantile(values, [0.5, 0.95], method=method)
     return Spread(float(median), float(p95), float(values.max()))
 
 
@@ -141,6 +141,8 @@ def median_interval(values: Floats) -> Interval:
 @functools.cache
 def _coin_quantile(throws: int) -> int:
     """Return the greatest k for which k heads or fewer fall in 2.5 % of cases at most, else -1."""
+    if throws > LARGE:  # by the normal distribution, with half a throw for continuity
+        return math.floor((throws - 1 - _NORMAL * math.sqrt(throws)) / 2)
     below, k = 0.0, -1
     while (below := below + _coin(throws, k + 1)) <= (1 - CONFIDENCE) / 2:
         k += 1
@@ -151,6 +153,16 @@ def _coin(throws: int, heads: int) -> float:
     """Return how likely so many heads are."""
     logs = math.lgamma(throws + 1) - math.lgamma(heads + 1) - math.lgamma(throws - heads + 1)
     return math.exp(logs - throws * math.log(2.0))
+
+
+def mean_interval(values: Floats) -> Interval:
+    """Return the mean and its interval by Student; NaN bounds of fewer than two."""
+    count, middle = int(np.size(values)), mean(values)
+    if count < 2:
+        return Interval(middle, math.nan, math.nan)
+    half = float(stdtrit(count - 1, (1 + CONFIDENCE) / 2) * np.std(values, ddof=1))
+    half /= math.sqrt(count)
+    return Interval(middle, middle - half, middle + half)
 
 
 def ranking(scores: Mapping[str, Floats]) -> Ranking:
@@ -174,15 +186,15 @@ def ranking(scores: Mapping[str, Floats]) -> Ranking:
 def chance_of_pairs(a: Floats, b: Floats) -> float:
     """Return how likely two are as far apart on average if signs are drawn by lot, (target,) each.
 
-    Exact for differences of one size and for few; else the sum is taken for normal, with the
-    variance that the lots give it.
+    Exact for differences of one size, unless there are very many, and for few; else the sum is
+    taken for normal, with the variance that the lots give it.
     """
     apart = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
     apart = apart[apart != 0]
     total, size = abs(float(apart.sum())), np.abs(apart)
     if not len(apart):
         return 1.0
-    if size.min() == size.max():
+    if size.min() == size.max() and len(apart) <= LARGE:
         wins = max(int(np.sum(apart > 0)), int(np.sum(apart < 0)))
         return min(1.0, 2.0 * sum(_coin(len(apart), k) for k in range(wins, len(apart) + 1)))
     if len(apart) <= _FEW:

@@ -5,6 +5,7 @@ solved, by what, with which settings, the arrays that came out, and where it was
 """
 
 import contextlib
+import functools
 import io
 import json
 import mmap
@@ -220,12 +221,11 @@ class RecordFile:
         """
         lines, _ = self._lines()
         rank = {key: i for i, key in enumerate(order)}
-        places = [i for i, line in enumerate(lines) if line.record and line.record.key in rank]
-        ranks = [rank[line.record.key] for i in places if (line := lines[i]).record]
-        if ranks != sorted(ranks):
-            moved = sorted(zip(ranks, places, strict=True))
+        found = [(rank.get(line.record.key), i) for i, line in enumerate(lines) if line.record]
+        ranked = [(number, i) for number, i in found if number is not None]
+        if (shown := list(dict.fromkeys(number for number, _ in ranked))) != sorted(shown):
             texts = [line.text for line in lines]
-            for place, (_, source) in zip(places, moved, strict=True):
+            for (_, place), (_, source) in zip(ranked, sorted(ranked), strict=True):
                 texts[place] = lines[source].text
             self._replace(b"".join(text + b"\n" for text in texts))
 
@@ -339,10 +339,17 @@ def _is_begun(line: bytes) -> bool:
 
 
 def _decoded(text: bytes, number: int) -> _Decoded:
+    return _Decoded(number, text, *_record_of(text))
+
+
+# A run reads its file again and again: so many lines are decoded once.
+@functools.lru_cache(maxsize=4096)
+def _record_of(text: bytes) -> tuple[Record | None, str]:
+    """Return the record of a line, or None and why it is none."""
     try:
-        return _Decoded(number, text, decode(text), "")
+        return decode(text), ""
     except ValueError as error:
-        return _Decoded(number, text, None, str(error)[:100])
+        return None, str(error)[:100]
 
 
 def _cut_off(path: Path) -> str:

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -68,8 +68,11 @@ def run(
         present = {record.key: record for record in file.read().records}
         for together in [suites] if executor.takes_suites_together else [[s] for s in suites]:
             begin = time.perf_counter()
-            wanted = [block for suite in together for block in _asked_for(suite, choice)]
+            every = [block for suite in together for block in blocks(suite, choice.scale)]
+            executor.look_at(present.get(block_key(block)) for block in every if block.times)
+            wanted = [block for block in every if choice.takes(block)]
             yield from _run_blocks(wanted, choice, file, present, executor)
+            file.arrange(block_key(block) for block in wanted)
             for suite in together:
                 spent = time.perf_counter() - begin
                 asked = [block for block in wanted if block.suite == suite]
@@ -88,7 +91,6 @@ def _run_blocks(
     executor: Executor,
 ) -> Iterator[Event]:
     """Have the blocks measured that are not on record; write each record as it comes."""
-    executor.look_at(present.get(block_key(block)) for block in wanted if block.times)
     again = {block_key(block): why_again(block, present, executor) for block in wanted}
     for block in wanted:
         if again[block_key(block)] is None:
@@ -120,11 +122,10 @@ def _leave(suite: str, blocks: Sequence[Block], file: RecordFile) -> Iterator[Ev
 
 def _finish(finished: Record, blocks: Sequence[Block], file: RecordFile) -> Iterator[Event]:
     """Put on record that a suite was gone through, and say what it did not ask for."""
-    asked = dict.fromkeys(map(block_key, blocks))
-    file.arrange(asked)
+    asked = set(map(block_key, blocks))
     suite, finished = finished.problem, replace(finished, size=len(asked))
     records = {record.key: record for record in file.read().records}
-    if asked.keys() <= records.keys() and not _says_the_same(records.get(finished.key), finished):
+    if asked <= records.keys() and not _says_the_same(records.get(finished.key), finished):
         file.append([finished])
     extra = [r for r in records.values() if r.suite == suite and r.key not in asked]
     old = [record for record in extra if _is_superseded(record, asked)]
@@ -154,7 +155,7 @@ def _says_the_same(record: Record | None, other: Record) -> bool:
     )  # fmt: skip
 
 
-def _is_superseded(record: Record, asked: Iterable[Key]) -> bool:
+def _is_superseded(record: Record, asked: set[Key]) -> bool:
     """Return whether a record that is not asked for belongs to what is, or to nothing measured.
 
     Its problem and solver are asked for under other settings, or it says only that something was

@@ -5,6 +5,7 @@ and a style, and limits other than the usual ones. A peer is an adapter of its o
 Nothing here imports an engine.
 """
 
+import functools
 import importlib.metadata
 import zlib
 from collections.abc import Iterator, Mapping
@@ -16,6 +17,7 @@ from reference import IK_SOLVERS, STEP_SOLVERS
 from . import environments
 
 PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
+BULLET = "PyBullet"
 
 
 class Style(NamedTuple):
@@ -36,7 +38,7 @@ OTHER = Style("faint", ":", "P")
 _COLOURS = ("ink", "blue", "orange", "green", "purple", "brass")
 _LINES: tuple[Any, ...] = ((0, (8, 2)), (0, (3, 1, 1, 1)), (0, (8, 2, 2, 2)))
 # The markers of solvers for cloths, by whose they are.
-ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^"}
+ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^", BULLET: "D"}
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,7 @@ CHOLMOD = Solver("cholespy", "CHOLMOD (cholespy)", "CHOLMOD")
 FACTORS = (SUPERNODAL, CHOLMOD)
 
 
+@functools.cache
 def _version(package: str) -> str:
     """Return the version of a package, "" if it is not installed."""
     try:
@@ -361,6 +364,15 @@ CLOTH_ENGINES = (
     _newton("VBD, its own colours", "vbd", ITERATED, SOME, own=1),
     _newton("XPBD", "xpbd", ITERATED, SOME),
     _newton("XPBD, substeps", "xpbd", EXPLICIT, iterations=1),
+    ClothPeer(
+        *(
+            "PyBullet deformable, Euler",
+            BULLET,
+            "bench.peers.cloth.pybullet_deformable",
+            "pybullet",
+        ),
+        EXPLICIT,
+    ),
 )
 
 
@@ -391,7 +403,14 @@ def cloth_peers() -> tuple[ClothPeer, ...]:
 
 def find(name: str) -> Solver:
     """Return the solver that records call so; one that nobody knows is written as it is called."""
-    return next((s for s in _solvers() if s.name == name), Solver(name, name, "", _style(name)))
+    known = _by_name(tuple(IK_SOLVERS), tuple(STEP_SOLVERS))
+    return known.get(name) or Solver(name, name, "", _style(name))
+
+
+@functools.cache
+def _by_name(*of_reference: tuple[str, ...]) -> Mapping[str, Solver]:
+    """Return the solvers by what records call them, the first of a name."""
+    return {solver.name: solver for solver in reversed(list(_solvers()))}
 
 
 def names() -> set[str]:

@@ -1,6 +1,7 @@
 """Columns that many tables have: a heading, and how its cell is read from a record."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -29,6 +30,21 @@ SOLVER = text("solver", lambda record: label(record.solver))
 def setting(title: str, name: str, unit: str = "") -> Column:
     """Return the column of a setting."""
     return Column(title, unit, read=lambda record: record.settings[name])
+
+
+def least(columns: Iterable[Column]) -> list[Column]:
+    """Return columns in which the least number is best."""
+    return [replace(column, best="least") for column in columns]
+
+
+def greatest(columns: Iterable[Column]) -> list[Column]:
+    """Return columns in which the greatest number or share is best."""
+    return [replace(column, best="greatest") for column in columns]
+
+
+def folded(columns: Iterable[Column]) -> list[Column]:
+    """Return columns that are shown only to those who ask for them."""
+    return [replace(column, folded=True) for column in columns]
 
 
 def number(title: str, name: str = "", unit: str = "") -> Column:
@@ -68,7 +84,10 @@ def places(
     title: str, unit: str, of: Sequence[str], read: Callable[[Any], Sequence[Cell]]
 ) -> list[Column]:
     """Return the columns of some places in a sample, which `read` returns together."""
-    return [Column(f"{title}, {which}", unit, read=at(_PLACES[which], read)) for which in of]
+    return [
+        Column(f"{title}, {which}", unit, read=at(_PLACES[which], read), group=title)
+        for which in of
+    ]
 
 
 def at(i: int, read: Callable[[Any], Any]) -> Callable[[Any], Any]:

@@ -1,10 +1,11 @@
 """The first screen’s answers: is it right, who is most accurate and fastest, who is absent.
 
-All are made from the records. Who leads by less than the interval allows ties with who is led.
+All are made from the records. Who is not told from the first ties with it: over robots by the pairs
+of `metrics.ranking`, among timed works where intervals overlap.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,8 @@ import numpy as np
 from ..experiments.cloth_peers import ONE_STEP
 from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
-from ..experiments.robots.readings import KINDS, measured, records_of
+from ..experiments.robots.overall.readings import Overall, overall
+from ..experiments.robots.readings import KINDS, SHIFT, measured
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..peers import registry
@@ -22,9 +24,11 @@ from .tables import words
 # So near to the converged step a solver has solved it.
 TARGET = "1e-6"
 NEAR = float(TARGET)
+# The table of solvers over all robots.
+OVERALL = "robots_overall_one_start"
 # Ties of more solvers than this are counted, not listed.
 MOST_NAMED = 2
-SUBJECTS = {"kinematics": "Forward kinematics", "ik": "An IK solve", "cloth": "A cloth step"}
+SUBJECTS = {"kinematics": "Forward kinematics", "ik": "Inverse kinematics", "cloth": "Cloth step"}
 _OURS = registry.COMPILED.name
 _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
 
@@ -137,111 +141,53 @@ def _absent_engines(results: Results) -> list[str]:
     return [f"{engine} (cloth)" for engine in engines if engine not in here]
 
 
-class _Poses(NamedTuple):
-    """The same poses for several solvers: which are solved, and how soon [s], (solver, pose)."""
-
-    solvers: list[str]
-    solved: np.ndarray
-    seconds: np.ndarray
-
-
-def _poses(results: Results) -> _Poses | None:
-    """Return the poses of all robots that most solvers took; what was not begun is not solved."""
-    kind = next(iter(KINDS))
-    taken: dict[str, dict[str, Record]] = {}
-    for record in measured(records_of(results, kind)):
-        taken.setdefault(record.solver, {})[record.problem] = record
-    solvers, robots = _comparable({solver: list(of) for solver, of in taken.items()})
-    if len(solvers) < 2 or not robots:
-        return None
-    sizes = [max(int(of[robot].size) for of in taken.values() if robot in of) for robot in robots]
-
-    def read(name: str) -> np.ndarray:
-        records = [[taken[solver][robot] for robot in robots] for solver in solvers]
-        return np.array([_joined(of, name, sizes) for of in records])
-
-    return _Poses(solvers, read("solved") == 1.0, read("seconds"))
-
-
-def _joined(records: Sequence[Record], name: str, sizes: Sequence[int]) -> np.ndarray:
-    """Return an array over several records, NaN where a solver was cut short."""
-    joined = [np.full(size, np.nan) for size in sizes]
-    for values, record in zip(joined, records, strict=True):
-        values[: len(record.arrays[name])] = record.arrays[name]
-    return np.concatenate(joined)
-
-
-def _comparable(taken: Mapping[str, list[str]]) -> tuple[list[str], list[str]]:
-    """Return solvers and the problems that all of them took, at least half of the most taken."""
-    chosen: list[str] = []
-    common = max(taken.values(), key=len, default=[])
-    least = len(common) / 2
-    for solver in sorted(taken, key=lambda solver: -len(taken[solver])):
-        left = [problem for problem in common if problem in taken[solver]]
-        if left and len(left) >= least:
-            chosen, common = [*chosen, solver], left
-    return [solver for solver in taken if solver in chosen], common
+def _compared(results: Results) -> dict[str, Overall]:
+    """Return the solvers over the set of robots on which most of them can be ranked."""
+    sets: dict[str, dict[str, Overall]] = {}
+    for row in overall(results, next(iter(KINDS))):
+        if row.is_ranked:
+            sets.setdefault(row.robots, {})[row.solver] = row
+    return max(sets.values(), key=len, default={})
 
 
 def _most_accurate(results: Results) -> Headline | None:
-    poses = _poses(results)
-    if poses is None:
+    rows = _compared(results)
+    if len(rows) < 2:
         return None
-    shares = dict(zip(poses.solvers, map(metrics.share, poses.solved), strict=True))
-    best = max(shares.values(), key=lambda share: share.hits)
-    ties = [
-        s for s, x in sorted(shares.items(), key=lambda item: -item[1].hits) if x.high >= best.low
-    ]
-    rate, low, high = (f"{100 * x:.3g}" for x in (best.hits / best.total, best.low, best.high))
-    detail = f"solves {rate} % of {words(best.total)} poses ({low}–{high})"
-    return Headline("kinematics", "Most accurate", _tied(ties), detail, "robots_success_one_start")
+    ranking = next(iter(rows.values())).success
+    share = rows[ranking.order[0]].share
+    rate, low, high = (f"{100 * x:.3g}" for x in (share.hits / share.total, share.low, share.high))
+    detail = f"solves {rate} % of {words(share.total)} poses ({low}–{high})"
+    return Headline("kinematics", "Most accurate", _tied(ranking.first), detail, OVERALL)
+
+
+def _fastest(results: Results) -> Headline | None:
+    """Return who takes the least time, unsolved poses with their penalty, and the next."""
+    rows = _compared(results)
+    if len(rows) < 2:
+        return None
+    ranking = next(iter(rows.values())).time
+    first, second = (rows[solver].penalised + SHIFT for solver in ranking.order[:2])
+    ratio = metrics.paired_ratio(second, first)
+    interval = f"({words(ratio.low)}–{words(ratio.high)})"
+    detail = f"{words(ratio.mean)} × {ranking.order[1]} {interval}, {words(ratio.pairs)} poses"
+    return Headline(
+        "kinematics", "Fastest, misses penalised", _tied(ranking.first), detail, OVERALL
+    )
 
 
 def _tied(names: Sequence[str]) -> str:
     """Return who leads: one name, or those that tie."""
     if len(names) <= 1:
         return "".join(names)
-    return f"{listed(names)} tie" if len(names) <= MOST_NAMED else f"{len(names)} solvers tie"
-
-
-def _fastest(results: Results) -> Headline | None:
-    poses = _poses(results)
-    if poses is None:
-        return None
-    taken = np.where(poses.solved, poses.seconds, np.nan)
-    first = metrics.performance_profiles(taken, poses.solved, np.array([1.0]))[:, 0]
-    leader = int(np.argmax(first))
-    rivals = {s: taken[i] for i, s in enumerate(poses.solvers) if i != leader}
-    closest = _closest(taken[leader], rivals)
-    if closest is None:
-        return None
-    answer, factor = _leads(poses.solvers[leader], *closest)
-    detail = f"{factor} on {words(closest[1].pairs)} poses both solve"
-    return Headline("kinematics", "Fastest", answer, detail, "robots_success_one_start")
-
-
-def _closest(
-    leader: np.ndarray, rivals: Mapping[str, np.ndarray]
-) -> tuple[str, metrics.Ratio] | None:
-    """Return who comes nearest to the leader where both are known, and by what factor."""
-    ratios = {name: metrics.paired_ratio(times, leader) for name, times in rivals.items()}
-    known = {name: ratio for name, ratio in ratios.items() if ratio.pairs}
-    name = min(known, key=lambda name: known[name].mean, default=None)
-    return None if name is None else (name, known[name])
-
-
-def _leads(leader: str, rival: str, ratio: metrics.Ratio) -> tuple[str, str]:
-    """Return who leads, or ties, and by what factor."""
-    interval = f"({words(ratio.low)}–{words(ratio.high)})"
-    if ratio.low <= 1.0 <= ratio.high:
-        return f"{leader} and {rival} tie", f"time ratio {words(ratio.mean)} {interval}"
-    if ratio.mean < 1.0:
-        return rival, f"{words(1 / ratio.mean)} × as fast as {leader}"
-    return leader, f"{words(ratio.mean)} × {rival}’s speed {interval}"
+    return f"Tie: {', '.join(names) if len(names) <= MOST_NAMED else f'{len(names)} solvers'}"
 
 
 class Time(NamedTuple):
-    """What a work takes a solver [s], and where 80 % of the rounds lie."""
+    """The median of what a work takes a solver [s], and its interval.
+
+    Of too few rounds for an interval these are the 10th and the 90th percentile.
+    """
 
     median: float
     low: float
@@ -270,7 +216,7 @@ def _arrived(results: Results) -> Headline | None:
     if not most:
         return None
     ties = [solver for solver, count in arrivals.items() if count == most]
-    detail = f"within {TARGET} of the converged step on {most} of {len(times)} cloths"
+    detail = f"within {TARGET} on {most}/{len(times)} cloths"
     return Headline("cloth", "Most accurate", _tied(ties), detail, "cloth_peers_step")
 
 
@@ -280,7 +226,7 @@ def _soonest(results: Results) -> Headline | None:
     for cloth, times in _arrival_times(results).items():
         for solver in sorted(times, key=lambda solver: times[solver]):
             best.setdefault(cloth, {}).setdefault(registry.find(solver).engine, times[solver])
-    return _first("cloth", "Fastest there", "cloths", best, "cloth_peers_step")
+    return _first("cloth", "Fastest", "cloths", best, "cloth_peers_step")
 
 
 def _timed(results: Results, subject: str) -> Headline | None:
@@ -295,6 +241,8 @@ def _timed(results: Results, subject: str) -> Headline | None:
 
 def _time(record: Record) -> Time:
     timing = metrics.timing(record.arrays["seconds"])
+    if np.isfinite(timing.interval).all():
+        return Time(*timing.interval)
     return Time(timing.median, timing.low, timing.high)
 
 
@@ -310,20 +258,20 @@ def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headl
     firsts = Counter(ranked[0][0] for ranked in decided)
     most = max(firsts.values())
     leaders = [name for name, count in firsts.items() if count == most]
-    detail = f"first in {most} of {len(works)} {of}"
+    detail = f"{most}/{len(works)} {of}"
     if len(leaders) == 1:
-        detail += _ahead([ranked for ranked in decided if ranked[0][0] == leaders[0]])
+        detail = f"{_ahead([r for r in decided if r[0][0] == leaders[0]])}, {detail}"
     return Headline(chapter, asked, _tied(leaders), detail, table)
 
 
 def _ahead(won: Sequence[Sequence[tuple[str, Time]]]) -> str:
     """Say by what factors the works were won."""
     factors = [ranked[1][1].median / ranked[0][1].median for ranked in won if len(ranked) > 1]
-    return f", {_range(factors)} × the next" if factors else "; no other engine arrives"
+    return f"{_range(factors)} × the next" if factors else "no rival arrives"
 
 
 def _is_tie(ranked: Sequence[tuple[str, Time]]) -> bool:
-    """Return whether the rounds of the first two overlap."""
+    """Return whether the intervals of the first two overlap."""
     return len(ranked) > 1 and ranked[0][1].high >= ranked[1][1].low
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..harness.record import Record
+from .provenance import provenance
 from .results import Results
 from .tables import NO_SUMMARY, Column, Source, Summary, Table
 
@@ -59,6 +60,7 @@ class Layout:
             self.compared,
             frozenset(i for i, subject in enumerate(subjects) if not self.ranked(subject)),
             tuple(map(source, subjects)),
+            provenance(list(dict.fromkeys(_records(subjects)))),
         )
 
 

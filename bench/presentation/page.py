@@ -1,8 +1,11 @@
 """The page of the report, from a template that escapes whatever is put into it."""
 
 import base64
+import hashlib
 import re
-from collections.abc import Callable, Mapping, Sequence
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,28 +13,22 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from ..harness.record import Record
-from . import svg, tables
+from . import motion, svg
+from .columns import words_in
 from .figures import Drawing
+from .headlines import Answers, Headline
 from .layout import Figure, Layout
-from .sections import SECTIONS
-from .tables import Cell, Column, Table
+from .sections import SECTIONS, Section, offered
+from .shown_tables import ShownTable, rich, shown_table
+from .tables import Table
 
 _HERE = Path(__file__).parent
-
-
-class Format(NamedTuple):
-    """A form that a table is written in: how, what it is called, and its type for browsers."""
-
-    write: Callable[[Table], str]
-    name: str
-    mime: str
-
-
-FORMATS = {
-    "md": Format(tables.markdown, "Markdown", "text/markdown"),
-    "tex": Format(tables.latex, "LaTeX", "application/x-tex"),
-    "csv": Format(tables.comma_separated, "CSV", "text/csv"),
-}
+# Without indents and comments, which a page need not carry.
+SCRIPT = motion.squeezed((_HERE / "page.js").read_text(encoding="utf-8"))
+# So many columns of a chapter's main table are unfolded.
+MOST_COLUMNS = 6
+# Absent peers that the first screen names.
+MOST_NAMED = 5
 
 
 class Shown(NamedTuple):
@@ -40,40 +37,68 @@ class Shown(NamedTuple):
     records: Sequence[Record]
     tables: Mapping[Layout, Table]
     drawings: Mapping[Figure, Drawing]
+    answers: Answers
+    scenes: Mapping[str, motion.Scene]
 
 
-class Row(NamedTuple):
-    """A row of a table: neighbours with the same first cell share it, over `span` rows.
+class Unmeasured(NamedTuple):
+    """The questions of a chapter that have no answer yet, and the command that finds them."""
 
-    The other cells each have their class in the page.
-    """
-
-    head: Cell
-    span: int
-    cells: list[tuple[Cell, str]]
+    questions: list[str]
+    command: str
 
 
-class Download(NamedTuple):
-    """A table as a file that the page carries."""
+class Motion(NamedTuple):
+    """What can be seen moving in a chapter."""
+
+    title: str
+    shows: str
+    fragment: Markup
+
+
+class Chapter(NamedTuple):
+    """A chapter: its main figure and table, the others folded, and what was not measured."""
 
     name: str
-    address: str
-    format: str
+    short: str
+    title: str
+    about: str
+    headlines: list[Headline]
+    figure: Drawing | None
+    main: ShownTable | None
+    folds: list[ShownTable]
+    motion: Motion | None
+    unmeasured: Unmeasured | None
 
 
 def render(shown: Shown, newest: Record, missing: Sequence[str]) -> str:
     """Return the page, whose head is that of the newest record."""
     template = _environment().get_template("page.html")
+    scripts = [SCRIPT, *([motion.SCRIPT] if shown.scenes else [])]
     return template.render(
         style=Markup((_HERE / "page.css").read_text(encoding="utf-8")),
+        motion_style=Markup(motion.STYLE if shown.scenes else ""),
+        scripts=list(map(Markup, scripts)),
+        policy=policy(scripts),
         date=newest.when.replace("T", " ").replace("+00:00", " UTC"),
         day=newest.when[:10],
         machine=_machine(newest),
         versions=newest.stamp.get("versions", {}),
-        sections=SECTIONS,
-        tables=shown.tables,
-        drawings=shown.drawings,
+        answers=shown.answers,
+        chapters=[_chapter(section, shown) for section in SECTIONS],
         missing=missing,
+        most_named=MOST_NAMED,
+        suffixes=("csv", "tex", "md"),
+    )
+
+
+def policy(scripts: Iterable[str]) -> str:
+    """Return a policy by which a page connects to nothing and runs no scripts but these."""
+    digests = (base64.b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; "
+        "base-uri 'none'; form-action 'none'"
     )
 
 
@@ -85,59 +110,66 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    filters = {"rich": rich, "words": tables.words, "rows": rows, "inline": svg.inline}
-    environment.filters.update(filters, downloads=downloads)
+    environment.filters |= {"rich": rich, "coded": coded, "inline": svg.inline}
+    environment.filters["percent"] = partial(words_in, unit="%")
     return environment
 
 
 def _machine(record: Record) -> dict[str, str]:
     machine, versions = record.stamp.get("machine", {}), record.stamp.get("versions", {})
-    memory = machine.get("memory_gib")
+    cores, memory = machine.get("cores", "–"), machine.get("memory_gib")
     return {
         "Machine": machine.get("processor", "–"),
-        "Cores": f"{machine.get('cores', '–')}" + (f", {memory} GiB memory" if memory else ""),
+        "Cores": f"{cores} core{'' if cores == 1 else 's'}",
+        "Memory": f"{memory} GiB" if memory else "–",
         "System": f"{machine.get('system', '–')}, Python {versions.get('python', '–')}",
         "Plumbob": f"{versions.get('plumbob', '–')}, sources {record.stamp.get('source', '–')}",
     }
 
 
-def rows(table: Table) -> list[Row]:
-    """Return the rows of a table; the span of a first cell that stands in a row above is 0."""
-    heads = [row[0] for row in table.rows]
-    spans, others = [0] * len(heads), table.columns[1:]
-    first = 0
-    for i, head in enumerate(heads):
-        first = i if head != heads[first] else first
-        spans[first] += 1
-    return [
-        Row(row[0], span, [(cell, _kind(cell, c)) for cell, c in zip(row[1:], others, strict=True)])
-        for row, span in zip(table.rows, spans, strict=True)
-    ]
+def _chapter(section: Section, shown: Shown) -> Chapter:
+    layouts = [layout for layout in section.layouts if shown.tables[layout].rows]
+    main = next((layout for layout in layouts if layout.name == section.main), None)
+    drawn = [shown.drawings[f] for layout in layouts for f in layout.figures if f in shown.drawings]
+    figure = next((drawing for drawing in drawn if drawing.name == section.figure), None)
+    return Chapter(
+        section.name,
+        section.short,
+        section.title,
+        section.about,
+        [headline for headline in shown.answers.headlines if headline.chapter == section.name],
+        figure,
+        _shown(main, shown, figure, MOST_COLUMNS) if main else None,
+        [_shown(layout, shown, figure) for layout in layouts if layout is not main],
+        _motion(shown.scenes.get(section.name)),
+        _unmeasured(section, shown),
+    )
 
 
-def _kind(cell: Cell, column: Column) -> str:
-    if column.title == "verdict":
-        return f"words {'held' if cell == 'held' else 'missed'}"
-    return "words" if column.words else ""
+def _motion(scene: motion.Scene | None) -> Motion | None:
+    return scene and Motion(scene.title, scene.shows, motion.fragment(scene))
 
 
-def downloads(table: Table) -> list[Download]:
-    """Return a table in each format, as addresses that hold the file."""
-    return [
-        Download(
-            f"{table.name}.{suffix}",
-            f"data:{form.mime};base64,{base64.b64encode(form.write(table).encode()).decode()}",
-            form.name,
-        )
-        for suffix, form in FORMATS.items()
-    ]
+def _shown(
+    layout: Layout, shown: Shown, without: Drawing | None, most: int | None = None
+) -> ShownTable:
+    """Return a table with its figures but for one that stands elsewhere."""
+    drawn = [shown.drawings[figure] for figure in layout.figures if figure in shown.drawings]
+    beside = [drawing for drawing in drawn if drawing is not without]
+    return shown_table(layout.question, shown.tables[layout], beside, most)
 
 
-def rich(text: str) -> Markup:
-    """Return escaped text in which powers of ten are set as such."""
-    return Markup(tables.POWER.sub(_power, str(Markup.escape(text))))
+def _unmeasured(section: Section, shown: Shown) -> Unmeasured | None:
+    questions: list[str] = []
+    suites: dict[str, None] = {}
+    for experiment in section.experiments:
+        empty = [layout for layout in offered(experiment) if not shown.tables[layout].rows]
+        questions += [layout.question for layout in empty]
+        suites |= {experiment.suite: None} if empty else {}
+    command = shlex.join(["plumbob", "bench", *suites])
+    return Unmeasured(questions, command) if questions else None
 
 
-def _power(match: re.Match[str]) -> str:
-    mantissa, exponent = match[1].replace("-", "−"), match[2].replace("-", "−")
-    return f'<span class="number">{mantissa} · 10<sup>{exponent}</sup></span>'
+def coded(text: str) -> Markup:
+    """Return escaped text in which what stands between backticks is set as code."""
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(Markup.escape(text))))

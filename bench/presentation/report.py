@@ -9,19 +9,26 @@ from typing import Any, NamedTuple
 from ..experiments import SUITES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
 from .figures import Drawing, Sketch, drawn
+from .headlines import Answers, absent, answers
+from .latex import latex
 from .layout import Figure, Layout
-from .page import FORMATS, Shown, render, rows
-from .results import Results, plain, sift
-from .sections import SECTIONS
-from .tables import Table
+from .motion import Scene
+from .page import Shown, render
+from .results import Results, listed, plain, sift
+from .sections import MOTIONS, SECTIONS
+from .tables import Table, best_cells, comma_separated, markdown
+
+# The forms that a table is written in, by the suffix of the file.
+FORMATS = {"md": markdown, "tex": latex, "csv": comma_separated}
 
 
 class Written(NamedTuple):
-    """What a report came to: its page, its tables, and sentences on what is missing."""
+    """What a report came to: its page, its tables, what is missing, and who leads."""
 
     page: Path
     tables: list[Table]
     missing: list[str]
+    answers: Answers
 
 
 def write(folder: Path) -> Written:
@@ -38,10 +45,10 @@ def write(folder: Path) -> Written:
     sketched, left_out = sound([plain(record) for record in stored if not record.superseded])
     shown = _drawn(sketched, folder / "figures")
     missing = [*([warning] if warning else []), *left_out, *_missing(shown.records)]
-    _write_files(folder, shown.tables.values(), shown.drawings.values())
+    _write_files(folder, sketched.texts, shown.drawings.values())
     page = folder / "index.html"
     _write(page, render(shown, _newest(shown.records), missing))
-    return Written(page, list(shown.tables.values()), missing)
+    return Written(page, list(shown.tables.values()), missing, sketched.answers)
 
 
 def sound(records: Sequence[Record]) -> tuple["Sketched", list[str]]:
@@ -56,24 +63,31 @@ def sound(records: Sequence[Record]) -> tuple["Sketched", list[str]]:
 
 
 class Sketched(NamedTuple):
-    """What a report shows, before its figures are drawn."""
+    """What a report shows, before its figures are drawn; the texts are tables by name of file."""
 
     records: Sequence[Record]
     tables: Mapping[Layout, Table]
+    texts: Mapping[str, str]
     sketches: Mapping[Figure, Sketch]
+    answers: Answers
+    scenes: Mapping[str, Scene]
 
 
 def _sketched(records: Sequence[Record]) -> Sketched:
     results = Results(records)
-    made = {layout: _checked(layout, results) for section in SECTIONS for layout in section.layouts}
+    made = {layout: _made(layout, results) for section in SECTIONS for layout in section.layouts}
+    tables = {layout: table for layout, (table, _) in made.items()}
+    texts = {name: text for _, texts in made.values() for name, text in texts.items()}
     sketches = {figure: figure(results) for figure in all_figures()}
-    return Sketched(records, made, {figure: one for figure, one in sketches.items() if one})
+    scenes = {section: scene for section, make in MOTIONS.items() if (scene := make(results))}
+    drawable = {figure: one for figure, one in sketches.items() if one}
+    return Sketched(records, tables, texts, drawable, answers(results), scenes)
 
 
 def _drawn(sketched: Sketched, folder: Path) -> Shown:
     """Draw the figures, but for those that the folder has already."""
     drawings = {figure: drawn(one, folder) for figure, one in sketched.sketches.items()}
-    return Shown(sketched.records, sketched.tables, drawings)
+    return Shown(sketched.records, sketched.tables, drawings, sketched.answers, sketched.scenes)
 
 
 def all_figures() -> list[Figure]:
@@ -84,26 +98,24 @@ def all_figures() -> list[Figure]:
 def _makers() -> Iterator[Callable[[Results], Any]]:
     """Yield all that makes something of records, one by one."""
     for section in SECTIONS:
-        yield from (partial(_checked, layout) for layout in section.layouts)
+        yield from (partial(_made, layout) for layout in section.layouts)
     yield from all_figures()
+    yield answers
+    yield from MOTIONS.values()
 
 
-def _checked(layout: Layout, results: Results) -> Table:
-    """Return a table that can be written in every form."""
+def _made(layout: Layout, results: Results) -> tuple[Table, dict[str, str]]:
+    """Return a table, and it in every form by the name of its file."""
     table = layout(results)
-    rows(table)
-    for form in FORMATS.values():
-        form.write(table)
-    return table
+    best_cells(table)
+    return table, {f"{table.name}.{suffix}": form(table) for suffix, form in FORMATS.items()}
 
 
-def _write_files(folder: Path, made: Iterable[Table], drawings: Iterable[Drawing]) -> None:
+def _write_files(folder: Path, texts: Mapping[str, str], drawings: Iterable[Drawing]) -> None:
     for name in ("tables", "figures"):
         (folder / name).mkdir(parents=True, exist_ok=True)
-    for table in made:
-        for suffix, form in FORMATS.items():
-            path = folder / "tables" / f"{table.name}.{suffix}"
-            _write(path, form.write(table))
+    for name, text in texts.items():
+        _write(folder / "tables" / name, text)
     for drawing in drawings:
         _write(folder / "figures" / f"{drawing.name}.svg", drawing.svg)
         _write(folder / "figures" / f"{drawing.name}.pdf", drawing.pdf)
@@ -137,6 +149,11 @@ def _missing(records: Sequence[Record]) -> list[str]:
         for package, version in newest.stamp.get("versions", {}).items()
         if not version
     ]
+    if names := absent(Results(records)):
+        sentences.append(
+            f"Absent peers: {listed(names)}. `make peers` (or `pip install -e .[peers]`) adds those"
+            " that have a wheel for this Python; `plumbob bench ik cloth` then measures them."
+        )
     others = sum(record.stamp != newest.stamp for record in records)
     if others:
         sentences.append(

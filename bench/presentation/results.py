@@ -1,5 +1,6 @@
 """The records of a report, and how problems and solvers are written."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,6 +10,9 @@ from ..harness.record import Record
 from ..peers import registry
 from .tables import words
 from .text import all_visible, shortened, visible
+
+# So much may a time that is shown be off, in relative terms, by the drift of its machine.
+PRECISION = 0.05
 
 
 class Results:
@@ -122,3 +126,17 @@ def leaders(ranking: Ranking) -> str:
     """Return who is first, and who is not told from that one: "a, in a tie with b and c"."""
     first, *tied = ranking.first
     return f"{first}, in a tie with {listed(tied)}" if tied else first
+
+
+def steadiness(noise: float) -> str:
+    """Return whether a machine was steady enough for the precision that is stated, "" if unknown.
+
+    `noise` is half the width of the middle eight tenths of a fixed loop's times, over their median.
+    """
+    if math.isnan(noise):
+        return ""
+    said = f"a fixed loop timed meanwhile varied by ± {round(100 * noise, 1):g} %"
+    stated = f"{100 * PRECISION:g} %"
+    if noise > PRECISION:
+        return f"The machine was too noisy for the {stated} that are aimed at: {said}."
+    return f"The machine was steady within the {stated} that are aimed at: {said}."

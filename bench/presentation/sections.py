@@ -1,12 +1,14 @@
 """The chapters of the report, in order: each is made of what some experiments offer."""
 
 import importlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from ..experiments import EXPERIMENTS
+from ..experiments.pictures.readings import arm_motion, cloth_motion
 from ..harness.experiment import Experiment
 from .layout import Layout
+from .motion import Scene
 from .results import Results
 from .tables import Table
 
@@ -16,6 +18,7 @@ class Section(NamedTuple):
 
     Attributes:
         name: what experiments and addresses within the page call it.
+        short: what links to it say.
         title: its heading.
         about: what it is about.
         main: the name of its main table, shown unfolded; "" if it has none.
@@ -23,6 +26,7 @@ class Section(NamedTuple):
     """
 
     name: str
+    short: str
     title: str
     about: str
     main: str = ""
@@ -47,21 +51,24 @@ class Section(NamedTuple):
 SECTIONS = (
     Section(
         "right",
+        "Right?",
         "Is it right?",
         "Nothing below counts unless the reference itself is right. Each claim computes one "
         "quantity twice, by Plumbob and by a physics engine that shares no code with it.",
     ),
     Section(
         "kinematics",
+        "Kinematics",
         "Inverse kinematics",
         "Real arms and a character with two hands to place: the same targets, starts and "
         "evaluation for every solver. The lab’s arm of five joints draws curves, and a chain of "
         "ten ball joints reaches for targets near, far, at the edge of its reach and beyond it.",
-        "robots_success_one_start",
+        "robots_overall_one_start",
         "budget_one_start",
     ),
     Section(
         "cloth",
+        "Cloth",
         "Cloth by implicit Euler",
         "A cloth falls from rest and swings from two corners, as it is and stiffer. A step "
         "minimises the objective g of Liu et al. (2013).",
@@ -71,12 +78,20 @@ SECTIONS = (
     Section(
         "speed",
         "Speed",
+        "Speed",
         "The same work by the compiled and the plain source, and by both engines, in one run on "
         "one core.",
         "timing_kinematics",
         "timing_kinematics",
     ),
 )
+
+
+# What moves in a chapter.
+MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
+    "kinematics": arm_motion,
+    "cloth": cloth_motion,
+}
 
 
 def offered(experiment: Experiment) -> tuple[Layout, ...]:

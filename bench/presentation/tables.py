@@ -1,10 +1,11 @@
-"""A table as a value, and its three forms for others: Markdown, LaTeX (booktabs), CSV.
+"""A table as a value, and its forms Markdown and CSV.
 
 Tables compute nothing: the cells arrive as numbers and leave as text.
 """
 
 import csv
 import io
+import itertools
 import math
 import re
 import shlex
@@ -72,6 +73,11 @@ class Column:
         return in_unit(plain, self.unit) if self.factor is None else self.factor * plain
 
     @property
+    def below(self) -> str:
+        """The title as it stands under the heading of its group: "median" under "residual"."""
+        return self.title.removeprefix(self.group).lstrip(",: ") or self.title
+
+    @property
     def titled(self) -> str:
         """Title and note in one."""
         return f"{self.title} ({self.note})" if self.note else self.title
@@ -122,6 +128,8 @@ class Table:
         compared: rows whose first so many cells agree are compared with one another; 0: all are.
         unranked: the numbers of rows that are never best, such as those of a solver cut short.
         sources: what is behind each row; rows without one come last.
+        provenance: how many samples, on which machine, with which versions.
+        best: row and column of the cells that are best, where not the columns say it.
     """
 
     name: str
@@ -134,6 +142,8 @@ class Table:
     compared: int = 1
     unranked: frozenset[int] = frozenset()
     sources: tuple[Source, ...] = ()
+    provenance: str = ""
+    best: frozenset[tuple[int, int]] | None = None
 
     def __post_init__(self) -> None:
         """Refuse ragged rows and headings that stand twice."""
@@ -152,6 +162,8 @@ def best_cells(table: Table) -> set[tuple[int, int]]:
     Ties are all best: shares whose intervals overlap with that of the best, numbers that are
     written alike. A cell that nothing is compared with is not best.
     """
+    if table.best is not None:
+        return set(table.best)
     groups: dict[tuple[Cell, ...], list[int]] = {}
     for i, row in enumerate(table.rows):
         groups.setdefault(row[: table.compared], []).append(i)
@@ -187,6 +199,20 @@ def _ties(cell: Cell, best: Cell) -> bool:
     return words(cell) == words(best)
 
 
+# So many columns at most name a row.
+_MOST_NAMES = 3
+
+
+def naming(table: Table) -> int:
+    """Return how many of the first columns name a row: as few as tell all rows apart, or so."""
+    last = len(table.columns) - 1
+    for count in range(1, min(_MOST_NAMES, last) + 1):
+        if len({row[:count] for row in table.rows}) == len(table.rows):
+            return count
+    in_words = itertools.takewhile(lambda column: column.words, table.columns[:last])
+    return max(1, min(_MOST_NAMES, len(list(in_words))))
+
+
 def listing(sentence: str, points: Iterable[str]) -> Summary:
     """Return a sentence with points below it, or nothing where there are no points."""
     made = tuple(points)
@@ -207,44 +233,19 @@ def words(cell: Cell) -> str:
 
 
 def markdown(table: Table) -> str:
-    """Return the table in GitHub's Markdown, titled and explained."""
+    """Return the table in GitHub's Markdown, titled and explained, the best cells bold."""
     head = [_markdown(column.heading) for column in table.columns]
     rule = ["---" if column.words else "---:" for column in table.columns]
-    body = [[_markdown(words(cell)) for cell in row] for row in table.rows]
+    best = best_cells(table)
+    body = [
+        [_bold(_markdown(words(cell)), (i, j) in best) for j, cell in enumerate(row)]
+        for i, row in enumerate(table.rows)
+    ]
     lines = ["| " + " | ".join(row) + " |" for row in (head, rule, *body)]
     points = "\n".join(f"- {_markdown(point)}" for point in table.summary.points)
     about = [_markdown(text) for text in (table.shows, table.measured)]
     parts = [f"# {_markdown(table.title)}", _markdown(table.summary.sentence), points, *about]
     return "\n\n".join([*filter(None, parts), "\n".join(lines)]) + "\n"
-
-
-def latex(table: Table) -> str:
-    """Return the table as LaTeX for the packages booktabs and graphicx.
-
-    A table that is wider than the line is shrunk to it.
-    """
-    align = "".join("l" if column.words else "r" for column in table.columns)
-    head = " & ".join(_latex(column.heading) for column in table.columns)
-    caption = " ".join(_latex(text) for text in (table.title + ".", table.shows) if text)
-    return "\n".join(
-        [
-            r"% needs \usepackage{booktabs,graphicx}",
-            r"\begin{table}",
-            r"  \centering",
-            rf"  \caption{{{caption}}}",
-            rf"  \label{{tab:{table.name}}}",
-            r"  \resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
-            rf"  \begin{{tabular}}{{{align}}}",
-            r"    \toprule",
-            rf"    {head} \\",
-            r"    \midrule",
-            *(f"    {line}" for line in _latex_rows(table)),
-            r"    \bottomrule",
-            r"  \end{tabular}}",
-            r"\end{table}",
-            "",
-        ]
-    )
 
 
 def comma_separated(table: Table) -> str:
@@ -289,57 +290,15 @@ def _trimmed(digits: str) -> str:
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=](?=[-+=\s]|$)|(?<=^\d)[.)](?=\s|$))")
 
 
+def _bold(text: str, bold: bool) -> str:
+    return f"**{text}**" if bold else text
+
+
 def _markdown(text: str) -> str:
     return _MARKDOWN.sub(r"\\\1", " ".join(text.split()))
 
 
-_LATEX = {
-    "\\": r"\textbackslash{}",
-    "{": r"\{",
-    "}": r"\}",
-    "[": "{[}",  # else an option of the end of the row before
-    "]": "{]}",
-    "*": "{*}",
-    "$": r"\$",
-    "&": r"\&",
-    "#": r"\#",
-    "%": r"\%",
-    "_": r"\_",
-    "^": r"\textasciicircum{}",
-    "~": r"\textasciitilde{}",
-    "<": r"\ensuremath{<}",
-    ">": r"\ensuremath{>}",
-    "|": r"\textbar{}",
-    "–": "--",
-    "−": r"\ensuremath{-}",
-    "µ": r"\textmu{}",
-    "°": r"\textdegree{}",
-    "²": r"\textsuperscript{2}",
-    "×": r"\ensuremath{\times}",
-    "·": r"\ensuremath{\cdot}",
-    "≤": r"\ensuremath{\leq}",
-    "≥": r"\ensuremath{\geq}",
-    "→": r"\ensuremath{\to}",
-}
 POWER = re.compile(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?!\w)")
-
-
-def _latex(text: str) -> str:
-    escaped = "".join(_LATEX.get(letter, letter) for letter in " ".join(text.split()))
-    return POWER.sub(r"$\1 \\cdot 10^{\2}$", escaped)
-
-
-def _latex_rows(table: Table) -> list[str]:
-    lines: list[str] = []
-    previous = None
-    grouped = len({row[0] for row in table.rows}) < len(table.rows)
-    for row in table.rows:
-        if grouped and lines and row[0] != previous:
-            lines.append(r"\addlinespace")
-        first = "" if row[0] == previous else _latex(words(row[0]))
-        lines.append(" & ".join([first, *(_latex(words(cell)) for cell in row[1:])]) + r" \\")
-        previous = row[0]
-    return lines
 
 
 def _csv_head(table: Table, spread_out: list[bool]) -> list[str]:

@@ -1,7 +1,12 @@
 """Names from elsewhere as text that no terminal, browser or parser takes for an instruction."""
 
-from collections.abc import Mapping
+import functools
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+# Where a word may be broken: after a dash and its like between letters, never in a number.
+_BREAK = re.compile(r"(?<=[^\W\d_][/_.-])(?=[^\W\d_])")
 
 
 def visible(text: str) -> str:
@@ -29,3 +34,9 @@ def all_visible(value: Any) -> Any:
 def shortened(text: str, length: int) -> str:
     """Return the text, its end cut off if it is longer."""
     return text if len(text) <= length else f"{text[: length - 1]}…"
+
+
+@functools.lru_cache(maxsize=10_000)
+def chunks(text: str) -> Sequence[str]:
+    """Return a text in the parts between which a line may end: after spaces, dashes, slashes."""
+    return [part for token in text.split() for part in _BREAK.split(token)]

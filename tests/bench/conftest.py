@@ -31,6 +31,20 @@ def first_called(name, solver, cold, warm=0.3):
     return record("first_call", name, solver, {}, arrays, facts=facts)
 
 
+def in_parts(solver="Plumbob LM, 100 restarts", missed=((), (7,))):
+    """Parts of five targets each, of which some are missed, one falsely claimed to be solved."""
+    return [
+        record(
+            "many_targets", f"many/iiwa14/{part:06d}", solver,
+            {"tolerance": 1e-3, "tolerance_rotation": 1e-3},
+            {"targets": 5, "solved": 5 - len(which), "false": len(which), "position": 1e-5,
+             "rotation": 1e-6, "missed": np.array(which, dtype=int)},
+            size=5, facts={"title": "KUKA iiwa14", "robot": "iiwa14", "part": part},
+        )
+        for part, which in enumerate(missed)
+    ]  # fmt: skip
+
+
 def drawn(solver, warm, angle):
     """The arm drawing a curve, in three frames."""
     return record(
@@ -268,6 +282,25 @@ def pictured():
     ]  # fmt: skip
 
 
+def moved():
+    """The arm on a curve by two solvers, in five frames, and a cloth of 3 x 3 by two."""
+    curve = np.array([[0.1 * k, 0.0, 0.2] for k in range(5)])
+    arm = np.array([[[0, 1, 0], [0.3, 0.5, 0], point] for point in curve])
+    rows, columns = np.divmod(np.arange(9), 3)
+    cloth = np.array([[columns, -0.2 * k * rows, rows] for k in range(4)]).swapaxes(1, 2)
+    return [
+        *(record("pictures", "motion/arm/x", s, {"coherent": s == "fabrik", "every": 1},
+                 {"positions": arm + 0.05 * i, "curve": curve, "error": [10.0 ** (-3 - i)] * 5},
+                 facts={"task": "motion of the arm", "order": i})
+          for i, s in enumerate(("ccd", "fabrik"))),
+        *(record("pictures", "motion/cloth/x", s, {"h": 0.1, "every": 1, "iterations": n},
+                 {"positions": cloth * (1 + i), "distance": np.full((4, 9), 0.0 if i else 1e-2),
+                  "pinned": [0, 2]},
+                 facts={"task": "motion of the cloth", "order": i})
+          for i, (s, n) in enumerate((("local_global", 1), ("newton", 100)))),
+    ]  # fmt: skip
+
+
 def worked(solver, stiffness=1e3, sizes=(20, 20), seconds=(1e-3, 1e-2), error=(0.5, 1e-4)):
     """One step of a cloth with ever more work."""
     arrays = {"particles": sizes, "seconds": seconds, "error": error, "remark_particles": [20]}
@@ -315,7 +348,7 @@ def as_liu(solver, seconds):
     return record("cloth", "peers/liu2013", solver, {"size": 81}, arrays, facts=facts)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make():
     """The makers of records, by name."""
     return SimpleNamespace(
@@ -326,6 +359,7 @@ def make():
         beyond=beyond,
         claim=claim,
         first_called=first_called,
+        in_parts=in_parts,
         timed=timed,
         stepped=stepped,
         swung=swung,
@@ -337,6 +371,7 @@ def make():
         republished=republished,
         worked=worked,
         fell=fell,
+        moved=moved,
         needed=needed,
         bounded=bounded,
         as_liu=as_liu,
@@ -354,6 +389,7 @@ def records():
         judged("CCD", "root to tip"),
         judged("honest solvers", "", ()),
         first_called("solve_ik/chain", "fabrik", 2.0),
+        *in_parts(),
         *arm,
         *followed("ccd", cold=1.0, warm=0.5, coherent=0.25),
         *drifted("ccd"),
@@ -381,6 +417,7 @@ def records():
         bounded("MuJoCo Euler", 0.02),
         as_liu("local_global", 0.03),
         *pictured(),
+        *moved(),
         timed("Plumbob, compiled", 1e-6),
         timed("Pinocchio", 5e-7),
         *(timed("Plumbob, compiled", 1e-6, work, "near", "CCD") for work in ("ik", "cloth")),

@@ -36,7 +36,7 @@ from reference.mass_spring import stiffness_matrix
 SIZE, STIFFNESS = 5, 100.0
 # Single precision rounds positions of two metres to 1e-7, over and over.
 DOUBLE, SINGLE = 1e-12, 2e-5
-PRECISION = {"Plumbob": DOUBLE, "MuJoCo": DOUBLE, "Newton": SINGLE}
+PRECISION = {"Plumbob": DOUBLE, "MuJoCo": DOUBLE, "Newton": SINGLE, "PyBullet": DOUBLE}
 # To compile these takes Newton a minute.
 LONG_TO_COMPILE = ("VBD", "XPBD")
 

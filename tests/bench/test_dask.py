@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -16,11 +17,15 @@ from pathlib import Path
 import pytest
 
 from bench import cli
+from bench.entrants.entrant import Entrant
+from bench.entrants.sources import digest_of
 from bench.executors import dask, executor_at, work
 from bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
 from bench.harness import run
+from bench.harness.choice import Choice
 from bench.harness.machine import stamp
 from bench.harness.measure import block_key, measure
+from bench.harness.progress import Progress, listening
 from bench.harness.record import RecordFile, encode
 from bench.presentation.results import Results, plain
 from bench.presentation.sections import tables
@@ -74,20 +79,14 @@ def few(monkeypatch):
 # What takes times says so.
 
 
-def test_every_experiment_says_whether_it_takes_times():
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda e: e.package.rsplit(".")[-1])
+def test_every_experiment_says_whether_it_takes_times(experiment):
     """One that reads the stopwatch or keeps seconds shares no machine while it is measured."""
-    clocks = ("stopwatch", '"seconds"', "budget=", "Budget(")
-    for experiment in EXPERIMENTS:
-        folder = ROOT / Path(*experiment.package.split("."))
-        files = [path for path in folder.glob("*.py") if path.name not in ("tables.py",)]
-        text = "".join(path.read_text(encoding="utf-8") for path in files)
-        if experiment.package.endswith("published"):
-            text += "budget="  # by way of the robots
-        if experiment.package.endswith("first_call"):
-            assert "stopwatch" in text
-        assert experiment.times == any(word in text for word in clocks), experiment.package
-        for block in experiment.blocks(TINY):
-            assert block.times == experiment.times
+    folder = ROOT / Path(*experiment.package.split("."))
+    files = [path for path in folder.glob("*.py") if path.name != "tables.py"]
+    text = "".join(path.read_text(encoding="utf-8") for path in files)
+    assert experiment.times == any(word in text for word in ("stopwatch", '"seconds"'))
+    assert {block.times for block in experiment.blocks(TINY)} == {experiment.times}
 
 
 # Addresses and complaints.
@@ -148,6 +147,9 @@ class MadeUpCluster:
         return {"host": host, "stamp": {**stamp(), "machine": {"processor": machine}}}
 
     def close(self, timeout):
+        pass
+
+    def subscribe_topic(self, topic, handler):
         pass
 
     def submit(self, function, task, key, workers=None):
@@ -245,6 +247,18 @@ def test_the_machine_of_most_records_goes_on_and_answers_of_any_machine_are_kept
     assert any("times are taken on another machine (slide rule)" in e.message for e in again)
 
 
+def test_some_rows_of_a_table_are_not_timed_elsewhere_than_the_others(made_up, monkeypatch):
+    made_up(MadeUpCluster(**ONE_KIND))
+    some = Choice("quick", TINY, problems=("a", "b"), is_partial=True)
+    monkeypatch.setattr(run, "chosen", lambda scale: some)
+    assert states(made_up(MadeUpCluster(**TWO_KINDS)))[run.KEPT] == 6
+    elsewhere = made_up(MadeUpCluster(w4="h3/abacus"))
+    assert states(elsewhere) == {run.KEPT: 2, run.FAILED: 4, run.NOT_RUN: 3}
+    assert "timed on another machine than is here (slide rule; here abacus)" in elsewhere[2].message
+    mixed = made_up(MadeUpCluster(w4="h3/abacus"), mix=True)
+    assert states(mixed)[run.KEPT] == 6
+
+
 def test_no_worker_is_misuse(made_up):
     with pytest.raises(ValueError, match=r"expected a worker, got none within 0\.1 s"):
         made_up(MadeUpCluster())
@@ -265,7 +279,7 @@ def test_a_run_without_any_worker_left_ends_and_can_be_taken_up(made_up, tmp_pat
 @pytest.mark.parametrize("part", ["versions", "source"])
 def test_a_worker_with_other_versions_or_sources_refuses(made_up, part):
     other = {**stamp(), part: {"numpy": "0"} if part == "versions" else "0"}
-    task = work.Task("arm", TINY, ("arm", "no such", "s", "{}"), False, other)
+    task = work.Task("arm", pickle.dumps(TINY), ("arm", "no such", "s", "{}"), False, other)
     assert "other" in work.perform(task).refused
     cluster = MadeUpCluster(w1="h1/x")
     cluster.place = lambda name: {"host": "h1", "stamp": other}
@@ -281,8 +295,22 @@ def test_a_worker_without_plumbob_is_misuse(made_up):
 
 
 def test_a_block_that_only_the_client_knows_is_refused():
-    found = work.measured("arm", TINY, ("arm", "my own problem", "s", "{}"))
-    assert "there is no block arm, my own problem, s, {}" in found["refused"]
+    key = ("arm", "my own problem", "s", "{}")
+    found = work.measured("arm", pickle.dumps(TINY), key)
+    assert found == {"refused": "there is no block arm, my own problem, s, {}"}
+
+
+def test_a_solver_of_the_users_has_to_be_on_the_worker_as_it_is_there(tmp_path):
+    path = tmp_path / "my_ik.py"
+    path.write_text("def inverse_kinematics(request):\n    return request\n")
+    entrant = Entrant("Mine", str(path), str(path), digest=digest_of(str(path)))
+    scale, key = pickle.dumps(replace(TINY, entrants=(entrant,))), ("arm", "p", "s", "{}")
+    assert "there is no block" in work.measured("arm", scale, key)["refused"]
+    work._blocks.cache_clear()
+    path.write_text("raise SystemExit")
+    assert "got other ones (" in work.measured("arm", scale, key)["refused"]
+    path.unlink()
+    assert f"expected the files of {path}, got none" in work.measured("arm", scale, key)["refused"]
 
 
 def test_a_machine_is_shared_by_answers_and_not_by_times(tmp_path, monkeypatch):
@@ -300,6 +328,23 @@ def test_a_machine_is_shared_by_answers_and_not_by_times(tmp_path, monkeypatch):
         assert not waited
     thread.join()
     assert waited
+
+
+def test_what_a_worker_does_is_heard(made_up, monkeypatch):
+    """Long steps are said while they last, as in one process."""
+    cluster = MadeUpCluster(w1="h1/x")
+    cluster.subscribe_topic = lambda topic, handler: setattr(cluster, "tell", handler)
+    submit = cluster.submit
+
+    def tell_and_submit(*given, **where):
+        cluster.tell((0.0, list(Progress(f"step {len(cluster.given)}"))))
+        return submit(*given, **where)
+
+    cluster.submit = tell_and_submit
+    heard = []
+    with listening(lambda progress: heard.append(progress.what)):
+        made_up(cluster)
+    assert heard == [f"step {i}" for i in range(9)]
 
 
 # A cluster that is real: two workers, each a process of this machine.
@@ -343,7 +388,7 @@ def assert_same_tables(suites, executor, folder):
 
 
 def test_two_workers_give_the_same_tables_to_the_bit_as_one_process(executor, few, tmp_path):
-    few(arm=24, ik=28)
+    few(arm=20, ik=14)
     assert_same_tables(["ik", "arm"], executor, tmp_path)
 
 
@@ -357,33 +402,12 @@ def test_every_suite_gives_the_same_tables_on_two_workers(executor, monkeypatch,
     assert_same_tables([suite], executor, tmp_path)
 
 
-def pids(cluster):
-    from distributed import Client
-
-    with Client(cluster.scheduler_address, set_as_default=False) as client:
-        return list(client.run(os.getpid).values())
-
-
-@pytest.mark.parametrize(("suite", "count"), [("arm", 30), ("cloth_scale", 2)])
-def test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none(
-    cluster, executor, few, tmp_path, suite, count
-):
-    asked, killed = few(**{suite: count}), []
-    for event in run.run([suite], "quick", tmp_path, executor):
-        if event.state == run.MEASURED and not killed:
-            killed = pids(cluster)
-            os.kill(killed[0], signal.SIGKILL)
-    assert rows(tmp_path) == dict.fromkeys(asked, 1)
-    assert not any(record.failed for record in records(tmp_path))
-    assert all(record.stamp == stamp() for record in records(tmp_path))
-    assert killed
-
-
 CLIENT = """
 import os, sys, signal
 from bench.experiments import SCALES, Scale
 from bench.executors import executor_at
 from bench.harness import run
+from bench.harness.choice import Choice
 from pathlib import Path
 SCALES["quick"] = Scale(targets=3, seconds=0.001)
 done = 0
@@ -402,3 +426,29 @@ def test_a_client_that_was_killed_takes_up_where_it_was(cluster, executor, tmp_p
     events = list(run.run(["arm"], "quick", tmp_path, executor))
     assert states(events)[run.KEPT] == 5
     assert rows(tmp_path) == dict.fromkeys((block_key(b) for b in blocks("arm", TINY)), 1)
+
+
+def pids(cluster):
+    from distributed import Client
+
+    with Client(cluster.scheduler_address, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=30)
+        return list(client.run(os.getpid).values())
+
+
+@pytest.mark.parametrize(
+    ("suite", "count"), [("arm", 30), pytest.param("cloth_scale", 2, marks=pytest.mark.slow)]
+)
+def test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none(
+    cluster, executor, few, tmp_path, suite, count
+):
+    (asked, (worker, _)), heard = (few(**{suite: count}), pids(cluster)), []
+    with listening(heard.append):
+        for event in run.run([suite], "quick", tmp_path, executor):
+            if event.state == run.MEASURED and len(rows(tmp_path)) == 1:
+                os.kill(worker, signal.SIGKILL)
+    assert bool(heard) is (suite == "cloth_scale")
+    assert worker not in pids(cluster)
+    assert rows(tmp_path) == dict.fromkeys(asked, 1)
+    assert not any(record.failed for record in records(tmp_path))
+    assert all(record.stamp == stamp() for record in records(tmp_path))

@@ -20,6 +20,7 @@ from bench.experiments.timing import tables as timing
 from bench.presentation.results import Results
 from bench.presentation.sections import SECTIONS, tables
 from bench.presentation.tables import Share, comma_separated
+from bench.presentation.tex_text import escaped
 
 
 def column(table, heading):
@@ -44,6 +45,13 @@ def test_every_number_in_csv_is_one(records):
             assert not [cell for cell in row if cell.startswith(("np.", "array"))], table.name
 
 
+def test_every_letter_of_ours_can_be_typeset(records):
+    for table in tables(Results(records)):
+        texts = [column.heading for column in table.columns]
+        texts += [table.title, table.shows, table.measured, table.summary.sentence]
+        assert not [text for text in texts if r"\textbackslash" in escaped(text)], table.name
+
+
 def test_every_section_has_a_name_of_its_own():
     assert len({section.name for section in SECTIONS}) == len(SECTIONS)
 
@@ -59,23 +67,65 @@ def test_chains_are_counted_as_straight_only_if_they_are(make):
     table = kinematics.beyond_reach(Results([make.beyond("ccd", 0.5), make.beyond("fabrik", 1e-9)]))
     assert column(table, "off the line, largest [m]") == [0.5, 1e-9]
     ccd, fabrik = table.summary.points
-    assert ccd.startswith("CCD: 1 of 2; at worst 25.0 % of the reach")
-    assert fabrik.startswith("FABRIK: 2 of 2;")
+    assert ccd.startswith("CCD: 1/2 = 50 % (9.5–90.5); at worst 25.0 % of the reach")
+    assert fabrik.startswith("FABRIK: 2/2 = 100 % (34.2–100);")
 
 
 def test_iterations_count_for_whoever_needs_fewer(records):
     table = kinematics.iterations(Results(records))
     assert column(table, "problem") == ["arm, circle", "arm, beyond", "chain, near"]
     assert column(table, "CCD / FABRIK, means") == [2.5, 1.0, 1.0]
-    assert "fewer iterations than CCD on 1 of 3 problems" in table.summary.sentence
+    tied = (
+        "fewer iterations than CCD on 0 of 3 problems, more on 0, and on 3 they tie (n = 7 solves)"
+    )
+    assert tied in table.summary.sentence
+
+
+def test_iterations_are_fewer_only_where_the_same_targets_say_so(make):
+    def pair(counts):
+        made = [replace(r, arrays={**r.arrays, "iterations": np.asarray(c)})
+                for r, c in zip((make.beyond("ccd", 0.0), make.beyond("fabrik", 0.0)), counts,
+                                strict=True)]  # fmt: skip
+        return kinematics.iterations(Results(made)).summary.sentence
+
+    few, many = np.arange(3, 13), np.arange(4, 14)
+    assert "fewer iterations than CCD on 1 of 1 problems" in pair([many, few])
+    assert "more on 1, and on 0 they tie (n = 10 solves)" in pair([few, many])
+    assert "on 1 they tie" in pair([many, np.roll(many, 5)])
+
+
+def test_who_meets_most_targets_ties_within_chance(make):
+    def accuracy(misses):
+        made = []
+        for solver, missed in misses.items():
+            r = make.drawn(solver, False, 1.0)
+            residual = np.where(np.arange(40) < missed, 1.0, 1e-9)
+            made.append(replace(r, arrays={**r.arrays, "residual": residual}))
+        return arm.accuracy(Results(made)).summary
+
+    said = accuracy({"ccd": 1, "fabrik": 3})
+    assert said.sentence.endswith("first: CCD, in a tie with FABRIK:")
+    assert said.points[0] == "CCD: 39/40 = 97.5 % (87.1–99.6)"
+    assert accuracy({"ccd": 20, "fabrik": 3}).sentence.endswith("first: FABRIK:")
+
+
+def test_a_published_table_counts_what_was_never_begun(make):
+    trac, toolbox, *_ = (replace(r, size=4) for r in make.republished())
+    table = published.trac_ik(Results([trac]))
+    assert column(table, "solved [%]")[-1] == 25.0
+    assert column(table, "mark")[-1] == "cut at 2 of 4"
+    assert table.summary.points[0].endswith("cut at 2 of 4")
+    table = published.toolbox(Results([toolbox]))
+    assert column(table, "here, by its own word [%]") == [75.0]
+    assert column(table, "mark") == ["cut at 2 of 4"]
 
 
 def test_jitter_is_the_largest_angle_in_degrees_and_the_closing_one_stands_apart(make):
     table = tracking.jitter(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
     for mode, angle in (("cold", 1.0), ("warm", 0.5), ("coherent", 0.25)):
-        assert column(table, f"{mode}, largest [°]") == [pytest.approx(math.degrees(angle))]
-        assert column(table, f"{mode}, mean [°]") == [pytest.approx(math.degrees(angle / 4))]
-    assert column(table, "coherent, last to first [°]") == [pytest.approx(math.degrees(0.125))]
+        assert column(table, f"largest, {mode} [°]") == [pytest.approx(math.degrees(angle))]
+        assert column(table, f"mean, {mode} [°]") == [pytest.approx(math.degrees(angle / 4))]
+    assert column(table, "last to first, coherent [°]") == [pytest.approx(math.degrees(0.125))]
     assert "in 1 of 1 cases, and in 1 the step" in table.summary.sentence
     assert table.summary.points[0] == "cold: 57.3° (arm, circle, CCD)"
 
@@ -93,7 +143,7 @@ def test_a_curve_that_was_not_followed_in_all_modes_has_no_row(make):
 def test_iterations_over_all_frames_are_those_that_every_frame_has_more(make):
     table = tracking.price(Results(make.followed("ccd", cold=1.0, warm=0.5, coherent=0.25)))
     assert column(table, "of these over all frames at once") == [7]
-    assert [share.hits for share in column(table, "coherent, within tolerance")] == [3]
+    assert [share.hits for share in column(table, "within tolerance, coherent")] == [3]
     assert "together 7 to 7 times" in table.summary.sentence
 
 
@@ -130,6 +180,55 @@ def test_times_are_medians_beside_ours(records):
     table = timing.kinematics(Results(records))
     assert column(table, "median [ns]") == pytest.approx([2000.0, 1000.0])
     assert column(table, "of our compiled time") == [None, 0.5]
+
+
+def swept(make, solver, seconds, noise=0.01):
+    """Nine sweeps of three rounds, and how noisy the machine was."""
+    made = make.timed(solver, 1.0)
+    rounds = np.repeat(np.asarray(seconds)[:, None], 3, axis=1)
+    return replace(made, arrays=made.arrays | {"seconds": rounds},
+                   facts={**made.facts, "noise": noise})  # fmt: skip
+
+
+def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_so(make, rng):
+    drift = rng.lognormal(0.0, 0.5, 9)
+    ours, rival = (
+        swept(make, "Plumbob, compiled", 1e-6 * drift),
+        swept(make, "MuJoCo", 2e-6 * drift),
+    )
+    table = timing.kinematics(Results([ours, rival]))
+    known = column(table, "median known to ± [%]")
+    assert known[0] == pytest.approx(known[1])
+    assert known[0] == pytest.approx(
+        50.0 * (np.sort(drift)[7] - np.sort(drift)[1]) / np.median(drift)
+    )
+    (point,) = table.summary.points
+    assert point.endswith("first: Plumbob")
+    apart = replace(rival, facts={**rival.facts, "together": "another run"})
+    (point,) = timing.kinematics(Results([ours, apart])).summary.points
+    assert point.endswith("timed apart, and not ranked")
+    again = swept(make, "MuJoCo", 1e-6 * rng.permutation(drift))
+    (point,) = timing.kinematics(Results([ours, again])).summary.points
+    assert "in a tie with" in point
+
+
+@pytest.mark.parametrize(("noise", "mark"), [(0.049, ""), (0.12, "noisy")])
+def test_a_machine_too_noisy_for_the_precision_aimed_at_is_said_to_be_so(make, noise, mark):
+    table = timing.kinematics(Results([swept(make, "MuJoCo", np.ones(9), noise)]))
+    assert column(table, "mark") == [mark]
+    assert ("too noisy for the 5 %" in table.measured) == bool(mark)
+    assert table.summary.sentence.startswith("The machine was too noisy") == bool(mark)
+
+
+def test_the_paces_beside_the_records_tell_whether_robots_were_timed_in_peace(make):
+    def how(paces):
+        made = [make.raced(s, "one start") for s in "abc"]
+        noted = [replace(r, conditions={"pace": p}) for r, p in zip(made, paces, strict=True)]
+        return ONE.success(Results(noted)).measured
+
+    assert "steady within the 5 %" in how([1e-4, 1.01e-4, 1e-4])
+    assert "too noisy for the 5 %" in how([1e-4, 1.5e-4, 1e-4])
+    assert "noisy" not in ONE.success(Results([make.raced("a", "one start")])).measured
 
 
 def test_a_limit_stands_in_a_column_and_not_in_a_row(make):

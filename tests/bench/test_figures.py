@@ -203,3 +203,29 @@ def test_curves_of_different_lengths_are_no_curve():
     with pytest.raises(ValueError, match="rows of one length"):
         series("x", [1.0, 2.0], [1.0])
     assert len(series("x", [1.0, np.nan, 3.0], [1.0, 2.0, np.inf]).x) == 1
+
+
+@pytest.mark.parametrize("count", [2, 9])
+def test_no_point_lies_outside_of_its_axes(records, count):
+    """But for what the limits of the chart itself leave out."""
+    for chart in charts(with_solvers(records, count)):
+        figure = laid_out(chart)
+        for ax, panel in zip(figure.axes, chart.panels, strict=True):
+            for one in panel.series:
+                for values, axis, (low, high) in (
+                    (one.x, chart.x, sorted(ax.get_xlim())),
+                    (one.y, chart.y, sorted(ax.get_ylim())),
+                ):
+                    inner = values[(values > 0) | (not axis.log)]
+                    for limit, side in zip(axis.limits, (np.greater_equal, np.less_equal),
+                                           strict=True):  # fmt: skip
+                        inner = inner[side(inner, limit)] if limit is not None else inner
+                    assert ((inner >= low) & (inner <= high)).all(), (chart.name, panel.title)
+
+
+def test_panels_that_share_an_axis_hold_the_points_of_all():
+    near, far = (series("a", x, np.array([1.0, 2.0])) for x in ([1.0, 2.0], [1e3, 1e5]))
+    chart = Chart("n", "t", "", (Panel("", (near,)), Panel("", (far,))), Axis(log=True))
+    low, high = laid_out(chart).axes[0].get_xlim()
+    assert low <= 1.0
+    assert high >= 1e5

@@ -257,3 +257,26 @@ def test_drop_removes_just_what_is_unwanted(tmp_path):
     assert len(file.read().records) == 1
     assert same(file.read().records[0], kept)
     assert list(tmp_path.iterdir()) == [file.path]
+
+
+def test_records_are_brought_into_order_and_all_else_keeps_its_place(tmp_path):
+    file = RecordFile(tmp_path)
+    old, new = (block("b", value=value) for value in (1.0, 2.0))
+    given = [block("other"), block("c"), old, block("rest"), block("a"), new]
+    file.append(given)
+    file.path.write_bytes(b"rubbish\n" + file.path.read_bytes())
+    before = file.path.read_bytes().splitlines()
+    file.arrange([block(name).key for name in "abc"])
+    after = file.path.read_bytes().splitlines()
+    assert [r.solver for r in file.read().records] == ["other", "a", "b", "rest", "c"]
+    assert sorted(after) == sorted(before)
+    assert after[0] == b"rubbish"
+    assert file.read().records[2].arrays["residual"] == 2.0
+
+
+def test_a_file_in_order_is_not_written_again(tmp_path, monkeypatch):
+    """A record that was measured again stands where it first stood."""
+    file = RecordFile(tmp_path)
+    file.append([block("a"), block("b"), block("a", value=2.0)])
+    monkeypatch.setattr(RecordFile, "_replace", None)
+    file.arrange([block(name).key for name in "ab"])

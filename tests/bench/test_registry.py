@@ -62,7 +62,7 @@ def test_a_new_step_solver_stands_in_the_tables(make):
     record = run.measure(replace(block, measure=small))
     assert not record.failed
     table = cloth_tables.convergence(Results([record]))
-    errors = [row[[c.title for c in table.columns].index("damped global: error")]
+    errors = [row[[c.title for c in table.columns].index("error, damped global")]
               for row in table.rows]  # fmt: skip
     assert errors[0] == record.arrays["error"][1] < 1.0
     certified = newton_tables.certified(Results([make.certified("damped_global")]))

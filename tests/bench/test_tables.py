@@ -88,51 +88,11 @@ def test_a_number_in_markdown_stays_as_it_is(number):
     assert f"| {number} |" in tables.markdown(table((number, 1.0)))
 
 
-def test_latex_specials_are_escaped():
-    lines = tables.latex(table((HOSTILE, 1.0))).splitlines()
-    row = lines[lines.index(r"    \midrule") + 1].removesuffix(r" & 1.00 \\")
-    commands = r"\\(textbackslash|textasciicircum|textasciitilde|textbar)\{\}|\\ensuremath\{[<>]\}"
-    commands += r"|\{[\[\]*]\}"
-    rest = re.sub(rf"{commands}|\\[{{}}$&#%_]", "", row)
-    assert not set(rest) & set("\\{}$&#%_^~<>|")
-    assert "50" in rest
-
-
-@pytest.mark.parametrize("name", ["[red]x", "*", "*[2cm]"])
-def test_a_latex_row_is_no_option_of_the_row_before(name):
-    text = tables.latex(table(("a", 1), ("a", 2), (name, 1.0)))
-    assert not re.search(r"(\\\\|\\midrule|\\addlinespace)\s*[\[*]", text)
-
-
 @pytest.mark.parametrize("name", ["- x", "+ x", "1. x", "1) x", "= x", "$x$"])
 def test_a_point_in_markdown_begins_no_list_or_formula(name):
     answered = Table("t", "T", (Column("a"),), ((1,),), summary=Summary(name, (name,)))
     lines = tables.markdown(answered).splitlines()
     assert not any(re.match(r"(- )?([-+=$]|\d[.)]) ?x", line) for line in lines)
-
-
-def test_latex_braces_and_environments_close_in_turn():
-    text = re.sub(r"%.*|\\\\[{}%]", "", tables.latex(table((HOSTILE, 1.0), ("b", 2e9))))
-    depths = np.cumsum([{"{": 1, "}": -1}.get(character, 0) for character in text])
-    assert depths.min() == depths[-1] == 0
-    opened = []
-    for what, name in re.findall(r"\\(begin|end){(\w+)}", text):
-        if what == "begin":
-            opened.append(name)
-        else:
-            assert opened.pop() == name
-    assert opened == []
-
-
-def test_latex_sets_powers_of_ten():
-    assert r"$1.0 \cdot 10^{-5}$" in tables.latex(table(("x", 1e-5)))
-
-
-def test_latex_separates_groups_only_where_there_are_some():
-    single = tables.latex(table(("a", 1), ("b", 2)))
-    grouped = tables.latex(table(("a", 1), ("a", 2), ("b", 3)))
-    assert "addlinespace" not in single
-    assert grouped.count("addlinespace") == 1
 
 
 def test_csv_keeps_all_digits_and_any_text():

@@ -1,5 +1,8 @@
 """Timing, for real but in a blink: pytest-benchmark, in a process of its own."""
 
+import itertools
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -16,11 +19,11 @@ from bench.experiments.timing.case import (
     streaming,
 )
 from bench.experiments.timing.cases import cases
-from bench.experiments.timing.job import ROUNDS, TimingJob
+from bench.experiments.timing.job import ROUNDS, SWEEPS, Timed, TimingJob
 from bench.harness import run
 from bench.harness.machine import stamp
 from bench.harness.record import RecordFile
-from bench.harness.worker import Unfit
+from bench.harness.worker import Done, Found, Unfit
 from reference import forward_kinematics, set_num_threads
 
 WORK = Work("p", "s", "g", "t")
@@ -49,13 +52,14 @@ def test_every_case_is_kept_with_rounds_of_one_operation_each(folder):
     assert {record.settings["operations"] for record in records} == {1, 10_000, 50_000}
     for record in records:
         assert not record.failed
-        assert 5 <= record.arrays["seconds"].size <= 10 * ROUNDS
+        assert len(record.arrays["seconds"]) == SWEEPS
+        assert SWEEPS <= record.arrays["seconds"].size <= 10 * ROUNDS
         assert (record.arrays["seconds"] > 0).all()
         assert record.size == 0.001
-        together = record.arrays["seconds"].sum() * record.settings["operations"]
-        assert together < record.seconds
+        assert record.facts["noise"] > 0
         assert record.stamp["machine"] == stamp()["machine"]
         assert record.facts["subject"] == "kinematics"
+    assert len({record.facts["together"] for record in records}) == 1
 
 
 def test_a_suite_of_the_timing_is_finished_as_any_other(folder):
@@ -77,9 +81,77 @@ def test_a_case_that_fails_says_why(monkeypatch, prepare, options, why):
     given = job.arguments
     monkeypatch.setattr(job, "cases", lambda: (case,))
     monkeypatch.setattr(job, "arguments", lambda *args: [*given(*args), *options])
-    (message,) = TimingJob(case.key, 0.001).perform()
+    (message,) = TimingJob((case.key,), 0.001).perform()
     assert isinstance(message, Unfit)
     assert why in message.why
+
+
+@pytest.fixture
+def said(monkeypatch):
+    """What a job says of three cases, one of which fails, and which was called when."""
+    called = []
+
+    def preparing(name):
+        return lambda: lambda: called.append(name)
+
+    made = [Case(WORK, name, preparing(name)) for name in "ab"] + [Case(WORK, "c", fails)]
+    monkeypatch.setattr(job, "cases", lambda: made)
+    messages = list(TimingJob(tuple(case.key for case in made), 0.001).perform())
+    return messages, called
+
+
+def test_cases_that_are_compared_alternate_in_an_order_by_lot(said):
+    (found, done), called = said
+    assert isinstance(found, Found)
+    assert isinstance(done, Done)
+    changes = sum(a != b for a, b in itertools.pairwise(called))
+    assert changes >= SWEEPS - 1
+    assert [np.shape(rounds)[0] for rounds in found.values["rounds"][:2]] == [SWEEPS] * 2
+    assert all(np.ndim(rounds) == 2 for rounds in found.values["rounds"][:2])
+
+
+def test_a_case_that_fails_costs_none_that_it_is_compared_with(said):
+    (found, _), _ = said
+    assert found.values["rounds"][2] == []
+    assert found.values["troubles"] == ["", "", "OSError: no engine"]
+
+
+def test_every_sweep_has_every_case_once_and_the_order_is_seeded():
+    case = [Case(WORK, name, int) for name in "abcde"]
+    order = np.reshape(Timed(case).order, (SWEEPS, 5))
+    assert (np.sort(order, axis=1) == np.arange(5)).all()
+    assert len(np.unique(order, axis=0)) > SWEEPS / 2
+    assert Timed(case).order == order.ravel().tolist()
+
+
+def test_a_group_is_timed_once_and_what_is_left_of_another_run_is_not_used(monkeypatch):
+    made = [Case(WORK, name, int) for name in "ab"]
+    asked = []
+
+    def find(job):
+        asked.append(job)
+        return {"rounds": [[[1.0 + len(asked)]], []], "paces": [1.0], "troubles": ["", "broken"]}
+
+    monkeypatch.setattr(measurement, "cases", lambda: made)
+    monkeypatch.setattr(measurement, "worker_process", lambda: SimpleNamespace(find=find))
+    blocks = list(measurement.blocks(Scale(1, 0.1)))
+    assert blocks[0].measure().arrays["seconds"].tolist() == [[2.0]]
+    with pytest.raises(RuntimeError, match="broken"):
+        blocks[1].measure()
+    assert len(asked) == 1
+    assert blocks[0].measure().arrays["seconds"].tolist() == [[3.0]]  # measured, not remembered
+    again = list(measurement.blocks(Scale(1, 0.1)))
+    with pytest.raises(RuntimeError, match="broken"):
+        again[1].measure()
+    assert len(asked) == 3
+    assert again[0].measure().arrays["seconds"].tolist() == [[4.0]]
+    with pytest.raises(RuntimeError, match="broken"):
+        again[1].measure()
+    monkeypatch.setattr(measurement, "FRESH", -1.0)  # as if found long ago
+    with pytest.raises(RuntimeError, match="broken"):
+        again[1].measure()
+    assert again[0].measure().arrays["seconds"].tolist() == [[7.0]]
+    assert len(asked) == 6
 
 
 def test_the_limit_moves_as_many_bytes_as_it_says(monkeypatch):

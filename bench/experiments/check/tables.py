@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import number, text
+from ...presentation.columns import folded, number, text
 from ...presentation.layout import Layout
 from ...presentation.tables import Summary, in_unit, words
 
@@ -34,12 +34,12 @@ verdicts = Layout(
     subjects=lambda results: results.all("check"),
     columns=(
         text("claim", lambda record: record.problem),
-        text("what we compute", lambda record: record.notes["ours"]),
+        text("verdict", _verdict),
+        *folded([text("what we compute", lambda record: record.notes["ours"])]),
         text("held against", lambda record: record.solver),
         number("cases"),
         number("largest difference", "difference"),
         number("tolerance"),
-        text("verdict", _verdict),
     ),
     shows="Differences are relative, to the reach, the largest force or whatever scale the "
     "claim's tolerance names. A claim holds only if something moved in each of its cases.",

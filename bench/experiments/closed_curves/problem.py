@@ -1,5 +1,8 @@
 """Closed curves to be followed by the lab's arm and by a robot arm of seven hinges."""
 
+import functools
+from collections.abc import Sequence
+
 import numpy as np
 
 from reference import curves, resample, scenes
@@ -26,7 +29,8 @@ _CENTRE, _SCALE = (0.5, 0.0, 0.5), 0.4
 DRIFT_FRAMES = 60
 
 
-def arm_closed_curves() -> list[FollowedCurve]:
+@functools.cache
+def arm_closed_curves() -> Sequence[FollowedCurve]:
     """Return the lab's arm on the lab's curves; the custom one evened out, its ends joined."""
     skeleton, rest = scenes.lab_arm()
     drawn = {name: curves[name](FRAMES[name]) for name in ARM_CURVES}

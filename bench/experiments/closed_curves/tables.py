@@ -5,7 +5,7 @@ from typing import Any
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import largest, text, words_in
+from ...presentation.columns import folded, greatest, largest, least, text, words_in
 from ...presentation.layout import Layout
 from ...presentation.results import Results, label, settings
 from ...presentation.tables import Column, Summary, words
@@ -42,7 +42,7 @@ def _by_mode(
     def read_in(mode: str) -> Callable[[Case], Any]:
         return lambda case: read(case[mode])
 
-    return [Column(f"{mode}, {what}", unit, read=read_in(mode)) for mode in modes]
+    return [Column(f"{what}, {mode}", unit, read=read_in(mode), group=what) for mode in modes]
 
 
 def _largest_angle(record: Record) -> float:
@@ -87,9 +87,9 @@ jitter = Layout(
         CURVE_COLUMN,
         SOLVER,
         Column("frames", read=lambda case: case[WARM].arrays["residual"].size),
-        *_by_mode("largest", _largest_angle, "°"),
-        *_by_mode("mean", _mean_angle, "°"),
-        *_by_mode("last to first", _closing_angle, "°", (WARM, COHERENT)),
+        *least(_by_mode("largest", _largest_angle, "°")),
+        *folded(_by_mode("mean", _mean_angle, "°")),
+        *least(_by_mode("last to first", _closing_angle, "°", (WARM, COHERENT))),
     ),
     shows="The angle by which a joint rotates between neighbouring frames: of a ball the "
     "geodesic one, of a hinge the change of its coordinate. The largest is over all frames and "
@@ -149,8 +149,8 @@ price = Layout(
     columns=(
         CURVE_COLUMN,
         SOLVER,
-        *_by_mode("within tolerance", _within),
-        *_by_mode("largest path error", lambda r: largest([r], "residual"), "m"),
+        *greatest(_by_mode("within tolerance", _within)),
+        *folded(_by_mode("largest path error", lambda r: largest([r], "residual"), "m")),
         *_by_mode("mean iterations", lambda r: metrics.mean(r.arrays["iterations"])),
         Column("of these over all frames at once", read=_together),
     ),
@@ -175,7 +175,13 @@ drift = Layout(
     columns=(
         SOLVER,
         *(
-            Column(f"{mode}, after {counted}", "°", read=_drift_after(mode, i))
+            Column(
+                f"{mode}, after {counted}",
+                "°",
+                read=_drift_after(mode, i),
+                best="least",
+                group=mode,
+            )
             for mode in (WARM, COHERENT)
             for i, counted in enumerate(("one repetition", "two", "three"))
         ),
@@ -186,6 +192,7 @@ drift = Layout(
     "is closed: its last frame leads back to its first, so that after the third repetition "
     "it has returned by construction.",
     summary=_drift_summary,
+    compared=0,
 )
 
 

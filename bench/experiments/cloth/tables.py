@@ -13,6 +13,7 @@ from ...peers import registry
 from ...presentation.columns import (
     LARGEST,
     MEDIAN,
+    folded,
     largest,
     lengths_of_steps,
     setting,
@@ -75,12 +76,13 @@ newton_steps = Layout(
     columns=(
         titled("cloth"),
         Column("steps", read=lambda record: record.arrays["iterations"].size),
-        share("converged", _solved),
+        share("converged", _solved, best="greatest"),
         *spread("iterations", "iterations"),
         *spread("residual", "residual"),
         Column(
             "steps at the rounding floor",
             read=lambda record: np.count_nonzero(record.arrays["at_floor"]),
+            folded=True,
         ),
     ),
     shows="The residual is |grad g(x)| over its value at the inertial start y, or over what "
@@ -113,7 +115,9 @@ def _records(rows: Sequence[_Iteration]) -> list[Record]:
 
 
 def _reached(solver: str, what: str) -> Column:
-    return Column(f"{label(solver)}: {what}", read=lambda row: row.reached(solver, what))
+    return Column(
+        f"{what}, {label(solver)}", read=lambda row: row.reached(solver, what), group=what
+    )
 
 
 def _convergence_summary(rows: Sequence[_Iteration]) -> Summary:
@@ -158,7 +162,7 @@ convergence = Layout(
         text("cloth", lambda row: row.title),
         Column("iterations", read=lambda row: row.k),
         *(_reached(rival, "error") for rival in _rivals()),
-        *(_reached(rival, "residual") for rival in CHECKED),
+        *folded(_reached(rival, "residual") for rival in CHECKED),
     ),
     subjects=_iterations,
     shows="The error is |x − x*| / |y − x*|: what is left of the distance between the "

@@ -10,7 +10,7 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
-from ...presentation.columns import SOLVER, number, text, words_in
+from ...presentation.columns import SOLVER, folded, least, number, text, words_in
 from ...presentation.entered import entered
 from ...presentation.layout import Layout
 from ...presentation.results import Results, label, listed
@@ -70,7 +70,7 @@ class WithMissing(Layout):
         return replace(table, rows=(*table.rows, *rows))
 
 
-def _columns_to(target: str) -> tuple[Column, Column]:
+def _columns_to(target: str) -> tuple[Column, ...]:
     """Return what the cheapest setting takes to an error, and which it is."""
 
     def cheapest(group: Sequence[Point]) -> Point | None:
@@ -281,11 +281,15 @@ motion = WithMissing(
         text("cloth", _cloth_of),
         text("solver", lambda point: point.solver),
         text("a frame by", lambda point: point.rung),
-        Column("frames", read=lambda point: int(point.values["frames"])),
-        _known("distance from implicit Euler", "implicit", "m"),
-        _known("distance from the truth", "true", "m"),
+        Column("frames", read=lambda point: int(point.values["frames"]), folded=True),
+        *least(
+            [
+                _known("distance from implicit Euler", "implicit", "m"),
+                _known("distance from the truth", "true", "m"),
+            ]
+        ),
         _known("time for a frame", "seconds", "ms"),
-        Column("time for a simulated second", "s", read=_simulated_second),
+        Column("time for a simulated second", "s", read=_simulated_second, folded=True),
         text("remark", _fate),
     ),
     subjects=lambda results: points(results, MOTION),
@@ -304,9 +308,17 @@ iterations = Layout(
     columns=(
         Column("stiffness", "N/m", read=lambda record: int(record.settings["stiffness"])),
         SOLVER,
-        *(Column(f"to {decade}", read=partial(_needed, decade=decade)) for decade in DECADES),
-        number("tried"),
-        number("least error", "least"),
+        *(
+            Column(
+                f"to {decade}",
+                read=partial(_needed, decade=decade),
+                best="least",
+                folded=decade not in TARGETS,
+            )
+            for decade in DECADES
+        ),
+        *folded([number("tried")]),
+        *least([number("least error", "least")]),
     ),
     subjects=lambda results: results.all("cloth", task=NEEDED),
     shows="Iterations until |x − x*| / |y − x*| is at most so much; nothing where all that "
@@ -330,7 +342,7 @@ stability = Layout(
         Column("stiffness", "N/m", read=lambda limit: limit.stiffness),
         Column("longest stable step", "ms", read=lambda limit: limit.step),
         Column("2 / ω", "ms", read=lambda limit: limit.theory),
-        Column("of 2 / ω", read=lambda limit: limit.share),
+        Column("of 2 / ω", read=lambda limit: limit.share, best="greatest"),
         text("remark", lambda limit: limit.record.notes["remark"]),
     ),
     shows="Symplectic Euler is stable up to h = 2 / ω, the classical Runge-Kutta method up to "
@@ -339,6 +351,7 @@ stability = Layout(
     "highest mode; a step is stable if that has not grown a hundredfold 400 steps later. Found "
     "by bisection to two ten-thousandths.",
     summary=_stability_summary,
+    compared=0,
 )
 
 
@@ -374,7 +387,7 @@ liu_2013 = Layout(
         SOLVER,
         text("a frame by", lambda record: published.LIU_2013[record.solver].done),
         Column("published", "ms", read=lambda record: published.LIU_2013[record.solver].seconds),
-        Column("here", "ms", read=_median),
+        Column("here", "ms", read=_median, best="least"),
         number("here, error left", "error"),
     ),
     subjects=_as_published,
@@ -388,6 +401,7 @@ liu_2013 = Layout(
         "Newton to a residual of 1e-6."
     ),
     summary=_liu_summary,
+    compared=0,
 )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
-from ...presentation.columns import number, setting, text
+from ...presentation.columns import folded, least, number, setting, text
 from ...presentation.layout import Layout
 from ...presentation.results import settings
 from ...presentation.tables import Column, Summary, listing, words
@@ -18,8 +18,12 @@ def _iterations_columns(records: Sequence[Record]) -> tuple[Column, ...]:
     count = settings(records, "iterations")
     return (
         setting("particles", "particles"),
-        _over_particles("nonzeros of L for each", "entries"),
-        Column("solve", "ns/nonzero", read=lambda r: _ratio(r, "solve", "entries")),
+        *folded(
+            [
+                _over_particles("nonzeros of L for each", "entries"),
+                Column("solve", "ns/nonzero", read=lambda r: _ratio(r, "solve", "entries")),
+            ]
+        ),
         _over_particles("solve", "solve", "ns/particle"),
         _over_particles("local step", "local", "ns/particle"),
         Column(
@@ -124,10 +128,14 @@ factors = Layout(
     columns=(
         setting("particles", "particles"),
         text("by", _library),
-        number("first factor", "factor", "s"),
-        number("again, pattern known", "refactor", "s"),
-        Column("solve", "ms", read=lambda r: _median(r, "solve") if r.arrays else None),
-        Column("most memory", "GiB", read=_memory),
+        *least(
+            [
+                number("first factor", "factor", "s"),
+                number("again, pattern known", "refactor", "s"),
+                Column("solve", "ms", read=lambda r: _median(r, "solve") if r.arrays else None),
+                Column("most memory", "GiB", read=_memory),
+            ]
+        ),
     ),
     shows="The first factor finds an order of elimination; another step length or stiffness "
     "needs only the second. The memory is that of a whole process, compiler and cloth "

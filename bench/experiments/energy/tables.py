@@ -50,7 +50,12 @@ energy = Layout(
         titled("cloth"),
         text("integrator", lambda record: label(record.solver)),
         *(
-            Column(f"left after {words(k)} steps", "%", read=partial(_left, steps=k))
+            Column(
+                f"left after {words(k)} steps",
+                "%",
+                read=partial(_left, steps=k),
+                group="left after",
+            )
             for k in LISTED
         ),
         Column("most ever", "%", read=lambda record: _extent(record)[1]),

@@ -1,12 +1,13 @@
 """What the first call of a public function costs: compiled then, or read from disk."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ...harness.record import Record
 from ...presentation.columns import number, text, titled
 from ...presentation.layout import Layout
 from ...presentation.results import label
-from ...presentation.tables import Summary, words
+from ...presentation.tables import Column, Summary, words
 
 
 def _summary(records: Sequence[Record]) -> Summary:
@@ -19,6 +20,12 @@ def _summary(records: Sequence[Record]) -> Summary:
     )
 
 
+def _taken(title: str, name: str) -> list[Column]:
+    """Return the columns of a call's time of the processor, and by the clock on the wall."""
+    pair = (number(f"{title}, {clock}", f"{name} {clock}", "s") for clock in ("processor", "wall"))
+    return [replace(column, group=title, folded=i > 0) for i, column in enumerate(pair)]
+
+
 first_calls = Layout(
     "What does the first call cost, which compiles?",
     "first_calls",
@@ -28,10 +35,8 @@ first_calls = Layout(
         titled("function"),
         text("by", lambda record: label(record.solver)),
         number("compiled", "cold compiled"),
-        number("nothing on disk, processor", "cold processor", "s"),
-        number("nothing on disk, wall", "cold wall", "s"),
-        number("compiled before, processor", "warm processor", "s"),
-        number("compiled before, wall", "warm wall", "s"),
+        *_taken("nothing on disk", "cold"),
+        *_taken("compiled before", "warm"),
     ),
     shows="A kernel is compiled by the first call that needs it, and kept on disk; importing "
     "the compiler is part of the first call, importing Plumbob is not. The third column counts "

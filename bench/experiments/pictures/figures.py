@@ -85,7 +85,7 @@ def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "PathCollection"
     import matplotlib as mpl
     from matplotlib.colors import LogNorm
 
-    from ...presentation.scene_drawing import ARM_VIEW, seen
+    from ...presentation.view import ARM_VIEW, seen
 
     x, y, _ = seen(curve[:-1], ARM_VIEW)
     shades = mpl.colormaps["viridis"].resampled(SHADES)
@@ -96,7 +96,8 @@ def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "PathCollection"
 def _ghosts(ax: "Axes", ghosts: Any) -> None:
     import numpy as np
 
-    from ...presentation.scene_drawing import ARM_VIEW, draw_arm, seen
+    from ...presentation.scene_drawing import draw_arm
+    from ...presentation.view import ARM_VIEW, seen
 
     for joints, alpha in zip(ghosts, np.linspace(0.06, 0.5, len(ghosts)), strict=True):
         draw_arm(ax, joints, alpha)

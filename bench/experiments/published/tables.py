@@ -1,7 +1,10 @@
 """Published tables, and the same set-up here."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
+
+import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
@@ -16,6 +19,7 @@ from ...presentation.tables import (
     listing,
     words,
 )
+from ..robots.readings import RULE, cut, solved, total
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
 
@@ -32,6 +36,7 @@ class Rate(NamedTuple):
     percent: float | None = None
     median: float | None = None
     mean: float | None = None
+    mark: str = ""
 
 
 def _rates(results: Results) -> list[Rate]:
@@ -50,7 +55,7 @@ def _rates(results: Results) -> list[Rate]:
 def _measured_rate(record: Record) -> Rate:
     if "solved" not in record.arrays:
         return Rate(record.facts["robot"], record.solver, record.notes.get("remark", ""))
-    share = metrics.share(record.arrays["solved"])
+    share = metrics.share(solved(record))
     median, _, mean = effort(record)
     return Rate(
         record.facts["robot"],
@@ -60,6 +65,7 @@ def _measured_rate(record: Record) -> Rate:
         in_unit(metrics.ratio(share.hits, share.total), "%"),
         in_unit(median, "ms"),
         in_unit(mean, "ms"),
+        cut(record),
     )
 
 
@@ -68,19 +74,21 @@ def _published_rate(record: Record) -> float | None:
 
 
 def _unclaimed(record: Record) -> float:
-    share = metrics.share(record.arrays["claimed"] != 1)
-    return metrics.ratio(share.hits, share.total)
+    """Return the share of all targets that a search does not call solved, begun or not."""
+    return 1.0 - metrics.ratio(float(np.sum(record.arrays["claimed"] == 1)), total(record))
 
 
 def _failed(record: Record) -> metrics.Share:
-    return metrics.share(~record.arrays["solved"])
+    return metrics.share(~solved(record))
 
 
 def _said_of_search(record: Record) -> str:
     before = _published_rate(record)
     beside = "" if before is None else f", published {words(before)} %"
     own = words_in(_unclaimed(record), "%")
-    return f"{record.solver}: {own} infeasible by its own word{beside}; {words(_failed(record))}"
+    marked = f", {cut(record)}" if cut(record) else ""
+    said = f"{own} infeasible by its own word{beside}; {words(_failed(record))}{marked}"
+    return f"{record.solver}: {said}"
 
 
 trac_ik = Layout(
@@ -91,15 +99,19 @@ trac_ik = Layout(
         text("robot", lambda rate: rate.robot),
         text("solver", lambda rate: rate.solver),
         text("from", lambda rate: rate.source),
-        Column("solved", note=INTERVAL, read=lambda rate: rate.solved),
         Column("solved", "%", read=lambda rate: rate.percent, factor=1.0),
-        Column("time, median", "ms", read=lambda rate: rate.median, factor=1.0),
         Column("time, mean", "ms", read=lambda rate: rate.mean, factor=1.0),
+        text("mark", lambda rate: rate.mark),
+        replace(Column("solved", note=INTERVAL, read=lambda rate: rate.solved), folded=True),
+        replace(
+            Column("time, median", "ms", read=lambda rate: rate.median, factor=1.0), folded=True
+        ),
     ),
+    ranked=lambda rate: not rate.mark,
     subjects=_rates,
     shows="Full poses at 1e-5 m and rad in each of six components, every search from the "
     "middle of the limits, at most 5 ms for TRAC-IK; times of all targets, those that failed "
-    "included.",
+    f"included. {RULE}",
     measured="Published: 10,000 reachable random poses on a machine of its time. Here: as many "
     "of our own as the column says, evaluated by MuJoCo at the norm of three such components; "
     "the PR2’s continuous joints have two revolutions in either direction.",
@@ -107,6 +119,7 @@ trac_ik = Layout(
         "Here:",
         (
             f"{rate.robot}, {rate.solver}: {words(rate.solved)}, mean {words(rate.mean)} ms"
+            f"{', ' if rate.mark else ''}{rate.mark}"
             for rate in rates
             if rate.solved
         ),
@@ -125,11 +138,12 @@ toolbox = Layout(
         Column("here, by its own word", "%", read=_unclaimed),
         Column("here, not solved within the limits", note=INTERVAL, read=_failed),
         *places("time", "µs", ("median",), effort),
+        text("mark", cut),
     ),
     shows="UR5, random poses and starts, one search of at most "
     f"{words(published.TOOLBOX_ITERATIONS)} iterations; infeasible is what the search does not "
     "solve. The published searches look at no limits, nor do the toolbox’s here; the last "
-    "share counts answers beyond the limits as not solved.",
+    f"share counts answers beyond the limits as not solved. {RULE}",
     measured="Published: 10,000 poses, the tutorial’s own Python loops (Haviland and Corke "
     "2022). Here the toolbox’s compiled ones, and ours; half the squared error within "
     f"{words(published.TOOLBOX_HALF_SQUARE)}.",
@@ -184,11 +198,19 @@ def _fabrik_summary(solvers: Sequence[Counted]) -> Summary:
     return Summary(
         "Mean iterations towards a reachable target:",
         tuple(
-            f"{label(one.solver)}: {words(one.mean(NEAR))} here, "
+            f"{label(one.solver)}: {_mean_in_words(one)} here, "
             f"{words(one.published(NEAR))} published"
             for one in solvers
         ),
     )
+
+
+def _mean_in_words(counted: Counted) -> str:
+    if NEAR not in counted.here:
+        return words(None)
+    counts = counted.here[NEAR].arrays["iterations"]
+    mean, low, high = metrics.mean_interval(counts)
+    return f"{words(mean)} ({words(low)}–{words(high)}, n = {words(counts.size)})"
 
 
 fabrik = Layout(

@@ -78,8 +78,14 @@ agreement = Layout(
     "Robots and characters from files, beside both engines",
     columns=(
         text("file", lambda file: file[0].title),
-        *(Column(title, read=partial(_size, name=name)) for title, name in SIZES.items()),
-        *(Column(title, read=partial(_most, name=name)) for title, name in QUANTITIES.items()),
+        *(
+            Column(title, read=partial(_size, name=name), folded=title != "freedoms")
+            for title, name in SIZES.items()
+        ),
+        *(
+            Column(title, read=partial(_most, name=name), group="largest difference")
+            for title, name in QUANTITIES.items()
+        ),
         text("engines", lambda file: listed([r.solver for r in _agreeing(file)]) or "none"),
         text("but", lambda file: "; ".join(filter(None, map(_remark, file)))),
     ),

@@ -30,7 +30,7 @@ def robot_curves(
         panels = curves(records, along)
         if not panels:
             return None
-        counts = {(r.title, r.solver): r.arrays["solved"].size for r in readings.measured(records)}
+        counts = {(r.title, r.solver): readings.total(r) for r in readings.measured(records)}
         return chart_sketch(
             Chart(
                 name,

@@ -5,6 +5,7 @@ never began count as not solved. It has a mark, and is not ranked; nor is one wh
 other targets than those of most solvers.
 """
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +18,8 @@ from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
 from ...presentation.columns import words_in
-from ...presentation.results import Results, settings
+from ...presentation.results import Results, settings, steadiness
+from ...presentation.tables import words
 from . import LIMIT_TOLERANCE, REACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}
@@ -78,10 +80,15 @@ def _commonest(records: Sequence[Record]) -> int:
 def _marked(record: Record, size: int) -> Record:
     if "solved" not in record.arrays:
         return record
+    others = f"other targets, {total(record)}" if total(record) != size else ""
+    marks = "; ".join(filter(None, (cut(record), others)))
+    return replace(record, notes={**record.notes, MARK: marks})
+
+
+def cut(record: Record) -> str:
+    """Return where a budget of time ended a record's targets, "" if there was enough of it."""
     asked, begun = total(record), record.arrays["solved"].size
-    marks = [f"cut at {begun} of {asked}"] if begun < asked else []
-    marks += [f"other targets, {asked}"] if asked != size else []
-    return replace(record, notes={**record.notes, MARK: "; ".join(marks)})
+    return f"cut at {words(begun)} of {words(asked)}" if begun < asked else ""
 
 
 def is_ranked(record: Record) -> bool:
@@ -245,8 +252,11 @@ def _of_same_targets(records: Sequence[Record]) -> list[Record]:
 
 
 def how(records: Sequence[Record]) -> str:
-    """Return how the numbers of records came about."""
+    """Return how the numbers of records came about, and whether the machine was steady."""
+    paces = [float(r.conditions["pace"]) for r in records if r.conditions.get("pace")]
+    noise = metrics.relative_spread(np.array(paces)) if len(paces) > 1 else math.nan
     return (
         f"{_MEASURED}within {settings(records, 'tolerance')} m and "
-        f"{settings(records, 'tolerance_rotation')} rad, every limit kept to 1e-6 rad."
-    )
+        f"{settings(records, 'tolerance_rotation')} rad, every limit kept to 1e-6 rad. "
+        f"{steadiness(noise)}"
+    ).rstrip()

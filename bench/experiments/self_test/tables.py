@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from ...harness.record import Record
-from ...presentation.columns import number, text, titled
+from ...presentation.columns import folded, number, text, titled
 from ...presentation.layout import Layout
 from ...presentation.results import Results
 from ...presentation.tables import Column, Summary
@@ -80,7 +80,7 @@ def _matrix(records: Sequence[Record]) -> list[Column]:
         text("solvers", lambda record: str(record.facts["family"])),
         titled("fault"),
         number("named"),
-        *(_law(law) for law, _ in broken.most_common(MOST_LAWS)),
+        *folded(_law(law) for law, _ in broken.most_common(MOST_LAWS)),
     ]
 
 

@@ -1,15 +1,18 @@
 """How long forward kinematics, solves and steps take, beside the engines and a limit."""
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import at, text
+from ...presentation.columns import at, text, words_in
 from ...presentation.layout import Layout
-from ...presentation.results import Results, by_problem
-from ...presentation.tables import Column, Summary, in_unit, words
+from ...presentation.results import PRECISION, Results, by_problem, leaders, steadiness
+from ...presentation.tables import Column, Summary, words
 from . import figures
 from .case import COMPILED, LIMIT, PLAIN
 
@@ -26,6 +29,16 @@ class Timed(NamedTuple):
         """Where the rounds lie [s]."""
         return metrics.timing(self.record.arrays["seconds"])
 
+    @property
+    def precision(self) -> float | None:
+        """Half the width of the median's interval over the median, None if nothing is known."""
+        return _precision(self.record)
+
+    @property
+    def mark(self) -> str:
+        """Whether the machine was too noisy while it was timed."""
+        return "noisy" if self.record.facts.get("noise", 0.0) > PRECISION else ""
+
 
 def _timed(subject: str, results: Results) -> list[Timed]:
     records = results.all("timing", subject=subject)
@@ -38,6 +51,11 @@ def _timed(subject: str, results: Results) -> list[Timed]:
         for record in records
         if record.solver != LIMIT
     ]
+
+
+def _precision(record: Record) -> float | None:
+    median, low, high = metrics.timing(record.arrays["seconds"]).interval
+    return None if math.isnan(low) else (high - low) / (2.0 * median)
 
 
 def _median(record: Record) -> float:
@@ -63,8 +81,8 @@ LIMIT_SENTENCE = (
     "in memory as near as theirs."
 )
 LIMIT_COLUMNS = (
-    Column("times the limit", read=lambda timed: _multiple(timed.record, timed.limit)),
-    Column("bandwidth at the limit", "GB/s", read=_bandwidth),
+    Column("times the limit", read=lambda timed: _multiple(timed.record, timed.limit), folded=True),
+    Column("bandwidth at the limit", "GB/s", read=_bandwidth, folded=True),
 )
 
 
@@ -74,9 +92,11 @@ def _columns(unit: str, works: Sequence[Timed]) -> tuple[Column, ...]:
         text("work", lambda timed: timed.record.title),
         text("by", lambda timed: timed.record.solver),
         Column("median", unit, read=at(0, _timing), best="least"),
+        Column("median known to ±", "%", read=lambda timed: timed.precision),
+        Column("of our compiled time", read=lambda timed: _multiple(timed.record, timed.ours)),
+        text("mark", lambda timed: timed.mark),
         *(Column(name, unit, read=at(i, _timing), folded=True) for i, name in enumerate(places, 1)),
         Column("rounds", read=lambda timed: timed.timing.rounds, folded=True),
-        Column("of our compiled time", read=lambda timed: _multiple(timed.record, timed.ours)),
         *(LIMIT_COLUMNS if any(timed.limit for timed in works) else ()),
     )
 
@@ -92,16 +112,59 @@ def _summary(unit: str, works: Sequence[Timed]) -> Summary:
     for problem, records in by_problem(timed.record for timed in works).items():
         group, work = records[0].facts["group"], records[0].facts["work"]
         mine = [record for record in records if record.solver != PLAIN]
-        times = ", ".join(f"{_short(r.solver)} {words(in_unit(_median(r), unit))}" for r in mine)
+        times = ", ".join(f"{_short(r.solver)} {_time(r, unit)}" for r in mine)
         multiple = _multiple(mine[0], limits[problem]) if mine else None
         beside = "" if multiple is None else f" ({words(multiple)} times the limit)"
-        groups.setdefault(group, []).append(f"{work}: {times} {unit}{beside}")
+        groups.setdefault(group, []).append(f"{work}: {times}{beside}{_first(mine)}")
     points = (f"{group} – {'; '.join(works)}" for group, works in groups.items())
-    return Summary("Medians, plain Python left out:", tuple(points))
+    noise = _noise(works)
+    warning = f"{steadiness(noise)} " if noise > PRECISION else ""
+    said = "Medians, known in 95 % of cases to what stands behind ±, plain Python left out:"
+    return Summary(warning + said, tuple(points))
+
+
+def _noise(works: Sequence[Timed]) -> float:
+    """Return by how much a fixed loop varied where it varied most, NaN if that is not known."""
+    return max((timed.record.facts.get("noise", math.nan) for timed in works), default=math.nan)
+
+
+def _time(record: Record, unit: str) -> str:
+    precision = _precision(record)
+    known = "" if precision is None else f" ± {round(100 * precision, 1):g} %"
+    return f"{words_in(_median(record), unit)}{known}"
+
+
+def _first(records: Sequence[Record]) -> str:
+    """Say who is first of several, or who ties, by the medians of the sweeps that they share.
+
+    Nothing is said of what was timed apart: its sweeps are no pairs.
+    """
+    if len({record.facts.get("together") for record in records}) > 1:
+        return " – timed apart, and not ranked"
+    sweeps = {_short(r.solver): _of_sweeps(r) for r in records}
+    if len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
+        return ""
+    return f" – first: {leaders(metrics.ranking(sweeps))}"
+
+
+def _of_sweeps(record: Record) -> metrics.Floats:
+    """Return how good each sweep was, the logarithm of one over its median, (sweep,)."""
+    seconds = record.arrays["seconds"]
+    return -np.log(np.median(seconds, axis=-1) if seconds.ndim == 2 else seconds)
 
 
 def _short(solver: str) -> str:
     return "Plumbob" if solver == COMPILED else solver
+
+
+def _how(works: Sequence[Timed]) -> str:
+    return (
+        "pytest-benchmark, one core unless all are named, after a first call that may compile; "
+        "each time is a call’s divided by what it does. All that is compared alternates in an "
+        "order by seeded lot, sweep after sweep; the interval is of the medians of sweeps, by "
+        "order statistics, and two tie unless lots for the signs of their differences, sweep by "
+        f"sweep, would set them as far apart in less than 5 % of cases. {steadiness(_noise(works))}"
+    ).rstrip()
 
 
 def _layout(question: str, subject: str, title: str, unit: str, shows: str) -> Layout:
@@ -112,8 +175,7 @@ def _layout(question: str, subject: str, title: str, unit: str, shows: str) -> L
         subjects=partial(_timed, subject),
         columns=partial(_columns, unit),
         shows=lambda works: shows + (LIMIT_SENTENCE if any(timed.limit for timed in works) else ""),
-        measured="pytest-benchmark, one core unless all are named, after a first call that may "
-        "compile; each time is a call’s divided by what it does. Spread over rounds of many calls.",
+        measured=_how,
         summary=partial(_summary, unit),
         figures=(figures.TIMINGS[subject],),
     )

@@ -1,0 +1,160 @@
+"""The first screen's answers: who leads by what, what ties, who was absent, at which scale."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.harness import metrics
+from bench.harness.record import FINISHED
+from bench.peers import registry
+from bench.presentation import headlines
+from bench.presentation.layout import source
+from bench.presentation.results import Results
+
+N = 200
+FASTEST = "Fastest, misses penalised"
+
+
+def raced(make, solver, solved, seconds=1e-5, robot="arm", size=N):
+    """A record of N targets, the first so many of them solved, each in these seconds."""
+    count = len(seconds) if np.ndim(seconds) else N
+    changed = {"solved": np.arange(count) < solved, "claimed": np.ones(count)}
+    changed |= {"seconds": np.full(count, seconds), "stratum": np.zeros(count, int)}
+    changed |= dict.fromkeys(("position", "rotation", "beyond"), np.zeros(count))
+    return replace(make.raced(solver, "one start", robot=robot, **changed), size=float(size))
+
+
+def asked(records, question, chapter="kinematics"):
+    (found,) = [h for h in headlines.headlines(Results(records))
+                if (h.asked, h.chapter) == (question, chapter)]  # fmt: skip
+    return found
+
+
+def test_the_most_accurate_leads_alone_only_where_chance_would_not_do_as_much(make):
+    far = [raced(make, "a", 190), raced(make, "b", 100)]
+    assert asked(far, "Most accurate")[2:4] == ("a", "solves 95 % of 200 poses (91–97.3)")
+    near = [raced(make, "a", 190), raced(make, "b", 188), raced(make, "c", 20)]
+    assert asked(near, "Most accurate").answer == "Tie: a, b"
+    assert asked([*near, raced(make, "d", 189)], "Most accurate").answer == "Tie: 3 solvers"
+
+
+def test_a_solver_cut_short_is_not_ranked(make):
+    cut = raced(make, "slow", 3, seconds=[1.0, 1.0, 1.0])
+    records = [raced(make, "a", 150), raced(make, "b", 20), cut]
+    assert asked(records, "Most accurate").answer == "a"
+    assert "slow" not in asked(records, FASTEST).detail
+    assert headlines.headlines(Results([records[0], cut])) == []
+
+
+def test_solvers_are_compared_on_robots_on_which_most_of_them_can_be(make):
+    records = [raced(make, s, 150, robot=r) for s in ("a", "b") for r in ("arm", "ur5", "hand")]
+    assert "of 600 poses" in asked(records, "Most accurate").detail
+    chains = [raced(make, "c", 199, robot=r) for r in ("arm", "ur5")]
+    assert "of 400 poses" in asked([*records, *chains], "Most accurate").detail
+
+
+def test_the_fastest_leads_by_a_factor_with_its_interval_and_count(make):
+    spread = np.geomspace(1.0, 1.2, N)
+    records = [raced(make, "a", N, 1e-3 * spread), raced(make, "b", N, 4e-3 * spread[::-1])]
+    answer, detail = asked(records, FASTEST)[2:4]
+    assert answer == "a"
+    assert detail == "3.97 × b (3.91–4.03), 200 poses"  # 4, but for the shift of 10 µs
+
+
+def test_who_is_no_faster_beyond_chance_ties(make):
+    noise = np.exp(np.random.default_rng(0).normal(0.0, 1.0, (2, N)))
+    records = [raced(make, s, N, 1e-5 * of) for s, of in zip("ab", noise, strict=True)]
+    assert asked(records, FASTEST).answer.startswith("Tie: ")
+
+
+def test_a_solver_that_fails_fast_is_not_the_fastest(make):
+    records = [raced(make, "a", 190, 1e-4), raced(make, "hasty", 5, 1e-6), raced(make, "b", 190)]
+    assert asked(records, FASTEST).answer == "b"
+
+
+@pytest.mark.parametrize(("factor", "answer"), [(2.0, "Pinocchio"), (1.01, "Tie: ")])
+def test_works_whose_rounds_overlap_are_nobodys(make, factor, answer):
+    """Rounds are 1, 2 and 3 times the time that is given."""
+    works = [make.timed("Pinocchio", 1e-7), make.timed("Plumbob, compiled", 1e-7 * factor * 5)]
+    if factor < 2:
+        works[1] = make.timed("Plumbob, compiled", 1e-7 * factor)
+    found = asked(works, "Forward kinematics", "speed")
+    assert found.answer.startswith(answer)
+    assert found.detail == ("10.0 × the next, 1/1 works" if factor == 2 else "no lead in 1 works")
+
+
+def test_plain_python_and_the_limit_are_no_rivals(make):
+    names = (registry.PLAIN.name, registry.LIMIT_NAME, "Plumbob, compiled")
+    records = [make.timed(name, 1e-7) for name in names]
+    assert headlines.headlines(Results(records)) == []
+
+
+def test_a_cloth_is_solved_by_who_arrives_and_first_by_its_engine(make):
+    records = [
+        make.worked("Plumbob Newton", error=(1e-3, 1e-9), seconds=(1e-3, 2e-3)),
+        make.worked("Plumbob L-BFGS", error=(1e-3, 1e-7), seconds=(1e-3, 3e-3)),
+        make.worked("MuJoCo Euler", error=(0.5, 0.4)),
+    ]
+    assert asked(records, "Most accurate", "cloth")[2:4] == (
+        "Tie: Plumbob Newton, Plumbob L-BFGS", "within 1e-6 on 1/1 cloths")  # fmt: skip
+    assert asked(records, "Fastest", "cloth").detail == "no rival arrives, 1/1 cloths"
+    arrived = make.worked("MuJoCo discrete", error=(0.5, 1e-8), seconds=(1e-3, 8e-3))
+    found = asked([*records, arrived], "Fastest", "cloth")
+    assert found[2:4] == ("Plumbob", "4.00 × the next, 1/1 cloths")
+
+
+def test_the_verdict_names_the_claim_with_the_narrowest_margin(make):
+    wide, narrow = make.claim("wide"), make.claim("narrow")
+    narrow.arrays["difference"] = np.array(9e-13)
+    found = headlines.verdict(Results([wide, narrow, make.claim("broken", held=False)]))
+    assert found == headlines.Verdict(2, 3, "narrow", pytest.approx(0.9))
+    assert headlines.verdict(Results([])) is None
+
+
+def test_peers_without_a_measurement_are_absent(make):
+    records = [
+        raced(make, "pink", 1),
+        raced(make, "Plumbob LM", 1),
+        make.lacking("mink", "one start", ""),
+    ]
+    found = headlines.absent(Results([*records, make.worked("Plumbob Newton")]))
+    assert "mink" in found
+    assert not {"pink", "Plumbob LM"} & set(found)
+    assert [name for name in found if name.endswith("(cloth)")] == [
+        "MuJoCo (cloth)",
+        "Newton (cloth)",
+    ]
+    assert headlines.absent(Results([])) == []
+
+
+def test_the_scale_says_how_many_targets(make):
+    quick = make.record(FINISHED, "ik", "", notes={"scale": "quick"})
+    assert headlines.scale(Results([quick, raced(make, "a", 1)])) == (
+        "Quick run: 100 targets a stratum")  # fmt: skip
+    assert headlines.scale(Results([])) == ""
+
+
+def test_nothing_measured_gives_no_headline():
+    assert headlines.answers(Results([])) == (None, [], "", [])
+
+
+def test_a_paired_ratio_holds_the_factor_and_a_single_pair_leaves_it_open():
+    found = metrics.paired_ratio(np.array([2.0, 8.0, np.nan]), np.array([1.0, 2.0, 1.0]))
+    assert found.mean == pytest.approx(np.sqrt(8.0))
+    assert found.low < 1.0 < found.high
+    assert found.pairs == 2
+    assert metrics.paired_ratio(np.array([2.0]), np.array([1.0])) == (2.0, 0.0, np.inf, 1)
+    many = metrics.paired_ratio(np.full(50, 3.0), np.ones(50))
+    assert many.low == pytest.approx(3.0)
+
+
+def test_a_row_says_what_measures_it_again(make):
+    record = raced(make, "Pinocchio’s closed loop", 1)
+    command = "plumbob bench ik --solver 'Pinocchio’s closed loop' --problem robots/arm"
+    assert source(record).command == command
+    assert source((record, 3)).command == command
+    many = [raced(make, name, 1) for name in "abcd"]
+    assert source(many).command == "plumbob bench ik --problem robots/arm"
+    assert source(make.lacking("pink", "one start", "not installed")).command == ""
+    assert source("no record").command == ""

@@ -1,0 +1,267 @@
+"""LaTeX: every table compiles, nothing is smaller than eight points, and every name is data."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bench.harness.metrics import Share, share
+from bench.presentation import fitting, latex, sections, tex_text
+from bench.presentation.fitting import Need
+from bench.presentation.results import Results, plain
+from bench.presentation.tables import Column, Table
+
+HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
+NAMES = (
+    *(HOSTILE, r"\input{/etc/passwd}", r"$\frac{$", "[red]x", "*[2cm]", "x" * 5_000, "手腕"),
+    *("é ß Å ł", r"\end{tabular}\\", "--- ,, '' ?` !`", "%", "", "~^_", "{", "}", "$", "&"),
+    *("ω² ≤ M⁻¹ K − 2 × 3 · 10 → ∞", "Levenberg-Marquardt/very_long-winded.name"),
+    *("\x00\x07", "a\u202eb", "0" * 60, "1.2e-5"),
+)  # fmt: skip
+# An overfull box of this little [pt] is not seen; widths are rounded to a tenth of a point.
+OVERFULL = 1.0
+COLUMNS = (Column("name", words=True), Column("value", "m", best="least"))
+
+
+def table(*rows, columns=COLUMNS, **more):
+    return Table("t", "Title", columns, rows, **more)
+
+
+def many_columns(count, rows=2):
+    """A table far too wide for a page."""
+    columns = [Column("solver", words=True), Column("remark", words=True, folded=True)]
+    columns += [
+        Column(f"time, of kind {i}", "µs", group="time", best="least") for i in range(count)
+    ]
+    cells = [(f"solver {i}", "said " * 30, *(10.0 ** (j % 9 - 5) for j in range(count)))
+             for i in range(rows)]  # fmt: skip
+    return Table("wide", "A wide table", tuple(columns), tuple(cells), compared=0)
+
+
+def hostile():
+    rows = [
+        (name, other, 1.0 / (i + 1)) for i, name in enumerate(NAMES) for other in NAMES[i : i + 1]
+    ]
+    columns = (Column("name", words=True), Column("note", words=True), Column("value", "kg m²"))
+    return Table('t"}\\x', HOSTILE, columns, tuple(rows), HOSTILE, HOSTILE, provenance="x" * 3_000)
+
+
+def mixed():
+    """Numbers of all kinds in one column, shares of one total and of several."""
+    numbers = [1, 12_345, -1.2e-15, 0.0123, 123_456.0, float("nan"), None, float("inf"), 2.5e9, 0.0]
+    columns = (Column("i"), Column("n", best="greatest"), Column("of 100"), Column("of several"))
+    rows = [(i, n, share(np.arange(100) < 9 * i), share(np.arange(50 + i) < i))
+            for i, n in enumerate(numbers)]  # fmt: skip
+    return Table("mixed", "Mixed", columns, tuple(rows), compared=0)
+
+
+@pytest.fixture(scope="module")
+def every_table(records):
+    """The tables of a report, and some that are harder."""
+    made = sections.tables(Results([plain(record) for record in records]))
+    long = [(f"solver {i}", 1.0 / (i + 1)) for i in range(120)]
+    return [
+        *made,
+        many_columns(30),
+        many_columns(12, 60),
+        hostile(),
+        mixed(),
+        table(*long),
+        table(),
+    ]
+
+
+def document(tables, width):
+    """A whole document of tables, as wide as they may be, in fonts that scale to any size."""
+    body = "\n\\clearpage\n".join(latex.latex(made, width) for made in tables)
+    return (
+        r"\pdfcompresslevel=0 \pdfobjcompresslevel=0 \documentclass{article}"
+        r"\usepackage[T1]{fontenc}\usepackage{lmodern,booktabs,longtable,siunitx}"
+        rf"\usepackage[textwidth={latex.paper(width).width:.1f}pt,textheight=640pt]{{geometry}}"
+        rf"\begin{{document}}{body}\end{{document}}"
+    )
+
+
+@pytest.fixture(scope="module", params=["page", "column"])
+def compiled(request, every_table, tmp_path_factory):
+    """The log and the uncompressed PDF of all tables."""
+    if not shutil.which("pdflatex"):
+        pytest.skip("pdflatex is not installed")
+    folder = tmp_path_factory.mktemp("tex")
+    (folder / "all.tex").write_text(document(every_table, request.param), encoding="utf-8")
+    command = [
+        "pdflatex",
+        "-halt-on-error",
+        "-interaction=nonstopmode",
+        "-no-shell-escape",
+        "all.tex",
+    ]
+    run = subprocess.run(command, cwd=folder, capture_output=True, timeout=300)
+    log = (folder / "all.log").read_text(encoding="utf-8", errors="replace")
+    assert run.returncode == 0, [line for line in log.splitlines() if line.startswith("!")]
+    return log, (folder / "all.pdf").read_bytes()
+
+
+def test_all_tables_compile_and_none_sticks_out(compiled):
+    log, _ = compiled
+    wide = [float(points) for points in re.findall(r"Overfull .hbox \(([\d.]+)pt", log)]
+    assert max(wide, default=0.0) <= OVERFULL
+    assert "Float too large" not in log
+    assert not re.findall(r"Overfull .vbox.*", log)
+
+
+def test_no_text_is_smaller_than_eight_points(compiled):
+    """What is set in a font says so by Tf [1/72 inch], and no matrix but the identity scales it.
+
+    pdfTeX writes `/F8 7.9701 Tf` for 8 points; scaling by \\resizebox would leave this and write a
+    matrix `x 0 0 x 0 0 cm` around it.
+    """
+    _, pdf = compiled
+    sizes = [72.27 / 72 * float(size) for size in re.findall(rb"/F\d+ ([\d.]+) Tf", pdf)]
+    assert len(sizes) > 1000
+    assert min(sizes) > 7.999
+    scaled = set(re.findall(rb"([-\d.]+) [-\d.]+ [-\d.]+ ([-\d.]+) [-\d.]+ [-\d.]+ cm", pdf))
+    assert scaled <= {(b"1", b"1")}
+    assert not re.search(rb" T[zs]\b", pdf)
+
+
+@pytest.mark.parametrize("width", ["page", "column", "120mm", "7in"])
+def test_no_table_is_scaled_or_set_below_eight_points(every_table, width):
+    for made in every_table:
+        text = latex.latex(made, width)
+        assert not re.search(r"resizebox|scalebox|\\(tiny|scriptsize|footnotesize)\b", text)
+        assert min(map(int, re.findall(r"\\fontsize\{(\d+)\}", text))) >= 8
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_braces_and_environments_close_in_turn_whatever_a_name_is(name):
+    made = Table(
+        name, name, (Column(f"{name} "), Column("b", group=name)), ((name, 1.0),), name, name
+    )
+    lines = latex.latex(made).splitlines()
+    text = re.sub(r"\\[{}%\\]", "", "\n".join(line for line in lines if not line.startswith("%")))
+    depths = np.cumsum([{"{": 1, "}": -1}.get(character, 0) for character in text])
+    assert depths.min() == depths[-1] == 0
+    opened = []
+    for what, inner in re.findall(r"\\(begin|end)\{([a-z*]+)\}", text):
+        if what == "begin":
+            opened.append(inner)
+        else:
+            assert opened.pop() == inner
+    assert opened == []
+
+
+@given(st.text(max_size=40))
+def test_a_text_is_data_of_letters_that_every_tex_has(text):
+    made = tex_text.breakable(text, 5.0)
+    assert made.isascii()
+    assert "\n" not in made
+    known = (
+        r"\\(text\w+|ensuremath|hspace|raisebox|num|dots|ss|ae|o|l|AE|O|L)\b|\\[`'^~=u.\"rHvc]\{"
+    )
+    rest = re.sub(rf"{known}|\\[{{}}$&#%_]", "", made)
+    assert not set(re.sub(r"\{.*?\}", "", rest)) & set("$&#%^~")
+
+
+@pytest.mark.parametrize("name", ["[red]x", "*", "*[2cm]"])
+def test_a_row_is_no_option_of_the_row_before(name):
+    text = latex.latex(table(("a", 1), ("a", 2), (name, 1.0)))
+    assert not re.search(r"(\\\\|\\midrule|\\addlinespace)\s*[\[*]", text)
+
+
+def test_numbers_are_aligned_by_siunitx_and_the_best_are_bold_ties_too():
+    text = latex.latex(table(("a", 1.2e-5), ("b", 0.5), ("c", 1.2001e-5), compared=0))
+    assert "S[table-format=1.3e-1]" in text
+    assert r"a & \bfseries 1.2e-5 \\" in text
+    assert r"c & \bfseries 1.2e-5 \\" in text
+    assert "b & 0.500" in text
+    assert "Best in bold" in text
+
+
+def test_a_share_says_its_total_once_where_all_have_the_same():
+    same = latex.latex(table(("a", Share(1, 2, 0.1, 0.9)), ("b", Share(2, 2, 0.3, 1.0))))
+    assert "(of 2)" in same
+    assert r"b & 100 (30\textendash{}100)" in same.replace(r"\bfseries ", "")
+    several = latex.latex(table(("a", Share(1, 2, 0.1, 0.9)), ("b", Share(2, 3, 0.3, 1.0))))
+    assert r"of 3 \\" in several
+
+
+def test_groups_stand_under_a_heading_in_common():
+    columns = (
+        Column("name", words=True),
+        *(Column(f"time, {n}", group="time") for n in ("a", "b")),
+    )
+    text = latex.latex(table(("x", 1.0, 2.0), columns=columns))
+    assert r"\multicolumn{2}{c}{time}" in text
+    assert r"\cmidrule(lr){2-3}" in text
+    assert "{a} & {b}" in text
+
+
+def test_rows_of_one_name_are_set_apart_from_others():
+    assert "addlinespace" not in latex.latex(table(("a", 1), ("b", 2)))
+    assert latex.latex(table(("a", 1), ("a", 2), ("b", 3))).count("addlinespace") == 1
+
+
+@pytest.mark.parametrize(("rows", "is_long"), [(40, False), (41, True)])
+def test_more_than_forty_rows_break_over_pages(rows, is_long):
+    text = latex.latex(table(*((f"{i}", 1.0) for i in range(rows))))
+    assert (r"\begin{longtable}" in text) == is_long
+    assert (r"\begin{table*}" in text) == (not is_long)
+
+
+def test_what_is_too_wide_loses_folded_columns_then_stands_in_parts():
+    text = latex.latex(many_columns(20), "column")
+    assert "said" not in text
+    assert "1 of 22 columns left out" in text
+    assert text.count(r"\begin{tabular}{@{}") > 1
+    assert text.count("solver 1") == text.count(r"\toprule") > 1
+    assert len(re.findall(r"S\[", text)) == 20
+
+
+def test_a_caption_says_how_many_on_which_machine_with_what(records):
+    made = sections.tables(Results([plain(record) for record in records]))
+    captions = {t.name: latex.latex(t).split(r"\caption")[1].split(r"\label")[0] for t in made}
+    arm = captions["accuracy"]
+    for fact in ("n = 2 to 3", r"tolerance \num{1.0e-4}", "slide", "Plumbob 0.0", "2000-01-02"):
+        assert fact in arm
+    assert "Starts:" in arm
+
+
+@pytest.mark.parametrize("width", ["", "wide", "-3mm", "10mm", "1e9in", "3", "3 ells"])
+def test_a_width_that_is_none_is_refused(width):
+    with pytest.raises(ValueError, match="--width: expected column, page or a length"):
+        latex.paper(width)
+
+
+needs = st.lists(
+    st.tuples(st.floats(1, 50), st.floats(0, 80), st.booleans()).map(
+        lambda n: Need(n[0], n[0] + n[1], n[2])
+    ),
+    min_size=1,
+    max_size=12,
+)
+
+
+@given(needs, st.floats(1, 2000), st.floats(0, 9))
+def test_widths_are_within_what_columns_ask_for_and_fill_no_more_than_there_is(needs, width, gap):
+    if not fitting.fits(needs, width, gap):
+        with pytest.raises(ValueError, match="width: expected more"):
+            fitting.assigned(needs, width, gap)
+        return
+    widths = fitting.assigned(needs, width, gap)
+    assert sum(widths) + gap * (len(needs) - 1) <= width + 1e-6
+    for made, need in zip(widths, needs, strict=True):
+        assert need.least - 1e-9 <= made <= need.natural + 1e-9
+    if sum(need.natural for need in needs) + gap * (len(needs) - 1) <= width:
+        assert np.allclose(widths, [need.natural for need in needs])
+
+
+@given(needs, st.floats(60, 500))
+def test_parts_hold_every_column_once_and_those_that_name_a_row_always(needs, width):
+    made = fitting.parts(1, needs, width, 2.0)
+    assert [i for part in made for i in part[1:]] == list(range(1, len(needs)))
+    assert all(part[0] == 0 for part in made)

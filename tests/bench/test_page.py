@@ -1,0 +1,353 @@
+"""The page in a browser: its first screen, its tables, its addresses; it asks for nothing."""
+
+import itertools
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, Browser
+
+from bench.harness.record import FINISHED, RecordFile
+from bench.peers import registry
+from bench.presentation import motion, report
+from bench.presentation import page as pages
+from bench.presentation.sections import SECTIONS
+
+DESK, PHONE = (1440, 900), (390, 844)
+ROBOTS = ("Panda", "UR5", "xArm7", "PR2", "character")
+# The table that is tried: it is folded, and has a row for each of these solvers on each robot.
+MAIN = "robots_success_one_start"
+ENTRIES = [entry for peer in registry.PEERS for entry in peer.entries if entry.kind == "one start"]
+ROWS = len(ROBOTS) * len(ENTRIES)
+# What a page keeps in place of the clipboard, which a test may not touch.
+CLIPBOARD = """window.copied = [];
+Object.defineProperty(navigator, "clipboard",
+                      {value: {writeText: async text => { window.copied.push(text); }}});"""
+
+
+def of_full_length(make):
+    """Records of a run with every peer on every robot, and of every solver on nine cloths."""
+    generator = np.random.default_rng(0)
+    for robot in ROBOTS:
+        for peer in registry.PEERS:
+            for entry in peer.entries:
+                chance = generator.uniform(0.2, 0.9)
+                changed = {"solved": generator.random(120) < chance, "claimed": np.ones(120)}
+                changed |= {"seconds": generator.uniform(1, 9, 120) * 1e-5 / chance}
+                changed |= {name: generator.random(120) for name in ("position", "rotation")}
+                changed |= {"stratum": np.arange(120) % 2, "beyond": np.zeros(120)}
+                made = make.raced(peer.called(entry), entry.kind, robot=robot, **changed)
+                yield made.__class__(**{**vars(made), "size": 120.0})
+    for stiffness in (1e2, 1e3, 1e4):
+        for i, peer in enumerate(registry.cloth_peers()):
+            sizes, error = (20, 40, 80), (0.5, 1e-4, 10.0**-i)
+            seconds = (1e-3, 2e-3, (1 + i) * 1e-3)
+            yield make.worked(peer.title, stiffness, sizes, seconds, error)
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory, records, make):
+    """The address of a page as of a run at full length."""
+    folder = tmp_path_factory.mktemp("page")
+    kept = [r for r in records if not r.problem.startswith(("robots/", "peers/one step"))]
+    scales = [make.record(FINISHED, "ik", "", notes={"scale": "quick"})]
+    RecordFile(folder).append([*kept, *of_full_length(make), *scales])
+    beside = {"robots_budget_one_start", "cloth_peers_step", "timing_kinematics"}
+    layouts = [layout for section in SECTIONS for layout in section.layouts]
+    drawn = [draw for layout in layouts if layout.name in beside for draw in layout.figures]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report, "all_figures", lambda: drawn)  # the others take long, and are folded
+        return report.write(folder).page.as_uri()
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory):
+    """A browser for all tests of this file."""
+    if not CHROMIUM:
+        pytest.skip("the page is looked at in Chromium, which is not installed")
+    browser = Browser(tmp_path_factory.mktemp("profile"))
+    browser.before_every_page(CLIPBOARD)
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def browser(chromium, address):
+    """The page, opened at a desk; in the end nothing was asked for and nothing went wrong."""
+    chromium.open(address, *DESK)
+    yield chromium
+    said = ("Runtime.consoleAPICalled", "Runtime.exceptionThrown", "Log.entryAdded")
+    assert [event for event in chromium.events if event.get("method") in said] == []
+    asked = [event["params"]["request"]["url"] for event in chromium.events
+             if event.get("method") == "Network.requestWillBeSent"]  # fmt: skip
+    assert [url for url in asked if url.partition("#")[0] not in (address, "about:blank")] == []
+
+
+@pytest.fixture
+def table(browser):
+    """The page with the table open that is tried."""
+    browser.run(f"""new Promise(done => {{
+        addEventListener("hashchange", () => done(), {{once: true}});
+        location.hash = "{MAIN}"; }})""")
+    return browser
+
+
+def texts(browser, selector):
+    """The texts of all elements that a selector finds and that are seen."""
+    return browser.run(f"""[...document.querySelectorAll({json.dumps(selector)})]
+        .filter(e => e.offsetParent).map(e => e.textContent.trim())""")
+
+
+def column(browser, j, table=MAIN):
+    return texts(browser, f'[id="{table}"] tbody tr > :nth-child({j})')
+
+
+def click(browser, selector):
+    browser.run(f"document.querySelector({json.dumps(selector)}).click()")
+
+
+def check(browser, name, table=MAIN):
+    """Check or uncheck a box of a menu by its label."""
+    browser.run(f"""[...document.querySelectorAll('[id="{table}"] .menu label')]
+        .find(label => label.textContent.trim() === {json.dumps(name)}).firstChild.click()""")
+
+
+def address_of(browser):
+    return browser.run("decodeURIComponent(location.hash)")
+
+
+WORDS = r"""(() => {
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), found = [];
+  for (let node; (node = walk.nextNode());) {
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    const box = range.getBoundingClientRect();
+    const isSeen = box.height && box.top < innerHeight && box.left >= 0;
+    if (isSeen && node.parentElement.checkVisibility())
+      found.push(...node.textContent.split(/\s+/).filter(word => /[\p{L}\d]/u.test(word)));
+  }
+  return found;
+})()"""
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_the_first_screen_answers_in_120_words(browser, size):
+    browser.resize(*size)
+    seen = browser.run(WORDS)
+    assert len(seen) <= 120, " ".join(seen)
+    end = browser.run("document.querySelector('#answers').getBoundingClientRect().bottom")
+    assert end <= size[1] + 1
+    said = browser.run("document.querySelector('#answers').innerText")
+    for words in (
+        "1 of 1 claims hold",
+        "spring forces",
+        "50.0 % of tolerance",
+        "Most accurate",
+        "Fastest",
+        "a <b>slide</b> rule",
+        "Quick run: 60 targets a stratum",
+        "Absent",
+    ):
+        assert words in said  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
+def test_the_page_is_short_and_never_scrolls_sideways(browser, size):
+    browser.resize(*size)
+    wide, high = browser.run("[document.documentElement.scrollWidth, document.body.scrollHeight]")
+    assert wide <= size[0]
+    assert high <= 15 * 900 if size == DESK else high <= 25 * 844
+    browser.run("document.querySelectorAll('details').forEach(fold => { fold.open = true; })")
+    assert browser.run("document.documentElement.scrollWidth") <= size[0]
+
+
+def test_every_chapter_has_one_figure_and_one_table_of_six_columns(browser):
+    for section in SECTIONS[1:]:
+        inside = f"#{section.name} > "
+        assert len(texts(browser, f"{inside}article table caption")) == 1, section.name
+        assert browser.run(f"document.querySelectorAll('{inside}figure').length") == 1
+        assert len(texts(browser, f"{inside}article thead tr:last-child th")) <= 6
+    assert browser.run("document.querySelectorAll('table').length") > 20
+
+
+def test_a_click_sorts_and_says_so(table):
+    head = f'[id="{MAIN}"] thead tr:last-child th:nth-child(2)'
+    order = column(table, 2)
+    for said, key in (("ascending", False), ("descending", True), ("none", None)):
+        click(table, f"{head} button")
+        assert table.run(f"document.querySelector('{head}').ariaSort") == said
+        names = column(table, 2)
+        assert names == (order if key is None else sorted(order, key=str.casefold, reverse=key))
+
+
+def test_numbers_sort_as_numbers_and_what_is_missing_comes_last(browser):
+    click(browser, '[id="cloth_peers_step"] thead tr:last-child th:nth-child(5) button')
+    found = browser.run("""[...document.querySelectorAll('[id="cloth_peers_step"] tbody tr')]
+        .map(row => row.cells[4].dataset.v || "")""")  # fmt: skip
+    assert len(found) > 20
+    errors = browser.run("""[...document.querySelectorAll('[id="cloth_peers_step"] tbody tr')]
+        .map(row => row.cells[6].dataset.v || "")""")  # fmt: skip
+    assert len(errors) == len(found)
+    shown = [float(value) for value in found if value]
+    assert shown == sorted(shown)
+    assert not any(found[len(shown) :])
+
+
+def test_a_key_sorts_and_escape_closes_a_menu(table):
+    table.run(f"""document.querySelector('[id="{MAIN}"] thead button').focus()""")
+    table.press("Enter", "\r")
+    assert "sort=0" in address_of(table)
+    table.run(f"""document.querySelector('[id="{MAIN}"] .menu summary').focus()""")
+    table.press("Enter", "\r")
+    assert table.run("document.querySelectorAll('.menu[open]').length") == 1
+    table.press("Escape")
+    assert table.run("document.querySelectorAll('.menu[open]').length") == 0
+    assert table.run("document.activeElement.tagName") == "SUMMARY"
+
+
+def test_rows_are_filtered_by_solver_and_problem_and_counted(table):
+    check(table, "the UR5")
+    assert set(column(table, 1)) == {"the UR5"}
+    check(table, "ikpy")
+    check(table, "pink")
+    assert column(table, 2) == ["pink", "ikpy"]
+    assert texts(table, f'[id="{MAIN}"] .status') == [f"2 of {ROWS} rows"]
+
+
+def test_columns_are_chosen_and_the_first_stays_in_sight(table):
+    before = len(column(table, 1)), len(texts(table, f'[id="{MAIN}"] thead tr:last-child th'))
+    check(table, "set-up [ms]")
+    assert "set-up [ms]" in texts(table, f'[id="{MAIN}"] thead tr:last-child th')
+    assert len(texts(table, f'[id="{MAIN}"] thead tr:last-child th')) == before[1] + 1
+    table.resize(*PHONE)
+    left = table.run(f"""(() => {{ const box = document.querySelector('[id="{MAIN}"] .scroll');
+        box.scrollLeft = 300;
+        const at = cell => cell.getBoundingClientRect().left - box.getBoundingClientRect().left;
+        return [box.scrollLeft, ...[...box.querySelector("tbody tr").cells].slice(0, 3).map(at)];
+    }})()""")  # fmt: skip
+    assert left[0] == 300
+    assert left[1] == pytest.approx(0, abs=1)
+    assert left[2] > 50  # the solver stays beside it
+    assert left[3] < 0
+
+
+def test_a_view_is_kept_in_the_address_and_comes_back(table):
+    check(table, "the UR5")
+    check(table, "set-up [ms]")
+    click(table, f'[id="{MAIN}"] thead tr:last-child th:nth-child(2) button')
+    rows, heads = column(table, 2), texts(table, f'[id="{MAIN}"] thead tr:last-child th')
+    kept = table.run("location.href")
+    table.open(kept, *DESK)
+    assert column(table, 2) == rows
+    assert texts(table, f'[id="{MAIN}"] thead tr:last-child th') == heads
+    click(table, f'[id="{MAIN}"] .bar > button:nth-last-of-type(1)')
+    assert len(column(table, 2)) == ROWS
+    assert address_of(table) == f"#{MAIN}"
+
+
+@pytest.mark.parametrize("nonsense", ["#x", "#%", "#robots_list?sort=99&columns=a", "#:?by0=%zz"])
+def test_an_address_of_nonsense_is_harmless(browser, address, nonsense):
+    browser.open(address + nonsense, *DESK)
+    assert len(column(browser, 2, "robots_overall_one_start")) == len(ENTRIES)
+
+
+def test_a_link_to_a_row_opens_its_fold_and_marks_it(browser, address):
+    row = "robots_success_restarts:the-ur5-trac-ik-5-ms"
+    browser.open(f"{address}#{row}", *DESK)
+    found = browser.run("""(() => { const row = document.querySelector("[aria-current]");
+        const box = row.getBoundingClientRect();
+        const isSeen = box.top > 0 && box.bottom < innerHeight;
+        return [row.id, row.closest("details").open, isSeen]; })()""")
+    assert found == [row, True, True]
+    command = "plumbob bench ik --solver 'TRAC-IK, 5 ms' --problem robots/UR5"
+    assert texts(browser, ".chosen code") == [command]
+    click(browser, ".chosen button")
+    assert browser.run("window.copied") == [command]
+
+
+def test_every_row_is_linked_by_mouse_and_by_keys(table):
+    table.run(f"""document.querySelector('[id="{MAIN}"] .link').focus()""")
+    table.press("ArrowDown")
+    table.press("Enter", "\r")
+    chosen = table.run("document.querySelector('[aria-current]').id")
+    assert chosen == f"{MAIN}:the-panda-pinocchio-s-closed-loop"
+    assert address_of(table) == f"#{chosen}"
+
+
+def test_what_is_shown_is_copied_in_three_forms(table):
+    check(table, "the UR5")
+    check(table, "pink")
+    for i in (1, 2, 3):
+        click(table, f'[id="{MAIN}"] .bar > button:nth-of-type({i})')
+    markdown, latex, csv = table.run("window.copied")
+    heads = texts(table, f'[id="{MAIN}"] thead tr:last-child th')
+    lines = markdown.splitlines()
+    assert len(lines) == 3
+    assert lines[0] == f"| {' | '.join(heads)} |"
+    assert lines[2].startswith("| the UR5 | pink | ")
+    assert r"\toprule" in latex
+    assert re.search(r"\nthe UR5 & pink & .*\\%.* \\\\\n", latex)
+    rows = csv.splitlines()
+    assert rows[0].startswith('robot,solver,"solved')
+    assert rows[1].startswith("the UR5,pink,")
+    assert len(rows) == 2
+
+
+def test_the_best_is_bold_and_ties_are_marked(browser):
+    marked = browser.run("""[...document.querySelectorAll('[id="cloth_peers_step"] td.best')]
+        .map(cell => [getComputedStyle(cell).fontWeight, cell.classList.contains("tie"),
+                      getComputedStyle(cell, "::before").content])""")  # fmt: skip
+    assert len(marked) > 3
+    assert {weight for weight, _, _ in marked} == {"700"}
+    assert all((sign == '"="') == tie for _, tie, sign in marked)
+    assert any(tie for _, tie, _ in marked)
+    assert not all(tie for _, tie, _ in marked)
+
+
+NAMELESS = """[...document.querySelectorAll('a, button, summary, input, [role=region], nav, table')]
+  .filter(e => !(e.ariaLabel || e.textContent.trim() || e.labels?.[0]?.textContent.trim()))
+  .map(e => e.outerHTML.slice(0, 80))"""
+
+
+def test_controls_are_named_tables_are_tables_and_headings_are_in_order(browser):
+    browser.run("document.querySelectorAll('details').forEach(fold => { fold.open = true; })")
+    browser.run("new Promise(done => setTimeout(done, 100))")
+    assert browser.run(NAMELESS) == []
+    levels = browser.run(
+        "[...document.querySelectorAll('h1, h2, h3, h4')].map(head => +head.tagName[1])"
+    )
+    assert levels.count(1) == 1
+    assert levels[0] == 1
+    assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
+    browser.open(browser.run("location.href.split('#')[0]"), *DESK)
+    tree = browser.send("Accessibility.getFullAXTree")["nodes"]
+    roles = {node["role"]["value"] for node in tree if not node["ignored"]}
+    for role in ("table", "columnheader", "rowheader", "caption", "status", "main", "navigation"):
+        assert role in roles or role.capitalize() in roles, role
+
+
+def test_without_its_script_every_table_can_be_read(browser, address):
+    browser.send("Emulation.setScriptExecutionDisabled", value=True)
+    try:
+        browser.open(address, *DESK)
+        tree = browser.send("Accessibility.getFullAXTree")["nodes"]
+        named = {node.get("name", {}).get("value", "") for node in tree}
+        assert "time, 95 % from [µs]" in named  # a column that is folded where there is a script
+    finally:
+        browser.send("Emulation.setScriptExecutionDisabled", value=False)
+
+
+def test_a_request_would_be_refused(browser, address):
+    """The guard against requests can fail: what the page forbids is seen to be forbidden."""
+    refused = browser.run("""new Promise(done => {
+        addEventListener("securitypolicyviolation", event => done(event.violatedDirective));
+        fetch("https://example.org").catch(() => {}); })""")  # fmt: skip
+    assert refused == "connect-src"
+    browser.events.clear()
+
+
+def test_scripts_and_page_are_small(address):
+    assert len((pages.SCRIPT + motion.SCRIPT).encode()) <= 15 * 1024
+    assert len(Path(address.removeprefix("file://")).read_bytes()) < 3_000_000

@@ -1,0 +1,237 @@
+"""`plumbob report --table`: columns, rows and order as a user names them, in four forms."""
+
+import csv
+import html.parser
+import io
+import re
+
+import numpy as np
+import pytest
+
+from bench import cli
+from bench.harness.metrics import Share, share
+from bench.harness.record import RecordFile
+from bench.presentation import sections
+from bench.presentation.fragment import fragment
+from bench.presentation.results import Results, plain
+from bench.presentation.selection import column_numbers, selected
+from bench.presentation.tables import Column, Table, best_cells, comma_separated, markdown
+
+COLUMNS = (
+    Column("robot", words=True),
+    Column("solver", words=True),
+    Column("time, median", "µs", best="least", group="time"),
+    Column("time, 95 %", "µs", best="least", group="time", folded=True),
+    Column("solved", note="95 % interval", best="greatest"),
+)
+ROWS = (
+    ("UR5", "Newton", 3.0, 4.0, share(np.arange(10) < 9)),
+    ("UR5", "local/global", 1.0, 40.0, share(np.arange(10) < 1)),
+    ("iiwa", "Newton", 2.0, None, share(np.arange(10) < 5)),
+    ("iiwa", "local/global", 20.0, 1 / 3, Share(0, 0, 0.0, 1.0)),
+)
+TABLE = Table("robots", "Robots", COLUMNS, ROWS)
+
+
+@pytest.mark.parametrize(
+    ("text", "numbers"),
+    [
+        ("solver", [1]),
+        ("2", [1]),
+        ("1,3-5", [0, 2, 3, 4]),
+        ("time, median", [2]),
+        ("time, median [µs]", [2]),
+        ("solver, time, median, SOLVED", [1, 2, 4]),
+        ("solved (95 % interval)", [4]),
+        ("time, 95 %,robot", [3, 0]),
+    ],
+)
+def test_columns_are_named_by_heading_title_or_number(text, numbers):
+    assert column_numbers(TABLE, text) == numbers
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("solvr", "no column 'solvr': did you mean 'solver'?"),
+        ("time, medina", "did you mean 'time, median"),
+        ("qqq", "expected one of"),
+        ("0", "numbers from 1 to 5, got 0"),
+        ("2-9", "numbers from 1 to 5, got 2-9"),
+        ("4-2", "numbers from 1 to 5, got 4-2"),
+        ("solver,", "no column ''"),
+    ],
+)
+def test_a_column_that_is_not_there_is_refused_with_the_nearest(text, sentence):
+    with pytest.raises(ValueError, match=re.escape(sentence)):
+        column_numbers(TABLE, text)
+
+
+@pytest.mark.parametrize(
+    ("rows", "left"),
+    [
+        (["solver=newton"], [0, 2]),
+        (["solver=local_global"], [1, 3]),
+        (["solver!=newton"], [1, 3]),
+        (["robot~ur"], [0, 1]),
+        (["robot!~ur"], [2, 3]),
+        (["robot~ur", "solver=Newton"], [0]),
+        (["robot=ur5", "robot=IIWA", "solver=Newton"], [0, 2]),
+        (["time, median<3"], [1, 2]),
+        (["time, median <= 3"], [0, 1, 2]),
+        (["solved>=50"], [0, 2]),
+        (["3>2", "3<1.5"], [0, 1, 3]),
+        (["2=Newton"], [0, 2]),
+    ],
+)
+def test_rows_pass_one_filter_of_each_column(rows, left):
+    assert selected(TABLE, rows=rows).rows == tuple(ROWS[i] for i in left)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("solver", "expected COLUMN and one of"),
+        ("solvr=x", "did you mean 'solver'?"),
+        ("solver=CCD", "no row of robots passes; solver is 'Newton' or 'local/global'"),
+        ("solved<many", "expected a number"),
+        ("robot,solver=x", "no column"),
+    ],
+)
+def test_a_filter_that_is_none_is_refused(text, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        selected(TABLE, rows=[text])
+
+
+@pytest.mark.parametrize(
+    ("column", "order"),
+    [("3", [1, 2, 0, 3]), ("solved", [0, 2, 1, 3]), ("time, 95 %", [3, 0, 1, 2]), ("robot", None)],
+)
+def test_rows_are_sorted_the_best_first_and_what_is_unknown_last(column, order):
+    made = selected(TABLE, order=column)
+    assert made.rows == tuple(ROWS[i] for i in order or range(4))
+
+
+def test_the_best_are_those_of_the_rows_left_by_the_columns_of_before():
+    assert best_cells(selected(TABLE, ["time, median"])) == {(1, 0), (2, 0)}
+    swapped = selected(TABLE, ["3, 1"], ["solver=Newton", "solver=local/global"], "3")
+    assert {swapped.rows[i][1] for i, j in best_cells(swapped)} == {"UR5", "iiwa"}
+    assert best_cells(selected(TABLE, ["time, median"], ["solver=Newton"])) == set()
+
+
+def test_columns_asked_for_are_not_folded():
+    assert not any(column.folded for column in selected(TABLE, ["1-5"]).columns)
+    assert selected(TABLE).columns == COLUMNS
+
+
+class Cells(html.parser.HTMLParser):
+    """The cells of a table in HTML, and what is open."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.rows, self.open, self.tags, self.bold = [], [], set(), []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.open.append(tag)
+        self.tags.add(tag)
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if {"td", "th"} & {*self.open}:
+            self.rows[-1][-1] += data
+            if "b" in self.open:
+                self.bold.append(data)
+
+
+def test_all_forms_say_the_same_and_csv_keeps_all_digits():
+    page, text = Cells(fragment(TABLE)), markdown(TABLE)
+    assert page.open == []
+    assert not page.tags & {"script", "link", "style", "img"}
+    bold = re.findall(r"\*\*(.*?)\*\*", text)
+    assert sorted(page.bold) == sorted(cell.replace("\\", "") for cell in bold)
+    assert len(page.rows) == 1 + len(ROWS)
+    rows = list(csv.reader(io.StringIO(comma_separated(TABLE))))
+    assert float(rows[4][3]) == 1 / 3
+    assert rows[1][4:6] == ["9", "10"]
+
+
+def test_html_is_data_whatever_a_name_is():
+    nasty = '<img src=x onerror="alert(1)">&'
+    page = Cells(fragment(Table("t", nasty, (Column(nasty),), ((nasty,),), nasty, nasty)))
+    assert "img" not in page.tags
+    assert page.rows == [[nasty], [nasty]]
+
+
+@pytest.fixture
+def folder(tmp_path, records, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    RecordFile(tmp_path / "report").append(records)
+    return tmp_path
+
+
+def run(capsys, *arguments):
+    code = cli.run_command(["report", *arguments])
+    return code, *capsys.readouterr()
+
+
+def test_the_list_names_every_table_and_its_columns(capsys, folder, records):
+    code, out, _ = run(capsys, "--list")
+    made = sections.tables(Results([plain(record) for record in records]))
+    assert code == 0
+    assert [line.split(":")[0] for line in out.splitlines()] == [table.name for table in made]
+    code, out, _ = run(capsys, "--table", "accuracy", "--list")
+    assert out.splitlines()[0] == "1 problem"
+    assert "greatest is best" in out
+    assert "folded" in out
+
+
+@pytest.mark.parametrize(
+    ("form", "begin"),
+    [("md", "# Success"), ("tex", "% needs"), ("csv", "problem,"), ("html", "<figure")],
+)
+def test_a_table_goes_to_standard_output_or_to_a_file(capsys, folder, form, begin):
+    arguments = ["--table", "accuracy", "--format", form]
+    code, out, _ = run(capsys, *arguments)
+    assert code == 0
+    assert out.startswith(begin)
+    assert run(capsys, "report", *arguments, "-o", "table")[:2] == (0, "table written\n")
+    assert (folder / "table").read_text() == out
+    assert not (folder / "report" / "index.html").exists()
+
+
+def test_columns_rows_and_order_can_be_chosen(capsys, folder):
+    arguments = ["--columns", "solver, within tolerance", "--columns", "1", "--sort", "solver"]
+    code, out, _ = run(capsys, "--table", "accuracy", *arguments, "--rows", "problem~circle")
+    assert code == 0
+    lines = [line for line in out.splitlines() if line.startswith("|")]
+    assert lines[0].startswith("| solver | within tolerance (95 % interval) | problem |")
+    assert [line.split(" |")[0] for line in lines[2:]] == ["| CCD"] * 2 + ["| FABRIK"] * 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--table", "acuracy"], "did you mean 'accuracy'?"),
+        (["--table", "accuracy", "--format", "pdf"], "unknown format 'pdf'"),
+        (["--table", "accuracy", "--columns", "solvr"], "did you mean 'solver'?"),
+        (["--table", "accuracy", "--rows", "solver=x"], "no row of accuracy passes"),
+        (["--table", "accuracy", "--format", "tex", "--width", "1mm"], "--width: expected"),
+        (["--table", "accuracy", "-o", "report"], "expected a file for the table"),
+        (["--columns", "solver"], "expected --table"),
+        (["--rows", "solver=x"], "expected --table"),
+        (["report", "-o", "other"], "expected --table"),
+        (["nowhere", "--list"], "no records in nowhere"),
+    ],
+)
+def test_misuse_exits_2_with_one_sentence(capsys, folder, arguments, sentence):
+    code, out, err = run(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert sentence in err
+    assert err.count("\n") == 1

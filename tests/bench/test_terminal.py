@@ -1,0 +1,218 @@
+"""The terminal: no digit is cut and no name shortened, at any width; the run ends in ten lines."""
+
+import functools
+import io
+import re
+
+import pytest
+from rich.cells import cell_len
+from rich.console import Console
+
+from bench import cli, terminal
+from bench.harness.record import RecordFile
+from bench.presentation import aligned, outcome, report, sections
+from bench.presentation.headlines import Answers, Headline, Verdict
+from bench.presentation.results import Results, plain
+from bench.presentation.tables import Column, Table, naming, words
+
+WIDTHS = range(40, 201)
+FEW = (40, 57, 80, 133, 200)
+
+
+@pytest.fixture(scope="module")
+def every_table(records):
+    """The tables of a report, and one of long names, many columns and long numbers."""
+    made = sections.tables(Results([plain(record) for record in records]))
+    columns = (Column("solver", words=True), Column("of", words=True))
+    columns += tuple(Column(f"time, kind {i}", "µs", best="least") for i in range(20))
+    names = ("Levenberg-Marquardt, 100 restarts", "Levenberg-Marquardt, 20 restarts", "手腕" * 9)
+    rows = [(n, "x" * 70, *(-1.2345e-15 * 10**i for i in range(20))) for n in names]
+    return [*made, Table("hard", "Hard", columns, tuple(rows))]
+
+
+@functools.cache
+def of_number(identity, width):
+    return aligned.aligned(TABLES[identity], width)
+
+
+TABLES = {}
+
+
+def made_in(table, width):
+    """A table in lines; made once for all tests."""
+    TABLES[id(table)] = table
+    return of_number(id(table), width)
+
+
+def lines_of(table, width):
+    return ["".join(span.text for span in line) for line in made_in(table, width).lines]
+
+
+def columns_of(table, width):
+    """The lines of each column that is shown, as they stand below each other."""
+    made = made_in(table, width)
+    return [[line[k].text.strip() for line in made.lines] for k in range(len(made.lines[0]))]
+
+
+def test_no_line_is_wider_than_the_terminal(every_table):
+    for table in every_table:
+        for width in WIDTHS:
+            assert max(map(cell_len, lines_of(table, width))) <= width, (table.name, width)
+
+
+def test_no_digit_is_cut_and_no_name_is_shortened(every_table):
+    """Every cell of a column that is shown is there letter by letter, its numbers in one line."""
+    for table in every_table:
+        for width in WIDTHS:
+            made = made_in(table, width)
+            shown = [c for c in table.columns if c.heading not in made.left_out]
+            assert len(shown) == len(made.lines[0])
+            for column, texts in zip(shown, columns_of(table, width), strict=True):
+                j = table.columns.index(column)
+                together = "".join(texts).replace(" ", "")
+                wanted = [column.heading, *(words(row[j]) for row in table.rows)]
+                assert together == "".join(wanted).replace(" ", ""), (table.name, width)
+                numbers = [n for w in wanted for n in re.findall(r"\d[\d.,]*(?:e-?\d+)?", w)]
+                found = [n for t in texts for n in re.findall(r"\d[\d.,]*(?:e-?\d+)?", t)]
+                assert found == numbers, (table.name, width)
+
+
+def test_what_names_a_row_and_one_more_column_are_always_there(every_table):
+    for table in every_table:
+        for width in FEW:
+            left = made_in(table, width).left_out
+            assert table.columns[0].heading not in left
+            assert len(left) < len(table.columns) - 1
+
+
+def test_folded_columns_are_dropped_first_and_the_best_last(every_table):
+    for table in every_table:
+        for width in WIDTHS:
+            left = made_in(table, width).left_out
+            assert {c.heading for c in table.columns[1:] if c.folded} <= {*left} | names(table)
+    columns = tuple(Column(n, best=b) for n, b in (("a", ""), ("b", "least"), ("c", ""), ("d", "")))
+    table = Table("t", "T", columns, ((1, 10**12, 10**12, 10**12), (2, 2, 2, 2)))
+    assert [made_in(table, w).left_out for w in (60, 45, 30)] == [[], ["d"], ["c", "d"]]
+
+
+def names(table):
+    """The headings of the columns that name a row."""
+    return {column.heading for column in table.columns[: naming(table)]}
+
+
+def test_a_wider_terminal_never_shows_less(every_table):
+    for table in every_table:
+        shown = [len(made_in(table, width).left_out) for width in WIDTHS]
+        assert shown[-1] == min(shown)
+
+
+def test_a_sentence_says_how_many_columns_are_left_out_and_what_shows_them(
+    capsys, tmp_path, records, monkeypatch
+):
+    RecordFile(tmp_path).append(records)
+    monkeypatch.setenv("COLUMNS", "60")
+    terminal.print_tables(["cloth"], tmp_path)
+    out = capsys.readouterr().out
+    assert re.search(r"\d of \d+ columns left\s+out", out)
+    assert "--table cloth_peers_step" in " ".join(out.split())
+    assert max(map(cell_len, out.splitlines())) <= max(60, len(str(tmp_path)))
+
+
+def test_rows_that_miss_are_red_and_the_best_bold():
+    columns = (
+        Column("claim", words=True),
+        Column("verdict", words=True),
+        Column("x", best="least"),
+    )
+    rows = (("a", "MISSED: far", 1.0), ("b", "held", 2.0))
+    made = aligned.aligned(Table("t", "T", columns, rows, compared=0), 80)
+    assert {span.style for span in made.lines[1]} == {"bold red"}
+    assert [span.style for span in made.lines[2]] == ["", "", ""]
+    held = aligned.aligned(Table("t", "T", columns, (rows[1], ("c", "held", 3.0)), compared=0), 80)
+    assert [span.style for span in held.lines[1]] == ["", "", "bold"]
+
+
+@pytest.mark.parametrize("width", [30, 40, 60, 80, 200])
+@pytest.mark.parametrize(
+    "what", ["x", "a long name of a problem and of a solver that is slow " * 3]
+)
+def test_bar_count_and_time_left_are_there_at_any_width(monkeypatch, width, what):
+    text = io.StringIO()
+    monkeypatch.setattr(terminal.sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", str(width))
+    bar = terminal.progress()
+    console = Console(file=text, width=width, force_terminal=True, color_system=None)
+    task = bar.add_task(what, total=12_345, kept=0)
+    bar.update(task, completed=6234)
+    bar.tasks[0].start_time = bar.get_time() - 7200
+    console.print(bar.get_renderable())
+    (line,) = text.getvalue().strip("\n").split("\n")
+    assert "6234/12345" in line
+    assert re.search(r"\d:\d\d:\d\d left", line)
+    assert "━" in line
+    assert cell_len(line.rstrip()) <= width
+
+
+@pytest.mark.parametrize(
+    ("done", "kept", "text"),
+    [(0, 0, "? left"), (5, 5, "? left"), (10, 5, "0:10 left"), (5, 0, "0:15 left")],
+)
+def test_the_time_left_goes_by_what_took_time(done, kept, text):
+    total = {"0:15 left": 20}.get(text, 15)
+    assert (
+        terminal.time_left(10.0 if done != 5 or kept else 5.0, done, total, {"kept": kept}) == text
+    )
+
+
+def an_outcome(folder, tables=(), **more):
+    verdict = Verdict(52, 52, "spring forces", 0.462)
+    headline = Headline("kinematics", "Fastest", "A", "2.00 × B (1.90–2.10), 400 poses", "robots")
+    cloth = headline._replace(chapter="cloth")
+    answers = Answers(verdict, [headline, headline, cloth, headline], "Quick run", ["pink", "mink"])
+    answers = answers._replace(**more)
+    missing = ["a"] + ["A sentence on what is missing, which is rather long. " * 3] * 20
+    return report.Written(folder / "index.html", list(tables), missing, answers)
+
+
+@pytest.mark.parametrize("width", [80, 120, 240])
+@pytest.mark.parametrize("absent", [[], ["pink"], [f"solver {i}" for i in range(40)]])
+def test_a_run_ends_in_ten_lines(capsys, tmp_path, monkeypatch, width, absent):
+    monkeypatch.setenv("COLUMNS", str(width))
+    monkeypatch.chdir(tmp_path)
+    written = an_outcome(tmp_path.relative_to(tmp_path), absent=absent)
+    terminal.print_outcome(written)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 10
+    assert max(map(len, lines)) <= width
+    assert "52 of 52 claims hold" in lines[0]
+    text = "\n".join(lines)
+    assert text.count("astest") == outcome.HEADLINES
+    assert "Missing: a" in text
+    assert "index.html" in text
+    assert ("Absent" in text) == bool(absent)
+    assert re.search(r"\d+ more remarks", text)
+    if len(absent) > 1:
+        assert re.search(r"Absent: .*, \d+ more;", text)
+
+
+def test_a_missed_claim_is_said_first(tmp_path):
+    written = an_outcome(tmp_path, verdict=Verdict(51, 52, "spring forces", 3.0))
+    assert outcome.outcome(written, 80)[0] == "WRONG: 1 of 52 claims are missed."
+    written = an_outcome(tmp_path, verdict=None)
+    assert "bench check" in outcome.outcome(written, 80)[0]
+
+
+COMMANDS = ["", "verify", "check", "bench", "report", "show", "compare", "history", "records"]
+COMMANDS += ["records list", "records merge", "records drop"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_is_no_wider_than_the_terminal(capsys, monkeypatch, command):
+    full = None
+    for width in (200, *range(40, 121, 10)):
+        monkeypatch.setenv("COLUMNS", str(width))
+        assert cli.run_command([*command.split(), "--help"]) == 0
+        out = capsys.readouterr().out
+        assert max(map(len, out.splitlines())) <= width, width
+        full = full or re.sub(r"\s", "", out)
+        assert re.sub(r"\s", "", out) == full
