@@ -124,7 +124,7 @@ def test_a_solver_that_no_figure_knows_is_drawn_all_the_same(tmp_path, records):
     known = ("ccd", "Pinocchio")
     new = [replace(r, solver="brand_new") for r in records if r.solver in known]
     result, page = written(tmp_path, [*records, *new])
-    assert "brand new" in "".join(page.text)
+    assert "brand_new" in "".join(page.text)
 
 
 def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
