@@ -134,6 +134,13 @@ def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
     assert "Measured by plumbob bench timing cloth_scale first_call, at full length." in text
 
 
+def test_that_nobody_entered_a_solver_is_nothing_missing(tmp_path, records):
+    _, page = written(tmp_path, [record for record in records if record.solver != "mine"])
+    text = "".join(page.text)
+    assert "Which solvers of yours" not in text
+    assert "Not measured" not in text
+
+
 def test_what_is_missing_is_said(tmp_path, records):
     failed = replace(records[0], problem="gone", notes={"failed": "OSError: no engine"}, arrays={})
     others = [r for r in records if not (r.suite == "finished" and r.problem == "cloth")]
