@@ -6,8 +6,10 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from ..experiments import SUITES, blocks
-from ..experiments.cloth_peers.measurement import levels
+from ..experiments import SUITES, blocks, chain, cloth_peers, published
+from ..experiments.cloth_peers import measurement as cloths
+from ..experiments.robots import REACHABLE, UNREACHABLE
+from ..experiments.robots import measurement as robots
 from ..harness import run
 from ..harness.block import Block, Scale
 from ..harness.choice import Choice
@@ -17,8 +19,10 @@ from ..harness.record import Key, Record, RecordFile
 from ..peers import registry
 
 RECORDED, ALIKE, BUDGET, UNKNOWN = "its own record", "records of others", "budgets", "unknown"
-# Budgets of a block in seconds, for those of a benchmark at its scale, by how its problem begins.
-_BUDGETS = (("robots/", 3.0), ("unreachable/", 3.0), ("published/", 15.0), ("chain/", 50.0))
+# Budgets of a block in seconds, for those of a benchmark at its scale, by its task; an entrant's on
+# skeletons.
+_BUDGETS = {REACHABLE: 3.0, UNREACHABLE: 3.0, published.TRAC_IK: 15.0, published.TOOLBOX: 15.0}
+_ENTERED = {chain.CHAIN: 50.0, published.FABRIK: 50.0}
 # Parts of a cloth's ladder that use its whole budget.
 _LADDER = 2.0
 
@@ -66,15 +70,13 @@ def _for_size(record: Record, block: Block) -> float:
 
 
 def _budget(block: Block, scale: Scale) -> float:
-    if block.suite == "cloth" and block.problem.startswith("peers/"):
-        return _LADDER * sum(level.budget for level in levels(scale))
+    task = block.facts.get("task")
+    if task in (cloth_peers.ONE_STEP, cloth_peers.MOTION):
+        return _LADDER * sum(level.budget for level in cloths.levels(scale))
     if block.suite == "timing":
         return scale.seconds
-    entered = block.facts.get("entrant", False)
-    for begin, seconds in _BUDGETS:
-        if block.problem.startswith(begin) and (entered or begin != "chain/"):
-            return seconds * scale.seconds
-    return 0.0
+    known = _BUDGETS | (_ENTERED if block.facts.get("entrant") else {})
+    return known.get(str(task), 0.0) * scale.seconds
 
 
 def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
@@ -128,8 +130,12 @@ def listed(suites: Sequence[str], choice: Choice) -> list[str]:
     return lines
 
 
+NOT_INSTALLED = (robots.not_installed, cloths.not_installed)
+
+
 def _is_missing(block: Block) -> bool:
-    return block.problem.endswith("/all") and not block.facts.get("entrant")
+    """Return whether a block only says that a package is not installed."""
+    return getattr(block.measure, "func", None) in NOT_INSTALLED
 
 
 def _called(solver: str) -> str:

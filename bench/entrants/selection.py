@@ -6,12 +6,16 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ..experiments import SCALES, blocks
+from ..experiments.published import TOOLBOX, TRAC_IK
+from ..experiments.robots import REACHABLE, UNREACHABLE
 from ..harness.block import Block, Scale
 from ..harness.choice import Choice
 from ..peers import registry
 from .entrant import Entrant
 from .problems import OwnProblem
 
+# The tasks whose problems are robots.
+OF_ROBOTS = (REACHABLE, UNREACHABLE, TRAC_IK, TOOLBOX)
 # Names that a message lists.
 _LISTED = 12
 
@@ -82,21 +86,21 @@ def _names_of(there: Iterable[Block], read: Callable[[Block], tuple[str, list[st
 
 def _solver_names(block: Block) -> tuple[str, list[str]]:
     """Return a solver's names: in records, in tables, and without what distinguishes its rows."""
-    label = registry.find(block.solver).label
-    return block.solver, [block.solver, label, block.solver.partition(", ")[0]]
+    solver = block.solver
+    return solver, [solver, registry.find(solver).label, solver.partition(", ")[0]]
 
 
 def _problem_names(block: Block) -> tuple[str, list[str]]:
     """Return a problem's name, its title, and the family before the stroke."""
-    parts = block.problem.split("/")
-    families = ["/".join(parts[:i]) for i in range(1, len(parts))]
-    return block.problem, [block.problem, str(block.facts.get("title", block.problem)), *families]
+    problem, title = block.problem, str(block.facts.get("title", block.problem))
+    parts = problem.split("/")
+    return problem, [problem, title, *("/".join(parts[:i]) for i in range(1, len(parts)))]
 
 
 def _robot_names(block: Block) -> tuple[str, list[str]]:
-    family, _, robot = block.problem.rpartition("/")
-    is_robot = family in ("robots", "unreachable") or family.startswith("published/t")
-    return block.problem, [robot] if is_robot and robot != "all" else []
+    problem = block.problem
+    robot = problem.rpartition("/")[2]
+    return problem, [robot] if block.facts.get("task") in OF_ROBOTS and robot != "all" else []
 
 
 def _meant(kind: str, wanted: Sequence[str], names: _Names) -> list[str]:

@@ -1,5 +1,6 @@
 """Records made up for the tests, and a stamp that does not depend on the machine."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -146,6 +147,14 @@ def reached(stratum, solver):
     limits = {"tolerance": 1e-4, "max_iterations": 1000}
     facts = {"task": "chain", "stratum": stratum, "title": f"chain, {stratum}"}
     return record("ik", f"chain/{stratum}", solver, limits, arrays | history, size=2, facts=facts)
+
+
+def entered(made):
+    """The same record of a solver that a user entered."""
+    facts = {**made.facts, "entrant": True, "door": "my_ik.py", "digest": "0123456789ab"}
+    settings = {**made.settings, "version": "1.0"}
+    commit = {"solver_commit": "0123456789abcdef with changes"}
+    return replace(made, facts=facts, settings=settings, conditions=commit)
 
 
 def stepped(solver):
@@ -412,6 +421,8 @@ def records():
         beyond("ccd", 0.5),
         beyond("fabrik", 0.0),
         *(reached("near", solver) for solver in ("ccd", "fabrik")),
+        entered(reached("near", "My solver")),
+        entered(worked("My cloth")),
         *(stepped(solver) for solver in ("local_global", "newton")),
         *(few(iterations) for iterations in (1, 10)),
         stepping(),
