@@ -112,7 +112,7 @@ def fragment(scene: Scene) -> Markup:
         .get_template("motion.html")
         .render(
             scene=scene,
-            data=Markup(_json(data_of(scene))),
+            data=Markup(json.dumps(data_of(scene), separators=(",", ":"), allow_nan=False)),
             labels=[visible(one.label) for one in scene.motions],
             panes=range(min(scene.panes, len(scene.motions))),
             frames=len(scene.motions[0].positions),
@@ -144,7 +144,7 @@ def _environment() -> Environment:
 
 
 def data_of(scene: Scene) -> dict[str, Any]:
-    """Return a scene as what `SCRIPT` reads: numbers, and arrays as base64."""
+    """Return a scene as what `SCRIPT` reads: numbers, and arrays as base64; no name is in it."""
     every = [np.asarray(one.positions, dtype=float).reshape(-1, 3) for one in scene.motions]
     every += [] if scene.curve is None else [np.asarray(scene.curve, dtype=float)]
     low = np.min([np.nanmin(np.where(np.isfinite(e), e, np.nan), axis=0) for e in every], axis=0)
@@ -209,8 +209,3 @@ def length(metres: float) -> str:
             digits = float(f"{metres / size:.2g}")
             return f"{digits:.0f} {unit}" if digits >= 10 else f"{digits:g} {unit}"
     return "< 1 nm" if metres > 0.0 else "0"
-
-
-def _json(content: Any) -> str:
-    """Return JSON that cannot end the element that it stands in."""
-    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

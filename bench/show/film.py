@@ -33,8 +33,8 @@ def animate(scene: Scene, path: Path, progress: Told) -> None:
     with mpl.rc_context({**STYLE, **_WHITE}):
         count = len(scene.motions)
         figure = Figure(figsize=(4.8 * count, 4.8 if count == 1 else 5.4), dpi=96)
-        base = 0.0 if count == 1 else 0.12
-        axes = [figure.add_axes((i / count, base, 1 / count, 1 - base)) for i in range(count)]
+        base, top = (0.0, 1.0) if count == 1 else (0.18, 0.94)
+        axes = [figure.add_axes((i / count, base, 1 / count, top - base)) for i in range(count)]
         if count > 1:
             _bar(scene, figure, figure.add_axes((0.3, 0.08, 0.4, 0.02)))
         update = partial(_frame, axes, scene)
@@ -88,10 +88,9 @@ def _frame(axes: Sequence[Axes], scene: Scene, i: int, title: bool = True) -> tu
 
 def _say(ax: Axes, one: Moving, i: int, title: bool) -> None:
     """Write whose motion this is, and its error in this frame."""
-    if title:
-        ax.text(0.03, 0.98, written(one.label), transform=ax.transAxes, va="top", weight="bold")
+    ax.set_title(written(one.label) if title else "", fontweight="bold", loc="left")
     error = f"error {length(one.errors[i])}" if np.isfinite(one.errors[i]) else "diverged"
-    ax.text(0.03, 0.03, error, transform=ax.transAxes, color=COLOURS["faint"])
+    ax.text(0.0, -0.02, error, transform=ax.transAxes, va="top", color=COLOURS["faint"])
 
 
 def _arm(ax: Axes, scene: Scene, one: Moving, i: int) -> None:
