@@ -11,7 +11,7 @@
   const plain = cell => {
     const copy = cell.cloneNode(true);
     copy.querySelectorAll("sup").forEach(sup => sup.prepend("e"));
-    return copy.textContent.replaceAll(" · 10e", "e").replace(/−(?=\d)/g, "-").replace(/\s+/g, " ").trim();
+    return copy.textContent.replaceAll(" · 10e", "e").replaceAll("−", "-").replace(/\s+/g, " ").trim();
   };
   const number = cell => {
     const [value, total = 1] = (cell.dataset.v ?? "NaN").split("/");

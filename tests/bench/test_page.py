@@ -3,6 +3,8 @@
 import itertools
 import json
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -294,6 +296,24 @@ def test_what_is_shown_is_copied_in_three_forms(table):
     assert rows[0].startswith('robot,solver,"solved')
     assert rows[1].startswith("the UR5,pink,")
     assert len(rows) == 2
+
+
+@pytest.mark.skipif(not shutil.which("pdflatex"), reason="no TeX is installed")
+def test_all_that_is_copied_as_latex_compiles(browser, tmp_path):
+    browser.run("""(() => {
+        for (const fold of document.querySelectorAll(".folds > details")) fold.open = true;
+        return new Promise(done => setTimeout(done, 300)); })()""")
+    browser.run("""document.querySelectorAll(".bar > button").forEach(button => {
+        if (button.textContent === "Copy LaTeX") button.click(); })""")
+    tables = browser.run("window.copied")
+    assert len(tables) > 40
+    body = "\n\n".join(f"{{\\tiny {table}}}" for table in tables)
+    head = r"\documentclass{article}\usepackage{booktabs}"
+    text = rf"{head}\begin{{document}}{body}\end{{document}}"
+    (tmp_path / "all.tex").write_text(text, encoding="utf-8")
+    told = ["pdflatex", "-halt-on-error", "-interaction=nonstopmode", "all.tex"]
+    done = subprocess.run(told, cwd=tmp_path, capture_output=True, timeout=120)
+    assert done.returncode == 0, done.stdout.decode(errors="replace")[-1500:]
 
 
 def test_the_best_is_bold_and_ties_are_marked(browser):
