@@ -109,9 +109,9 @@ def plumbob(
 
 app.command(cls=verify.SolverCommand, epilog=block("Examples", *verify.EXAMPLES))(verify.verify)
 app.command(cls=Command, epilog=check.EXAMPLES)(check.check)
-app.command(cls=Command, epilog=bench.EXAMPLES)(bench.bench)
+app.command(cls=verify.SolverCommand, epilog=bench.EXAMPLES)(bench.bench)
 app.command(cls=Command, epilog=report.EXAMPLES)(report.report)
-app.command(cls=Command, epilog=show.EXAMPLES)(show.show)
+app.command(cls=verify.SolverCommand, epilog=show.EXAMPLES)(show.show)
 app.command(cls=Command, epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)
 app.command(cls=Command, epilog=comparison.HISTORY_EXAMPLES)(comparison.history)
 app.add_typer(records.app, name="records")

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -14,10 +14,12 @@ from ..harness.progress import listening
 from ..help_text import block
 from ..presentation.text import visible
 from ..terminal import print_tables, progress
+from ..verify.command import program_of
 from .options import MISSED, REPORT, SUCCESS, Fresh, Output, known, writable
 from .report import write_report
 
 if TYPE_CHECKING:
+    from ..harness.choice import Choice
     from ..harness.executor import Executor
 
 # The width of the names of suites in the help.
@@ -26,40 +28,141 @@ QUICK, FULL = "quick", "full"
 EXAMPLES = (
     block(
         "Examples",
-        "plumbob bench                  everything, at full length",
-        "plumbob bench --quick timing   one suite, quickly",
-        "plumbob bench cloth --fresh    forget the cloth's records and measure anew",
+        "plumbob bench                          everything, at full length",
+        "plumbob bench --quick timing           one suite, quickly",
+        "plumbob bench cloth --fresh            forget the cloth's records and measure anew",
         "plumbob bench --executor dask://node1:8786    on a cluster, see docs/cluster.md",
+    )
+    + "\n\n"
+    + block(
+        "Your solver",
+        "plumbob bench ik --with my_ik.py       in every table beside ours and the peers",
+        "plumbob bench cloth --with my_package.cloth:Solver",
+        "plumbob bench ik --with 'Mine 2=my_ik.py' --with my_ik_before.py",
+        "plumbob bench ik -- ./my_solver --flag",
+    )
+    + "\n\n"
+    + block(
+        "Your problems, and parts of the work",
+        "plumbob bench ik --problem my_problems.py --problem robots/",
+        "plumbob bench ik --with my_ik.py --solver my_ik.py --robot panda --targets 50",
+        "plumbob bench ik --list                what there is to choose from",
+        "plumbob bench --dry-run                what would be measured, and how long it takes",
     )
     + "\n\n"
     + block("Suites", *(f"{name:<{INDENT}}{about}" for name, about in SUITES.items()))
 )
+_Names = list[str] | None
+With = Annotated[
+    _Names,
+    typer.Option("--with", metavar="SOLVER", help="Your my_ik.py, or module:object; repeatable."),
+]
+Solver = Annotated[_Names, typer.Option(metavar="NAME", help="Only this solver; repeatable.")]
+Problem = Annotated[
+    _Names,
+    typer.Option(metavar="NAME", help="Only this one, or yours: a .py, a model, a folder."),
+]
+Robot = Annotated[_Names, typer.Option(metavar="NAME", help="Only this robot; repeatable.")]
+Targets = Annotated[
+    int | None, typer.Option(metavar="N", help="Random targets a problem; robots get a tenth.")
+]
+Effector = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Of your models, the link that is to get there.")
+]
+Pins = Annotated[
+    str | None, typer.Option(metavar="RULE", help="Of your OBJ: far, top, or indices as 0,10.")
+]
+Listing = Annotated[bool, typer.Option("--list", help="List problems and solvers, and stop.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be measured, and stop.")]
+Executed = Annotated[str, typer.Option(metavar="local|dask://HOST:PORT", help="Where to measure.")]
+Mixed = Annotated[
+    bool, typer.Option("--mix-machines", help="With Dask: let one table hold times of several.")
+]
 
 
-def bench(
+class Asked(NamedTuple):
+    """What the options about solvers and problems say, as they are."""
+
+    entered: Sequence[str] = ()
+    program: Sequence[str] = ()
+    solvers: Sequence[str] = ()
+    problems: Sequence[str] = ()
+    robots: Sequence[str] = ()
+    targets: int | None = None
+    effector: str | None = None
+    pins: str | None = None
+
+
+def bench(  # noqa: PLR0913 -- one parameter an option
+    context: typer.Context,
     suites: Annotated[
         list[str] | None, typer.Argument(metavar="SUITE", help="Suites to run; all if none.")
     ] = None,
     output: Output = REPORT,
     fresh: Fresh = False,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer targets, shorter timing.")] = False,
-    executor: Annotated[
-        str, typer.Option(metavar="local|dask://HOST:PORT", help="Where to measure.")
-    ] = "local",
-    mix_machines: Annotated[
-        bool, typer.Option("--mix-machines", help="With Dask: let one table hold times of several.")
-    ] = False,
+    entered: With = None,
+    solver: Solver = None,
+    problem: Problem = None,
+    robot: Robot = None,
+    targets: Targets = None,
+    effector: Effector = None,
+    pins: Pins = None,
+    listing: Listing = False,
+    dry: DryRun = False,
+    executor: Executed = "local",
+    mix_machines: Mixed = False,
 ) -> int:
-    """Measure problems with solvers. What is on record is kept, so a run can be taken up again."""
+    """Measure problems with solvers. What is on record is kept, so a run can be taken up again.
+
+    A solver of yours is opened as by plumbob verify, and stands in every table of the suites ik and
+    cloth under its own name. Installed packages enter solvers by the entry point plumbob.solvers.
+    """
     from ..executors import executor_at
 
     chosen = tuple(dict.fromkeys(known("suite", name, SUITES) for name in suites or SUITES))
+    names = (solver or (), problem or (), robot or ())
+    asked = Asked(entered or (), program_of(context), *names, targets, effector, pins)
+    choice = _choice(chosen, QUICK if quick else FULL, asked)
+    if listing or dry:
+        return _look_ahead(chosen, choice, output, listing)
     writable(output)
     with closing(executor_at(executor, mix_machines)) as where:
-        code = run_suites(chosen, QUICK if quick else FULL, output, fresh, where)
+        code = run_suites(chosen, choice, output, fresh, where)
     if suites:
         print_tables(chosen, output)
     return code
+
+
+def _choice(suites: Sequence[str], scale: str, asked: Asked) -> "Choice":
+    """Return what is to be measured, after opening the solvers and problems that are entered."""
+    from ..entrants import opening, problem_files, selection
+
+    entries = opening.named(asked.entered, asked.program)
+    entrants = opening.opened(entries, suites)
+    for found in opening.opened_where_possible(opening.installed(), suites, entrants):
+        if isinstance(found, str):
+            print(f"plumbob: {visible(found)}", file=sys.stderr)
+        else:
+            entrants.append(found)
+    own, names = problem_files.read(asked.problems, suites, asked.effector, asked.pins)
+    made = selection.scale_of(scale, asked.targets, entrants, own)
+    wanted = selection.Wanted(asked.solvers, names, asked.robots, asked.targets)
+    return selection.choose(suites, scale, made, wanted)
+
+
+def _look_ahead(suites: Sequence[str], choice: "Choice", output: Path, listing: bool) -> int:
+    from ..entrants import outlook
+
+    lines = outlook.listed(suites, choice) if listing else outlook.dry_run(suites, choice, output)
+    for line in lines:
+        print(visible_indented(line))
+    return SUCCESS
+
+
+def visible_indented(line: str) -> str:
+    """Return a line with its indentation, and whatever does not print as an escape."""
+    return " " * (len(line) - len(line.lstrip(" "))) + visible(line)
 
 
 def main_job(output: Path, fresh: bool) -> int:
@@ -77,7 +180,7 @@ def main_job(output: Path, fresh: bool) -> int:
 
 def run_suites(
     suites: Sequence[str],
-    scale: str,
+    scale: "str | Choice",
     output: Path,
     fresh: bool,
     executor: "Executor | None" = None,

@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import pickle
 import queue
 import uuid
 from collections import Counter, deque
@@ -102,7 +103,7 @@ class DaskExecutor:
         self._topic = f"plumbob-{uuid.uuid4().hex}"
         self._client.subscribe_topic(self._topic, self._heard)
         self._places: dict[str, Place] = {}
-        self._machine = ""
+        self._machine, self._timed = "", list[Record]()
         try:
             self._wait_for_workers()
         except BaseException:
@@ -115,11 +116,12 @@ class DaskExecutor:
 
     def look_at(self, timed: Iterable[Record | None]) -> None:
         """Choose the machine that times are taken on: of those here, that of the most records."""
-        records = Counter(
-            _machine(record.stamp)
+        self._timed = [
+            record
             for record in timed
-            if record and not record.failed and not unlike(record.stamp, stamp())
-        )
+            if record and record.arrays and not unlike(record.stamp, stamp())
+        ]
+        records = Counter(_machine(record.stamp) for record in self._timed)
         workers = Counter(one.machine for one in self._places.values())
         self._machine = max(sorted(workers), key=lambda name: (records[name], workers[name]))
 
@@ -136,7 +138,22 @@ class DaskExecutor:
     def measure(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
         """Yield each block as it is given out, and what came of it, as it comes."""
         yield from self._spread([block for block in blocks if not block.times], scale)
-        yield from self._pin([block for block in blocks if block.times], scale)
+        timed = [block for block in blocks if block.times]
+        mixed = self._would_be_mixed(timed)
+        yield from (NotMeasured(b, mixed[b.suite]) for b in timed if b.suite in mixed)
+        yield from self._pin([block for block in timed if block.suite not in mixed], scale)
+
+    def _would_be_mixed(self, blocks: Sequence[Block]) -> dict[str, str]:
+        """Return the suites of which rows that stay are of another machine, and why that is bad."""
+        again, here = {block_key(block) for block in blocks}, _in_words(self._machine)
+        return {
+            record.suite: f"others of {record.suite} are timed on another machine than is here "
+            f"({_in_words(_machine(record.stamp))}; here {here}): ask for the whole suite, or "
+            "--mix-machines"
+            for record in self._timed
+            if not (self.mix_machines or record.key in again)
+            and _machine(record.stamp) != self._machine
+        }
 
     def _spread(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
         """Let Dask choose the workers."""
@@ -216,13 +233,14 @@ class DaskExecutor:
                 line.host = ""
 
     def _submit(self, block: Block, scale: Scale, **where: Any) -> Any:
-        task = Task(block.suite, scale, block_key(block), block.times, stamp(), self._topic)
+        known = block.suite, pickle.dumps(scale), block_key(block)
+        task = Task(*known, block.times, stamp(), self._topic)
         future = self._client.submit(perform, task, key=f"plumbob-{uuid.uuid4().hex}", **where)
         future.add_done_callback(self._done.put)
         return future
 
-    def _heard(self, event: tuple[Any, Mapping[str, str]]) -> None:
-        self._done.put(Progress(**event[1]))
+    def _heard(self, event: tuple[Any, Sequence[str]]) -> None:
+        self._done.put(Progress(*event[1]))
 
     def _next(self) -> Any:
         """Return a future that is done, None if there is none for a while; pass on progress."""

@@ -8,6 +8,7 @@ import contextlib
 import fcntl
 import functools
 import os
+import pickle
 import socket
 import tempfile
 import threading
@@ -16,13 +17,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..entrants.entrant import Entrant
+from ..entrants.sources import digest_of
 from ..experiments import Block, Scale, blocks
 from ..harness.isolation import WorkerProcess
 from ..harness.machine import difference, stamp
 from ..harness.measure import block_key, measure
 from ..harness.progress import Progress, listening
 from ..harness.record import Key, check_regular, encode
-from ..harness.worker import Calculation
+from ..harness.worker import Calculation, describe
 
 # A block that says nothing for so long [s] is given up.
 PATIENCE = 24 * 3600.0
@@ -34,7 +37,7 @@ class Task(NamedTuple):
 
     Attributes:
         suite: its suite.
-        scale: how much is measured.
+        scale: how much is measured, and whose solvers and problems take part, pickled.
         key: the block's key.
         times: whether it is timed, so that nothing else may be measured meanwhile.
         stamp: that of the process that asks, whose versions and sources the worker must have.
@@ -42,7 +45,7 @@ class Task(NamedTuple):
     """
 
     suite: str
-    scale: Scale
+    scale: bytes
     key: Key
     times: bool
     stamp: Mapping[str, Any]
@@ -72,14 +75,17 @@ def perform(task: Task) -> Reply:
 def _tell(topic: str, progress: Progress) -> None:
     from distributed import get_worker
 
-    get_worker().log_event(topic, progress._asdict())
+    get_worker().log_event(topic, list(progress))
 
 
-def measured(suite: str, scale: Scale, key: Key) -> Mapping[str, str]:
-    """Return the record of a block as a line, or that there is no such block here."""
-    block = _blocks(suite, scale).get(key)
+def measured(suite: str, scale: bytes, key: Key) -> Mapping[str, str]:
+    """Return the record of a block as a line, or why it is not measured here."""
+    try:
+        block = _blocks(suite, scale).get(key)
+    except Exception as error:  # whatever files of a user's may raise
+        return {"refused": describe(error)}
     if block is None:
-        return {"refused": f"there is no block {', '.join(key)}; are the same files there?"}
+        return {"refused": f"there is no block {', '.join(key)}"}
     return {"line": encode(measure(block))}
 
 
@@ -93,9 +99,19 @@ def place() -> dict[str, Any]:
     return {"host": socket.gethostname(), "stamp": stamp()}
 
 
-@functools.cache
-def _blocks(suite: str, scale: Scale) -> dict[Key, Block]:
-    return {block_key(block): block for block in blocks(suite, scale)}
+@functools.lru_cache(maxsize=32)
+def _blocks(suite: str, scale: bytes) -> dict[Key, Block]:
+    made: Scale = pickle.loads(scale)
+    for entrant in made.entrants:
+        _check_files(entrant)
+    return {block_key(block): block for block in blocks(suite, made)}
+
+
+def _check_files(entrant: Entrant) -> None:
+    """Raise unless the files of a user's solver are here as they are there."""
+    if (digest := digest_of(entrant.spec)) != entrant.digest:
+        found = f"other ones ({digest}, there {entrant.digest})" if digest else "none"
+        raise ValueError(f"with: expected the files of {entrant.door}, got {found}")
 
 
 def _process() -> WorkerProcess:

@@ -2,7 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from ..entrants.entrant import Entrant
+    from ..entrants.problems import OwnProblem
 
 
 class Measured(NamedTuple):
@@ -21,10 +25,23 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True)
 class Scale:
-    """How much is measured: random targets a problem, seconds a benchmark."""
+    """How much is measured.
+
+    Attributes:
+        targets: random targets a problem.
+        seconds: of a benchmark.
+        entrants: solvers of the user's, beside those that the bench knows.
+        problems: problems of the user's, likewise.
+    """
 
     targets: int
     seconds: float
+    entrants: "tuple[Entrant, ...]" = ()
+    problems: "tuple[OwnProblem, ...]" = ()
+
+    def is_as_short_as(self, name: str) -> bool:
+        """Return whether benchmarks are as short as at a scale that has a name."""
+        return self.seconds == SCALES[name].seconds
 
 
 SCALES = {"quick": Scale(targets=200, seconds=0.2), "full": Scale(targets=2000, seconds=2.0)}
@@ -46,6 +63,7 @@ class Block:
         facts: what the names say, as values: numbers, words, truth values and lists of words.
             "title" is how the problem is written, "task" which of the suite's kinds it is.
         times: whether times are among the numbers, or end the work: see `Experiment`.
+        conditions: what its solver is measured under, beside what every record has.
     """
 
     suite: str
@@ -56,3 +74,4 @@ class Block:
     size: float = 0
     facts: Mapping[str, Any] = field(default_factory=dict)
     times: bool = True
+    conditions: Mapping[str, Any] = field(default_factory=dict)

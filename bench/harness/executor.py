@@ -29,7 +29,7 @@ class Executor(Protocol):
     takes_suites_together: bool
 
     def look_at(self, timed: Iterable[Record | None]) -> None:
-        """Take note of what is on record of the blocks that are timed, before anything else."""
+        """Take note of what is on record of all blocks that take times, asked for or not."""
 
     def difference(self, block: Block, record: Record) -> str:
         """Return in what a record differs from what would be measured now, "" if in nothing."""

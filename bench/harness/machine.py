@@ -7,7 +7,7 @@ import os
 import platform
 import statistics
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,7 @@ PRESENTATION = (
     "bench/comparison",
     "bench/help_text.py",
     "bench/presentation",
-    "bench/show.py",
+    "bench/show",
     "bench/terminal.py",
     "bench/verify",
 )
@@ -87,12 +87,15 @@ def _our_commit() -> str:
 
 def commit_of(root: Path) -> str:
     """Return the commit of sources, and whether they were changed since; "" outside of git."""
-    if not (root / ".git").exists():
-        return ""
-    git = ["git", "-C", str(root)]
+    return git_commit(root, _PACKAGES) if (root / ".git").exists() else ""
+
+
+def git_commit(folder: Path, paths: Sequence[str]) -> str:
+    """Return the commit of a folder, and whether these paths differ from it; "" outside of git."""
+    git = ["git", "-C", str(folder)]
     try:
         head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, check=True)
-        status = [*git, "status", "--porcelain", "--", *_PACKAGES]
+        status = [*git, "status", "--porcelain", "--", *paths]
         changed = subprocess.run(status, capture_output=True, check=True).stdout
     except (OSError, subprocess.CalledProcessError):  # no git, or no commit yet
         return ""

@@ -51,5 +51,5 @@ def record_of(block: Block, measured: Measured, seconds: float) -> Record:
         now(),
         seconds,
         {**block.facts, **measured.facts},
-        conditions(),
+        {**conditions(), **block.conditions},
     )

@@ -4,7 +4,7 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,7 +113,9 @@ def spread(values: Floats) -> Spread:
     values = np.asarray(values, dtype=float).ravel()
     if values.size == 0:
         return Spread(math.nan, math.nan, math.nan)
-    median, p95 = np.quantile(values, [0.5, 0.95])
+    # Between two infinite values there is nothing to interpolate.
+    method: Literal["higher", "linear"] = "higher" if np.isinf(values).any() else "linear"
+    median, p95 = np.quantile(values, [0.5, 0.95], method=method)
     return Spread(float(median), float(p95), float(values.max()))
 
 
@@ -139,6 +141,8 @@ def median_interval(values: Floats) -> Interval:
 @functools.cache
 def _coin_quantile(throws: int) -> int:
     """Return the greatest k for which k heads or fewer fall in 2.5 % of cases at most, else -1."""
+    if throws > LARGE:  # by the normal distribution, with half a throw for continuity
+        return math.floor((throws - 1 - _NORMAL * math.sqrt(throws)) / 2)
     below, k = 0.0, -1
     while (below := below + _coin(throws, k + 1)) <= (1 - CONFIDENCE) / 2:
         k += 1
@@ -182,15 +186,15 @@ def ranking(scores: Mapping[str, Floats]) -> Ranking:
 def chance_of_pairs(a: Floats, b: Floats) -> float:
     """Return how likely two are as far apart on average if signs are drawn by lot, (target,) each.
 
-    Exact for differences of one size and for few; else the sum is taken for normal, with the
-    variance that the lots give it.
+    Exact for differences of one size, unless there are very many, and for few; else the sum is
+    taken for normal, with the variance that the lots give it.
     """
     apart = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
     apart = apart[apart != 0]
     total, size = abs(float(apart.sum())), np.abs(apart)
     if not len(apart):
         return 1.0
-    if size.min() == size.max():
+    if size.min() == size.max() and len(apart) <= LARGE:
         wins = max(int(np.sum(apart > 0)), int(np.sum(apart < 0)))
         return min(1.0, 2.0 * sum(_coin(len(apart), k) for k in range(wins, len(apart) + 1)))
     if len(apart) <= _FEW:
@@ -349,9 +353,12 @@ def convergence(history: Floats) -> Convergence:
 
 
 def counts(values: Floats, edges: Floats) -> NDArray[np.int64]:
-    """Return how many values fall between neighbouring edges; the last bin takes all beyond."""
+    """Return how many values fall between neighbouring edges; the last bin takes all beyond.
+
+    What is not a number falls nowhere.
+    """
     values = np.asarray(values, dtype=float).ravel()
-    inside = np.clip(values, edges[0], edges[-1])
+    inside = np.clip(values[~np.isnan(values)], edges[0], edges[-1])
     return np.histogram(inside, bins=edges)[0].astype(np.int64)
 
 

@@ -20,9 +20,15 @@ class Begun(NamedTuple):
 
 
 class Ready(NamedTuple):
-    """The solver is set up, in so long [s] without imports, and did one target, not counted."""
+    """The solver is set up, in so long [s] without imports, and did one target, not counted.
+
+    Attributes:
+        setup: how long that took [s].
+        remark: what is to be said of its numbers, else "".
+    """
 
     setup: float
+    remark: str = ""
 
 
 class Solved(NamedTuple):

@@ -7,6 +7,7 @@ Nothing here imports an engine.
 
 import functools
 import importlib.metadata
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -16,6 +17,7 @@ from reference import IK_SOLVERS, STEP_SOLVERS
 from . import environments
 
 PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
+BULLET = "PyBullet"
 
 
 class Style(NamedTuple):
@@ -32,8 +34,11 @@ THIRD = Style("green", "-.", "^")
 FOURTH = Style("purple", (0, (1, 1)), "v")
 FIFTH = Style("brass", (0, (4, 1, 1, 1, 1, 1)), "D")
 OTHER = Style("faint", ":", "P")
+# Of which those of solvers that nobody knows are made: lines that no solver above has.
+_COLOURS = ("ink", "blue", "orange", "green", "purple", "brass")
+_LINES: tuple[Any, ...] = ((0, (8, 2)), (0, (3, 1, 1, 1)), (0, (8, 2, 2, 2)))
 # The markers of solvers for cloths, by whose they are.
-ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^"}
+ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^", BULLET: "D"}
 
 
 @dataclass(frozen=True)
@@ -178,11 +183,14 @@ class Peer(NamedTuple):
     environment: str = ""
 
     @property
+    def distribution(self) -> importlib.metadata.Distribution | None:
+        """The package where it is installed, None if it is not."""
+        return environments.distribution(self.environment, self.package)
+
+    @property
     def version(self) -> str:
         """The version that is installed, "" if none is."""
-        if self.environment:
-            return environments.version(self.environment, self.package)
-        return _version(self.package)
+        return self.distribution.version if self.distribution else ""
 
     def called(self, entry: Entry) -> str:
         """Return how an entry is written."""
@@ -230,10 +238,10 @@ DRAKE = _peer(
     Entry(ONE_START, {"solver": "IPOPT"}, note="IPOPT"),
     Entry(RESTARTS, {}, AGAIN, f"SNOPT, {AGAIN} restarts"),
 )
-# PyBullet's null space keeps the limits better than it reaches targets.
 PYBULLET = _peer(
     *("PyBullet", "pybullet", "pybullet", "Zlib"),
-    f"{_CHAINS}, either accurate or mindful of limits; makes no claims",
+    "poses of one chain of hinges; limits only as a pull in the null space, with which it hardly "
+    "arrives and oversteps them all the same; makes no claims",
     Entry(ONE_START, note="limits left out"),
     Entry(ONE_START, {"limits": True}, note="limits in the null space"),
     Entry(RESTARTS, {"check": True}, AGAIN, f"{AGAIN} restarts, its pose looked at"),
@@ -243,6 +251,7 @@ TORCH = _peer(
     Entry(ONE_START),
     Entry(RESTARTS, {"attempts": AGAIN + 1}, note=f"{AGAIN} restarts, all at once"),
 )
+DART = _peer("DART", "dart", "dartpy", "BSD-2-Clause", _CHAINS, *_either(100))
 PLACO = _peer("PlaCo", "placo", "placo", "MIT", _CHAINS, *_either(50))._replace(environment="placo")
 PEERS = (
     OURS,
@@ -257,15 +266,23 @@ PEERS = (
     _peer("ikpy", "ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims", Entry(ONE_START)),
     _peer("EAIK", "eaik", "eaik", "BSD-3-Clause", _SIX, _EVERY_SOLUTION),
     DRAKE,
-    _peer("DART", "dart", "dartpy", "BSD-2-Clause", _CHAINS, *_either(100)),
+    DART,
     PLACO,
     PYBULLET,
     TORCH,
 )
+# Those whose kinematics is compared with ours, with what is to be known of it.
+KINEMATICS = (DRAKE, DART, PYBULLET, TORCH)
+SINGLE_PRECISION = {
+    PYBULLET.title: "reads the file, and gives poses, in single precision",
+    TORCH.title: "reads the file in single precision",
+}
 
 
 # Peers for cloths: what distinguishes the settings that each is tried with.
 ITERATED, LINEARISED, EXPLICIT = "iterations", "one linear solve", "explicit"
+# An entrant that does not say which step it makes is tried with steps of all lengths.
+UNDECLARED = "undeclared"
 
 
 @dataclass(frozen=True)
@@ -357,6 +374,15 @@ CLOTH_ENGINES = (
     _newton("VBD, its own colours", "vbd", ITERATED, SOME, own=1),
     _newton("XPBD", "xpbd", ITERATED, SOME),
     _newton("XPBD, substeps", "xpbd", EXPLICIT, iterations=1),
+    ClothPeer(
+        *(
+            "PyBullet deformable, Euler",
+            BULLET,
+            "bench.peers.cloth.pybullet_deformable",
+            "pybullet",
+        ),
+        EXPLICIT,
+    ),
 )
 
 
@@ -388,13 +414,25 @@ def cloth_peers() -> tuple[ClothPeer, ...]:
 def find(name: str) -> Solver:
     """Return the solver that records call so; one that nobody knows is written as it is called."""
     known = _by_name(tuple(IK_SOLVERS), tuple(STEP_SOLVERS))
-    return known.get(name) or Solver(name, _spaced(name), "")
+    return known.get(name) or Solver(name, name, "", _style(name))
 
 
 @functools.cache
 def _by_name(*of_reference: tuple[str, ...]) -> Mapping[str, Solver]:
     """Return the solvers by what records call them, the first of a name."""
     return {solver.name: solver for solver in reversed(list(_solvers()))}
+
+
+def names() -> set[str]:
+    """Return what solvers of ours and of peers are called, in records and as they are written."""
+    return {one for solver in _solvers() for one in (solver.name, solver.label)}
+
+
+def _style(name: str) -> Style:
+    """Return a style for a solver that nobody knows, the same whenever it is drawn."""
+    number = zlib.crc32(name.encode(errors="replace"))
+    colour = _COLOURS[number % len(_COLOURS)]
+    return Style(colour, _LINES[number // len(_COLOURS) % len(_LINES)], "P")
 
 
 def _solvers() -> Iterator[Solver]:

@@ -130,6 +130,8 @@ def draw_chart(chart: Chart) -> Figure:
             ax.tick_params(labelbottom=True)
         if i % columns == 0 and (words := panel.label or chart.y.label):
             ax.set_ylabel(written(words))
+    for ax in axes[: len(chart.panels)]:
+        drawer.scale(ax)
     for ax in axes[len(chart.panels) :]:
         ax.remove()
     if entries:
@@ -196,14 +198,16 @@ class _Drawer:
                 artist.set_gid(f"series-{self._numbers[one.solver]}")
         if panel.across is not None:
             ax.axhline(panel.across, color=COLOURS["faint"], linewidth=0.8, dashes=(2, 2))
-        x, y = self._chart.x, self._chart.y
-        _scale(ax, "x", x, self._ticks)
+
+    def scale(self, ax: Axes) -> None:
+        """Set up the axes of a panel, when all panels that share them have their curves."""
+        _scale(ax, "x", self._chart.x, self._ticks)
         if self._chart.rows:
             names = [_lines(name, _ROW) for name in self._chart.rows]
             ax.set_yticks(range(len(names)), names)
             ax.set_ylim(len(names) - 0.5, -0.5)
         else:
-            _scale(ax, "y", y, 6)
+            _scale(ax, "y", self._chart.y, 6)
 
     def _drawn(self, ax: Axes, one: Series) -> list[Artist]:
         style = _style(self._look.get(one.solver, GREY), marks=one.form != LINE)
@@ -255,7 +259,8 @@ def _scale(ax: Axes, which: str, axis: Axis, most: int) -> None:
     along = ax.xaxis if which == "x" else ax.yaxis
     if axis.log:
         (ax.set_xscale if which == "x" else ax.set_yscale)("log")
-    (ax.set_xlim if which == "x" else ax.set_ylim)(*axis.limits)
+    if axis.limits != (None, None):
+        (ax.set_xlim if which == "x" else ax.set_ylim)(*axis.limits)
     low, high = sorted(along.get_view_interval())
     if not axis.log:
         along.set_major_locator(mpl.ticker.MaxNLocator(most, steps=[1, 2, 5, 10]))

@@ -216,7 +216,7 @@ def _arrived(results: Results) -> Headline | None:
     if not most:
         return None
     ties = [solver for solver, count in arrivals.items() if count == most]
-    detail = f"{TARGET} near on {most}/{len(times)} cloths"
+    detail = f"within {TARGET} on {most}/{len(times)} cloths"
     return Headline("cloth", "Most accurate", _tied(ties), detail, "cloth_peers_step")
 
 
@@ -258,16 +258,16 @@ def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headl
     firsts = Counter(ranked[0][0] for ranked in decided)
     most = max(firsts.values())
     leaders = [name for name, count in firsts.items() if count == most]
-    detail = f"first in {most}/{len(works)} {of}"
+    detail = f"{most}/{len(works)} {of}"
     if len(leaders) == 1:
-        detail += _ahead([ranked for ranked in decided if ranked[0][0] == leaders[0]])
+        detail = f"{_ahead([r for r in decided if r[0][0] == leaders[0]])}, {detail}"
     return Headline(chapter, asked, _tied(leaders), detail, table)
 
 
 def _ahead(won: Sequence[Sequence[tuple[str, Time]]]) -> str:
     """Say by what factors the works were won."""
     factors = [ranked[1][1].median / ranked[0][1].median for ranked in won if len(ranked) > 1]
-    return f", {_range(factors)} × the next" if factors else "; no rival arrives"
+    return f"{_range(factors)} × the next" if factors else "no rival arrives"
 
 
 def _is_tie(ranked: Sequence[tuple[str, Time]]) -> bool:

@@ -106,17 +106,17 @@ class Scene(NamedTuple):
 
 def fragment(scene: Scene) -> Markup:
     """Return a scene as a part of a page that has `STYLE` and `SCRIPT`."""
-    low, high = _decades(scene)
+    low, high = decades(scene)
     return Markup(
         _environment()
         .get_template("motion.html")
         .render(
             scene=scene,
-            data=Markup(_json(data_of(scene))),
+            data=Markup(json.dumps(data_of(scene), separators=(",", ":"), allow_nan=False)),
             labels=[visible(one.label) for one in scene.motions],
             panes=range(min(scene.panes, len(scene.motions))),
             frames=len(scene.motions[0].positions),
-            ticks=["≤ " * (k == low) + _length(10.0**k) for k in range(low, high + 1)],
+            ticks=["≤ " * (k == low) + length(10.0**k) for k in range(low, high + 1)],
         )
     )
 
@@ -144,26 +144,26 @@ def _environment() -> Environment:
 
 
 def data_of(scene: Scene) -> dict[str, Any]:
-    """Return a scene as what `SCRIPT` reads: numbers, and arrays as base64."""
+    """Return a scene as what `SCRIPT` reads: numbers, and arrays as base64; no name is in it."""
     every = [np.asarray(one.positions, dtype=float).reshape(-1, 3) for one in scene.motions]
     every += [] if scene.curve is None else [np.asarray(scene.curve, dtype=float)]
     low = np.min([np.nanmin(np.where(np.isfinite(e), e, np.nan), axis=0) for e in every], axis=0)
     high = np.max([np.nanmax(np.where(np.isfinite(e), e, np.nan), axis=0) for e in every], axis=0)
     size = float((high - low).max()) or 1.0
-    decades = _decades(scene)
+    ends = decades(scene)
     return {
         "points": int(np.shape(scene.motions[0].positions)[1]),
         "seconds": scene.seconds,
         "extent": [round(float(x), 4) for x in (high - low) / size],
         "view": [round(float(x), 4) for x in scene.view],
-        "decades": decades,
+        "decades": ends,
         "curve": "" if scene.curve is None else _packed(scene.curve, low, size),
         "marked": [int(i) for i in scene.marked],
         "motions": [
             {
                 "at": _packed(one.positions, low, size),
                 "errors": [_rounded(float(e)) for e in one.errors],
-                "shades": "" if one.distances is None else _shades(one.distances, decades),
+                "shades": "" if one.distances is None else _shades(one.distances, ends),
             }
             for one in scene.motions
         ],
@@ -177,16 +177,16 @@ def _packed(points: Floats, low: Floats, size: float) -> str:
     return base64.b64encode(np.clip(scaled, 0, _FULL).astype("<u2").tobytes()).decode()
 
 
-def _shades(distances: Floats, decades: tuple[int, int]) -> str:
+def _shades(distances: Floats, ends: tuple[int, int]) -> str:
     """Return distances by their logarithm, as 8 bits each, from the first decade to the last."""
-    low, high = decades
+    low, high = ends
     with np.errstate(divide="ignore", invalid="ignore"):
         share = (np.log10(distances) - low) / (high - low)
     whole = np.nan_to_num(np.round(_SHADES * share), nan=_SHADES, posinf=_SHADES, neginf=0)
     return base64.b64encode(np.clip(whole, 0, _SHADES).astype(np.uint8).tobytes()).decode()
 
 
-def _decades(scene: Scene) -> tuple[int, int]:
+def decades(scene: Scene) -> tuple[int, int]:
     """Return the powers of ten that the colours go from and to, at most four decades."""
     found = [one.errors if one.distances is None else one.distances for one in scene.motions]
     values = np.concatenate([np.ravel(part) for part in found])
@@ -202,13 +202,10 @@ def _rounded(value: float) -> float | None:
     return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
 
 
-def _length(metres: float) -> str:
-    for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
+def length(metres: float) -> str:
+    """Return a length in words, two digits of it."""
+    for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9)):
         if metres >= 0.999 * size:
-            return f"{metres / size:g} {unit}"
-    return f"{metres / 1e-9:g} nm"
-
-
-def _json(content: Any) -> str:
-    """Return JSON that cannot end the element that it stands in."""
-    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+            digits = float(f"{metres / size:.2g}")
+            return f"{digits:.0f} {unit}" if digits >= 10 else f"{digits:g} {unit}"
+    return "< 1 nm" if metres > 0.0 else "0"

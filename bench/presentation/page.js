@@ -7,21 +7,22 @@
     element.append(...children);
     return element;
   };
+  const button = (onclick, ...children) => make("button", { onclick }, ...children);
   const plain = cell => {
     const copy = cell.cloneNode(true);
-    copy.querySelectorAll("sup").forEach(sup => sup.replaceWith("^" + sup.textContent));
-    return copy.textContent.replace(/ · 10\^−?(\d+)/g, (all, n) => (all.includes("−") ? "e-" : "e") + n)
-      .replace(/−(?=\d)/g, "-").replace(/\s+/g, " ").trim();
-  };
-  // Percent signs are decoded in the name only: values stand in parameters of their own.
-  const decoded = text => {
-    const [id, ...rest] = text.split("?");
-    try { return [decodeURIComponent(id), ...rest].join("?"); } catch { return ""; }
+    copy.querySelectorAll("sup").forEach(sup => sup.prepend("e"));
+    return copy.textContent.replaceAll(" · 10e", "e").replace(/−(?=\d)/g, "-").replace(/\s+/g, " ").trim();
   };
   const number = cell => {
-    const [value, total] = (cell.dataset.v ?? "").split("/");
-    return value === "" ? NaN : total === undefined ? +value : value / total;
+    const [value, total = 1] = (cell.dataset.v ?? "NaN").split("/");
+    return value / total;
   };
+  const compare = (a, b, sign) => {
+    const [x, y] = [number(a), number(b)];
+    if (isNaN(x) && isNaN(y)) return sign * plain(a).localeCompare(plain(b), undefined, { numeric: true });
+    return isNaN(x) ? 1 : isNaN(y) ? -1 : sign * (x - y);
+  };
+  const listed = flags => flags.flatMap((on, j) => on ? j : []).join(".");
 
   class View {
     constructor(box) {
@@ -30,65 +31,50 @@
       this.body = this.table.tBodies[0];
       this.rows = [...this.body.rows];
       this.groups = [...this.table.querySelectorAll("th.group")];
-      this.heads = [...this.table.tHead.rows].at(-1).cells;
-      this.titles = [...this.heads].map(plain);
-      this.usual = this.titles.map((_, j) => !this.heads[j].classList.contains("folded"));
-      this.menus = {};
+      this.heads = [...[...this.table.tHead.rows].at(-1).cells];
+      this.titles = this.heads.map(plain);
+      this.usual = this.heads.map(head => !head.classList.contains("folded"));
+      this.menus = [];
       this.reset();
       this.controls();
       this.show();
     }
     reset() {
-      this.sort = null;
+      this.sort = [];
       this.columns = [...this.usual];
-      this.only = {};
+      this.only = this.heads.map(() => new Set());
     }
 
     controls() {
       this.status = make("span", { className: "status", role: "status" });
-      const bar = make("div", { className: "bar", role: "group" });
-      bar.setAttribute("aria-label", "Controls of the table " + this.table.caption.textContent);
-      [...this.heads].forEach((head, j) => {
-        const text = [...head.childNodes];
-        const button = make("button", { type: "button" }, ...text);
-        button.onclick = () => this.change(() => this.sortBy(j));
-        head.append(button);
+      this.chosen = make("p", { className: "chosen", hidden: true });
+      const bar = make("div", { className: "bar", role: "group", ariaLabel: this.table.caption.textContent });
+      this.heads.forEach((head, j) => {
+        head.append(button(() => this.change(() => this.sortBy(j)), ...head.childNodes));
         const values = [...new Set(this.rows.map(row => plain(row.cells[j])))];
         if ("filter" in head.dataset && values.length > 1)
-          bar.append(this.menu("by" + j, this.titles[j], values, (value, on) => {
-            const chosen = (this.only[j] ??= new Set());
-            on ? chosen.add(value) : chosen.delete(value);
-          }));
+          bar.append(this.menu(this.titles[j], "Only", values, i => this.only[j].has(values[i]),
+            (i, on) => this.only[j][on ? "add" : "delete"](values[i])));
       });
-      bar.append(this.menu("columns", "columns", this.titles, (title, on) => {
-        this.columns[this.titles.indexOf(title)] = on;
-      }));
+      bar.append(this.menu("columns", "Show", this.titles, j => this.columns[j],
+        (j, on) => { this.columns[j] = on; }));
       for (const form of ["Markdown", "LaTeX", "CSV"])
-        bar.append(this.button("Copy " + form, () => this.copy(this[form](), form)));
-      bar.append(this.button("Reset", () => this.change(() => this.reset())), this.status);
+        bar.append(button(() => this.copy(this[form](), form), "Copy " + form));
+      bar.append(button(() => this.change(() => this.reset()), "Reset"), this.status);
       this.box.prepend(bar);
-      this.chosen = make("p", { className: "chosen", hidden: true });
       this.box.append(this.chosen);
-      for (const row of this.rows) {
-        const link = make("a", { className: "link", href: "#" + row.id, tabIndex: -1 });
-        link.setAttribute("aria-label", "Link and command of this row");
-        link.onclick = event => { event.preventDefault(); this.choose(row); this.remember(); };
-        row.cells[0].append(link);
-      }
-      this.rows[0].cells[0].lastChild.tabIndex = 0;
+      this.rows.forEach((row, i) => row.cells[0].append(make("a", {
+        className: "link", href: "#" + row.id, tabIndex: i ? -1 : 0, ariaLabel: "Link and command of this row",
+        onclick: event => { event.preventDefault(); this.pick(row); } })));
       this.body.onkeydown = event => this.walk(event);
     }
-    button(text, onclick) { return make("button", { type: "button", onclick }, text); }
-    menu(key, title, values, change) {
-      const boxes = values.map(value => {
-        const box = make("input", { type: "checkbox" });
-        box.onchange = () => this.change(() => change(value, box.checked));
-        return box;
-      });
-      this.menus[key] = { boxes, values };
-      const labels = values.map((value, i) => make("label", {}, boxes[i], " " + value));
+    menu(title, legend, values, isOn, change) {
+      const boxes = values.map((_, i) => make("input", { type: "checkbox",
+        onchange: event => this.change(() => change(i, event.target.checked)) }));
+      this.menus.push({ boxes, isOn });
       const menu = make("details", { className: "menu" }, make("summary", {}, title),
-        make("fieldset", {}, make("legend", {}, key === "columns" ? "Show" : "Only"), ...labels));
+        make("fieldset", {}, make("legend", {}, legend),
+          ...values.map((value, i) => make("label", {}, boxes[i], " " + value))));
       menu.onkeydown = event => {
         if (event.key !== "Escape") return;
         menu.open = false;
@@ -96,23 +82,22 @@
       };
       return menu;
     }
+    // The arrow keys move between the links of rows, of which only one takes part in tabbing.
     walk(event) {
-      const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-      const row = event.target.closest(".link") && event.target.closest("tr");
-      if (!step || !row) return;
-      const shown = [...this.body.rows].filter(row => !row.hidden);
-      const next = shown[shown.indexOf(row) + step];
-      if (!next) return;
+      const shown = this.shownRows();
+      const next = shown[shown.indexOf(event.target.closest("tr")) + { ArrowDown: 1, ArrowUp: -1 }[event.key]];
+      if (!next || event.target.className !== "link") return;
       event.preventDefault();
       event.target.tabIndex = -1;
       next.cells[0].lastChild.tabIndex = 0;
       next.cells[0].lastChild.focus();
     }
+    shownRows() { return [...this.body.rows].filter(row => !row.hidden); }
 
     sortBy(j) {
       const first = this.heads[j].dataset.best === "greatest" ? -1 : 1;
-      const [before, sign] = this.sort ?? [];
-      this.sort = before !== j ? [j, first] : sign === first ? [j, -first] : null;
+      const [before, sign] = this.sort;
+      this.sort = before !== j ? [j, first] : sign === first ? [j, -first] : [];
     }
     change(how) {
       how();
@@ -120,127 +105,102 @@
       this.remember();
     }
     show() {
-      const [by, sign] = this.sort ?? [-1, 1];
-      const order = [...this.rows];
-      if (by >= 0) order.sort((a, b) => this.compare(a.cells[by], b.cells[by], sign));
+      const [by, sign] = this.sort, order = [...this.rows];
+      if (sign) order.sort((a, b) => compare(a.cells[by], b.cells[by], sign));
       this.body.append(...order);
-      let before = "", count = 0;
-      for (const row of order) {
-        row.hidden = Object.entries(this.only).some(([j, values]) =>
-          values.size && !values.has(plain(row.cells[j])));
-        if (row.hidden) continue;
-        const first = row.cells[0].textContent;
-        row.cells[0].classList.toggle("same", first === before);
-        before = first;
-        count++;
-      }
-      for (const row of [[...this.heads], ...this.rows.map(row => [...row.cells])])
-        row.forEach((cell, j) => cell.classList.toggle("folded", !this.columns[j]));
+      for (const row of order) row.hidden = this.only.some((values, j) =>
+        values.size && !values.has(plain(row.cells[j])));
+      const shown = this.shownRows(), said = shown.map(row => plain(row.cells[0]));
+      shown.forEach((row, i) => row.cells[0].classList.toggle("same", i && said[i] === said[i - 1]));
+      for (const cells of [this.heads, ...this.rows.map(row => [...row.cells])])
+        cells.forEach((cell, j) => cell.classList.toggle("folded", !this.columns[j]));
       let at = 0;
       for (const group of this.groups) {
         const span = +(group.dataset.span ??= group.colSpan);
-        const shown = this.columns.slice(at, at += span).filter(Boolean).length;
-        group.colSpan = shown || 1;
-        group.hidden = !shown;
+        const left = this.columns.slice(at, at += span).filter(Boolean).length;
+        group.colSpan = left || 1;
+        group.hidden = !left;
       }
-      [...this.heads].forEach((head, j) =>
-        head.setAttribute("aria-sort", j !== by ? "none" : sign > 0 ? "ascending" : "descending"));
-      for (const [key, { boxes, values }] of Object.entries(this.menus)) boxes.forEach((box, i) => {
-        box.checked = key === "columns" ? this.columns[i] : !!this.only[key.slice(2)]?.has(values[i]);
+      this.heads.forEach((head, j) => {
+        head.ariaSort = j !== by ? "none" : sign > 0 ? "ascending" : "descending";
       });
-      const all = this.rows.length;
-      this.status.textContent = count < all ? `${count} of ${all} rows` : `${all} rows`;
-    }
-    compare(a, b, sign) {
-      const [x, y] = [number(a), number(b)];
-      if (!isNaN(x) || !isNaN(y)) return isNaN(x) ? 1 : isNaN(y) ? -1 : sign * (x - y);
-      return sign * plain(a).localeCompare(plain(b), undefined, { numeric: true });
+      for (const { boxes, isOn } of this.menus) boxes.forEach((box, i) => { box.checked = isOn(i); });
+      this.status.textContent = `${shown.length} of ${this.rows.length} rows`;
     }
 
+    pick(row) {
+      this.choose(row);
+      this.remember();
+    }
     choose(row) {
-      this.box.querySelector("[aria-current]")?.removeAttribute("aria-current");
+      this.row?.removeAttribute("aria-current");
       this.row = row;
       this.chosen.hidden = !row;
       if (!row) return;
-      row.setAttribute("aria-current", "true");
+      row.ariaCurrent = "true";
       const run = row.dataset.run;
       this.chosen.replaceChildren(
-        ...(run ? [make("code", {}, run), this.button("Copy command", () => this.copy(run, "command"))] : []),
-        this.button("Copy link", () => this.copy(location.href, "link")),
-        this.button("Close", () => { this.choose(null); this.remember(); }));
+        ...(run ? [make("code", {}, run), button(() => this.copy(run, "command"), "Copy command")] : []),
+        button(() => this.pick(), "Close"));
     }
     remember() {
-      const kept = new URLSearchParams();
-      if (this.sort) kept.set("sort", this.sort[0] + (this.sort[1] > 0 ? "" : "-"));
-      const shown = list => list.flatMap((on, j) => on ? [j] : []).join(".");
-      if (shown(this.columns) !== shown(this.usual)) kept.set("columns", shown(this.columns));
-      for (const [j, values] of Object.entries(this.only))
-        values.forEach(value => kept.append("by" + j, value));
-      const state = kept.size ? "?" + kept : "";
-      history.replaceState(null, "", "#" + (this.row ?? this.box).id + state);
+      const kept = new URLSearchParams(), [by, sign] = this.sort;
+      if (sign) kept.set("sort", by + (sign > 0 ? "" : "-"));
+      if (listed(this.columns) !== listed(this.usual)) kept.set("columns", listed(this.columns));
+      this.only.forEach((values, j) => values.forEach(value => kept.append("by" + j, value)));
+      history.replaceState(null, "", `#${(this.row ?? this.box).id}${kept.size ? "?" + kept : ""}`);
     }
     restore(kept, row) {
       this.reset();
-      const sort = /^(\d+)(-?)$/.exec(kept.get("sort") ?? "");
-      if (sort && this.heads[sort[1]]) this.sort = [+sort[1], sort[2] ? -1 : 1];
+      const by = parseInt(kept.get("sort"));
+      if (this.heads[by]) this.sort = [by, kept.get("sort").endsWith("-") ? -1 : 1];
       const columns = kept.get("columns")?.split(".");
       if (columns) this.columns = this.columns.map((_, j) => columns.includes(String(j)));
-      for (const [key, value] of kept)
-        if (this.menus[key] && key !== "columns") (this.only[key.slice(2)] ??= new Set()).add(value);
+      for (const [key, value] of kept) if (/^by/.test(key)) this.only[key.slice(2)]?.add(value);
       this.show();
       this.choose(row);
     }
 
-    // Heading and rows as shown, each cell written by `write`.
-    shown(write) {
-      const visible = [...this.columns.keys()].filter(j => this.columns[j]);
-      const rows = [...this.body.rows].filter(row => !row.hidden);
-      return [visible.map(j => write(this.heads[j], j)),
-        ...rows.map(row => visible.map(j => write(row.cells[j], j)))];
+    // Heading and rows as they are seen, each cell written by a function.
+    written(write) {
+      return [this.heads, ...this.shownRows().map(row => [...row.cells])].map(cells =>
+        cells.flatMap((cell, j) => this.columns[j] ? write(cell, j) : []));
+    }
+    aligned(left, right) {
+      return this.written(cell => cell.classList.contains("words") ? left : right)[0];
     }
     Markdown() {
-      const write = cell => {
+      const lines = this.written(cell => {
         const text = plain(cell).replace(/[\\`*_|<>]/g, "\\$&");
         return cell.classList.contains("best") ? `**${text}**` : text;
-      };
-      const [head, ...rows] = this.shown(write).map(cells => `| ${cells.join(" | ")} |`);
-      const rule = this.shown(cell => cell.classList.contains("words") ? "---" : "---:")[0];
-      return [head, `| ${rule.join(" | ")} |`, ...rows, ""].join("\n");
+      });
+      lines.splice(1, 0, this.aligned("---", "---:"));
+      return lines.map(cells => `| ${cells.join(" | ")} |\n`).join("");
     }
     LaTeX() {
       const marks = { "\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}",
-        "−": "$-$", "≤": "$\\leq$", "≥": "$\\geq$", "×": "$\\times$", "ω": "$\\omega$", "–": "--",
-        "[": "{[}", "]": "{]}" };
-      const write = cell => {
-        const text = plain(cell).replace(/[\\{}$&#%_^~\[\]−≤≥×ω–]/g, mark => marks[mark] ?? "\\" + mark)
-          .replace(/(?<![\w.])(-?\d+(?:\.\d+)?)e(-?\d+)(?!\w)/g, "$$$1 \\cdot 10^{$2}$$");
+        "≤": "$\\leq$", "≥": "$\\geq$", "×": "$\\times$", "ω": "$\\omega$", "[": "{[}", "]": "{]}" };
+      const [head, ...rows] = this.written(cell => {
+        const text = plain(cell).replace(/[\\{}$&#%_^~\[\]≤≥×ω]/g, mark => marks[mark] ?? "\\" + mark)
+          .replace(/(?<![\w.])(-?[\d.]+)e(-?\d+)(?!\w)/g, "$$$1 \\cdot 10^{$2}$$");
         return cell.classList.contains("best") ? `\\textbf{${text}}` : text;
-      };
-      const [head, ...rows] = this.shown(write).map(cells => cells.join(" & ") + " \\\\");
-      const align = this.shown(cell => cell.classList.contains("words") ? "l" : "r")[0].join("");
-      return ["% needs \\usepackage{booktabs}", `\\begin{tabular}{${align}}`, "\\toprule", head, "\\midrule",
-        ...rows, "\\bottomrule", "\\end{tabular}", ""].join("\n");
+      }).map(cells => cells.join(" & ") + " \\\\");
+      return ["% needs \\usepackage{booktabs}", `\\begin{tabular}{${this.aligned("l", "r").join("")}}`,
+        "\\toprule", head, "\\midrule", ...rows, "\\bottomrule", "\\end{tabular}", ""].join("\n");
     }
+    // All digits are kept; a share becomes its four parts.
     CSV() {
-      const isShare = this.titles.map((_, j) => this.rows.some(row => row.cells[j].dataset.v?.includes("/")));
-      const parts = ["hits", "total", "95 % low", "95 % high"];
-      const write = (cell, j) => {
-        const value = cell.dataset.v;
-        if (cell.tagName === "TH" && cell.scope === "col")
-          return isShare[j] ? parts.map(part => `${this.titles[j]}, ${part}`) : [this.titles[j]];
-        if (isShare[j]) return value ? value.split("/") : ["", "", "", ""];
-        return [value ?? (plain(cell) === "–" ? "" : plain(cell))];
-      };
-      const quote = text => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
-      return this.shown(write).map(cells => cells.flat().map(quote).join(",") + "\n").join("");
+      const isShare = this.heads.map((_, j) => this.rows.some(row => row.cells[j].dataset.v?.includes("/")));
+      return this.written((cell, j) => {
+        const said = plain(cell).replace(/^–$/, ""), { v } = cell.dataset;
+        if (!isShare[j]) return v ?? said;
+        if (this.heads.includes(cell)) return ["hits", "total", "95 % low", "95 % high"].map(part => `${said}, ${part}`);
+        return v?.split("/") ?? ["", "", "", ""];
+      }).map(cells => cells.map(text => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text) + "\n").join("");
     }
     async copy(text, what) {
-      try {
-        await navigator.clipboard.writeText(text);
-        this.status.textContent = `Copied: ${what}`;
-      } catch {
-        this.status.textContent = "The browser does not let this page copy";
-      }
+      const done = navigator.clipboard?.writeText(text) ?? Promise.reject();
+      this.status.textContent = await done.then(() => `Copied: ${what}`, () => "The browser refuses to copy");
     }
   }
 
@@ -248,11 +208,11 @@
   const viewOf = box => views.get(box) ?? views.set(box, new View(box)).get(box);
   const prepare = part => part.querySelectorAll(".data").forEach(viewOf);
   const follow = () => {
-    const [, id, kept] = /^#([^?]*)\??(.*)$/s.exec(decoded(location.hash)) ?? [];
-    const found = id && document.getElementById(id), box = found?.closest(".data");
+    const [, id, kept] = /^#([^?]*)\??(.*)$/s.exec(location.hash) ?? [];
+    const found = document.getElementById(id), box = found?.closest(".data");
     if (!box) return;
-    for (let fold = box.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
-    const row = found.matches("tr") ? found : null;
+    for (let fold = box; (fold = fold.parentElement.closest("details"));) fold.open = true;
+    const row = found === box ? null : found.closest("tr");
     viewOf(box).restore(new URLSearchParams(kept), row);
     found.scrollIntoView({ block: row ? "center" : "start", behavior: "instant" });
   };

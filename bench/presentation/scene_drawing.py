@@ -1,11 +1,12 @@
 """Drawings of an arm and a cloth, seen in parallel projection."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import to_rgba
+from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from numpy.typing import NDArray
 
 from .figures import COLOURS
@@ -14,6 +15,10 @@ from .view import ARM_VIEW, CLOTH_VIEW, seen
 Floats = NDArray[np.float64]
 
 LIGHT = np.array([0.4, 0.8, 0.45])
+# From near to far, each lighter than the one before: as in motion.js.
+COLOUR_MAP = LinearSegmentedColormap.from_list(
+    "distance", ["#3d4ec6", "#8f3fb5", "#d0486f", "#f08a3c", "#f5c33b"]
+)
 
 
 def draw_arm(ax: Axes, joints: Floats, alpha: float = 1.0) -> None:
@@ -25,8 +30,16 @@ def draw_arm(ax: Axes, joints: Floats, alpha: float = 1.0) -> None:
     )
 
 
-def draw_cloth(ax: Axes, positions: Floats, pinned: Sequence[int] | NDArray[np.int64]) -> None:
-    """Draw a square cloth from its particles' positions, (particle, 3), the far squares first."""
+def draw_cloth(
+    ax: Axes,
+    positions: Floats,
+    pinned: Sequence[int] | NDArray[np.int64],
+    shares: Floats | None = None,
+) -> None:
+    """Draw a square cloth from its particles' positions, (particle, 3), the far squares first.
+
+    The shares colour it, from 0 at the near end of the colours to 1 at the far one, (particle,).
+    """
     size = round(len(positions) ** 0.5)
     i, j = np.divmod(np.arange((size - 1) ** 2), size - 1)
     first = size * i + j
@@ -37,12 +50,13 @@ def draw_cloth(ax: Axes, positions: Floats, pinned: Sequence[int] | NDArray[np.i
     normals = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     lit = 0.25 + 0.6 * np.abs(normals @ (LIGHT / np.linalg.norm(LIGHT)))
-    colours = [to_rgba(COLOURS["blue"], 1.0 - 0.85 * shade) for shade in lit[order]]
+    colours: list[Any] = [to_rgba(COLOURS["blue"], 1.0 - 0.85 * shade) for shade in lit[order]]
+    if shares is not None:
+        colours = list(COLOUR_MAP(shares[corners].mean(axis=1)[order]))
+    edges = COLOURS["blue"] if shares is None else "white"
     outlines = np.stack([x[corners], y[corners]], axis=-1)[order]
     ax.add_collection(
-        PolyCollection(
-            list(outlines), facecolors=colours, edgecolors=COLOURS["blue"], linewidths=0.35
-        )
+        PolyCollection(list(outlines), facecolors=colours, edgecolors=edges, linewidths=0.35)
     )
     ax.plot(x[pinned], y[pinned], "o", color=COLOURS["brass"], markersize=4, zorder=4)
     ax.autoscale_view()

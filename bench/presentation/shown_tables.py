@@ -11,16 +11,29 @@ from markupsafe import Markup
 from ..harness.metrics import Share
 from .figures import Drawing
 from .results import label
-from .tables import POWER, Cell, Column, Source, Table, best_cells, words
+from .tables import POWER, Cell, Column, Source, Summary, Table, best_cells, words
 
 
 class Head(NamedTuple):
-    """The heading of a column: its classes, what is best in it, whether rows are filtered by it."""
+    """The heading of a column: its classes, what is best in it, whether rows are filtered by it.
+
+    What its title has from the heading of its group leads, and is not seen.
+    """
 
     column: Column
     classes: str
     best: str
     filter: bool
+
+    @property
+    def lead(self) -> str:
+        """What stands in the heading of its group already."""
+        return self.column.title.removesuffix(self.column.below) if self.column.group else ""
+
+    @property
+    def rest(self) -> str:
+        """What does not."""
+        return self.column.titled.removeprefix(self.lead)
 
 
 class Group(NamedTuple):
@@ -59,7 +72,7 @@ class ShownTable(NamedTuple):
         heads: headings of the columns.
         rows: its rows.
         best: "best" if cells are marked as best, "ties" if some of them tie, else "".
-        gist: what it says, without the list that follows.
+        gist: what it says, in a line.
         drawings: figures beside it.
     """
 
@@ -93,14 +106,16 @@ def shown_table(
         heads,
         rows,
         "ties" if any(cell.ties for row in rows for cell in row.cells) else "best" * bool(best),
-        _gist(table.summary.sentence),
+        _gist(table.summary),
         list(drawings),
     )
 
 
-def _gist(sentence: str) -> str:
-    """Return what is said without an end that only announces a list."""
-    return sentence[: sentence.rfind(". ") + 1] if sentence.endswith(":") else sentence
+def _gist(summary: Summary) -> str:
+    """Return what is said in a line: of a list that is announced, the first point."""
+    if not summary.sentence.endswith(":") or not summary.points:
+        return summary.sentence
+    return f"{summary.sentence} {summary.points[0]}" + ("; …" if len(summary.points) > 1 else "")
 
 
 def _column_classes(table: Table, most: int | None, solver: int | None) -> list[str]:

@@ -1,5 +1,6 @@
 """Figures as parts of a page: an SVG file's tree changed so that it can stand within HTML."""
 
+import itertools
 import re
 import xml.etree.ElementTree as ElementTree
 
@@ -29,6 +30,9 @@ def inline(drawing: Drawing) -> Markup:
     used = set(_REFERENCE.findall(drawing.svg))
     for element in root.iter():
         element.tag = element.tag.removeprefix(_SVG)
+        if element.tag not in ("text", "tspan"):
+            element.text = None
+        element.tail = None
         if element.get("id") not in used:
             element.attrib.pop("id", None)
         element.attrib = _attributes(element.attrib, drawing.name)
@@ -60,8 +64,40 @@ def _attributes(given: dict[str, str], name: str) -> dict[str, str]:
             value = value.replace("#", f"#{name}-", 1)
         elif key == "style":
             value = _style(value)
+        elif key == "d":
+            value = shorter_path(value)
         kept[key] = value.replace("url(#", f"url(#{name}-")
     return kept
+
+
+def shorter_path(path: str) -> str:
+    """Return a path to a hundredth of a point, without what lies within level or upright lines."""
+    parts = [re.split(r"\s+", part.strip()) for part in re.findall(r"[A-Za-z][^A-Za-z]*", path)]
+    kept: list[list[str]] = []
+    for letter, *numbers in parts:
+        part = [letter, *map(_rounded, numbers)]
+        if len(kept) > 1 and letter == kept[-1][0] == "L" and _is_between(kept[-2:], part):
+            kept.pop()
+        kept.append(part)
+    told = [" ".join(part) for part in kept]
+    for i, (before, part) in enumerate(
+        itertools.pairwise(kept), 1
+    ):  # a line's letter is understood
+        if part[0] == "L" and before[0] in "ML":
+            told[i] = " ".join(part[1:])
+    return " ".join(told)
+
+
+def _is_between(before: list[list[str]], part: list[str]) -> bool:
+    """Return whether the last point lies on a level or upright line to the next one."""
+    (x, y), (at_x, at_y), (to_x, to_y) = ([float(n) for n in p[-2:]] for p in (*before, part))
+    level = y == at_y == to_y and min(x, to_x) <= at_x <= max(x, to_x)
+    upright = x == at_x == to_x and min(y, to_y) <= at_y <= max(y, to_y)
+    return level or upright
+
+
+def _rounded(number: str) -> str:
+    return f"{float(number):.2f}".rstrip("0").rstrip(".")
 
 
 def _style(text: str) -> str:

@@ -43,6 +43,7 @@ _SPECIAL = {
     "³": r"\textthreesuperior{}",
     "⁻": r"\raisebox{0.6ex}{-}",
     "×": r"\texttimes{}",
+    "±": r"\textpm{}",
     "·": r"\textperiodcentered{}",
     "≤": r"\ensuremath{\leq}",
     "≥": r"\ensuremath{\geq}",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .words import Say
 
 RIGHT, WRONG = 0, 1
-_PROGRAM = "plumbob.program"
+PROGRAM = "plumbob.program"
 EXAMPLES = (
     "plumbob verify my_ik.py                    the functions of a Python file",
     "plumbob verify my_package.cloth:Solver     an object of a module",
@@ -37,9 +37,14 @@ class SolverCommand(Command):
         """Put the program aside and parse the rest."""
         if "--" in args:
             place = args.index("--")
-            ctx.meta[_PROGRAM] = args[place:]
+            ctx.meta[PROGRAM] = args[place:]
             args = args[:place]
         return super().parse_args(ctx, args)
+
+
+def program_of(context: typer.Context) -> list[str]:
+    """Return the program behind --, without that; nothing if there is none."""
+    return list(context.meta.get(PROGRAM, ()))[1:]
 
 
 _File = Path | None
@@ -121,7 +126,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     if self_test:
         return _self_test(say)
     folder = [ANSWERS, str(answers)] if answers else []
-    words = [*folder, *(solver or ()), *context.meta.get(_PROGRAM, ())]
+    words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
     question = Question(tuple(task or ()), rerun, thorough, seed)
     files = Files(json, junit, html, output)
     return _judge(words, limits(time_limit, memory_limit), question, files, language)

@@ -19,11 +19,13 @@ class Answer:
             task's shapes; NaN where it gave none.
         seconds: how long it took, without the door where that can be told; 0 if unknown [s].
         remarks: what was odd without voiding the answer: prints, changed inputs.
+        timed_by_itself: whether the seconds are the solver's own count, without the door.
     """
 
     values: Mapping[str, Any]
     seconds: float
     remarks: tuple[Sentence, ...] = ()
+    timed_by_itself: bool = False
 
 
 class FailureKind(StrEnum):

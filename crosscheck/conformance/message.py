@@ -164,7 +164,9 @@ def decode_answer(
         values = understand(task, task.counts(inputs), fields)
     except ValueError as error:
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=shown(str(error), 400)))
-    return Answer(values, _own_seconds(fields, seconds), _decode_remarks(fields, inputs))
+    own = _own_seconds(fields, seconds)
+    remarks = _decode_remarks(fields, inputs)
+    return Answer(values, seconds if own is None else own, remarks, own is not None)
 
 
 def decode_error(fields: Mapping[str, Any]) -> Failure:
@@ -179,11 +181,10 @@ def decode_error(fields: Mapping[str, Any]) -> Failure:
     return Failure(FailureKind.REFUSED, sentence("It says that it cannot: {why}", why=why))
 
 
-def _own_seconds(fields: Mapping[str, Any], seconds: float) -> float:
+def _own_seconds(fields: Mapping[str, Any], seconds: float) -> float | None:
+    """Return the solver's own time, None if it gives none that can be."""
     own = fields.get("seconds")
-    if isinstance(own, int | float) and 0.0 < own < seconds:
-        return float(own)
-    return seconds
+    return float(own) if isinstance(own, int | float) and 0.0 < own < seconds else None
 
 
 def _decode_remarks(fields: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[Sentence, ...]:

@@ -89,6 +89,25 @@ _STEP = (
     Field("external_forces", ("particle", 3), optional=True, about="besides gravity [N]"),
     Field("tension_only", ("spring",), "boolean", True, "springs that resist no compression"),
 )
+_ROBOT = (
+    Field("parents", ("joint",), "integer", about="parent of each joint, -1 for the base"),
+    Field("origins", ("joint", 3), about="of a joint's frame, in its parent's [m]"),
+    Field("orientations", ("joint", 4), about="of that frame in its parent's, wxyz, where q is 0"),
+    Field("axes", ("joint", 3), about="of unit length, in the joint's own frame"),
+    Field("slides", ("joint",), "boolean", about="moves along its axis, else rotates about it"),
+    Field("lower", ("joint",), about="least coordinates [rad, m]"),
+    Field("upper", ("joint",), about="greatest coordinates [rad, m]"),
+    Field("effector", (), "integer", about="index of the joint that carries the tool"),
+    Field("tool_position", (3,), about="of the tool, in that joint's frame [m]"),
+    Field("tool_rotation", (4,), about="of the tool, in that joint's frame, wxyz"),
+    Field("start", ("joint",), about="coordinates to begin from [rad, m]"),
+    Field("target_position", (3,), about="of the tool, global [m]"),
+    Field("target_rotation", (4,), about="of the tool, global, wxyz"),
+    Field("tolerance", (), about="distance that counts as reached [m]"),
+    Field("tolerance_rotation", (), about="angle that counts as reached [rad]"),
+    Field("max_iterations", (), "integer", about="the most iterations"),
+    Field("urdf", (), "text", True, "the same robot as URDF, its tool the link `tool`"),
+)
 
 TASKS: dict[str, Task] = {
     task.name: task
@@ -169,6 +188,15 @@ TASKS: dict[str, Task] = {
             (
                 Field("positions", ("frame", "particle", 3), about="after each step [m]"),
                 Field("velocities", ("frame", "particle", 3), about="likewise [m/s]"),
+            ),
+        ),
+        Task(
+            "robot_inverse_kinematics",
+            "Bring a robot's tool to a position and a rotation, each joint within its limits.",
+            _ROBOT,
+            (
+                Field("q", ("joint",), about="coordinates [rad, m]"),
+                Field("converged", (), "boolean", about="whether it claims to have arrived"),
             ),
         ),
     )

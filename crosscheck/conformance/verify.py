@@ -8,7 +8,13 @@ from .case import Case
 from .contestant import Asked, Contestant, Failure, FailureKind
 from .greeting import Greeting
 from .judgement import Report, TaskReport
-from .kinematics import forward_kinematics, inverse_kinematics, resample, track
+from .kinematics import (
+    forward_kinematics,
+    inverse_kinematics,
+    resample,
+    robot_inverse_kinematics,
+    track,
+)
 from .mass_spring import energy, forces, motion, step
 
 # After so many answers of a task were waited for in vain, the rest of the task is not asked.
@@ -36,6 +42,7 @@ DISCIPLINES: Mapping[str, Discipline] = {
     "energy": energy,
     "mass_spring_step": step,
     "mass_spring_motion": motion,
+    "robot_inverse_kinematics": robot_inverse_kinematics,
 }
 
 

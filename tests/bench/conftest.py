@@ -227,6 +227,12 @@ def raced(solver, kind, task="reachable", robot="arm", size=4, **changed):
                   facts=facts)  # fmt: skip
 
 
+def entrant(suite):
+    """What is on record of a solver that a user entered."""
+    facts = {"task": "its own", "entrant": True, "door": "mine.py", "digest": "0a1b2c"}
+    return record(suite, "mine", "mine", {"version": "1"}, {"residual": [0.0]}, facts=facts)
+
+
 def lacking(solver, kind, why, robot="all"):
     """A solver that is missing or cannot."""
     facts = {"task": "reachable", "title": "every robot"}
@@ -242,6 +248,14 @@ def compared(engine, cause=""):
     settings = {"configurations": 5}
     return record("robot_models", "robots/arm", engine, settings, sizes | apart, notes=notes,
                   facts={"title": "arm"})  # fmt: skip
+
+
+def read_by_a_peer(engine):
+    """One robot of the bench in the engine of a peer."""
+    notes, facts = {"remark": ""}, {"task": "peers", "title": "the arm"}
+    settings = {"configurations": 100, "version": "1.2"}
+    arrays = {"positions": 3e-8, "rotations": 2e-7}
+    return record("robot_models", "peers/arm", engine, settings, arrays, notes=notes, facts=facts)
 
 
 def scaled(solver):
@@ -353,6 +367,8 @@ def make():
     """The makers of records, by name."""
     return SimpleNamespace(
         record=record,
+        read_by_a_peer=read_by_a_peer,
+        compared=compared,
         drawn=drawn,
         followed=followed,
         drifted=drifted,
@@ -407,10 +423,12 @@ def records():
             for kind in ("one start", "restarts")
             for task in ("reachable", "unreachable")
         ),
+        *(entrant(suite) for suite in ("ik", "cloth")),
         *republished(),
         *(scaled(solver) for solver in ("supernodal", "cholespy")),
         compared("MuJoCo"),
         compared("Pinocchio", "it forgets the hand"),
+        read_by_a_peer("PyBullet"),
         *(worked(solver) for solver in ("Plumbob Newton", "MuJoCo Euler")),
         fell("Plumbob Newton"),
         needed("newton", [1, 2, 3, 4, 5, 6, 7, np.nan]),

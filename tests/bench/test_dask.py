@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -16,9 +17,12 @@ from pathlib import Path
 import pytest
 
 from bench import cli
+from bench.entrants.entrant import Entrant
+from bench.entrants.sources import digest_of
 from bench.executors import dask, executor_at, work
 from bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
 from bench.harness import run
+from bench.harness.choice import Choice
 from bench.harness.machine import stamp
 from bench.harness.measure import block_key, measure
 from bench.harness.progress import Progress, listening
@@ -243,6 +247,18 @@ def test_the_machine_of_most_records_goes_on_and_answers_of_any_machine_are_kept
     assert any("times are taken on another machine (slide rule)" in e.message for e in again)
 
 
+def test_some_rows_of_a_table_are_not_timed_elsewhere_than_the_others(made_up, monkeypatch):
+    made_up(MadeUpCluster(**ONE_KIND))
+    some = Choice("quick", TINY, problems=("a", "b"), is_partial=True)
+    monkeypatch.setattr(run, "chosen", lambda scale: some)
+    assert states(made_up(MadeUpCluster(**TWO_KINDS)))[run.KEPT] == 6
+    elsewhere = made_up(MadeUpCluster(w4="h3/abacus"))
+    assert states(elsewhere) == {run.KEPT: 2, run.FAILED: 4, run.NOT_RUN: 3}
+    assert "timed on another machine than is here (slide rule; here abacus)" in elsewhere[2].message
+    mixed = made_up(MadeUpCluster(w4="h3/abacus"), mix=True)
+    assert states(mixed)[run.KEPT] == 6
+
+
 def test_no_worker_is_misuse(made_up):
     with pytest.raises(ValueError, match=r"expected a worker, got none within 0\.1 s"):
         made_up(MadeUpCluster())
@@ -263,7 +279,7 @@ def test_a_run_without_any_worker_left_ends_and_can_be_taken_up(made_up, tmp_pat
 @pytest.mark.parametrize("part", ["versions", "source"])
 def test_a_worker_with_other_versions_or_sources_refuses(made_up, part):
     other = {**stamp(), part: {"numpy": "0"} if part == "versions" else "0"}
-    task = work.Task("arm", TINY, ("arm", "no such", "s", "{}"), False, other)
+    task = work.Task("arm", pickle.dumps(TINY), ("arm", "no such", "s", "{}"), False, other)
     assert "other" in work.perform(task).refused
     cluster = MadeUpCluster(w1="h1/x")
     cluster.place = lambda name: {"host": "h1", "stamp": other}
@@ -279,8 +295,22 @@ def test_a_worker_without_plumbob_is_misuse(made_up):
 
 
 def test_a_block_that_only_the_client_knows_is_refused():
-    found = work.measured("arm", TINY, ("arm", "my own problem", "s", "{}"))
-    assert "there is no block arm, my own problem, s, {}" in found["refused"]
+    key = ("arm", "my own problem", "s", "{}")
+    found = work.measured("arm", pickle.dumps(TINY), key)
+    assert found == {"refused": "there is no block arm, my own problem, s, {}"}
+
+
+def test_a_solver_of_the_users_has_to_be_on_the_worker_as_it_is_there(tmp_path):
+    path = tmp_path / "my_ik.py"
+    path.write_text("def inverse_kinematics(request):\n    return request\n")
+    entrant = Entrant("Mine", str(path), str(path), digest=digest_of(str(path)))
+    scale, key = pickle.dumps(replace(TINY, entrants=(entrant,))), ("arm", "p", "s", "{}")
+    assert "there is no block" in work.measured("arm", scale, key)["refused"]
+    work._blocks.cache_clear()
+    path.write_text("raise SystemExit")
+    assert "got other ones (" in work.measured("arm", scale, key)["refused"]
+    path.unlink()
+    assert f"expected the files of {path}, got none" in work.measured("arm", scale, key)["refused"]
 
 
 def test_a_machine_is_shared_by_answers_and_not_by_times(tmp_path, monkeypatch):
@@ -307,7 +337,7 @@ def test_what_a_worker_does_is_heard(made_up, monkeypatch):
     submit = cluster.submit
 
     def tell_and_submit(*given, **where):
-        cluster.tell((0.0, Progress(f"step {len(cluster.given)}")._asdict()))
+        cluster.tell((0.0, list(Progress(f"step {len(cluster.given)}"))))
         return submit(*given, **where)
 
     cluster.submit = tell_and_submit
@@ -377,6 +407,7 @@ import os, sys, signal
 from bench.experiments import SCALES, Scale
 from bench.executors import executor_at
 from bench.harness import run
+from bench.harness.choice import Choice
 from pathlib import Path
 SCALES["quick"] = Scale(targets=3, seconds=0.001)
 done = 0

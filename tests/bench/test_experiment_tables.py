@@ -20,6 +20,7 @@ from bench.experiments.timing import tables as timing
 from bench.presentation.results import Results
 from bench.presentation.sections import SECTIONS, tables
 from bench.presentation.tables import Share, comma_separated
+from bench.presentation.tex_text import escaped
 
 
 def column(table, heading):
@@ -42,6 +43,13 @@ def test_every_number_in_csv_is_one(records):
     for table in tables(Results(records)):
         for row in list(csv.reader(io.StringIO(comma_separated(table))))[1:]:
             assert not [cell for cell in row if cell.startswith(("np.", "array"))], table.name
+
+
+def test_every_letter_of_ours_can_be_typeset(records):
+    for table in tables(Results(records)):
+        texts = [column.heading for column in table.columns]
+        texts += [table.title, table.shows, table.measured, table.summary.sentence]
+        assert not [text for text in texts if r"\textbackslash" in escaped(text)], table.name
 
 
 def test_every_section_has_a_name_of_its_own():
@@ -196,6 +204,9 @@ def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_s
     )
     (point,) = table.summary.points
     assert point.endswith("first: Plumbob")
+    apart = replace(rival, facts={**rival.facts, "together": "another run"})
+    (point,) = timing.kinematics(Results([ours, apart])).summary.points
+    assert point.endswith("timed apart, and not ranked")
     again = swept(make, "MuJoCo", 1e-6 * rng.permutation(drift))
     (point,) = timing.kinematics(Results([ours, again])).summary.points
     assert "in a tie with" in point

@@ -225,10 +225,18 @@ def test_the_map_has_a_field_for_each_robot_that_a_solver_takes(run):
     assert [share and share.hits for share in table.rows[1][1:3]] == [MANY, None]
     assert column(table, "the arm, times the least time") == pytest.approx([1.0, 100.0])
     assert column(table, "the leg, times the least time")[1] is None
-    (draw,) = ONE_MAP.figures
+    (draw,) = ONE.map.figures
     svg = drawn(draw(results)).svg
     assert svg.count(">100<") == 4  # three shares of 100 %, and 100 times the least time
     assert draw(Results([])) is None
+    assert table.summary.sentence.endswith("(n = 240 targets of 2 robots):")
+    assert table.summary.points == ("a: on 2", "b: on 1")
 
 
-ONE_MAP = robots.OF_KIND[KIND].map
+def test_the_map_marks_who_was_cut_short(cut):
+    table = ONE.map(cut)
+    cuts = dict(zip(column(table, "solver"), column(table, "cut on"), strict=True))
+    assert cuts == {"slow": "the arm", "steady": ""}
+    (draw,) = ONE.map.figures
+    assert drawn(draw(cut)).svg.count("*<") == 2
+    assert table.summary.points == ("steady: on 1",)

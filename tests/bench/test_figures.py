@@ -12,8 +12,9 @@ from matplotlib.text import Text
 
 from bench.presentation import drawing, figures, page, report
 from bench.presentation.chart import LOOKS, MOST, Axis, Chart, Panel, looks, series
-from bench.presentation.figures import chart_sketch, drawn
+from bench.presentation.figures import Drawing, chart_sketch, drawn
 from bench.presentation.results import Results, label
+from bench.presentation.svg import inline
 
 ENTRANT = "my very own solver, a name of some length"
 CHARTS = 15
@@ -53,26 +54,36 @@ def test_at_most_six_curves_are_labelled_and_every_other_can_be_named(records, c
     assert len(made) == CHARTS
     for chart in made:
         names = chart.labelled
-        assert len(names) <= MOST
+        assert len(names) <= 6
         assert set(names) | set(chart.others) == set(chart.solvers)
         assert bool(chart.others) == (len(chart.solvers) > MOST)
         if chart.others:
             assert all(label(name) in chart.caption for name in chart.others)
 
 
-@pytest.mark.parametrize("count", [7, 20])
-def test_entrants_ours_and_the_best_of_the_others_are_labelled(records, count):
-    for chart in charts(with_solvers(records, count)):
-        ours = [n for n in chart.solvers if n.startswith("Plumbob") or n in ("ccd", "newton")]
-        assert ENTRANT in chart.labelled
-        assert not ours or set(ours) & set(chart.labelled)
-        assert len(chart.labelled) == MOST
+OURS = ("ccd", "fabrik", "levenberg_marquardt", "newton", "lbfgs", "chebyshev", "local_global")
+
+
+def flat(names, **more):
+    """A chart of level curves, each lower and so better than the one before."""
+    x = np.arange(1.0, 11.0)
+    curves = tuple(series(name, x, np.full(10, 10.0**-i)) for i, name in enumerate(names))
+    return Chart("n", "t", "", (Panel("", curves),), Axis(), Axis(log=True), **more)
+
+
+def test_entrants_the_best_of_ours_and_of_others_are_labelled_however_far_behind():
+    others = [f"s{i}" for i in range(9)]
+    chart = flat(["fabrik", "ccd", "mine", *others], entrants=frozenset({"mine"}))
+    assert chart.labelled == ["ccd", "mine", "s5", "s6", "s7", "s8"]
+    chart = flat(["s0", "s1", "mine", *OURS], entrants=frozenset({"mine"}))
+    assert chart.labelled == ["s1", "mine", *OURS[-4:]]
+    many = [f"entrant {i}" for i in range(8)]
+    chart = flat([*many, "ccd", "s0"], entrants=frozenset(many))
+    assert chart.labelled == many[-6:]
 
 
 def test_the_best_by_the_measure_of_the_figure_are_those_labelled():
-    x = np.arange(1.0, 11.0)
-    curves = tuple(series(f"s{i}", x, np.full(10, 10.0**-i)) for i in range(12))
-    chart = Chart("n", "t", "", (Panel("", curves),), Axis(), Axis(log=True))
+    chart = flat([f"s{i}" for i in range(12)])
     assert chart.labelled == [f"s{i}" for i in range(6, 12)]
     greatest = replace(chart, better="greater")
     assert greatest.labelled == [f"s{i}" for i in range(6)]
@@ -203,3 +214,38 @@ def test_curves_of_different_lengths_are_no_curve():
     with pytest.raises(ValueError, match="rows of one length"):
         series("x", [1.0, 2.0], [1.0])
     assert len(series("x", [1.0, np.nan, 3.0], [1.0, 2.0, np.inf]).x) == 1
+
+
+@pytest.mark.parametrize("count", [2, 9])
+def test_no_point_lies_outside_of_its_axes(records, count):
+    """But for what the limits of the chart itself leave out."""
+    for chart in charts(with_solvers(records, count)):
+        figure = laid_out(chart)
+        for ax, panel in zip(figure.axes, chart.panels, strict=True):
+            for one in panel.series:
+                for values, axis, (low, high) in (
+                    (one.x, chart.x, sorted(ax.get_xlim())),
+                    (one.y, chart.y, sorted(ax.get_ylim())),
+                ):
+                    inner = values[(values > 0) | (not axis.log)]
+                    for limit, side in zip(axis.limits, (np.greater_equal, np.less_equal),
+                                           strict=True):  # fmt: skip
+                        inner = inner[side(inner, limit)] if limit is not None else inner
+                    assert ((inner >= low) & (inner <= high)).all(), (chart.name, panel.title)
+
+
+def test_panels_that_share_an_axis_hold_the_points_of_all():
+    near, far = (series("a", x, np.array([1.0, 2.0])) for x in ([1.0, 2.0], [1e3, 1e5]))
+    chart = Chart("n", "t", "", (Panel("", (near,)), Panel("", (far,))), Axis(log=True))
+    low, high = laid_out(chart).axes[0].get_xlim()
+    assert low <= 1.0
+    assert high >= 1e5
+
+
+def test_a_drawing_from_a_folder_brings_no_script_and_no_address_into_the_page():
+    nasty = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1" onload="alert(1)">
+    <script>alert(2)</script><foreignObject><p>hi</p></foreignObject>
+    <g onclick="alert(3)"><use href="https://example.org/x"/><path d="M0 0"/></g></svg>"""
+    shown = str(inline(Drawing("n", "t", "", nasty)))
+    assert "<path" in shown
+    assert not re.search("script|alert|foreign|example", shown)

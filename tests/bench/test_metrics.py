@@ -177,6 +177,18 @@ def test_the_interval_of_a_median_holds_it_as_often_as_it_says(rng):
     assert 0.92 <= np.mean(held) <= 0.99  # 0.962 by the binomial; 400 draws err by 0.01
 
 
+def test_of_very_many_throws_the_normal_distribution_says_the_same(monkeypatch, rng):
+    values, a, b = rng.random(9000), rng.random(9000) < 0.5, rng.random(9000) < 0.515
+    exact = metrics.median_interval(values), metrics.chance_of_pairs(a, b)
+    monkeypatch.setattr(metrics, "LARGE", 1000)
+    metrics._coin_quantile.cache_clear()
+    ordered, near = np.sort(values), metrics.median_interval(values)
+    apart = np.searchsorted(ordered, near[1:]) - np.searchsorted(ordered, exact[0][1:])
+    assert np.abs(apart).max() <= 1
+    assert metrics.chance_of_pairs(a, b) == pytest.approx(exact[1], abs=0.02)
+    metrics._coin_quantile.cache_clear()
+
+
 def test_the_interval_of_a_mean_is_students():
     """Of 1, 2, 3: the quantile of two degrees of freedom is 4.3027, the deviation of the mean 1."""
     mean, low, high = metrics.mean_interval(np.array([1.0, 2.0, 3.0]))

@@ -62,7 +62,10 @@ def whole(tmp_path_factory, records):
 def test_the_page_needs_nothing_from_outside(whole):
     result, page = whole
     text = result.page.read_text(encoding="utf-8")
-    assert all(link.startswith("#") for link in page.links)
+    files = [link for link in page.links if not link.startswith("#")]
+    assert files
+    assert all(re.fullmatch(r"(tables|figures)/\w+\.\w+", link) for link in files)
+    assert all((result.page.parent / link).is_file() for link in files)
     assert not re.search(r"https?://|//[a-z]+\.|@import|url\((?!#)", text)
     assert "xlink" not in text
     assert page.scripts <= 4  # ours, that of motions, and what two of them show
@@ -121,14 +124,21 @@ def test_a_solver_that_no_figure_knows_is_drawn_all_the_same(tmp_path, records):
     known = ("ccd", "Pinocchio")
     new = [replace(r, solver="brand_new") for r in records if r.solver in known]
     result, page = written(tmp_path, [*records, *new])
-    assert "brand new" in "".join(page.text)
+    assert "brand_new" in "".join(page.text)
 
 
 def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
     _, page = written(tmp_path, [record for record in records if record.suite == "check"])
     text = "".join(page.text)
     assert text.count("Not measured: ") == 4
-    assert "plumbob bench timing cloth_scale first_call measures" in text
+    assert "Measured by plumbob bench timing cloth_scale first_call, at full length." in text
+
+
+def test_that_nobody_entered_a_solver_is_nothing_missing(tmp_path, records):
+    _, page = written(tmp_path, [record for record in records if record.solver != "mine"])
+    text = "".join(page.text)
+    assert "Which solvers of yours" not in text
+    assert "Not measured" not in text
 
 
 def test_what_is_missing_is_said(tmp_path, records):

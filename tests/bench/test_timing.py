@@ -59,6 +59,7 @@ def test_every_case_is_kept_with_rounds_of_one_operation_each(folder):
         assert record.facts["noise"] > 0
         assert record.stamp["machine"] == stamp()["machine"]
         assert record.facts["subject"] == "kinematics"
+    assert len({record.facts["together"] for record in records}) == 1
 
 
 def test_a_suite_of_the_timing_is_finished_as_any_other(folder):

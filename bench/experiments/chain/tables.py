@@ -20,6 +20,7 @@ from ...presentation.columns import (
     titled,
     words_in,
 )
+from ...presentation.entered import entered
 from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem, counted, label, settings, solvers
 from ...presentation.tables import Column, Summary, words
@@ -58,12 +59,14 @@ def _beyond_summary(records: Sequence[Record]) -> Summary:
 def _straightness(records: Sequence[Record]) -> str:
     bends = _over_reach(records, "bend")
     straight = metrics.share(bends <= STRAIGHT)
-    most = max(spread_of(record, "iterations")[2] for record in records)
+    made = [spread_of(record, "iterations")[2] for record in records]
+    most = max((count for count in made if np.isfinite(count)), default=None)
+    counts = "iterations unsaid" if most is None else counted(int(most), "iteration")
     return (
         f"{words(straight)}; at worst "
         f"{words_in(metrics.spread(bends).largest, '%')} of the reach off the line, "
         f"{words(largest(records, 'excess'))} m above distance − reach, "
-        f"{counted(int(most), 'iteration')}"
+        f"{counts}"
     )
 
 
@@ -169,4 +172,4 @@ iterations = Layout(
 )
 
 
-LAYOUTS = (beyond_reach, iterations)
+LAYOUTS = (beyond_reach, iterations, entered("ik", "inverse kinematics"))

@@ -10,7 +10,7 @@ import numpy as np
 from reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rotation, track
 from reference.arguments import FloatArray
 
-from ...harness.block import SCALES, Block, Measured, Scale
+from ...harness.block import Block, Measured, Scale
 from ..arm.problem import FollowedCurve
 from . import COHERENT, COLD, CURVE, DRIFT, WARM
 from .problem import (
@@ -32,7 +32,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every curve for every solver in each mode, and the heart three times."""
     for problem in arm_closed_curves():
         yield from _modes(problem, list(IK_SOLVERS))
-    some = [ROBOT_SOLVER] if scale == SCALES["quick"] else list(IK_SOLVERS)
+    some = [ROBOT_SOLVER] if scale.is_as_short_as("quick") else list(IK_SOLVERS)
     for problem in robot_closed_curves():
         yield from _modes(problem, some)
     for solver in IK_SOLVERS:

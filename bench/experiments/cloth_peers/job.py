@@ -12,6 +12,7 @@ from reference.mass_spring import SystemArrays
 from ...harness.stopwatch import Budget, timed
 from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
 from ...peers.cloth.protocol import Mover
+from ...peers.ik.protocol import remark_of
 from .problem import FRAME
 
 # Moved once before anything is timed, in so short a frame [s] that any solver is stable: what has
@@ -57,7 +58,7 @@ class ClothJob(NamedTuple):
         """Yield the positions after each frame and how long it took, as soon as they are there."""
         try:
             mover, setup = self._prepared()
-            yield Ready(setup)
+            yield Ready(setup, remark_of(importlib.import_module(self.module)))
             yield from self._moved(mover)
         except Exception as error:  # whatever an engine raises is its result
             yield Unfit(describe(error))

@@ -5,9 +5,9 @@ and against the motion itself.
 """
 
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, WorkerProcess
 from ...peers import registry
 from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
-from ...peers.registry import EXPLICIT, ClothPeer
+from ...peers.registry import EXPLICIT, UNDECLARED, ClothPeer
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
@@ -31,7 +31,10 @@ from .problem import (
     hanging_cloth,
     highest_mode,
 )
-from .truth import ClothTruth, cloth_truth, implicit_motion
+from .truth import ClothTruth, cloth_truth, implicit_motion, truth_of
+
+if TYPE_CHECKING:
+    from ...entrants.problems import OwnProblem
 
 SUITE = "cloth"
 # One step is timed so often, but for no more than a twentieth of its ladder's time.
@@ -49,6 +52,9 @@ NEEDED_SIZE = 20
 STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
 STABILITY_DIGITS = 2e-4
 _DOUBLINGS = 30
+# A solver that does not say that it is explicit, and is stable at so many times symplectic Euler's
+# limit, is taken not to be.
+_FAR = 8.0
 
 # Numbers, and a label in the end.
 Row = tuple[Any, ...]
@@ -91,14 +97,15 @@ def blocks(scale: Scale) -> Iterator[Block]:
             measure = partial(iterations_needed, solver, stiffness)
             yield Block(SUITE, name, solver, measure, settings, facts=facts)
     for peer in (peer for peer in peers if peer.version):
-        yield from _peer_blocks(peer, sizes)
+        yield from blocks_of(peer, sizes)
     settings = {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME}
     for solver in published.LIU_2013 if sizes == FULL else ():
         measure, facts = partial(liu_2013, solver), {"task": LIU}
         yield Block(SUITE, "peers/liu2013", solver, measure, settings, facts=facts)
 
 
-def _peer_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
+def blocks_of(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
+    """Yield one step, a motion and, if it is explicit, the limit of a solver."""
     most = sum(level.size for level in sizes)
     for stiffness in STIFFNESSES:
         settings = {"stiffness": stiffness, "frame": FRAME, "version": peer.version}
@@ -106,11 +113,27 @@ def _peer_blocks(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
             call = partial(measure, peer, stiffness, sizes)
             problem, facts = f"peers/{name}/k{stiffness:g}", {"task": task}
             yield Block(SUITE, problem, peer.title, call, settings, most, facts)
-    if peer.kind == EXPLICIT and not peer.settings.get("iterations"):
+    if peer.kind in (EXPLICIT, UNDECLARED) and not peer.settings.get("iterations"):
         hung = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
         settings = {"size": STABILITY_SIZE, "version": peer.version}
         found, facts = partial(stability, peer, hung), {"task": STABILITY}
         yield Block(SUITE, "peers/stability", peer.title, found, settings, len(hung), facts)
+
+
+def own_blocks(
+    peer: ClothPeer, problem: "OwnProblem", cloth: Callable[[], FallingCloth], scale: Scale
+) -> Iterator[Block]:
+    """Yield one step and a motion of a user's cloth."""
+    assert problem.cloth is not None
+    system, _ = problem.cloth
+    level = levels(scale)[0]._replace(size=system.particle_count)
+    stiffness = float(system.stiffnesses.mean())
+    settings = {"stiffness": stiffness, "frame": problem.h, "version": peer.version}
+    calls = ((ONE_STEP, one_step_on), (MOTION, motion_on))
+    for name, (task, measure) in zip(problem.recorded, calls, strict=True):
+        facts = {"task": task, "cloth": problem.name}
+        call = partial(measure, peer, [Fall(level, cloth)])
+        yield Block(SUITE, name, peer.title, call, settings, level.size, facts)
 
 
 def not_installed(package: str) -> Measured:
@@ -123,13 +146,18 @@ def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Mea
 
     A ladder that has used its time, or has arrived, is climbed no further.
     """
+    return one_step_on(peer, [Fall(level, stiffness) for level in sizes])
+
+
+def one_step_on(peer: ClothPeer, falls: Sequence["Fall"]) -> Measured:
+    """Take the same step of some cloths with ever more work; see `one_step`."""
     rows: list[Row] = []
     remarks: list[Remark] = []
-    for level in sizes:
-        cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
+    for fall in falls:
+        level, cloth, truth = fall.level, fall.cloth, fall.truth
         spent = 0.0
-        for rung in step_rungs(peer, cloth.frequency):
-            shape = Shape(1, _REPEATS, _REPEATING * level.budget)
+        for rung in step_rungs(peer, cloth.beat):
+            shape = Shape(1, _REPEATS, _REPEATING * level.budget, cloth.frame)
             outcome = _tried(job(peer.module, cloth, rung.settings, shape))
             remarks += _remarks(level, rung, outcome)
             if not outcome.solved:
@@ -145,7 +173,7 @@ def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Mea
 
 def _tried(job: ClothJob) -> Outcome:
     """Return what came of a job; one that could not be set up in time is not set up again."""
-    what = job.module, len(job.start.positions)
+    what = job.module, job.settings.get("spec"), len(job.start.positions)
     if what in _given_up:
         return Outcome(0.0, [], _given_up[what])
     outcome = worker_process().perform(job)
@@ -154,7 +182,7 @@ def _tried(job: ClothJob) -> Outcome:
     return outcome
 
 
-_given_up: dict[tuple[str, int], str] = {}
+_given_up: dict[tuple[str, Any, int], str] = {}
 
 
 class Remark(NamedTuple):
@@ -181,30 +209,59 @@ def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
 
 def motion(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measured:
     """Move on frame after frame; keep the distances from implicit Euler and from the truth."""
+    return motion_on(peer, [Fall(level, stiffness) for level in sizes])
+
+
+def motion_on(peer: ClothPeer, falls: Sequence["Fall"]) -> Measured:
+    """Move some cloths on frame after frame; see `motion`."""
     rows: list[Row] = []
     remarks: list[Remark] = []
-    for level in sizes:
-        cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
-        for rung in motion_rungs(peer, cloth.frequency):
-            shape = Shape(level.frames, 1, level.budget)
+    for fall in falls:
+        level, cloth, truth = fall.level, fall.cloth, fall.truth
+        for rung in motion_rungs(peer, cloth.beat):
+            shape = Shape(level.frames, 1, level.budget, cloth.frame)
             outcome = _tried(job(peer.module, cloth, rung.settings, shape))
             remarks += _remarks(level, rung, outcome)
-            rows.append((*_moved(outcome, level, truth), rung.label))
+            rows.append((*_moved(outcome, level, truth, cloth.extent), rung.label))
             if not outcome.solved:
                 break
     names = ("particles", "frames", "wanted", "seconds", "setup", "implicit", "true", "diverged")
     measured = _columns(names, rows, remarks)
-    truths = [_truth(level, stiffness) for level in sizes]
+    truths = [fall.truth for fall in falls]
     known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
     return measured._replace(arrays={**measured.arrays, **known})
 
 
-def _moved(outcome: Outcome, level: Level, truth: ClothTruth) -> tuple[float, ...]:
+class Fall:
+    """A cloth that falls for so many frames, with its answers, made when they are asked for.
+
+    Attributes:
+        level: how far, and for how long.
+    """
+
+    def __init__(self, level: Level, of: float | Callable[[], FallingCloth]) -> None:
+        """Take a stiffness of ours [N/m], or what makes a user's cloth."""
+        self.level, self._of = level, of
+
+    @property
+    def cloth(self) -> FallingCloth:
+        """The cloth."""
+        return self._of() if callable(self._of) else falling_cloth(self.level.size, self._of)
+
+    @property
+    def truth(self) -> ClothTruth:
+        """Its answers."""
+        if callable(self._of):
+            return truth_of(self._of(), self.level.frames)
+        return cloth_truth(self.level.size, self._of, self.level.frames)
+
+
+def _moved(outcome: Outcome, level: Level, truth: ClothTruth, extent: float) -> tuple[float, ...]:
     """Return a row: distances are those in the end, or as far as the motion got."""
     frames = len(outcome.solved)
     seconds = metrics.spread(np.array([one.seconds for one in outcome.solved])).median
     positions = np.array([one.q for one in outcome.solved]).reshape(frames, *truth.start.shape)
-    lost = diverged(positions, truth.true[:frames])
+    lost = diverged(positions, truth.true[:frames], extent)
     apart = [np.nan, np.nan]
     if frames and not lost:
         answers = truth.implicit[frames - 1], truth.true[frames - 1]
@@ -212,11 +269,11 @@ def _moved(outcome: Outcome, level: Level, truth: ClothTruth) -> tuple[float, ..
     return (level.size, frames, level.frames, seconds, outcome.setup, *apart, lost)
 
 
-def diverged(positions: np.ndarray, true: np.ndarray) -> bool:
+def diverged(positions: np.ndarray, true: np.ndarray, extent: float = SIDE) -> bool:
     """Return whether a particle ever is farther from where it belongs than the cloth is wide."""
     if not np.isfinite(positions).all():
         return True
-    return bool((np.abs(positions - true) > SIDE).any())
+    return bool((np.abs(positions - true) > extent).any())
 
 
 def iterations_needed(solver: str, stiffness: float) -> Measured:
@@ -249,7 +306,10 @@ def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
         frequencies.append(np.sqrt(largest))
         start = State(rest + AMPLITUDE * mode, np.zeros_like(rest))
         stable = partial(is_stable, peer, system, start, rest)
+        far = _FAR * 2.0 / np.sqrt(largest)
         try:
+            if peer.kind == UNDECLARED and stable(far):
+                raise ArithmeticError(f"stable at {far:.2g} s, as implicit steps are")
             limits.append(stability_limit(stable, FRAME))
         except ArithmeticError as error:
             limits.append(np.nan)
@@ -324,10 +384,6 @@ def liu_2013(solver: str) -> Measured:
 def job(module: str, cloth: FallingCloth, settings: Mapping[str, Any], shape: Shape) -> ClothJob:
     """Return the job of moving a cloth from its start."""
     return ClothJob(module, cloth.system.arrays, cloth.start, settings, shape)
-
-
-def _truth(level: Level, stiffness: float) -> ClothTruth:
-    return cloth_truth(level.size, stiffness, level.frames)
 
 
 def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[Remark]) -> Measured:

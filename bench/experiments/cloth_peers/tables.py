@@ -11,6 +11,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...presentation.columns import SOLVER, folded, least, number, text, words_in
+from ...presentation.entered import entered
 from ...presentation.layout import Layout
 from ...presentation.results import Results, label, listed
 from ...presentation.tables import Column, Summary, Table, listing, words
@@ -37,7 +38,7 @@ _TRUTH = (
 
 
 def _cloth_of(point: Point) -> str:
-    return f"{point.particles} × {point.particles}, {words(int(point.stiffness))} N/m"
+    return point.own or f"{point.particles} × {point.particles}, {words(int(point.stiffness))} N/m"
 
 
 def _cloths(found: Sequence[Point]) -> dict[str, list[Point]]:
@@ -404,4 +405,4 @@ liu_2013 = Layout(
 )
 
 
-LAYOUTS = (iterations, one_step, motion, stability, liu_2013)
+LAYOUTS = (iterations, one_step, motion, stability, liu_2013, entered("cloth", "the cloth"))

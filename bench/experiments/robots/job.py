@@ -11,7 +11,7 @@ import numpy as np
 
 from ...harness.stopwatch import Budget, timed
 from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
-from ...peers.ik.protocol import Ask, Solve, SolverOutput, UnableError
+from ...peers.ik.protocol import Ask, Solve, SolverOutput, UnableError, remark_of
 from ...peers.ik.restarts import restarted
 from .evaluate import Targets, Tolerance
 from .problem import Robot
@@ -46,13 +46,15 @@ class Job(NamedTuple):
         try:
             adapter = importlib.import_module(self.module)
             ask, setup = timed(lambda: _prepared(adapter, self))
-            _solve(_asked(ask, self, 0), self)  # may compile
+            first = _solve(_asked(ask, self, 0), self)  # may compile
+            if self.restarts and first.claimed < 0:
+                raise UnableError("not started again, for it claims nothing of its answers")
         except UnableError as error:
             yield Unfit(str(error))
         except Exception as error:  # whatever an engine raises is its result
             yield Unfit(describe(error))
         else:
-            yield Ready(setup)
+            yield Ready(setup, remark_of(adapter))
             yield from _solved(ask, self)
             yield Done()
 

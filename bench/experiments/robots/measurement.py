@@ -51,16 +51,21 @@ def blocks(scale: Scale) -> Iterator[Block]:
     The solvers of a robot follow each other in an order drawn by lot, so that a machine that gets
     slower or faster does so to all of them.
     """
-    count = max(1, round(_TARGETS * scale.targets))
     here = [name for name in ROBOTS if is_installed(name)]
     for name in ROBOTS:
         if name not in here:
             absent = partial(not_installed, PACKAGE)
             facts = {"task": REACHABLE, "title": title(name)}
             yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"}, 0, facts)
-    entries = ((peer, entry) for peer in registry.PEERS for entry in peer.entries)
-    made = [block for one in entries for block in _entry_blocks(*one, here, count, scale.seconds)]
+    made = [block for peer in registry.PEERS for block in blocks_of(peer, here, scale)]
     yield from by_lot(made)
+
+
+def blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
+    """Yield a solver on robots that are installed, by each of its entries."""
+    count = max(1, round(_TARGETS * scale.targets))
+    for entry in peer.entries:
+        yield from _entry_blocks(peer, entry, robots, count, scale.seconds)
 
 
 def by_lot(blocks: Iterable[Block]) -> list[Block]:

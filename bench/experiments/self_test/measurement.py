@@ -5,7 +5,7 @@ from functools import partial
 
 from crosscheck.conformance.self_test import HONEST, Subject, attempt, subjects
 
-from ...harness.block import SCALES, Block, Measured, Scale
+from ...harness.block import Block, Measured, Scale
 
 # At less than full length every so manieth fault is tried, and all honest solvers.
 EVERY = 5
@@ -13,7 +13,7 @@ EVERY = 5
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield the subjects, a block each."""
-    every = 1 if scale == SCALES["full"] else EVERY
+    every = 1 if scale.is_as_short_as("full") else EVERY
     for i, subject in enumerate(subjects()):
         if subject.family == HONEST or i % every == 0:
             name = f"{subject.family}/{subject.task}/{subject.name}"

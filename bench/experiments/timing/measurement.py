@@ -4,6 +4,7 @@ import functools
 import secrets
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -35,15 +36,15 @@ def blocks(scale: Scale) -> Iterator[Block]:
 # What was found for cases that were measured together with another, by the run and the case; it is
 # handed out for so long [s].
 _found: dict[tuple[str, Key], tuple[Measured | str, Budget]] = {}
-FRESH = 600.0
+FRESH = 3600.0
 
 
 def timed(run: str, case: Case, seconds: float) -> Measured:
     """Time a case for about so long, alternating with those that it is compared with.
 
-    Keep the seconds of one operation, (sweep, round), the bytes that it moves, and by how much a
-    fixed loop varied meanwhile. What is found for the others is handed out when they are asked for
-    in the same run.
+    Keep the seconds of one operation, (sweep, round), the bytes that it moves, by how much a fixed
+    loop varied meanwhile, and a word that those measured together have in common. What is found
+    for the others is handed out when they are asked for in the same run.
 
     Raises:
         RuntimeError: if there are no rounds; the message says why.
@@ -63,16 +64,17 @@ def _together(case: Case, seconds: float) -> dict[Key, Measured | str]:
     """Return what is found for all cases of a group, or why nothing is."""
     group = [c for c in cases() if (c.work.subject, c.work.group) == case.work[1:3]]
     found = worker_process().find(TimingJob(tuple(c.key for c in group), seconds))
-    noise = metrics.relative_spread(np.array(found["paces"]))
+    facts = {"noise": metrics.relative_spread(np.array(found["paces"])),
+             "together": secrets.token_hex(4)}  # fmt: skip
     return {
-        one.key: trouble or _measured(one, np.array(rounds), noise)
+        one.key: trouble or _measured(one, np.array(rounds), facts)
         for one, rounds, trouble in zip(group, found["rounds"], found["troubles"], strict=True)
     }
 
 
-def _measured(case: Case, rounds: np.ndarray, noise: float) -> Measured:
+def _measured(case: Case, rounds: np.ndarray, facts: dict[str, Any]) -> Measured:
     arrays = {"seconds": rounds / case.operations, "moved": np.array(case.moved / case.operations)}
-    return Measured(arrays, facts={"noise": noise})
+    return Measured(arrays, facts=facts)
 
 
 @functools.cache

@@ -135,7 +135,12 @@ def _time(record: Record, unit: str) -> str:
 
 
 def _first(records: Sequence[Record]) -> str:
-    """Say who is first of several, or who ties, by the medians of the sweeps that they share."""
+    """Say who is first of several, or who ties, by the medians of the sweeps that they share.
+
+    Nothing is said of what was timed apart: its sweeps are no pairs.
+    """
+    if len({record.facts.get("together") for record in records}) > 1:
+        return " – timed apart, and not ranked"
     sweeps = {_short(r.solver): _of_sweeps(r) for r in records}
     if len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
         return ""

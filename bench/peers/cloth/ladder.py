@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ...experiments.cloth_peers.problem import explicit_substeps
-from ..registry import EXPLICIT, LINEARISED, ClothPeer
+from ..registry import EXPLICIT, LINEARISED, UNDECLARED, ClothPeer
 
 # Explicit steps, for those at symplectic Euler's limit of stability.
 MARGINS = (1.1, 2.0, 4.0)
@@ -41,6 +41,9 @@ def _rungs(
     if peer.kind == EXPLICIT:
         counts = [explicit_substeps(frequency, margin) for margin in MARGINS]
         return [_rung(peer, _counted(n, "step"), substeps=n) for n in counts]
+    if peer.kind == UNDECLARED:
+        counts = [explicit_substeps(frequency, margin) for margin in MARGINS]
+        return [_rung(peer, _counted(n, "step"), substeps=n) for n in sorted({*parts, *counts})]
     if peer.kind == LINEARISED:
         return [_rung(peer, _counted(n, "step"), substeps=n) for n in parts]
     rungs = [_rung(peer, _counted(n, "iteration"), iterations=n) for n in iterations]

@@ -5,10 +5,13 @@ engine up once for a robot and returns a function `ask(positions, rotations, sta
 target in the engine's own types and returns the call to be timed, which returns a `SolverOutput`:
 neither conversions nor set-up count as time of a solve. For a robot that it cannot solve `prepare`
 raises `UnableError`.
+
+An adapter of an engine whose kinematics is compared as well has a function `kinematics(robot)`,
+which returns a `Forward`.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from reference.arguments import FloatArray
 
@@ -43,6 +46,15 @@ class Ask(Protocol):
             rotations: of the effectors, (effector, 3, 3).
             start: coordinates, (coordinate,).
         """
+
+
+# Coordinates to the effectors' positions [m], (effector, 3), and rotations, (effector, 3, 3).
+Forward = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+def remark_of(adapter: Any) -> str:
+    """Return what an adapter has to say of its numbers, by a function `remark`, else ""."""
+    return str(adapter.remark()) if hasattr(adapter, "remark") else ""
 
 
 class UnableError(ValueError):

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +99,7 @@ class ProgramContestant:
         printed, self._print = self._print, None
         if isinstance(answer, Answer) and printed is not None and "printed" not in fields:
             remarks = (*answer.remarks, message.prints(printed))
-            return Answer(answer.values, answer.seconds, remarks)
+            return replace(answer, remarks=remarks)
         return answer
 
     def _exchange(

@@ -54,8 +54,9 @@ def heat_map(kind: str) -> Figure:
             f"robots_map_{KINDS[kind]}",
             f"Robots, {kind}: who is good at what",
             "Left: targets solved of all given. Right: the geometric mean of times over the "
-            "least on that robot, unsolved targets with their penalty. Fuller is better; no "
-            "field where a solver does not take the robot.",
+            "least on that robot, unsolved targets with their penalty. Fuller is better; a star "
+            "where a budget of time cut the solver short, no field where it does not take the "
+            "robot.",
             Map(tuple(line.solver for line in made), robots, panels),
             draw_map,
         )
@@ -75,7 +76,7 @@ def _success(line: Line, robot: str) -> Field | None:
     if share is None:
         return None
     rate = share.hits / max(share.total, 1)
-    return rate**2, f"{100 * rate:.3g}"  # squared, for most rates are near to 1
+    return rate**2, f"{100 * rate:.3g}{_star(line, robot)}"  # squared, for most rates are near to 1
 
 
 def _slowness(line: Line, robot: str) -> Field | None:
@@ -83,7 +84,12 @@ def _slowness(line: Line, robot: str) -> Field | None:
     if ratio is None:
         return None
     fullness = 1.0 - np.log(max(ratio, 1.0)) / np.log(SLOWEST)
-    return float(np.clip(fullness, 0.0, 1.0)), f"{ratio:,.{1 if ratio < 10 else 0}f}"
+    said = f"{ratio:,.{1 if ratio < 10 else 0}f}{_star(line, robot)}"
+    return float(np.clip(fullness, 0.0, 1.0)), said
+
+
+def _star(line: Line, robot: str) -> str:
+    return "*" if line.is_cut(robot) else ""
 
 
 def draw_map(data: Map) -> "Canvas":

@@ -1,5 +1,6 @@
 """What the records say of a solver over all robots, and how far it is from the best on each."""
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from ..readings import (
     measured,
     outcomes,
     penalised,
+    ranked_by_success,
     records_of,
     solved,
     total,
@@ -145,6 +147,20 @@ class Line(NamedTuple):
         """Return its geometric mean of times over the least, None if it does not take the robot."""
         record = self.records.get(robot)
         return None if record is None else metrics.ratio(_score(record), self.best[robot])
+
+    def is_cut(self, robot: str) -> bool:
+        """Return whether it is not ranked on a robot that it takes."""
+        return robot in self.records and not is_ranked(self.records[robot])
+
+
+def most_solved(made: Sequence[Line]) -> Counter[str]:
+    """Return on how many robots each solver solves the most targets, or ties with who does."""
+    robots = dict.fromkeys(robot for line in made for robot in line.records)
+    rankings = [
+        ranked_by_success([line.records[robot] for line in made if robot in line.records])
+        for robot in robots
+    ]
+    return Counter(solver for ranking in rankings for solver in ranking.first)
 
 
 def lines(results: Results, kind: str) -> list[Line]:

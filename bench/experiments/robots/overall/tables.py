@@ -7,11 +7,11 @@ from functools import partial
 from ....harness import metrics
 from ....presentation.columns import text, words_in
 from ....presentation.layout import Layout
-from ....presentation.results import leaders
+from ....presentation.results import leaders, listed
 from ....presentation.tables import INTERVAL, Column, Summary, in_unit, listing, words
 from ..readings import KINDS, RULE, SCORE, TIES, how
 from . import figures
-from .readings import Line, Overall, lines, overall
+from .readings import Line, Overall, lines, most_solved, overall
 
 
 def aggregate(kind: str) -> Layout:
@@ -81,16 +81,33 @@ def problem_map(kind: str) -> Layout:
         shows="Targets solved, and the geometric mean of times over the least of any solver on "
         f"that robot; empty where a solver does not take the robot. {RULE} {SCORE}",
         measured=lambda made: how([r for line in made for r in line.records.values()]),
+        summary=_map_summary,
         figures=(figures.heat_map(kind),),
         compared=0,
     )
+
+
+def _map_summary(made: Sequence[Line]) -> Summary:
+    """Say on how many robots each solver is first, or ties with who is."""
+    robots = {robot for line in made for robot in line.records}
+    targets = sum(max(_targets(made, robot)) for robot in robots)
+    return listing(
+        "Solves the most targets of a robot, or ties with who does "
+        f"(n = {words(targets)} targets of {words(len(robots))} robots):",
+        (f"{solver}: on {words(count)}" for solver, count in most_solved(made).most_common()),
+    )
+
+
+def _targets(made: Sequence[Line], robot: str) -> list[int]:
+    return [share.total for line in made if (share := line.share(robot))]
 
 
 def _columns(made: Sequence[Line]) -> tuple[Column, ...]:
     robots = list(dict.fromkeys(robot for line in made for robot in line.records))
     shares = [_share(robot) for robot in robots]
     ratios = [_ratio(robot) for robot in robots]
-    folded = [*(replace(column, folded=True) for column in (*shares[5:], *ratios))]
+    cuts = text("cut on", lambda line: listed([r for r in robots if line.is_cut(r)]))
+    folded = [*(replace(column, folded=True) for column in (*shares[5:], *ratios, cuts))]
     return (text("solver", lambda line: line.solver), *shares[:5], *folded)
 
 

@@ -1,0 +1,64 @@
+"""The entrant that works in this process's child: one at a time, opened when it is first asked."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from crosscheck.conformance.case import Case
+from crosscheck.conformance.contestant import Answer, Contestant, Failure
+from crosscheck.conformance.doors import Limits, open_contestant
+from crosscheck.conformance.sentence import sentence
+
+from ..harness.stopwatch import count
+from .entrant import Spec
+
+# The bench itself loses patience with a silent worker sooner: see `bench.harness.isolation`.
+LIMITS = Limits(first=900.0, request=900.0)
+_ABOUT = sentence("")
+
+
+class EntrantError(Exception):
+    """An entrant gave no answer; the message says why."""
+
+
+class Asked:
+    """A solver behind its door.
+
+    Attributes:
+        contestant: the solver.
+        remark: how its times are taken, where that is not by its own clock.
+    """
+
+    def __init__(self, spec: Spec) -> None:
+        self.contestant: Contestant = open_contestant(spec, LIMITS)
+        self.remark = ""
+
+    def answer(self, task: str, inputs: Mapping[str, Any]) -> Answer:
+        """Return what it answers.
+
+        Raises:
+            EntrantError: if there is no answer.
+        """
+        found = self.contestant.answer(Case("of the bench", task, inputs, "bench", _ABOUT))
+        if isinstance(found, Failure):
+            raise EntrantError(str(found.sentence))
+        count(found.seconds)
+        if not found.timed_by_itself:
+            self.remark = "timed by the round trip of a request, for its answers hold no seconds"
+        return found
+
+
+_open: dict[Spec, Asked] = {}
+
+
+def asked(spec: Spec) -> Asked:
+    """Return a solver, the same as before if it is asked again; any other is ended."""
+    if spec not in _open:
+        for other in list(_open):
+            _open.pop(other).contestant.close()
+        _open[spec] = Asked(spec)
+    return _open[spec]
+
+
+def remark() -> str:
+    """Return what is to be said of the times of the solver that works."""
+    return next(iter(_open.values())).remark if _open else ""

@@ -1,0 +1,86 @@
+"""The files that an entrant is made of: their digest and their commit."""
+
+import ast
+import hashlib
+import importlib.machinery
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from ..harness.machine import git_commit
+from .entrant import Spec
+
+# Files of a program larger than this [B] are interpreters rather than somebody's solver.
+_LARGEST = 1 << 26
+
+
+def digest_of(spec: Spec) -> str:
+    """Return twelve hex digits over all files of a solver, "" if none is known."""
+    files = source_files(spec)
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(path.name.encode(errors="replace") + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:12] if files else ""
+
+
+def commit_of(spec: Spec) -> str:
+    """Return the commit of a solver's files, and whether they were changed since; "" if none."""
+    files = source_files(spec)
+    return git_commit(files[0].parent, [str(path) for path in files]) if files else ""
+
+
+def source_files(spec: Spec) -> list[Path]:
+    """Return the files of a Python file, of a module, or of a command, the main one first.
+
+    Of a Python file those of its own folder that it imports belong to it, of a module its package.
+    """
+    if not isinstance(spec, str):
+        return _files_of_command(spec)
+    place = spec.partition(":")[0]
+    if place.endswith(".py"):
+        return list(dict.fromkeys(_with_imports(Path(place).resolve(), set())))
+    if Path(place).is_file():
+        return _files_of_command([place])
+    return _files_of_module(place)
+
+
+def _files_of_command(words: Sequence[str]) -> list[Path]:
+    paths = [Path(word).resolve() for word in words if "/" in word or "." in word]
+    return [path for path in paths if path.is_file() and path.stat().st_size <= _LARGEST]
+
+
+def _with_imports(path: Path, seen: set[Path]) -> Iterator[Path]:
+    """Yield a file and those of its folder that it imports, however deep."""
+    if path in seen or not path.is_file():
+        return
+    seen.add(path)
+    yield path
+    for name in _imported(path):
+        place = path.parent.joinpath(*name.split("."))
+        yield from _with_imports(place.with_name(f"{place.name}.py"), seen)
+        yield from _with_imports(place / "__init__.py", seen)
+
+
+def _imported(path: Path) -> Iterator[str]:
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (SyntaxError, ValueError):  # whoever loads it will say so
+        return
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            inside = f"{node.module}." if node.module else ""
+            yield from (inside + alias.name for alias in node.names)
+            yield from [node.module] if node.module else []
+
+
+def _files_of_module(name: str) -> list[Path]:
+    found = importlib.machinery.PathFinder.find_spec(
+        name.split(".")[0], [str(Path.cwd()), *sys.path]
+    )
+    if found is None or not found.origin:
+        return []
+    folders = [Path(folder) for folder in found.submodule_search_locations or ()]
+    inside = sorted(path for folder in folders for path in folder.rglob("*.py"))
+    return list(dict.fromkeys([Path(found.origin), *inside]))

@@ -1,0 +1,66 @@
+"""The table of the solvers that users entered, for each suite that asks them."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import NamedTuple
+
+from ..harness.record import Record
+from .columns import text
+from .layout import Layout
+from .results import Results, listed
+from .tables import Column, Summary
+
+
+class Entered(NamedTuple):
+    """A solver that was entered, with what is on record of it in a suite."""
+
+    name: str
+    records: list[Record]
+
+    @property
+    def commit(self) -> str:
+        """The commit of its own sources, with a plus where they were changed."""
+        known = str(self.records[-1].conditions.get("solver_commit", ""))
+        commit, _, changes = known.partition(" ")
+        return commit[:7] + ("+" if changes else "") or "–"
+
+    def fact(self, name: str) -> str:
+        """Return what its last record says of it."""
+        return str(self.records[-1].facts.get(name, "")) or "–"
+
+
+def _entered(suite: str, results: Results) -> list[Entered]:
+    by: dict[str, list[Record]] = {}
+    for record in results.all(suite, entrant=True):
+        by.setdefault(record.solver, []).append(record)
+    return [Entered(name, records) for name, records in by.items()]
+
+
+def _summary(entered: Sequence[Entered]) -> Summary:
+    names = [f"{one.name} ({one.records[-1].settings.get('version') or '–'})" for one in entered]
+    return Summary(f"{listed(names)}.")
+
+
+def entered(suite: str, task: str) -> Layout:
+    """Return the table of the solvers that users entered into a suite."""
+    return Layout(
+        f"Which solvers of yours take part in {task}?",
+        f"entered_{suite}",
+        f"Solvers that were entered, {task}",
+        subjects=partial(_entered, suite),
+        columns=(
+            text("solver", lambda one: one.name),
+            text("version", lambda one: one.records[-1].settings.get("version") or "–"),
+            text("commit", lambda one: one.commit),
+            text("sources", lambda one: one.fact("digest")),
+            text("door", lambda one: one.fact("door")),
+            Column("records", read=lambda one: len(one.records)),
+        ),
+        shows="A commit with a plus has changes beside it; sources are a digest of its files, "
+        "and a change of them is measured anew.",
+        measured="Opened by the doors of plumbob verify. A Python file is timed call by call in "
+        "its own process, a program by the seconds of its answers, else by the round trip of a "
+        "request: its remark says so.",
+        summary=_summary,
+        optional=True,
+    )

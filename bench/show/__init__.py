@@ -1,0 +1,1 @@
+"""Scenes in motion: by our solvers or by yours, as animations, pictures, pages and BVH."""

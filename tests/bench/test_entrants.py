@@ -1,0 +1,546 @@
+"""Solvers that users enter: in tables and figures beside the others, kept, and told apart."""
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.cli import run_command
+from bench.entrants import opening
+from bench.experiments.chain import figures as chain_figures
+from bench.experiments.cloth_peers import figures as cloth_figures
+from bench.harness.record import RecordFile
+from bench.presentation.figures import drawn
+from bench.presentation.results import Results, plain
+from bench.presentation.sections import tables
+from crosscheck.conformance.doors import open_contestant
+
+PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
+IK, CLOTH, PROBLEMS = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+FACTS = {"task": "chain", "stratum": "near", "entrant": True}
+CHAIN = {
+    "residual": [0.0],
+    "iterations": [1],
+    "history_low": [1.0, 0.1],
+    "history_median": [1.0, 0.1],
+}
+CHAIN |= {
+    "history_high": [1.0, 0.1],
+    "bend": [0.0],
+    "reach": 1.0,
+    "excess": [0.0],
+    "distance": [1.0],
+}
+SMALL = ["--quick", "--targets", "2", "--problem", "chain/near"]
+EXPLICIT = ("--solver", "My symplectic Euler", "--solver", "Plumbob symplectic Euler")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with the solvers of the page, and nobody's entry points."""
+    monkeypatch.setattr(opening, "installed", list)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_ik.py").write_text(IK, encoding="utf-8")
+    (tmp_path / "my_cloth.py").write_text(CLOTH, encoding="utf-8")
+    return tmp_path
+
+
+def bench(*words):
+    return run_command(["bench", *words, "-o", "out"])
+
+
+def records(solver=None):
+    found = [plain(one) for one in RecordFile("out").read().records if one.suite != "finished"]
+    return [one for one in found if solver in (None, one.solver)]
+
+
+def cells(table):
+    return [str(cell) for row in table.rows for cell in row]
+
+
+def test_the_solvers_of_the_readme_are_those_of_the_page():
+    readme = PAGE.parents[1].joinpath("README.md").read_text("utf-8")
+    assert IK in readme
+    assert CLOTH in readme
+
+
+@pytest.mark.parametrize("code", [IK, CLOTH], ids=["ik", "cloth"])
+def test_fifteen_lines_suffice(code):
+    assert sum(bool(line.strip()) for line in code.splitlines()) <= 15
+
+
+def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, capsys):
+    code = bench("ik", *SMALL, "--problem", "robots/ur5", "--problem", "published/fabrik",
+                 "--problem", "chain/beyond", "--with", "my_ik.py", "--solver", "My FABRIK",
+                 "--solver", "ccd", "--solver", "fabrik")  # fmt: skip
+    assert code == 0
+    (near,) = [one for one in records("My FABRIK") if one.problem == "chain/near"]
+    assert near.settings["version"] == "0.1"
+    assert near.facts["entrant"] is True
+    assert near.facts["door"] == "my_ik.py"
+    assert len(near.facts["digest"]) == 12
+    assert near.conditions["solver_commit"] == ""
+    assert (near.arrays["residual"] <= 1e-4).all()
+    made = {table.name: table for table in tables(Results(records()), ["ik"])}
+    for name in ("accuracy", "q1_beyond_reach", "published_fabrik", "entered_ik"):
+        assert "My FABRIK" in cells(made[name]), name
+    for draw in (chain_figures.ik_residuals, chain_figures.iterations):
+        assert "My FABRIK" in drawn(draw(Results(records()))).svg
+    assert "My FABRIK" in capsys.readouterr().out
+
+
+def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
+    problems = ("--problem", "peers/one step/k1000", "--problem", "peers/motion/k1000")
+    assert bench("cloth", "--quick", *problems, "--with", "my_cloth.py", *EXPLICIT) == 0
+    made = {table.name: table for table in tables(Results(records()), ["cloth"])}
+    for name in ("cloth_peers_step", "cloth_peers_motion", "entered_cloth"):
+        assert "My symplectic Euler" in cells(made[name]), name
+    assert "My symplectic Euler" in drawn(cloth_figures.one_step(Results(records()))).svg
+    # The same method is the same to rounding, in every number but the times.
+    ours, theirs = (
+        next(one for one in records(name) if one.problem == "peers/one step/k1000")
+        for name in ("Plumbob symplectic Euler", "My symplectic Euler")
+    )
+    few = len(theirs.arrays["error"])
+    np.testing.assert_allclose(ours.arrays["error"][:few], theirs.arrays["error"], rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_the_limit_of_stability_of_the_same_method_is_the_same(folder):
+    asked = ("--problem", "peers/stability", "--with", "my_cloth.py", *EXPLICIT)
+    assert bench("cloth", "--quick", *asked) == 0
+    limits = [one.arrays["limit"] for one in records()]
+    np.testing.assert_allclose(*limits, rtol=1e-3)
+    made = {table.name: table for table in tables(Results(records()), ["cloth"])}
+    assert "My symplectic Euler" in cells(made["cloth_stability"])
+
+
+def test_a_later_plain_run_keeps_what_was_entered(folder, capsys, monkeypatch):
+    bench("ik", *SMALL, "--with", "my_ik.py", "--solver", "My FABRIK")
+    (before,) = records()
+    assert not any(one.suite == "finished" for one in RecordFile("out").read().records)
+    capsys.readouterr()
+    from bench.harness import run  # what a plain run asks for, without measuring all of it
+
+    few = [one for one in run.blocks("ik", run.SCALES["quick"]) if one.problem == "chain/near"][:2]
+    monkeypatch.setattr(run, "blocks", lambda suite, scale: iter(few))
+    assert bench("ik", "--quick") == 0
+    assert "1 record of My FABRIK kept, not run" in capsys.readouterr().out
+    (after,) = records("My FABRIK")
+    assert after.when == before.when
+    assert not after.superseded
+
+
+def test_a_changed_file_is_measured_again_and_why_is_said(folder, capsys):
+    asked = ("ik", *SMALL, "--with", "my_ik.py", "--solver", "My FABRIK")
+    bench(*asked)
+    assert bench(*asked) == 0
+    assert "0 measured, 1 kept" in capsys.readouterr().out
+    (folder / "my_ik.py").write_text(IK + "# changed\n", encoding="utf-8")
+    assert bench(*asked) == 0
+    said = capsys.readouterr().out
+    assert re.search(
+        r"measured again: 1, for other sources of My FABRIK \(\w{12}, now \w{12}\)", said
+    )
+
+
+def test_a_file_that_the_solver_imports_belongs_to_it(folder):
+    from bench.entrants.sources import digest_of
+
+    (folder / "my_ik.py").write_text("import mine.one\n" + IK, encoding="utf-8")
+    (folder / "mine").mkdir()
+    (folder / "mine" / "one.py").write_text("x = 1\n")
+    before = digest_of(str(folder / "my_ik.py"))
+    (folder / "mine" / "one.py").write_text("x = 2\n")
+    assert digest_of(str(folder / "my_ik.py")) != before
+
+
+def test_the_commit_of_the_solver_is_on_record(folder):
+    import subprocess
+
+    from bench.entrants.sources import commit_of
+
+    git = ["git", "-C", str(folder), "-c", "user.name=n", "-c", "user.email=e"]
+    for words in (["init", "-q"], ["add", "my_ik.py"], ["commit", "-qm", "one"]):
+        subprocess.run([*git, *words], check=True)
+    path = folder / "my_ik.py"
+    assert re.fullmatch(r"[0-9a-f]{40}", commit_of(str(path)))
+    path.write_text(IK + "\n")
+    assert re.fullmatch(r"[0-9a-f]{40} with changes", commit_of(str(path)))
+
+
+PROGRAM = """
+import json, sys
+for line in sys.stdin:
+    asked = json.loads(line)
+    answer = {"id": asked["id"]}
+    if asked["task"] == "greeting":
+        answer |= {"protocol": 1, "tasks": ["inverse_kinematics"], "name": "My program"}
+    else:
+        answer |= {"local_rotations": asked["local_rotations"], EXTRA}
+    print(json.dumps(answer), flush=True)
+"""
+
+
+@pytest.mark.parametrize(("extra", "remark"), [('"seconds": 1e-7', ""), ("", "round trip")])
+def test_a_program_enters_by_lines_and_is_timed_by_itself_or_says_so(folder, extra, remark):
+    (folder / "program.py").write_text(PROGRAM.replace("EXTRA", extra), encoding="utf-8")
+    words = ["bench", "ik", *SMALL, "--solver", "My program", "-o", "out"]
+    assert run_command([*words, "--", sys.executable, str(folder / "program.py")]) == 0
+    (record,) = records("My program")
+    assert remark in record.notes["remark"]
+    assert (record.arrays["seconds"] < 1e-6).all() == bool(extra)
+
+
+BROKEN = {
+    "raises": 'raise RuntimeError("no arms")',
+    "crashes": "import os; os.abort()",
+    "garbage": 'return "garbage"',
+    "shape": 'return {"local_rotations": [[1.0]]}',
+    "stretches": 'return {"positions": 2.0 * offsets.cumsum(axis=0)}',
+    "nothing": 'return {"residual": 0.0}',
+    "nan": 'return {"local_rotations": 0.0 * local_rotations / 0.0}',
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_solver_loses_its_own_rows_only_and_says_why(folder, name, capsys):
+    head = "def inverse_kinematics(offsets, local_rotations):\n    "
+    (folder / "broken.py").write_text(head + BROKEN[name] + "\n", encoding="utf-8")
+    bench("ik", *SMALL, "--with", "broken.py", "--solver", "broken.py", "--solver", "ccd",
+          "--with", "my_ik.py", "--solver", "My FABRIK")  # fmt: skip
+    (theirs,) = records("broken.py")
+    assert theirs.failed or theirs.notes["remark"]
+    assert theirs.failed or np.isinf(theirs.arrays["residual"]).all()
+    for other in ("ccd", "My FABRIK"):
+        (record,) = records(other)
+        assert (record.arrays["residual"] <= 1e-4).all()
+    assert tables(Results(records()), ["ik"])
+
+
+def test_a_solver_that_hangs_is_ended(folder, monkeypatch):
+    from bench.entrants import chain
+    from bench.harness.isolation import WorkerProcess
+
+    impatient = WorkerProcess(30.0, 0.5)
+    monkeypatch.setattr(chain, "worker_process", lambda: impatient)
+    (folder / "hangs.py").write_text(
+        "calls = 0\n\n\ndef inverse_kinematics(local_rotations):\n    global calls\n"
+        "    calls += 1\n    while calls > 2:\n        pass\n"
+        "    return {'local_rotations': local_rotations}\n"
+    )
+    bench("ik", *SMALL, "--with", "hangs.py", "--solver", "hangs.py")
+    impatient.close()
+    (record,) = records("hangs.py")
+    assert "silence" in record.notes["remark"]
+    assert "cut at 1 of 2 targets" in record.notes["remark"]
+    assert np.isfinite(record.arrays["residual"]).tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("def f(:\n", "SyntaxError"),
+        ("x = 1\n", "expected functions named as some of"),
+        ("raise SystemExit(3)\n", "SystemExit"),
+        ("def forward_kinematics(parents):\n    return parents\n", "suites that ask entrants"),
+    ],
+)
+def test_what_cannot_be_opened_is_refused_in_one_sentence(folder, capsys, text, said):
+    (folder / "bad.py").write_text(text)
+    assert bench("ik", "--quick", "--with", "bad.py") == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1
+    assert not Path("out").exists()
+
+
+def test_what_does_not_exist_is_refused(folder, capsys):
+    assert bench("ik", "--with", "nobody.py") == 2
+    assert "nobody.py, which does not exist" in capsys.readouterr().err
+
+
+def entrants(*words):
+    return opening.opened(opening.named(words), ["ik"])
+
+
+@pytest.mark.parametrize("name", ["ccd", "CCD", "mink", "Plumbob Newton", "TRAC-IK, 5 ms"])
+def test_a_name_of_ours_or_of_a_peer_gets_the_address_behind_it(folder, name):
+    (one,) = entrants(f"{name}=my_ik.py")
+    assert one.name == f"{name} (my_ik.py)"
+
+
+def test_two_of_one_name_are_refused_and_may_be_called_otherwise(folder):
+    (folder / "other.py").write_text(IK)
+    with pytest.raises(ValueError, match=r"'My FABRIK' twice, my_ik\.py and other\.py"):
+        entrants("my_ik.py", "other.py")
+    assert [e.name for e in entrants("my_ik.py", "New=other.py")] == ["My FABRIK", "New"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "<script>alert(1)</script>",
+        "$\\frac$ _x_ | \\begin",
+        "\x1b[31m\n\u202e",
+        "\ud800",
+        "x" * 500,
+    ],
+)
+def test_a_hostile_name_can_be_shown_anywhere(folder, name, make):
+    (folder / "hostile.py").write_text(IK.replace('"My FABRIK"', ascii(name)))
+    (one,) = entrants("hostile.py")
+    assert one.name.isprintable()
+    assert 0 < len(one.name) <= 60
+    record = make.record(
+        "ik", "chain/near", one.name, {"tolerance": 1e-4}, facts=FACTS, arrays=CHAIN
+    )
+    RecordFile("out").append([record])
+    (record,) = records()
+    assert record.solver == one.name
+    assert "<script>" not in drawn(chain_figures.ik_residuals(Results([record]))).svg
+
+
+def test_each_method_has_rows_of_its_own(folder):
+    methods = IK.replace(
+        "def inverse",
+        "def fabrik(**k):\n    return inverse_kinematics(**k)\nccd = fabrik\ndef inverse",
+    )
+    (folder / "two.py").write_text(
+        methods.replace('"version"', '"methods": ["ccd", "fabrik"], "version"')
+    )
+    (one,) = entrants("two.py")
+    assert [method.solver for method in one.called()] == ["My FABRIK, ccd", "My FABRIK, fabrik"]
+
+
+class Installed:
+    """An entry point of an installed package."""
+
+    name, dist = "mine", None
+
+    def __init__(self, value):
+        self.value = value
+
+
+def test_an_entry_point_takes_part_by_itself_and_a_broken_one_harms_nobody(
+    folder, monkeypatch, capsys
+):
+    monkeypatch.undo()
+    monkeypatch.chdir(folder)
+    points = [Installed("my_ik"), Installed("nothing_here:Solver")]
+    monkeypatch.setattr(opening.importlib.metadata, "entry_points", lambda group: points)
+    assert bench("ik", "--list", "--quick") == 0
+    told = capsys.readouterr()
+    assert "    My FABRIK\n" in told.out
+    assert "takes no part" in told.err
+
+
+def test_one_start_of_robots_and_restarts_through_the_door_are_those_of_the_solver_itself(folder):
+    (folder / "robot.py").write_text(ROBOT)
+    bench("ik", "--quick", "--targets", "10", "--robot", "ur5", "--with", "robot.py", "--with",
+          "my_ik.py", "--solver", "Mine", "--solver", "My FABRIK")  # fmt: skip
+    by = {(one.problem, one.solver): one for one in records()}
+    assert {solver for _, solver in by} == {"Mine", "Mine, 20 restarts"}
+    once, again = (by["robots/ur5", name] for name in ("Mine", "Mine, 20 restarts"))
+    assert once.arrays["solved"].sum() >= 1
+    assert again.arrays["solved"].sum() > once.arrays["solved"].sum()
+    assert not (once.arrays["claimed"].astype(bool) & ~once.arrays["solved"]).any()
+    assert "unreachable/ur5" in {problem for problem, _ in by}
+    bench("ik", "--quick", "--targets", "10", "--problem", "robots/all", "--with", "my_ik.py",
+          "--solver", "My FABRIK")  # fmt: skip
+    made = {table.name: table for table in tables(Results(records()), ["ik"])}
+    (row,) = [row for row in made["robots_success_one_start"].rows if "My FABRIK" in row]
+    assert "not asked: it offers no robot_inverse_kinematics" in str(row)
+
+
+ROBOT = """
+from plumbob import Target, formats, solve_ik
+
+PLUMBOB = {"name": "Mine", "version": "3"}
+
+
+def robot_inverse_kinematics(urdf, start, target_position, target_rotation, tolerance):
+    robot = formats.urdf.parse(urdf).articulation
+    target = Target(target_position, target_rotation, robot.names[-1])
+    found = solve_ik(robot, start, target, "levenberg_marquardt", restarts=0, tolerance=tolerance)
+    return {"q": found.coordinates, "converged": found.outcome.name == "CONVERGED"}
+"""
+
+
+def test_the_door_is_closed_after_the_greeting(folder, monkeypatch):
+    closed = []
+    made = open_contestant(str(folder / "my_ik.py"))
+    close = made.close
+    monkeypatch.setattr(made, "close", lambda: closed.append(close()))
+    monkeypatch.setattr(opening, "open_contestant", lambda *_: made)
+    entrants("my_ik.py")
+    assert closed == [None]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--solver", "levenberg"], "did you mean 'levenberg_marquardt'?"),
+        (["--problem", "chain/naer"], "did you mean 'chain/near'?"),
+        (["--robot", "ur6"], "did you mean 'ur5'?"),
+        (["--targets", "0"], "targets: expected 1 or more, got 0"),
+        (["--solver", "ccd", "--robot", "ur5"], "got none of them"),
+    ],
+)
+def test_a_near_miss_is_met_with_a_question(folder, capsys, words, said):
+    assert bench("ik", "--quick", *words) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_dry_run_measures_nothing_and_knows_how_long_it_takes(folder, capsys):
+    asked = ("ik", *SMALL, "--with", "my_ik.py")
+    assert bench(*asked, "--dry-run") == 0
+    told = capsys.readouterr().out
+    assert "8 to measure, 0 kept" in told
+    assert "from budgets" in told
+    assert not Path("out").exists()
+    bench(*asked, "--solver", "ccd")
+    capsys.readouterr()
+    bench(*asked, "--dry-run")
+    told = capsys.readouterr().out
+    assert "7 to measure, 1 kept" in told
+    assert "from records of others" in told
+    assert len(records()) == 1
+
+
+def test_a_part_forgets_nothing(folder):
+    bench("ik", *SMALL, "--with", "my_ik.py", "--solver", "My FABRIK")
+    bench("ik", *SMALL, "--solver", "ccd")
+    bench("ik", *SMALL, "--solver", "ccd", "--fresh")
+    assert {one.solver for one in records()} == {"My FABRIK", "ccd"}
+
+
+def test_what_there_is_is_listed(folder, capsys):
+    assert bench("ik", "--list", "--with", "my_ik.py") == 0
+    told = capsys.readouterr().out
+    for name in ("chain/near", "robots/ur5", "ccd", "My FABRIK", "Levenberg-Marquardt"):
+        assert name in told
+
+
+def test_problems_of_a_python_file_stand_in_the_same_tables(folder):
+    (folder / "my_problems.py").write_text(PROBLEMS, encoding="utf-8")
+    words = ("--problem", "my_problems.py", "--with", "my_ik.py", "--solver", "My FABRIK")
+    assert bench("ik", "--quick", *words, "--solver", "ccd") == 0
+    assert {(r.problem, r.solver) for r in records()} == {
+        ("chain/tentacle", "ccd"), ("chain/tentacle", "My FABRIK"),
+    }  # fmt: skip
+    made = {table.name: table for table in tables(Results(records()), ["ik"])}
+    assert [row[0] for row in made["accuracy"].rows] == ["tentacle", "tentacle"]
+    assert all((r.arrays["residual"] <= 1e-4).mean() > 0.5 for r in records())
+    (folder / "my_problems.py").write_text(PROBLEMS.replace("0.3, 0.3", "0.2, 0.2"))
+    assert "tentacle is another problem now" in dry(folder, *words)
+
+
+def dry(folder, *words):
+    from bench.commands.bench import Asked, _choice
+    from bench.entrants import outlook
+
+    given = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--problem"]
+    entered = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--with"]
+    choice = _choice(["ik"], "quick", Asked(entered, problems=given))
+    return "\n".join(outlook.dry_run(["ik"], choice, folder / "out"))
+
+
+def test_a_cloth_of_a_python_file_stands_in_the_same_tables(folder):
+    (folder / "my_problems.py").write_text(PROBLEMS, encoding="utf-8")
+    words = ("--problem", "my_problems.py", "--with", "my_cloth.py", "--solver")
+    assert (
+        bench("cloth", "--quick", *words, "My symplectic Euler", "--solver", "Plumbob Newton") == 0
+    )
+    made = {table.name: table for table in tables(Results(records()), ["cloth"])}
+    rows = [row[:2] for row in made["cloth_peers_step"].rows]
+    assert set(rows) == {("hammock", "My symplectic Euler"), ("hammock", "Plumbob Newton")}
+    assert "hammock" in drawn(cloth_figures.one_step(Results(records()))).svg
+
+
+OBJ = "".join(f"v {x} 0 {z}\n" for z in range(3) for x in range(3))
+OBJ += "".join(f"f {i} {i + 1} {i + 4} {i + 3}\n" for i in (1, 2, 4, 5))
+
+
+@pytest.mark.parametrize(
+    ("rule", "pinned"), [(None, [0, 8]), ("0,2", [0, 2]), ("top", [*range(9)])]
+)
+def test_an_obj_becomes_a_cloth_with_pins_by_a_rule(folder, rule, pinned):
+    from bench.entrants import models
+
+    (folder / "mesh.obj").write_text(OBJ)
+    system, state = models.cloth(folder / "mesh.obj", rule)
+    assert system.pinned.tolist() == pinned
+    assert len(system.springs) == 16
+    assert system.masses.sum() == pytest.approx(1.0)
+    np.testing.assert_array_equal(state.velocities, 0.0)
+
+
+URDF = """<robot name="r"><link name="b"/><link name="l1"/><link name="l2"/><link name="t"/>
+<joint name="j1" type="revolute"><parent link="b"/><child link="l1"/>
+<origin xyz="0 0 .3" rpy=".1 .2 .3"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+<joint name="j2" type="continuous"><parent link="l1"/><child link="l2"/><origin xyz=".4 0 0"/>
+<axis xyz="0 1 0"/></joint>
+<joint name="j3" type="fixed"><parent link="l2"/><child link="t"/>
+<origin xyz=".3 0 .1" rpy="1 0 0"/></joint></robot>"""
+
+
+def test_a_urdf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
+    from bench.entrants import models
+    from bench.experiments.robots.evaluate import Evaluator
+    from reference import forward_kinematics
+    from reference.formats import urdf
+
+    path = folder / "mine.urdf"
+    path.write_text(URDF)
+    robot = models.robot(path, "mine", None)
+    assert robot.lower.tolist() == [-2.0, -2.0 * np.pi]
+    q = np.array([0.4, -0.9])
+    found, turned = Evaluator(robot).forward(q)
+    model = urdf.read(path).articulation
+    full = np.zeros(model.coordinate_count)
+    full[[model.coordinates_of(j).start for j in (1, 2)]] = q
+    expected = forward_kinematics(model, full)
+    np.testing.assert_allclose(found[0], expected.positions[-1], atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_folder_of_models_is_measured_by_ours_and_by_entrants(folder):
+    (folder / "models").mkdir()
+    (folder / "models" / "mine.urdf").write_text(URDF)
+    (folder / "models" / "readme.txt").write_text("nothing")
+    (folder / "robot.py").write_text(ROBOT)
+    bench("ik", "--quick", "--targets", "10", "--problem", "models", "--with", "robot.py",
+          "--solver", "Mine", "--solver", "Plumbob LM")  # fmt: skip
+    found = {(one.problem, one.solver): one for one in records()}
+    for solver in ("Mine", "Plumbob LM"):
+        assert found["robots/mine", solver].arrays["solved"].size == 6
+        assert found["unreachable/mine", solver].arrays["solved"].sum() == 0
+    assert found["robots/mine", "Plumbob LM"].arrays["solved"].any()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("bad.py", "def f(:", "SyntaxError"),
+        ("empty.py", "x = 1", "expected functions without arguments or PROBLEMS, got none"),
+        ("raises.py", "def f():\n    raise OSError('gone')", "OSError: gone"),
+        ("lacks.py", "def f():\n    return {'parents': [-1]}", "f: lacks 'offsets'"),
+        ("odd.py", "PROBLEMS = [{'colour': 1}]", "got 'colour'"),
+        ("shape.py", "PROBLEMS = [{'parents': [-1, 0], 'offsets': [[0, 0, 0], [1, 0, 0]], "
+                     "'targets': [1, 2]}]", "targets: expected finite numbers (target, 3)"),
+        ("bad.urdf", "<robot>", "bad.urdf"),
+        ("other.xml", "<html/>", "other XML"),
+        ("bad.obj", "f 1 2 3", "bad.obj"),
+    ],
+)  # fmt: skip
+def test_a_problem_that_is_none_is_refused_in_one_sentence(folder, capsys, name, text, said):
+    (folder / name).write_text(text)
+    suite = "cloth" if name.endswith("obj") else "ik"
+    assert bench(suite, "--quick", "--problem", name) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1

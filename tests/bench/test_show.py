@@ -1,0 +1,259 @@
+"""The command `show`: our scenes, and yours beside ours, as pictures, films and pages."""
+
+import json
+import re
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+from bench import cli
+from bench.presentation import motion
+from bench.show import ours
+from bench.show.yours import Yours
+from reference import ImplicitEuler, State, scenes, solve_ik
+
+IK = """
+    import numpy as np
+    from reference import Skeleton, solve_ik
+
+    def inverse_kinematics(parents, offsets, local_rotations, target, effector):
+        found = solve_ik(Skeleton(parents, offsets), local_rotations, target, solver="ccd"{})
+        return {{"local_rotations": found.local_rotations}}
+"""
+STEP = """
+    from reference import ImplicitEuler, MassSpring, State
+
+    def mass_spring_step(masses, springs, rest_lengths, stiffnesses, dampings, pinned, gravity,
+                         positions, velocities, h):
+        system = MassSpring(masses, springs, rest_lengths=rest_lengths, stiffnesses=stiffnesses,
+                            dampings=dampings, pinned=pinned, gravity=gravity)
+        after = ImplicitEuler(system, h=h).step(State(positions, velocities)).state
+        return {{"positions": after.positions{}, "velocities": after.velocities}}
+"""
+
+# Two that import nothing, to be drawn.
+STILL = """
+    def mass_spring_step(positions, velocities):
+        return {"positions": positions, "velocities": velocities}
+"""
+DOT = """
+    def track(parents, curve):
+        return {"positions": [[list(point)] * len(parents) for point in curve]}
+"""
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch, tmp_path):
+    """Curves of few points and a short swing, in a folder of their own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(ours, "FRAMES", 6)
+    monkeypatch.setattr(ours, "MIN_SPACING", 0.3)
+    monkeypatch.setattr(ours, "MAX_SPACING", 0.6)
+
+
+def file(tmp_path, name, text):
+    path = tmp_path / name
+    path.write_text(textwrap.dedent(text), encoding="utf-8")
+    return str(path)
+
+
+def errors(page):
+    """The errors of each motion of a page, in the order of its solvers."""
+    text = page.read_text(encoding="utf-8")
+    data = json.loads(re.search(r'<script type="application/json">(.*?)</script>', text)[1])
+    return [one["errors"] for one in data["motions"]]
+
+
+def show(capsys, *arguments):
+    code = cli.run_command(["show", *map(str, arguments)])
+    told = capsys.readouterr()
+    return code, told.out, told.err
+
+
+def test_your_arm_stands_beside_ours_with_its_error(capsys, tmp_path):
+    mine = file(tmp_path, "my_ik.py", IK.format(", max_iterations=1"))
+    code, out, err = show(capsys, "circle", "--with", mine, "-o", "circle.html")
+    assert (code, out, err) == (0, "circle.html\n", "")
+    text = (tmp_path / "circle.html").read_text()
+    assert text.index("my_ik.py") < text.index("Plumbob FABRIK")
+    yours, others = errors(tmp_path / "circle.html")
+    assert max(yours) > 1e-3
+    assert max(others) <= 1e-4
+
+
+def test_an_honest_arm_is_as_near_as_ours_and_each_frame_starts_from_the_last(tmp_path):
+    mine = Yours([file(tmp_path, "my_ik.py", IK.format(""))])
+    found = ours.drawn("circle", "ccd", coherent=False)
+    told = []
+    positions = mine.draws(found, lambda done, total: told.append((done, total)))
+    mine.close()
+    np.testing.assert_allclose(positions, found.motion.positions, atol=1e-9)
+    assert told[-1] == (len(found.curve), len(found.curve))
+    start = solve_ik(found.skeleton, found.rest, found.curve[-1], solver="ccd").positions
+    assert np.abs(positions[-1] - start).max() > 1e-3
+
+
+def test_a_solver_that_tracks_is_asked_for_the_whole_curve(tmp_path):
+    yours = Yours([file(tmp_path, "tracks.py", DOT)])
+    found = ours.drawn("heart", "fabrik", coherent=False)
+    positions = yours.draws(found, lambda *_: None)
+    yours.close()
+    scene = ours.arm_scene("heart", found, "ours", ("yours", positions))
+    assert [one.label for one in scene.motions] == ["yours", "ours"]
+    assert scene.motions[0].errors.max() == 0.0
+
+
+def test_the_cloth_by_your_steps_is_as_far_off_as_it_is(tmp_path):
+    system, start = scenes.lab_cloth()
+    for change, least in (("", 0.0), (" + 1e-3", 1e-3)):
+        yours = Yours([file(tmp_path, "my_cloth.py", STEP.format(change))])
+        found = ours.fallen("newton")
+        positions = yours.falls(found, lambda *_: None)
+        yours.close()
+        scene = ours.cloth_scene(found, "newton", ("yours", positions))
+        assert scene.motions[1].errors.max() == 0.0
+        assert least <= scene.motions[0].errors.max() < 1e-6 + 100 * least
+    state = State(start.positions, start.velocities)
+    first = ImplicitEuler(system, h=ours.H).step(state).state.positions
+    np.testing.assert_allclose(found.positions[1], first, atol=0)
+
+
+def test_a_cloth_that_blows_up_is_shown_until_it_does(tmp_path):
+    mine = file(
+        tmp_path,
+        "bang.py",
+        """
+        def mass_spring_step(positions, velocities, h):
+            return {"positions": positions * 1e200, "velocities": velocities}
+        """,
+    )
+    yours = Yours([mine])
+    found = ours.fallen("newton")
+    positions = yours.falls(found, lambda *_: None)
+    yours.close()
+    assert np.isfinite(positions[1]).all()
+    assert np.isnan(positions[-1]).all()
+    text = motion.page(ours.cloth_scene(found, "newton", ("yours", positions)))
+    assert "NaN" not in text
+    assert "Infinity" not in text
+
+
+@pytest.mark.parametrize("suffix", ["svg", "gif", "html"])
+@pytest.mark.parametrize("scene", ["circle", "cloth"])
+def test_both_are_drawn_in_every_form(capsys, tmp_path, scene, suffix):
+    mine = file(tmp_path, "mine.py", STILL if scene == "cloth" else DOT)
+    path = tmp_path / f"{scene}.{suffix}"
+    assert show(capsys, scene, "--with", mine, "-o", path)[0] == 0
+    if suffix != "gif":
+        assert "mine.py" in path.read_text(encoding="utf-8")
+        return
+    from PIL import Image
+
+    with Image.open(path) as film:
+        assert film.width > 1.7 * film.height
+        first = film.convert("RGB").tobytes()
+        film.seek(film.n_frames - 1)
+        assert film.convert("RGB").tobytes() != first
+
+
+def test_without_a_scene_a_solver_is_shown_with_what_it_can(capsys, tmp_path):
+    mine = file(tmp_path, "my_cloth.py", STILL)
+    assert show(capsys, "--with", mine, "-o", "a.html")[:2] == (0, "a.html\n")
+    assert "motion-cloth" in (tmp_path / "a.html").read_text()
+
+
+def test_a_program_behind_two_dashes_is_a_solver(capsys, tmp_path):
+    program = file(
+        tmp_path,
+        "program.py",
+        """
+        import json, sys
+        for line in sys.stdin:
+            asked = json.loads(line)
+            if asked["task"] == "greeting":
+                answer = {"protocol": 1, "tasks": ["track"], "name": "The Dot"}
+            else:
+                answer = {"positions": [[p] * len(asked["parents"]) for p in asked["curve"]]}
+            print(json.dumps({"id": asked["id"], **answer}), flush=True)
+        """,
+    )
+    code, out, err = show(capsys, "heart", "-o", "dot.html", "--", sys.executable, program)
+    assert (code, err) == (0, "")
+    assert "The Dot beside Plumbob FABRIK" in (tmp_path / "dot.html").read_text()
+
+
+@pytest.mark.parametrize("options", [[], ["--coherent"], ["--solver", "ccd"]])
+def test_ours_alone_makes_a_page_of_one_arm(capsys, tmp_path, options):
+    assert show(capsys, "star", "-o", "star.html", *options)[0] == 0
+    assert (tmp_path / "star.html").read_text().count("<canvas") == 1
+    assert max(errors(tmp_path / "star.html")[0]) <= 1e-4
+
+
+FAULTS = {
+    "no such function": (
+        "def solve(x): return x",
+        ["circle"],
+        "expected functions named as some of forward_kinematics, inverse_kinematics",
+        "got solve",
+    ),
+    "a function of another task": (
+        "def forward_kinematics(parents): return 0",
+        ["circle"],
+        "expected a solver with a function track or inverse_kinematics for an arm",
+        "which has forward_kinematics; plumbob verify --list",
+    ),
+    "of no scene": (
+        "def forward_kinematics(parents): return 0",
+        [],
+        "track or inverse_kinematics or mass_spring_step or mass_spring_motion",
+        "which has forward_kinematics",
+    ),
+    "an arm for a cloth": (
+        "def track(curve): return curve",
+        ["cloth"],
+        "mass_spring_step or mass_spring_motion for a cloth",
+        "which has track",
+    ),
+    "it raises": (
+        "def inverse_kinematics(target): raise KeyError('oh')",
+        ["circle"],
+        "expected an answer to frame 1 of",
+        "It raised KeyError in line 1 of mine.py: 'oh'",
+    ),
+    "no pose": (
+        "def inverse_kinematics(target): return {'residual': 0.5}",
+        ["circle"],
+        "expected positions in the answer",
+        "got residual",
+    ),
+    "a syntax error": ("def f(:", ["circle"], "expected a solver, got", "SyntaxError in line 1"),
+    "no motions as bones": (
+        "def track(curve): return curve",
+        ["circle", "-o", "a.bvh"],
+        "suffix of the file: expected one of .gif, .svg, .html",
+        "'.bvh'",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_what_is_wrong_with_a_solver_is_said_in_a_sentence(capsys, tmp_path, name):
+    text, arguments, expected, got = FAULTS[name]
+    mine = file(tmp_path, "mine.py", text)
+    code, out, err = show(capsys, "--with", mine, *arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert expected in err
+    assert got in err
+
+
+def test_a_file_that_is_not_there_and_two_solvers_are_refused(capsys):
+    code, _, err = show(capsys, "circle", "--with", "gone.py")
+    assert code == 2
+    assert "gone.py, which does not exist" in err
+    code, _, err = show(capsys, "circle", "--with", "a.py", "--", "b")
+    assert (code, err) == (
+        2,
+        "plumbob: with: expected one solver, got --with and a program behind --\n",
+    )
