@@ -25,39 +25,42 @@ EXAMPLES = block(
 FORMATS = ("md", "tex", "csv", "html")
 
 
+Folder = Annotated[
+    Path | None, typer.Argument(metavar="[FOLDER]", help="Folder of records, else report.")
+]
+Target = Annotated[
+    Path | None,
+    typer.Option(
+        "--output", "-o", metavar="PATH", help="The folder as well; with --table, a file."
+    ),
+]
+Name = Annotated[str, typer.Option("--table", metavar="NAME", help="Print one table; see --list.")]
+Form = Annotated[str, typer.Option("--format", help=f"Of the table: {', '.join(FORMATS)}.")]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option("--columns", metavar="COLUMNS", help="Headings or numbers: 'solver, 3-5'."),
+]
+Rows = Annotated[
+    list[str] | None,
+    typer.Option("--rows", metavar="FILTER", help="solver=Newton, robot~UR, 'median<10' ..."),
+]
+Order = Annotated[str, typer.Option("--sort", metavar="COLUMN", help="The best or least first.")]
+Width = Annotated[
+    str, typer.Option("--width", help="Of LaTeX: column, page, or a length such as 120mm.")
+]
+Listing = Annotated[bool, typer.Option("--list", help="List tables; with --table, its columns.")]
+
+
 def report(  # noqa: PLR0913 -- one parameter an option
-    folder: Annotated[
-        Path | None, typer.Argument(metavar="[FOLDER]", help="Folder of records, else report.")
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", metavar="PATH", help="The folder as well; with --table, a file."
-        ),
-    ] = None,
-    name: Annotated[
-        str, typer.Option("--table", metavar="NAME", help="Print one table; see --list.")
-    ] = "",
-    form: Annotated[
-        str, typer.Option("--format", help=f"Of the table: {', '.join(FORMATS)}.")
-    ] = "md",
-    columns: Annotated[
-        list[str] | None,
-        typer.Option("--columns", metavar="COLUMNS", help="Headings or numbers: 'solver, 3-5'."),
-    ] = None,
-    rows: Annotated[
-        list[str] | None,
-        typer.Option("--rows", metavar="FILTER", help="solver=Newton, robot~UR, 'median<10' ..."),
-    ] = None,
-    order: Annotated[
-        str, typer.Option("--sort", metavar="COLUMN", help="The best or least first.")
-    ] = "",
-    width: Annotated[
-        str, typer.Option("--width", help="Of LaTeX: column, page, or a length such as 120mm.")
-    ] = "page",
-    names: Annotated[
-        bool, typer.Option("--list", help="List tables; with --table, its columns.")
-    ] = False,
+    folder: Folder = None,
+    output: Target = None,
+    name: Name = "",
+    form: Form = "md",
+    columns: Columns = None,
+    rows: Rows = None,
+    order: Order = "",
+    width: Width = "page",
+    names: Listing = False,
 ) -> int:
     """Write tables (Markdown, LaTeX, CSV), figures and one offline page from the records.
 

@@ -287,3 +287,30 @@ def test_parts_hold_every_column_once_and_those_that_name_a_row_always(needs, wi
     made = fitting.parts(1, needs, width, 2.0)
     assert [i for part in made for i in part[1:]] == list(range(1, len(needs)))
     assert all(part[0] == 0 for part in made)
+
+
+FAULTS = {
+    "scaled": r"\resizebox{40pt}{!}{a table that is far wider than this}",
+    "tiny": r"{\tiny small print}",
+    "narrow": r"\begin{tabular}{S[table-format=1.0]@{}S[table-format=1.0]@{}S[table-format=1.0]}"
+    r"1.23456789 & 1.23456789 & 1.23456789 \end{tabular}",
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_the_checks_of_a_document_notice_what_they_are_for(fault, tmp_path):
+    if not shutil.which("pdflatex") or not shutil.which("pdftotext"):
+        pytest.skip("pdflatex or pdftotext is not installed")
+    filler = "words " * 1200
+    made = document([], "page").replace(
+        r"\end{document}", rf"{filler} {FAULTS[fault]}\end{{document}}"
+    )
+    made = made.replace("{lmodern,", "{graphicx,lmodern,")
+    (tmp_path / "all.tex").write_text(made, encoding="utf-8")
+    command = ["pdflatex", "-halt-on-error", "-interaction=nonstopmode", "all.tex"]
+    subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=100, check=True)
+    laws = [test_no_text_is_smaller_than_eight_points, test_no_word_stands_upon_another]
+    with pytest.raises(AssertionError):
+        laws[fault == "narrow"](("", tmp_path / "all.pdf"))
+    if fault != "narrow":
+        test_no_word_stands_upon_another(("", tmp_path / "all.pdf"))
