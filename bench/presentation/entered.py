@@ -62,4 +62,5 @@ def entered(suite: str, task: str) -> Layout:
         "its own process, a program by the seconds of its answers, else by the round trip of a "
         "request: its remark says so.",
         summary=_summary,
+        optional=True,
     )

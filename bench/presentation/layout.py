@@ -31,6 +31,7 @@ class Layout:
         figures: what stands beside it.
         compared: rows whose first so many cells agree are compared with one another; 0: all are.
         ranked: whether a subject may be best in its group.
+        optional: whether nothing is missing where it is empty.
     """
 
     question: str
@@ -44,6 +45,7 @@ class Layout:
     figures: tuple[Figure, ...] = ()
     compared: int = 1
     ranked: Callable[[Any], bool] = lambda subject: True
+    optional: bool = False
 
     def __call__(self, results: Results) -> Table:
         """Return the table with a row for each subject."""

@@ -163,7 +163,8 @@ def _unmeasured(section: Section, shown: Shown) -> Unmeasured | None:
     questions: list[str] = []
     suites: dict[str, None] = {}
     for experiment in section.experiments:
-        empty = [layout for layout in offered(experiment) if not shown.tables[layout].rows]
+        wanted = [layout for layout in offered(experiment) if not layout.optional]
+        empty = [layout for layout in wanted if not shown.tables[layout].rows]
         questions += [layout.question for layout in empty]
         suites |= {experiment.suite: None} if empty else {}
     command = shlex.join(["plumbob", "bench", *suites])

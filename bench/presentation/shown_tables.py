@@ -15,12 +15,25 @@ from .tables import POWER, Cell, Column, Source, Summary, Table, best_cells, wor
 
 
 class Head(NamedTuple):
-    """The heading of a column: its classes, what is best in it, whether rows are filtered by it."""
+    """The heading of a column: its classes, what is best in it, whether rows are filtered by it.
+
+    What its title has from the heading of its group leads, and is not seen.
+    """
 
     column: Column
     classes: str
     best: str
     filter: bool
+
+    @property
+    def lead(self) -> str:
+        """What stands in the heading of its group already."""
+        return self.column.title.removesuffix(self.column.below) if self.column.group else ""
+
+    @property
+    def rest(self) -> str:
+        """What does not."""
+        return self.column.titled.removeprefix(self.lead)
 
 
 class Group(NamedTuple):

@@ -227,6 +227,12 @@ def raced(solver, kind, task="reachable", robot="arm", size=4, **changed):
                   facts=facts)  # fmt: skip
 
 
+def entrant(suite):
+    """What is on record of a solver that a user entered."""
+    facts = {"task": "its own", "entrant": True, "door": "mine.py", "digest": "0a1b2c"}
+    return record(suite, "mine", "mine", {"version": "1"}, {"residual": [0.0]}, facts=facts)
+
+
 def lacking(solver, kind, why, robot="all"):
     """A solver that is missing or cannot."""
     facts = {"task": "reachable", "title": "every robot"}
@@ -407,6 +413,7 @@ def records():
             for kind in ("one start", "restarts")
             for task in ("reachable", "unreachable")
         ),
+        *(entrant(suite) for suite in ("ik", "cloth")),
         *republished(),
         *(scaled(solver) for solver in ("supernodal", "cholespy")),
         compared("MuJoCo"),

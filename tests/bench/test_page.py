@@ -202,6 +202,7 @@ def test_a_key_sorts_and_escape_closes_a_menu(table):
     table.run(f"""document.querySelector('[id="{MAIN}"] .menu summary').focus()""")
     table.press("Enter", "\r")
     assert table.run("document.querySelectorAll('.menu[open]').length") == 1
+    table.run("document.querySelector('.menu[open] input').focus()")
     table.press("Escape")
     assert table.run("document.querySelectorAll('.menu[open]').length") == 0
     assert table.run("document.activeElement.tagName") == "SUMMARY"

@@ -124,7 +124,7 @@ def test_a_solver_that_no_figure_knows_is_drawn_all_the_same(tmp_path, records):
     known = ("ccd", "Pinocchio")
     new = [replace(r, solver="brand_new") for r in records if r.solver in known]
     result, page = written(tmp_path, [*records, *new])
-    assert "brand new" in "".join(page.text)
+    assert "brand_new" in "".join(page.text)
 
 
 def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
@@ -132,6 +132,13 @@ def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
     text = "".join(page.text)
     assert text.count("Not measured: ") == 4
     assert "Measured by plumbob bench timing cloth_scale first_call, at full length." in text
+
+
+def test_that_nobody_entered_a_solver_is_nothing_missing(tmp_path, records):
+    _, page = written(tmp_path, [record for record in records if record.solver != "mine"])
+    text = "".join(page.text)
+    assert "Which solvers of yours" not in text
+    assert "Not measured" not in text
 
 
 def test_what_is_missing_is_said(tmp_path, records):
