@@ -249,3 +249,11 @@ def test_a_drawing_from_a_folder_brings_no_script_and_no_address_into_the_page()
     shown = str(inline(Drawing("n", "t", "", nasty)))
     assert "<path" in shown
     assert not re.search("script|alert|foreign|example", shown)
+
+
+def test_a_grey_curve_of_one_point_is_seen():
+    names = [f"s{i}" for i in range(9)]
+    chart = Chart("n", "t", "", (Panel("", tuple(series(n, [1.0], [2.0]) for n in names)),), Axis())
+    lines = laid_out(chart).axes[0].get_lines()
+    assert len(lines) == len(names)
+    assert all(line.get_marker() not in ("none", "", None) for line in lines)
