@@ -171,7 +171,7 @@ def test_text_on_the_page_is_never_below_seven_points(records):
     narrowest = min(
         float(rem) for rem in re.findall(r"figure svg \{[^}]*min-width: ([\d.]+)rem", css)
     )
-    for figure in report.all_figures()[::2]:
+    for figure in report.all_figures()[::3]:
         svg = drawn(figure(Results(records))).svg
         width = float(re.search(r'viewBox="0 0 ([\d.]+)', svg)[1])
         sizes = [float(x) for x in re.findall(r"font(?:-size)?: [^;\"]*?([\d.]+)px", svg)]
@@ -203,11 +203,11 @@ def test_a_figure_is_drawn_again_only_if_it_shows_something_else(tmp_path, recor
 
 
 def test_a_pdf_has_its_fonts_and_its_text(records):
-    for figure in report.all_figures()[::2]:
+    for figure in report.all_figures()[::3]:
         made = drawn(figure(Results(records)))
         assert made.pdf.startswith(b"%PDF")
         assert b"/FontFile2" in made.pdf
-        assert b"/Subtype /Type3" not in made.pdf or made.name
+        assert b"/Type3" not in made.pdf
 
 
 def test_curves_of_different_lengths_are_no_curve():
