@@ -1,27 +1,34 @@
 """The blocks of entrants, and of everybody on the user's problems, in the suites that know them."""
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from reference import scenes
+from reference import IK_SOLVERS, scenes
 
 from ..experiments import chain, published
 from ..experiments.chain.measurement import (
     BEYOND_TOLERANCE,
     ENGINE_ITERATIONS,
+    MAX_ITERATIONS,
     TOLERANCE,
     Limits,
+    solve_targets,
+    solve_with_engine,
 )
-from ..experiments.chain.problem import STRATA, chain_targets, unit
+from ..experiments.chain.problem import STRATA, TargetsForSkeleton, chain_targets, unit
 from ..experiments.cloth_peers import measurement as cloth_peers
+from ..experiments.cloth_peers.problem import FallingCloth, own_cloth
 from ..experiments.published import problem as of_paper
 from ..experiments.robots import REACHABLE
 from ..experiments.robots import measurement as robots
-from ..experiments.robots.problem import ROBOTS, is_installed
+from ..experiments.robots.problem import ROBOTS, enter, is_installed
 from ..harness.block import Block, Measured, Scale
+from ..peers import registry
 from ..peers.registry import (
     AGAIN,
     EXPLICIT,
@@ -37,6 +44,7 @@ from . import robot
 from .chain import ChainProblem, solve_chain
 from .chain_job import TASK as CHAIN_TASK
 from .entrant import SUITE_TASKS, Entrant, Method
+from .problems import OwnProblem
 
 # Seconds that an entrant has for a stratum of the chain, for those of a scale.
 _CHAIN_BUDGET = 50.0
@@ -67,11 +75,80 @@ class EnteredCloth(ClothPeer):
 
 def blocks(suite: str, scale: Scale) -> Iterator[Block]:
     """Yield what a suite asks of each entrant."""
+    own = [problem for problem in scale.problems if problem.suite == suite]
+    for problem in own:
+        if problem.robot is not None:
+            enter(problem.robot)
+        yield from (_with_digest(block, problem) for block in _of_problem(problem, scale))
     for entrant in scale.entrants:
         if suite in SUITE_TASKS and entrant.offers(suite):
             of_suite = _of_kinematics if suite == "ik" else _of_cloths
             for block in of_suite(entrant, scale):
                 yield _marked(block, entrant)
+            for problem in own:
+                for block in _on_own(entrant, problem, scale):
+                    yield _with_digest(_marked(block, entrant), problem)
+
+
+def _with_digest(block: Block, problem: OwnProblem) -> Block:
+    """Return a block that is measured again once the problem is another."""
+    return replace(block, facts={**block.facts, "problem_digest": problem.digest})
+
+
+def _of_problem(problem: OwnProblem, scale: Scale) -> Iterator[Block]:
+    """Yield a user's problem for every solver that the bench knows."""
+    if problem.robot is not None:
+        for peer in registry.PEERS:
+            if peer.version:
+                yield from robots.blocks_of(peer, [problem.name], scale)
+    elif problem.targets is not None:
+        yield from _chain_of_all(problem, problem.targets)
+    elif problem.cloth is not None:
+        for one in registry.cloth_peers():
+            if one.version:
+                yield from _cloth_of(one, problem, scale)
+
+
+def _chain_of_all(problem: OwnProblem, targets: TargetsForSkeleton) -> Iterator[Block]:
+    name, facts, count = problem.recorded[0], _chain_facts(problem), len(targets.targets)
+    ours, theirs = Limits(TOLERANCE, MAX_ITERATIONS), Limits(TOLERANCE, ENGINE_ITERATIONS)
+    for solver in IK_SOLVERS:
+        measure = partial(solve_targets, targets, solver, ours, record=True)
+        yield Block("ik", name, solver, measure, ours._asdict(), count, facts)
+    for loop in registry.LOOPS:
+        measure = partial(solve_with_engine, targets, loop.engine, theirs)
+        yield Block("ik", name, loop.name, measure, theirs._asdict(), count, facts)
+
+
+def _chain_facts(problem: OwnProblem) -> dict[str, Any]:
+    return {"task": chain.CHAIN, "stratum": "yours", "title": problem.name}
+
+
+def _on_own(entrant: Entrant, problem: OwnProblem, scale: Scale) -> Iterator[Block]:
+    """Yield a user's problem for a user's solver."""
+    if problem.robot is not None and robot.TASK in entrant.tasks:
+        yield from robots.blocks_of(as_peer(entrant), [problem.name], scale)
+    if problem.cloth is not None:
+        yield from _cloth_of(as_cloth_peer(entrant), problem, scale)
+    if problem.targets is not None and CHAIN_TASK in entrant.tasks:
+        made, limits = problem.targets, Limits(TOLERANCE, ENGINE_ITERATIONS)
+        asked = ChainProblem(made.skeleton, made.starts, made.targets)
+        budget, name = _CHAIN_BUDGET * scale.seconds, problem.recorded[0]
+        known, count = (asked, limits, budget), len(made.targets)
+        for method in entrant.called():
+            measure = partial(solve_chain, entrant.spec, method.name, *known, followed=True)
+            facts, settings = _chain_facts(problem), limits._asdict()
+            yield Block("ik", name, method.solver, measure, settings, count, facts)
+
+
+def _cloth_of(peer: ClothPeer, problem: OwnProblem, scale: Scale) -> Iterator[Block]:
+    yield from cloth_peers.own_blocks(peer, problem, partial(_falling, problem), scale)
+
+
+@functools.lru_cache(maxsize=4)
+def _falling(problem: OwnProblem) -> FallingCloth:
+    assert problem.cloth is not None
+    return own_cloth(problem.name, *problem.cloth, problem.h)
 
 
 def joined(known: list[Block], suite: str, scale: Scale) -> list[Block]:

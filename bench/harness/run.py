@@ -221,6 +221,8 @@ def why_again(block: Block, present: Mapping[Key, Record], executor: Executor) -
         return "its settings are asked for again"
     if record.size < block.size:
         return f"a larger size ({record.size:g}, now {block.size:g})"
+    if record.facts.get("problem_digest") != block.facts.get("problem_digest"):
+        return f"{block.problem} is another problem now"
     before, digest = record.facts.get("digest", ""), block.facts.get("digest", "")
     if before != digest:
         return f"other sources of {block.solver} ({before or 'none'}, now {digest or 'none'})"

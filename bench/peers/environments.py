@@ -14,11 +14,11 @@ def python(name: str) -> Path:
     return _folder(name) / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
 
 
-def version(name: str, package: str) -> str:
-    """Return the version of a package in a peer's environment, "" if it is not there."""
+def distribution(name: str, package: str) -> importlib.metadata.Distribution | None:
+    """Return a package in a peer's environment, or in ours if its name is "", None if it lacks."""
     places = [str(path) for path in _folder(name).glob("lib/python*/site-packages")]
-    found = importlib.metadata.distributions(name=package, path=places)
-    return next((distribution.version for distribution in found), "")
+    found = importlib.metadata.distributions(name=package, path=places if name else sys.path)
+    return next(iter(found), None)
 
 
 def _folder(name: str) -> Path:

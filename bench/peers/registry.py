@@ -183,11 +183,14 @@ class Peer(NamedTuple):
     environment: str = ""
 
     @property
+    def distribution(self) -> importlib.metadata.Distribution | None:
+        """The package where it is installed, None if it is not."""
+        return environments.distribution(self.environment, self.package)
+
+    @property
     def version(self) -> str:
         """The version that is installed, "" if none is."""
-        if self.environment:
-            return environments.version(self.environment, self.package)
-        return _version(self.package)
+        return self.distribution.version if self.distribution else ""
 
     def called(self, entry: Entry) -> str:
         """Return how an entry is written."""
@@ -235,10 +238,10 @@ DRAKE = _peer(
     Entry(ONE_START, {"solver": "IPOPT"}, note="IPOPT"),
     Entry(RESTARTS, {}, AGAIN, f"SNOPT, {AGAIN} restarts"),
 )
-# PyBullet's null space keeps the limits better than it reaches targets.
 PYBULLET = _peer(
     *("PyBullet", "pybullet", "pybullet", "Zlib"),
-    f"{_CHAINS}, either accurate or mindful of limits; makes no claims",
+    "poses of one chain of hinges; limits only as a pull in the null space, with which it hardly "
+    "arrives and oversteps them all the same; makes no claims",
     Entry(ONE_START, note="limits left out"),
     Entry(ONE_START, {"limits": True}, note="limits in the null space"),
     Entry(RESTARTS, {"check": True}, AGAIN, f"{AGAIN} restarts, its pose looked at"),
@@ -248,6 +251,7 @@ TORCH = _peer(
     Entry(ONE_START),
     Entry(RESTARTS, {"attempts": AGAIN + 1}, note=f"{AGAIN} restarts, all at once"),
 )
+DART = _peer("DART", "dart", "dartpy", "BSD-2-Clause", _CHAINS, *_either(100))
 PLACO = _peer("PlaCo", "placo", "placo", "MIT", _CHAINS, *_either(50))._replace(environment="placo")
 PEERS = (
     OURS,
@@ -262,11 +266,17 @@ PEERS = (
     _peer("ikpy", "ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims", Entry(ONE_START)),
     _peer("EAIK", "eaik", "eaik", "BSD-3-Clause", _SIX, _EVERY_SOLUTION),
     DRAKE,
-    _peer("DART", "dart", "dartpy", "BSD-2-Clause", _CHAINS, *_either(100)),
+    DART,
     PLACO,
     PYBULLET,
     TORCH,
 )
+# Those whose kinematics is compared with ours, with what is to be known of it.
+KINEMATICS = (DRAKE, DART, PYBULLET, TORCH)
+SINGLE_PRECISION = {
+    PYBULLET.title: "reads the file, and gives poses, in single precision",
+    TORCH.title: "reads the file in single precision",
+}
 
 
 # Peers for cloths: what distinguishes the settings that each is tried with.

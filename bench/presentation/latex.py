@@ -24,7 +24,7 @@ NARROWEST = 160.0
 SIZES = (10, 9, 8)
 # More rows than these stand in a table that may break over pages, and so does what is higher [pt].
 MOST_ROWS = 40
-_HIGHEST = 540.0
+_HIGHEST = 545.0
 # Letters of a name, of which a paper needs no more.
 _LONGEST = 200
 # Half of what is between two columns [pt].
@@ -75,7 +75,8 @@ def latex(table: Table, width: str = "page") -> str:
     columns = [_Typeset(table, j, best) for j in range(len(table.columns))]
     size, numbers = _size(table, columns, page.width)
     made = _parts(table, [columns[j] for j in numbers], page.width, size)
-    is_long = len(table.rows) > MOST_ROWS or sum(part.height for part in made) > _HIGHEST
+    caption = _caption_height(table, page)
+    is_long = len(table.rows) > MOST_ROWS or caption + sum(p.height for p in made) > _HIGHEST
     about = [_PACKAGES, *_comments(table, len(numbers))]
     body = _long(table, made, page, size) if is_long else _float(table, made, page, size)
     return "\n".join([*about, *body, ""])
@@ -374,14 +375,26 @@ def _setting(size: int) -> list[str]:
 
 def _caption(table: Table, page: Paper, ordinal: str = "") -> str:
     """Return caption and label: set-up, samples, machine and versions."""
-    title = shortened(table.title, _LONGEST)
-    sentences = [f"{title}{ordinal}.", shortened(table.measured, 6 * _LONGEST)]
-    if best_cells(table):
-        sentences.append("Best in bold, ties too.")
-    if table.provenance:
-        sentences.append(f"{shortened(table.provenance, 3 * _LONGEST)}.")
-    text = breakable(" ".join(filter(None, sentences)), _narrowest_line(page))
-    return rf"\caption[{{{escaped(title)}}}]{{{text}}}\label{{tab:{_label(table.name)}}}"
+    title = escaped(shortened(table.title, _LONGEST))
+    text = breakable(_said(table, ordinal), _narrowest_line(page))
+    return rf"\caption[{{{title}}}]{{{text}}}\label{{tab:{_label(table.name)}}}"
+
+
+def _said(table: Table, ordinal: str = "") -> str:
+    """Return what the caption says."""
+    sentences = [
+        f"{shortened(table.title, _LONGEST)}{ordinal}.",
+        shortened(table.measured, 6 * _LONGEST),
+        "Best in bold, ties too." if best_cells(table) else "",
+        f"{shortened(table.provenance, 3 * _LONGEST)}." if table.provenance else "",
+    ]
+    return " ".join(filter(None, sentences))
+
+
+def _caption_height(table: Table, page: Paper) -> float:
+    """Return roughly how high the caption is [pt], in letters of the largest size."""
+    lines = 1 + 1.1 * SIZES[0] * wide(_said(table)) / page.width
+    return _LEAD * SIZES[0] * lines
 
 
 def _narrowest_line(page: Paper) -> float:

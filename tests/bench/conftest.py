@@ -250,6 +250,14 @@ def compared(engine, cause=""):
                   facts={"title": "arm"})  # fmt: skip
 
 
+def read_by_a_peer(engine):
+    """One robot of the bench in the engine of a peer."""
+    notes, facts = {"remark": ""}, {"task": "peers", "title": "the arm"}
+    settings = {"configurations": 100, "version": "1.2"}
+    arrays = {"positions": 3e-8, "rotations": 2e-7}
+    return record("robot_models", "peers/arm", engine, settings, arrays, notes=notes, facts=facts)
+
+
 def scaled(solver):
     """A cloth of a thousand particles: factored by one library, and stepped if by ours."""
     settings = {"particles": 1024, "iterations": 10, "stiffness": 1000.0, "h": 0.02}
@@ -359,6 +367,8 @@ def make():
     """The makers of records, by name."""
     return SimpleNamespace(
         record=record,
+        read_by_a_peer=read_by_a_peer,
+        compared=compared,
         drawn=drawn,
         followed=followed,
         drifted=drifted,
@@ -418,6 +428,7 @@ def records():
         *(scaled(solver) for solver in ("supernodal", "cholespy")),
         compared("MuJoCo"),
         compared("Pinocchio", "it forgets the hand"),
+        read_by_a_peer("PyBullet"),
         *(worked(solver) for solver in ("Plumbob Newton", "MuJoCo Euler")),
         fell("Plumbob Newton"),
         needed("newton", [1, 2, 3, 4, 5, 6, 7, np.nan]),

@@ -19,6 +19,7 @@ from bench.experiments.cloth_peers.problem import (
     hanging_cloth,
     highest_frequency,
     highest_mode,
+    level_cloth,
 )
 from bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, true_motion
 from bench.harness import metrics
@@ -271,6 +272,47 @@ def test_by_itself_newton_gives_springs_one_colour(cloth):
     newton_model = pytest.importorskip("bench.peers.cloth.newton_model", exc_type=ImportError)
     model = newton_model.model(cloth.system, own_colours=True)
     assert len(model.particle_color_groups) == 1
+
+
+@pytest.mark.parametrize("size", [3, 6])
+def test_bullets_mesh_has_the_springs_for_edges_and_no_corners_in_line(size):
+    bullet = pytest.importorskip("bench.peers.cloth.pybullet_deformable", exc_type=ImportError)
+    system, _ = level_cloth(size, STIFFNESS)
+    flat, triangles = bullet.mesh(system)
+    ends = np.diff(flat[system.springs], axis=1)[:, 0]
+    np.testing.assert_allclose(np.linalg.norm(ends, axis=-1), system.rest_lengths)
+    a, b, c = np.moveaxis(flat[triangles], 1, 0)
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=-1).min() > 1e-3
+
+
+@pytest.mark.parametrize("change", ["masses", "stiffnesses", "rest_lengths", "dampings"])
+def test_bullet_refuses_what_it_cannot_move(change):
+    bullet = pytest.importorskip("bench.peers.cloth.pybullet_deformable", exc_type=ImportError)
+    system, _ = level_cloth(4, STIFFNESS)
+    values = getattr(system, change).copy()
+    values[-1] += 0.1
+    with pytest.raises(ValueError, match="system: expected"):
+        bullet.prepare(system.replaced(**{change: values}), FRAME)
+    with pytest.raises(ValueError, match="square cloth"):
+        bullet.prepare(one_spring().system, FRAME)
+
+
+def test_bullet_goes_where_symplectic_euler_goes_whatever_was_before(cloth):
+    """A cloth whose spacing is no binary fraction; before, it was thrown until it blew up."""
+    bullet = pytest.importorskip("bench.peers.cloth.pybullet_deformable", exc_type=ImportError)
+    system, level = level_cloth(6, STIFFNESS)
+    thrown = State(level.positions, 50.0 * np.ones_like(level.positions))
+    mover = bullet.prepare(system, 3.0)
+    mover.begin(thrown)
+    for _ in range(50):
+        mover.advance()
+    state = State(level.positions, system.free[:, None] * np.array([0.3, -0.2, 0.1]))
+    mover = bullet.prepare(system, FRAME, substeps=8)
+    mover.begin(state)
+    mover.advance()
+    for _ in range(8):
+        state = symplectic_euler(system, state, FRAME / 8)
+    np.testing.assert_allclose(mover.positions(), state.positions, atol=1e-10)
 
 
 def test_every_entry_has_a_name_and_every_rung_a_label_of_its_own():

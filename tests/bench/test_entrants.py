@@ -20,8 +20,19 @@ from crosscheck.conformance.doors import open_contestant
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
 IK, CLOTH, PROBLEMS = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
 FACTS = {"task": "chain", "stratum": "near", "entrant": True}
-CHAIN = {"residual": [0.0], "iterations": [1], "history_low": [1.0], "history_median": [1.0]}
-CHAIN |= {"history_high": [1.0], "bend": [0.0], "reach": 1.0, "excess": [0.0], "distance": [1.0]}
+CHAIN = {
+    "residual": [0.0],
+    "iterations": [1],
+    "history_low": [1.0, 0.1],
+    "history_median": [1.0, 0.1],
+}
+CHAIN |= {
+    "history_high": [1.0, 0.1],
+    "bend": [0.0],
+    "reach": 1.0,
+    "excess": [0.0],
+    "distance": [1.0],
+}
 SMALL = ["--quick", "--targets", "2", "--problem", "chain/near"]
 EXPLICIT = ("--solver", "My symplectic Euler", "--solver", "Plumbob symplectic Euler")
 
@@ -47,6 +58,12 @@ def records(solver=None):
 
 def cells(table):
     return [str(cell) for row in table.rows for cell in row]
+
+
+def test_the_solvers_of_the_readme_are_those_of_the_page():
+    readme = PAGE.parents[1].joinpath("README.md").read_text("utf-8")
+    assert IK in readme
+    assert CLOTH in readme
 
 
 @pytest.mark.parametrize("code", [IK, CLOTH], ids=["ik", "cloth"])
@@ -405,3 +422,125 @@ def test_what_there_is_is_listed(folder, capsys):
     told = capsys.readouterr().out
     for name in ("chain/near", "robots/ur5", "ccd", "My FABRIK", "Levenberg-Marquardt"):
         assert name in told
+
+
+def test_problems_of_a_python_file_stand_in_the_same_tables(folder):
+    (folder / "my_problems.py").write_text(PROBLEMS, encoding="utf-8")
+    words = ("--problem", "my_problems.py", "--with", "my_ik.py", "--solver", "My FABRIK")
+    assert bench("ik", "--quick", *words, "--solver", "ccd") == 0
+    assert {(r.problem, r.solver) for r in records()} == {
+        ("chain/tentacle", "ccd"), ("chain/tentacle", "My FABRIK"),
+    }  # fmt: skip
+    made = {table.name: table for table in tables(Results(records()), ["ik"])}
+    assert [row[0] for row in made["accuracy"].rows] == ["tentacle", "tentacle"]
+    assert all((r.arrays["residual"] <= 1e-4).mean() > 0.5 for r in records())
+    (folder / "my_problems.py").write_text(PROBLEMS.replace("0.3, 0.3", "0.2, 0.2"))
+    assert "tentacle is another problem now" in dry(folder, *words)
+
+
+def dry(folder, *words):
+    from bench.commands.bench import Asked, _choice
+    from bench.entrants import outlook
+
+    given = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--problem"]
+    entered = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--with"]
+    choice = _choice(["ik"], "quick", Asked(entered, problems=given))
+    return "\n".join(outlook.dry_run(["ik"], choice, folder / "out"))
+
+
+def test_a_cloth_of_a_python_file_stands_in_the_same_tables(folder):
+    (folder / "my_problems.py").write_text(PROBLEMS, encoding="utf-8")
+    words = ("--problem", "my_problems.py", "--with", "my_cloth.py", "--solver")
+    assert (
+        bench("cloth", "--quick", *words, "My symplectic Euler", "--solver", "Plumbob Newton") == 0
+    )
+    made = {table.name: table for table in tables(Results(records()), ["cloth"])}
+    rows = [row[:2] for row in made["cloth_peers_step"].rows]
+    assert set(rows) == {("hammock", "My symplectic Euler"), ("hammock", "Plumbob Newton")}
+    assert "hammock" in drawn(cloth_figures.one_step(Results(records()))).svg
+
+
+OBJ = "".join(f"v {x} 0 {z}\n" for z in range(3) for x in range(3))
+OBJ += "".join(f"f {i} {i + 1} {i + 4} {i + 3}\n" for i in (1, 2, 4, 5))
+
+
+@pytest.mark.parametrize(
+    ("rule", "pinned"), [(None, [0, 8]), ("0,2", [0, 2]), ("top", [*range(9)])]
+)
+def test_an_obj_becomes_a_cloth_with_pins_by_a_rule(folder, rule, pinned):
+    from bench.entrants import models
+
+    (folder / "mesh.obj").write_text(OBJ)
+    system, state = models.cloth(folder / "mesh.obj", rule)
+    assert system.pinned.tolist() == pinned
+    assert len(system.springs) == 16
+    assert system.masses.sum() == pytest.approx(1.0)
+    np.testing.assert_array_equal(state.velocities, 0.0)
+
+
+URDF = """<robot name="r"><link name="b"/><link name="l1"/><link name="l2"/><link name="t"/>
+<joint name="j1" type="revolute"><parent link="b"/><child link="l1"/>
+<origin xyz="0 0 .3" rpy=".1 .2 .3"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+<joint name="j2" type="continuous"><parent link="l1"/><child link="l2"/><origin xyz=".4 0 0"/>
+<axis xyz="0 1 0"/></joint>
+<joint name="j3" type="fixed"><parent link="l2"/><child link="t"/>
+<origin xyz=".3 0 .1" rpy="1 0 0"/></joint></robot>"""
+
+
+def test_a_urdf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
+    from bench.entrants import models
+    from bench.experiments.robots.evaluate import Evaluator
+    from reference import forward_kinematics
+    from reference.formats import urdf
+
+    path = folder / "mine.urdf"
+    path.write_text(URDF)
+    robot = models.robot(path, "mine", None)
+    assert robot.lower.tolist() == [-2.0, -2.0 * np.pi]
+    q = np.array([0.4, -0.9])
+    found, turned = Evaluator(robot).forward(q)
+    model = urdf.read(path).articulation
+    full = np.zeros(model.coordinate_count)
+    full[[model.coordinates_of(j).start for j in (1, 2)]] = q
+    expected = forward_kinematics(model, full)
+    np.testing.assert_allclose(found[0], expected.positions[-1], atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_folder_of_models_is_measured_by_ours_and_by_entrants(folder):
+    (folder / "models").mkdir()
+    (folder / "models" / "mine.urdf").write_text(URDF)
+    (folder / "models" / "readme.txt").write_text("nothing")
+    (folder / "robot.py").write_text(ROBOT)
+    bench("ik", "--quick", "--targets", "10", "--problem", "models", "--with", "robot.py",
+          "--solver", "Mine", "--solver", "Plumbob LM")  # fmt: skip
+    found = {(one.problem, one.solver): one for one in records()}
+    for solver in ("Mine", "Plumbob LM"):
+        assert found["robots/mine", solver].arrays["solved"].size == 6
+        assert found["unreachable/mine", solver].arrays["solved"].sum() == 0
+    assert found["robots/mine", "Plumbob LM"].arrays["solved"].any()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("bad.py", "def f(:", "SyntaxError"),
+        ("empty.py", "x = 1", "expected functions without arguments or PROBLEMS, got none"),
+        ("raises.py", "def f():\n    raise OSError('gone')", "OSError: gone"),
+        ("lacks.py", "def f():\n    return {'parents': [-1]}", "f: lacks 'offsets'"),
+        ("odd.py", "PROBLEMS = [{'colour': 1}]", "got 'colour'"),
+        ("shape.py", "PROBLEMS = [{'parents': [-1, 0], 'offsets': [[0, 0, 0], [1, 0, 0]], "
+                     "'targets': [1, 2]}]", "targets: expected finite numbers (target, 3)"),
+        ("bad.urdf", "<robot>", "bad.urdf"),
+        ("other.xml", "<html/>", "other XML"),
+        ("bad.obj", "f 1 2 3", "bad.obj"),
+    ],
+)  # fmt: skip
+def test_a_problem_that_is_none_is_refused_in_one_sentence(folder, capsys, name, text, said):
+    (folder / name).write_text(text)
+    suite = "cloth" if name.endswith("obj") else "ik"
+    assert bench(suite, "--quick", "--problem", name) == 2
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("\n") == 1

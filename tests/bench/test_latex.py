@@ -103,14 +103,14 @@ def compiled(request, every_table, tmp_path_factory):
     run = subprocess.run(command, cwd=folder, capture_output=True, timeout=300)
     log = (folder / "all.log").read_text(encoding="utf-8", errors="replace")
     assert run.returncode == 0, [line for line in log.splitlines() if line.startswith("!")]
-    return log, (folder / "all.pdf").read_bytes()
+    return log, folder / "all.pdf"
 
 
 def test_all_tables_compile_and_none_sticks_out(compiled):
     log, _ = compiled
     wide = [float(points) for points in re.findall(r"Overfull .hbox \(([\d.]+)pt", log)]
     assert max(wide, default=0.0) <= OVERFULL
-    assert "Float too large" not in log
+    assert "too large for page" not in log
     assert not re.findall(r"Overfull .vbox.*", log)
 
 
@@ -120,13 +120,35 @@ def test_no_text_is_smaller_than_eight_points(compiled):
     pdfTeX writes `/F8 7.9701 Tf` for 8 points; scaling by \\resizebox would leave this and write a
     matrix `x 0 0 x 0 0 cm` around it.
     """
-    _, pdf = compiled
+    pdf = compiled[1].read_bytes()
     sizes = [72.27 / 72 * float(size) for size in re.findall(rb"/F\d+ ([\d.]+) Tf", pdf)]
     assert len(sizes) > 1000
     assert min(sizes) > 7.999
     scaled = set(re.findall(rb"([-\d.]+) [-\d.]+ [-\d.]+ ([-\d.]+) [-\d.]+ [-\d.]+ cm", pdf))
     assert scaled <= {(b"1", b"1")}
     assert not re.search(rb" T[zs]\b", pdf)
+
+
+WORD = re.compile(
+    r'xMin="([-\d.]+)" yMin="([-\d.]+)" xMax="([-\d.]+)" yMax="([-\d.]+)">(.*?)</word>'
+)
+
+
+def test_no_word_stands_upon_another(compiled):
+    """siunitx lets numbers stick out of a column without a word: no boxes overlap by a point."""
+    if not shutil.which("pdftotext"):
+        pytest.skip("pdftotext is not installed")
+    command = ["pdftotext", "-bbox", str(compiled[1]), "-"]
+    text = subprocess.run(command, capture_output=True, timeout=60, check=True).stdout.decode()
+    for page in text.split("<page ")[1:]:
+        found = [(*map(float, w[:4]), w[4]) for w in WORD.findall(page)]
+        found.sort(key=lambda w: w[1])
+        for i, (left, top, right, bottom, word) in enumerate(found):
+            for x, y, to, down, other in found[i + 1 :]:
+                if y > bottom:
+                    break
+                upon = min(right, to) - max(left, x) > 1 and min(bottom, down) - max(top, y) > 4
+                assert not upon, (word, other)
 
 
 @pytest.mark.parametrize("width", ["page", "column", "120mm", "7in"])

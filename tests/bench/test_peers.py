@@ -1,18 +1,20 @@
 """The adapters: each engine, where it is installed, finds poses that are evaluated as solved."""
 
 import importlib
-import importlib.metadata
+import sys
 
 import numpy as np
 import pytest
 
+from bench.experiments.robots import LIMIT_TOLERANCE
 from bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
 from bench.experiments.robots.job import Job
 from bench.experiments.robots.problem import CHARACTER, is_installed, robot
 from bench.experiments.robots.targets import robot_targets, uniform_targets, unreachable_targets
 from bench.harness.worker import Solved
-from bench.peers.ik.protocol import UnableError
-from bench.peers.registry import ONE_START, OURS, PEERS, RESTARTS
+from bench.peers.ik.protocol import SolverOutput, UnableError
+from bench.peers.ik.restarts import restarted
+from bench.peers.registry import ONE_START, OURS, PEERS, PLACO, RESTARTS
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several effectors.
@@ -105,14 +107,82 @@ def test_ours_finds_every_target_of_every_stratum():
 
 
 def test_the_registry_says_what_the_packages_say(peer):
-    metadata = importlib.metadata.metadata(peer.package)
+    metadata = peer.distribution.metadata
     expression = metadata.get("License-Expression", "")
     said = " ".join(
         [expression, metadata.get("License", ""), *(metadata.get_all("Classifier") or [])]
     )
-    words = {"Apache-2.0": "Apache", "BSD-3-Clause": "BSD", "MIT": "MIT"}
+    word = peer.license.partition("-")[0].lower()
     if "icense" in said or expression:
-        assert words[peer.license] in said
+        assert word in said.lower()
+
+
+def claims_and_answers(peer, entry, name, targets):
+    solved, _ = answers(peer, entry, name, targets)
+    return [(one.claimed, one.q.tobytes()) for one in solved]
+
+
+def test_the_answer_to_a_target_is_the_same_again_and_in_another_order(peer, arm):
+    """TRAC-IK goes by the clock, in two threads; the toolbox draws from a generator of all C code,
+    which the bench seeds by the number of the target.
+    """
+    if module(peer) == "trac_ik":
+        pytest.skip("its answers depend on the clock")
+    targets = uniform_targets(arm, FEW, False)
+    backwards = Targets(*(part[::-1] for part in targets))
+    for entry in peer.entries:
+        there = claims_and_answers(peer, entry, arm, targets)
+        assert claims_and_answers(peer, entry, arm, targets) == there
+        if module(peer) != "toolbox":
+            assert claims_and_answers(peer, entry, arm, backwards)[::-1] == there
+
+
+# Those that do not look at limits, and those whose limits are a wish.
+UNLIMITED = {"closed_loop", "pybullet"}
+
+
+def test_limits_are_kept_by_those_that_say_so(peer, arm):
+    if module(peer) in UNLIMITED:
+        assert "limits" in peer.can.partition(";")[2] + peer.can.partition(",")[2]
+        pytest.skip("its line in the registry says that it does not keep limits")
+    for entry in peer.entries:
+        _, verdict = answers(peer, entry, arm, uniform_targets(arm, FEW, False))
+        beyond = verdict.beyond[np.isfinite(verdict.beyond)]
+        assert (beyond <= LIMIT_TOLERANCE).all(), peer.called(entry)
+
+
+@pytest.mark.parametrize("version", ["", "0.10.2"])
+def test_a_peer_in_an_environment_of_its_own_is_found_there(tmp_path, monkeypatch, version):
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    if version:
+        place = tmp_path / "peers" / "placo" / "lib" / "python3.11" / "site-packages"
+        facts = place / f"placo-{version}.dist-info" / "METADATA"
+        facts.parent.mkdir(parents=True)
+        facts.write_text(f"Metadata-Version: 2.1\nName: placo\nVersion: {version}\n")
+    assert PLACO.version == version
+
+
+def measuring(seconds):
+    """A solver that claims its third attempt, and says how long each of them took."""
+    attempts = []
+
+    def ask(positions, rotations, start):
+        def solve():
+            attempts.append(start)
+            return SolverOutput(start, len(attempts) == 3, seconds)
+
+        return solve
+
+    return ask
+
+
+@pytest.mark.parametrize(("each", "together"), [(None, None), (0.25, 0.75)])
+def test_times_that_a_solver_measures_are_added_over_its_restarts(each, together):
+    arm = robot("iiwa14")
+    nowhere = np.zeros((1, 3)), np.eye(3)[None], arm.draw(np.random.default_rng(0), 1)[0]
+    answer = restarted(measuring(each), arm, 5)(*nowhere)()
+    assert answer.claimed
+    assert answer.seconds == together
 
 
 def test_every_entry_has_a_name_of_its_own_within_its_kind():

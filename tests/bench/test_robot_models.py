@@ -3,7 +3,10 @@
 import pytest
 
 from bench.experiments.robot_models.measurement import compare
-from bench.experiments.robot_models.tables import agreement
+from bench.experiments.robot_models.peers import beside, differences
+from bench.experiments.robot_models.tables import agreement, peers_kinematics
+from bench.experiments.robots.problem import ALL, CHARACTER, is_installed
+from bench.peers.registry import DRAKE, KINEMATICS, SINGLE_PRECISION
 from bench.presentation.results import Results
 from crosscheck.engines import ROBOT_ENGINES
 from crosscheck.robots.models import Model
@@ -77,3 +80,34 @@ def test_an_engine_with_a_known_cause_is_left_out_of_the_numbers(compared):
     assert column(table, "engines") == ["MuJoCo"]
     assert column(table, "but") == ["Pinocchio is off by 0.250: something is not read"]
     assert table.summary.points[0].endswith("1 of them otherwise than MuJoCo's documentation says")
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("peer", KINEMATICS, ids=lambda peer: peer.title)
+def test_the_engine_of_a_peer_puts_effectors_where_we_do(peer, name):
+    """Ten rotations in a row round to 1e-15; single precision rounds a metre to 6e-8 each."""
+    if not peer.version or not is_installed(name):
+        pytest.skip(f"{peer.package} or the robot is not installed")
+    if name == CHARACTER and peer is not DRAKE:
+        pytest.skip("takes chains only")
+    apart = differences(peer.module, name)
+    most = 1e-6 if peer.title in SINGLE_PRECISION else 1e-14
+    assert all(0.0 < value < most for value in apart.values())
+
+
+def test_what_an_engine_does_not_take_is_said_and_what_it_rounds_too(make):
+    peer = next((peer for peer in KINEMATICS if peer.version and peer is not DRAKE), None)
+    if peer is None:
+        pytest.skip("none of the engines is installed")
+    measured = beside(peer, CHARACTER)
+    assert measured.notes["remark"].endswith("takes one chain of hinges only")
+    assert not measured.arrays
+
+
+def test_the_table_of_peers_shows_differences_and_why(make):
+    results = Results([make.read_by_a_peer("PyBullet"), make.compared("MuJoCo")])
+    table = peers_kinematics(results)
+    (row,) = table.rows
+    assert row == ("the arm", "PyBullet", "1.2", 3e-8, 2e-7, SINGLE_PRECISION["PyBullet"])
+    assert "PyBullet" in table.summary.points[0]
+    assert len(agreement(results).rows) == 1

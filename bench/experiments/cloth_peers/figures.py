@@ -22,13 +22,18 @@ def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str
         found = [p for p in points(results, task) if _can_be_drawn(p, error)]
         if not found:
             return None
-        stiffnesses = sorted({p.stiffness for p in found})
-        sizes = sorted({p.particles for p in found})
+        ours = [p for p in found if not p.own]
+        stiffnesses = sorted({p.stiffness for p in ours})
+        sizes = sorted({p.particles for p in ours})
         panels = tuple(
             Panel(f"{size} × {size}, {stiffness:,.0f} N/m", _curves(here, error))
             for size in sizes
             for stiffness in stiffnesses
-            for here in [[p for p in found if (p.particles, p.stiffness) == (size, stiffness)]]
+            for here in [[p for p in ours if (p.particles, p.stiffness) == (size, stiffness)]]
+        )
+        panels += tuple(
+            Panel(name, _curves([p for p in found if p.own == name], error))
+            for name in dict.fromkeys(p.own for p in found if p.own)
         )
         return chart_sketch(
             Chart(
@@ -38,7 +43,7 @@ def work_precision(name: str, task: str, error: str, titles: tuple[str, str, str
                 panels,
                 Axis("time for a frame [ms]", log=True),
                 Axis(titles[1], log=True),
-                columns=len(stiffnesses),
+                columns=len(stiffnesses) or len(panels),
                 entrants=results.entrants,
             )
         )

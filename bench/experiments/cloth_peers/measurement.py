@@ -5,9 +5,9 @@ and against the motion itself.
 """
 
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -31,7 +31,10 @@ from .problem import (
     hanging_cloth,
     highest_mode,
 )
-from .truth import ClothTruth, cloth_truth, implicit_motion
+from .truth import ClothTruth, cloth_truth, implicit_motion, truth_of
+
+if TYPE_CHECKING:
+    from ...entrants.problems import OwnProblem
 
 SUITE = "cloth"
 # One step is timed so often, but for no more than a twentieth of its ladder's time.
@@ -117,6 +120,22 @@ def blocks_of(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
         yield Block(SUITE, "peers/stability", peer.title, found, settings, len(hung), facts)
 
 
+def own_blocks(
+    peer: ClothPeer, problem: "OwnProblem", cloth: Callable[[], FallingCloth], scale: Scale
+) -> Iterator[Block]:
+    """Yield one step and a motion of a user's cloth."""
+    assert problem.cloth is not None
+    system, _ = problem.cloth
+    level = levels(scale)[0]._replace(size=system.particle_count)
+    stiffness = float(system.stiffnesses.mean())
+    settings = {"stiffness": stiffness, "frame": problem.h, "version": peer.version}
+    calls = ((ONE_STEP, one_step_on), (MOTION, motion_on))
+    for name, (task, measure) in zip(problem.recorded, calls, strict=True):
+        facts = {"task": task, "cloth": problem.name}
+        call = partial(measure, peer, [Fall(level, cloth)])
+        yield Block(SUITE, name, peer.title, call, settings, level.size, facts)
+
+
 def not_installed(package: str) -> Measured:
     """Return a block without numbers that says what is missing."""
     return Measured({}, {"remark": f"{package} is not installed"})
@@ -127,13 +146,18 @@ def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Mea
 
     A ladder that has used its time, or has arrived, is climbed no further.
     """
+    return one_step_on(peer, [Fall(level, stiffness) for level in sizes])
+
+
+def one_step_on(peer: ClothPeer, falls: Sequence["Fall"]) -> Measured:
+    """Take the same step of some cloths with ever more work; see `one_step`."""
     rows: list[Row] = []
     remarks: list[Remark] = []
-    for level in sizes:
-        cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
+    for fall in falls:
+        level, cloth, truth = fall.level, fall.cloth, fall.truth
         spent = 0.0
-        for rung in step_rungs(peer, cloth.frequency):
-            shape = Shape(1, _REPEATS, _REPEATING * level.budget)
+        for rung in step_rungs(peer, cloth.beat):
+            shape = Shape(1, _REPEATS, _REPEATING * level.budget, cloth.frame)
             outcome = _tried(job(peer.module, cloth, rung.settings, shape))
             remarks += _remarks(level, rung, outcome)
             if not outcome.solved:
@@ -185,30 +209,59 @@ def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
 
 def motion(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measured:
     """Move on frame after frame; keep the distances from implicit Euler and from the truth."""
+    return motion_on(peer, [Fall(level, stiffness) for level in sizes])
+
+
+def motion_on(peer: ClothPeer, falls: Sequence["Fall"]) -> Measured:
+    """Move some cloths on frame after frame; see `motion`."""
     rows: list[Row] = []
     remarks: list[Remark] = []
-    for level in sizes:
-        cloth, truth = falling_cloth(level.size, stiffness), _truth(level, stiffness)
-        for rung in motion_rungs(peer, cloth.frequency):
-            shape = Shape(level.frames, 1, level.budget)
+    for fall in falls:
+        level, cloth, truth = fall.level, fall.cloth, fall.truth
+        for rung in motion_rungs(peer, cloth.beat):
+            shape = Shape(level.frames, 1, level.budget, cloth.frame)
             outcome = _tried(job(peer.module, cloth, rung.settings, shape))
             remarks += _remarks(level, rung, outcome)
-            rows.append((*_moved(outcome, level, truth), rung.label))
+            rows.append((*_moved(outcome, level, truth, cloth.extent), rung.label))
             if not outcome.solved:
                 break
     names = ("particles", "frames", "wanted", "seconds", "setup", "implicit", "true", "diverged")
     measured = _columns(names, rows, remarks)
-    truths = [_truth(level, stiffness) for level in sizes]
+    truths = [fall.truth for fall in falls]
     known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
     return measured._replace(arrays={**measured.arrays, **known})
 
 
-def _moved(outcome: Outcome, level: Level, truth: ClothTruth) -> tuple[float, ...]:
+class Fall:
+    """A cloth that falls for so many frames, with its answers, made when they are asked for.
+
+    Attributes:
+        level: how far, and for how long.
+    """
+
+    def __init__(self, level: Level, of: float | Callable[[], FallingCloth]) -> None:
+        """Take a stiffness of ours [N/m], or what makes a user's cloth."""
+        self.level, self._of = level, of
+
+    @property
+    def cloth(self) -> FallingCloth:
+        """The cloth."""
+        return self._of() if callable(self._of) else falling_cloth(self.level.size, self._of)
+
+    @property
+    def truth(self) -> ClothTruth:
+        """Its answers."""
+        if callable(self._of):
+            return truth_of(self._of(), self.level.frames)
+        return cloth_truth(self.level.size, self._of, self.level.frames)
+
+
+def _moved(outcome: Outcome, level: Level, truth: ClothTruth, extent: float) -> tuple[float, ...]:
     """Return a row: distances are those in the end, or as far as the motion got."""
     frames = len(outcome.solved)
     seconds = metrics.spread(np.array([one.seconds for one in outcome.solved])).median
     positions = np.array([one.q for one in outcome.solved]).reshape(frames, *truth.start.shape)
-    lost = diverged(positions, truth.true[:frames])
+    lost = diverged(positions, truth.true[:frames], extent)
     apart = [np.nan, np.nan]
     if frames and not lost:
         answers = truth.implicit[frames - 1], truth.true[frames - 1]
@@ -216,11 +269,11 @@ def _moved(outcome: Outcome, level: Level, truth: ClothTruth) -> tuple[float, ..
     return (level.size, frames, level.frames, seconds, outcome.setup, *apart, lost)
 
 
-def diverged(positions: np.ndarray, true: np.ndarray) -> bool:
+def diverged(positions: np.ndarray, true: np.ndarray, extent: float = SIDE) -> bool:
     """Return whether a particle ever is farther from where it belongs than the cloth is wide."""
     if not np.isfinite(positions).all():
         return True
-    return bool((np.abs(positions - true) > SIDE).any())
+    return bool((np.abs(positions - true) > extent).any())
 
 
 def iterations_needed(solver: str, stiffness: float) -> Measured:
@@ -331,10 +384,6 @@ def liu_2013(solver: str) -> Measured:
 def job(module: str, cloth: FallingCloth, settings: Mapping[str, Any], shape: Shape) -> ClothJob:
     """Return the job of moving a cloth from its start."""
     return ClothJob(module, cloth.system.arrays, cloth.start, settings, shape)
-
-
-def _truth(level: Level, stiffness: float) -> ClothTruth:
-    return cloth_truth(level.size, stiffness, level.frames)
 
 
 def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[Remark]) -> Measured:

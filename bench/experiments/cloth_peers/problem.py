@@ -28,7 +28,7 @@ _SEED = 2013
 _FALL_MARGIN, _FALL_DAMPING, _UNEVEN = 1.5, 20.0, 1e-3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FallingCloth:
     """A cloth in mid-fall.
 
@@ -38,6 +38,9 @@ class FallingCloth:
         system: particles and springs.
         start: the state in mid-fall.
         frequency: the highest there [rad/s].
+        frame: the length of a frame [s].
+        extent: how wide it is [m].
+        name: of a user's cloth, "" for ours.
     """
 
     size: int
@@ -45,6 +48,23 @@ class FallingCloth:
     system: MassSpring
     start: State
     frequency: float
+    frame: float = FRAME
+    extent: float = SIDE
+    name: str = ""
+
+    @property
+    def beat(self) -> float:
+        """The highest frequency, in frames of ours [rad/s]: so many explicit steps it asks for."""
+        return self.frequency * self.frame / FRAME
+
+
+def own_cloth(name: str, system: MassSpring, start: State, frame: float) -> FallingCloth:
+    """Return a user's cloth, which falls from the state that it is given in."""
+    frequency = highest_frequency(system, start.positions)
+    extent = float(np.ptp(start.positions, axis=0).max())
+    stiffness = float(system.stiffnesses.mean())
+    known = (system.particle_count, stiffness, system, start, frequency)
+    return FallingCloth(*known, frame, extent, name)
 
 
 @functools.cache

@@ -27,6 +27,11 @@ class Point(NamedTuple):
     record: Record
 
     @property
+    def own(self) -> str:
+        """The name of a user's cloth, "" of ours."""
+        return str(self.record.facts.get("cloth", ""))
+
+    @property
     def is_whole(self) -> bool:
         """Whether a motion got to its end."""
         return not self.values["diverged"] and self.values["frames"] == self.values["wanted"]
@@ -35,7 +40,7 @@ class Point(NamedTuple):
 def points(results: Results, task: str) -> list[Point]:
     """Return all points of a task, cloth by cloth: stiffness first, then particles."""
     found = [p for record in results.all("cloth", task=task) for p in _points_of(record)]
-    return sorted(found, key=lambda point: (point.stiffness, point.particles))
+    return sorted(found, key=lambda point: (point.own, point.stiffness, point.particles))
 
 
 def _points_of(record: Record) -> Iterator[Point]:

@@ -38,7 +38,7 @@ _TRUTH = (
 
 
 def _cloth_of(point: Point) -> str:
-    return f"{point.particles} × {point.particles}, {words(int(point.stiffness))} N/m"
+    return point.own or f"{point.particles} × {point.particles}, {words(int(point.stiffness))} N/m"
 
 
 def _cloths(found: Sequence[Point]) -> dict[str, list[Point]]:

@@ -47,14 +47,19 @@ class ClothTruth(NamedTuple):
 @functools.cache
 def cloth_truth(size: int, stiffness: float, frames: int) -> ClothTruth:
     """Return the answers for a falling cloth."""
-    cloth = falling_cloth(size, stiffness)
-    substeps = explicit_substeps(cloth.frequency, _COARSE)
+    return truth_of(falling_cloth(size, stiffness), frames)
+
+
+@functools.lru_cache(maxsize=4)
+def truth_of(cloth: FallingCloth, frames: int) -> ClothTruth:
+    """Return the answers for a cloth."""
+    substeps = explicit_substeps(cloth.beat, _COARSE)
     coarse, middle, fine = (true_motion(cloth, frames, n * substeps) for n in (1, 2, 4))
     unsure = metrics.rms_distance(middle[-1], fine[-1])
     order = math.log2(metrics.rms_distance(coarse[-1], middle[-1]) / unsure)
     x, v = cloth.start.positions, cloth.start.velocities
-    inertial = x + FRAME * np.where(cloth.system.free[:, None], v, 0.0)
-    return ClothTruth(x, inertial, implicit_motion(cloth, frames), fine, order, unsure)
+    inertial = x + cloth.frame * np.where(cloth.system.free[:, None], v, 0.0)
+    return ClothTruth(x, inertial, implicit_motion(cloth, frames, cloth.frame), fine, order, unsure)
 
 
 def true_motion(cloth: FallingCloth, frames: int, substeps: int) -> FloatArray:
@@ -62,7 +67,7 @@ def true_motion(cloth: FallingCloth, frames: int, substeps: int) -> FloatArray:
     state, positions = cloth.start, []
     for _ in range(frames):
         for _ in range(substeps):
-            state = runge_kutta(cloth.system, state, FRAME / substeps)
+            state = runge_kutta(cloth.system, state, cloth.frame / substeps)
         positions.append(state.positions)
     return np.array(positions)
 

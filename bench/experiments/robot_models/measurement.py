@@ -10,12 +10,13 @@ from crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
 from crosscheck.robots.sweep import CONFIGURATIONS, sweep
 
 from ...harness.block import Block, Measured, Scale
+from . import peers
 
 SUITE = "robot_models"
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
-    """Yield every file for every engine, none where the files are not installed."""
+    """Yield every file for every engine, none where the files are not installed; then the peers."""
     settings = {"configurations": CONFIGURATIONS}
     for family in PACKAGES:
         for model in models(family):
@@ -23,6 +24,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
                 measure = partial(compare, engine, model)
                 facts = {"title": model.name}
                 yield Block(SUITE, f"{family}/{model.name}", engine, measure, settings, facts=facts)
+    yield from peers.blocks(SUITE)
 
 
 def compare(engine: str, model: Model) -> Measured:

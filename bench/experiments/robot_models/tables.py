@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from functools import partial
 
 from ...harness.record import Record
-from ...presentation.columns import text
+from ...peers import registry
+from ...presentation.columns import text, titled
 from ...presentation.layout import Layout
-from ...presentation.results import by_problem, counted, listed, problems, settings
+from ...presentation.results import Results, by_problem, counted, listed, problems, settings
 from ...presentation.tables import Column, Summary, words
+from . import PEERS
 
 SIZES = {"links": "links", "moving joints": "joints", "freedoms": "freedoms"}
 QUANTITIES = {
@@ -15,6 +17,10 @@ QUANTITIES = {
     "rotations": "rotations",
     "Jacobians": "jacobians",
 }
+
+
+def _of_files(results: Results) -> list[Record]:
+    return [r for r in results.all("robot_models") if r.facts.get("task") != PEERS]
 
 
 def _all(files: Sequence[Sequence[Record]]) -> list[Record]:
@@ -89,7 +95,7 @@ agreement = Layout(
         text("engines", lambda file: listed([r.solver for r in _agreeing(file)]) or "none"),
         text("but", lambda file: "; ".join(filter(None, map(_remark, file)))),
     ),
-    subjects=lambda results: by_problem(results.all("robot_models")).values(),
+    subjects=lambda results: by_problem(_of_files(results)).values(),
     shows="The reference reads each file itself. Differences are the largest of all links in "
     "all configurations; positions are measured against the extent of the links, "
     "Jacobians against that and one radian. An engine that is known to place links elsewhere "
@@ -102,4 +108,56 @@ agreement = Layout(
 )
 
 
-LAYOUTS = (agreement,)
+def _peers_summary(records: Sequence[Record]) -> Summary:
+    read = [record for record in records if "positions" in record.arrays]
+    if not read:
+        return Summary()
+    engines = dict.fromkeys(record.solver for record in read)
+    return Summary(
+        "Where the engines of peers put the effectors of the bench’s own robots, largest "
+        "differences from the reference:",
+        tuple(_farthest([r for r in read if r.solver == engine]) for engine in engines),
+    )
+
+
+def _farthest(records: Sequence[Record]) -> str:
+    position, rotation = (
+        words(max(float(record.arrays[name]) for record in records))
+        for name in ("positions", "rotations")
+    )
+    return f"{records[0].solver}: {position} m and {rotation} in a rotation matrix"
+
+
+def _peer_remark(record: Record) -> str:
+    return record.notes["remark"] or registry.SINGLE_PRECISION.get(record.solver, "")
+
+
+peers_kinematics = Layout(
+    "Do the engines of the other solvers read the same robots?",
+    "peers_kinematics",
+    "The bench’s robots in engines of other solvers",
+    columns=(
+        titled("robot"),
+        text("engine", lambda record: record.solver),
+        Column("version", words=True, folded=True, read=lambda r: r.settings["version"]),
+        Column("positions", "m", group="largest difference", read=lambda r: _maybe(r, "positions")),
+        Column("rotations", group="largest difference", read=lambda r: _maybe(r, "rotations")),
+        text("but", _peer_remark),
+    ),
+    subjects=lambda results: results.all("robot_models", task=PEERS),
+    shows="Each engine reads the same text as the reference and puts the effectors where it "
+    "says; rotations are compared entry by entry as matrices. Rounding in double precision "
+    "leaves 1e-15.",
+    measured=lambda records: (
+        f"{settings(records, 'configurations') or 'No'} random configurations of each robot, "
+        "within the limits."
+    ),
+    summary=_peers_summary,
+)
+
+
+def _maybe(record: Record, name: str) -> float | None:
+    return float(record.arrays[name]) if name in record.arrays else None
+
+
+LAYOUTS = (agreement, peers_kinematics)

@@ -10,6 +10,7 @@ import functools
 import importlib.metadata
 import math
 import xml.etree.ElementTree as ElementTree
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,6 +114,22 @@ ROBOTS = (*_ARMS, CHARACTER)
 ALL = (*_ARMS, "iiwa14", CHARACTER)
 
 
+# Robots of users, by name.
+OWN: dict[str, Robot] = {}
+
+
+def enter(own: Robot) -> None:
+    """Let a user's robot be known by its name, in place of one entered before."""
+    if OWN.get(own.name) is not own:
+        OWN[own.name] = own
+        robot.cache_clear()
+
+
+def seed_of(name: str) -> int:
+    """Return a number of a robot by which its targets are drawn."""
+    return ALL.index(name) if name in ALL else zlib.crc32(name.encode(errors="replace"))
+
+
 @functools.cache
 def robot(name: str) -> Robot:
     """Return a robot by name.
@@ -121,6 +138,8 @@ def robot(name: str) -> Robot:
         ValueError: if there is none of this name.
         AbsentError: if its file is not installed.
     """
+    if name in OWN:
+        return OWN[name]
     choice("robot", name, ALL)
     if name == CHARACTER:
         return _character()
@@ -128,6 +147,11 @@ def robot(name: str) -> Robot:
         return _chain(name, _Arm("KUKA iiwa14", "", "link_0", "link_8"), _iiwa())
     arm = _ARMS[name]
     return _chain(name, arm, _folder().joinpath(arm.file).read_text(encoding="utf-8"))
+
+
+def chain_from(name: str, title: str, text: str, root: str, effector: str) -> Robot:
+    """Return the chain of hinges of a URDF from a root to an effector."""
+    return _chain(name, _Arm(title, "", root, effector), text)
 
 
 def is_installed(name: str) -> bool:
@@ -141,6 +165,7 @@ def is_installed(name: str) -> bool:
 def title(name: str) -> str:
     """Return how a robot is written."""
     own = {"iiwa14": "KUKA iiwa14", CHARACTER: "character"}
+    own |= {entered.name: entered.title for entered in OWN.values()}
     return own.get(name) or _ARMS[name].title
 
 

@@ -13,7 +13,7 @@ from reference.arguments import FloatArray
 
 from ..chain.problem import random_rotations, unit
 from .evaluate import Evaluator, Targets, evaluator_of
-from .problem import ALL, links
+from .problem import links, seed_of
 
 STRATA = {
     "joint space": "uniform in joint space",
@@ -40,7 +40,7 @@ def robot_targets(name: str, count: int) -> Targets:
         AbsentError: if its file is not installed.
     """
     evaluator = evaluator_of(name)
-    rng = np.random.default_rng([_SEED, ALL.index(name)])
+    rng = np.random.default_rng([_SEED, seed_of(name)])
     poses = stratum_poses(evaluator, rng, count).values()
     positions, rotations = (
         np.stack(parts, axis=1).reshape(count * len(STRATA), *parts[0].shape[1:])
@@ -77,7 +77,7 @@ def unreachable_targets(name: str, count: int) -> Targets:
         AbsentError: if its file is not installed.
     """
     evaluator = evaluator_of(name)
-    rng = np.random.default_rng([_SEED, ALL.index(name), 1])
+    rng = np.random.default_rng([_SEED, seed_of(name), 1])
     positions, rotations = _unreachable(rng, evaluator, count)
     return Targets(
         positions, rotations, evaluator.robot.draw(rng, count), np.zeros(count, dtype=int)
@@ -103,7 +103,7 @@ def uniform_targets(name: str, count: int, middle: bool) -> Targets:
         AbsentError: if its file is not installed.
     """
     evaluator = evaluator_of(name)
-    rng = np.random.default_rng([_SEED, ALL.index(name), count])
+    rng = np.random.default_rng([_SEED, seed_of(name), count])
     positions, rotations = evaluator.forward(evaluator.robot.draw(rng, count))
     starts = evaluator.robot.draw(rng, count)
     if middle:

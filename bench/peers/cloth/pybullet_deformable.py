@@ -7,6 +7,7 @@ step, which is taken with the cloth flat. Velocities cannot be written but are k
 are: a step from where the springs' forces make them gives the particles their first velocities.
 """
 
+import functools
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,8 @@ from .protocol import Mover
 # The length [s] of the step that makes velocities, how much larger gravity is in it than they ask
 # for, and the steps of implicit Euler, of this length [s], that find where it begins.
 _PUSH, _PULL, _RELAX, _RELAXATIONS, _ITERATIONS = 0.1, 4.0, 1e3, 3, 50
+# Larger ones take PyBullet minutes to load.
+MOST = 2500
 # A step so short [s] moves nothing.
 _INSTANT = 1e-12
 # Rest lengths are those of the flat cloth up to rounding.
@@ -32,78 +35,108 @@ def prepare(system: MassSpring, frame: float, substeps: int = 1) -> Mover:
     """Return PyBullet, stepping so many times a frame.
 
     Raises:
-        ValueError: if the system is no square cloth of equal masses and undamped springs.
+        ValueError: if the system is no square cloth of equal masses and undamped springs, or large.
     """
     return _Steps(system, frame / substeps, substeps)
 
 
 class _Steps:
     def __init__(self, system: MassSpring, h: float, substeps: int) -> None:
-        self._system, self._h, self._substeps = system, h, substeps
-        self._flat, self._triangles = mesh(system)
-        self._client: Any = pybullet.connect(pybullet.DIRECT)
-
-    def __del__(self) -> None:
-        if hasattr(self, "_client"):
-            pybullet.disconnect(self._client)
+        flat, triangles = mesh(system)
+        text = wavefront(flat, triangles), flat.tobytes()
+        pins, whole = tuple(system.pinned.tolist()), float(system.masses.sum())
+        self._load = functools.partial(_body, *text, pins, whole, float(system.stiffnesses[0]))
+        self._body = self._load()
+        self._system, self._flat, self._h, self._substeps = system, flat, h, substeps
 
     def begin(self, state: State) -> None:
-        self._load()
-        self._write(self._flat)  # the file was read in single precision
-        self._step(0.0 * self._system.gravity, _INSTANT)  # takes the rest lengths
-        self._give(state.velocities)
-        self._write(state.positions)
-        self._set(self._system.gravity, self._h)
+        before = self._velocities()
+        if not np.isfinite(before).all():  # it blew up, and does not forget
+            _body.cache_clear()
+            self._body, before = self._load(), np.zeros_like(before)
+        self._give(self._system.free[:, None] * state.velocities - before)
+        self._body.write(state.positions)
+        self._body.set(self._system.gravity, self._h)
 
     def advance(self) -> None:
         for _ in range(self._substeps):
-            pybullet.stepSimulation(self._client)
+            self._body.step()
 
     def positions(self) -> FloatArray:
-        flags = pybullet.MESH_DATA_SIMULATION_MESH
-        _, vertices = pybullet.getMeshData(
-            self._body, -1, flags=flags, physicsClientId=self._client
-        )
-        return np.array(vertices)
+        return self._body.positions()
 
-    def _load(self) -> None:
-        """Put the cloth, flat and still, into an empty world, and fix its pinned particles."""
+    def _velocities(self) -> FloatArray:
+        """Return the velocities [m/s], by a step of the flat cloth, in which no spring pulls."""
+        self._body.write(self._flat)
+        self._body.set(0.0 * self._system.gravity, _PUSH)
+        self._body.step()
+        return (self._body.positions() - self._flat) / _PUSH
+
+    def _give(self, velocities: FloatArray) -> None:
+        """Add to the velocities, which particles keep when they are put elsewhere."""
+        fastest = float(np.abs(velocities).max())
+        if fastest:
+            gravity = np.array([0.0, -_PULL * fastest / _PUSH, 0.0])
+            pulled = self._system.replaced(gravity=gravity)
+            self._body.write(_pushed(pulled, velocities, self._flat))
+            self._body.set(gravity, _PUSH)
+            self._body.step()
+
+
+class _Body:
+    """A cloth in a world of its own, whose rest lengths are those of where it was flat."""
+
+    def __init__(
+        self, text: str, flat: FloatArray, pins: tuple[int, ...], mass: float, stiffness: float
+    ) -> None:
+        self._client: Any = pybullet.connect(pybullet.DIRECT)
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=self._client)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "cloth.obj"
-            file.write_text(wavefront(self._flat, self._triangles), encoding="utf-8")
-            self._body = pybullet.loadSoftBody(
+            file.write_text(text, encoding="utf-8")
+            self._number = pybullet.loadSoftBody(
                 str(file),
-                mass=float(self._system.masses.sum()),
+                mass=mass,
                 useMassSpring=1,
-                springElasticStiffness=float(self._system.stiffnesses[0]),
+                springElasticStiffness=stiffness,
                 springDampingStiffness=0.0,
                 springBendingStiffness=0.0,
                 physicsClientId=self._client,
             )
-        for particle in self._system.pinned:
+        for particle in pins:
             pybullet.createSoftBodyAnchor(
-                self._body, int(particle), -1, -1, physicsClientId=self._client
+                self._number, particle, -1, -1, physicsClientId=self._client
             )
+        self.write(flat)  # the file was read in single precision
+        self.set(np.zeros(3), _INSTANT)
+        self.step()
 
-    def _give(self, velocities: FloatArray) -> None:
-        """Give the particles velocities, which they keep when they are put elsewhere."""
-        fastest = float(np.abs(velocities).max())
-        if fastest:
-            gravity = np.array([0.0, -_PULL * fastest / _PUSH, 0.0])
-            self._write(_pushed(self._system.replaced(gravity=gravity), velocities, self._flat))
-            self._step(gravity, _PUSH)
+    def __del__(self) -> None:
+        pybullet.disconnect(self._client)
 
-    def _write(self, positions: FloatArray) -> None:
-        pybullet.resetMeshData(self._body, positions.tolist(), physicsClientId=self._client)
+    def positions(self) -> FloatArray:
+        flags = pybullet.MESH_DATA_SIMULATION_MESH
+        _, vertices = pybullet.getMeshData(
+            self._number, -1, flags=flags, physicsClientId=self._client
+        )
+        return np.array(vertices)
 
-    def _step(self, gravity: FloatArray, h: float) -> None:
-        self._set(gravity, h)
-        pybullet.stepSimulation(self._client)
+    def write(self, positions: FloatArray) -> None:
+        """Put the particles elsewhere; they keep their velocities."""
+        pybullet.resetMeshData(self._number, positions.tolist(), physicsClientId=self._client)
 
-    def _set(self, gravity: FloatArray, h: float) -> None:
+    def set(self, gravity: FloatArray, h: float) -> None:
         pybullet.setGravity(*gravity.tolist(), physicsClientId=self._client)
         pybullet.setTimeStep(h, physicsClientId=self._client)
+
+    def step(self) -> None:
+        pybullet.stepSimulation(self._client)
+
+
+@functools.lru_cache(maxsize=1)
+def _body(text: str, flat: bytes, pins: tuple[int, ...], mass: float, stiffness: float) -> _Body:
+    """Return a body, kept for the next solver: to load one takes time quadratic in its size."""
+    return _Body(text, np.frombuffer(flat).reshape(-1, 3), pins, mass, stiffness)
 
 
 def _pushed(system: MassSpring, velocities: FloatArray, start: FloatArray) -> FloatArray:
@@ -123,8 +156,13 @@ def mesh(system: MassSpring) -> tuple[FloatArray, IndexArray]:
     """Return the flat cloth (particle, 3) and triangles (triangle, 3) whose edges are its springs.
 
     Raises:
-        ValueError: if the system is no square cloth of equal masses and undamped springs.
+        ValueError: if the system is no square cloth of equal masses and undamped springs, or large.
     """
+    if system.particle_count > MOST:
+        raise ValueError(
+            f"system: expected {MOST:,} particles or fewer, which PyBullet loads in seconds, "
+            f"got {system.particle_count:,}"
+        )
     size = round(system.particle_count**0.5)
     i, j = np.divmod(np.arange(size**2), size)
     triangles = _triangles(size)
@@ -143,13 +181,13 @@ def mesh(system: MassSpring) -> tuple[FloatArray, IndexArray]:
 
 
 def _triangles(size: int) -> IndexArray:
-    """Return all four triangles of each square, and those that stand on two edges in a row.
+    """Return two triangles of each square, those over two edges in a row, and a last diagonal.
 
     No three corners are in line, and all are joined: PyBullet loads other meshes without end.
     """
     at = np.arange(size**2).reshape(size, size)
     a, b, c, d = at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]
-    groups = [(a, b, c), (a, c, d), (a, b, d), (b, c, d)]
+    groups = [(a, b, c), (a, c, d), (a[:1, :1], b[:1, :1], d[:1, :1])]
     for grid in (at, at.T):
         beside = np.concatenate([grid[1:-1, 1:], grid[1:-1, -2:-1]], axis=1)
         groups.append((grid[:-2], beside, grid[2:]))

@@ -11,7 +11,7 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
-from .protocol import Ask, Solve, SolverOutput, needs_a_chain
+from .protocol import Ask, Forward, Solve, SolverOutput, needs_a_chain
 
 
 def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 200) -> Ask:
@@ -39,6 +39,20 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 200) -> Ask:
         return solve
 
     return ask
+
+
+def kinematics(robot: Robot) -> Forward:
+    """Return DART's forward kinematics of the effector."""
+    needs_a_chain(robot)
+    skeleton = dart_skeleton(robot)
+    effector = skeleton.getBodyNode(robot.effectors[0])
+
+    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        skeleton.setPositions(q)
+        T = effector.getWorldTransform().matrix()
+        return T[None, :3, 3], T[None, :3, :3]
+
+    return forward
 
 
 def dart_skeleton(robot: Robot) -> dartpy.dynamics.Skeleton:

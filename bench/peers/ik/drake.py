@@ -23,7 +23,7 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
-from .protocol import Ask, Solve, SolverOutput
+from .protocol import Ask, Forward, Solve, SolverOutput
 
 # The part of the tolerance that is asked for.
 INSIDE = 0.5
@@ -73,6 +73,23 @@ def prepare(
         return solve
 
     return ask
+
+
+def kinematics(robot: Robot) -> Forward:
+    """Return Drake's forward kinematics of the effectors."""
+    plant, _ = drake_plant(robot)
+    context, coordinates = plant.CreateDefaultContext(), _Coordinates(robot, plant)
+    frames = [plant.GetFrameByName(effector) for effector in robot.effectors]
+
+    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        plant.SetPositions(context, coordinates.to_drake(q))
+        poses = [frame.CalcPoseInWorld(context) for frame in frames]
+        return (
+            np.array([pose.translation() for pose in poses]),
+            np.array([pose.rotation().matrix() for pose in poses]),
+        )
+
+    return forward
 
 
 def drake_plant(robot: Robot) -> tuple[Any, list[Any]]:

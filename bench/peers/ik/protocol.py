@@ -5,6 +5,9 @@ engine up once for a robot and returns a function `ask(positions, rotations, sta
 target in the engine's own types and returns the call to be timed, which returns a `SolverOutput`:
 neither conversions nor set-up count as time of a solve. For a robot that it cannot solve `prepare`
 raises `UnableError`.
+
+An adapter of an engine whose kinematics is compared as well has a function `kinematics(robot)`,
+which returns a `Forward`.
 """
 
 from collections.abc import Callable
@@ -43,6 +46,10 @@ class Ask(Protocol):
             rotations: of the effectors, (effector, 3, 3).
             start: coordinates, (coordinate,).
         """
+
+
+# Coordinates to the effectors' positions [m], (effector, 3), and rotations, (effector, 3, 3).
+Forward = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
 def remark_of(adapter: Any) -> str:

@@ -2,7 +2,7 @@
 
 Without limits it takes a damping; the default of 0.5 converges too slowly for our tolerance. With
 limits it pulls towards them in the null space of the effector's motion, does not take the damping,
-and does not arrive. It never says whether it has arrived: a caller who starts it again must look at
+hardly arrives and oversteps them all the same. It never says whether it has arrived: a caller who starts it again must look at
 its forward kinematics, which `check` does. `IK_SDLS` ends the process, and is left out.
 """
 
@@ -18,7 +18,7 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
-from .protocol import Ask, Solve, SolverOutput, needs_a_chain
+from .protocol import Ask, Forward, Solve, SolverOutput, needs_a_chain
 from .trac_ik import quaternion_with_w_last
 
 # It stops within this part of the tolerance, which bounds a distance; angles come along.
@@ -60,6 +60,18 @@ def prepare(
         return solve
 
     return ask
+
+
+def kinematics(robot: Robot) -> Forward:
+    """Return PyBullet's forward kinematics of the effector."""
+    needs_a_chain(robot)
+    body = BulletBody(robot)
+
+    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        position, rotation = body.forward(q)
+        return position[None], rotation[None]
+
+    return forward
 
 
 class BulletBody:

@@ -13,7 +13,7 @@ from reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
-from .protocol import Ask, Solve, SolverOutput, needs_a_chain
+from .protocol import Ask, Forward, Solve, SolverOutput, needs_a_chain
 from .restarts import generator_of
 
 
@@ -49,6 +49,18 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 50, attempts: 
     return ask
 
 
+def kinematics(robot: Robot) -> Forward:
+    """Return the forward kinematics of the effector."""
+    needs_a_chain(robot)
+    chain = torch_chain(robot)
+
+    def forward(q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        T = chain.forward_kinematics(torch.tensor(q)).get_matrix().numpy()
+        return T[:, :3, 3], T[:, :3, :3]
+
+    return forward
+
+
 def torch_chain(robot: Robot) -> pytorch_kinematics.SerialChain:
     """Return a chain in double precision, its joints in the robot's order.
 
@@ -62,9 +74,3 @@ def torch_chain(robot: Robot) -> pytorch_kinematics.SerialChain:
     if names != robot.joints:
         raise ValueError(f"pytorch_kinematics orders the joints as {', '.join(names)}")
     return chain.to(dtype=torch.float64)
-
-
-def forward(chain: pytorch_kinematics.SerialChain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the effector's position [m], (3,), and rotation, (3, 3)."""
-    T = chain.forward_kinematics(torch.tensor(q)).get_matrix()[0].numpy()
-    return np.array(T[:3, 3]), np.array(T[:3, :3])
