@@ -216,6 +216,8 @@ class _Drawer:
         if one.solver in self._look:
             _between(ax, one, style)
             style["markevery"] = _every(one, self._order.index(one.solver))
+        elif len(one.x) <= 3 * _MARKS:
+            style["marker"] = "."
         return list(ax.plot(one.x, one.y, **style))
 
     def _marks(self, ax: Axes, one: Series, style: dict[str, Any]) -> list[Artist]:

@@ -171,7 +171,7 @@ def test_text_on_the_page_is_never_below_seven_points(records):
     narrowest = min(
         float(rem) for rem in re.findall(r"figure svg \{[^}]*min-width: ([\d.]+)rem", css)
     )
-    for figure in report.all_figures()[::2]:
+    for figure in report.all_figures()[::3]:
         svg = drawn(figure(Results(records))).svg
         width = float(re.search(r'viewBox="0 0 ([\d.]+)', svg)[1])
         sizes = [float(x) for x in re.findall(r"font(?:-size)?: [^;\"]*?([\d.]+)px", svg)]
@@ -203,11 +203,11 @@ def test_a_figure_is_drawn_again_only_if_it_shows_something_else(tmp_path, recor
 
 
 def test_a_pdf_has_its_fonts_and_its_text(records):
-    for figure in report.all_figures()[::2]:
+    for figure in report.all_figures()[::3]:
         made = drawn(figure(Results(records)))
         assert made.pdf.startswith(b"%PDF")
         assert b"/FontFile2" in made.pdf
-        assert b"/Subtype /Type3" not in made.pdf or made.name
+        assert b"/Type3" not in made.pdf
 
 
 def test_curves_of_different_lengths_are_no_curve():
@@ -249,3 +249,11 @@ def test_a_drawing_from_a_folder_brings_no_script_and_no_address_into_the_page()
     shown = str(inline(Drawing("n", "t", "", nasty)))
     assert "<path" in shown
     assert not re.search("script|alert|foreign|example", shown)
+
+
+def test_a_grey_curve_of_one_point_is_seen():
+    names = [f"s{i}" for i in range(9)]
+    chart = Chart("n", "t", "", (Panel("", tuple(series(n, [1.0], [2.0]) for n in names)),), Axis())
+    lines = laid_out(chart).axes[0].get_lines()
+    assert len(lines) == len(names)
+    assert all(line.get_marker() not in ("none", "", None) for line in lines)

@@ -140,13 +140,14 @@ def test_a_cloth_that_blows_up_is_shown_until_it_does(tmp_path):
     assert "Infinity" not in text
 
 
-@pytest.mark.parametrize("suffix", ["svg", "gif", "html"])
-@pytest.mark.parametrize("scene", ["circle", "cloth"])
+@pytest.mark.parametrize(
+    ("scene", "suffix"), [("circle", "svg"), ("circle", "gif"), ("cloth", "svg"), ("cloth", "gif")]
+)
 def test_both_are_drawn_in_every_form(capsys, tmp_path, scene, suffix):
     mine = file(tmp_path, "mine.py", STILL if scene == "cloth" else DOT)
     path = tmp_path / f"{scene}.{suffix}"
     assert show(capsys, scene, "--with", mine, "-o", path)[0] == 0
-    if suffix != "gif":
+    if suffix == "svg":
         assert "mine.py" in path.read_text(encoding="utf-8")
         return
     from PIL import Image
@@ -184,7 +185,7 @@ def test_a_program_behind_two_dashes_is_a_solver(capsys, tmp_path):
     assert "The Dot beside Plumbob FABRIK" in (tmp_path / "dot.html").read_text()
 
 
-@pytest.mark.parametrize("options", [[], ["--coherent"], ["--solver", "ccd"]])
+@pytest.mark.parametrize("options", [["--coherent"], ["--solver", "ccd"]])
 def test_ours_alone_makes_a_page_of_one_arm(capsys, tmp_path, options):
     assert show(capsys, "star", "-o", "star.html", *options)[0] == 0
     assert (tmp_path / "star.html").read_text().count("<canvas") == 1
