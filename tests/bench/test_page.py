@@ -21,7 +21,8 @@ DESK, PHONE = (1440, 900), (390, 844)
 ROBOTS = ("Panda", "UR5", "xArm7", "PR2", "character")
 # The table that is tried: it is folded, and has a row for each of these solvers on each robot.
 MAIN = "robots_success_one_start"
-ENTRIES = [entry for peer in registry.PEERS for entry in peer.entries if entry.kind == "one start"]
+PRESENT = registry.PEERS[:8]  # the others are absent
+ENTRIES = [entry for peer in PRESENT for entry in peer.entries if entry.kind == "one start"]
 ROWS = len(ROBOTS) * len(ENTRIES)
 # What a page keeps in place of the clipboard, which a test may not touch.
 CLIPBOARD = """window.copied = [];
@@ -30,10 +31,10 @@ Object.defineProperty(navigator, "clipboard",
 
 
 def of_full_length(make):
-    """Records of a run with every peer on every robot, and of every solver on nine cloths."""
+    """Records of a run with most peers on every robot, and of every solver on nine cloths."""
     generator = np.random.default_rng(0)
     for robot in ROBOTS:
-        for peer in registry.PEERS:
+        for peer in PRESENT:
             for entry in peer.entries:
                 chance = generator.uniform(0.2, 0.9)
                 changed = {"solved": generator.random(120) < chance, "claimed": np.ones(120)}
@@ -150,7 +151,7 @@ def test_the_first_screen_answers_in_120_words(browser, size):
         "Fastest",
         "a <b>slide</b> rule",
         "Quick run: 60 targets a stratum",
-        "Absent",
+        "EAIK, Drake, ",
     ):
         assert words in said  # fmt: skip
 
