@@ -25,7 +25,9 @@ def name(path):
 def test_only_runs_the_stopwatch_and_timing_read_a_clock():
     clocks = {"time", "datetime", "timeit"}
     readers = {name(path) for path in SOURCES if clocks & set(imports(path))}
+    # PlaCo lives in an environment of its own, where nothing of ours is: it times itself.
     allowed = {"harness/measure.py", "harness/run.py", "harness/stopwatch.py"}
+    allowed |= {"peers/ik/placo_program.py"}
     assert readers >= allowed
     assert {reader for reader in readers if "timing/" not in reader} == allowed
 
