@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .presentation.report import Written
-    from .presentation.tables import Table
+    from .presentation.tables.table import Table
 
 # How wide a table is in a pipe, where nobody says.
 IN_A_PIPE = 240
@@ -21,7 +21,7 @@ def width() -> int:
 
 def print_table(table: "Table") -> None:
     """Print a table with what it says: aligned on a terminal, as Markdown in a pipe."""
-    from .presentation.tables import markdown
+    from .presentation.tables.table import markdown
 
     if sys.stdout.isatty():
         print_aligned(table, "a wider terminal, or a pipe")
@@ -44,7 +44,7 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
 
 def print_summary(table: "Table") -> None:
     """Print what a table is called and says."""
-    from .presentation.aligned import filled
+    from .presentation.tables.aligned import filled
 
     print()
     for text in (table.title, table.summary.sentence):
@@ -55,7 +55,7 @@ def print_summary(table: "Table") -> None:
 
 def print_aligned(table: "Table", shown_by: str) -> None:
     """Print a table with what it says, as wide as the terminal; say what shows columns left out."""
-    from .presentation.aligned import filled, left_out
+    from .presentation.tables.aligned import filled, left_out
 
     print_summary(table)
     missing = print_lines(table)
@@ -68,7 +68,7 @@ def print_lines(table: "Table") -> list[str]:
     from rich.console import Console
     from rich.text import Text
 
-    from .presentation.aligned import aligned
+    from .presentation.tables.aligned import aligned
 
     made = aligned(table, width())
     console = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
@@ -88,7 +88,7 @@ def print_outcome(written: "Written") -> None:
 
 def print_verdicts(verdicts: Sequence[Any]) -> None:
     """Print the table of verdicts."""
-    from .presentation.tables import Column, Table
+    from .presentation.tables.table import Column, Table
 
     words = {name: Column(name, words=True) for name in ("claim", "verdict")}
     numbers = (Column(n, folded=n == "cases") for n in ("cases", "largest difference", "tolerance"))

@@ -11,10 +11,10 @@ from pathlib import Path
 
 from bench.harness.record import FILE_NAME, RecordFile
 from bench.presentation.headlines import Headline
-from bench.presentation.provenance import provenance
 from bench.presentation.report import Written, write
 from bench.presentation.results import listed
-from bench.presentation.tables import words
+from bench.presentation.tables.provenance import provenance
+from bench.presentation.tables.table import words
 
 DOCS = Path(__file__).parent
 SAMPLE, README = DOCS / "sample", DOCS.parent / "README.md"

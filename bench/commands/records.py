@@ -11,7 +11,7 @@ from .options import REPORT, SUCCESS
 
 if TYPE_CHECKING:
     from ..harness.record import Key, Record
-    from ..presentation.tables import Table
+    from ..presentation.tables.table import Table
 
 app = typer.Typer(cls=Group, rich_markup_mode=None)
 
@@ -170,7 +170,7 @@ def _machines(found: "Iterable[Record]") -> set[str]:
 
 
 def _table(folder: Path, found: "list[Record]") -> "Table":
-    from ..presentation.tables import Column, Summary, Table
+    from ..presentation.tables.table import Column, Summary, Table
 
     groups: dict[tuple[str, str], list[Record]] = {}
     for record in found:

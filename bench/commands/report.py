@@ -11,7 +11,7 @@ from ..terminal import print_outcome
 from .options import REPORT, SUCCESS, known
 
 if TYPE_CHECKING:
-    from ..presentation.tables import Table
+    from ..presentation.tables.table import Table
 
 EXAMPLES = block(
     "Examples",
@@ -76,7 +76,7 @@ def report(  # noqa: PLR0913 -- one parameter an option
     table = _table(folder or REPORT, name)
     if names:
         return _list_columns(table)
-    from ..presentation.selection import selected
+    from ..presentation.tables.selection import selected
 
     text = _written(selected(table, columns or [], rows or [], order), form, width)
     return _put(text, output)
@@ -134,9 +134,9 @@ def _list_columns(table: "Table") -> int:
 
 
 def _written(table: "Table", form: str, width: str) -> str:
-    from ..presentation.fragment import fragment
-    from ..presentation.latex import latex
-    from ..presentation.tables import comma_separated, markdown
+    from ..presentation.tables.fragment import fragment
+    from ..presentation.tables.latex import latex
+    from ..presentation.tables.table import comma_separated, markdown
 
     forms = {"md": markdown, "csv": comma_separated, "html": fragment}
     return latex(table, width) if form == "tex" else forms[form](table)

@@ -70,7 +70,7 @@ def compare(
     stopped = stops_at(made.rows, limit)
     print("\n".join(output.summary(made, stopped)))
     if markdown:
-        from ..presentation import tables
+        from ..presentation.tables import table as tables
 
         _write(markdown, tables.markdown(output.table(made, stopped, old, new)))
     if json:

@@ -115,9 +115,9 @@ def _ends(course: Course) -> str:
 
 def draw(runs: Sequence[Run], made: Sequence[Course], quantity: str) -> str:
     """Return the courses as SVG: those that changed most in colour, the others grey."""
-    from ..presentation.chart import LOOKS
-    from ..presentation.drawing import canvas, styled, svg_of
-    from ..presentation.figures import COLOURS, written
+    from ..presentation.figures.chart import LOOKS
+    from ..presentation.figures.drawing import canvas, styled, svg_of
+    from ..presentation.figures.style import COLOURS, written
 
     with styled():
         figure, (ax,) = canvas(4.2, 1)

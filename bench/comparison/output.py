@@ -4,7 +4,7 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 
-from ..presentation.tables import Column, Summary, Table
+from ..presentation.tables.table import Column, Summary, Table
 from ..presentation.text import shortened, visible
 from .compare import Comparison
 from .rows import ORDER, Row, Verdict, distinguishing

@@ -21,7 +21,7 @@ BULLET = "PyBullet"
 
 
 class Style(NamedTuple):
-    """A colour by its name in `presentation.figures`, a line style and a marker of matplotlib's."""
+    """A colour by its name in `presentation.figures.style`, a line and a marker of matplotlib's."""
 
     colour: str
     line: Any

@@ -5,10 +5,10 @@ from functools import partial
 from typing import NamedTuple
 
 from ..harness.record import Record
-from .columns import text
-from .layout import Layout
 from .results import Results, listed
-from .tables import Column, Summary
+from .tables.columns import text
+from .tables.layout import Layout
+from .tables.table import Column, Summary
 
 
 class Entered(NamedTuple):

@@ -19,7 +19,7 @@ from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..peers import registry
 from .results import Results, by_problem, listed
-from .tables import words
+from .tables.table import words
 
 # So near to the converged step a solver has solved it.
 TARGET = "1e-6"

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from .aligned import filled
 from .headlines import Headline, Verdict
 from .report import Written
 from .results import counted
-from .tables import words
+from .tables.aligned import filled
+from .tables.table import words
 from .text import visible
 
 # Chapter and question of the headlines that are printed, as far as there are any, then others.

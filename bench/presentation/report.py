@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 
 from ..experiments import SUITES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
-from .figures import Drawing, Sketch, drawn
+from .figures.sketch import Drawing, Sketch, drawn
 from .headlines import Answers, absent, answers
-from .latex import latex
-from .layout import Figure, Layout
-from .motion import Scene
-from .page import Shown, render
+from .motion.motion import Scene
+from .page.page import Shown, render
 from .results import Results, listed, plain, sift
 from .sections import MOTIONS, SECTIONS
-from .tables import Table, best_cells, comma_separated, markdown
+from .tables.latex import latex
+from .tables.layout import Figure, Layout
+from .tables.table import Table, best_cells, comma_separated, markdown
 
 # The forms that a table is written in, by the suffix of the file.
 FORMATS = {"md": markdown, "tex": latex, "csv": comma_separated}

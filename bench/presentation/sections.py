@@ -7,10 +7,10 @@ from typing import NamedTuple
 from ..experiments import EXPERIMENTS
 from ..experiments.pictures.readings import arm_motion, cloth_motion
 from ..harness.experiment import Experiment
-from .layout import Layout
-from .motion import Scene
+from .motion.motion import Scene
 from .results import Results
-from .tables import Table
+from .tables.layout import Layout
+from .tables.table import Table
 
 
 class Section(NamedTuple):

@@ -14,11 +14,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from ..presentation.drawing import STYLE, power
-from ..presentation.figures import COLOURS, written
-from ..presentation.motion import Moving, Scene, decades, length
-from ..presentation.scene_drawing import COLOUR_MAP, draw_arm, draw_cloth
-from ..presentation.view import seen
+from ..presentation.figures.drawing import STYLE, power
+from ..presentation.figures.scene_drawing import COLOUR_MAP, draw_arm, draw_cloth
+from ..presentation.figures.style import COLOURS, written
+from ..presentation.figures.view import seen
+from ..presentation.motion.motion import Moving, Scene, decades, length
 
 # A picture shows so many moments beside each other.
 MOMENTS = 4

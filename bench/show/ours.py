@@ -19,9 +19,9 @@ from reference import (
 from reference.arguments import FloatArray
 
 from ..experiments.arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING
-from ..presentation.motion import Moving, Scene
+from ..presentation.figures.view import ARM_VIEW, CLOTH_VIEW
+from ..presentation.motion.motion import Moving, Scene
 from ..presentation.results import label
-from ..presentation.view import ARM_VIEW, CLOTH_VIEW
 
 ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *curves)

@@ -8,8 +8,8 @@ from reference import IK_SOLVERS, STEP_SOLVERS, scenes
 from reference.arguments import choice
 from reference.formats import bvh
 
-from ..presentation import motion
-from ..presentation.motion import Scene
+from ..presentation.motion import motion
+from ..presentation.motion.motion import Scene
 from ..presentation.results import label
 from .ours import CLOTH, EXACT, SCENES, SECONDS, arm_scene, cloth_scene, drawn, fallen
 from .yours import ARM_TASKS, CLOTH_TASKS, Yours

@@ -26,7 +26,7 @@ from .words import (
 )
 
 _HERE = Path(__file__).parent
-_STYLES = (_HERE.parent / "presentation" / "page.css", _HERE / "page.css")
+_STYLES = (_HERE.parent / "presentation" / "page" / "page.css", _HERE / "page.css")
 _ROWS = 8
 WORDS = {
     "heading": sentence("Verdict on your solver"),

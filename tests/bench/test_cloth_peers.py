@@ -28,7 +28,7 @@ from bench.harness.worker import Done, Ready, Solved, Unfit
 from bench.peers import registry
 from bench.peers.cloth.ladder import Rung, motion_rungs, step_rungs
 from bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
-from bench.presentation.figures import drawn
+from bench.presentation.figures.sketch import drawn
 from bench.presentation.report import all_figures
 from bench.presentation.results import Results
 from reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler

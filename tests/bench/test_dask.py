@@ -29,7 +29,7 @@ from bench.harness.progress import Progress, listening
 from bench.harness.record import RecordFile, encode
 from bench.presentation.results import Results, plain
 from bench.presentation.sections import tables
-from bench.presentation.tables import markdown
+from bench.presentation.tables.table import markdown
 
 TINY = Scale(targets=3, seconds=0.001)
 ROOT = Path(__file__).parents[2]

@@ -6,7 +6,7 @@ import pytest
 from bench.experiments import Scale, blocks
 from bench.experiments.energy import figures, tables
 from bench.experiments.energy import measurement as suite
-from bench.presentation.figures import drawn
+from bench.presentation.figures.sketch import drawn
 from bench.presentation.results import Results
 
 STEPS = 100

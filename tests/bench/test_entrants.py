@@ -12,7 +12,7 @@ from bench.entrants import opening
 from bench.experiments.chain import figures as chain_figures
 from bench.experiments.cloth_peers import figures as cloth_figures
 from bench.harness.record import RecordFile
-from bench.presentation.figures import drawn
+from bench.presentation.figures.sketch import drawn
 from bench.presentation.results import Results, plain
 from bench.presentation.sections import tables
 from crosscheck.conformance.doors import open_contestant

@@ -19,8 +19,8 @@ from bench.experiments.robots import tables as robots
 from bench.experiments.timing import tables as timing
 from bench.presentation.results import Results
 from bench.presentation.sections import SECTIONS, tables
-from bench.presentation.tables import Share, comma_separated
-from bench.presentation.tex_text import escaped
+from bench.presentation.tables.table import Share, comma_separated
+from bench.presentation.tables.tex_text import escaped
 
 
 def column(table, heading):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from bench.experiments.robots import tables as robots
-from bench.presentation.figures import drawn
+from bench.presentation.figures.sketch import drawn
 from bench.presentation.results import Results
-from bench.presentation.tables import best_cells
+from bench.presentation.tables.table import best_cells
 
 KIND = "one start"
 ONE = robots.OF_KIND[KIND]

@@ -37,7 +37,7 @@ def test_only_record_names_the_result_file():
     assert namers == {"harness/record.py"}
 
 
-SHOWS = ["presentation/tables.py", "presentation/report.py", "experiments/chain/tables.py"]
+SHOWS = ["presentation/tables/table.py", "presentation/report.py", "experiments/chain/tables.py"]
 
 
 @pytest.mark.parametrize("file", SHOWS)

@@ -9,8 +9,8 @@ from bench.harness import metrics
 from bench.harness.record import FINISHED
 from bench.peers import registry
 from bench.presentation import headlines
-from bench.presentation.layout import source
 from bench.presentation.results import Results
+from bench.presentation.tables.layout import source
 
 N = 200
 FASTEST = "Fastest, misses penalised"

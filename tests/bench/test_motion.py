@@ -11,8 +11,9 @@ from browser import CHROMIUM, Browser
 
 from bench.experiments.pictures.readings import arm_motion, cloth_motion
 from bench.harness.record import RecordFile
-from bench.presentation import motion, report
-from bench.presentation.motion import Moving, Scene, data_of
+from bench.presentation import report
+from bench.presentation.motion import motion
+from bench.presentation.motion.motion import Moving, Scene, data_of
 from bench.presentation.results import Results
 
 KILOBYTE = 1024

@@ -13,8 +13,9 @@ from browser import CHROMIUM, Browser
 
 from bench.harness.record import FINISHED, RecordFile
 from bench.peers import registry
-from bench.presentation import motion, report
-from bench.presentation import page as pages
+from bench.presentation import report
+from bench.presentation.motion import motion
+from bench.presentation.page import page as pages
 from bench.presentation.sections import SECTIONS
 
 DESK, PHONE = (1440, 900), (390, 844)

@@ -23,10 +23,10 @@ from bench.harness.worker import Found, Solved, Unfit
 from bench.peers import registry
 from bench.peers.registry import ONE_START, Entry, Peer
 from bench.presentation import report
-from bench.presentation.layout import Layout
 from bench.presentation.results import Results
 from bench.presentation.sections import tables
-from bench.presentation.tables import Column
+from bench.presentation.tables.layout import Layout
+from bench.presentation.tables.table import Column
 from reference import STEP_SOLVERS
 from reference.implicit_euler.local_global import LocalGlobal
 

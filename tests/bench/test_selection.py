@@ -12,10 +12,10 @@ from bench import cli
 from bench.harness.metrics import Share, share
 from bench.harness.record import RecordFile
 from bench.presentation import sections
-from bench.presentation.fragment import fragment
 from bench.presentation.results import Results, plain
-from bench.presentation.selection import column_numbers, selected
-from bench.presentation.tables import Column, Table, best_cells, comma_separated, markdown
+from bench.presentation.tables.fragment import fragment
+from bench.presentation.tables.selection import column_numbers, selected
+from bench.presentation.tables.table import Column, Table, best_cells, comma_separated, markdown
 
 COLUMNS = (
     Column("robot", words=True),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bench import cli
-from bench.presentation import motion
+from bench.presentation.motion import motion
 from bench.show import ours
 from bench.show.yours import Yours
 from reference import ImplicitEuler, State, scenes, solve_ik

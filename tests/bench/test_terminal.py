@@ -10,10 +10,11 @@ from rich.console import Console
 
 from bench import cli, terminal
 from bench.harness.record import RecordFile
-from bench.presentation import aligned, outcome, report, sections
+from bench.presentation import outcome, report, sections
 from bench.presentation.headlines import Answers, Headline, Verdict
 from bench.presentation.results import Results, plain
-from bench.presentation.tables import Column, Table, naming, words
+from bench.presentation.tables import aligned
+from bench.presentation.tables.table import Column, Table, naming, words
 
 WIDTHS = range(40, 201)
 FEW = (40, 57, 80, 133, 200)

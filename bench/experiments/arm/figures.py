@@ -2,10 +2,10 @@
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.chart import SPAN, Axis, Chart, Panel, series
-from ...presentation.figures import Sketch, chart_sketch
+from ...presentation.figures.chart import SPAN, Axis, Chart, Panel, series
+from ...presentation.figures.sketch import Sketch, chart_sketch
 from ...presentation.results import Results, by_problem
-from ...presentation.tables import in_unit
+from ...presentation.tables.table import in_unit
 from . import CURVE
 
 

@@ -8,19 +8,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import (
-    LARGEST,
-    MEDIAN,
-    P95,
-    SOLVER,
-    share,
-    spread,
-    text,
-    titled,
-)
-from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem, label, leaders, settings
-from ...presentation.tables import Summary, words
+from ...presentation.tables.columns import LARGEST, MEDIAN, P95, SOLVER, share, spread, text, titled
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Summary, words
 from ..chain import BEYOND, CHAIN
 from ..chain import figures as chain
 from . import CURVE

@@ -4,8 +4,8 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.chart import GREATER, Axis, Chart, Panel, Series, series
-from ...presentation.figures import Sketch, chart_sketch
+from ...presentation.figures.chart import GREATER, Axis, Chart, Panel, Series, series
+from ...presentation.figures.sketch import Sketch, chart_sketch
 from ...presentation.results import Results, by_problem
 from . import BEYOND, CHAIN
 

@@ -7,7 +7,9 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import (
+from ...presentation.entered import entered
+from ...presentation.results import Results, by_problem, counted, label, settings, solvers
+from ...presentation.tables.columns import (
     LARGEST,
     MEDIAN,
     P95,
@@ -20,10 +22,8 @@ from ...presentation.columns import (
     titled,
     words_in,
 )
-from ...presentation.entered import entered
-from ...presentation.layout import Layout
-from ...presentation.results import Results, by_problem, counted, label, settings, solvers
-from ...presentation.tables import Column, Summary, words
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Column, Summary, words
 from .. import arm
 from . import BEYOND, CHAIN, figures
 

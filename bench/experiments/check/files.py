@@ -19,7 +19,7 @@ from crosscheck.robots.files import (
     Reading,
 )
 
-from ...presentation.tables import Column, Summary, Table
+from ...presentation.tables.table import Column, Summary, Table
 
 OUTCOMES = (AGREES, DIFFERS, DEVIATES, UNREAD, REFUSED, NEITHER, LOST)
 NAMES = tuple(dict.fromkeys(engine for engines in ENGINES.values() for engine in engines))

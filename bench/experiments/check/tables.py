@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import folded, number, text
-from ...presentation.layout import Layout
-from ...presentation.tables import Summary, in_unit, words
+from ...presentation.tables.columns import folded, number, text
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Summary, in_unit, words
 
 
 def _verdict(record: Record) -> str:

@@ -10,7 +10,8 @@ from reference import Outcome
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
-from ...presentation.columns import (
+from ...presentation.results import Results, by_problem, counted, label, settings
+from ...presentation.tables.columns import (
     LARGEST,
     MEDIAN,
     folded,
@@ -24,9 +25,8 @@ from ...presentation.columns import (
     titled,
     words_in,
 )
-from ...presentation.layout import Layout
-from ...presentation.results import Results, by_problem, counted, label, settings
-from ...presentation.tables import Column, Summary, words
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Column, Summary, words
 from ..pictures import figures as pictures
 from . import DAMPERS, FEW, ONE_STEP, SWING, figures
 

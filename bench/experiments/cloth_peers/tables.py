@@ -10,11 +10,11 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
-from ...presentation.columns import SOLVER, folded, least, number, text, words_in
 from ...presentation.entered import entered
-from ...presentation.layout import Layout
 from ...presentation.results import Results, label, listed
-from ...presentation.tables import Column, Summary, Table, listing, words
+from ...presentation.tables.columns import SOLVER, folded, least, number, text, words_in
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Column, Summary, Table, listing, words
 from ..published import problem as published
 from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY, figures
 from .readings import Point, points

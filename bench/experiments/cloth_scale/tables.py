@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
-from ...presentation.columns import folded, least, number, setting, text
-from ...presentation.layout import Layout
 from ...presentation.results import settings
-from ...presentation.tables import Column, Summary, listing, words
+from ...presentation.tables.columns import folded, least, number, setting, text
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Column, Summary, listing, words
 
 OURS = registry.SUPERNODAL.name
 PEERS = {library.name: library.label for library in registry.FACTORS}

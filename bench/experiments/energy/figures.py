@@ -1,7 +1,7 @@
 """The energy that every integrator leaves, against the time."""
 
-from ...presentation.chart import GREATER, Axis, Chart, Panel, series
-from ...presentation.figures import Sketch, chart_sketch
+from ...presentation.figures.chart import GREATER, Axis, Chart, Panel, series
+from ...presentation.figures.sketch import Sketch, chart_sketch
 from ...presentation.results import Results, by_problem
 
 

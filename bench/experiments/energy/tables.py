@@ -5,10 +5,10 @@ from functools import partial
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import lengths_of_steps, text, titled
-from ...presentation.layout import Layout
 from ...presentation.results import label, settings
-from ...presentation.tables import Column, Summary, in_unit, words
+from ...presentation.tables.columns import lengths_of_steps, text, titled
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Column, Summary, in_unit, words
 from . import figures
 
 LISTED = (100, 1_000, 10_000)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ...harness.record import Record
-from ...presentation.columns import number, text, titled
-from ...presentation.layout import Layout
 from ...presentation.results import label
-from ...presentation.tables import Column, Summary, words
+from ...presentation.tables.columns import number, text, titled
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Column, Summary, words
 
 
 def _summary(records: Sequence[Record]) -> Summary:

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import text
-from ...presentation.layout import Layout
 from ...presentation.results import Results, label, settings
-from ...presentation.tables import INTERVAL, Column, Summary, words
+from ...presentation.tables.columns import text
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import INTERVAL, Column, Summary, words
 
 Group = list[Record]
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import SOLVER, folded, least, number, text
-from ...presentation.layout import Layout
 from ...presentation.results import counted, settings
-from ...presentation.tables import Column, Summary, words
+from ...presentation.tables.columns import SOLVER, folded, least, number, text
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Column, Summary, words
 
 
 def _distance(record: Record) -> float | None:

@@ -2,7 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from ...presentation.figures import COLOURS, Sketch
+from ...presentation.figures.sketch import Sketch
+from ...presentation.figures.style import COLOURS
 from ...presentation.results import Results
 from . import ARM, CLOTH
 
@@ -50,7 +51,7 @@ def falling_cloth(results: Results) -> Sketch | None:
 
 
 def _draw_arms(data: Any) -> "Figure":
-    from ...presentation.drawing import canvas, power
+    from ...presentation.figures.drawing import canvas, power
 
     figure, axes = canvas(5.2, len(data), sharex=True, sharey=True)
     for ax, (evened, curve, spacing, ghosts) in zip(axes, data, strict=True):
@@ -67,8 +68,8 @@ def _draw_arms(data: Any) -> "Figure":
 
 
 def _draw_cloths(data: Any) -> "Figure":
-    from ...presentation.drawing import canvas
-    from ...presentation.scene_drawing import draw_cloth
+    from ...presentation.figures.drawing import canvas
+    from ...presentation.figures.scene_drawing import draw_cloth
 
     moments, times, pinned = data
     rows = -(-len(times) // COLUMNS)
@@ -85,7 +86,7 @@ def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "PathCollection"
     import matplotlib as mpl
     from matplotlib.colors import LogNorm
 
-    from ...presentation.view import ARM_VIEW, seen
+    from ...presentation.figures.view import ARM_VIEW, seen
 
     x, y, _ = seen(curve[:-1], ARM_VIEW)
     shades = mpl.colormaps["viridis"].resampled(SHADES)
@@ -96,8 +97,8 @@ def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "PathCollection"
 def _ghosts(ax: "Axes", ghosts: Any) -> None:
     import numpy as np
 
-    from ...presentation.scene_drawing import draw_arm
-    from ...presentation.view import ARM_VIEW, seen
+    from ...presentation.figures.scene_drawing import draw_arm
+    from ...presentation.figures.view import ARM_VIEW, seen
 
     for joints, alpha in zip(ghosts, np.linspace(0.06, 0.5, len(ghosts)), strict=True):
         draw_arm(ax, joints, alpha)

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...harness.record import Record
-from ...presentation.motion import Moving, Scene
+from ...presentation.figures.view import ARM_VIEW, CLOTH_VIEW
+from ...presentation.motion.motion import Moving, Scene
 from ...presentation.results import Results, counted, label
-from ...presentation.view import ARM_VIEW, CLOTH_VIEW
 from . import ARM_MOTION, CLOTH_MOTION
 
 # So many motions of a kind are on the page, those of entrants first: a cloth costs it some 60 kB.

@@ -8,17 +8,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.columns import effort, places, spread_of, text, words_in
-from ...presentation.layout import Layout
 from ...presentation.results import Results, label, settings
-from ...presentation.tables import (
-    INTERVAL,
-    Column,
-    Summary,
-    in_unit,
-    listing,
-    words,
-)
+from ...presentation.tables.columns import effort, places, spread_of, text, words_in
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from ..robots.readings import RULE, cut, solved, total
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published

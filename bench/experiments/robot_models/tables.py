@@ -5,10 +5,10 @@ from functools import partial
 
 from ...harness.record import Record
 from ...peers import registry
-from ...presentation.columns import text, titled
-from ...presentation.layout import Layout
 from ...presentation.results import Results, by_problem, counted, listed, problems, settings
-from ...presentation.tables import Column, Summary, words
+from ...presentation.tables.columns import text, titled
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Column, Summary, words
 from . import PEERS
 
 SIZES = {"links": "links", "moving joints": "joints", "freedoms": "freedoms"}

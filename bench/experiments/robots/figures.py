@@ -6,10 +6,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.chart import GREATER, Axis, Chart, Panel, Series, series
-from ...presentation.figures import Sketch, chart_sketch
-from ...presentation.layout import Figure
+from ...presentation.figures.chart import GREATER, Axis, Chart, Panel, Series, series
+from ...presentation.figures.sketch import Sketch, chart_sketch
 from ...presentation.results import Results
+from ...presentation.tables.layout import Figure
 from . import readings
 
 

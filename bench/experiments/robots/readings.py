@@ -17,9 +17,9 @@ from ...harness.metrics import Floats, Ranking
 from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
-from ...presentation.columns import words_in
 from ...presentation.results import Results, settings, steadiness
-from ...presentation.tables import words
+from ...presentation.tables.columns import words_in
+from ...presentation.tables.table import words
 from . import LIMIT_TOLERANCE, REACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}

@@ -15,7 +15,8 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
 from ...peers.registry import Peer
-from ...presentation.columns import (
+from ...presentation.results import Results, leaders, listed
+from ...presentation.tables.columns import (
     LARGEST,
     MEDIAN,
     at,
@@ -27,9 +28,8 @@ from ...presentation.columns import (
     titled,
     words_in,
 )
-from ...presentation.layout import Layout
-from ...presentation.results import Results, leaders, listed
-from ...presentation.tables import Cell, Column, Summary, in_unit, listing, words
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Cell, Column, Summary, in_unit, listing, words
 from . import REACHABLE, UNREACHABLE, figures
 from .overall.tables import aggregate, problem_map
 from .readings import (

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from functools import partial
 
 from ...harness.record import Record
-from ...presentation.columns import folded, number, text, titled
-from ...presentation.layout import Layout
 from ...presentation.results import Results
-from ...presentation.tables import Column, Summary
+from ...presentation.tables.columns import folded, number, text, titled
+from ...presentation.tables.layout import Layout
+from ...presentation.tables.table import Column, Summary
 
 Group = tuple[str, list[Record]]
 # So many laws have a column of their own, those that most faults break.

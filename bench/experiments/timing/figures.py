@@ -4,10 +4,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.chart import MARKS, Axis, Chart, Panel, Series, series
-from ...presentation.figures import Sketch, chart_sketch
-from ...presentation.layout import Figure
+from ...presentation.figures.chart import MARKS, Axis, Chart, Panel, Series, series
+from ...presentation.figures.sketch import Sketch, chart_sketch
 from ...presentation.results import Results, by_problem, solvers
+from ...presentation.tables.layout import Figure
 
 
 def timing(subject: str, unit: str, scale: float, title: str) -> Figure:

@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ....presentation.figures import COLOURS, Sketch, written
-from ....presentation.layout import Figure
+from ....presentation.figures.sketch import Sketch
+from ....presentation.figures.style import COLOURS, written
 from ....presentation.results import Results
+from ....presentation.tables.layout import Figure
 from ..readings import KINDS
 from .readings import Line, lines
 
@@ -94,7 +95,7 @@ def _star(line: Line, robot: str) -> str:
 
 def draw_map(data: Map) -> "Canvas":
     """Return the maps as a figure of matplotlib's."""
-    from ....presentation.drawing import canvas
+    from ....presentation.figures.drawing import canvas
 
     figure, axes = canvas(1.3 + 0.27 * len(data.solvers), len(data.panels), sharey=True)
     for ax, panel in zip(axes, data.panels, strict=True):

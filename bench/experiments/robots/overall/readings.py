@@ -10,7 +10,7 @@ from ....harness import metrics
 from ....harness.metrics import Floats, Interval, Ranking, Share
 from ....harness.record import Record
 from ....presentation.results import Results, listed
-from ....presentation.tables import words
+from ....presentation.tables.table import words
 from ..readings import (
     SHIFT,
     by_robot,

@@ -5,10 +5,10 @@ from dataclasses import replace
 from functools import partial
 
 from ....harness import metrics
-from ....presentation.columns import text, words_in
-from ....presentation.layout import Layout
 from ....presentation.results import leaders, listed
-from ....presentation.tables import INTERVAL, Column, Summary, in_unit, listing, words
+from ....presentation.tables.columns import text, words_in
+from ....presentation.tables.layout import Layout
+from ....presentation.tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from ..readings import KINDS, RULE, SCORE, TIES, how
 from . import figures
 from .readings import Line, Overall, lines, most_solved, overall

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..peers import registry
-from .results import label
+from ...peers import registry
+from ..results import label
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ _PLACES = 64
 
 
 class Look(NamedTuple):
-    """A colour by its name in `figures.COLOURS`, a line and a marker of matplotlib's."""
+    """A colour by its name in `style.COLOURS`, a line and a marker of matplotlib's."""
 
     colour: str
     line: Any

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..harness.metrics import Share
-from .tables import Cell, Table, best_cells, words
+from ...harness.metrics import Share
+from .table import Cell, Table, best_cells, words
 
 _COMPARE: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,

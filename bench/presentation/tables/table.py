@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from ..harness.metrics import Share
+from ...harness.metrics import Share
 
 Cell = str | int | float | bool | Share | None
 

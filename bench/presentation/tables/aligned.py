@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from rich.cells import cell_len
 
+from ..text import chunks
 from .fitting import Need, assigned, fits, fitting
-from .tables import Table, best_cells, words
-from .text import chunks
+from .table import Table, best_cells, words
 
 GAP = 2
 # Words are broken into pieces of so many letters where columns do not fit otherwise; where even

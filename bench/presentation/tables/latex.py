@@ -11,11 +11,11 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from ..harness.metrics import Share
+from ...harness.metrics import Share
+from ..text import chunks, shortened
 from .fitting import Need, assigned, fits, fitting, parts
-from .tables import Cell, Table, best_cells, naming, words
+from .table import Cell, Table, best_cells, naming, words
 from .tex_text import NARROW, breakable, escaped, fragments, wide
-from .text import chunks, shortened
 
 # A column and a page of most journals [pt], 84 and 177 mm.
 WIDTHS = {"column": 240.0, "page": 504.0}

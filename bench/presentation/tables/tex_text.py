@@ -4,8 +4,8 @@ import functools
 import re
 import unicodedata
 
-from .tables import POWER
-from .text import chunks
+from ..text import chunks
+from .table import POWER
 
 # A column of words may be as narrow as this, in units of its size.
 NARROW = 4.0

@@ -7,7 +7,7 @@ letters or in points, and none is ever less than the least that a column asks fo
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from .tables import Table, naming
+from .table import Table, naming
 
 
 class Need(NamedTuple):

@@ -2,7 +2,7 @@
 
 from html import escape
 
-from .tables import POWER, Column, Table, best_cells, words
+from .table import POWER, Column, Table, best_cells, words
 
 _CELL = "padding:0.15em 0.6em"
 _LINE = "border-bottom:1px solid currentColor"

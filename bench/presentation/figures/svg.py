@@ -6,7 +6,8 @@ import xml.etree.ElementTree as ElementTree
 
 from markupsafe import Markup
 
-from .figures import COLOURS, Drawing
+from .sketch import Drawing
+from .style import COLOURS
 
 _SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
 # What a drawing consists of; all else is left out, such as what describes the file.

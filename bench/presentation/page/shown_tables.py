@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from ..harness.metrics import Share
-from .figures import Drawing
-from .results import label
-from .tables import POWER, Cell, Column, Source, Summary, Table, best_cells, words
+from ...harness.metrics import Share
+from ..figures.sketch import Drawing
+from ..results import label
+from ..tables.table import POWER, Cell, Column, Source, Summary, Table, best_cells, words
 
 
 class Head(NamedTuple):

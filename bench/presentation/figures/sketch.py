@@ -14,26 +14,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..harness.record import check_regular
-from .text import shortened
+from ...harness.record import check_regular
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .chart import Chart
 
-COLOURS = {
-    "ink": "#22272e",
-    "faint": "#68717d",
-    "rule": "#d5d9df",
-    "blue": "#0b62a8",
-    "orange": "#c4500c",
-    "green": "#0b7a5b",
-    "purple": "#8a4a9f",
-    "brass": "#96690f",
-}
-# Letters of a name in a figure.
-LONGEST = 60
 # Drawings that are kept for as long as the process lives.
 _KEPT = 64
 _DIGEST = "plumbob figure"
@@ -78,7 +65,7 @@ class Sketch:
 
 _SOURCES = [
     Path(__file__).with_name(f"{name}.py")
-    for name in ("figures", "drawing", "chart", "scene_drawing")
+    for name in ("sketch", "style", "drawing", "chart", "scene_drawing", "view")
 ]
 _drawn: OrderedDict[str, tuple[str, bytes]] = OrderedDict()
 
@@ -132,12 +119,6 @@ def _update(found: Any, value: Any) -> None:
         _update(found, [getattr(value, field.name) for field in fields(value)])
     else:
         found.update(f"{type(value).__name__}:{value!r};".encode())
-
-
-def written(name: str) -> str:
-    """Return a name as matplotlib writes it letter by letter: no formula, no label to be hidden."""
-    short = shortened(name, LONGEST).replace("$", r"\$")
-    return f" {short}" if short.startswith("_") else short or "–"
 
 
 def chart_sketch(chart: "Chart") -> Sketch:

@@ -12,15 +12,16 @@ from typing import NamedTuple
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from ..harness.record import Record
-from . import motion, svg
-from .columns import words_in
-from .figures import Drawing
-from .headlines import Answers, Headline
-from .layout import Figure, Layout
-from .sections import SECTIONS, Section, offered
+from ...harness.record import Record
+from ..figures import svg
+from ..figures.sketch import Drawing
+from ..headlines import Answers, Headline
+from ..motion import motion
+from ..sections import SECTIONS, Section, offered
+from ..tables.columns import words_in
+from ..tables.layout import Figure, Layout
+from ..tables.table import Table
 from .shown_tables import ShownTable, rich, shown_table
-from .tables import Table
 
 _HERE = Path(__file__).parent
 # Without indents and comments, which a page need not carry.

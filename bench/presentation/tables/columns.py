@@ -5,10 +5,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from ..harness import metrics
-from ..harness.record import Record
-from .results import label
-from .tables import INTERVAL, Cell, Column, in_unit, words
+from ...harness import metrics
+from ...harness.record import Record
+from ..results import label
+from .table import INTERVAL, Cell, Column, in_unit, words
 
 MEDIAN, P95, LARGEST = "median", "95 %", "largest"
 _PLACES = {MEDIAN: 0, P95: 1, LARGEST: 2, "mean": 2}

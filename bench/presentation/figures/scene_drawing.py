@@ -9,7 +9,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from numpy.typing import NDArray
 
-from .figures import COLOURS
+from .style import COLOURS
 from .view import ARM_VIEW, CLOTH_VIEW, seen
 
 Floats = NDArray[np.float64]

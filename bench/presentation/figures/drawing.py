@@ -1,6 +1,6 @@
 """The common style of all figures, and how a chart is drawn; nothing here computes.
 
-Colours are tuned for a white page and named in `figures.COLOURS`, so that a page with a dark side
+Colours are tuned for a white page and named in `style.COLOURS`, so that a page with a dark side
 can put its own in their place. Solvers differ in line and marker as well as in colour.
 """
 
@@ -20,10 +20,10 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 
+from ..results import label
+from ..text import shortened
 from .chart import GREY, LINE, SPAN, Axis, Chart, Look, Panel, Series, looks
-from .figures import COLOURS, written
-from .results import label
-from .text import shortened
+from .style import COLOURS, written
 
 # On the page no figure is narrower than 38 rem [inch]; letters there are never below 7 points.
 WIDTH = 7.0

@@ -4,13 +4,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..harness.record import Record
+from ...harness.record import Record
+from ..results import Results
 from .provenance import provenance
-from .results import Results
-from .tables import NO_SUMMARY, Column, Source, Summary, Table
+from .table import NO_SUMMARY, Column, Source, Summary, Table
 
 if TYPE_CHECKING:
-    from .figures import Sketch
+    from ..figures.sketch import Sketch
 
 Figure = Callable[[Results], "Sketch | None"]
 

@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..harness.record import Record
-from ..peers import registry
-from .results import settings
+from ...harness.record import Record
+from ...peers import registry
+from ..results import settings
 
 # What is installed for an engine, by how the registry calls the engine.
 _PACKAGES = {

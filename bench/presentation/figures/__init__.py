@@ -1,0 +1,1 @@
+"""Figures: charts as data, sketches, and how they are drawn."""

@@ -1,0 +1,1 @@
+"""The arm on its curve and cloths beside each other, to be played in a browser."""
