@@ -13,7 +13,7 @@ from .commands import bench, check, records, report, show
 from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh
 from .comparison import command as comparison
 from .help_text import Command, Group, block
-from .presentation.text import visible
+from .text import visible
 from .verify import command as verify
 
 _UsageError: Any = typer.BadParameter.__base__

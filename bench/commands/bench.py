@@ -12,8 +12,8 @@ import typer
 from ..experiments import SUITES
 from ..harness.progress import listening
 from ..help_text import block
-from ..presentation.text import visible
 from ..terminal import print_tables, progress
+from ..text import visible
 from ..verify.command import program_of
 from .options import MISSED, REPORT, SUCCESS, Fresh, Output, known, writable
 from .report import write_report

@@ -163,7 +163,7 @@ def _rank(record: "Record") -> tuple[bool, str]:
 
 def _machines(found: "Iterable[Record]") -> set[str]:
     """Return the machines that records were measured on, in words."""
-    from ..presentation.text import visible
+    from ..text import visible
 
     made = (record.stamp.get("machine", {}) for record in found if record.stamp)
     return {visible(", ".join(map(str, machine.values()))) for machine in made if machine}

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..help_text import block
-from ..presentation.text import visible
 from ..terminal import print_outcome
+from ..text import visible
 from .options import REPORT, SUCCESS, known
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..help_text import block
-from ..presentation.text import visible
 from ..terminal import progress
+from ..text import visible
 from ..verify.command import PROGRAM
 from .options import REPORT, SUCCESS, known, writable
 

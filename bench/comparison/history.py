@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..harness.record import Record, RecordFile
-from ..presentation.text import shortened, visible
+from ..text import shortened, visible
 from .rows import RowKey, by_row
 
 BLOCKS = "▁▂▃▄▅▆▇█"

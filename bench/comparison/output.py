@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from ..presentation.tables.table import Column, Summary, Table
-from ..presentation.text import shortened, visible
+from ..text import shortened, visible
 from .compare import Comparison
 from .rows import ORDER, Row, Verdict, distinguishing
 

@@ -11,7 +11,7 @@ from crosscheck.conformance.greeting import Greeting
 from crosscheck.conformance.message import shown
 
 from ..peers import registry
-from ..presentation.text import visible
+from ..text import visible
 from .entrant import SUITE_TASKS, Entrant, Spec
 from .sources import commit_of, digest_of
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
+from ..text import visible
 from .headlines import Headline, Verdict
 from .report import Written
 from .results import counted
 from .tables.aligned import filled
 from .tables.table import words
-from .text import visible
 
 # Chapter and question of the headlines that are printed, as far as there are any, then others.
 _FIRST = (("kinematics", "Most accurate"), ("kinematics", "Fastest"), ("cloth", "Fastest"))

@@ -8,8 +8,8 @@ from typing import Any
 from ..harness.metrics import Ranking
 from ..harness.record import Record
 from ..peers import registry
+from ..text import all_visible, shortened, visible
 from .tables.table import words
-from .text import all_visible, shortened, visible
 
 # So much may a time that is shown be off, in relative terms, by the drift of its machine.
 PRECISION = 0.05

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from crosscheck.conformance.judgement import Report
 
 from ..harness.record import check_regular
-from ..presentation.text import visible
+from ..text import visible
 from . import json_file, junit, page, saved, terminal
 from .question import Question
 from .words import GOOD, Presentation

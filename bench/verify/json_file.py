@@ -8,7 +8,7 @@ from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.greeting import Greeting
 from crosscheck.conformance.judgement import CaseJudgement, Finding, Report, TaskReport
 
-from ..presentation.text import all_visible
+from ..text import all_visible
 from .words import GOOD, Say, advice, passed
 
 FORMAT: Literal["plumbob verify"] = "plumbob verify"

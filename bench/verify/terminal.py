@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from crosscheck.conformance.judgement import CaseJudgement, Report, TaskReport
 from crosscheck.conformance.sentence import Sentence, sentence
 
-from ..presentation.text import visible
+from ..text import visible
 from . import comparison, saved
 from .words import (
     GOOD,

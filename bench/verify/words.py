@@ -10,7 +10,7 @@ from crosscheck.conformance.judgement import CaseJudgement, TaskReport, Verdict
 from crosscheck.conformance.language import translator
 from crosscheck.conformance.sentence import Sentence, sentence
 
-from ..presentation.text import visible
+from ..text import visible
 
 Say = Callable[[Sentence], str]
 GOOD = (Verdict.RIGHT, Verdict.RIGHT_BUT)

@@ -119,7 +119,7 @@ def test_what_measures_never_imports_what_only_shows():
         "from ..presentation import results",
         "from bench.presentation import figures",
         "def f():\n    from ..presentation.results import label",
-        'importlib.import_module("bench.presentation.text")',
+        'importlib.import_module("bench.presentation.results")',
     ],
 )
 def test_an_import_of_what_only_shows_is_found(copy, line):

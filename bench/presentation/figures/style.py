@@ -1,6 +1,6 @@
 """The colours of figures, and how names are written in them."""
 
-from ..text import shortened
+from ...text import shortened
 
 COLOURS = {
     "ink": "#22272e",

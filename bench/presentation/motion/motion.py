@@ -16,8 +16,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from ...text import visible
 from ..figures.style import COLOURS
-from ..text import visible
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from rich.cells import cell_len
 
-from ..text import chunks
+from ...text import chunks
 from .fitting import Need, assigned, fits, fitting
 from .table import Table, best_cells, words
 

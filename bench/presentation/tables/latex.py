@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from ...harness.metrics import Share
-from ..text import chunks, shortened
+from ...text import chunks, shortened
 from .fitting import Need, assigned, fits, fitting, parts
 from .table import Cell, Table, best_cells, naming, words
 from .tex_text import NARROW, breakable, escaped, fragments, wide

@@ -4,7 +4,7 @@ import functools
 import re
 import unicodedata
 
-from ..text import chunks
+from ...text import chunks
 from .table import POWER
 
 # A column of words may be as narrow as this, in units of its size.
