@@ -55,7 +55,8 @@ def test_columns_are_named_by_heading_title_or_number(text, numbers):
     [
         ("solvr", "no column 'solvr': did you mean 'solver'?"),
         ("time, medina", "did you mean 'time, median"),
-        ("qqq", "expected one of"),
+        ("solvd", "did you mean 'solved (95 % interval)'?"),
+        ("qqq", "expected one of robot; "),
         ("0", "numbers from 1 to 5, got 0"),
         ("2-9", "numbers from 1 to 5, got 2-9"),
         ("4-2", "numbers from 1 to 5, got 4-2"),

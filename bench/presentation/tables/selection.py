@@ -193,6 +193,7 @@ def _by_number(table: Table, text: str, option: str) -> list[int]:
 def _unknown(table: Table, name: str, option: str) -> str:
     headings = [column.heading for column in table.columns]
     known = {_plain(word): c.heading for c in table.columns for word in (c.heading, c.title)}
+    known = {word[: len(_plain(name))]: heading for word, heading in known.items()} | known
     near: list[Any] = difflib.get_close_matches(_plain(name), known, n=1)
-    hint = f"did you mean {known[near[0]]!r}?" if near else f"expected one of {headings}"
+    hint = f"did you mean {known[near[0]]!r}?" if near else f"expected one of {'; '.join(headings)}"
     return f"{option}: {table.name} has no column {name!r}: {hint}"
