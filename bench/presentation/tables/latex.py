@@ -33,6 +33,8 @@ _LEAD = 1.2
 # Words are set in smaller letters before their column is narrower than this, in units of the size.
 _COMFORT = 9.0
 _PACKAGES = r"% needs \usepackage{booktabs,longtable} and siunitx of 2021 or newer (version 3)"
+# Room between a caption and what stands below it, of which the classes of LaTeX leave none.
+_SKIP = r"\setlength{\belowcaptionskip}{5pt}"
 _NUMBERS = (
     r"\sisetup{mode=text, reset-text-series=false, reset-text-family=false, "
     r"reset-text-shape=false, group-digits=integer, group-minimum-digits=4, group-separator={,}, "
@@ -335,7 +337,8 @@ def _parts(table: Table, columns: Sequence[_Typeset], width: float, size: int) -
 def _float(table: Table, made: Sequence[_Part], page: Paper, size: int) -> list[str]:
     """Return a table that stands on one page, its parts below one another."""
     name = "table*" if page.is_page else "table"
-    body = [rf"\begin{{{name}}}", r"\centering", _NUMBERS, _caption(table, page), *_setting(size)]
+    body = [rf"\begin{{{name}}}", r"\centering", _SKIP, _NUMBERS, _caption(table, page)]
+    body += _setting(size)
     for i, part in enumerate(made):
         body += [r"\par\medskip"] if i else []
         body += [
