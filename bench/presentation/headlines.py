@@ -1,7 +1,7 @@
 """The first screen’s answers: is it right, who is most accurate and fastest, who is absent.
 
 All are made from the records. Who is not told from the first ties with it: over robots by the pairs
-of `metrics.ranking`, among timed works where intervals overlap.
+of `metrics.ranking`, among timed cases where intervals overlap.
 """
 
 from collections import Counter
@@ -230,13 +230,13 @@ def _soonest(results: Results) -> Headline | None:
 
 
 def _timed(results: Results, subject: str) -> Headline | None:
-    """Return who is first in the works of a subject that more than one can do."""
+    """Return who is first in the cases of a subject that more than one can do."""
     works: Times = {}
     for problem, records in by_problem(results.all("timing", subject=subject)).items():
         rivals = [record for record in records if record.solver not in _NOT_RIVALS]
         if len(rivals) > 1:
             works[problem] = {_short(record.solver): _time(record) for record in rivals}
-    return _first("speed", SUBJECTS[subject], "works", works, f"timing_{subject}")
+    return _first("speed", SUBJECTS[subject], "cases", works, f"timing_{subject}")
 
 
 def _time(record: Record) -> Time:
@@ -247,14 +247,14 @@ def _time(record: Record) -> Time:
 
 
 def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headline | None:
-    """Return who is first most often, in how many works, and by what factors; ties are nobody's."""
+    """Return who is first most often, in how many cases, and by what factors; ties are nobody's."""
     order = [sorted(times.items(), key=lambda item: item[1]) for times in works.values() if times]
     decided = [ranked for ranked in order if not _is_tie(ranked)]
     if not order:
         return None
     if not decided:
         tied = _tied([name for name, _ in order[0]])
-        return Headline(chapter, asked, tied, f"no lead in {len(order)} {of}", table)
+        return Headline(chapter, asked, tied, f"nobody leads, 0/{len(order)} {of}", table)
     firsts = Counter(ranked[0][0] for ranked in decided)
     most = max(firsts.values())
     leaders = [name for name, count in firsts.items() if count == most]
@@ -265,7 +265,7 @@ def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headl
 
 
 def _ahead(won: Sequence[Sequence[tuple[str, Time]]]) -> str:
-    """Say by what factors the works were won."""
+    """Say by what factors the cases were won."""
     factors = [ranked[1][1].median / ranked[0][1].median for ranked in won if len(ranked) > 1]
     return f"{_range(factors)} × the next" if factors else "no rival arrives"
 

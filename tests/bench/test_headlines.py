@@ -81,7 +81,9 @@ def test_works_whose_rounds_overlap_are_nobodys(make, factor, answer):
         works[1] = make.timed("Plumbob, compiled", 1e-7 * factor)
     found = asked(works, "Forward kinematics", "speed")
     assert found.answer.startswith(answer)
-    assert found.detail == ("10.0 × the next, 1/1 works" if factor == 2 else "no lead in 1 works")
+    assert found.detail == (
+        "10.0 × the next, 1/1 cases" if factor == 2 else "nobody leads, 0/1 cases"
+    )
 
 
 def test_plain_python_and_the_limit_are_no_rivals(make):
