@@ -1,4 +1,4 @@
-"""The sample report: its headlines in the README are those of its page, and its links lead there."""
+"""The sample report: the README has the headlines of its page, and links that lead there."""
 
 import importlib.util
 import re
