@@ -13,6 +13,7 @@ from ...presentation.columns import (
     MEDIAN,
     P95,
     SOLVER,
+    iterations,
     share,
     spread,
     text,
@@ -70,12 +71,12 @@ accuracy = Layout(
         SOLVER,
         share("within tolerance", _met, best="greatest"),
         *spread("residual", "residual", "m", (LARGEST,)),
-        *spread("iterations", "iterations", of=(MEDIAN,)),
+        *iterations((MEDIAN,)),
         *(
             replace(column, folded=True)
             for column in (
                 *spread("residual", "residual", "m", (MEDIAN, P95)),
-                *spread("iterations", "iterations", of=(P95, LARGEST)),
+                *iterations((P95, LARGEST)),
             )
         ),
     ),

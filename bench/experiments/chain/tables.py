@@ -7,6 +7,7 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...presentation import columns
 from ...presentation.columns import (
     LARGEST,
     MEDIAN,
@@ -59,9 +60,8 @@ def _beyond_summary(records: Sequence[Record]) -> Summary:
 def _straightness(records: Sequence[Record]) -> str:
     bends = _over_reach(records, "bend")
     straight = metrics.share(bends <= STRAIGHT)
-    made = [spread_of(record, "iterations")[2] for record in records]
-    most = max((count for count in made if np.isfinite(count)), default=None)
-    counts = "iterations unsaid" if most is None else counted(int(most), "iteration")
+    made = np.concatenate([columns.iterations_said(record) for record in records])
+    counts = counted(int(made.max()), "iteration") if made.size else "iterations unsaid"
     return (
         f"{words(straight)}; at worst "
         f"{words_in(metrics.spread(bends).largest, '%')} of the reach off the line, "
@@ -79,7 +79,7 @@ beyond_reach = Layout(
         SOLVER,
         *spread("off the line", "bend", "m", (LARGEST,)),
         *spread("residual above distance − reach", "excess", "m", (LARGEST,)),
-        *spread("iterations", "iterations"),
+        *columns.iterations(),
         *(
             replace(column, folded=True)
             for column in (
