@@ -50,8 +50,8 @@ from .problems import OwnProblem
 _CHAIN_BUDGET = 50.0
 _BY_LOT = ("robots/", "unreachable/")
 _EXPLICIT_METHODS = ("explicit", "symplectic")
-NO_ROBOTS = "not asked: it offers no robot_inverse_kinematics, which robots with limits need"
-NO_BALLS = "not asked: it offers no inverse_kinematics, which skeletons of balls need"
+NO_ROBOTS = "not asked for robots: it offers no robot_inverse_kinematics"
+NO_BALLS = "not asked for chains: it offers no inverse_kinematics"
 
 
 class EnteredPeer(Peer):

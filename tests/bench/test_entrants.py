@@ -356,7 +356,7 @@ def test_one_start_of_robots_and_restarts_through_the_door_are_those_of_the_solv
           "--solver", "My FABRIK")  # fmt: skip
     made = {table.name: table for table in tables(Results(records()), ["ik"])}
     (row,) = [row for row in made["robots_success_one_start"].rows if "My FABRIK" in row]
-    assert "not asked: it offers no robot_inverse_kinematics" in str(row)
+    assert "not asked for robots: it offers no robot_inverse_kinematics" in str(row)
 
 
 ROBOT = """

@@ -10,9 +10,14 @@ import pytest
 
 from bench.cli import run_command
 from bench.entrants import opening
+from bench.experiments.arm.tables import accuracy
 from bench.experiments.chain import figures
+from bench.experiments.chain.tables import beyond_reach
+from bench.experiments.robots.tables import who
 from bench.harness.record import RecordFile
+from bench.presentation.entered import remarks_of_entrants
 from bench.presentation.figures import drawn
+from bench.presentation.headlines import absent, not_asked
 from bench.presentation.results import Results, plain
 from bench.presentation.sections import tables
 from bench.presentation.tables import words
@@ -22,6 +27,7 @@ IK = re.search(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)[1]
 SILENT = IK.replace(', "iterations": k + 1', "").replace(
     'PLUMBOB = {"name": "My FABRIK", "version": "0.1"}', ""
 )
+CHAINS = {"task": "chain", "stratum": "beyond", "title": "every chain"}
 NO_ROBOTS = "my_ik.py was not asked for robots: it offers no robot_inverse_kinematics"
 
 
@@ -73,3 +79,41 @@ def test_who_counts_nothing_has_no_curve_over_iterations(records):
     results = Results(records)
     assert figures.iterations(results) is None
     assert "my_ik.py" in drawn(figures.ik_residuals(results)).svg
+
+
+def test_peers_that_were_not_asked_are_not_said_to_be_missing(printed, records, made):
+    assert "not installed" not in printed
+    assert made["robots_solvers"].rows == ()
+    assert absent(Results(records)) == []
+
+
+def test_peers_that_took_part_or_are_missing_are_told_from_those_that_nobody_asked(make):
+    mine = make.raced("My solver", "one start")
+    mine.facts["entrant"] = True
+    results = Results([make.raced("Plumbob LM", "one start"), mine,
+                       make.lacking("mink", "one start", "mink is not installed")])  # fmt: skip
+    table = who(results)
+    versions = {row[0]: row[2] for row in table.rows}
+    assert versions == {"Plumbob LM": "1.2", "mink": "not installed", "My solver": "1.2"}
+    assert table.summary.sentence.startswith("2 of 3 that were asked took part; not asked: Pinoc")
+    assert absent(results) == ["mink"]
+    assert "pink" in not_asked(results)
+
+
+def test_who_offers_no_robots_gets_a_sentence_and_no_table_of_dashes(printed, made):
+    assert printed.count(NO_ROBOTS) == 1
+    assert "Robots, one start" not in printed
+    table = made["robots_success_one_start"]
+    (mark,) = [j for j, one in enumerate(table.columns) if one.title == "mark"]
+    assert not table.columns[mark].folded
+    assert table.rows[0][mark] == NO_ROBOTS.removeprefix("my_ik.py was ")
+
+
+def test_who_offers_no_chains_has_no_row_of_numbers_there(make):
+    none = make.record("ik", "chain/all", "Mine", {}, facts={**CHAINS, "entrant": True},
+                       notes={"remark": "not asked for chains: it offers nothing"})  # fmt: skip
+    results = Results([none, make.beyond("ccd", 0.5)])
+    assert [row[1] for row in beyond_reach(results).rows] == ["CCD"]
+    assert accuracy(results).rows == ()
+    (sentence,) = remarks_of_entrants(results, ["ik"])
+    assert sentence == "Mine was not asked for chains: it offers nothing."

@@ -90,7 +90,8 @@ beyond_reach = Layout(
         ),
     ),
     subjects=lambda results: (
-        results.all("arm", task=arm.BEYOND) + results.all("ik", task=CHAIN, stratum=BEYOND)
+        results.all("arm", task=arm.BEYOND)
+        + [r for r in results.all("ik", task=CHAIN, stratum=BEYOND) if r.arrays]
     ),
     shows="The best answer is the straight line from root to target, which leaves exactly "
     "distance − reach. “Off the line” is the joint farthest from that line.",
