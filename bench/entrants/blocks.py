@@ -184,16 +184,17 @@ def _of_kinematics(entrant: Entrant, scale: Scale) -> Iterator[Block]:
             yield from _as_in_the_paper(entrant, method, scale)
     else:
         facts = {"task": chain.CHAIN, "stratum": chain.BEYOND, "title": "every chain"}
-        yield Block("ik", "chain/all", entrant.name, partial(_not_asked, NO_BALLS), facts=facts)
+        yield Block("ik", "chain/all", entrant.name, partial(not_asked, NO_BALLS), facts=facts)
     if robot.TASK in entrant.tasks:
         yield from _on_robots(entrant, scale)
     else:
         facts = {"task": REACHABLE, "title": "every robot"}
-        measure, settings = partial(_not_asked, NO_ROBOTS), {"kind": "any"}
+        measure, settings = partial(not_asked, NO_ROBOTS), {"kind": "any"}
         yield Block("ik", "robots/all", entrant.name, measure, settings, facts=facts)
 
 
-def _not_asked(why: str) -> Measured:
+def not_asked(why: str) -> Measured:
+    """Return a block without numbers that says why a solver is not asked."""
     return Measured({}, {"remark": why})
 
 

@@ -10,11 +10,13 @@ import pytest
 
 from bench.cli import run_command
 from bench.entrants import opening
+from bench.experiments import SUITES
 from bench.experiments.arm.tables import accuracy
 from bench.experiments.chain import figures
 from bench.experiments.chain.tables import beyond_reach
 from bench.experiments.robots.tables import who
 from bench.harness.record import RecordFile
+from bench.peers import registry
 from bench.presentation.entered import remarks_of_entrants
 from bench.presentation.figures import drawn
 from bench.presentation.headlines import absent, not_asked
@@ -117,3 +119,44 @@ def test_who_offers_no_chains_has_no_row_of_numbers_there(make):
     assert accuracy(results).rows == ()
     (sentence,) = remarks_of_entrants(results, ["ik"])
     assert sentence == "Mine was not asked for chains: it offers nothing."
+
+
+def listed(*suites):
+    """The lines of a list, by what they begin with."""
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        assert run_command(["bench", *suites, "--list", "--with", "my_ik.py"]) == 0
+    return out.getvalue().splitlines()
+
+
+def test_the_list_of_a_suite_names_each_problem_once_and_lines_up(folder):
+    lines = listed("ik")
+    assert "  chain/near" in lines
+    assert not any(line.startswith("  robots/all") for line in lines)
+    titled = [line for line in lines if re.match(r"  (robots|unreachable)/(panda|pr2)  ", line)]
+    assert len({len(line) - len(line.split("  ")[-1].strip()) for line in titled}) == 1
+    assert all(line.endswith(("  Franka Panda", "  PR2, right arm")) for line in titled)
+    solvers = lines[lines.index("solvers") + 1 :]
+    said = {line.split("  ")[1]: line.split("  ")[-1].strip() for line in solvers if line}
+    assert said["my_ik.py"] == "entered, my_ik.py"
+    assert re.fullmatch(r"\d+\.\d+\S*", said["Plumbob LM"])
+    assert re.fullmatch(r"\d+\.\d+\S*", said["ccd"])
+    assert set(said) >= {"mink", "TRAC-IK, 5 ms"}
+    columns = {line.rindex("  ") for line in solvers if line.startswith("  ")}
+    assert len(columns) == 1
+
+
+def test_a_peer_that_is_missing_is_listed_as_such(folder, monkeypatch):
+    monkeypatch.setattr(registry.Peer, "version", "")
+    (line,) = [line for line in listed("ik") if line.startswith("  mink  ")]
+    assert line.endswith("  not installed")
+
+
+def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder):
+    lines = listed()
+    headings = [line.partition(":")[0] for line in lines if line and line[0] != " "]
+    assert headings[: len(SUITES)] == list(SUITES)
+    assert len(lines) <= 5 * len(SUITES) + 1
+    assert max(map(len, lines)) <= 100
+    assert lines[-1] == "All problems and solvers of one: plumbob bench SUITE --list"
+    assert "joint positions, Pinocchio; " in "\n".join(lines)
+    assert "joint positions, Pinocchio joint" not in "\n".join(lines)
