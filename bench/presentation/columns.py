@@ -84,6 +84,16 @@ def spread_of_iterations(record: Record) -> Sequence[int | float | None]:
     return metrics.whole(said) if said.size else (None, None, None)
 
 
+def allowed() -> Column:
+    """Return the column of the most iterations that a solver may make."""
+    return Column("iterations allowed", read=lambda record: record.settings.get("max_iterations"))
+
+
+def remark() -> Column:
+    """Return the column of what is to be said of a record."""
+    return text("remark", lambda record: record.notes.get("remark", ""))
+
+
 def iterations(of: Sequence[str] = (MEDIAN, LARGEST)) -> list[Column]:
     """Return the columns of the iterations of a record's solves, empty where they are unsaid."""
     return places("iterations", "", of, spread_of_iterations)

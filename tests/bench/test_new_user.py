@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from bench.cli import run_command
-from bench.entrants import opening
-from bench.experiments import SUITES
+from bench.entrants import opening, selection
+from bench.experiments import SUITES, blocks
 from bench.experiments.arm.tables import accuracy
 from bench.experiments.chain import figures
 from bench.experiments.chain.tables import beyond_reach
@@ -48,7 +48,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def printed(folder):
     """What the first run prints."""
-    problems = ("chain", "published/fabrik", "robots/all")
+    problems = ("chain", "published/fabrik/reachable", "robots/all")
     asked = [word for name in problems for word in ("--problem", name)]
     with contextlib.redirect_stdout(io.StringIO()) as out:
         run_command(["bench", "ik", "--quick", "--targets", "2", "--with", "my_ik.py",
@@ -72,7 +72,7 @@ def test_iterations_that_nobody_counts_are_unsaid_and_no_number(printed, made):
     for name in ("accuracy", "q1_beyond_reach", "published_fabrik"):
         (row, *_) = made[name].rows
         said = {c.heading: words(v) for c, v in zip(made[name].columns, row, strict=True)}
-        counts = [v for h, v in said.items() if "iteration" in h or "here" in h]
+        counts = [v for h, v in said.items() if h.startswith("iterations, ") or "here" in h]
         assert set(counts) == {"–"}, name
         assert "not a number" not in said.values()
 
@@ -160,3 +160,27 @@ def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder):
     assert lines[-1] == "All problems and solvers of one: plumbob bench SUITE --list"
     assert "joint positions, Pinocchio; " in "\n".join(lines)
     assert "joint positions, Pinocchio joint" not in "\n".join(lines)
+
+
+def test_entrants_may_make_as_many_iterations_as_ours(folder, records, made):
+    entrants = opening.opened(opening.named(["my_ik.py"]), ["ik"])
+    scale = selection.scale_of("quick", 2, entrants, [])
+    asked: dict[str, dict[str, object]] = {}
+    for block in blocks("ik", scale):
+        if block.problem.startswith(("chain/", "published/fabrik")) and "max_iterations" in (
+            block.settings
+        ):
+            asked.setdefault(block.problem, {})[block.solver] = {
+                name: block.settings[name] for name in ("tolerance", "max_iterations")
+            }
+    assert len(asked) == 6
+    for problem, limits in asked.items():
+        assert limits["my_ik.py"] == limits["ccd"], problem
+
+
+@pytest.mark.parametrize("name", ["accuracy", "q1_beyond_reach"])
+def test_tables_say_how_many_iterations_each_may_make_and_who_was_cut_short(made, name):
+    (j,) = [j for j, one in enumerate(made[name].columns) if one.title == "iterations allowed"]
+    assert {row[j] for row in made[name].rows} == {1000}
+    assert not made[name].columns[j].folded
+    assert any(one.title == "remark" for one in made[name].columns)

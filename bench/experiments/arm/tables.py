@@ -13,7 +13,9 @@ from ...presentation.columns import (
     MEDIAN,
     P95,
     SOLVER,
+    allowed,
     iterations,
+    remark,
     share,
     spread,
     text,
@@ -72,6 +74,8 @@ accuracy = Layout(
         share("within tolerance", _met, best="greatest"),
         *spread("residual", "residual", "m", (LARGEST,)),
         *iterations((MEDIAN,)),
+        allowed(),
+        remark(),
         *(
             replace(column, folded=True)
             for column in (

@@ -80,6 +80,8 @@ beyond_reach = Layout(
         *spread("off the line", "bend", "m", (LARGEST,)),
         *spread("residual above distance − reach", "excess", "m", (LARGEST,)),
         *columns.iterations(),
+        columns.allowed(),
+        columns.remark(),
         *(
             replace(column, folded=True)
             for column in (

@@ -21,6 +21,7 @@ from ...presentation.columns import (
     at,
     effort,
     places,
+    remark,
     share,
     text,
     times,
@@ -201,7 +202,7 @@ def success(kind: str) -> Layout:
             *map(_if_measured, columns),
             text("mark", _mark),
             *(replace(_if_measured(column), folded=True) for column in folded),
-            replace(text("remark", lambda record: record.notes.get("remark", "")), folded=True),
+            replace(remark(), folded=True),
         ),
         shows=f"{RULE} Medians are of all targets begun, those that failed included. Residuals "
         "are of those solved, not cut off at the tolerance. “Claimed but not so” counts "
