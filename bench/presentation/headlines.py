@@ -5,12 +5,12 @@ of `metrics.ranking`, among timed cases where intervals overlap.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ..experiments.cloth_peers import ONE_STEP
+from ..experiments.cloth_peers import MISSING, ONE_STEP
 from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.overall.readings import Overall, overall
@@ -124,21 +124,32 @@ def _in_a_stratum(record: Record) -> int:
 
 
 def absent(results: Results) -> list[str]:
-    """Return the peers that took no part in what was measured."""
-    return [*_absent_solvers(results), *_absent_engines(results)]
+    """Return the peers that were asked and took no part."""
+    packages = {record.solver for record in results.all("cloth", task=MISSING)}
+    engines = [peer.engine for peer in registry.cloth_peers() if peer.package in packages]
+    return [*_absent_solvers(results), *_for_cloth(engines)]
 
 
 def _absent_solvers(results: Results) -> list[str]:
     records = results.all("ik", task=REACHABLE)
-    here = {record.solver for record in measured(records)}
-    peers = registry.PEERS if records else ()
-    return [p.title for p in peers if here.isdisjoint(p.called(entry) for entry in p.entries)]
+    here, asked = ({r.solver for r in some} for some in (measured(records), records))
+    names = {peer.title: set(map(peer.called, peer.entries)) for peer in registry.PEERS}
+    return [title for title, mine in names.items() if mine & asked and not mine & here]
 
 
-def _absent_engines(results: Results) -> list[str]:
+def not_asked(results: Results) -> list[str]:
+    """Return the peers of which nothing is on record, where there is something of others."""
+    asked = {record.solver for record in results.all("ik", task=REACHABLE)}
+    peers = registry.PEERS if asked else ()
+    solvers = [p.title for p in peers if asked.isdisjoint(map(p.called, p.entries))]
     here = {registry.find(point.solver).engine for point in points(results, ONE_STEP)}
-    engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers()) if here else ()
-    return [f"{engine} (cloth)" for engine in engines if engine not in here]
+    others = [peer.engine for peer in registry.cloth_peers() if here and peer.engine not in here]
+    missing = absent(results)
+    return [*solvers, *(name for name in _for_cloth(others) if name not in missing)]
+
+
+def _for_cloth(engines: Iterable[str]) -> list[str]:
+    return [f"{engine} (cloth)" for engine in dict.fromkeys(engines)]
 
 
 def _compared(results: Results) -> dict[str, Overall]:
