@@ -35,9 +35,8 @@ class SmallDiscipline:
 
     def judge(self, asked, greeting, method):
         judgements = [self._judged(one) for one in asked]
-        bad = [one for one in judgements if one.verdict > Verdict.RIGHT_BUT]
         wrong = [a for a, j in zip(asked, judgements, strict=True) if j.verdict is Verdict.WRONG]
-        return TaskReport(self.task, method, judgements, self._why(wrong), next(iter(bad), None))
+        return TaskReport(self.task, method, judgements, self._why(wrong))
 
     def _judged(self, one: Asked):
         expected = self.right(one.case)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import stats
 
-from .quantities import SOLVED, is_answer, is_cut_by_clock, same_bits, worse_sign
+from .quantities import SOLVED, ended_by_clock, is_answer, is_cut_by_clock, same_bits, worse_sign
 from .rows import Pair, Row, RowKey, Verdict
 
 
@@ -64,8 +64,17 @@ def _prefixes(old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return old, new
 
 
+def _without_ended(pair: Pair, old: np.ndarray, new: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return arrays of a value a motion without the motions that a clock ended in either run."""
+    ended = [ended_by_clock(record)[: len(old)] for record in pair if old.ndim == 1]
+    if not all(len(one) == len(old) == len(new) for one in ended):
+        return old, new
+    kept = ~np.any(ended, axis=0) if ended else ...
+    return old[kept], new[kept]
+
+
 def _compared(key: RowKey, name: str, pair: Pair) -> Row:
-    old, new = _prefixes(pair.old.arrays[name], pair.new.arrays[name])
+    old, new = _without_ended(pair, *_prefixes(pair.old.arrays[name], pair.new.arrays[name]))
     if same_bits(old, new):
         return Row(key, name, Verdict.SAME)
     if old.shape != new.shape:

@@ -31,6 +31,7 @@ _MERITS = frozenset({"solved", "held", "covered", "same"})
 SOLVED = "solved"
 # A setting by which a clock ends a solve: its answers differ from run to run.
 _TIME_LIMIT = "seconds"
+_NONE = np.zeros(0)
 # What may change between runs of one row: the version of what is measured.
 _MOVING = frozenset({"version"})
 
@@ -55,6 +56,17 @@ def worse_sign(suite: str, name: str) -> int:
 def is_cut_by_clock(record: Record) -> bool:
     """Return whether a time limit ends each of its solves."""
     return _TIME_LIMIT in record.settings
+
+
+def ended_by_clock(record: Record) -> np.ndarray:
+    """Return which motions of a record a budget of time ended early; empty if it holds none.
+
+    A solver that fails leaves a remark, and where there is one none is excused.
+    """
+    arrays = record.arrays
+    if not {"frames", "wanted"} <= arrays.keys() or arrays.get("remark_particles", _NONE).size:
+        return np.zeros(0, dtype=bool)
+    return np.asarray(arrays["frames"] < arrays["wanted"])
 
 
 def row_settings(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -162,7 +162,7 @@ def _judge(
         report = ask(contestant, question)
     except NoGreetingError as error:
         raise ValueError(say(sentence(
-            "solver: expected a greeting, got none: {why}", why=error.failure.sentence
+            "solver: expected one that can be started: {why}", why=error.failure.sentence
         ))) from None  # fmt: skip
     return files.write(report, Presentation(say, language, words, files.saved(report, question)))
 

@@ -111,16 +111,22 @@ def _trouble(task: TaskReport, context: Presentation, room: int) -> list[str]:
     failure = task.smallest_failure
     if failure is None:
         return [f"{title(task)}:", *_cut(why, _WHY)]
-    told = sentence(
-        "Smallest failing case, {name}: {what}",
-        name=f'"{failure.case.name}"',
-        what=" ".join(map(say, complaints(failure)[:1])),
-    )
-    case = _cut(wrapped(say(told), WIDTH, "  "), _COMPLAINT)
+    case = _cut(_failing(task, failure, say), _COMPLAINT)
     again = _again(task, context)
     room -= 1 + len(case) + len(again)
     why = _cut(why, max(2, min(_WHY, room - 3)))
     return [f"{title(task)}:", *why, *case, *_numbers(failure, say, room - len(why) - 1), *again]
+
+
+def _failing(task: TaskReport, failure: CaseJudgement, say: Say) -> list[str]:
+    """Return the smallest failing case and what is wrong with it, where no law has said so yet."""
+    what, law = " ".join(map(say, complaints(failure)[:1])), task.diagnosis.first_broken
+    if law is not None and say(law).endswith(what) and failure.case.name in say(law):
+        return []
+    told = sentence(
+        "Smallest failing case, {name}: {what}", name=f'"{failure.case.name}"', what=what
+    )
+    return wrapped(say(told), WIDTH, "  ")
 
 
 def _again(task: TaskReport, context: Presentation) -> list[str]:

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from .sentence import Sentence
 
 
@@ -30,3 +32,8 @@ class Case:
     about: Sentence
     follows: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        """How many numbers the request holds."""
+        return sum(int(np.size(value)) for value in self.inputs.values())

@@ -52,7 +52,7 @@ class NoGreetingError(ValueError):
     """A solver did not say what it is, so that nothing can be asked; `failure` says why."""
 
     def __init__(self, failure: Failure) -> None:
-        super().__init__(f"solver: expected a greeting, got none: {failure.sentence}")
+        super().__init__(f"solver: expected one that can be started: {failure.sentence}")
         self.failure = failure
 
 

@@ -109,6 +109,18 @@ class Diagnosis:
     tried: int = 0
 
 
+def smallest_failure(judgements: Sequence[CaseJudgement], explained: bool) -> CaseJudgement | None:
+    """Return the failing case with the fewest numbers, or None.
+
+    Where no fault explains wrong answers, it is one of those with the worst verdict.
+    """
+    failing = [one for one in judgements if one.verdict >= Verdict.WRONG]
+    if failing and not explained:
+        worst = max(one.verdict for one in failing)
+        failing = [one for one in failing if one.verdict == worst]
+    return min(failing, key=lambda one: one.case.size, default=None)
+
+
 @dataclass(frozen=True, eq=False)
 class TaskReport:
     """All about one task, or one method of inverse kinematics.
@@ -117,14 +129,17 @@ class TaskReport:
         task: its name; method: of inverse kinematics, else "".
         judgements: one a case.
         diagnosis: of what is wrong or inferred.
-        smallest_failure: the failing case with the fewest numbers, or None.
     """
 
     task: str
     method: str
     judgements: Sequence[CaseJudgement]
     diagnosis: Diagnosis
-    smallest_failure: CaseJudgement | None
+
+    @property
+    def smallest_failure(self) -> CaseJudgement | None:
+        """As of the function `smallest_failure`."""
+        return smallest_failure(self.judgements, bool(self.diagnosis.explanations))
 
     @property
     def verdict(self) -> Verdict:

@@ -4,6 +4,7 @@ import html.parser
 import json
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from crosscheck.conformance.greeting import Greeting
 from crosscheck.conformance.judgement import (
     CaseJudgement,
     Diagnosis,
+    Explanation,
     Finding,
     Report,
     TaskReport,
@@ -179,9 +181,27 @@ def undecided(verdict, digits=None):
     finding = Finding("a law", verdict, np.nan, np.inf, "m", words)
     judged = CaseJudgement(case, Answer({"total": 1.0}, 1e-3), (finding,), {}, digits, 1e-3)
     diagnosis = Diagnosis(behaviour=sentence("Damping is explicit."))
-    return Report(
-        Greeting(1, ("energy",)), [TaskReport("energy", "", [judged], diagnosis, None)], 0
-    )
+    return Report(Greeting(1, ("energy",)), [TaskReport("energy", "", [judged], diagnosis)], 0)
+
+
+@pytest.mark.parametrize(("explained", "case"), [(False, "large"), (True, "small")])
+def test_what_is_saved_of_a_broken_task_is_what_it_breaks_on(explained, case):
+    found = {"small": Verdict.WRONG, "larger": Verdict.BROKEN, "large": Verdict.BROKEN}
+    size = {"small": 1, "large": 2, "larger": 3}
+    judgements = []
+    for name, verdict in found.items():
+        asked = Case(name, "energy", {"masses": np.ones(size[name])}, "x", sentence("It is all."))
+        finding = Finding("a law", verdict, 1.0, 0.0, "m", sentence(f"{name} is off."))
+        judgements.append(CaseJudgement(asked, Answer({}, 1e-3), (finding,), {}))
+    why = (Explanation(("a fault",), sentence("A fault."), 1.0, 0.0),) if explained else ()
+    task = TaskReport("energy", "", judgements, Diagnosis(why))
+    assert task.smallest_failure.case.name == case
+    assert TaskReport("energy", "", [], Diagnosis()).smallest_failure is None
+    law = sentence("The first law to break is 'a law', in the case 'large': large is off.")
+    told = replace(task, diagnosis=replace(task.diagnosis, first_broken=law))
+    text = normal(" ".join(terminal.lines(Report(Greeting(1, ("energy",)), [told], 0), shown())))
+    assert text.count("large is off.") == 1
+    assert ("Smallest failing case" in text) is explained
 
 
 @pytest.mark.parametrize("verdict", Verdict)
@@ -224,7 +244,7 @@ def texts_of(value):
 def test_no_text_of_json_holds_a_control_character():
     greeting = Greeting(1, TASKS, HOSTILE, HOSTILE, HOSTILE, methods=(HOSTILE,))
     one = undecided(Verdict.RIGHT).tasks[0]
-    report = Report(greeting, [TaskReport("energy", HOSTILE, one.judgements, Diagnosis(), None)], 0)
+    report = Report(greeting, [TaskReport("energy", HOSTILE, one.judgements, Diagnosis())], 0)
     found = json.loads(json_file.text(report, speaker("en")))
     assert [text for text in texts_of(found) if not text.isprintable()] == []
     assert found["solver"]["methods"] == [found["tasks"][0]["method"]]

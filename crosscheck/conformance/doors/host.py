@@ -38,6 +38,8 @@ from ..task import TASKS
 # Functions by these names are methods of inverse kinematics where nothing declares methods.
 METHODS = ("ccd", "fabrik")
 INVERSE_KINEMATICS = "inverse_kinematics"
+# Names that a function of something else may have by chance.
+COMMON_NAMES = frozenset({"track", "resample", "energy"})
 
 
 class OfferError(ValueError):
@@ -106,27 +108,41 @@ def _functions(found: object, methods: Any) -> dict[str, Callable[..., Any]]:
     return {
         name: function
         for name, function in functions.items()
-        if callable(function) and _takes_some(function, name)
+        if callable(function) and _is_meant(function, name)
     }
 
 
-def _takes_some(function: Callable[..., Any], name: str) -> bool:
-    """Return whether a function takes something of its task: others have its name by chance."""
-    task = TASKS.get(name, TASKS[INVERSE_KINEMATICS])
-    return any(takes(function, field.name) for field in task.inputs)
+def _is_meant(function: Callable[..., Any], name: str) -> bool:
+    """Return whether a function is of its task; one of a common name has to take an input."""
+    if name not in COMMON_NAMES:
+        return True
+    return any(takes(function, field.name) for field in TASKS[name].inputs)
 
 
 def _offers_nothing(found: object, name: str) -> str:
-    inside = found if isinstance(found, Mapping) else dir(found)
-    own = [str(one) for one in inside if callable(_get(found, one)) and not one.startswith("_")]
+    own = _names(found)
     namesakes = [one for one in own if one in TASKS]
     if namesakes:
         arguments = ", ".join(field.name for field in TASKS[namesakes[0]].inputs)
         return f"{name}: expected {namesakes[0]} to take some of {arguments}, got others"
-    hints = [(one, did_you_mean(one, TASKS)) for one in own]
-    hint = next((f" ({one}{words})" for one, words in hints if words), "")
-    got = ", ".join(own[:8]) or "none"
-    return f"{name}: expected functions named as some of {', '.join(TASKS)}, got {got}{hint}"
+    hints = ((one, did_you_mean(one, TASKS).removeprefix("; ")) for one in own[:8])
+    got = ", ".join(f"{one} ({hint})" if hint else one for one, hint in hints) or "none"
+    return f"{name}: expected functions named as some of {', '.join(TASKS)}, got {got}"
+
+
+def _names(found: object) -> list[str]:
+    """Return the names of functions and classes: of a module, of those that it defines itself."""
+    inside = {
+        str(one): _get(found, one) for one in (found if isinstance(found, Mapping) else dir(found))
+    }
+    home = found.__name__ if inspect.ismodule(found) else None
+    return [
+        name
+        for name, one in inside.items()
+        if callable(one)
+        and not name.startswith("_")
+        and home in (None, getattr(one, "__module__", home))
+    ]
 
 
 def _fields(answer: Answer | Failure) -> dict[str, Any]:

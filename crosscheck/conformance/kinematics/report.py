@@ -10,7 +10,7 @@ from ..case import Case
 from ..contestant import Answer, Asked
 from ..explain import explain
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
+from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict, smallest_failure
 from ..sentence import Sentence, sentence
 from .faults import describe
 from .predictions import variants
@@ -46,7 +46,7 @@ def diagnosed(
     if not told:
         return Diagnosis(behaviour=behaviour)
     right = [one for one in asked if isinstance(one.answer, Answer) and one not in told]
-    compared = (sorted(told, key=numbers) + sorted(right, key=numbers))[:COMPARED]
+    compared = (sorted(told, key=_size) + sorted(right, key=_size))[:COMPARED]
     found, tried = explain(
         variants(method, most_faults), compared, tolerance, lambda keys: describe(method, keys)
     )
@@ -54,9 +54,8 @@ def diagnosed(
     return Diagnosis(named, behaviour, tried=tried)
 
 
-def numbers(one: Asked) -> int:
-    """Return how many numbers a request holds."""
-    return sum(int(np.size(value)) for value in one.case.inputs.values())
+def _size(one: Asked) -> int:
+    return one.case.size
 
 
 def report(
@@ -68,15 +67,13 @@ def report(
     greeting: Greeting,
 ) -> TaskReport:
     """Return the report, with what a diagnosis without explanations has to say."""
-    by_size = sorted(zip(asked, judgements, strict=True), key=lambda pair: numbers(pair[0]))
-    failing = [told for _, told in by_size if told.verdict >= Verdict.WRONG]
-    smallest = failing[0] if failing else None
+    smallest = smallest_failure(judgements, bool(diagnosis.explanations))
     hints = _hints(judgements)
     broken = None
     if smallest is not None and not diagnosis.explanations:
         broken = _first_broken(smallest)
     told = Diagnosis(diagnosis.explanations, diagnosis.behaviour, broken, hints, diagnosis.tried)
-    return TaskReport(task, method, judgements, told, smallest)
+    return TaskReport(task, method, judgements, told)
 
 
 def _first_broken(smallest: CaseJudgement) -> Sentence | None:

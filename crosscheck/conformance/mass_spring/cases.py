@@ -367,11 +367,6 @@ def _transformed(
     )
 
 
-def numbers(case: Case) -> int:
-    """Return how many numbers a case has, the measure of its size."""
-    return sum(int(np.size(value)) for value in case.inputs.values())
-
-
 def by_name(cases: Sequence[Case]) -> dict[str, Case]:
     """Return the cases by their names."""
     return {case.name: case for case in cases}

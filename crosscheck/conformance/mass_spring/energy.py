@@ -21,7 +21,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
 from . import laws
-from .cases import numbers, task_cases
+from .cases import task_cases
 from .faults import GRAVITY, SPRINGS, Option
 from .problem import (
     Problem,
@@ -66,9 +66,7 @@ def _displaced(case: Case, seed: int) -> Case:
 def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
     """Hold the energies against formulas and the work of forces, and name the faults."""
     judgements = [_judge_case(one, asked, greeting) for one in asked]
-    failing = [one for one in judgements if one.verdict >= Verdict.WRONG]
-    smallest = min(failing, key=lambda one: numbers(one.case), default=None)
-    return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting), smallest)
+    return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
 
 
 def right(p: Problem) -> dict[str, float]:

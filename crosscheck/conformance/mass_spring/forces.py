@@ -17,7 +17,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
 from . import laws
-from .cases import numbers, task_cases
+from .cases import task_cases
 from .faults import FORCE_FAULTS, Option
 from .problem import (
     Problem,
@@ -43,9 +43,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
 def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
     """Hold the forces against the formula and the balance of momentum, and name the faults."""
     judgements = [_judge_case(one, asked, greeting) for one in asked]
-    failing = [one for one in judgements if one.verdict >= Verdict.WRONG]
-    smallest = min(failing, key=lambda one: numbers(one.case), default=None)
-    return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting), smallest)
+    return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
 
 
 def tolerance(p: Problem, epsilon: float) -> float:

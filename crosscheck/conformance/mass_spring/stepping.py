@@ -15,7 +15,6 @@ from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
 from . import laws
-from .cases import numbers
 from .faults import ASPECTS, Option, apply
 from .honest import domains
 from .laws import Context
@@ -42,9 +41,7 @@ def judge(task: str, asked: Sequence[Asked], greeting: Greeting) -> TaskReport:
     ]
     diagnosis = _diagnose(asked, problems, judgements, search, found, greeting)
     judgements = _with_faults(judgements, diagnosis, known)
-    failing = [one for one in judgements if one.verdict >= Verdict.WRONG]
-    smallest = min(failing, key=lambda one: numbers(one.case), default=None)
-    return TaskReport(task, "", judgements, diagnosis, smallest)
+    return TaskReport(task, "", judgements, diagnosis)
 
 
 def problems_of(asked: Sequence[Asked], greeting: Greeting) -> dict[str, Problem]:

@@ -202,7 +202,12 @@ def test_what_a_file_says_of_itself_is_its_greeting(inside):
             "import numpy as np\nclass A:\n    def forwardKinematics(self): pass\n"
             "def forwardKinematics(): pass",
             r"my_ik.py: expected functions named as some of forward_kinematics, .*"
-            r"\(forwardKinematics; did you mean forward_kinematics\?\)",
+            r"got A, forwardKinematics \(did you mean forward_kinematics\?\)$",
+        ),
+        (
+            "from math import cos\ndef part1_forward_kinematics(): pass\ndef spring_forces(): pass",
+            r"got part1_forward_kinematics \(did you mean forward_kinematics\?\), "
+            r"spring_forces \(did you mean mass_spring_forces\?\)$",
         ),
         ("x = 3", "expected functions named as some of .*, got none"),
         ("def energy(chain): pass", "expected energy to take some of masses, .*, got others"),
@@ -235,6 +240,18 @@ def test_a_file_that_offers_nothing_says_what_to_mend(inside, text, message):
     said = words(caught.value.failure)
     assert re.search(message, said), said
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("name", ["forward_kinematics", "mass_spring_step", "ccd"])
+def test_a_function_of_a_task_is_asked_even_if_no_argument_is_known(inside, name):
+    contestant = inside(f"def {name}(joint_parent): pass\ndef energy(masses): pass")
+    task = "inverse_kinematics" if name == "ccd" else name
+    assert set(contestant.greeting.tasks) == {task, "energy"}
+
+
+def test_a_helper_of_a_common_name_is_not_taken_for_a_task(inside):
+    contestant = inside(f"{FORWARD}return offsets\ndef resample(signal, n): pass\n")
+    assert contestant.greeting.tasks == ("forward_kinematics",)
 
 
 @pytest.mark.parametrize(
@@ -297,7 +314,7 @@ def test_a_process_survives_or_is_started_anew(solver, body, message):
         ("x = input()", "raised: It raised EOFError in line 1 of my_ik.py"),
         ("import os; os._exit(3)", "crashed: .*exit code 3"),
         ("def f(:\n  pass", "raised: It raised SyntaxError in line 1 of my_ik.py: invalid syntax"),
-        ("def energies(masses): pass", r"garbage: .*energies; did you mean energy\?"),
+        ("def energies(masses): pass", r"garbage: .*energies \(did you mean energy\?\)"),
     ],
 )
 def test_a_process_that_cannot_load_its_file_says_so(solver, text, message):
