@@ -4,6 +4,7 @@
 #               wheels of; 9 GB on Linux x86-64, of which CUDA, which PyTorch's wheels bring, is 5
 # make lint     ruff and mypy
 # make bench    every benchmark at full length, then the report
+# make sample   every benchmark at full length with every peer, as docs/sample
 # make drawing  draw the pictures of docs/ anew, the architecture's from the imports
 # make messages renew the translations of `plumbob verify` from its sentences
 # make locks    renew the lock files after a change of pyproject.toml; UPGRADE=--upgrade
@@ -22,7 +23,7 @@ BIN := .venv/bin
 UV ?= build/uv/bin/uv
 export UV_PYTHON_DOWNLOADS := never
 
-.PHONY: help report test test-all peers lint bench drawing messages locks wheels test-pythons test-lowest clean
+.PHONY: help report test test-all peers lint bench sample drawing messages locks wheels test-pythons test-lowest clean
 
 help:
 	@sed -n 's/^# \{0,1\}//p' $(MAKEFILE_LIST)
@@ -46,6 +47,10 @@ lint: .venv/installed
 bench: .venv/installed
 	$(BIN)/plumbob bench
 	$(BIN)/plumbob report
+
+sample: .venv/peers/installed
+	$(BIN)/plumbob bench --output build/sample
+	$(BIN)/python docs/write_sample.py build/sample
 
 drawing: .venv/installed
 	$(BIN)/python docs/draw_architecture.py

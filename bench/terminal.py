@@ -30,16 +30,21 @@ def print_table(table: "Table") -> None:
 
 
 def print_tables(suites: Sequence[str], output: Path) -> None:
-    """Print the tables that come from these suites, with what they say."""
+    """Print the tables with numbers that come from these suites, and who was not asked for some."""
     from .harness.record import RecordFile
+    from .presentation.entered import remarks_of_entrants
     from .presentation.results import Results, plain, sift
     from .presentation.sections import tables
+    from .presentation.tables.aligned import filled
+    from .presentation.tables.table import is_blank
 
     records = [plain(record) for record in RecordFile(output).read().records]
     records, _ = sift(lambda results: tables(results, suites), records)
     for made in tables(Results(records), suites):
-        if made.rows:
+        if not is_blank(made):
             print_aligned(made, f"plumbob report {output} --table {made.name}")
+    for sentence in remarks_of_entrants(Results(records), suites):
+        print("\n" + "\n".join(filled(sentence, width())))
 
 
 def print_summary(table: "Table") -> None:

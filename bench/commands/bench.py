@@ -1,5 +1,6 @@
 """The command `bench`, which measures, and the main job, which measures and reports."""
 
+import re
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -152,17 +153,16 @@ def _choice(suites: Sequence[str], scale: str, asked: Asked) -> "Choice":
 
 
 def _look_ahead(suites: Sequence[str], choice: "Choice", output: Path, listing: bool) -> int:
-    from ..entrants import outlook
+    from ..entrants.listing import listed
+    from ..entrants.outlook import dry_run
 
-    lines = outlook.listed(suites, choice) if listing else outlook.dry_run(suites, choice, output)
-    for line in lines:
-        print(visible_indented(line))
+    for line in listed(suites, choice) if listing else dry_run(suites, choice, output):
+        print("".join(part if part.isspace() else visible(part) for part in _COLUMNS.split(line)))
     return SUCCESS
 
 
-def visible_indented(line: str) -> str:
-    """Return a line with its indentation, and whatever does not print as an escape."""
-    return " " * (len(line) - len(line.lstrip(" "))) + visible(line)
+# What stands between the columns of a line.
+_COLUMNS = re.compile(r"( {2,})")
 
 
 def main_job(output: Path, fresh: bool) -> int:

@@ -8,7 +8,7 @@ from crosscheck.conformance.contestant import Answer, Contestant, Failure
 from crosscheck.conformance.doors import Limits, open_contestant
 from crosscheck.conformance.sentence import sentence
 
-from ..harness.stopwatch import count
+from ..harness.stopwatch import behind_door
 from .entrant import Spec
 
 # The bench itself loses patience with a silent worker sooner: see `bench.harness.isolation`.
@@ -38,12 +38,16 @@ class Asked:
         Raises:
             EntrantError: if there is no answer.
         """
-        found = self.contestant.answer(Case("of the bench", task, inputs, "bench", _ABOUT))
-        if isinstance(found, Failure):
-            raise EntrantError(str(found.sentence))
-        count(found.seconds)
+        case = Case("of the bench", task, inputs, "bench", _ABOUT)
+        found = behind_door(lambda: self._answered(case), lambda answer: answer.seconds)
         if not found.timed_by_itself:
             self.remark = "timed by the round trip of a request, for its answers hold no seconds"
+        return found
+
+    def _answered(self, case: Case) -> Answer:
+        found = self.contestant.answer(case)
+        if isinstance(found, Failure):
+            raise EntrantError(str(found.sentence))
         return found
 
 

@@ -1,4 +1,4 @@
-"""What a run would measure and how long that may take, and what there is to be chosen from."""
+"""What a run would measure, and how long that may take."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -6,23 +6,22 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from ..experiments import SUITES, blocks, chain, cloth_peers, published
+from ..experiments import blocks, chain, cloth_peers, published
 from ..experiments.cloth_peers import measurement as cloths
 from ..experiments.robots import REACHABLE, UNREACHABLE
-from ..experiments.robots import measurement as robots
 from ..harness import run
 from ..harness.block import Block, Scale
 from ..harness.choice import Choice
 from ..harness.executor import HERE
 from ..harness.measure import block_key
 from ..harness.record import Key, Record, RecordFile
-from ..peers import registry
+from .blocks import CHAIN_BUDGET
 
 RECORDED, ALIKE, BUDGET, UNKNOWN = "its own record", "records of others", "budgets", "unknown"
 # Budgets of a block in seconds, for those of a benchmark at its scale, by its task; an entrant's on
 # skeletons.
 _BUDGETS = {REACHABLE: 3.0, UNREACHABLE: 3.0, published.TRAC_IK: 15.0, published.TOOLBOX: 15.0}
-_ENTERED = {chain.CHAIN: 50.0, published.FABRIK: 50.0}
+_ENTERED = {chain.CHAIN: CHAIN_BUDGET, published.FABRIK: CHAIN_BUDGET}
 # Parts of a cloth's ladder that use its whole budget.
 _LADDER = 2.0
 
@@ -112,32 +111,3 @@ def duration(seconds: float) -> str:
     if seconds < 90.0:
         return f"{seconds:.2g} s" if seconds < 10.0 else f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
-
-
-def listed(suites: Sequence[str], choice: Choice) -> list[str]:
-    """Return lines that name what there is: problems and solvers, those not installed apart."""
-    lines = []
-    for suite in suites:
-        there = list(filter(choice.takes, blocks(suite, choice.scale)))
-        measured = [block for block in there if not _is_missing(block)]
-        titles = {b.problem: str(b.facts.get("title", b.problem)) for b in measured}
-        lines += [f"{suite}: {SUITES[suite]}", "  problems"]
-        lines += [f"    {name:<28} {title}" for name, title in titles.items()]
-        names = dict.fromkeys(block.solver for block in measured)
-        lines += ["  solvers", *(f"    {_called(name)}" for name in names)]
-        if missing := dict.fromkeys(block.solver for block in there if _is_missing(block)):
-            lines += ["  not installed", *(f"    {name}" for name in missing)]
-    return lines
-
-
-NOT_INSTALLED = (robots.not_installed, cloths.not_installed)
-
-
-def _is_missing(block: Block) -> bool:
-    """Return whether a block only says that a package is not installed."""
-    return getattr(block.measure, "func", None) in NOT_INSTALLED
-
-
-def _called(solver: str) -> str:
-    label = registry.find(solver).label
-    return solver if label == solver else f"{solver:<28} {label}"

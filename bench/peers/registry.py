@@ -132,7 +132,7 @@ FACTORS = (SUPERNODAL, CHOLMOD)
 
 
 @functools.cache
-def _version(package: str) -> str:
+def version(package: str) -> str:
     """Return the version of a package, "" if it is not installed."""
     try:
         return importlib.metadata.version(package)
@@ -314,7 +314,7 @@ class ClothPeer:
     @property
     def version(self) -> str:
         """The version that is installed, "" if none is."""
-        return _version(self.package)
+        return version(self.package)
 
 
 def _of_ours(solver: StepSolver) -> ClothPeer:

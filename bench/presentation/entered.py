@@ -1,6 +1,6 @@
 """The table of the solvers that users entered, for each suite that asks them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -9,6 +9,8 @@ from .results import Results, listed
 from .tables.columns import text
 from .tables.layout import Layout
 from .tables.table import Column, Summary
+
+NOT_ASKED = "not asked"
 
 
 class Entered(NamedTuple):
@@ -24,9 +26,27 @@ class Entered(NamedTuple):
         commit, _, changes = known.partition(" ")
         return commit[:7] + ("+" if changes else "") or "–"
 
+    @property
+    def remarks(self) -> list[str]:
+        """Why it was not asked for all."""
+        return [why for record in self.records if (why := _why_not_asked(record))]
+
     def fact(self, name: str) -> str:
         """Return what its last record says of it."""
         return str(self.records[-1].facts.get(name, "")) or "–"
+
+
+def _why_not_asked(record: Record) -> str:
+    """Return why a solver was not asked, "" if it was."""
+    why = "" if record.arrays else str(record.notes.get("remark", ""))
+    return why if why.startswith(NOT_ASKED) else ""
+
+
+def remarks_of_entrants(results: Results, suites: Iterable[str]) -> list[str]:
+    """Return sentences on solvers that were entered into suites and not asked for all."""
+    known = [record for suite in suites for record in results.all(suite, entrant=True)]
+    said = [f"{r.solver} was {why}." for r in known if (why := _why_not_asked(r))]
+    return list(dict.fromkeys(said))
 
 
 def _entered(suite: str, results: Results) -> list[Entered]:
@@ -55,6 +75,7 @@ def entered(suite: str, task: str) -> Layout:
             text("sources", lambda one: one.fact("digest")),
             text("door", lambda one: one.fact("door")),
             Column("records", read=lambda one: len(one.records)),
+            text("remark", lambda one: "; ".join(one.remarks)),
         ),
         shows="A commit with a plus has changes beside it; sources are a digest of its files, "
         "and a change of them is measured anew.",

@@ -1,16 +1,16 @@
 """The first screen’s answers: is it right, who is most accurate and fastest, who is absent.
 
 All are made from the records. Who is not told from the first ties with it: over robots by the pairs
-of `metrics.ranking`, among timed works where intervals overlap.
+of `metrics.ranking`, among timed cases where intervals overlap.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ..experiments.cloth_peers import ONE_STEP
+from ..experiments.cloth_peers import MISSING, ONE_STEP
 from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.overall.readings import Overall, overall
@@ -124,21 +124,32 @@ def _in_a_stratum(record: Record) -> int:
 
 
 def absent(results: Results) -> list[str]:
-    """Return the peers that took no part in what was measured."""
-    return [*_absent_solvers(results), *_absent_engines(results)]
+    """Return the peers that were asked and took no part."""
+    packages = {record.solver for record in results.all("cloth", task=MISSING)}
+    engines = [peer.engine for peer in registry.cloth_peers() if peer.package in packages]
+    return [*_absent_solvers(results), *_for_cloth(engines)]
 
 
 def _absent_solvers(results: Results) -> list[str]:
     records = results.all("ik", task=REACHABLE)
-    here = {record.solver for record in measured(records)}
-    peers = registry.PEERS if records else ()
-    return [p.title for p in peers if here.isdisjoint(p.called(entry) for entry in p.entries)]
+    here, asked = ({r.solver for r in some} for some in (measured(records), records))
+    names = {peer.title: set(map(peer.called, peer.entries)) for peer in registry.PEERS}
+    return [title for title, mine in names.items() if mine & asked and not mine & here]
 
 
-def _absent_engines(results: Results) -> list[str]:
+def not_asked(results: Results) -> list[str]:
+    """Return the peers of which nothing is on record, where there is something of others."""
+    asked = {record.solver for record in results.all("ik", task=REACHABLE)}
+    peers = registry.PEERS if asked else ()
+    solvers = [p.title for p in peers if asked.isdisjoint(map(p.called, p.entries))]
     here = {registry.find(point.solver).engine for point in points(results, ONE_STEP)}
-    engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers()) if here else ()
-    return [f"{engine} (cloth)" for engine in engines if engine not in here]
+    others = [peer.engine for peer in registry.cloth_peers() if here and peer.engine not in here]
+    missing = absent(results)
+    return [*solvers, *(name for name in _for_cloth(others) if name not in missing)]
+
+
+def _for_cloth(engines: Iterable[str]) -> list[str]:
+    return [f"{engine} (cloth)" for engine in dict.fromkeys(engines)]
 
 
 def _compared(results: Results) -> dict[str, Overall]:
@@ -230,13 +241,13 @@ def _soonest(results: Results) -> Headline | None:
 
 
 def _timed(results: Results, subject: str) -> Headline | None:
-    """Return who is first in the works of a subject that more than one can do."""
+    """Return who is first in the cases of a subject that more than one can do."""
     works: Times = {}
     for problem, records in by_problem(results.all("timing", subject=subject)).items():
         rivals = [record for record in records if record.solver not in _NOT_RIVALS]
         if len(rivals) > 1:
             works[problem] = {_short(record.solver): _time(record) for record in rivals}
-    return _first("speed", SUBJECTS[subject], "works", works, f"timing_{subject}")
+    return _first("speed", SUBJECTS[subject], "cases", works, f"timing_{subject}")
 
 
 def _time(record: Record) -> Time:
@@ -247,14 +258,14 @@ def _time(record: Record) -> Time:
 
 
 def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headline | None:
-    """Return who is first most often, in how many works, and by what factors; ties are nobody's."""
+    """Return who is first most often, in how many cases, and by what factors; ties are nobody's."""
     order = [sorted(times.items(), key=lambda item: item[1]) for times in works.values() if times]
     decided = [ranked for ranked in order if not _is_tie(ranked)]
     if not order:
         return None
     if not decided:
         tied = _tied([name for name, _ in order[0]])
-        return Headline(chapter, asked, tied, f"no lead in {len(order)} {of}", table)
+        return Headline(chapter, asked, tied, f"nobody leads, 0/{len(order)} {of}", table)
     firsts = Counter(ranked[0][0] for ranked in decided)
     most = max(firsts.values())
     leaders = [name for name, count in firsts.items() if count == most]
@@ -265,7 +276,7 @@ def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headl
 
 
 def _ahead(won: Sequence[Sequence[tuple[str, Time]]]) -> str:
-    """Say by what factors the works were won."""
+    """Say by what factors the cases were won."""
     factors = [ranked[1][1].median / ranked[0][1].median for ranked in won if len(ranked) > 1]
     return f"{_range(factors)} × the next" if factors else "no rival arrives"
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from ..experiments import SUITES
 from ..harness.record import FINISHED, Record, RecordFile, check_folder, check_regular
 from .figures.sketch import Drawing, Sketch, drawn
-from .headlines import Answers, absent, answers
+from .headlines import Answers, absent, answers, not_asked
 from .motion.motion import Scene
 from .page.page import Shown, render
 from .results import Results, listed, plain, sift
@@ -160,6 +160,8 @@ def _missing(records: Sequence[Record]) -> list[str]:
             f"Absent peers: {listed(names)}. `make peers` (or `pip install -e .[peers]`) adds those"
             " that have a wheel for this Python; `plumbob bench ik cloth` then measures them."
         )
+    if names := not_asked(Results(records)):
+        sentences.append(f"Not asked: {listed(names)}. `plumbob bench ik cloth` asks all.")
     others = sum(record.stamp != newest.stamp for record in records)
     if others:
         sentences.append(

@@ -434,6 +434,7 @@ def records():
             for kind in ("one start", "restarts")
             for task in ("reachable", "unreachable")
         ),
+        lacking("pink", "one start", "pink is not installed"),
         *(entrant(suite) for suite in ("ik", "cloth")),
         *republished(),
         *(scaled(solver) for solver in ("supernodal", "cholespy")),

@@ -293,13 +293,14 @@ def test_who_is_missing_or_cannot_has_a_row_that_says_why(make):
     table = ONE.success(results)
     remarks = column(table, "remark")
     assert remarks == ["", "b is not installed", "the data is not installed"]
-    assert set(table.rows[1][2:-1]) == {None}
+    assert set(table.rows[1][2:-1]) == {None, "b is not installed"}
     assert [row[1] for row in AGAIN.success(results).rows] == ["all solvers"]
     assert len(ONE.strata(results).rows) == len(ONE.budgets(results).rows) == 1
 
 
 def test_solvers_that_are_not_installed_are_listed_as_such(make):
-    table = robots.who(Results([make.raced("Plumbob LM", "one start")]))
+    missing = make.lacking("pink", "one start", "pink is not installed")
+    table = robots.who(Results([make.raced("Plumbob LM", "one start"), missing]))
     versions = dict(zip(column(table, "solver"), column(table, "version"), strict=True))
     assert versions["Plumbob LM"] == "1.2"
     assert versions["pink"] == "not installed"

@@ -81,7 +81,9 @@ def test_works_whose_rounds_overlap_are_nobodys(make, factor, answer):
         works[1] = make.timed("Plumbob, compiled", 1e-7 * factor)
     found = asked(works, "Forward kinematics", "speed")
     assert found.answer.startswith(answer)
-    assert found.detail == ("10.0 × the next, 1/1 works" if factor == 2 else "no lead in 1 works")
+    assert found.detail == (
+        "10.0 × the next, 1/1 cases" if factor == 2 else "nobody leads, 0/1 cases"
+    )
 
 
 def test_plain_python_and_the_limit_are_no_rivals(make):
@@ -112,21 +114,23 @@ def test_the_verdict_names_the_claim_with_the_narrowest_margin(make):
     assert headlines.verdict(Results([])) is None
 
 
-def test_peers_without_a_measurement_are_absent(make):
+def test_peers_without_a_measurement_are_absent_or_were_not_asked(make):
     records = [
         raced(make, "pink", 1),
         raced(make, "Plumbob LM", 1),
         make.lacking("mink", "one start", ""),
     ]
-    found = headlines.absent(Results([*records, make.worked("Plumbob Newton")]))
-    assert "mink" in found
-    assert not {"pink", "Plumbob LM"} & set(found)
+    missing = make.record("cloth", "peers/all", "mujoco", facts={"task": "missing"})
+    results = Results([*records, make.worked("Plumbob Newton"), missing])
+    assert headlines.absent(results) == ["mink", "MuJoCo (cloth)"]
+    found = headlines.not_asked(results)
+    assert not {"pink", "Plumbob LM", "mink"} & set(found)
+    assert "TRAC-IK" in found
     engines = dict.fromkeys(peer.engine for peer in registry.cloth_peers())
     assert [name for name in found if name.endswith("(cloth)")] == [
-        f"{engine} (cloth)" for engine in engines if engine != registry.PLUMBOB
+        f"{engine} (cloth)" for engine in engines if engine not in (registry.PLUMBOB, "MuJoCo")
     ]
-    assert "MuJoCo (cloth)" in found
-    assert headlines.absent(Results([])) == []
+    assert headlines.absent(Results([])) == headlines.not_asked(Results([])) == []
 
 
 def test_the_scale_says_how_many_targets(make):

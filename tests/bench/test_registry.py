@@ -146,8 +146,8 @@ def blocks(scale):
     yield Block("sums", "1 + 1", "Python", lambda: Measured({"sum": 2}), facts={"title": "One"})
 """,
     "tables.py": """
-from bench.presentation.columns import number, titled
-from bench.presentation.layout import Layout
+from bench.presentation.tables.columns import number, titled
+from bench.presentation.tables.layout import Layout
 
 sums = Layout(
     "What is 1 + 1?",

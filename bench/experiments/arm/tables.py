@@ -9,7 +9,19 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, by_problem, label, leaders, settings
-from ...presentation.tables.columns import LARGEST, MEDIAN, P95, SOLVER, share, spread, text, titled
+from ...presentation.tables.columns import (
+    LARGEST,
+    MEDIAN,
+    P95,
+    SOLVER,
+    allowed,
+    iterations,
+    remark,
+    share,
+    spread,
+    text,
+    titled,
+)
 from ...presentation.tables.layout import Layout
 from ...presentation.tables.table import Summary, words
 from ..chain import BEYOND, CHAIN
@@ -61,12 +73,14 @@ accuracy = Layout(
         SOLVER,
         share("within tolerance", _met, best="greatest"),
         *spread("residual", "residual", "m", (LARGEST,)),
-        *spread("iterations", "iterations", of=(MEDIAN,)),
+        *iterations((MEDIAN,)),
+        allowed(),
+        remark(),
         *(
             replace(column, folded=True)
             for column in (
                 *spread("residual", "residual", "m", (MEDIAN, P95)),
-                *spread("iterations", "iterations", of=(P95, LARGEST)),
+                *iterations((P95, LARGEST)),
             )
         ),
     ),

@@ -7,6 +7,7 @@ from ...harness.record import Record
 from ...presentation.figures.chart import GREATER, Axis, Chart, Panel, Series, series
 from ...presentation.figures.sketch import Sketch, chart_sketch
 from ...presentation.results import Results, by_problem
+from ...presentation.tables.columns import iterations_said
 from . import BEYOND, CHAIN
 
 # Iterations at which targets are counted.
@@ -15,7 +16,7 @@ COUNTED = np.unique(np.logspace(0, 3, 61).round())
 
 def iterations(results: Results) -> Sketch | None:
     """Show the share of the targets that is done within so many iterations, stratum by stratum."""
-    panels = _ik_panels(results)
+    panels = [counting for of in _ik_panels(results) if (counting := [*filter(_counts, of)])]
     if not panels:
         return None
     return chart_sketch(
@@ -31,6 +32,11 @@ def iterations(results: Results) -> Sketch | None:
             entrants=results.entrants,
         )
     )
+
+
+def _counts(record: Record) -> bool:
+    """Return whether a solver says its iterations."""
+    return bool(iterations_said(record).size)
 
 
 def _reached(record: Record) -> Series:

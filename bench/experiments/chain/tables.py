@@ -9,6 +9,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.entered import entered
 from ...presentation.results import Results, by_problem, counted, label, settings, solvers
+from ...presentation.tables import columns
 from ...presentation.tables.columns import (
     LARGEST,
     MEDIAN,
@@ -59,9 +60,8 @@ def _beyond_summary(records: Sequence[Record]) -> Summary:
 def _straightness(records: Sequence[Record]) -> str:
     bends = _over_reach(records, "bend")
     straight = metrics.share(bends <= STRAIGHT)
-    made = [spread_of(record, "iterations")[2] for record in records]
-    most = max((count for count in made if np.isfinite(count)), default=None)
-    counts = "iterations unsaid" if most is None else counted(int(most), "iteration")
+    made = np.concatenate([columns.iterations_said(record) for record in records])
+    counts = counted(int(made.max()), "iteration") if made.size else "iterations unsaid"
     return (
         f"{words(straight)}; at worst "
         f"{words_in(metrics.spread(bends).largest, '%')} of the reach off the line, "
@@ -79,7 +79,9 @@ beyond_reach = Layout(
         SOLVER,
         *spread("off the line", "bend", "m", (LARGEST,)),
         *spread("residual above distance − reach", "excess", "m", (LARGEST,)),
-        *spread("iterations", "iterations"),
+        *columns.iterations(),
+        columns.allowed(),
+        columns.remark(),
         *(
             replace(column, folded=True)
             for column in (
@@ -90,7 +92,8 @@ beyond_reach = Layout(
         ),
     ),
     subjects=lambda results: (
-        results.all("arm", task=arm.BEYOND) + results.all("ik", task=CHAIN, stratum=BEYOND)
+        results.all("arm", task=arm.BEYOND)
+        + [r for r in results.all("ik", task=CHAIN, stratum=BEYOND) if r.arrays]
     ),
     shows="The best answer is the straight line from root to target, which leaves exactly "
     "distance − reach. “Off the line” is the joint farthest from that line.",

@@ -24,7 +24,10 @@ from . import problem as published
 _TARGETS = 5
 _BUDGET = 15.0
 _SEED = 2011
-_LIMITS: dict[str, Any] = {"tolerance": published.FABRIK_TOLERANCE, "max_iterations": 10_000}
+_LIMITS: dict[str, Any] = {
+    "tolerance": published.FABRIK_TOLERANCE,
+    "max_iterations": published.FABRIK_ITERATIONS,
+}
 # The solvers fast enough for 10,000 targets, with restarts as TRAC-IK has them.
 _FAST = (registry.OURS, registry.TOOLBOX, registry.TRAC_IK)
 

@@ -73,6 +73,8 @@ FABRIK = {
 FABRIK_LINKS = 9
 FABRIK_DISTANCES = {"reachable": 0.6, "unreachable": 1.2}
 FABRIK_TOLERANCE = 1e-6
+# The most iterations for a target, here; ours come to 240.
+FABRIK_ITERATIONS = 1000
 FABRIK_RUNS = 20
 
 

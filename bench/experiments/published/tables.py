@@ -9,7 +9,14 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, settings
-from ...presentation.tables.columns import effort, places, spread_of, text, words_in
+from ...presentation.tables.columns import (
+    effort,
+    iterations_said,
+    places,
+    spread_of_iterations,
+    text,
+    words_in,
+)
 from ...presentation.tables.layout import Layout
 from ...presentation.tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from ..robots.readings import RULE, cut, solved, total
@@ -163,12 +170,13 @@ class Counted(NamedTuple):
     def mean(self, stratum: str) -> float | None:
         """Return the mean here."""
         here = self.here.get(stratum)
-        return None if here is None else metrics.mean(here.arrays["iterations"])
+        said = np.zeros(0) if here is None else iterations_said(here)
+        return metrics.mean(said) if said.size else None
 
     def largest(self, stratum: str) -> float | None:
         """Return the largest number here."""
         here = self.here.get(stratum)
-        return None if here is None else spread_of(here, "iterations")[2]
+        return None if here is None else spread_of_iterations(here)[2]
 
 
 def _counted(results: Results) -> list[Counted]:
@@ -201,9 +209,12 @@ def _fabrik_summary(solvers: Sequence[Counted]) -> Summary:
 def _mean_in_words(counted: Counted) -> str:
     if NEAR not in counted.here:
         return words(None)
-    counts = counted.here[NEAR].arrays["iterations"]
+    counts = iterations_said(counted.here[NEAR])
+    if not counts.size:
+        return "iterations unsaid"
     mean, low, high = metrics.mean_interval(counts)
-    return f"{words(mean)} ({words(low)}–{words(high)}, n = {words(counts.size)})"
+    interval = "" if np.isnan(low) else f"{words(low)}–{words(high)}, "
+    return f"{words(mean)} ({interval}n = {words(counts.size)})"
 
 
 fabrik = Layout(

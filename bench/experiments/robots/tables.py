@@ -14,7 +14,7 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers import registry
-from ...peers.registry import Peer
+from ...peers.registry import Entry, Peer
 from ...presentation.results import Results, leaders, listed
 from ...presentation.tables.columns import (
     LARGEST,
@@ -22,6 +22,7 @@ from ...presentation.tables.columns import (
     at,
     effort,
     places,
+    remark,
     share,
     text,
     times,
@@ -110,25 +111,40 @@ models = Layout(
 
 
 class Participant(NamedTuple):
-    """A peer and the version that took part, "" if it did not."""
+    """A solver that was asked, and its version, "" if it is not installed."""
 
     peer: Peer
     version: str
 
 
 def _participants(results: Results) -> list[Participant]:
-    """Return all peers if any took part."""
-    present = {r.solver: r.settings.get("version", "") for r in results.all("ik", task=REACHABLE)}
+    """Return the peers that have records, and those that users entered."""
+    records = [r for r in results.all("ik", task=REACHABLE) if r.settings["kind"] in KINDS]
+    present = {record.solver: str(record.settings.get("version", "")) for record in records}
+    entered = [r for r in records if r.facts.get("entrant") is True]
     return [
-        Participant(
-            peer, next((present[n] for n in map(peer.called, peer.entries) if n in present), "")
-        )
-        for peer in (registry.PEERS if present else ())
+        Participant(peer, version)
+        for peer in (*registry.PEERS, *map(_as_peer, entered))
+        for version in [present[n] for n in map(peer.called, peer.entries) if n in present][:1]
     ]
+
+
+def _as_peer(record: Record) -> Peer:
+    """Return what a record of a solver that was entered says of it."""
+    kind = str(record.settings["kind"])
+    return Peer(record.solver, "", str(record.facts.get("door", "")), "", "", (Entry(kind),))
 
 
 def _kinds(peer: Peer) -> str:
     return listed([f"{e.kind} ({e.note})" if e.note else e.kind for e in peer.entries])
+
+
+def _who_summary(all: Sequence[Participant]) -> Summary:
+    asked = {one.peer.title for one in all}
+    others = [peer.title for peer in registry.PEERS if peer.title not in asked]
+    rest = f"; not asked: {', '.join(others)}" if others else ""
+    count = sum(bool(one.version) for one in all)
+    return Summary(f"{count} of {len(all)} that were asked took part{rest}.")
 
 
 who = Layout(
@@ -148,9 +164,7 @@ who = Layout(
     "random poses until it claims an answer within the limits.",
     measured="Settings are the packages’ own but for those in brackets and what their adapters "
     "in bench/peers say.",
-    summary=lambda all: Summary(
-        f"{sum(bool(one.version) for one in all)} of {len(all)} installed."
-    ),
+    summary=_who_summary,
 )
 
 
@@ -164,7 +178,6 @@ def success(kind: str) -> Layout:
         share("solved", solved, best="greatest"),
         Column("claimed but not so", read=false_claims),
         Column("time, median", "µs", read=_median_of_times),
-        text("mark", lambda record: record.notes.get(MARK, "")),
     )
     folded = (
         share("solved, uniform in joint space", partial(solved, stratum=0)),
@@ -187,8 +200,9 @@ def success(kind: str) -> Layout:
         columns=(
             *NAMES,
             *map(_if_measured, columns),
+            text("mark", _mark),
             *(replace(_if_measured(column), folded=True) for column in folded),
-            replace(text("remark", lambda record: record.notes.get("remark", "")), folded=True),
+            replace(remark(), folded=True),
         ),
         shows=f"{RULE} Medians are of all targets begun, those that failed included. Residuals "
         "are of those solved, not cut off at the tolerance. “Claimed but not so” counts "
@@ -198,6 +212,11 @@ def success(kind: str) -> Layout:
         summary=_success_summary,
         ranked=is_ranked,
     )
+
+
+def _mark(record: Record) -> str:
+    """Return why a record is not ranked, or holds no numbers."""
+    return str(record.notes.get(MARK if "solved" in record.arrays else "remark", ""))
 
 
 def _if_measured(column: Column) -> Column:

@@ -5,6 +5,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from ...harness import metrics
 from ...harness.record import Record
 from ..results import label
@@ -64,10 +66,37 @@ def spread(
     return places(title, unit, of, partial(spread_of, name=name))
 
 
-def spread_of(record: Record, name: str) -> tuple[int | float, int | float, int | float]:
+def spread_of(record: Record, name: str) -> Sequence[int | float]:
     """Return median, 95th percentile and maximum of an array; of counts, as whole numbers."""
     values = record.arrays[name]
     return metrics.whole(values) if values.dtype.kind in "iu" else metrics.spread(values)
+
+
+def iterations_said(record: Record) -> metrics.Floats:
+    """Return the iterations of those solves whose solver says them, (solve,)."""
+    values = record.arrays["iterations"]
+    return values[~np.isnan(values)]
+
+
+def spread_of_iterations(record: Record) -> Sequence[int | float | None]:
+    """Return median, 95th percentile and maximum of the iterations, None where all are unsaid."""
+    said = iterations_said(record)
+    return metrics.whole(said) if said.size else (None, None, None)
+
+
+def allowed() -> Column:
+    """Return the column of the most iterations that a solver may make."""
+    return Column("iterations allowed", read=lambda record: record.settings.get("max_iterations"))
+
+
+def remark() -> Column:
+    """Return the column of what is to be said of a record."""
+    return text("remark", lambda record: record.notes.get("remark", ""))
+
+
+def iterations(of: Sequence[str] = (MEDIAN, LARGEST)) -> list[Column]:
+    """Return the columns of the iterations of a record's solves, empty where they are unsaid."""
+    return places("iterations", "", of, spread_of_iterations)
 
 
 def times(title: str, unit: str = "µs") -> list[Column]:

@@ -156,6 +156,13 @@ class Table:
                 )
 
 
+def is_blank(table: Table) -> bool:
+    """Return whether a table has no rows, or is to hold numbers and holds none."""
+    numbers = [j for j, column in enumerate(table.columns) if not column.words]
+    cells = [row[j] for row in table.rows for j in numbers]
+    return not table.rows or (bool(cells) and all(cell is None for cell in cells))
+
+
 def best_cells(table: Table) -> set[tuple[int, int]]:
     """Return row and column of each cell that is best among the rows it is compared with.
 

@@ -1,0 +1,186 @@
+"""What a new user sees who enters a solver of chains that counts nothing, and asks for it only."""
+
+import contextlib
+import io
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+from bench.cli import run_command
+from bench.entrants import opening, selection
+from bench.experiments import SUITES, blocks
+from bench.experiments.arm.tables import accuracy
+from bench.experiments.chain import figures
+from bench.experiments.chain.tables import beyond_reach
+from bench.experiments.robots.tables import who
+from bench.harness.record import RecordFile
+from bench.peers import registry
+from bench.presentation.entered import remarks_of_entrants
+from bench.presentation.figures.sketch import drawn
+from bench.presentation.headlines import absent, not_asked
+from bench.presentation.results import Results, plain
+from bench.presentation.sections import tables
+from bench.presentation.tables.table import words
+
+PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
+IK = re.search(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)[1]
+SILENT = IK.replace(', "iterations": k + 1', "").replace(
+    'PLUMBOB = {"name": "My FABRIK", "version": "0.1"}', ""
+)
+CHAINS = {"task": "chain", "stratum": "beyond", "title": "every chain"}
+NO_ROBOTS = "my_ik.py was not asked for robots: it offers no robot_inverse_kinematics"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with the solver, and nobody's entry points."""
+    made, before = tmp_path_factory.mktemp("new"), Path.cwd()
+    (made / "my_ik.py").write_text(SILENT, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(opening, "installed", list)
+        os.chdir(made)
+        yield made
+        os.chdir(before)
+
+
+@pytest.fixture(scope="module")
+def printed(folder):
+    """What the first run prints."""
+    problems = ("chain", "published/fabrik/reachable", "robots/all")
+    asked = [word for name in problems for word in ("--problem", name)]
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        run_command(["bench", "ik", "--quick", "--targets", "2", "--with", "my_ik.py",
+                     "--solver", "my_ik.py", *asked, "-o", "out"])  # fmt: skip
+    return out.getvalue()
+
+
+@pytest.fixture(scope="module")
+def records(printed):
+    return [plain(one) for one in RecordFile("out").read().records]
+
+
+@pytest.fixture(scope="module")
+def made(records):
+    return {table.name: table for table in tables(Results(records), ["ik"])}
+
+
+def test_iterations_that_nobody_counts_are_unsaid_and_no_number(printed, made):
+    assert "not a number" not in printed
+    assert "iterations unsaid here" in made["published_fabrik"].summary.points[0]
+    for name in ("accuracy", "q1_beyond_reach", "published_fabrik"):
+        (row, *_) = made[name].rows
+        said = {c.heading: words(v) for c, v in zip(made[name].columns, row, strict=True)}
+        counts = [v for h, v in said.items() if h.startswith("iterations, ") or "here" in h]
+        assert set(counts) == {"–"}, name
+        assert "not a number" not in said.values()
+
+
+def test_who_counts_nothing_has_no_curve_over_iterations(records):
+    results = Results(records)
+    assert figures.iterations(results) is None
+    assert "my_ik.py" in drawn(figures.ik_residuals(results)).svg
+
+
+def test_peers_that_were_not_asked_are_not_said_to_be_missing(printed, records, made):
+    assert "not installed" not in printed
+    assert made["robots_solvers"].rows == ()
+    assert absent(Results(records)) == []
+
+
+def test_peers_that_took_part_or_are_missing_are_told_from_those_that_nobody_asked(make):
+    mine = make.raced("My solver", "one start")
+    mine.facts["entrant"] = True
+    results = Results([make.raced("Plumbob LM", "one start"), mine,
+                       make.lacking("mink", "one start", "mink is not installed")])  # fmt: skip
+    table = who(results)
+    versions = {row[0]: row[2] for row in table.rows}
+    assert versions == {"Plumbob LM": "1.2", "mink": "not installed", "My solver": "1.2"}
+    assert table.summary.sentence.startswith("2 of 3 that were asked took part; not asked: Pinoc")
+    assert absent(results) == ["mink"]
+    assert "pink" in not_asked(results)
+
+
+def test_who_offers_no_robots_gets_a_sentence_and_no_table_of_dashes(printed, made):
+    assert printed.count(NO_ROBOTS) == 1
+    assert "Robots, one start" not in printed
+    table = made["robots_success_one_start"]
+    (mark,) = [j for j, one in enumerate(table.columns) if one.title == "mark"]
+    assert not table.columns[mark].folded
+    assert table.rows[0][mark] == NO_ROBOTS.removeprefix("my_ik.py was ")
+
+
+def test_who_offers_no_chains_has_no_row_of_numbers_there(make):
+    none = make.record("ik", "chain/all", "Mine", {}, facts={**CHAINS, "entrant": True},
+                       notes={"remark": "not asked for chains: it offers nothing"})  # fmt: skip
+    results = Results([none, make.beyond("ccd", 0.5)])
+    assert [row[1] for row in beyond_reach(results).rows] == ["CCD"]
+    assert accuracy(results).rows == ()
+    (sentence,) = remarks_of_entrants(results, ["ik"])
+    assert sentence == "Mine was not asked for chains: it offers nothing."
+
+
+def listed(*suites):
+    """The lines of a list, by what they begin with."""
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        assert run_command(["bench", *suites, "--list", "--with", "my_ik.py"]) == 0
+    return out.getvalue().splitlines()
+
+
+def test_the_list_of_a_suite_names_each_problem_once_and_lines_up(folder):
+    lines = listed("ik")
+    assert "  chain/near" in lines
+    assert not any(line.startswith("  robots/all") for line in lines)
+    titled = [line for line in lines if re.match(r"  (robots|unreachable)/(panda|pr2)  ", line)]
+    assert len({len(line) - len(line.split("  ")[-1].strip()) for line in titled}) == 1
+    assert all(line.endswith(("  Franka Panda", "  PR2, right arm")) for line in titled)
+    solvers = lines[lines.index("solvers") + 1 :]
+    said = {line.split("  ")[1]: line.split("  ")[-1].strip() for line in solvers if line}
+    assert said["my_ik.py"] == "entered, my_ik.py"
+    assert re.fullmatch(r"\d+\.\d+\S*", said["Plumbob LM"])
+    assert re.fullmatch(r"\d+\.\d+\S*", said["ccd"])
+    assert set(said) >= {"mink", "TRAC-IK, 5 ms"}
+    columns = {line.rindex("  ") for line in solvers if line.startswith("  ")}
+    assert len(columns) == 1
+
+
+def test_a_peer_that_is_missing_is_listed_as_such(folder, monkeypatch):
+    monkeypatch.setattr(registry.Peer, "version", "")
+    (line,) = [line for line in listed("ik") if line.startswith("  mink  ")]
+    assert line.endswith("  not installed")
+
+
+def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder):
+    lines = listed()
+    headings = [line.partition(":")[0] for line in lines if line and line[0] != " "]
+    assert headings[: len(SUITES)] == list(SUITES)
+    assert len(lines) <= 5 * len(SUITES) + 1
+    assert max(map(len, lines)) <= 100
+    assert lines[-1] == "All problems and solvers of one: plumbob bench SUITE --list"
+    assert "joint positions, Pinocchio; " in "\n".join(lines)
+    assert "joint positions, Pinocchio joint" not in "\n".join(lines)
+
+
+def test_entrants_may_make_as_many_iterations_as_ours(folder, records, made):
+    entrants = opening.opened(opening.named(["my_ik.py"]), ["ik"])
+    scale = selection.scale_of("quick", 2, entrants, [])
+    asked: dict[str, dict[str, object]] = {}
+    for block in blocks("ik", scale):
+        if block.problem.startswith(("chain/", "published/fabrik")) and "max_iterations" in (
+            block.settings
+        ):
+            asked.setdefault(block.problem, {})[block.solver] = {
+                name: block.settings[name] for name in ("tolerance", "max_iterations")
+            }
+    assert len(asked) == 6
+    for problem, limits in asked.items():
+        assert limits["my_ik.py"] == limits["ccd"], problem
+
+
+@pytest.mark.parametrize("name", ["accuracy", "q1_beyond_reach"])
+def test_tables_say_how_many_iterations_each_may_make_and_who_was_cut_short(made, name):
+    (j,) = [j for j, one in enumerate(made[name].columns) if one.title == "iterations allowed"]
+    assert {row[j] for row in made[name].rows} == {1000}
+    assert not made[name].columns[j].folded
+    assert any(one.title == "remark" for one in made[name].columns)

@@ -1,0 +1,63 @@
+"""The sample report: the README has the headlines of its page, and links that lead there."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+from bench.harness.record import RecordFile
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def sample():
+    spec = importlib.util.spec_from_file_location("write_sample", ROOT / "docs" / "write_sample.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def written(sample, records, tmp_path_factory):
+    """Write a sample of the tests' records; return the README before and after."""
+    folder = tmp_path_factory.mktemp("sample")
+    RecordFile(folder / "records").append(records)
+    sample.SAMPLE, sample.README = folder / "sample", folder / "README.md"
+    before = f"# Title\n{sample.BEGIN}\nout of date\n{sample.END}\nAfter.\n"
+    sample.README.write_text(before)
+    sample.write_sample(folder / "records")
+    return before, sample.README.read_text()
+
+
+def test_only_what_stands_between_the_marks_is_replaced(sample, written):
+    before, after = written
+    assert "out of date" not in after
+    assert after.split(sample.BEGIN)[0] == before.split(sample.BEGIN)[0]
+    assert after.split(sample.END)[1] == before.split(sample.END)[1]
+    headlines = (sample.SAMPLE / "headlines.md").read_text()
+    assert "Right: " in headlines
+    assert headlines in after
+    assert sample.with_headlines(after, headlines) == after
+
+
+def test_a_sample_holds_page_tables_and_figures_and_no_records(sample, written):
+    names = {path.name for path in sample.SAMPLE.iterdir()}
+    assert names == {"index.html", "headlines.md", "tables", "figures"}
+    linked = re.findall(r"docs/sample/(\S+?)\)", written[1])
+    assert linked
+    assert all((sample.SAMPLE / link).is_file() for link in linked)
+
+
+def test_a_readme_without_marks_is_refused(sample):
+    with pytest.raises(ValueError, match="README: expected the marks"):
+        sample.with_headlines("# Title\n", "line")
+
+
+def test_the_headlines_of_the_readme_are_those_of_the_committed_sample(sample):
+    readme = (ROOT / "README.md").read_text()
+    headlines = (ROOT / "docs" / "sample" / "headlines.md").read_text()
+    assert f"{sample.BEGIN}\n\n{headlines}\n{sample.END}" in readme
+    for link in re.findall(r"docs/sample/(\S+?)\)", readme):
+        assert (ROOT / "docs" / "sample" / link).is_file(), link
