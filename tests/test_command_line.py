@@ -335,6 +335,18 @@ def test_help_has_examples_and_does_nothing(capsys, main_job, empty_folder, comm
     assert list(empty_folder.iterdir()) == []
 
 
+COMMANDS = ("verify", "check", "bench", "report", "show", "compare", "history")
+COMMANDS += ("records list", "records merge", "records drop")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_names_no_type_of_python_and_no_bracket_twice(capsys, command):
+    _, out, _ = plumbob(capsys, *command.split(), "--help")
+    assert [
+        line for line in out.splitlines() if re.search(r"<[a-zA-Z]|\[\[|\{|\.\.\.\.", line)
+    ] == []
+
+
 def test_version(capsys, main_job):
     code, out, _ = plumbob(capsys, "--version")
     assert code == 0
