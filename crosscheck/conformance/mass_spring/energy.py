@@ -208,7 +208,8 @@ def _from_option(option: Option) -> Fault:
     return Fault(option.key, option.aspect, option.sentence, option.change)
 
 
-_OF_FORCES = ("first end only", "second end only", "both ends alike", "direction not normalised",
+_OF_FORCES = ("first end only", "second end only", "both ends alike",
+              "last spring of a particle only", "direction not normalised",
               "springs push", "springs twice", "tension only ignored")  # fmt: skip
 FAULTS = (
     Fault("kinetic without 1/2", "kinetic",

@@ -216,6 +216,12 @@ SPRINGS = (
         lambda p: p.changed(ends=(0.0, 1.0)),
     ),
     Option(
+        "last spring of a particle only", "springs",
+        sentence("Of the springs at a particle only the last one pulls: in NumPy, f[i] -= pull "
+                 "counts a repeated index once. Use np.subtract.at(f, i, pull)."),
+        lambda p: p.changed(accumulated=False),
+    ),
+    Option(
         "both ends alike", "springs",
         sentence("A spring adds the same force to both ends. The second takes the opposite one."),
         lambda p: p.changed(ends=(1.0, -1.0)),

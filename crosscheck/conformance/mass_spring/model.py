@@ -337,7 +337,10 @@ class Equation:
         if model.pins.startswith("springs"):
             self.hold *= h * h
         self.conservative = (
-            p.ends == (1.0, 1.0) and p.normalised and (self.by_length or not self.damped)
+            p.ends == (1.0, 1.0)
+            and p.accumulated
+            and p.normalised
+            and (self.by_length or not self.damped)
         )
 
     @property

@@ -33,6 +33,8 @@ class Problem:
         weights: the force of gravity if it is not m gravity [N], shape (particle, 3).
         weighing: the masses m in m gravity, if they are others than those of inertia.
         ends: what share of its force a spring exerts on its first and on its second end.
+        accumulated: whether forces of springs at one particle add up; else the last one stays, of
+            those whose first end it is and of those whose second.
         damping: what the dampers see: the velocity along the spring, all of the relative velocity,
             the particle's own velocity, or the particle's own along the spring.
         normalised: whether a spring's direction is of length one.
@@ -55,6 +57,7 @@ class Problem:
     weights: FloatArray | None = None
     weighing: FloatArray | None = None
     ends: tuple[float, float] = (1.0, 1.0)
+    accumulated: bool = True
     damping: str = "along"
     normalised: bool = True
 
@@ -71,7 +74,17 @@ class Problem:
     @cached_property
     def pulled(self) -> FloatArray:
         """The incidence with the ends that the springs pull, shape (spring, particle)."""
-        return self.incidence if self.ends == (1.0, 1.0) else self._rows(self.ends)
+        rows = self.incidence if self.ends == (1.0, 1.0) else self._rows(self.ends)
+        return rows if self.accumulated else rows * self._is_last
+
+    @property
+    def _is_last(self) -> Any:
+        """Where no later spring has the particle at the same end, shape (spring, particle)."""
+        last = np.zeros((len(self.springs), self.count), dtype=bool)
+        for end in self.springs.T:
+            for particle in np.unique(end):
+                last[np.flatnonzero(end == particle)[-1], particle] = True
+        return last
 
     def _rows(self, ends: tuple[float, float]) -> FloatArray:
         rows, every = np.zeros((len(self.springs), self.count)), np.arange(len(self.springs))
