@@ -27,14 +27,27 @@ class FittingFormatter(_Formatter):  # type: ignore[misc]
         self.most = max(NARROWEST, shutil.get_terminal_size().columns)
         super().__init__(**{**options, "width": min(self.most, WIDEST) - 2})
 
+    def write_usage(self, prog: str, args: str = "", prefix: str | None = None) -> None:
+        """Write the line of usage, every argument in one pair of brackets or in none."""
+        args = re.sub(r"\[\[(.*?)\]\]", r"[\1]", re.sub(r"\{(.*?)(\.\.\.)?\}", r"\1", args))
+        super().write_usage(prog, args, prefix)
+
     def write_dl(self, rows: Any, col_max: int = 30, col_spacing: int = 2) -> None:
         """Write options and what they do; in a narrow terminal below each other."""
-        super().write_dl(rows, min(col_max, self.most // 3), col_spacing)
+        named = [(_without_type(name), text) for name, text in rows]
+        super().write_dl(named, min(col_max, self.most // 3), col_spacing)
 
     def getvalue(self) -> str:
         """Return the help, lines that are too wide continued in the next."""
         lines = super().getvalue().splitlines()
         return "".join(f"{part}\n" for line in lines for part in fitted(line, self.most))
+
+
+def _without_type(name: str) -> str:
+    """Return an argument without a type of Python, or an option with a word in its place."""
+    if not name.startswith("-"):
+        return re.sub(r" <[^>]*>$", "", name)
+    return re.sub(r"<([^>]*)>$", lambda found: "N" if "int" in found[1] else "NAME", name)
 
 
 def fitted(line: str, width: int) -> list[str]:

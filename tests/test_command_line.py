@@ -42,6 +42,7 @@ MISUSE = {
     "option": (["bench", "--fersh"], "--fresh"),
     "option of the main job": (["--fersh"], "--fresh"),
     "suite": (["bench", "clot"], "did you mean 'cloth'?"),
+    "claim unlike any": (["check", "qqq"], "joint positions, Pinocchio; joint rotations"),
     "claim": (["check", "spring force"], "did you mean 'spring forces'?"),
     "scene": (["show", "hart"], "did you mean 'heart'?"),
     "scene unlike any": (["show", "qqq"], "expected one of arm, cloth, circle"),
@@ -334,6 +335,18 @@ def test_help_has_examples_and_does_nothing(capsys, main_job, empty_folder, comm
     assert list(empty_folder.iterdir()) == []
 
 
+COMMANDS = ("verify", "check", "bench", "report", "show", "compare", "history")
+COMMANDS += ("records list", "records merge", "records drop")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_names_no_type_of_python_and_no_bracket_twice(capsys, command):
+    _, out, _ = plumbob(capsys, *command.split(), "--help")
+    assert [
+        line for line in out.splitlines() if re.search(r"<[a-zA-Z]|\[\[|\{|\.\.\.\.", line)
+    ] == []
+
+
 def test_version(capsys, main_job):
     code, out, _ = plumbob(capsys, "--version")
     assert code == 0
@@ -368,7 +381,7 @@ def test_from_measuring_to_the_page(capsys, empty_folder):
     assert f"{count} measured, 0 kept" in out
     code, out, err = plumbob(capsys, "report", "-o", "out")
     assert (code, err) == (0, "")
-    assert re.search("Missing: The suite “.*” was not run to its end", out)
+    assert re.search("(?s)Missing: Not run: check, .*`plumbob bench check .*` measures", out)
     page = (empty_folder / "out" / "index.html").read_text()
     assert "FABRIK needs fewer iterations than CCD" in page
     assert [path.name for path in empty_folder.iterdir()] == ["out"]

@@ -36,6 +36,10 @@ def writable(folder: Path) -> None:
         raise OSError(error.errno, "cannot write here", str(folder)) from None
 
 
+def _listed(names: list[str]) -> str:
+    return ("; " if any("," in name for name in names) else ", ").join(names)
+
+
 def known(kind: str, name: str, valid: Iterable[str]) -> str:
     """Return a name that is valid.
 
@@ -46,5 +50,5 @@ def known(kind: str, name: str, valid: Iterable[str]) -> str:
     if name in names:
         return name
     near = difflib.get_close_matches(name, names, n=1)
-    hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(names)}"
+    hint = f"did you mean {near[0]!r}?" if near else f"expected one of {_listed(names)}"
     raise ValueError(f"unknown {kind} {name!r}: {hint}")

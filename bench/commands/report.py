@@ -35,7 +35,9 @@ Target = Annotated[
     ),
 ]
 Name = Annotated[str, typer.Option("--table", metavar="NAME", help="Print one table; see --list.")]
-Form = Annotated[str, typer.Option("--format", help=f"Of the table: {', '.join(FORMATS)}.")]
+Form = Annotated[
+    str, typer.Option("--format", metavar="FORM", help=f"Of the table: {', '.join(FORMATS)}.")
+]
 Columns = Annotated[
     list[str] | None,
     typer.Option("--columns", metavar="COLUMNS", help="Headings or numbers: 'solver, 3-5'."),
@@ -46,7 +48,10 @@ Rows = Annotated[
 ]
 Order = Annotated[str, typer.Option("--sort", metavar="COLUMN", help="The best or least first.")]
 Width = Annotated[
-    str, typer.Option("--width", help="Of LaTeX: column, page, or a length such as 120mm.")
+    str,
+    typer.Option(
+        "--width", metavar="LENGTH", help="Of LaTeX: column, page, or a length such as 120mm."
+    ),
 ]
 Listing = Annotated[bool, typer.Option("--list", help="List tables; with --table, its columns.")]
 

@@ -69,7 +69,9 @@ def courses(runs: Sequence[Run], quantity: str, words: Sequence[str] = ()) -> li
     known = [course for course in found if np.isfinite(course.values).any()]
     if not known:
         names = {n for run in runs for key in keys if key in run.rows for n in run.rows[key].arrays}
-        valid = ", ".join(sorted(names)) or "nothing by these words"
+        if not keys:
+            raise ValueError(f"only: expected part of a problem or solver, got {' '.join(words)!r}")
+        valid = ", ".join(sorted(names))
         raise ValueError(f"quantity: expected one of {valid}, got {quantity!r}")
     return sorted(known, key=lambda course: -abs(course.change))
 

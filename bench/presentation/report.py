@@ -134,11 +134,17 @@ def _missing(records: Sequence[Record]) -> list[str]:
         for record in records
         if record.suite == FINISHED
     }
+    begun = {record.suite for record in records}
+    never = [suite for suite in SUITES if suite not in begun and not finished.get(suite)]
     sentences = [
         f"The suite “{suite}” was not run to its end: `plumbob bench {suite}` takes it up again."
         for suite in SUITES
-        if not finished.get(suite)
+        if suite in begun and not finished.get(suite)
     ]
+    if never:
+        sentences.append(
+            f"Not run: {', '.join(never)}. `plumbob bench {' '.join(never)}` measures them."
+        )
     sentences += [
         f"{record.problem}, {record.solver} could not be measured: {record.failed}"
         for record in records

@@ -59,7 +59,7 @@ MISUSE = {
     "no folder": ([], "FOLDER"),
     "no records": (["nowhere"], "no records in nowhere"),
     "quantity": (["run0", "--quantity", "speed"], "quantity: expected one of moved, seconds, got"),
-    "nothing": (["run0", "--only", "x y"], "expected one of nothing by these words"),
+    "nothing": (["run0", "--only", "x y"], "only: expected part of a problem or solver, got 'x y'"),
     "suffix": (["run0", "-o", "a.png"], "--output: expected a file that ends with .svg"),
 }
 

@@ -205,6 +205,20 @@ def test_numbers_are_aligned_by_siunitx_and_the_best_are_bold_ties_too():
     assert "Best in bold" in text
 
 
+def test_a_column_in_which_nothing_stands_is_not_set():
+    columns = (Column("solver", words=True), Column("remark", words=True), Column("time", "s"))
+    made = latex.latex(Table("t", "T", columns, (("CCD", "", 1.0), ("LM", "", None))))
+    assert "remark" not in made
+    assert "CCD & 1.00" in made
+    said = latex.latex(Table("t", "T", columns, (("CCD", "cut", 1.0), ("LM", "", None))))
+    assert "remark" in said
+
+
+def test_captions_stand_apart_from_what_is_below():
+    text = latex.latex(Table("t", "T", (Column("a", "s"),), ((1.0,),)))
+    assert text.index("belowcaptionskip") < text.index("caption[")
+
+
 def test_a_share_says_its_total_once_where_all_have_the_same():
     same = latex.latex(table(("a", Share(1, 2, 0.1, 0.9)), ("b", Share(2, 2, 0.3, 1.0))))
     assert "(of 2)" in same

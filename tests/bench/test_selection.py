@@ -4,6 +4,7 @@ import csv
 import html.parser
 import io
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,15 @@ from bench.presentation import sections
 from bench.presentation.results import Results, plain
 from bench.presentation.tables.fragment import fragment
 from bench.presentation.tables.selection import column_numbers, selected
-from bench.presentation.tables.table import Column, Table, best_cells, comma_separated, markdown
+from bench.presentation.tables.table import (
+    NO_SUMMARY,
+    Column,
+    Summary,
+    Table,
+    best_cells,
+    comma_separated,
+    markdown,
+)
 
 COLUMNS = (
     Column("robot", words=True),
@@ -55,7 +64,8 @@ def test_columns_are_named_by_heading_title_or_number(text, numbers):
     [
         ("solvr", "no column 'solvr': did you mean 'solver'?"),
         ("time, medina", "did you mean 'time, median"),
-        ("qqq", "expected one of"),
+        ("solvd", "did you mean 'solved (95 % interval)'?"),
+        ("qqq", "expected one of robot; "),
         ("0", "numbers from 1 to 5, got 0"),
         ("2-9", "numbers from 1 to 5, got 2-9"),
         ("4-2", "numbers from 1 to 5, got 4-2"),
@@ -117,6 +127,13 @@ def test_the_best_are_those_of_the_rows_left_by_the_columns_of_before():
     swapped = selected(TABLE, ["3, 1"], ["solver=Newton", "solver=local/global"], "3")
     assert {swapped.rows[i][1] for i, j in best_cells(swapped)} == {"UR5", "iiwa"}
     assert best_cells(selected(TABLE, ["time, median"], ["solver=Newton"])) == set()
+
+
+def test_a_summary_of_all_rows_is_not_said_of_some():
+    table = replace(TABLE, summary=Summary("Newton solves more."))
+    assert selected(table, ["solver"]).summary == table.summary
+    assert selected(table, rows=["solver~o"]).summary == table.summary
+    assert selected(table, rows=["solver=Newton"]).summary == NO_SUMMARY
 
 
 def test_columns_asked_for_are_not_folded():

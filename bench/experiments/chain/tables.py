@@ -167,8 +167,8 @@ iterations = Layout(
         "The arm starts each frame from its last solution, or from rest towards targets "
         "beyond its reach; the chain starts from random poses. At most "
         f"{settings((record for pair in pairs for record in pair), 'max_iterations')} iterations. "
-        "They tie unless lots for the signs of the differences, target by target, would set them "
-        "as far apart in less than 5 % of cases."
+        "They tie unless Fisher’s randomisation test of the differences, target by target, gives "
+        "less than 5 %."
     ),
     summary=_rival_summary,
     figures=(figures.iterations,),

@@ -47,8 +47,8 @@ RULE = (
 )
 TIES = (
     "Solvers tie unless one does better on so many of the same targets that chance would do as "
-    "much in less than 5 % of cases (McNemar’s exact test for success, lots for the signs of "
-    "differences for times; Holm’s correction over rivals)."
+    "much in less than 5 % of cases (McNemar’s exact test for success, Fisher’s "
+    "randomisation test of differences for times; Holm’s correction over rivals)."
 )
 # What a geometric mean of times is.
 SCORE = (

@@ -161,9 +161,9 @@ def _how(works: Sequence[Timed]) -> str:
     return (
         "pytest-benchmark, one core unless all are named, after a first call that may compile; "
         "each time is a call’s divided by what it does. All that is compared alternates in an "
-        "order by seeded lot, sweep after sweep; the interval is of the medians of sweeps, by "
-        "order statistics, and two tie unless lots for the signs of their differences, sweep by "
-        f"sweep, would set them as far apart in less than 5 % of cases. {steadiness(_noise(works))}"
+        "order drawn by a seed, sweep after sweep; the interval is of the medians of sweeps, by "
+        "order statistics, and two tie unless Fisher’s randomisation test of their differences, "
+        f"sweep by sweep, gives less than 5 %. {steadiness(_noise(works))}"
     ).rstrip()
 
 

@@ -9,6 +9,7 @@ import functools
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 from ...harness.metrics import Share
@@ -33,6 +34,8 @@ _LEAD = 1.2
 # Words are set in smaller letters before their column is narrower than this, in units of the size.
 _COMFORT = 9.0
 _PACKAGES = r"% needs \usepackage{booktabs,longtable} and siunitx of 2021 or newer (version 3)"
+# Room between a caption and what stands below it, of which the classes of LaTeX leave none.
+_SKIP = r"\setlength{\belowcaptionskip}{5pt}"
 _NUMBERS = (
     r"\sisetup{mode=text, reset-text-series=false, reset-text-family=false, "
     r"reset-text-shape=false, group-digits=integer, group-minimum-digits=4, group-separator={,}, "
@@ -70,7 +73,7 @@ def paper(width: str) -> Paper:
 
 def latex(table: Table, width: str = "page") -> str:
     """Return the table as LaTeX for a column, a page, or another width."""
-    page = paper(width)
+    page, table = paper(width), _without_empty(table)
     best = best_cells(table)
     columns = [_Typeset(table, j, best) for j in range(len(table.columns))]
     size, numbers = _size(table, columns, page.width)
@@ -80,6 +83,19 @@ def latex(table: Table, width: str = "page") -> str:
     about = [_PACKAGES, *_comments(table, len(numbers))]
     body = _long(table, made, page, size) if is_long else _float(table, made, page, size)
     return "\n".join([*about, *body, ""])
+
+
+def _without_empty(table: Table) -> Table:
+    """Return a table without columns in which nothing stands, such as remarks that nobody made."""
+    filled = [j for j in range(len(table.columns)) if any(words(row[j]) for row in table.rows)]
+    kept = filled or list(range(len(table.columns)))
+    best = {(i, kept.index(j)) for i, j in best_cells(table) if j in kept}
+    return replace(
+        table,
+        columns=tuple(table.columns[j] for j in kept),
+        rows=tuple(tuple(row[j] for j in kept) for row in table.rows),
+        best=frozenset(best),
+    )
 
 
 def _size(table: Table, columns: Sequence["_Typeset"], width: float) -> tuple[int, list[int]]:
@@ -335,7 +351,8 @@ def _parts(table: Table, columns: Sequence[_Typeset], width: float, size: int) -
 def _float(table: Table, made: Sequence[_Part], page: Paper, size: int) -> list[str]:
     """Return a table that stands on one page, its parts below one another."""
     name = "table*" if page.is_page else "table"
-    body = [rf"\begin{{{name}}}", r"\centering", _NUMBERS, _caption(table, page), *_setting(size)]
+    body = [rf"\begin{{{name}}}", r"\centering", _SKIP, _NUMBERS, _caption(table, page)]
+    body += _setting(size)
     for i, part in enumerate(made):
         body += [r"\par\medskip"] if i else []
         body += [

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from ...harness.metrics import Share
-from .table import Cell, Table, best_cells, words
+from .table import NO_SUMMARY, Cell, Table, best_cells, words
 
 _COMPARE: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
@@ -25,7 +25,8 @@ def selected(
 ) -> Table:
     """Return a table with only some columns and rows, in the order of one of its columns.
 
-    The best are the best of the rows that are left, by all columns that the table had.
+    The best are the best of the rows that are left, by all columns that the table had. The summary
+    is of all rows, and so left out where one is.
 
     Raises:
         ValueError: if there is no such column, a filter is none, or no row is left.
@@ -43,6 +44,7 @@ def selected(
         columns=tuple(asked(left.columns[j]) for j in chosen),
         rows=tuple(tuple(left.rows[i][j] for j in chosen) for i in ordered),
         sources=tuple(left.sources[i] for i in ordered) if left.sources else (),
+        summary=table.summary if len(left.rows) == len(table.rows) else NO_SUMMARY,
         best=frozenset(
             (row, column)
             for row, i in enumerate(ordered)
@@ -193,6 +195,7 @@ def _by_number(table: Table, text: str, option: str) -> list[int]:
 def _unknown(table: Table, name: str, option: str) -> str:
     headings = [column.heading for column in table.columns]
     known = {_plain(word): c.heading for c in table.columns for word in (c.heading, c.title)}
+    known = {word[: len(_plain(name))]: heading for word, heading in known.items()} | known
     near: list[Any] = difflib.get_close_matches(_plain(name), known, n=1)
-    hint = f"did you mean {known[near[0]]!r}?" if near else f"expected one of {headings}"
+    hint = f"did you mean {known[near[0]]!r}?" if near else f"expected one of {'; '.join(headings)}"
     return f"{option}: {table.name} has no column {name!r}: {hint}"

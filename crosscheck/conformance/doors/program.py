@@ -138,16 +138,23 @@ class ProgramContestant:
         if fields is None or not line.lstrip(b"\xef\xbb\xbf \t").startswith(b"{"):
             self._print = self._print or line.strip() or None
         if fields is not None and not self._is_mine(fields):
-            raise LostError(
-                FailureKind.GARBAGE,
-                sentence(
-                    "It answered request {number} with the id {id}: each request is answered "
-                    "once, with its own id.",
-                    number=self._number,
-                    id=message.shown(repr(fields.get("id")), 40),
-                ),
-            )
+            raise LostError(FailureKind.GARBAGE, self._of_another(fields))
         return fields
+
+    def _of_another(self, fields: Mapping[str, Any]) -> Sentence:
+        """Return that an answer has no id or another one."""
+        if fields.get("id") is None:
+            return sentence(
+                "It answered request {number} without an id: each request is answered once, with "
+                "its own id.",
+                number=self._number,
+            )
+        return sentence(
+            "It answered request {number} with the id {id}: each request is answered "
+            "once, with its own id.",
+            number=self._number,
+            id=message.shown(repr(fields["id"]), 40),
+        )
 
     def _is_mine(self, fields: Mapping[str, Any]) -> bool:
         number = fields.get("id")

@@ -67,7 +67,7 @@ HOSTILE = {
         "garbage",
         "answered request 2 with the id 9",
     ),
-    "no id": ("say(positions=[])", "garbage", "answered request 2 with the id None"),
+    "no id": ("say(positions=[])", "garbage", "answered request 2 without an id"),
     "true as id": ("say(id=True)", "garbage", "with the id True"),
     "a list as id": ("say(id=[1])", "garbage", r"with the id \[1\]"),
     "broken JSON": ("print('{\"id\": 2, positions}', flush=True)", "garbage", "a broken line: exp"),
