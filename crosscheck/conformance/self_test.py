@@ -24,6 +24,9 @@ from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
 from .judgement import Verdict
 from .kinematics.faults import FAULTS, Switches, switches
 from .kinematics.predictions import predict_forward, predict_track, solve
+from .kinematics.robot_inverse_kinematics import FAULTS as ROBOT_FAULTS
+from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
+from .kinematics.robot_solver import solve_by_reference, solve_wrongly
 from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
 from .mass_spring.model import Integrator, Model, simulate
 from .mass_spring.problem import all_forces, problem_of, state_of, system_of
@@ -111,7 +114,9 @@ def subjects() -> Iterator[Subject]:
     """Yield every fault on its own, then the honest solvers."""
     yield from _kinematic_faults()
     yield from _mass_spring_faults()
+    yield from _robot_faults()
     yield from _right_kinematics()
+    yield from _right_robots()
     yield from _right_steps()
 
 
@@ -126,6 +131,21 @@ def _kinematic_faults() -> Iterator[Subject]:
             if not fault.honest:
                 function = partial(_textbook, method, switches([fault]))
                 yield Subject(fault.key, FAMILIES[kind], task, function, greeting, fault.key)
+
+
+def _robot_faults() -> Iterator[Subject]:
+    greeting = Greeting(PROTOCOL, (ROBOTS,))
+    for key, fault in ROBOT_FAULTS.items():
+        yield Subject(key, "robots", ROBOTS, partial(solve_wrongly, fault), greeting, key)
+
+
+def _right_robots() -> Iterator[Subject]:
+    greeting = Greeting(PROTOCOL, (ROBOTS,))
+    for name, function in (
+        ("damped least squares, robots", partial(solve_wrongly, None)),
+        ("reference, robots", solve_by_reference),
+    ):
+        yield Subject(name, HONEST, ROBOTS, function, greeting)
 
 
 def _textbook(method: str, switched: Switches, /, **inputs: Any) -> Mapping[str, Any]:

@@ -18,7 +18,7 @@ from bench.presentation.sections import tables
 from crosscheck.conformance.doors import open_contestant
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
-IK, CLOTH, PROBLEMS = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+IK, CLOTH, ROBOT, PROBLEMS = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
 FACTS = {"task": "chain", "stratum": "near", "entrant": True}
 CHAIN = {
     "residual": [0.0],
@@ -66,7 +66,7 @@ def test_the_solvers_of_the_readme_are_those_of_the_page():
     assert CLOTH in readme
 
 
-@pytest.mark.parametrize("code", [IK, CLOTH], ids=["ik", "cloth"])
+@pytest.mark.parametrize("code", [IK, CLOTH, ROBOT], ids=["ik", "cloth", "robot"])
 def test_fifteen_lines_suffice(code):
     assert sum(bool(line.strip()) for line in code.splitlines()) <= 15
 
@@ -408,20 +408,6 @@ def test_robots_out_of_reach_are_claimed_by_nobody(folder):
     bench("ik", "--quick", "--problem", "unreachable/ur5", "--with", "robot.py", "--solver", "Mine")
     assert len(records()) == 2
     assert not any(one.arrays["solved"].any() for one in records())
-
-
-ROBOT = """
-from plumbob import Target, formats, solve_ik
-
-PLUMBOB = {"name": "Mine", "version": "3"}
-
-
-def robot_inverse_kinematics(urdf, start, target_position, target_rotation, tolerance):
-    robot = formats.urdf.parse(urdf).articulation
-    target = Target(target_position, target_rotation, robot.names[-1])
-    found = solve_ik(robot, start, target, "levenberg_marquardt", restarts=0, tolerance=tolerance)
-    return {"q": found.coordinates, "converged": found.outcome.name == "CONVERGED"}
-"""
 
 
 def test_the_door_is_closed_after_the_greeting(folder, monkeypatch):

@@ -44,6 +44,9 @@ def of_full_length(make):
                 changed |= {"stratum": np.arange(120) % 2, "beyond": np.zeros(120)}
                 made = make.raced(peer.called(entry), entry.kind, robot=robot, **changed)
                 yield made.__class__(**{**vars(made), "size": 120.0})
+    for peer in registry.PEERS[len(PRESENT) :]:
+        entry = peer.entries[-1]  # with restarts: in another table than the one that is tried
+        yield make.lacking(peer.called(entry), entry.kind, f"{peer.package} is not installed")
     for stiffness in (1e2, 1e3, 1e4):
         for i, peer in enumerate(registry.cloth_peers()):
             sizes, error = (20, 40, 80), (0.5, 1e-4, 10.0**-i)

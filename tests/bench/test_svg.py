@@ -13,7 +13,7 @@ STEPS = "M 0 5.000001  L 1 5  L 2 5  L 3 5  L 3 7  L 3 9.123456  L 4 9.123456 L 
 
 
 def test_points_on_level_and_upright_lines_are_left_out():
-    assert shorter_path(STEPS) == "M 0 5 3 5 3 9.12 4 9.12 2 9.12 z"
+    assert shorter_path(STEPS) == "M 0 5 l 3 0 0 4.12 1 0 -2 0 z"
 
 
 def test_a_curve_keeps_its_letters_and_all_its_points():
@@ -22,11 +22,50 @@ def test_a_curve_keeps_its_letters_and_all_its_points():
     )  # fmt: skip
 
 
+def drawn(path):
+    """Return the points of a path whose lines are told as differences."""
+    steps = np.array(re.findall(r"-?[\d.]+", path), dtype=float).reshape(-1, 2)
+    return np.cumsum(steps, axis=0)
+
+
+@pytest.mark.parametrize("size", [5, 60])
+def test_differences_do_not_add_up_their_rounding(size):
+    points = np.random.default_rng(size).uniform(-99, 99, (size, 2))
+    path = "M " + " L ".join(f"{x} {y}" for x, y in points)
+    assert np.abs(drawn(shorter_path(path)) - points).max() <= (0.0051 if size == 5 else 0.051)
+
+
+@pytest.mark.parametrize("number", [0.5, -0.5, 10.5, -10.5, 20.04, 100, 0.004, -0.004, 0])
+def test_a_number_is_written_in_few_letters(number):
+    left = shorter_path(f"M {number} {-number} z").split()
+    assert [float(one) for one in left[1:3]] == [round(number, 2), -round(number, 2)]
+    assert "0." not in (left[1][:2], left[2][:2])
+
+
+STYLED = """<svg xmlns="http://www.w3.org/2000/svg"><g><path d="M 0 0 L 1 1" style="{}"/>
+<path d="M 0 0 L 2 1" style="{}"/></g></svg>"""
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "shared"),
+    [
+        ("fill: none; stroke: red", "fill: none; stroke: red", True),
+        ("fill: none", "fill: red", False),
+        ("fill: none; opacity: 0.5", "fill: none; opacity: 0.5", False),
+    ],
+    ids=["alike", "another", "not inherited"],
+)
+def test_a_style_is_told_once_where_all_parts_inherit_it(first, second, shared):
+    group = ET.fromstring(inline(Drawing("n", "t", "", STYLED.format(first, second)))).find("g")
+    assert (group.get("style") == first) == shared
+    assert all(("style" in part.attrib) != shared for part in group)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_every_point_lies_on_the_shorter_path(seed):
     points = np.cumsum(np.random.default_rng(seed).integers(-1, 2, (60, 2)), axis=0)
     path = "M " + " L ".join(f"{x} {y}" for x, y in points)
-    left = np.array(re.findall(r"-?[\d.]+", shorter_path(path)), dtype=float).reshape(-1, 2)
+    left = drawn(shorter_path(path))
     assert len(left) < len(points)
     start, step = left[:-1], np.diff(left, axis=0)
     length = np.maximum(np.sum(step**2, axis=1), 1e-12)

@@ -1,8 +1,8 @@
 """Figures as parts of a page: an SVG file's tree changed so that it can stand within HTML."""
 
-import itertools
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Mapping, Sequence
 
 from markupsafe import Markup
 
@@ -14,6 +14,13 @@ _SVG, _XLINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}"
 _DRAWN = {"svg", "g", "defs", "path", "use", "clipPath", "rect", "text", "tspan", "image", "title"}
 # What the page says itself: its own size of figures, and that it is SVG.
 _OF_THE_FILE = {"width", "height", "version"}
+# What the parts of a group inherit from it.
+_INHERITED = {"fill", "fill-opacity", "stroke", "stroke-opacity", "stroke-width", "font-size",
+              "stroke-dasharray", "stroke-dashoffset", "stroke-linecap", "stroke-linejoin",
+              "text-anchor"}  # fmt: skip
+# A path of more parts than this is drawn to a tenth of a point.
+_LONG = 20
+_NUMBER, _IN_URL = re.compile(r"-?[0-9.]+(e-?[0-9]+)?"), re.compile(r"url\(#([^)]*)\)")
 _REFERENCE = re.compile(r'(?:url\(|href=")#([^")]*)')
 _VARIABLES = {colour: f"var(--{name})" for name, colour in COLOURS.items()}
 
@@ -28,15 +35,17 @@ def inline(drawing: Drawing) -> Markup:
     _shorten(root)
     for title in root.findall(f"{_SVG}title"):
         root.remove(title)
-    used = set(_REFERENCE.findall(drawing.svg))
+    used = dict.fromkeys(_REFERENCE.findall(drawing.svg))
+    ids = {before: f"{drawing.name}-{number}" for number, before in enumerate(used)}
     for element in root.iter():
         element.tag = element.tag.removeprefix(_SVG)
         if element.tag not in ("text", "tspan"):
             element.text = None
         element.tail = None
-        if element.get("id") not in used:
+        if element.get("id") not in ids:
             element.attrib.pop("id", None)
-        element.attrib = _attributes(element.attrib, drawing.name)
+        element.attrib = _attributes(element.attrib, ids)
+    _share_styles(root)
     for name in _OF_THE_FILE:
         root.attrib.pop(name, None)
     root.attrib |= {"role": "img", "aria-label": drawing.title}
@@ -52,41 +61,70 @@ def _shorten(element: ElementTree.Element) -> None:
             element.remove(child)
 
 
-def _attributes(given: dict[str, str], name: str) -> dict[str, str]:
-    """Return attributes whose ids, and references to ids, are within the drawing of this name."""
+def _attributes(given: dict[str, str], ids: Mapping[str, str]) -> dict[str, str]:
+    """Return attributes with ids of the page's, in as few digits as can be told apart."""
     kept = {}
     for key, value in given.items():
         key = key.removeprefix(_XLINK)
         if key.startswith("on") or (key == "href" and not value.startswith("#")):
             continue
         if key == "id":
-            value = f"{name}-{value}"
+            value = ids[value]
         elif key == "href":
-            value = value.replace("#", f"#{name}-", 1)
+            value = f"#{ids[value[1:]]}"
         elif key == "style":
             value = _style(value)
         elif key == "d":
             value = shorter_path(value)
-        kept[key] = value.replace("url(#", f"url(#{name}-")
+        elif key in ("x", "y") and _NUMBER.fullmatch(value):
+            value = _rounded(value)
+        elif key == "transform" and value.startswith("rotate(-0 "):
+            continue
+        kept[key] = _IN_URL.sub(lambda found: f"url(#{ids[found[1]]})", value)
     return kept
 
 
+def _share_styles(element: ElementTree.Element) -> None:
+    """Move the style that all parts of a group have to the group, from which they inherit it."""
+    for child in element:
+        _share_styles(child)
+    styles = {child.get("style", "") for child in element}
+    if element.tag == "g" and len(styles) == 1 and "style" not in element.attrib:
+        declared = styles.pop()
+        names = {part.partition(":")[0].strip() for part in declared.split(";")}
+        if len(element) > 1 and names <= _INHERITED:
+            element.set("style", declared)
+            for child in element:
+                child.attrib.pop("style")
+
+
 def shorter_path(path: str) -> str:
-    """Return a path to a hundredth of a point, without what lies within level or upright lines."""
+    """Return a path to a hundredth of a point, a long one to a tenth, its lines as differences.
+
+    What lies within level or upright lines is left out.
+    """
     parts = [re.split(r"\s+", part.strip()) for part in re.findall(r"[A-Za-z][^A-Za-z]*", path)]
+    digits = 1 if len(parts) > _LONG else 2
     kept: list[list[str]] = []
     for letter, *numbers in parts:
-        part = [letter, *map(_rounded, numbers)]
+        part = [letter, *(_rounded(number, digits) for number in numbers)]
         if len(kept) > 1 and letter == kept[-1][0] == "L" and _is_between(kept[-2:], part):
             kept.pop()
         kept.append(part)
-    told = [" ".join(part) for part in kept]
-    for i, (before, part) in enumerate(
-        itertools.pairwise(kept), 1
-    ):  # a line's letter is understood
-        if part[0] == "L" and before[0] in "ML":
-            told[i] = " ".join(part[1:])
-    return " ".join(told)
+    return " ".join(_told(kept, digits))
+
+
+def _told(parts: Sequence[Sequence[str]], digits: int) -> Iterator[str]:
+    """Yield the parts of a path; lines as differences, whose letter is said once."""
+    before, at = "", ["0", "0"]
+    for letter, *numbers in parts:
+        if letter == "L" and before in ("M", "L"):
+            steps = (float(to) - float(start) for to, start in zip(numbers, at, strict=True))
+            told = [_rounded(str(step), digits) for step in steps]
+            yield " ".join(told if before == "L" else ["l", *told])
+        else:
+            yield " ".join([letter, *numbers])
+        before, at = letter, numbers[-2:]
 
 
 def _is_between(before: list[list[str]], part: list[str]) -> bool:
@@ -97,8 +135,9 @@ def _is_between(before: list[list[str]], part: list[str]) -> bool:
     return level or upright
 
 
-def _rounded(number: str) -> str:
-    return f"{float(number):.2f}".rstrip("0").rstrip(".")
+def _rounded(number: str, digits: int = 2) -> str:
+    short = f"{float(number):.{digits}f}".rstrip("0").rstrip(".")
+    return "0" if short == "-0" else re.sub(r"^(-?)0\.", r"\1.", short)
 
 
 def _style(text: str) -> str:

@@ -20,6 +20,8 @@ TASK = robot_models.TASK
 cases = robot_models.cases
 # Answers of a faulty solver may stop so many times as far off as its tolerance: it has its own.
 LENIENT = 10.0
+# Readings that explain whole poses are believed though the position explains so many times more.
+CHANCE = 4
 
 
 class Fault(NamedTuple):
@@ -170,12 +172,14 @@ def _diagnosis(judgements: Sequence[CaseJudgement]) -> Diagnosis:
     if not missed:
         return Diagnosis()
     counts = {key: sum(_explains(fault, one) for one in missed) for key, fault in FAULTS.items()}
+    # Whole poses are hardly met by chance, positions are where a solver is stuck: these come last.
+    poses = {key: count for key, count in counts.items() if FAULTS[key].order is not None}
+    if CHANCE * max(poses.values()) >= max(counts.values()):
+        counts = poses
     most = max(counts.values())
     if not most:
         return Diagnosis(tried=len(FAULTS))
-    # Who reaches another rotation may reach no more than the position: that is said last.
-    named = [key for key in FAULTS if counts[key] == most]
-    named = [key for key in named if FAULTS[key].order is not None] or named
+    named = [key for key in counts if counts[key] == most]
     told = Explanation(tuple(named), FAULTS[named[0]].sentence, most / len(missed), 0.0)
     return Diagnosis((told,), tried=len(FAULTS))
 

@@ -42,6 +42,7 @@ def test_every_family_has_subjects_with_names_of_their_own():
     assert len({(one.family, one.name, one.task) for one in SUBJECTS}) == len(SUBJECTS)
     assert {one.family for one in RIGHT} == {HONEST}
     assert len(FAULTY) > 200
+    assert {one.family for one in FAULTY} >= {"robots", "steps", "forces", "CCD", "FABRIK"}
 
 
 def test_a_judge_that_sees_nothing_or_accuses_all_does_not_pass():
