@@ -309,6 +309,13 @@ def test_files_are_checked_and_the_tables_are_markdown(capsys, robots):
     assert "| MJCF | Pinocchio | 2 | 1 | 0 | 1 |" in out
 
 
+def test_files_that_nobody_reads_are_counted(capsys, robots):
+    (robots / "broken.urdf").write_text("<robot")
+    code, out, _ = plumbob(capsys, "check", "--files", "robots")
+    assert code == 0
+    assert "Of 4 files nothing disagrees, 1 is read by none; 1 is a part" in out
+
+
 def test_files_that_differ_exit_1(capsys, robots):
     (robots / "b.xml").write_text(CHARACTER(BODY("<frame><joint name='k'/></frame>")))
     code, out, _ = plumbob(capsys, "check", "--files", "robots/b.xml", "robots/arms")

@@ -105,11 +105,17 @@ def _count(readings: list[Reading], outcomes: list[str]) -> list[int | float | N
 
 def _sentence(found: Found, checked: Sequence[Checked], disagreements: int) -> str:
     fragments = sum(one.file.kind == FRAGMENT for one in checked)
+    unread = sum(
+        bool(one.readings) and all(reading.outcome == NEITHER for reading in one.readings)
+        for one in checked
+    )
+    silent = f", {_counted(unread, 'is', 'are')} read by none" if unread else ""
     differ = _counted(disagreements, "reading disagrees", "readings disagree")
     parts = _counted(fragments, "is a part", "are parts")
     others = _counted(found.others, "XML file is", "XML files are")
     return (
-        f"Of {len(checked) - fragments:,} files {differ if disagreements else 'nothing disagrees'};"
+        f"Of {len(checked) - fragments:,} files {differ if disagreements else 'nothing disagrees'}"
+        f"{silent};"
         f" {parts} that others include, {others} of other kinds"
     )
 
