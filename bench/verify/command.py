@@ -124,6 +124,8 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     if export:
         return _print(exported(export, task or (), seed, thorough, say))
     if self_test:
+        if task or solver or answers:
+            raise ValueError("--self-test: expected no task or solver with it: it tries the judge")
         return _self_test(say)
     folder = [ANSWERS, str(answers)] if answers else []
     words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]

@@ -243,6 +243,7 @@ MISUSE = {
     "answers and solver": (["--answers", ".", "right.py"], "got right.py as well"),
     "output": (["right.py", "--json", "."], "expected a file, got a folder"),
     "output folder": (["right.py", "-o", "right.py"], "right.py"),
+    "self-test of a task": (["--self-test", "--task", "energy"], "expected no task or solver"),
     "option": (["right.py", "--jsn", "a"], "--json"),
 }
 
