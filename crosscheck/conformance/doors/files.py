@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from .. import message
 from ..case import Case
 from ..contestant import Answer, Failure, FailureKind, NoGreetingError
@@ -23,8 +25,11 @@ PREFIX = "answer_"
 
 def place_of(case: Case) -> str:
     """Return the folder of a case among all, as a relative path of plain letters."""
-    method = case.inputs.get("method", "")
-    return f"{_plain(f'{case.task} {method}')}/{_plain(case.name)}"
+    return f"{_folder(case.task, case.inputs.get('method', ''))}/{_plain(case.name)}"
+
+
+def _folder(task: str, method: str) -> str:
+    return _plain(f"{task} {method}")
 
 
 def _plain(name: str) -> str:
@@ -63,7 +68,6 @@ class FileContestant:
     Attributes:
         folder: of the export.
         seed, thorough: of its cases, to be passed to `verify`.
-        remarks: that an answer is never given twice.
 
     Raises:
         ValueError: if it is no folder of exported cases.
@@ -75,17 +79,44 @@ class FileContestant:
             raise ValueError(f"answers: expected a folder of exported cases, got {folder}")
         settings = _object((folder / SETTINGS).read_bytes(), SETTINGS)
         self.seed, self.thorough = int(settings.get("seed", 0)), bool(settings.get("thorough"))
-        self.remarks: tuple[Sentence, ...] = (
-            sentence("Files answer once: whether equal requests have equal answers is not known."),
+
+    @property
+    def remarks(self) -> tuple[Sentence, ...]:
+        """That an answer is never given twice, and which tasks have none."""
+        once = sentence(
+            "Files answer once: whether equal requests have equal answers is not known."
+        )
+        left_out = [task for task in self._offered().tasks if task not in self.greeting.tasks]
+        if not left_out:
+            return (once,)
+        return once, sentence(
+            "Left out, for they have no answers: {tasks}.", tasks=", ".join(left_out)
         )
 
     @property
     def greeting(self) -> Greeting:
-        """What greeting.json says.
+        """What greeting.json says, of the tasks that have answers if there are any.
 
         Raises:
             NoGreetingError: if it is not understood.
         """
+        offered = self._offered()
+        every = ("", *offered.methods)
+        tasks = tuple(t for t in offered.tasks if any(self._answers(t, one) for one in every))
+        methods = tuple(
+            one for one in offered.methods if any(self._answers(task, one) for task in tasks)
+        )
+        if not tasks:
+            return offered
+        return msgspec.structs.replace(offered, tasks=tasks, methods=methods or offered.methods)
+
+    def _answers(self, task: str, method: str) -> bool:
+        """Return whether anything stands beside the cases of a task that was not exported."""
+        exported = {REQUEST, *(f"{field.name}.csv" for field in TASKS[task].inputs)}
+        files = (self.folder / _folder(task, method)).glob("*/[!.]*")
+        return any(path.name not in exported for path in files)
+
+    def _offered(self) -> Greeting:
         try:
             return read_greeting(self.folder)
         except ValueError as error:

@@ -88,6 +88,28 @@ def test_a_folder_without_answers_says_what_to_write(folder):
     assert "expected answer.json or answer_positions.csv or" in str(failure.sentence)
 
 
+@pytest.mark.parametrize(
+    ("answered", "tasks", "methods", "left_out"),
+    [
+        ((), GREETING.tasks, ("",), False),
+        ((CASES[0],), ("forward_kinematics",), ("",), True),
+        ((CASES[2],), ("inverse_kinematics",), ("ccd",), True),
+        ((CASES[0], CASES[3]), GREETING.tasks, ("my own",), False),
+    ],
+    ids=["none", "one task", "one method", "a method of each task"],
+)
+def test_only_tasks_that_have_answers_are_judged(tmp_path, answered, tasks, methods, left_out):
+    greeting = Greeting(1, GREETING.tasks, methods=("ccd", "my own")) if answered else GREETING
+    write_cases(tmp_path / "cases", CASES, greeting)
+    contestant = FileContestant(tmp_path / "cases")
+    for case in answered:
+        (contestant.folder / place_of(case) / "anwser.json").write_text("{}")  # as people write
+    (contestant.folder / place_of(CASES[1]) / ".hidden").write_text("")
+    assert contestant.greeting.tasks == tasks
+    assert contestant.greeting.methods == (methods if methods != ("",) else greeting.methods)
+    assert any("Left out" in str(one) for one in contestant.remarks) == left_out
+
+
 ANSWER = {"positions": [[1, 2, 3], [4, 5, None]], "seconds": 0.5}
 POSITIONS = np.array([[1, 2, 3], [4, 5, np.nan]])
 JSON = {
