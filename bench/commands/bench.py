@@ -1,6 +1,7 @@
 """The command `bench`, which measures, and the main job, which measures and reports."""
 
 import re
+import shlex
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -132,6 +133,8 @@ def bench(  # noqa: PLR0913 -- one parameter an option
         code = run_suites(chosen, choice, output, fresh, where)
     if suites:
         print_tables(chosen, output)
+    folder = "" if output == REPORT else f" -o {shlex.quote(str(output))}"
+    print(visible(f"plumbob report{folder} writes these tables and the page."))
     return code
 
 

@@ -67,7 +67,11 @@ def choose(suites: Sequence[str], name: str, scale: Scale, wanted: Wanted) -> Ch
     problems += _meant("robot", wanted.robots, _names_of(there, _robot_names))
     choice = Choice(name, scale, tuple(solvers), tuple(problems), is_partial=True)
     if not any(map(choice.takes, there)):
-        raise ValueError("expected solvers that are asked these problems, got none of them")
+        asked = " and ".join(filter(None, map(", ".join, (wanted.problems, wanted.robots))))
+        raise ValueError(
+            f"solver: expected one that is asked {asked or 'something'} in {', '.join(suites)}, "
+            f"got {', '.join(wanted.solvers)}; `plumbob bench {suites[0]} --list` lists all"
+        )
     return choice
 
 

@@ -427,7 +427,10 @@ def test_the_door_is_closed_after_the_greeting(folder, monkeypatch):
         (["--problem", "chain/naer"], "did you mean 'chain/near'?"),
         (["--robot", "ur6"], "did you mean 'ur5'?"),
         (["--targets", "0"], "targets: expected 1 or more, got 0"),
-        (["--solver", "ccd", "--robot", "ur5"], "got none of them"),
+        (
+            ["--solver", "ccd", "--robot", "ur5"],
+            "expected one that is asked ur5 in ik, got ccd; `plumb",
+        ),
     ],
 )
 def test_a_near_miss_is_met_with_a_question(folder, capsys, words, said):
