@@ -16,6 +16,9 @@ from bench.presentation.results import Results, plain
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
 
+CELLS = ("td", "th")
+
+
 class Page(html.parser.HTMLParser):
     """What the tests ask of a page: its ids, links, tags left open, and text."""
 
@@ -30,8 +33,16 @@ class Page(html.parser.HTMLParser):
         self.scripts += tag == "script"
         self.ids += [value for name, value in attributes if name == "id"]
         self.links += [value for name, value in attributes if name in ("href", "src")]
+        if tag in CELLS or tag == "tr":
+            self._end_cells(row=tag == "tr")
         if tag not in VOID:
             self.open.append(tag)
+
+    def _end_cells(self, row):
+        """End a cell, and its row, which need no tags that say so."""
+        for tags in (CELLS, ("tr",) if row else ()):
+            if self.open and self.open[-1] in tags:
+                self.open.pop()
 
     def handle_startendtag(self, tag, attributes):
         self.handle_starttag(tag, attributes)
@@ -39,6 +50,8 @@ class Page(html.parser.HTMLParser):
             self.open.pop()
 
     def handle_endtag(self, tag):
+        if tag not in CELLS:
+            self._end_cells(row=tag != "tr")
         if not self.open or self.open.pop() != tag:
             self.wrong.append(tag)
 

@@ -2,6 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ElementTree
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 
 from markupsafe import Markup
@@ -20,6 +21,8 @@ _INHERITED = {"fill", "fill-opacity", "stroke", "stroke-opacity", "stroke-width"
               "text-anchor"}  # fmt: skip
 # A path of more parts than this is drawn to a tenth of a point.
 _LONG = 20
+# A space beside a letter or before a sign separates nothing.
+_UNNEEDED = re.compile(r"(?<=[A-Za-z]) | (?=[A-Za-z-])")
 _NUMBER, _IN_URL = re.compile(r"-?[0-9.]+(e-?[0-9]+)?"), re.compile(r"url\(#([^)]*)\)")
 _REFERENCE = re.compile(r'(?:url\(|href=")#([^")]*)')
 _VARIABLES = {colour: f"var(--{name})" for name, colour in COLOURS.items()}
@@ -36,7 +39,7 @@ def inline(drawing: Drawing) -> Markup:
     for title in root.findall(f"{_SVG}title"):
         root.remove(title)
     used = dict.fromkeys(_REFERENCE.findall(drawing.svg))
-    ids = {before: f"{drawing.name}-{number}" for number, before in enumerate(used)}
+    ids = {before: f"{_short(drawing.name)}-{number}" for number, before in enumerate(used)}
     for element in root.iter():
         element.tag = element.tag.removeprefix(_SVG)
         if element.tag not in ("text", "tspan"):
@@ -50,6 +53,11 @@ def inline(drawing: Drawing) -> Markup:
         root.attrib.pop(name, None)
     root.attrib |= {"role": "img", "aria-label": drawing.title}
     return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def _short(name: str) -> str:
+    """Return a name as few letters, which are others for another name."""
+    return f"f{zlib.crc32(name.encode()):x}"[:6]
 
 
 def _shorten(element: ElementTree.Element) -> None:
@@ -77,7 +85,7 @@ def _attributes(given: dict[str, str], ids: Mapping[str, str]) -> dict[str, str]
         elif key == "d":
             value = shorter_path(value)
         elif key in ("x", "y") and _NUMBER.fullmatch(value):
-            value = _rounded(value)
+            value = _rounded(value, 1)
         elif key == "transform" and value.startswith("rotate(-0 "):
             continue
         kept[key] = _IN_URL.sub(lambda found: f"url(#{ids[found[1]]})", value)
@@ -85,17 +93,28 @@ def _attributes(given: dict[str, str], ids: Mapping[str, str]) -> dict[str, str]
 
 
 def _share_styles(element: ElementTree.Element) -> None:
-    """Move the style that all parts of a group have to the group, from which they inherit it."""
+    """Move what styles all parts of a group, or clips all its paths, to the group."""
     for child in element:
         _share_styles(child)
-    styles = {child.get("style", "") for child in element}
-    if element.tag == "g" and len(styles) == 1 and "style" not in element.attrib:
-        declared = styles.pop()
-        names = {part.partition(":")[0].strip() for part in declared.split(";")}
-        if len(element) > 1 and names <= _INHERITED:
-            element.set("style", declared)
-            for child in element:
-                child.attrib.pop("style")
+    if element.tag != "g" or len(element) < 2:
+        return
+    if _names(element[0].get("style", "")) <= _INHERITED:
+        _share(element, "style")
+    if {child.tag for child in element} == {"path"}:
+        _share(element, "clip-path")
+
+
+def _names(style: str) -> set[str]:
+    return {part.partition(":")[0] for part in style.split(";")}
+
+
+def _share(group: ElementTree.Element, key: str) -> None:
+    """Move an attribute to a group, if it has none and that of all its parts is the same."""
+    values = {child.get(key, "") for child in group}
+    if key not in group.attrib and len(values) == 1 and values != {""}:
+        group.set(key, values.pop())
+        for child in group:
+            del child.attrib[key]
 
 
 def shorter_path(path: str) -> str:
@@ -111,20 +130,30 @@ def shorter_path(path: str) -> str:
         if len(kept) > 1 and letter == kept[-1][0] == "L" and _is_between(kept[-2:], part):
             kept.pop()
         kept.append(part)
-    return " ".join(_told(kept, digits))
+    return _UNNEEDED.sub("", " ".join(_told(kept, digits)))
 
 
 def _told(parts: Sequence[Sequence[str]], digits: int) -> Iterator[str]:
     """Yield the parts of a path; lines as differences, whose letter is said once."""
-    before, at = "", ["0", "0"]
+    before, said, at = "", "", ["0", "0"]
     for letter, *numbers in parts:
         if letter == "L" and before in ("M", "L"):
             steps = (float(to) - float(start) for to, start in zip(numbers, at, strict=True))
             told = [_rounded(str(step), digits) for step in steps]
-            yield " ".join(told if before == "L" else ["l", *told])
+            how, told = _line(told)
+            yield " ".join(told if how == said else [how, *told])
+            said = how
         else:
             yield " ".join([letter, *numbers])
+            said = letter
         before, at = letter, numbers[-2:]
+
+
+def _line(step: list[str]) -> tuple[str, list[str]]:
+    """Return a line's letter and numbers: of a level or upright one, how far it goes."""
+    if step[1] == "0":
+        return "h", step[:1]
+    return ("v", step[1:]) if step[0] == "0" else ("l", step)
 
 
 def _is_between(before: list[list[str]], part: list[str]) -> bool:
@@ -148,4 +177,4 @@ def _style(text: str) -> str:
         words = font.split()
         i = next(i for i, word in enumerate(words) if word.endswith("px"))
         declared |= {"font-size": words[i], **({"font-weight": words[0]} if i else {})}
-    return "; ".join(f"{key}: {_VARIABLES.get(value, value)}" for key, value in declared.items())
+    return ";".join(f"{key}:{_VARIABLES.get(value, value)}" for key, value in declared.items())

@@ -112,8 +112,19 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {"rich": rich, "coded": coded, "inline": svg.inline}
+    environment.filters |= {"quoted": _quoted, "bare": _bare}
     environment.filters["percent"] = partial(words_in, unit="%")
     return environment
+
+
+def _quoted(text: str) -> Markup:
+    """Return a text for an attribute in double quotes, where an apostrophe needs no escape."""
+    return Markup(str(Markup.escape(text)).replace("&#39;", "'"))
+
+
+def _bare(classes: str) -> Markup:
+    """Return classes as an attribute’s value, in quotes where there are several."""
+    return Markup(f'"{classes}"' if " " in classes else classes)
 
 
 def _machine(record: Record) -> dict[str, str]:

@@ -44,7 +44,7 @@ class Group(NamedTuple):
 
 
 class ShownCell(NamedTuple):
-    """A cell as markup, and its value to seven digits where it is a number or a share."""
+    """A cell as markup, and its value to six digits where it is a number or a share."""
 
     tag: str
     text: Markup
@@ -189,14 +189,14 @@ def _verdict(cell: Cell) -> str:
 
 
 def _value(cell: Cell) -> str:
-    """Return a number to seven digits, a share as its four parts, "" for anything else.
+    """Return a number to six digits, a share as its four parts, "" for anything else.
 
     The files beside the page hold all digits.
     """
     if isinstance(cell, Share):
         return "/".join(map(_value, cell))
     if isinstance(cell, float):
-        return f"{cell:.7g}"
+        return f"{cell:.6g}"
     return str(cell) if isinstance(cell, int) and not isinstance(cell, bool) else ""
 
 
