@@ -156,8 +156,8 @@ def _choice(suites: Sequence[str], scale: str, asked: Asked) -> "Choice":
 
 
 def _look_ahead(suites: Sequence[str], choice: "Choice", output: Path, listing: bool) -> int:
-    from ..entrants.listing import listed
     from ..entrants.outlook import dry_run
+    from .listing import listed
 
     for line in listed(suites, choice) if listing else dry_run(suites, choice, output):
         print("".join(part if part.isspace() else visible(part) for part in _COLUMNS.split(line)))

@@ -7,6 +7,7 @@ from functools import partial
 from itertools import zip_longest
 from typing import Any
 
+from ..entrants.blocks import not_asked
 from ..experiments import SUITES, blocks
 from ..experiments.cloth_peers import measurement as cloths
 from ..experiments.robots import measurement as robots
@@ -14,7 +15,6 @@ from ..harness.block import Block
 from ..harness.choice import Choice
 from ..peers import registry
 from ..presentation.results import counted
-from .blocks import not_asked
 
 NOT_INSTALLED = "not installed"
 # What a block does that measures nothing.
