@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from ..text import visible
 from .headlines import Headline, Verdict
 from .report import Written
-from .results import counted
+from .results import counted, listed
 from .tables.aligned import filled
 from .tables.table import words
 
@@ -25,11 +25,11 @@ def outcome(written: Written, width: int) -> list[str]:
     elif scale:
         said.append(scale)
     said.append(f"{page}: the page, {len(written.tables)} tables (plumbob report --list)")
+    named = listed(answers.absent)
+    missing = [one for one in written.missing if not named or named not in one]
     *lines, last = (filled(visible(sentence), width) for sentence in said)
     room = LINES - sum(map(len, (*lines, last)))
-    return [
-        line for part in (*lines, _missing(written.missing, width, room), last) for line in part
-    ]
+    return [line for part in (*lines, _missing(missing, width, room), last) for line in part]
 
 
 def _missing(sentences: Sequence[str], width: int, room: int) -> list[str]:

@@ -196,6 +196,14 @@ def test_a_run_ends_in_ten_lines(capsys, tmp_path, monkeypatch, width, absent):
         assert re.search(r"Absent: .*, \d+ more;", text)
 
 
+def test_who_is_absent_is_said_once(tmp_path):
+    written = an_outcome(tmp_path, absent=["pink", "mink"])
+    written.missing[:] = ["Absent peers: pink and mink. `make peers` adds them.", "b"]
+    lines = outcome.outcome(written, 120)
+    assert sum("pink" in line for line in lines) == 1
+    assert "Missing: b" in lines
+
+
 def test_a_missed_claim_is_said_first(tmp_path):
     written = an_outcome(tmp_path, verdict=Verdict(51, 52, "spring forces", 3.0))
     assert outcome.outcome(written, 80)[0] == "WRONG: 1 of 52 claims are missed."
