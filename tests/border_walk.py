@@ -263,7 +263,7 @@ def _scaled(value, factor):
 
 
 def trial_objects(call):
-    """Yield the same for each argument in turn replaced by each wrong object."""
+    """Yield the same for each argument, one after the other, replaced by each wrong object."""
     for name in call.arguments:
         for wrong in [*WRONG, (x for x in (1.0, 2.0))]:
             yield f"{name} = {_shown(wrong)}", {name: wrong}, ANYTHING

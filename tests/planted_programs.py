@@ -126,7 +126,7 @@ IN = {
         """,
     }.items()
 }
-# What turns each program's source into a program, if anything, and what has to be installed.
+# What makes a program of each source, if anything, and what has to be installed.
 COMPILERS = {
     "cpp": ("g++", ["-std=c++17", "-O1", f"-I{TEMPLATES}"]),
     "single": ("g++", ["-std=c++17", "-O1", "-DREAL=float", f"-I{TEMPLATES}"]),

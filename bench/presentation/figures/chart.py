@@ -172,7 +172,7 @@ class Chart:
         return f"{self.shows} Grey, named when pointed at: {names}."
 
     def costs(self) -> dict[str, float]:
-        """Return for each solver the mean over the panels of what its curve leaves to be wished.
+        """Return for each solver how far its curve is from the best, the mean over the panels.
 
         That is the area under the best it has reached so far, on the axes as they are drawn, from 0
         (the best of the panel from the start) to 1 (absent, or the worst throughout).

@@ -25,7 +25,7 @@ CHANCE = 4
 
 
 class Fault(NamedTuple):
-    """A way to read a request wrongly.
+    """A wrong reading of a request.
 
     Attributes:
         sentence: what is wrong, and what it should be.
@@ -44,7 +44,7 @@ FAULTS: Mapping[str, Fault] = {
         Reading(scale=np.pi / 180.0),
     ),
     "rotation sense": Fault(
-        sentence("Your hinges rotate the other way. A hinge rotates by q about its axis, "
+        sentence("Your hinges rotate in the wrong sense. A hinge rotates by q about its axis, "
                  "counterclockwise as seen from the axis' tip."),
         Reading(scale=-1.0),
     ),

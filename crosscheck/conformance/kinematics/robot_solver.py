@@ -1,4 +1,4 @@
-"""A solver for robots, right or with one way of reading requests wrongly."""
+"""A solver for robots, right or with one wrong reading of its requests."""
 
 from collections.abc import Callable, Mapping
 from functools import partial

@@ -103,7 +103,7 @@ GRAVITY = (
     ),
     Option(
         "gravity upwards", "gravity",
-        sentence("Gravity has the wrong sign: it points the other way. Add m g, do not subtract."),
+        sentence("Gravity has the wrong sign: it points upwards. Add m g, do not subtract."),
         lambda p: p.changed(gravity=-p.gravity),
     ),
     Option(

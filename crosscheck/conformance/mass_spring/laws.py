@@ -156,8 +156,8 @@ def minimiser(one: Context) -> Finding | None:
         said = sentence("The step is the converged one of implicit Euler.")
         return Finding("minimiser", Verdict.RIGHT, found.error, SOLVED, "", said)
     said = sentence(
-        "Another model than converged implicit Euler: {model} is {error:.2g} of the way from y to "
-        "x* off.",
+        "Another model than converged implicit Euler: {model} is {error:.2g} of the distance "
+        "from y to x* off.",
         model=one.says, error=found.error,
     )  # fmt: skip
     verdict = Verdict.RIGHT_BUT if one.known else Verdict.UNDECIDED
