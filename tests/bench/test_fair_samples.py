@@ -93,7 +93,7 @@ def test_beyond_a_limit_missed_wrong_claim_and_no_answer_are_apart(run):
         "rotation": [0.0, 0.0, 0.0, 0.0, np.nan, 0.9],
     }
     (row,) = ONE.outcomes(Results([run("a", 1, begun=6, size=8, **arrays)])).rows
-    assert row[2:] == (1, 1, 2, 1, 1, 2, 8)
+    assert row[2:] == (1, 1, 2, 1, 0, 1, 2, 8)
 
 
 @pytest.mark.parametrize("seed", range(25))

@@ -14,13 +14,17 @@ from bench.experiments.robots import measurement as robots
 from bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
 from bench.experiments.robots.job import AGAIN, Job
 from bench.experiments.robots.problem import robot
+from bench.experiments.robots.tables import OF_KIND
 from bench.harness import stopwatch
 from bench.harness.isolation import WorkerProcess, raised
+from bench.harness.measure import record_of
 from bench.harness.worker import Begun, Done, Ready, Solved, Unfit, serve
 from bench.peers import registry
 from bench.peers.ik.protocol import SolverOutput
 from bench.peers.ik.restarts import restarted
 from bench.peers.registry import ONE_START, Entry, Peer
+from bench.presentation.results import Results
+from bench.presentation.tables.table import markdown
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4
@@ -253,14 +257,25 @@ def test_a_solver_without_time_left_begins_no_further_target(targets):
 
 
 class Attempts:
-    """A solver that gives these answers one after the other, and counts its starts."""
+    """A solver that gives these answers one after the other; it raises those that are exceptions.
+
+    It counts the starts that it is asked from, and those of the attempts that it makes.
+    """
 
     def __init__(self, *answers):
-        self.answers, self.starts = list(answers), []
+        self.answers, self.asked, self.starts = list(answers), [], []
 
     def __call__(self, positions, rotations, start):
-        self.starts.append(start)
-        return lambda: self.answers.pop(0)
+        self.asked.append(start)
+
+        def solve():
+            self.starts.append(start)
+            answer = self.answers.pop(0)
+            if isinstance(answer, Exception):
+                raise answer
+            return answer
+
+        return solve
 
 
 @pytest.mark.parametrize("end", [SolverOutput(np.zeros(7), True), SolverOutput(np.zeros(7), None)])
@@ -273,6 +288,34 @@ def test_restarts_end_with_the_first_claim_within_the_limits(end):
     assert len(attempts.starts) == (3 if end.claimed else 4)
     assert (attempts.starts[0] == 0.5).all()
     assert len({tuple(start) for start in attempts.starts}) == len(attempts.starts)
+
+
+def test_an_attempt_that_raises_is_followed_by_the_next_restart():
+    """An exception once ended the target: a solver that solves all of them had 84 %."""
+    good = SolverOutput(np.zeros(7), True)
+    attempts = Attempts(ArithmeticError("once"), ArithmeticError("twice"), good)
+    answer = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))()
+    assert answer.claimed
+    assert (answer.q == 0.0).all()
+    assert answer.error == "ArithmeticError: once"
+    assert len(attempts.starts) == 3
+
+
+def test_an_exception_in_the_last_attempt_does_not_hide_the_answers_before():
+    missed = SolverOutput(np.ones(7), False)
+    attempts = Attempts(SolverOutput(None, False), missed, ArithmeticError("in the end"))
+    answer = restarted(attempts, robot("iiwa14"), 2)(None, None, np.full(7, 0.5))()
+    assert (answer.q == 1.0).all()
+    assert answer.claimed is False
+
+
+def test_targets_are_converted_for_every_restart_before_the_clock_runs():
+    attempts = Attempts(*[SolverOutput(None, False)] * 4)
+    solve = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))
+    assert len(attempts.asked) == 4
+    assert not attempts.starts
+    solve()
+    assert len(attempts.asked) == 4
 
 
 def test_restarts_that_all_fail_claim_nothing():
@@ -306,6 +349,7 @@ def suite(monkeypatch, worker):
     peers = [
         peer("liar", manner="liar"),
         peer("hangs", manner="hangs", at=1),
+        peer("raises", manner="raises", at=1),
         peer("gone", package="a-package-that-nobody-has"),
         peer("unable", manner="unable"),
     ]
@@ -335,9 +379,31 @@ def test_every_manner_becomes_one_record(suite):
 
 
 def test_the_target_that_a_solver_hangs_on_counts_as_failed_with_the_time_it_took(suite):
+    """The next targets are given to a new process, in which it hangs on its second again."""
     arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
-    assert len(arrays["solved"]) == 2
+    assert arrays["exception"].tolist() == [False, True] * 3
     assert not arrays["solved"][1]
     assert arrays["seconds"][1] == 0.5
     assert np.isnan(arrays["position"][1])
-    assert "silence" in notes["remark"]
+    assert notes["remark"] == "ended after 0.5 s of silence, on 3 of 6 targets"
+
+
+def test_a_process_lost_at_the_end_of_the_budget_is_not_started_again(suite, monkeypatch):
+    """Else a solver that hangs on every target would take hours."""
+    monkeypatch.setattr(robots, "Budget", lambda seconds: SimpleNamespace(is_spent=True))
+    arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
+    assert arrays["exception"].tolist() == [False, True]
+    assert notes["remark"] == "ended after 0.5 s of silence"
+
+
+@pytest.mark.parametrize(("solver", "count"), [("hangs", 3), ("raises", 1)])
+def test_what_a_solver_raises_is_printed_as_such_and_not_as_no_answer(suite, solver, count):
+    block = suite.blocks[solver, "robots/iiwa14"]
+    table = OF_KIND[ONE_START].outcomes(Results([record_of(block, block.measure(), 0.0)]))
+    heading, _, row = (line.split(" | ") for line in markdown(table).splitlines() if "|" in line)
+    printed = {name.strip("| "): cell.strip("| ") for name, cell in zip(heading, row, strict=True)}
+    assert printed["wrong claim"] == str(6 - count)
+    assert printed["exception or crash"] == str(count)
+    assert printed["no answer"] == printed["not begun"] == "0"
+    expected = f"{solver}: {6 - count} wrong claim and {count} exception or crash, of 6"
+    assert table.summary.points == (expected,)

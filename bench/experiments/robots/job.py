@@ -11,7 +11,7 @@ import numpy as np
 
 from ...harness.stopwatch import Budget, timed
 from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
-from ...peers.ik.protocol import Ask, Solve, SolverOutput, UnableError, remark_of
+from ...peers.ik.protocol import Ask, Solve, UnableError, attempt, remark_of
 from ...peers.ik.restarts import restarted
 from .evaluate import Targets, Tolerance
 from .problem import Robot
@@ -98,21 +98,11 @@ def _asked(ask: Ask, job: Job, i: int) -> Solve:
 
 
 def _solve(solve: Solve, job: Job) -> Solved:
-    trouble, starts = "", job.targets.starts
-
-    def solve_once() -> SolverOutput:
-        nonlocal trouble
-        try:
-            return solve()
-        except Exception as error:  # one target lost, not the rest
-            trouble = describe(error)
-            return SolverOutput(None, False)
-
-    answer, seconds = timed(solve_once)
-    seconds = seconds if answer.seconds is None else answer.seconds
-    nothing = np.full(starts.shape[-1], np.nan)
-    q = nothing if answer.q is None else np.array(answer.q, dtype=float)
+    output, seconds = timed(lambda: attempt(solve))
+    nothing = np.full(job.targets.starts.shape[-1], np.nan)
+    q = nothing if output.q is None else np.array(output.q, dtype=float)
+    trouble = output.error
     if q.shape != nothing.shape:
         q, trouble = nothing, f"returned {q.shape} numbers, not {nothing.shape}"
-    claimed = -1 if answer.claimed is None else int(answer.claimed)
-    return Solved(q, claimed, seconds, trouble)
+    claimed = -1 if output.claimed is None else int(output.claimed)
+    return Solved(q, claimed, seconds if output.seconds is None else output.seconds, trouble)

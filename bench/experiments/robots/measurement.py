@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import WorkerProcess
+from ...harness.isolation import Outcome, WorkerProcess, raised
+from ...harness.stopwatch import Budget
 from ...harness.worker import Solved
 from ...peers import registry
 from ...peers.registry import Entry, Peer
@@ -137,19 +138,13 @@ def _solve_unreachable(run: Run, count: int) -> Measured:
 def solve(run: Run, targets: Targets) -> Measured:
     """Solve the targets, and evaluate what came of it, finished or not.
 
-    A target over which the solver's process was lost counts as one that it did not solve, with the
-    time until it was given up; of targets never begun there is nothing, and tables count them as
-    not solved.
+    Of targets never begun there is nothing, and tables count them as not solved.
     """
     robot = evaluator_of(run.robot).robot
     asked, entry = (run.peer.module, robot, targets, run.tolerance), run.entry
     job = Job(*asked, entry.settings, entry.restarts, run.budget)
-    outcome = worker_process().perform(job)
-    done = outcome.solved
-    if outcome.lost and len(done) < len(targets.starts):
-        nothing = np.full(targets.starts.shape[-1], np.nan)
-        done = [*done, Solved(nothing, 0, worker_process().patience, outcome.trouble)]
-    arrays = _evaluated(run, targets, done) if done else {}
+    outcome = _performed(job, Budget(run.budget))
+    arrays = _evaluated(run, targets, outcome.solved) if outcome.solved else {}
     return Measured(
         {**arrays, "setup": np.array(outcome.setup)},
         {"remark": outcome.trouble},
@@ -163,6 +158,24 @@ def solve(run: Run, targets: Targets) -> Measured:
     )
 
 
+def _performed(job: Job, budget: Budget) -> Outcome:
+    """Return what came of a job, by a new process from the next target on where one was lost.
+
+    The target over which it was lost is not solved, and took the time until it was given up.
+    """
+    outcome, starts = worker_process().perform(job), job.targets.starts
+    if not outcome.lost or len(outcome.solved) == len(starts):
+        return outcome
+    lost = Solved(np.full_like(starts[0], np.nan), 0, worker_process().patience, outcome.trouble)
+    done = [*outcome.solved, lost]
+    remaining = Targets(*(values[len(done) :] for values in job.targets))
+    if budget.is_spent or not len(remaining.starts):
+        return outcome._replace(solved=done)
+    following = _performed(job._replace(targets=remaining), budget)
+    done += following.solved
+    return following._replace(setup=outcome.setup, solved=done, trouble=raised(done))
+
+
 def _evaluated(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.ndarray]:
     answers = np.array([one.q for one in done])
     evaluation = evaluator_of(run.robot).evaluate(targets, answers, run.tolerance)
@@ -173,6 +186,7 @@ def _evaluated(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.n
         "position": _short(evaluation.position),
         "rotation": _short(evaluation.rotation),
         "beyond": _short(evaluation.beyond),
+        "exception": np.array([bool(one.trouble) for one in done]),
         "stratum": targets.strata[: len(done)],
     }
 

@@ -29,7 +29,11 @@ PENALTY = 0.1
 SHIFT = 1e-5
 MARK = "mark"
 # What can become of a target; each counts under the first that is so.
-OUTCOMES = ("solved", "beyond a limit", "wrong claim", "missed", "no answer", "not begun")
+EXCEPTION = "exception or crash"
+OUTCOMES = (
+    *("solved", "beyond a limit", "wrong claim", "missed"),
+    *(EXCEPTION, "no answer", "not begun"),
+)
 
 _MEASURED = (
     "Every solver has the same text of the robot, the same targets and the same seeded random "
@@ -153,7 +157,8 @@ def outcomes(record: Record) -> dict[str, int]:
     answered = np.isfinite(arrays["position"])
     reached = answered & (arrays["position"] <= settings["tolerance"])
     reached &= arrays["rotation"] <= settings["tolerance_rotation"]
-    holds = (arrays["solved"], reached, answered & (arrays["claimed"] == 1), answered)
+    raised = arrays.get("exception", np.zeros(answered.size, dtype=bool))
+    holds = (arrays["solved"], reached, answered & (arrays["claimed"] == 1), answered, raised)
     counts, left = [], np.ones(answered.shape, dtype=bool)
     for each in holds:
         counts.append(int(np.count_nonzero(left & each)))

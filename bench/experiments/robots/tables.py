@@ -34,6 +34,7 @@ from ...presentation.tables.table import Cell, Column, Summary, in_unit, listing
 from . import REACHABLE, UNREACHABLE, figures
 from .overall.tables import aggregate, problem_map
 from .readings import (
+    EXCEPTION,
     KINDS,
     MARK,
     OUTCOMES,
@@ -281,19 +282,23 @@ def outcome(kind: str) -> Layout:
         f"robots_outcomes_{KINDS[kind]}",
         f"Robots, {kind}: what became of every target",
         subjects=partial(_measured, kind),
-        columns=(
-            *NAMES,
-            *(Column(name, read=partial(_count, name)) for name in OUTCOMES),
-            Column("targets", read=total, folded=True),
-        ),
+        columns=_outcome_columns,
         shows="Every target counts once, so that the parts are together all targets. Beyond a "
         "limit: the target is met, but by a pose that no joint may take. Wrong claim: off the "
-        "target though called solved. Missed: off the target, and not called solved. Not begun: "
-        "the budget of time ran out before.",
+        "target though called solved. Missed: off the target, and not called solved. Exception or "
+        "crash: the solver raised, or its process was lost, and left no answer. No answer: it "
+        "says that it has none. Not begun: the budget of time ran out before.",
         measured=how,
         summary=_outcome_summary,
         ranked=is_ranked,
     )
+
+
+def _outcome_columns(records: Sequence[Record]) -> tuple[Column, ...]:
+    """Return a column for each outcome; that of exceptions is shown if there are any."""
+    empty = () if any(outcomes(record)[EXCEPTION] for record in records) else (EXCEPTION,)
+    counts = [Column(n, read=partial(_count, n), folded=n in empty) for n in OUTCOMES]
+    return (*NAMES, *counts, Column("targets", read=total, folded=True))
 
 
 def _count(name: str, record: Record) -> int:

@@ -2,6 +2,8 @@
 
 Each step asks for all of the error at once (gain 1 over 1 s) within the joint limits. An effector
 without a target rotation has no cost for it. Velocity limits are left out: there is no motion here.
+With pink's own damping of 1e-12 the quadratic program is infeasible, and pink raises
+`NoSolutionFound`, once a step leaves a joint 1e-7 beyond its limit; with 1e-6 it never is here.
 """
 
 import numpy as np
@@ -16,7 +18,7 @@ from .protocol import Ask, Solve, SolverOutput
 
 
 def prepare(
-    robot: Robot, tolerance: Tolerance, iterations: int = 200, damping: float = 1e-12
+    robot: Robot, tolerance: Tolerance, iterations: int = 200, damping: float = 1e-6
 ) -> Ask:
     """Return the solver, set up for a robot."""
     model = pinocchio_model(robot)

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, Protocol
 from reference.arguments import FloatArray
 
 from ...experiments.robots.problem import Robot
+from ...harness.worker import describe
 
 
 class SolverOutput(NamedTuple):
@@ -24,15 +25,26 @@ class SolverOutput(NamedTuple):
     Attributes:
         q: the coordinates, in the robot's order; None if it returns none.
         claimed: whether it says that they solve the target; None if it does not say.
-        seconds: what a process of its own has measured [s]; None where the call is to be timed.
+        seconds: what the adapter or a process of its own has measured [s]; None where the call is
+            to be timed.
+        error: what the solver raised, else "".
     """
 
     q: FloatArray | None
     claimed: bool | None
     seconds: float | None = None
+    error: str = ""
 
 
 Solve = Callable[[], SolverOutput]
+
+
+def attempt(solve: Solve) -> SolverOutput:
+    """Return what a solve returns; one that raises is a failed attempt, with what it raised."""
+    try:
+        return solve()
+    except Exception as error:  # whatever an engine raises is its result
+        return SolverOutput(None, False, error=describe(error))
 
 
 class Ask(Protocol):

@@ -7,7 +7,7 @@ import numpy as np
 from reference.arguments import FloatArray
 
 from ...experiments.robots.problem import Robot
-from .protocol import Ask, Solve, SolverOutput
+from .protocol import Ask, Solve, SolverOutput, attempt
 
 _SEED = 1986
 
@@ -15,34 +15,36 @@ _SEED = 1986
 def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
     """Return a solver that makes up to `restarts` further attempts from seeded random poses.
 
-    An attempt counts only if its answer keeps the limits: not all solvers look at them. The poses
-    are those of the target, however often it or any other was solved before; they are drawn before
-    the clock runs.
+    An attempt succeeds if it claims an answer that keeps the limits: not all solvers look at them.
+    One that raises has failed like any other. The poses are those of the target, however often it
+    or any other was solved before; they and the attempts are prepared before the clock runs.
     """
 
-    def good(answer: SolverOutput) -> bool:
-        if not answer.claimed or answer.q is None:
+    def is_success(output: SolverOutput) -> bool:
+        if not output.claimed or output.q is None:
             return False
-        return bool((answer.q >= robot.lower).all() and (answer.q <= robot.upper).all())
+        return bool((output.q >= robot.lower).all() and (output.q <= robot.upper).all())
 
-    def again(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
+    def ask_again(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
         poses = robot.draw(generator_of(positions, rotations, start), restarts)
+        attempts = [ask(positions, rotations, pose.copy()) for pose in (start, *poses)]
 
         def solve() -> SolverOutput:
-            answer = ask(positions, rotations, start)()
-            seconds = answer.seconds
-            for pose in poses:
-                if good(answer):
-                    break
-                answer = ask(positions, rotations, pose.copy())()
-                if seconds is not None and answer.seconds is not None:
-                    seconds += answer.seconds
-            claimed = good(answer) if answer.claimed is not None else None
-            return SolverOutput(answer.q, claimed, seconds)
+            outputs: list[SolverOutput] = []
+            while len(outputs) < len(attempts) and not (outputs and is_success(outputs[-1])):
+                outputs.append(attempt(attempts[len(outputs)]))
+            last = next((o for o in reversed(outputs) if o.q is not None), outputs[-1])
+            times = [o.seconds for o in outputs if o.seconds is not None]
+            return SolverOutput(
+                last.q,
+                None if last.claimed is None else is_success(last),
+                sum(times) if times else None,
+                next((o.error for o in outputs if o.error), ""),
+            )
 
         return solve
 
-    return again
+    return ask_again
 
 
 def generator_of(*target: FloatArray) -> np.random.Generator:

@@ -9,7 +9,7 @@ from ....presentation.results import leaders, listed
 from ....presentation.tables.columns import text, words_in
 from ....presentation.tables.layout import Layout
 from ....presentation.tables.table import INTERVAL, Column, Summary, in_unit, listing, words
-from ..readings import KINDS, RULE, SCORE, TIES, how
+from ..readings import EXCEPTION, KINDS, RULE, SCORE, TIES, how
 from . import figures
 from .readings import Line, Overall, lines, most_solved, overall
 
@@ -22,6 +22,7 @@ def aggregate(kind: str) -> Layout:
         Column("beyond a limit", read=lambda row: row.count("beyond a limit")),
         Column("wrong claim", read=lambda row: row.count("wrong claim")),
         Column("missed", read=lambda row: row.count("missed")),
+        Column(EXCEPTION, read=lambda row: row.count(EXCEPTION)),
         Column("no answer", read=lambda row: row.count("no answer")),
         Column("not begun", read=lambda row: row.count("not begun")),
     )
