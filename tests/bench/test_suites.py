@@ -1,14 +1,25 @@
 """Suites: what they measure adds up."""
 
+import itertools
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 
 from bench.experiments import SUITES, Scale, blocks
+from bench.experiments.cloth import ONE_STEP
 from bench.experiments.cloth import measurement as cloth
 from bench.experiments.cloth.problem import cloth_swing
+from bench.experiments.cloth.tables import convergence
+from bench.harness.block import Block
 from bench.harness.machine import stamp
+from bench.harness.measure import measure
 from bench.harness.record import Record, decode, encode, key
 from bench.harness.run import now
+from bench.presentation.results import Results
+from bench.presentation.tables.table import markdown
+from reference import ImplicitEuler
 
 TINY = Scale(targets=3, seconds=0.001)
 
@@ -107,6 +118,25 @@ def test_one_step_of_the_cloth_starts_at_one_and_converges():
         arrays = found("cloth", "cloth/x1/one step", solver).measure().arrays
         assert arrays["residual"][0] == arrays["error"][0] == 1.0
         assert arrays["error"][last] < 1e-10
+
+
+def test_newtons_error_is_printed_as_it_is_in_fifty_digits(extended_precision):
+    """Measured against Newton's own answer it was 1e-17, which no float64 can be."""
+    swing, k = cloth_swing(1, size=4), 10
+    block = Block("cloth", "cloth", "newton", partial(cloth.one_step, swing, "newton", k))
+    record = measure(block)
+    record = replace(record, facts={"task": ONE_STEP}, settings={"step": 1, "h": swing.h})
+    table = convergence(Results([record]))
+    lines = [line for line in markdown(table).splitlines() if line.startswith("|")]
+    heading, _, *rows = ([cell.strip() for cell in line.split("|")] for line in lines)
+    printed = float(rows[-1][heading.index("error, Newton")])
+    state = cloth.converged_motion(swing)[cloth.MIDDLE]
+    iterates = ImplicitEuler(swing.system, h=swing.h, solver="newton").iterates(state)
+    x = next(itertools.islice(iterates, k, None)).positions
+    step, norm = extended_precision.Step(swing.system, state, swing.h), extended_precision.norm
+    exact = step.minimiser(x)
+    expected = float(norm(extended_precision.wide(x) - exact) / norm(step.y - exact))
+    assert printed == pytest.approx(expected, rel=0.05, abs=0)  # of two digits
 
 
 def test_the_two_laws_of_dampers_come_together_with_h_to_first_order():

@@ -1,8 +1,5 @@
 """Skeletons and poses for the kinematics tests, and a network for the mass-spring tests."""
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -124,13 +121,3 @@ def random_articulation(kinds, seed):
 def articulated():
     """Return the function that makes a random articulation of given kinds from a seed."""
     return random_articulation
-
-
-@pytest.fixture(scope="session")
-def extended_precision():
-    """Return the module of that name beside this file; there is no package to import it from."""
-    path = Path(__file__).with_name("extended_precision.py")
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module

@@ -170,7 +170,7 @@ convergence = Layout(
     measured=lambda rows: (
         f"Step {settings(_records(rows), 'step')} of the motion, "
         f"{lengths_of_steps(_records(rows))} ms; "
-        "x* by Newton, iterated far beyond the rounding floor."
+        "x* to 25 digits: Newton’s answer, refined in decimal arithmetic."
     ),
     summary=_convergence_summary,
     figures=(figures.cloth_convergence,),

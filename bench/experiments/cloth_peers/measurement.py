@@ -204,7 +204,7 @@ def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
     """
     if not np.isfinite(positions).all() or np.abs(positions).max() > 1e100:
         return np.inf
-    return metrics.relative_error(positions, truth.implicit[0], truth.inertial)
+    return truth.first.error(positions, truth.inertial)
 
 
 def motion(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measured:

@@ -32,8 +32,9 @@ _FAIR = (
     "set-up and conversions. Newton the engine computes in single precision, all others in double. "
 )
 _TRUTH = (
-    "Converged implicit Euler is our Newton in steps of a frame, at the rounding floor. The truth "
-    "is the classical Runge-Kutta method far below its limit of stability"
+    "Converged implicit Euler is our Newton in steps of a frame, at the rounding floor, and x* its "
+    "first step to 25 digits, in decimal arithmetic. The truth is the classical Runge-Kutta method "
+    "far below its limit of stability"
 )
 
 
@@ -324,7 +325,7 @@ iterations = Layout(
     shows="Iterations until |x − x*| / |y − x*| is at most so much; nothing where all that "
     "were tried did not suffice.",
     measured=lambda records: (
-        f"{_CLOTH}{_sizes(records)} particles. x* by Newton at the rounding floor."
+        f"{_CLOTH}{_sizes(records)} particles. x* to 25 digits, in decimal arithmetic."
     ),
     summary=_needed_summary,
 )

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crosscheck.mass_spring.exact_step import ExactStep, exact_step
 from reference import ImplicitEuler, State, runge_kutta
 from reference.arguments import FloatArray
 
@@ -30,6 +31,7 @@ class ClothTruth(NamedTuple):
     Attributes:
         start: positions before the first frame [m], (particle, 3).
         inertial: y of the first step, where the particles would go by themselves, (particle, 3).
+        first: the end of the first step of implicit Euler, to 25 digits.
         implicit: positions by converged implicit Euler, (frame, particle, 3).
         true: positions of the motion itself, (frame, particle, 3).
         order: at which the motion's steps come together.
@@ -38,6 +40,7 @@ class ClothTruth(NamedTuple):
 
     start: FloatArray
     inertial: FloatArray
+    first: ExactStep
     implicit: FloatArray
     true: FloatArray
     order: float
@@ -59,7 +62,9 @@ def truth_of(cloth: FallingCloth, frames: int) -> ClothTruth:
     order = math.log2(metrics.rms_distance(coarse[-1], middle[-1]) / unsure)
     x, v = cloth.start.positions, cloth.start.velocities
     inertial = x + cloth.frame * np.where(cloth.system.free[:, None], v, 0.0)
-    return ClothTruth(x, inertial, implicit_motion(cloth, frames, cloth.frame), fine, order, unsure)
+    implicit = implicit_motion(cloth, frames, cloth.frame)
+    first = exact_step(cloth.system, cloth.start, cloth.frame, implicit[0])
+    return ClothTruth(x, inertial, first, implicit, fine, order, unsure)
 
 
 def true_motion(cloth: FallingCloth, frames: int, substeps: int) -> FloatArray:

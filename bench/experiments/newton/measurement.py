@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.mass_spring import balance_residual
+from crosscheck.mass_spring.exact_step import ExactStep, exact_step
 from reference import STEP_SOLVERS, ImplicitEuler
 from reference.arguments import FloatArray
 from reference.implicit_euler.certificate import Certificate, certify
 from reference.implicit_euler.objective import Objective
 
-from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from .problem import STIFFNESSES, H, MidSwing, mid_swing
@@ -73,7 +73,7 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
             "lipschitz": known.lipschitz,
             "newton_step": known.newton_step,
             "apart": apart,
-            "error": metrics.relative_error(x, newton.x, objective.y),
+            "error": newton.exact.error(x, objective.y),
             "above": here.value - newton.value,
             "covered": known.covered,
             "same": same is True,
@@ -84,9 +84,10 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
 
 
 class Converged(NamedTuple):
-    """Newton's answer x, its certificate, and g there."""
+    """Newton's answer x, the same to 25 digits, its certificate, and g there."""
 
     x: FloatArray
+    exact: ExactStep
     certificate: Certificate
     value: float
 
@@ -96,7 +97,8 @@ def newtons_answer(problem: MidSwing) -> Converged:
     """Return what Newton's method comes to, iterated far beyond the rounding floor."""
     integrator = ImplicitEuler(problem.system, h=problem.h, tolerance=0.0, max_iterations=50)
     x, objective = integrator.step(problem.state).state.positions, _objective(problem)
-    return Converged(x, certify(objective, x), objective.value(x))
+    exact = exact_step(problem.system, problem.state, problem.h, x)
+    return Converged(x, exact, certify(objective, x), objective.value(x))
 
 
 def _objective(problem: MidSwing) -> Objective:

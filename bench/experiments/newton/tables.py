@@ -79,7 +79,7 @@ certified = Layout(
     shows="Within the distance there is a minimiser of g, and only one: proven, with all "
     "rounding allowed for, from the Newton step, the least eigenvalue of the Hessian and how "
     "fast the Hessian may change. Where there is no bound the column says why, and error and g "
-    "are all there is. The error is |x − x*| / |y − x*| for Newton’s answer x*.",
+    "are all there is. The error is |x − x*| / |y − x*|; x* is Newton’s answer to 25 digits.",
     measured=lambda records: (
         f"The lab’s cloth of {_sizes(records)} particles under 9.81 m/s², half a second "
         f"after it was let go; one step of {settings(records, 'h')} s, to a residual of "
