@@ -13,7 +13,6 @@ from reference import IK_SOLVERS, scenes
 from ..experiments import chain, published
 from ..experiments.chain.measurement import (
     BEYOND_TOLERANCE,
-    ENGINE_ITERATIONS,
     MAX_ITERATIONS,
     TOLERANCE,
     Limits,
@@ -112,13 +111,14 @@ def _of_problem(problem: OwnProblem, scale: Scale) -> Iterator[Block]:
 
 def _chain_of_all(problem: OwnProblem, targets: TargetsForSkeleton) -> Iterator[Block]:
     name, facts, count = problem.recorded[0], _chain_facts(problem), len(targets.targets)
-    ours, theirs = Limits(TOLERANCE, MAX_ITERATIONS), Limits(TOLERANCE, ENGINE_ITERATIONS)
+    limits = Limits(TOLERANCE, MAX_ITERATIONS)
+    settings = limits._asdict()
     for solver in IK_SOLVERS:
-        measure = partial(solve_targets, targets, solver, ours, record=True)
-        yield Block("ik", name, solver, measure, ours._asdict(), count, facts)
+        measure = partial(solve_targets, targets, solver, limits, record=True)
+        yield Block("ik", name, solver, measure, settings, count, facts)
     for loop in registry.LOOPS:
-        measure = partial(solve_with_engine, targets, loop.engine, theirs)
-        yield Block("ik", name, loop.name, measure, theirs._asdict(), count, facts)
+        measure = partial(solve_with_engine, targets, loop.engine, limits)
+        yield Block("ik", name, loop.name, measure, settings, count, facts)
 
 
 def _chain_facts(problem: OwnProblem) -> dict[str, Any]:

@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
+from bench.experiments.chain import BEYOND, CHAIN
+from bench.experiments.chain.measurement import Limits, solve_targets, solve_with_engine
 from bench.experiments.chain.problem import chain_targets
-from bench.peers.ik.levenberg_marquardt import levenberg_marquardt
+from bench.experiments.chain.tables import beyond_reach
+from bench.harness.record import Record
+from bench.peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
 from bench.peers.ik.reference_kinematics import ReferenceKinematics
+from bench.presentation.results import Results
 from crosscheck.engines import SKELETON_ENGINES
 from crosscheck.engines.skeleton_engine import coordinates
 from reference import Skeleton, forward_kinematics, rotation, solve_ik
@@ -67,16 +72,39 @@ def test_a_start_at_the_target_takes_no_iteration():
     np.testing.assert_array_equal(answer.q, q)
 
 
-def test_out_of_reach_all_iterations_are_made():
-    problem = chain_targets("beyond", 1)
+def test_what_cannot_be_reached_takes_all_iterations():
+    problem = chain_targets("far", 1)
     kinematics = ReferenceKinematics(problem.skeleton)
     q = coordinates(kinematics, problem.starts)[0]
-    effector = problem.skeleton.joint_count - 1
-    answer = levenberg_marquardt(
-        kinematics, q, problem.targets[0], effector, tolerance=1e-6, max_iterations=3
-    )
+    effector, target = problem.skeleton.joint_count - 1, 9.0 * problem.targets[0]
+    answer = levenberg_marquardt(kinematics, q, target, effector, tolerance=1e-6, max_iterations=3)
     assert answer.iterations == 3
     assert answer.residual > 0
+
+
+@pytest.mark.parametrize("engine", SKELETON_ENGINES)
+def test_beyond_reach_the_loop_on_an_engine_does_as_the_reference_does(engine):
+    """Towards the far target itself it swung for all iterations: 22 of 60 straight, not 60."""
+    problem, limits = chain_targets("beyond", 60), Limits(1e-6, 1000)
+    ours = solve_targets(problem, "levenberg_marquardt", limits).arrays
+    theirs = solve_with_engine(problem, engine, limits).arrays
+    np.testing.assert_array_equal(theirs["iterations"], ours["iterations"])
+    np.testing.assert_allclose(theirs["excess"], ours["excess"], atol=1e-7)  # a tenth of 1e-6
+    settings = {"tolerance": 1e-6, "max_iterations": 1000}
+    facts = {"task": CHAIN, "stratum": BEYOND}
+    record = Record("ik", "chain/beyond", f"lm/{engine}", settings, 60, theirs, facts=facts)
+    (sentence,) = beyond_reach(Results([record])).summary.points
+    assert sentence.startswith(f"LM, {engine}: 60/60 = 100 %")
+
+
+def test_targets_within_reach_stay_where_they_are(rng):
+    root, targets = rng.standard_normal(3), rng.standard_normal((50, 3))
+    distances = np.linalg.norm(targets - root, axis=-1)
+    near = within_reach(targets, root, 2.0)
+    np.testing.assert_array_equal(near[distances <= 2.0], targets[distances <= 2.0])
+    drawn = np.linalg.norm(near - root, axis=-1)
+    np.testing.assert_allclose(drawn, np.minimum(distances, 2.0))
+    assert 0 < np.sum(distances > 2.0) < 50
 
 
 def test_the_loop_and_the_reference_s_solver_are_one_method():

@@ -14,7 +14,7 @@ from reference.arguments import FloatArray
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
-from ...peers.ik.levenberg_marquardt import levenberg_marquardt
+from ...peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
 from . import BEYOND, CHAIN
 from .problem import STRATA, TargetsForSkeleton, chain_targets
 
@@ -22,8 +22,6 @@ TOLERANCE = 1e-4
 # Beyond reach it is the distance from the best answer there is; small, to see how straight it is.
 BEYOND_TOLERANCE = 1e-6
 MAX_ITERATIONS = 1000
-# An engine's loop in the interpreter would spend minutes on what it cannot reach.
-ENGINE_ITERATIONS = 200
 # The residuals of so many iterations are kept for the figure.
 HISTORY = 200
 
@@ -41,15 +39,13 @@ def blocks(scale: Scale) -> Iterator[Block]:
         problem = chain_targets(stratum, scale.targets)
         facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
         tolerance = BEYOND_TOLERANCE if stratum == BEYOND else TOLERANCE
-        ours = Limits(tolerance, MAX_ITERATIONS)
+        limits = Limits(tolerance, MAX_ITERATIONS)
+        settings = limits._asdict()
         for solver in IK_SOLVERS:
-            measure = partial(solve_targets, problem, solver, ours, record=True)
-            settings = ours._asdict()
+            measure = partial(solve_targets, problem, solver, limits, record=True)
             yield Block("ik", problem.name, solver, measure, settings, scale.targets, facts)
-        theirs = Limits(tolerance, ENGINE_ITERATIONS)
         for loop in registry.LOOPS:
-            measure = partial(solve_with_engine, problem, loop.engine, theirs)
-            settings = theirs._asdict()
+            measure = partial(solve_with_engine, problem, loop.engine, limits)
             yield Block("ik", problem.name, loop.name, measure, settings, scale.targets, facts)
 
 
@@ -70,10 +66,11 @@ def solve_targets(
 def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) -> Measured:
     """Solve all targets by Levenberg-Marquardt on an engine's kinematics."""
     engine = SKELETON_ENGINES[name](problem.skeleton)
-    effector = problem.skeleton.joint_count - 1
+    effector, root = problem.skeleton.joint_count - 1, problem.skeleton.offsets[0]
+    targets = within_reach(problem.targets, root, problem.skeleton.reach())
     answers = [
         levenberg_marquardt(engine, q, target, effector, **limits._asdict())
-        for q, target in zip(coordinates(engine, problem.starts), problem.targets, strict=True)
+        for q, target in zip(coordinates(engine, problem.starts), targets, strict=True)
     ]
     found = np.array([answer.q[engine.columns] for answer in answers])
     return Measured(_answers(problem, found, [answer.iterations for answer in answers]))

@@ -166,7 +166,8 @@ convergence = Layout(
     ),
     subjects=_iterations,
     shows="The error is |x − x*| / |y − x*|: what is left of the distance between the "
-    "inertial start y and the converged step x*. Where it stands still, rounding is reached.",
+    "inertial start y and the converged step x*. Where it stands still it is at the floor: to "
+    "round x* to float64 leaves as much.",
     measured=lambda rows: (
         f"Step {settings(_records(rows), 'step')} of the motion, "
         f"{lengths_of_steps(_records(rows))} ms; "

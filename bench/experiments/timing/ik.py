@@ -11,7 +11,7 @@ from reference import IK_SOLVERS, solve_ik
 from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt
 from ...peers.ik.reference_kinematics import ReferenceKinematics
-from ..chain.measurement import ENGINE_ITERATIONS, MAX_ITERATIONS, TOLERANCE, Limits
+from ..chain.measurement import MAX_ITERATIONS, TOLERANCE, Limits
 from ..chain.problem import chain_targets
 from .case import COMPILED, OURS, PLAIN, Case, Work
 
@@ -19,8 +19,7 @@ STRATA = ("near", "far")
 TARGETS = 50
 # Plain Python takes milliseconds a solve; the first targets of the same set are enough.
 FEW_TARGETS = 5
-OUR_LIMITS = Limits(TOLERANCE, MAX_ITERATIONS)._asdict()
-LOOP_LIMITS = Limits(TOLERANCE, ENGINE_ITERATIONS)._asdict()
+LIMITS = Limits(TOLERANCE, MAX_ITERATIONS)._asdict()
 LOOP = "levenberg_marquardt"
 
 
@@ -47,7 +46,7 @@ def one_by_one(stratum: str, solver: str, count: int) -> Callable[[], Any]:
 
     def run() -> None:
         for start, target in pairs:
-            solve_ik(problem.skeleton, start, target, solver, **OUR_LIMITS)
+            solve_ik(problem.skeleton, start, target, solver, **LIMITS)
 
     return run
 
@@ -56,7 +55,7 @@ def at_once(stratum: str, solver: str) -> Callable[[], Any]:
     """Return a call that solves all targets as one batch."""
     problem = chain_targets(stratum, TARGETS)
     ask = (problem.skeleton, problem.starts, problem.targets, solver)
-    return partial(solve_ik, *ask, **OUR_LIMITS)
+    return partial(solve_ik, *ask, **LIMITS)
 
 
 def by_loop(stratum: str, name: str) -> Callable[[], Any]:
@@ -72,6 +71,6 @@ def by_loop(stratum: str, name: str) -> Callable[[], Any]:
 
     def run() -> None:
         for q, target in zip(starts, problem.targets, strict=True):
-            levenberg_marquardt(engine, q, target, effector, **LOOP_LIMITS)
+            levenberg_marquardt(engine, q, target, effector, **LIMITS)
 
     return run

@@ -33,6 +33,17 @@ class LoopOutput(NamedTuple):
     iterations: int
 
 
+def within_reach(targets: FloatArray, root: FloatArray, reach: float) -> FloatArray:
+    """Return targets, (..., 3) [m], those beyond reach drawn to the nearest point within it.
+
+    The reference does the same: the nearest pose stays what it is, and steps do not swing about it.
+    """
+    arms = targets - root
+    distances = np.linalg.norm(arms, axis=-1, keepdims=True)
+    nearest = root + arms * (reach / np.maximum(distances, reach))
+    return np.where(distances > reach, nearest, targets)
+
+
 def levenberg_marquardt(
     kinematics: Kinematics,
     q: FloatArray,
