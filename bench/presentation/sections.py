@@ -54,7 +54,8 @@ SECTIONS = (
         "Right?",
         "Is it right?",
         "Nothing below counts unless the reference itself is right. Each claim computes one "
-        "quantity twice, by Plumbob and by a physics engine that shares no code with it.",
+        "quantity twice: by Plumbob, and by a physics engine that shares no code with it, or by a "
+        "closed form or an invariant where the table says so.",
     ),
     Section(
         "kinematics",

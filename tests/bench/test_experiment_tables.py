@@ -59,7 +59,8 @@ def test_every_section_has_a_name_of_its_own():
 def test_a_missed_claim_is_named_in_table_and_answer(make):
     table = check.verdicts(Results([make.claim(), make.claim("damper forces", held=False)]))
     assert column(table, "verdict") == ["held", "MISSED: they differ"]
-    assert table.summary.sentence.startswith("1 of 2 claims held")
+    basis = "(2 against Pinocchio or MuJoCo, 0 against closed forms and invariants)"
+    assert table.summary.sentence.startswith(f"1 of 2 claims held {basis}")
     assert table.summary.points == ("Missed: damper forces",)
 
 
@@ -327,7 +328,11 @@ def test_claims_out_of_reach_are_named(make):
     assert column(table, "answers within limits") == [3]
     assert table.summary.points == ("the arm, a: 3/4 = 75 % (30.1–95.4)",)
     honest = make.raced("a", "one start", "unreachable", claimed=[0] * 4, **far)
-    assert ONE.unreachable(Results([honest])).summary.sentence.startswith("No solver claims")
+    mute = make.raced("b", "one start", "unreachable", claimed=[-1] * 4, **far)
+    assert ONE.unreachable(Results([honest, mute])).summary.sentence == (
+        "No solver that makes claims claims a target that is out of reach (n = 4). "
+        "These make no claims: b."
+    )
 
 
 def test_budgets_and_profiles_show_who_is_ahead(make):

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+from crosscheck.verdict import sources
+
 from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.tables.columns import folded, number, text
@@ -20,8 +22,10 @@ def _summary(records: Sequence[Record]) -> Summary:
         metrics.ratio(float(record.arrays["difference"]), float(record.arrays["tolerance"]))
         for record in records
     )
+    basis = sources([f"{record.notes['ours']} {record.solver}" for record in records])
     return Summary(
-        f"{len(records) - len(missed)} of {len(records)} claims held, over {words(cases)} cases; "
+        f"{len(records) - len(missed)} of {len(records)} claims held ({basis}), over "
+        f"{words(cases)} cases; "
         f"the smallest margin used {words(in_unit(used, '%'))} % of its tolerance.",
         tuple(f"Missed: {name}" for name in missed),
     )
@@ -30,7 +34,7 @@ def _summary(records: Sequence[Record]) -> Summary:
 verdicts = Layout(
     "Do Pinocchio and MuJoCo agree with the reference?",
     "check",
-    "Claims held against Pinocchio and MuJoCo",
+    "Claims against Pinocchio, MuJoCo, closed forms and invariants",
     subjects=lambda results: results.all("check"),
     columns=(
         text("claim", lambda record: record.problem),
@@ -43,7 +47,8 @@ verdicts = Layout(
     ),
     shows="Differences are relative, to the reach, the largest force or whatever scale the "
     "claim's tolerance names. A claim holds only if something moved in each of its cases.",
-    measured="Each quantity computed twice, by us and by an engine, on seeded random systems.",
+    measured="Each quantity computed twice, by us and by an engine, or by a closed form or an "
+    "invariant as the column says, on seeded random systems.",
     summary=_summary,
 )
 

@@ -460,8 +460,11 @@ def _unreachable_summary(rows: Sequence[Missed]) -> Summary:
     records = [missed.record for missed in rows]
     claimed = [record for record in records if false_claims(record)]
     if not claimed:
-        begun = sum(record.arrays["solved"].size for record in records)
-        return Summary(f"No solver claims a target that is out of reach (n = {words(begun)}).")
+        count = sum(int(np.count_nonzero(r.arrays["claimed"] >= 0)) for r in records)
+        silent = list(dict.fromkeys(r.solver for r in records if false_claims(r) is None))
+        beside = f" These make no claims: {listed(silent)}." if silent else ""
+        sentence = "No solver that makes claims claims a target that is out of reach"
+        return Summary(f"{sentence} (n = {words(count)}).{beside}")
     points = (
         f"{r.title}, {r.solver}: "
         f"{words(metrics.share((r.arrays['claimed'] == 1) & ~r.arrays['solved']))}"
