@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
-from scipy import stats
 
+from ..harness.metrics import chance_of_pairs
 from .quantities import SOLVED, ended_by_clock, is_answer, is_cut_by_clock, same_bits, worse_sign
 from .rows import Pair, Row, RowKey, Verdict
 
@@ -34,9 +34,7 @@ def chance_by_clock(pair: Pair) -> float | None:
     """
     if not (is_cut_by_clock(pair.old) and SOLVED in pair.old.arrays and SOLVED in pair.new.arrays):
         return None
-    old, new = _prefixes(pair.old.arrays[SOLVED], pair.new.arrays[SOLVED])
-    lost, gained = int(np.sum(old & ~new)), int(np.sum(new & ~old))
-    return float(stats.binomtest(lost, lost + gained).pvalue) if lost + gained else 1.0
+    return chance_of_pairs(*_prefixes(pair.old.arrays[SOLVED], pair.new.arrays[SOLVED]))
 
 
 def compare_cut_answers(key: RowKey, pair: Pair, chance: float, rate: float) -> Row:

@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from ..harness.metrics import adjusted
 from ..harness.record import Record
 from .answers import chance_by_clock, compare_answers, compare_cut_answers
-from .intervals import ERROR_RATE, Ratio, adjusted
+from .intervals import ERROR_RATE, Ratio
 from .rows import Pair, Row, RowKey, Verdict, by_row, come_and_gone, pairs, worst_first
 from .times import Drift, drift, judged, time_ratios
 

@@ -1,10 +1,9 @@
-"""How sure a ratio of times is: bootstrap, signed ranks, and one error rate over many rows.
+"""How sure a ratio of times is: bootstrap and signed ranks.
 
 Times are compared by the logarithm of a ratio, so that twice and half are equally far from 1.
 """
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -109,17 +108,3 @@ def _signed_rank_quantile(count: int) -> int:
 def pairs_needed(rows: int) -> int:
     """Return how many pairs let one of so many rows be called though some of them disagree."""
     return math.ceil(math.log2(2 * max(rows, 1) / ERROR_RATE)) + 6
-
-
-def adjusted(chances: Sequence[float]) -> Floats:
-    """Return chances that hold over all rows at once, by Holm (1979).
-
-    The chance of calling any row wrongly is held, whatever the rows share: one false alarm stops a
-    merge, so a share of false ones among those called (Benjamini & Hochberg 1995) would not do.
-    """
-    raw = np.asarray(chances, dtype=float)
-    order = np.argsort(raw)
-    steps = np.maximum.accumulate(raw[order] * (len(raw) - np.arange(len(raw))))
-    result = np.empty(len(raw))
-    result[order] = np.minimum(steps, 1.0)
-    return result

@@ -18,10 +18,11 @@ import numpy as np
 
 from crosscheck.child_process import one_thread
 
+from ..harness.metrics import adjusted
 from ..harness.record import Record, decode
 from . import revision_process
 from .compare import Comparison, decide
-from .intervals import ERROR_RATE, Deviation, Ratio, adjusted, pairs_needed, ratio_of_pairs
+from .intervals import ERROR_RATE, Deviation, Ratio, pairs_needed, ratio_of_pairs
 from .quantities import is_clocked
 from .rows import Pair, RowKey, by_row, come_and_gone, pairs, row_key, worst_first
 from .times import FLOOR, Drift, known_drift

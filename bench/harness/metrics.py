@@ -178,7 +178,7 @@ def ranking(scores: Mapping[str, Floats]) -> Ranking:
     if not order:
         return Ranking((), ())
     first, *rivals = order
-    chances = _holm([chance_of_pairs(scores[first], scores[rival]) for rival in rivals])
+    chances = adjusted([chance_of_pairs(scores[first], scores[rival]) for rival in rivals])
     tied = [r for r, chance in zip(rivals, chances, strict=True) if chance > 1 - CONFIDENCE]
     return Ranking(tuple(order), (first, *tied))
 
@@ -203,12 +203,18 @@ def chance_of_pairs(a: Floats, b: Floats) -> float:
     return math.erfc(total / math.sqrt(2.0 * float(apart @ apart)))
 
 
-def _holm(chances: Sequence[float]) -> list[float]:
-    """Return chances that hold over all comparisons at once."""
-    raised, least = [1.0] * len(chances), 0.0
-    for rank, i in enumerate(np.argsort(chances, kind="stable").tolist()):
-        least = raised[i] = max(least, min(1.0, (len(chances) - rank) * chances[i]))
-    return raised
+def adjusted(chances: Sequence[float]) -> Floats:
+    """Return chances that hold over all comparisons at once, by Holm (1979).
+
+    The chance of calling any comparison wrongly is held, whatever they share: one false alarm stops
+    a merge, so a share of false ones among those called (Benjamini & Hochberg 1995) would not do.
+    """
+    raw = np.asarray(chances, dtype=float)
+    order = np.argsort(raw, kind="stable")
+    steps = np.maximum.accumulate(raw[order] * (len(raw) - np.arange(len(raw))))
+    result = np.empty(len(raw))
+    result[order] = np.minimum(steps, 1.0)
+    return result
 
 
 def penalised(seconds: Floats, solved: NDArray[np.bool_], penalty: float) -> Floats:
@@ -297,13 +303,14 @@ def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
 def timing(seconds: Floats) -> Timing:
     """Return the median, the 10th and 90th percentiles of the rounds, and the median's interval.
 
-    `seconds` are those of rounds, (round,), or of the rounds of each sweep, (sweep, round). Rounds
-    of one sweep follow each other and are alike, so the interval is that of the sweeps' medians.
+    `seconds` are those of rounds, (round,), or of the rounds of each sweep, (sweep, round). The
+    median is that of all rounds, which every record holds. Rounds of one sweep follow each other
+    and are alike, so how sure it is, and who ties, follows from the sweeps' medians.
     """
     rounds = np.asarray(seconds, dtype=float)
     low, median, high = np.quantile(rounds, [0.1, 0.5, 0.9])
     sweeps = np.median(rounds, axis=1) if rounds.ndim == 2 else rounds
-    interval = median_interval(sweeps)
+    interval = median_interval(sweeps)._replace(value=float(median))
     return Timing(float(median), float(low), float(high), int(rounds.size), interval)
 
 

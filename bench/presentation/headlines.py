@@ -1,11 +1,12 @@
 """The first screen’s answers: is it right, who is most accurate and fastest, who is absent.
 
-All are made from the records. Who is not told from the first ties with it: over robots by the pairs
-of `metrics.ranking`, among timed cases where intervals overlap.
+All are made from the records. As in the tables, who is not told from the first by
+`metrics.ranking` ties with it.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.overall.readings import Overall, overall
 from ..experiments.robots.readings import KINDS, SHIFT, measured
+from ..experiments.timing.tables import median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..peers import registry
@@ -194,19 +196,8 @@ def _tied(names: Sequence[str]) -> str:
     return f"Tie: {', '.join(names) if len(names) <= MOST_NAMED else f'{len(names)} solvers'}"
 
 
-class Time(NamedTuple):
-    """The median of what a work takes a solver [s], and its interval.
-
-    Of too few rounds for an interval these are the 10th and the 90th percentile.
-    """
-
-    median: float
-    low: float
-    high: float
-
-
-# What each work takes each solver.
-Times = dict[str, dict[str, Time]]
+# The median of what each work takes each solver [s].
+Times = dict[str, dict[str, float]]
 
 
 def _arrival_times(results: Results) -> Times:
@@ -214,9 +205,9 @@ def _arrival_times(results: Results) -> Times:
     found: Times = {}
     for point in points(results, ONE_STEP):
         times = found.setdefault(f"{point.particles}/{point.stiffness}", {})
-        seconds, before = point.values["seconds"], times.get(point.solver)
-        if point.values["error"] <= NEAR and (before is None or seconds < before.median):
-            times[point.solver] = Time(seconds, seconds, seconds)
+        if point.values["error"] <= NEAR:
+            seconds = point.values["seconds"]
+            times[point.solver] = min(seconds, times.get(point.solver, seconds))
     return found
 
 
@@ -243,24 +234,26 @@ def _soonest(results: Results) -> Headline | None:
 def _timed(results: Results, subject: str) -> Headline | None:
     """Return who is first in the cases of a subject that more than one can do."""
     works: Times = {}
+    ties: set[str] = set()
     for problem, records in by_problem(results.all("timing", subject=subject)).items():
         rivals = [record for record in records if record.solver not in _NOT_RIVALS]
         if len(rivals) > 1:
-            works[problem] = {_short(record.solver): _time(record) for record in rivals}
-    return _first("speed", SUBJECTS[subject], "cases", works, f"timing_{subject}")
+            works[problem] = {_short(r.solver): median_time(r) for r in rivals}
+            ranking = ranked_by_time(rivals)
+            if ranking is None or ranking.first != (
+                min(works[problem], key=works[problem].__getitem__),
+            ):
+                ties.add(problem)
+    return _first("speed", SUBJECTS[subject], "cases", works, f"timing_{subject}", ties)
 
 
-def _time(record: Record) -> Time:
-    timing = metrics.timing(record.arrays["seconds"])
-    if np.isfinite(timing.interval).all():
-        return Time(*timing.interval)
-    return Time(timing.median, timing.low, timing.high)
-
-
-def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headline | None:
+def _first(
+    chapter: str, asked: str, of: str, works: Times, table: str, ties: Container[str] = ()
+) -> Headline | None:
     """Return who is first most often, in how many cases, and by what factors; ties are nobody's."""
-    order = [sorted(times.items(), key=lambda item: item[1]) for times in works.values() if times]
-    decided = [ranked for ranked in order if not _is_tie(ranked)]
+    ranked = {work: sorted(times.items(), key=itemgetter(1)) for work, times in works.items()}
+    order = [times for times in ranked.values() if times]
+    decided = [times for work, times in ranked.items() if times and work not in ties]
     if not order:
         return None
     if not decided:
@@ -275,15 +268,10 @@ def _first(chapter: str, asked: str, of: str, works: Times, table: str) -> Headl
     return Headline(chapter, asked, _tied(leaders), detail, table)
 
 
-def _ahead(won: Sequence[Sequence[tuple[str, Time]]]) -> str:
+def _ahead(won: Sequence[Sequence[tuple[str, float]]]) -> str:
     """Say by what factors the cases were won."""
-    factors = [ranked[1][1].median / ranked[0][1].median for ranked in won if len(ranked) > 1]
+    factors = [ranked[1][1] / ranked[0][1] for ranked in won if len(ranked) > 1]
     return f"{_range(factors)} × the next" if factors else "no rival arrives"
-
-
-def _is_tie(ranked: Sequence[tuple[str, Time]]) -> bool:
-    """Return whether the intervals of the first two overlap."""
-    return len(ranked) > 1 and ranked[0][1].high >= ranked[1][1].low
 
 
 def _range(factors: Sequence[float]) -> str:

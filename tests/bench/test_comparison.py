@@ -11,6 +11,7 @@ from bench.comparison import compare as comparing
 from bench.comparison import intervals, times
 from bench.comparison.compare import Limits, compare, limits, stops_at
 from bench.comparison.rows import ORDER, Verdict
+from bench.harness import metrics
 from bench.harness.record import RecordFile
 
 
@@ -222,7 +223,7 @@ def test_pairs_by_lot_call_nothing_by_chance_and_find_a_fifth():
         order = rng.random((count, rows)) < 0.5
         times[order] = times[order][:, ::-1]
         times[:, 0, 1] *= 1.2
-        chances = intervals.adjusted(
+        chances = metrics.adjusted(
             [intervals.ratio_of_pairs(*times[:, row].T).chance for row in range(rows)]
         )
         found += chances[0] <= intervals.ERROR_RATE
@@ -243,8 +244,8 @@ def test_the_interval_of_pairs_is_that_of_the_tables():
 
 
 def test_chances_over_all_rows_are_those_of_holm():
-    assert intervals.adjusted([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
-    assert intervals.adjusted([]).size == 0
+    assert metrics.adjusted([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+    assert metrics.adjusted([]).size == 0
 
 
 LIMITS = {

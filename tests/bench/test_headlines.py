@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.experiments.timing import tables as timing
 from bench.harness import metrics
 from bench.harness.record import FINISHED
 from bench.peers import registry
 from bench.presentation import headlines
 from bench.presentation.results import Results
 from bench.presentation.tables.layout import source
+from bench.presentation.tables.table import words
 
 N = 200
 FASTEST = "Fastest, misses penalised"
@@ -73,17 +75,43 @@ def test_a_solver_that_fails_fast_is_not_the_fastest(make):
     assert asked(records, FASTEST).answer == "b"
 
 
-@pytest.mark.parametrize(("factor", "answer"), [(2.0, "Pinocchio"), (1.01, "Tie: ")])
-def test_works_whose_rounds_overlap_are_nobodys(make, factor, answer):
-    """Rounds are 1, 2 and 3 times the time that is given."""
-    works = [make.timed("Pinocchio", 1e-7), make.timed("Plumbob, compiled", 1e-7 * factor * 5)]
-    if factor < 2:
-        works[1] = make.timed("Plumbob, compiled", 1e-7 * factor)
-    found = asked(works, "Forward kinematics", "speed")
-    assert found.answer.startswith(answer)
-    assert found.detail == (
-        "10.0 × the next, 1/1 cases" if factor == 2 else "nobody leads, 0/1 cases"
-    )
+def in_sweeps(make, solver, rounds):
+    made = make.timed(solver, 1.0)
+    return replace(made, arrays=made.arrays | {"seconds": rounds})
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("factor", [1.2, 1.0])
+def test_headline_and_table_name_the_same_leader_by_the_same_medians(make, factor, seed):
+    """A drift that both share hides no difference: only its intervals overlap."""
+    rng = np.random.default_rng(seed)
+    drift = 1e-6 * rng.lognormal(0.0, 0.5, (9, 1)) * rng.lognormal(0.0, 0.1, (9, 3))
+    slower = factor * drift * rng.lognormal(0.0, 0.02, (9, 3))
+    records = [in_sweeps(make, "Pinocchio", drift), in_sweeps(make, "Plumbob, compiled", slower)]
+    table = timing.kinematics(Results(records))
+    (point,) = table.summary.points
+    found = asked(records, "Forward kinematics", "speed")
+    if factor == 1.0:
+        assert "in a tie with" in point
+        assert found.answer.startswith("Tie: ")
+        assert found.detail == "nobody leads, 0/1 cases"
+    else:
+        assert point.endswith("first: Pinocchio")
+        medians = [row[table.columns.index(median_of(table))] for row in table.rows]
+        ratio = words(medians[1] / medians[0])
+        assert found[2:4] == ("Pinocchio", f"{ratio} × the next, 1/1 cases")
+
+
+def median_of(table):
+    return next(column for column in table.columns if column.title == "median")
+
+
+def test_nobody_leads_among_those_that_were_timed_apart(make):
+    rounds = np.linspace(1e-6, 1.1e-6, 27).reshape(9, 3)
+    records = [in_sweeps(make, s, f * rounds) for s, f in (("Pinocchio", 1), ("MuJoCo", 9))]
+    apart = [replace(r, facts={**r.facts, "together": r.solver}) for r in records]
+    assert asked(records, "Forward kinematics", "speed").answer == "Pinocchio"
+    assert asked(apart, "Forward kinematics", "speed").detail == "nobody leads, 0/1 cases"
 
 
 def test_plain_python_and_the_limit_are_no_rivals(make):

@@ -58,7 +58,8 @@ def _precision(record: Record) -> float | None:
     return None if math.isnan(low) else (high - low) / (2.0 * median)
 
 
-def _median(record: Record) -> float:
+def median_time(record: Record) -> float:
+    """Return the median of all rounds [s]."""
     return metrics.timing(record.arrays["seconds"]).median
 
 
@@ -66,14 +67,14 @@ def _multiple(record: Record, other: Record | None) -> float | None:
     """Return a time over another's of the same work, None if there is none."""
     if other is None or other is record:
         return None
-    return metrics.ratio(_median(record), _median(other))
+    return metrics.ratio(median_time(record), median_time(other))
 
 
 def _bandwidth(timed: Timed) -> float | None:
     if timed.limit is None:
         return None
     moved = float(timed.limit.arrays["moved"])
-    return metrics.gigabytes_per_second(moved, _median(timed.limit))
+    return metrics.gigabytes_per_second(moved, median_time(timed.limit))
 
 
 LIMIT_SENTENCE = (
@@ -131,20 +132,27 @@ def _noise(works: Sequence[Timed]) -> float:
 def _time(record: Record, unit: str) -> str:
     precision = _precision(record)
     known = "" if precision is None else f" ± {round(100 * precision, 1):g} %"
-    return f"{words_in(_median(record), unit)}{known}"
+    return f"{words_in(median_time(record), unit)}{known}"
 
 
 def _first(records: Sequence[Record]) -> str:
-    """Say who is first of several, or who ties, by the medians of the sweeps that they share.
-
-    Nothing is said of what was timed apart: its sweeps are no pairs.
-    """
+    """Say who is first of several, or who ties."""
     if len({record.facts.get("together") for record in records}) > 1:
         return " – timed apart, and not ranked"
+    ranking = ranked_by_time(records)
+    return "" if ranking is None else f" – first: {leaders(ranking)}"
+
+
+def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
+    """Return who takes the least time, by the medians of the sweeps that they share.
+
+    None if there are no two, or they were timed apart: then their sweeps are no pairs.
+    """
     sweeps = {_short(r.solver): _of_sweeps(r) for r in records}
-    if len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
-        return ""
-    return f" – first: {leaders(metrics.ranking(sweeps))}"
+    apart = len({r.facts.get("together") for r in records}) > 1
+    if apart or len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
+        return None
+    return metrics.ranking(sweeps)
 
 
 def _of_sweeps(record: Record) -> metrics.Floats:
