@@ -116,7 +116,7 @@ OUR_KINEMATICS = Solver(
     "Plumbob's kinematics", "Plumbob's kinematics", style=Style("brass", "", "v")
 )
 LIMIT_NAME = "limit: copying as many bytes"
-LIMIT = Solver(LIMIT_NAME, LIMIT_NAME, "", Style("ink", "", "|"))
+LIMIT = Solver(LIMIT_NAME, "plain copy of as many bytes", "", Style("ink", "", "|"))
 TIMED = (
     COMPILED,
     PLAIN,

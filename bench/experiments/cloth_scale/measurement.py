@@ -37,7 +37,7 @@ OURS = registry.SUPERNODAL.name
 LIBRARIES = tuple(library.name for library in registry.FACTORS)
 # Rounds in each of which everything is timed once: so many particles in all, within limits.
 ROUNDS_PARTICLES, ROUNDS = 1_000_000, (3, 15)
-# What the limit of memory reads again and again: more than any cache holds [bytes].
+# What the yardstick of memory reads again and again: more than most caches hold [bytes].
 STRETCH = 2**28
 # So long [s] a part may take, such as the factor of a million particles, compilation included.
 PATIENCE = 1800.0

@@ -1,4 +1,4 @@
-"""A case for the stopwatch: some work, done by us or by an engine, or the least it could cost."""
+"""A case for the stopwatch: some work, done by us or by an engine, or a plain copy of its bytes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class Case:
         solver: by what.
         prepare: sets everything up and returns the call to be timed.
         operations: how many poses, solves or steps one call makes; times are for one.
-        moved: bytes that one call reads and writes, where it is a limit of memory.
+        moved: bytes that one call reads and writes, where it is a yardstick of memory.
         backend: by which of the reference's backends it runs.
         cores: on how many of them; None is all that there are.
     """
@@ -81,7 +81,7 @@ class Case:
 
 
 def copying(work: Work, size: int, *, passes: int = 1, operations: int = 1) -> Case:
-    """Return the limit of memory: copies that read and write as many bytes, half and half.
+    """Return a yardstick of memory: copies that read and write as many bytes, half and half.
 
     `size` bytes are moved in each pass, so that they come from as near a cache as the work's do.
     """
@@ -93,7 +93,7 @@ def streaming(
     work: Work, read: int, written: int, *, operations: int = 1,
     cores: int | None = 1, least: int = 0,
 ) -> Case:  # fmt: skip
-    """Return the limit of memory: a compiled loop that reads and writes so many bytes.
+    """Return a yardstick of memory: a compiled loop that reads and writes so many bytes.
 
     A processor reads what it is about to write (write-allocate), which counts as moved. On several
     cores the loop is cut into slices that read at least `least` bytes each.

@@ -99,7 +99,7 @@ def moving(problem: ClothSwing) -> State:
 
 
 def solving(work: Work, problem: ClothSwing) -> Case:
-    """Return the limit of the triangular solves, two an iteration, which each read all of L."""
+    """Return a copy of what the triangular solves read, all of L twice an iteration."""
     return copying(work, factor_bytes(problem), passes=2 * ITERATIONS)
 
 

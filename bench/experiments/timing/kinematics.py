@@ -29,7 +29,7 @@ class Model(NamedTuple):
 
 
 def cases() -> Iterator[Case]:
-    """Yield one pose by everyone, and batches by us, each with the least that memory allows."""
+    """Yield one pose by everyone, and batches by us, each with a plain copy of its bytes."""
     for name, (skeleton, batch) in models().items():
         bytes_moved = np.array([READ, WRITTEN]) * skeleton.joint_count
         one = _work(name, "one pose a call")

@@ -1,4 +1,4 @@
-"""How long forward kinematics, solves and steps take, beside the engines and a limit."""
+"""How long forward kinematics, solves and steps take, beside the engines and a plain copy."""
 
 import math
 from collections.abc import Sequence
@@ -18,11 +18,11 @@ from .case import COMPILED, LIMIT, PLAIN
 
 
 class Timed(NamedTuple):
-    """A time, beside those of the same work by our compiled source and by the limit."""
+    """A time, beside those of the same work by our compiled source and by a plain copy."""
 
     record: Record
     ours: Record | None
-    limit: Record | None
+    copy: Record | None
 
     @property
     def timing(self) -> metrics.Timing:
@@ -42,12 +42,12 @@ class Timed(NamedTuple):
 
 def _timed(subject: str, results: Results) -> list[Timed]:
     records = results.all("timing", subject=subject)
-    ours, limits = (
+    ours, copies = (
         {record.problem: record for record in records if record.solver == solver}
         for solver in (COMPILED, LIMIT)
     )
     return [
-        Timed(record, ours.get(record.problem), limits.get(record.problem))
+        Timed(record, ours.get(record.problem), copies.get(record.problem))
         for record in records
         if record.solver != LIMIT
     ]
@@ -71,19 +71,19 @@ def _multiple(record: Record, other: Record | None) -> float | None:
 
 
 def _bandwidth(timed: Timed) -> float | None:
-    if timed.limit is None:
+    if timed.copy is None:
         return None
-    moved = float(timed.limit.arrays["moved"])
-    return metrics.gigabytes_per_second(moved, median_time(timed.limit))
+    moved = float(timed.copy.arrays["moved"])
+    return metrics.gigabytes_per_second(moved, median_time(timed.copy))
 
 
-LIMIT_SENTENCE = (
-    " The limit is the time of moving as many bytes as have to be read and written at the least, "
-    "in memory as near as theirs."
+COPY_SENTENCE = (
+    " A plain copy is a loop that reads and writes as many bytes, in memory as near as theirs. It "
+    "is a yardstick and no lower bound: caches may serve other work better."
 )
-LIMIT_COLUMNS = (
-    Column("times the limit", read=lambda timed: _multiple(timed.record, timed.limit), folded=True),
-    Column("bandwidth at the limit", "GB/s", read=_bandwidth, folded=True),
+COPY_COLUMNS = (
+    Column("times a plain copy", read=lambda t: _multiple(t.record, t.copy), folded=True),
+    Column("bandwidth of the copy", "GB/s", read=_bandwidth, folded=True),
 )
 
 
@@ -98,7 +98,7 @@ def _columns(unit: str, works: Sequence[Timed]) -> tuple[Column, ...]:
         text("mark", lambda timed: timed.mark),
         *(Column(name, unit, read=at(i, _timing), folded=True) for i, name in enumerate(places, 1)),
         Column("rounds", read=lambda timed: timed.timing.rounds, folded=True),
-        *(LIMIT_COLUMNS if any(timed.limit for timed in works) else ()),
+        *(COPY_COLUMNS if any(timed.copy for timed in works) else ()),
     )
 
 
@@ -108,14 +108,14 @@ def _timing(timed: Timed) -> metrics.Timing:
 
 def _summary(unit: str, works: Sequence[Timed]) -> Summary:
     """Say who takes how long for what, plain Python left out, a point for each group of works."""
-    limits = {timed.record.problem: timed.limit for timed in works}
+    copies = {timed.record.problem: timed.copy for timed in works}
     groups: dict[str, list[str]] = {}
     for problem, records in by_problem(timed.record for timed in works).items():
         group, work = records[0].facts["group"], records[0].facts["work"]
         mine = [record for record in records if record.solver != PLAIN]
         times = ", ".join(f"{_short(r.solver)} {_time(r, unit)}" for r in mine)
-        multiple = _multiple(mine[0], limits[problem]) if mine else None
-        beside = "" if multiple is None else f" ({words(multiple)} times the limit)"
+        multiple = _multiple(mine[0], copies[problem]) if mine else None
+        beside = "" if multiple is None else f" ({words(multiple)} times a plain copy)"
         groups.setdefault(group, []).append(f"{work}: {times}{beside}{_first(mine)}")
     points = (f"{group} – {'; '.join(works)}" for group, works in groups.items())
     noise = _noise(works)
@@ -182,7 +182,7 @@ def _layout(question: str, subject: str, title: str, unit: str, shows: str) -> L
         title,
         subjects=partial(_timed, subject),
         columns=partial(_columns, unit),
-        shows=lambda works: shows + (LIMIT_SENTENCE if any(timed.limit for timed in works) else ""),
+        shows=lambda works: shows + (COPY_SENTENCE if any(timed.copy for timed in works) else ""),
         measured=_how,
         summary=partial(_summary, unit),
         figures=(figures.TIMINGS[subject],),
@@ -195,7 +195,7 @@ kinematics = _layout(
     "Time of forward kinematics, for one pose",
     "ns",
     "All joints’ positions and rotations. We check and normalise the quaternions given and "
-    "return arrays; an engine’s results stay inside it. The limit reads as many bytes as the "
+    "return arrays; an engine’s results stay inside it. The copy reads as many bytes as the "
     "rotations given have and writes as many as positions and rotations have, by a compiled "
     "loop into memory that is there already; its bandwidth counts that memory is read before "
     "it is written.",
@@ -213,9 +213,9 @@ cloth = _layout(
     "cloth",
     "Time of a cloth step, for one frame",
     "µs",
-    "The state is written into MuJoCo and read back, as a caller would. The limit of "
-    "local/global iterations counts only their triangular solves: the factor’s nonzeros, read "
-    "twice an iteration.",
+    "The state is written into MuJoCo and read back, as a caller would. The copy beside "
+    "local/global iterations moves what their triangular solves read: the factor’s nonzeros, twice "
+    "an iteration.",
 )
 
 
