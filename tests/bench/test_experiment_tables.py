@@ -362,6 +362,7 @@ def test_published_numbers_stand_beside_those_measured_here(make):
     assert column(table, "from") == ["TRAC-IK README, v1.1.0"] * 3 + ["here"]
     assert column(table, "solved [%]") == [35.89, 88.71, 99.62, 50.0]
     assert column(published.toolbox(results), "published, infeasible [%]") == [11.0]
+    assert "jhavl/dkt at 1155dcb" in markdown(published.toolbox(results))
     assert column(published.toolbox(results), "here, by its own word [%]") == [50.0]
     (row,) = published.fabrik(results).rows
     assert row == ("FABRIK", 15.5, 5.0, 6, 67.6, 5.0, 6)

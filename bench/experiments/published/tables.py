@@ -145,7 +145,8 @@ toolbox = Layout(
     "solve. The published searches look at no limits, nor do the toolbox’s here; the last "
     f"share counts answers beyond the limits as not solved. {RULE}",
     measured="Published: 10,000 poses, the tutorial’s own Python loops (Haviland and Corke "
-    "2022). Here the toolbox’s compiled ones, and ours; half the squared error within "
+    f"2022, {published.TOOLBOX_SOURCE}; the rates of its other commits differ by some tenths). "
+    "Here the toolbox’s compiled ones, and ours; half the squared error within "
     f"{words(published.TOOLBOX_HALF_SQUARE)}.",
     summary=lambda records: Summary(
         "Not solved by one search:", tuple(map(_said_of_search, records))
