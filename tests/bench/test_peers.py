@@ -11,6 +11,7 @@ from bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
 from bench.experiments.robots.job import Job
 from bench.experiments.robots.problem import CHARACTER, is_installed, robot
 from bench.experiments.robots.targets import robot_targets, uniform_targets, unreachable_targets
+from bench.harness import stopwatch
 from bench.harness.worker import Solved
 from bench.peers.ik.protocol import SolverOutput, UnableError
 from bench.peers.ik.restarts import restarted
@@ -189,3 +190,15 @@ def test_every_entry_has_a_name_of_its_own_within_its_kind():
     names = [(entry.kind, peer.called(entry)) for peer in PEERS for entry in peer.entries]
     assert len(set(names)) == len(names)
     assert {kind for kind, _ in names} == {ONE_START, RESTARTS}
+
+
+def test_the_choice_among_its_solutions_is_not_charged_to_eaik():
+    """The bench's loop over them took as long as the library."""
+    pytest.importorskip("eaik")
+    from bench.peers.ik import eaik
+
+    targets = robot_targets("ur5", 2)
+    ask = eaik.prepare(robot("ur5"), TOLERANCE)
+    for x, R, start in zip(targets.positions, targets.rotations, targets.starts, strict=True):
+        answer, whole = stopwatch.timed(ask(x, R, start))
+        assert 0 < answer.seconds < whole

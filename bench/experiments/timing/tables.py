@@ -213,7 +213,7 @@ cloth = _layout(
     "cloth",
     "Time of a cloth step, for one frame",
     "µs",
-    "The state is written into MuJoCo and read back, as a caller would. The copy beside "
+    "MuJoCo starts from a state that it has saved, and its results stay inside it. The copy beside "
     "local/global iterations moves what their triangular solves read: the factor’s nonzeros, twice "
     "an iteration.",
 )

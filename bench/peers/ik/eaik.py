@@ -2,7 +2,7 @@
 
 Some of what it returns are least-squares answers to what cannot be solved, marked `is_LS`; those
 are left out, and so are solutions beyond the limits, after whole revolutions are tried. It needs no
-start.
+start. Its time is that of `calculate_IK`: which of all solutions to take is for its user to choose.
 """
 
 import numpy as np
@@ -13,6 +13,7 @@ from reference.arguments import FloatArray
 from ...experiments.robots import LIMIT_TOLERANCE
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot, links
+from ...harness.stopwatch import timed
 from .protocol import Ask, Solve, SolverOutput, UnableError, needs_a_chain
 
 REVOLUTION = 2.0 * np.pi
@@ -38,13 +39,13 @@ def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
         target[:3, :3], target[:3, 3] = rotations[0], positions[0]
 
         def solve() -> SolverOutput:
-            found = engine.calculate_IK(target)
+            found, seconds = timed(lambda: engine.calculate_IK(target))
             exact = [q for q, nearest in zip(found.Q, found.is_LS, strict=True) if not nearest]
             for q in exact:
                 q = within(robot, np.asarray(q))
                 if ((q >= robot.lower) & (q <= robot.upper)).all():
-                    return SolverOutput(q, True)
-            return SolverOutput(None, False)
+                    return SolverOutput(q, True, seconds)
+            return SolverOutput(None, False, seconds)
 
         return solve
 
