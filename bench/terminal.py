@@ -93,8 +93,6 @@ def print_outcome(written: "Written") -> None:
 
 def print_verdicts(verdicts: Sequence[Any]) -> None:
     """Print the table of verdicts."""
-    from crosscheck.verdict import sources
-
     from .presentation.tables.table import Column, Table
 
     words = {name: Column(name, words=True) for name in ("claim", "verdict")}
@@ -111,8 +109,7 @@ def print_verdicts(verdicts: Sequence[Any]) -> None:
     ]
     table = Table("verdicts", "", (words["claim"], words["verdict"], *numbers), tuple(rows))
     print_lines(table)
-    basis = sources([f"{verdict.claim.ours} {verdict.claim.theirs}" for verdict in verdicts])
-    print(f"{sum(verdict.holds for verdict in verdicts)} of {len(rows)} claims held: {basis}")
+    print(f"{sum(verdict.holds for verdict in verdicts)} of {len(rows)} claims held")
 
 
 def progress() -> Any:

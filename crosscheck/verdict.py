@@ -1,6 +1,6 @@
 """A claim that two independent computations agree, and the function that checks it."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +14,6 @@ from .tolerances import Tolerance
 # Least distance of our quantity from its baseline, relative to the scale. It exceeds all tolerances
 # by far, so that a comparison of two results at rest proves nothing.
 LEAST_DISPLACEMENT = 1e-4
-ENGINES = ("Pinocchio", "MuJoCo")
 
 
 class Comparison(NamedTuple):
@@ -76,13 +75,6 @@ class Verdict:
     def holds(self) -> bool:
         """Whether the claim holds."""
         return not self.failure
-
-
-def sources(descriptions: Sequence[str]) -> str:
-    """Return how many claims rest on an engine: their descriptions of both sides name it."""
-    count = sum(any(engine in words for engine in ENGINES) for words in descriptions)
-    others = f"{len(descriptions) - count} against closed forms and invariants"
-    return f"{count} against {' or '.join(ENGINES)}, {others}"
 
 
 def each_case(compare: Callable[[int], Comparison]) -> Callable[[int], Iterable[Comparison]]:

@@ -9,17 +9,15 @@ from typing import Any
 
 from ..entrants.blocks import not_asked
 from ..experiments import SUITES, blocks
-from ..experiments.cloth_peers import measurement as cloths
-from ..experiments.robots import measurement as robots
 from ..harness.block import Block
 from ..harness.choice import Choice
+from ..harness.measure import not_installed
 from ..peers import registry
 from ..presentation.results import counted
 
 NOT_INSTALLED = "not installed"
 # What a block does that measures nothing.
-_MISSING: tuple[Callable[..., Any], ...] = (robots.not_installed, cloths.not_installed)
-_EMPTY = (*_MISSING, not_asked)
+_EMPTY: tuple[Callable[..., Any], ...] = (not_installed, not_asked)
 # So many names of problems or solvers stand in the list of all suites, on so wide a line.
 _FEW, _WIDTH = 6, 100
 _PACKAGES = {registry.PLUMBOB: "plumbob", registry.PINOCCHIO: "pin", registry.MUJOCO: "mujoco"}
@@ -62,7 +60,7 @@ def _plain(name: str) -> str:
 def _solvers(there: Iterable[Block]) -> list[tuple[str, str, str]]:
     """Return name, label if it is another, and version of each solver, those missing last."""
     found = {block.solver: block for block in there}
-    missing = {name for name, block in found.items() if _does(block, _MISSING)}
+    missing = {name for name, block in found.items() if _does(block, (not_installed,))}
     names = [*(name for name in found if name not in missing), *sorted(missing)]
     return [
         (

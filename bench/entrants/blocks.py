@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from reference import IK_SOLVERS, scenes
+from reference import scenes
 
 from ..experiments import chain, published
 from ..experiments.chain.measurement import (
@@ -16,10 +16,9 @@ from ..experiments.chain.measurement import (
     MAX_ITERATIONS,
     TOLERANCE,
     Limits,
-    solve_targets,
-    solve_with_engine,
+    blocks_of,
 )
-from ..experiments.chain.problem import STRATA, TargetsForSkeleton, chain_targets, unit
+from ..experiments.chain.problem import STRATA, chain_targets, unit
 from ..experiments.cloth_peers import measurement as cloth_peers
 from ..experiments.cloth_peers.problem import FallingCloth, own_cloth
 from ..experiments.published import problem as of_paper
@@ -102,23 +101,11 @@ def _of_problem(problem: OwnProblem, scale: Scale) -> Iterator[Block]:
             if peer.version:
                 yield from robots.blocks_of(peer, [problem.name], scale)
     elif problem.targets is not None:
-        yield from _chain_of_all(problem, problem.targets)
+        yield from blocks_of(problem.targets, problem.recorded[0], _chain_facts(problem))
     elif problem.cloth is not None:
         for one in registry.cloth_peers():
             if one.version:
                 yield from _cloth_of(one, problem, scale)
-
-
-def _chain_of_all(problem: OwnProblem, targets: TargetsForSkeleton) -> Iterator[Block]:
-    name, facts, count = problem.recorded[0], _chain_facts(problem), len(targets.targets)
-    limits = Limits(TOLERANCE, MAX_ITERATIONS)
-    settings = limits._asdict()
-    for solver in IK_SOLVERS:
-        measure = partial(solve_targets, targets, solver, limits, record=True)
-        yield Block("ik", name, solver, measure, settings, count, facts)
-    for loop in registry.LOOPS:
-        measure = partial(solve_with_engine, targets, loop.engine, limits)
-        yield Block("ik", name, loop.name, measure, settings, count, facts)
 
 
 def _chain_facts(problem: OwnProblem) -> dict[str, Any]:

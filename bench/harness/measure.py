@@ -37,6 +37,11 @@ def failure(why: str) -> Measured:
     return Measured({}, {"failed": why})
 
 
+def not_installed(package: str) -> Measured:
+    """Return a block without numbers that says what is missing."""
+    return Measured({}, {"remark": f"{package} is not installed"})
+
+
 def record_of(block: Block, measured: Measured, seconds: float) -> Record:
     """Return the record of what was measured here and now."""
     return Record(

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.special import bdtr, stdtrit
 
 from reference import rotation
 
@@ -141,18 +141,8 @@ def median_interval(values: Floats) -> Interval:
 @functools.cache
 def _coin_quantile(throws: int) -> int:
     """Return the greatest k for which k heads or fewer fall in 2.5 % of cases at most, else -1."""
-    if throws > LARGE:  # by the normal distribution, with half a throw for continuity
-        return math.floor((throws - 1 - _NORMAL * math.sqrt(throws)) / 2)
-    below, k = 0.0, -1
-    while (below := below + _coin(throws, k + 1)) <= (1 - CONFIDENCE) / 2:
-        k += 1
-    return k
-
-
-def _coin(throws: int, heads: int) -> float:
-    """Return how likely so many heads are."""
-    logs = math.lgamma(throws + 1) - math.lgamma(heads + 1) - math.lgamma(throws - heads + 1)
-    return math.exp(logs - throws * math.log(2.0))
+    chances = bdtr(np.arange(throws // 2 + 1), throws, 0.5)
+    return int(np.count_nonzero(chances <= (1 - CONFIDENCE) / 2)) - 1
 
 
 def mean_interval(values: Floats) -> Interval:
@@ -186,17 +176,17 @@ def ranking(scores: Mapping[str, Floats]) -> Ranking:
 def chance_of_pairs(a: Floats, b: Floats) -> float:
     """Return how likely two are as far apart on average if signs are drawn by lot, (target,) each.
 
-    Exact for differences of one size, unless there are very many, and for few; else the sum is
-    taken for normal, with the variance that the lots give it.
+    Exact for differences of one size, and for few; else the sum is taken for normal, with the
+    variance that the lots give it.
     """
     apart = np.asarray(a, dtype=float) - np.asarray(b, dtype=float)
     apart = apart[apart != 0]
     total, size = abs(float(apart.sum())), np.abs(apart)
     if not len(apart):
         return 1.0
-    if size.min() == size.max() and len(apart) <= LARGE:
-        wins = max(int(np.sum(apart > 0)), int(np.sum(apart < 0)))
-        return min(1.0, 2.0 * sum(_coin(len(apart), k) for k in range(wins, len(apart) + 1)))
+    if size.min() == size.max():
+        losses = min(int(np.sum(apart > 0)), int(np.sum(apart < 0)))
+        return min(1.0, 2.0 * float(bdtr(losses, len(apart), 0.5)))
     if len(apart) <= _FEW:
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(apart))))
         return float(np.mean(np.abs(signs @ size) >= total * (1.0 - 1e-12)))
@@ -204,11 +194,7 @@ def chance_of_pairs(a: Floats, b: Floats) -> float:
 
 
 def adjusted(chances: Sequence[float]) -> Floats:
-    """Return chances that hold over all comparisons at once, by Holm (1979).
-
-    The chance of calling any comparison wrongly is held, whatever they share: one false alarm stops
-    a merge, so a share of false ones among those called (Benjamini & Hochberg 1995) would not do.
-    """
+    """Return chances that hold over all comparisons at once, whatever they share (Holm 1979)."""
     raw = np.asarray(chances, dtype=float)
     order = np.argsort(raw, kind="stable")
     steps = np.maximum.accumulate(raw[order] * (len(raw) - np.arange(len(raw))))

@@ -37,8 +37,6 @@ OTHER = Style("faint", ":", "P")
 # Of which those of solvers that nobody knows are made: lines that no solver above has.
 _COLOURS = ("ink", "blue", "orange", "green", "purple", "brass")
 _LINES: tuple[Any, ...] = ((0, (8, 2)), (0, (3, 1, 1, 1)), (0, (8, 2, 2, 2)))
-# The markers of solvers for cloths, by whose they are.
-ENGINE_MARKERS = {PLUMBOB: "o", MUJOCO: "s", NEWTON: "^", BULLET: "D"}
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """The end of an implicit Euler step to 25 digits, to measure errors against.
 
-Newton's answer in float64 is about 1e-13 of the step away from it, and errors measured against that
-answer say nothing below. Here the gradient follows from its definition in 40 decimal digits, by
-Python's own arithmetic, which is the same on every platform; Newton steps with the Hessian of
-float64 refine the answer.
+Newton's answer in float64 is about 1e-13 of the step away from it. Here the gradient follows from
+its definition in 40 decimal digits, the same on every platform, and Newton steps with the Hessian
+of float64 refine the answer.
 """
 
 import decimal
+from collections.abc import Callable
 from decimal import Decimal
 from typing import Any, NamedTuple
 
@@ -23,13 +23,7 @@ ENOUGH = 1e-26
 
 
 class ExactStep(NamedTuple):
-    """The minimiser x* of g as a sum of two arrays of float64, (particle, 3) [m].
-
-    Attributes:
-        positions: x* rounded.
-        remainder: what rounding leaves out.
-        bound: the last correction's norm [m], which bounds what is still wrong.
-    """
+    """The end x* of a step: rounded, what rounding left, and a bound of its error [m]."""
 
     positions: FloatArray
     remainder: FloatArray
@@ -45,10 +39,9 @@ def exact_step(system: MassSpring, state: State, h: float, x: FloatArray) -> Exa
     """Return the end of a step of length h [s] from a state, next to Newton's answer x to it."""
     solve = scipy.sparse.linalg.splu(Objective(system, state, h).hessian_at(x).tocsc()).solve
     with decimal.localcontext(decimal.Context(prec=DIGITS)):
-        step, exact = _Step(system, state, h), _decimals(x)
+        gradient, exact = _gradient(system, state, Decimal(h)), _decimals(x)
         for _ in range(REFINEMENTS):
-            gradient = step.gradient(exact).astype(float)
-            correction = -solve(gradient.ravel()).reshape(x.shape)
+            correction = -solve(gradient(exact).astype(float).ravel()).reshape(x.shape)
             exact, bound = exact + _decimals(correction), float(np.linalg.norm(correction))
             if bound <= ENOUGH * np.linalg.norm(x):
                 break
@@ -56,36 +49,25 @@ def exact_step(system: MassSpring, state: State, h: float, x: FloatArray) -> Exa
         return ExactStep(rounded, (exact - _decimals(rounded)).astype(float), bound)
 
 
-class _Step:
-    """A step's objective in decimal numbers."""
+def _gradient(system: MassSpring, state: State, h: Decimal) -> Callable[[Any], Any]:
+    """Return what maps decimals x to M (x - y) - h² f(x) [kg m], zero at the pins."""
+    (i, j), free = system.springs.T, system.free[:, None]
+    x_n, masses = _decimals(state.positions), _decimals(system.masses)[:, None]
+    k, c, rest = map(_decimals, (system.stiffnesses, system.dampings, system.rest_lengths))
+    y = x_n + h * (free * _decimals(state.velocities))
+    before = np.sqrt(((x_n[i] - x_n[j]) ** 2).sum(axis=1))
 
-    def __init__(self, system: MassSpring, state: State, h: float) -> None:
-        self._system, self._h = system, Decimal(h)
-        self._masses = _decimals(system.masses)[:, None]
-        x_n, v_n = _decimals(state.positions), _decimals(state.velocities)
-        self._y = x_n + self._h * (system.free[:, None] * v_n)
-        self._k, self._r = _decimals(system.stiffnesses), _decimals(system.rest_lengths)
-        self._damping = _decimals(system.dampings) / self._h
-        self._lengths_before = self._springs(x_n)[1]
-
-    def gradient(self, x: Any) -> Any:
-        """Return M (x - y) - h² f(x) [kg m], (particle, 3), zero at the pins."""
-        p, lengths = self._springs(x)
-        slack = self._system.tension_only & (lengths <= self._r)
-        elastic = ~slack * (self._k * (lengths - self._r))
-        tension = elastic + self._damping * (lengths - self._lengths_before)
-        pull = (tension / lengths)[:, None] * p
-        forces, (i, j) = self._masses * _decimals(self._system.gravity), self._system.springs.T
+    def gradient(x: Any) -> Any:
+        p = x[i] - x[j]
+        lengths = np.sqrt((p * p).sum(axis=1))
+        slack = system.tension_only & (lengths <= rest)
+        tension = ~slack * (k * (lengths - rest)) + c / h * (lengths - before)
+        pull, forces = (tension / lengths)[:, None] * p, masses * _decimals(system.gravity)
         np.subtract.at(forces, i, pull)
         np.add.at(forces, j, pull)
-        gradient = self._masses * (x - self._y) - self._h**2 * forces
-        return self._system.free[:, None] * gradient
+        return free * (masses * (x - y) - h**2 * forces)
 
-    def _springs(self, x: Any) -> tuple[Any, Any]:
-        """Return the vectors from end to end [m], (spring, 3), and their lengths."""
-        i, j = self._system.springs.T
-        p = x[i] - x[j]
-        return p, np.sqrt((p * p).sum(axis=1))
+    return gradient
 
 
 def _decimals(values: FloatArray) -> Any:

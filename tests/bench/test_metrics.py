@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
 from bench.harness import metrics
 from reference import rotation
@@ -177,16 +178,18 @@ def test_the_interval_of_a_median_holds_it_as_often_as_it_says(rng):
     assert 0.92 <= np.mean(held) <= 0.99  # 0.962 by the binomial; 400 draws err by 0.01
 
 
-def test_of_very_many_throws_the_normal_distribution_says_the_same(monkeypatch, rng):
-    values, a, b = rng.random(9000), rng.random(9000) < 0.5, rng.random(9000) < 0.515
-    exact = metrics.median_interval(values), metrics.chance_of_pairs(a, b)
-    monkeypatch.setattr(metrics, "LARGE", 1000)
-    metrics._coin_quantile.cache_clear()
-    ordered, near = np.sort(values), metrics.median_interval(values)
-    apart = np.searchsorted(ordered, near[1:]) - np.searchsorted(ordered, exact[0][1:])
-    assert np.abs(apart).max() <= 1
-    assert metrics.chance_of_pairs(a, b) == pytest.approx(exact[1], abs=0.02)
-    metrics._coin_quantile.cache_clear()
+def test_throws_of_a_coin_are_counted_exactly_however_many(rng):
+    for throws in range(1, 60):
+        ways = np.cumsum([math.comb(throws, k) for k in range(throws + 1)])
+        expected = int(np.sum(ways <= 0.025 * 2**throws)) - 1
+        assert metrics._coin_quantile(throws) == expected
+    a, b = rng.random(90_000) < 0.5, rng.random(90_000) < 0.505
+    wins, losses = int(np.sum(a & ~b)), int(np.sum(b & ~a))
+    expected = stats.binomtest(wins, wins + losses).pvalue
+    assert metrics.chance_of_pairs(a, b) == pytest.approx(expected, rel=1e-9)
+    low, high = metrics.median_interval(np.arange(1e6))[1:]
+    assert low + high == 999_999
+    assert high - low == pytest.approx(1.96 * 1e3, rel=0.01)  # of the normal distribution
 
 
 def test_the_interval_of_a_mean_is_students():

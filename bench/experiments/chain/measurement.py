@@ -39,14 +39,20 @@ def blocks(scale: Scale) -> Iterator[Block]:
         problem = chain_targets(stratum, scale.targets)
         facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
         tolerance = BEYOND_TOLERANCE if stratum == BEYOND else TOLERANCE
-        limits = Limits(tolerance, MAX_ITERATIONS)
-        settings = limits._asdict()
-        for solver in IK_SOLVERS:
-            measure = partial(solve_targets, problem, solver, limits, record=True)
-            yield Block("ik", problem.name, solver, measure, settings, scale.targets, facts)
-        for loop in registry.LOOPS:
-            measure = partial(solve_with_engine, problem, loop.engine, limits)
-            yield Block("ik", problem.name, loop.name, measure, settings, scale.targets, facts)
+        yield from blocks_of(problem, problem.name, facts, tolerance)
+
+
+def blocks_of(
+    problem: TargetsForSkeleton, name: str, facts: dict[str, Any], tolerance: float = TOLERANCE
+) -> Iterator[Block]:
+    """Yield a batch of targets for every solver of ours, and for one loop on each engine."""
+    limits, count = Limits(tolerance, MAX_ITERATIONS), len(problem.targets)
+    for solver in IK_SOLVERS:
+        measure = partial(solve_targets, problem, solver, limits, record=True)
+        yield Block("ik", name, solver, measure, limits._asdict(), count, facts)
+    for loop in registry.LOOPS:
+        measure = partial(solve_with_engine, problem, loop.engine, limits)
+        yield Block("ik", name, loop.name, measure, limits._asdict(), count, facts)
 
 
 def solve_targets(

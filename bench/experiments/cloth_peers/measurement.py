@@ -16,6 +16,7 @@ from reference import ImplicitEuler, MassSpring, State
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, WorkerProcess
+from ...harness.measure import not_installed
 from ...peers import registry
 from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
 from ...peers.registry import EXPLICIT, UNDECLARED, ClothPeer
@@ -134,11 +135,6 @@ def own_blocks(
         facts = {"task": task, "cloth": problem.name}
         call = partial(measure, peer, [Fall(level, cloth)])
         yield Block(SUITE, name, peer.title, call, settings, level.size, facts)
-
-
-def not_installed(package: str) -> Measured:
-    """Return a block without numbers that says what is missing."""
-    return Measured({}, {"remark": f"{package} is not installed"})
 
 
 def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measured:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, WorkerProcess, raised
+from ...harness.measure import not_installed
 from ...harness.stopwatch import Budget
 from ...harness.worker import Solved
 from ...peers import registry
@@ -118,11 +119,6 @@ def settings_of(peer: Peer, entry: Entry, tolerance: Tolerance) -> dict[str, Any
     }
 
 
-def not_installed(package: str) -> Measured:
-    """Return a block without numbers that says what is missing."""
-    return Measured({}, {"remark": f"{package} is not installed"})
-
-
 def _solve_strata(run: Run, count: int) -> Measured:
     return solve(run, robot_targets(run.robot, count))
 
@@ -159,10 +155,7 @@ def solve(run: Run, targets: Targets) -> Measured:
 
 
 def _performed(job: Job, budget: Budget) -> Outcome:
-    """Return what came of a job, by a new process from the next target on where one was lost.
-
-    The target over which it was lost is not solved, and took the time until it was given up.
-    """
+    """Return what came of a job; where a target costs the process, a new one goes on behind it."""
     outcome, starts = worker_process().perform(job), job.targets.starts
     if not outcome.lost or len(outcome.solved) == len(starts):
         return outcome

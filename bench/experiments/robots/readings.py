@@ -29,11 +29,8 @@ PENALTY = 0.1
 SHIFT = 1e-5
 MARK = "mark"
 # What can become of a target; each counts under the first that is so.
-EXCEPTION = "exception or crash"
-OUTCOMES = (
-    *("solved", "beyond a limit", "wrong claim", "missed"),
-    *(EXCEPTION, "no answer", "not begun"),
-)
+CRASH = "exception or crash"
+OUTCOMES = ("solved", "beyond a limit", "wrong claim", "missed", CRASH, "no answer", "not begun")
 
 _MEASURED = (
     "Every solver has the same text of the robot, the same targets and the same seeded random "

@@ -34,7 +34,7 @@ from ...presentation.tables.table import Cell, Column, Summary, in_unit, listing
 from . import REACHABLE, UNREACHABLE, figures
 from .overall.tables import aggregate, problem_map
 from .readings import (
-    EXCEPTION,
+    CRASH,
     KINDS,
     MARK,
     OUTCOMES,
@@ -296,7 +296,7 @@ def outcome(kind: str) -> Layout:
 
 def _outcome_columns(records: Sequence[Record]) -> tuple[Column, ...]:
     """Return a column for each outcome; that of exceptions is shown if there are any."""
-    empty = () if any(outcomes(record)[EXCEPTION] for record in records) else (EXCEPTION,)
+    empty = () if any(outcomes(record)[CRASH] for record in records) else (CRASH,)
     counts = [Column(n, read=partial(_count, n), folded=n in empty) for n in OUTCOMES]
     return (*NAMES, *counts, Column("targets", read=total, folded=True))
 

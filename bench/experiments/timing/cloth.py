@@ -71,10 +71,7 @@ def substeps(problem: ClothSwing) -> Callable[[], Any]:
 
 
 def mujoco_steps(problem: ClothSwing, integrator: str, count: int) -> Callable[[], Any]:
-    """Return one frame of MuJoCo's steps from a state that it has saved; the engine holds the end.
-
-    To convert a state of ours and to compute energies would be no part of the same work.
-    """
+    """Return one frame of MuJoCo's steps, from and to its own state, without conversions."""
     engine = MujocoMassSpring(problem.system, h=problem.h / count, integrator=integrator)
     engine.model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     engine.write(moving(problem))

@@ -137,17 +137,14 @@ def _time(record: Record, unit: str) -> str:
 
 def _first(records: Sequence[Record]) -> str:
     """Say who is first of several, or who ties."""
-    if len({record.facts.get("together") for record in records}) > 1:
-        return " – timed apart, and not ranked"
     ranking = ranked_by_time(records)
-    return "" if ranking is None else f" – first: {leaders(ranking)}"
+    if ranking is None:
+        return " – timed apart, and not ranked" if len(records) > 1 else ""
+    return f" – first: {leaders(ranking)}"
 
 
 def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
-    """Return who takes the least time, by the medians of the sweeps that they share.
-
-    None if there are no two, or they were timed apart: then their sweeps are no pairs.
-    """
+    """Return who takes the least time by the medians of shared sweeps, None if they share none."""
     sweeps = {_short(r.solver): _of_sweeps(r) for r in records}
     apart = len({r.facts.get("together") for r in records}) > 1
     if apart or len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:

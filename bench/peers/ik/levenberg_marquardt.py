@@ -34,10 +34,7 @@ class LoopOutput(NamedTuple):
 
 
 def within_reach(targets: FloatArray, root: FloatArray, reach: float) -> FloatArray:
-    """Return targets, (..., 3) [m], those beyond reach drawn to the nearest point within it.
-
-    The reference does the same: the nearest pose stays what it is, and steps do not swing about it.
-    """
+    """Return targets, (..., 3) [m], those beyond reach drawn to the nearest point within it."""
     arms = targets - root
     distances = np.linalg.norm(arms, axis=-1, keepdims=True)
     nearest = root + arms * (reach / np.maximum(distances, reach))

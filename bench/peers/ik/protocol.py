@@ -25,8 +25,7 @@ class SolverOutput(NamedTuple):
     Attributes:
         q: the coordinates, in the robot's order; None if it returns none.
         claimed: whether it says that they solve the target; None if it does not say.
-        seconds: what the adapter or a process of its own has measured [s]; None where the call is
-            to be timed.
+        seconds: what the adapter or its process has measured [s]; None where the call is timed.
         error: what the solver raised, else "".
     """
 

@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from operator import methodcaller
 
 from ....harness import metrics
 from ....presentation.results import leaders, listed
 from ....presentation.tables.columns import text, words_in
 from ....presentation.tables.layout import Layout
 from ....presentation.tables.table import INTERVAL, Column, Summary, in_unit, listing, words
-from ..readings import EXCEPTION, KINDS, RULE, SCORE, TIES, how
+from ..readings import KINDS, OUTCOMES, RULE, SCORE, TIES, how
 from . import figures
 from .readings import Line, Overall, lines, most_solved, overall
 
@@ -19,12 +20,7 @@ def aggregate(kind: str) -> Layout:
     folded = (
         Column("time, 95 % from", "µs", read=lambda row: row.score.low),
         Column("time, 95 % to", "µs", read=lambda row: row.score.high),
-        Column("beyond a limit", read=lambda row: row.count("beyond a limit")),
-        Column("wrong claim", read=lambda row: row.count("wrong claim")),
-        Column("missed", read=lambda row: row.count("missed")),
-        Column(EXCEPTION, read=lambda row: row.count(EXCEPTION)),
-        Column("no answer", read=lambda row: row.count("no answer")),
-        Column("not begun", read=lambda row: row.count("not begun")),
+        *(Column(name, read=methodcaller("count", name)) for name in OUTCOMES[1:]),
     )
     return Layout(
         f"With {kind}: who is best over all robots?",
