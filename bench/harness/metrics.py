@@ -194,13 +194,14 @@ def chance_of_pairs(a: Floats, b: Floats) -> float:
 
 
 def adjusted(chances: Sequence[float]) -> Floats:
-    """Return chances that hold over all comparisons at once, whatever they share (Holm 1979)."""
+    """Return chances that hold over all comparisons at once, whatever they share (Holm 1979).
+
+    A share of false ones (Benjamini & Hochberg 1995) would not do: one false alarm stops a merge.
+    """
     raw = np.asarray(chances, dtype=float)
     order = np.argsort(raw, kind="stable")
     steps = np.maximum.accumulate(raw[order] * (len(raw) - np.arange(len(raw))))
-    result = np.empty(len(raw))
-    result[order] = np.minimum(steps, 1.0)
-    return result
+    return np.minimum(steps, 1.0)[np.argsort(order)]
 
 
 def penalised(seconds: Floats, solved: NDArray[np.bool_], penalty: float) -> Floats:

@@ -1,8 +1,7 @@
 """The end of an implicit Euler step to 25 digits, to measure errors against.
 
-Newton's answer in float64 is about 1e-13 of the step away from it. Here the gradient follows from
-its definition in 40 decimal digits, the same on every platform, and Newton steps with the Hessian
-of float64 refine the answer.
+Newton's answer in float64 is about 1e-13 of the step away from it. Newton steps with a gradient in
+40 decimal digits, which are the same on every platform, refine it.
 """
 
 import decimal
