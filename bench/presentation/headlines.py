@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..experiments.cloth_peers import MISSING, ONE_STEP
+from ..experiments.cloth_peers import MISSING, ONE_STEP, SOLVED
 from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.overall.readings import Overall, overall
@@ -21,9 +21,6 @@ from ..peers import registry
 from .results import Results, by_problem, listed
 from .tables.table import words
 
-# So near to the converged step a solver has solved it.
-TARGET = "1e-6"
-NEAR = float(TARGET)
 # The table of solvers over all robots.
 OVERALL = "robots_overall_one_start"
 # Ties of more solvers than this are counted, not listed.
@@ -215,7 +212,7 @@ def _arrival_times(results: Results) -> Times:
     for point in points(results, ONE_STEP):
         times = found.setdefault(f"{point.particles}/{point.stiffness}", {})
         seconds, before = point.values["seconds"], times.get(point.solver)
-        if point.values["error"] <= NEAR and (before is None or seconds < before.median):
+        if point.values["error"] <= float(SOLVED) and (before is None or seconds < before.median):
             times[point.solver] = Time(seconds, seconds, seconds)
     return found
 
@@ -227,7 +224,7 @@ def _arrived(results: Results) -> Headline | None:
     if not most:
         return None
     ties = [solver for solver, count in arrivals.items() if count == most]
-    detail = f"within {TARGET} on {most}/{len(times)} cloths"
+    detail = f"within {SOLVED} on {most}/{len(times)} cloths"
     return Headline("cloth", "Most accurate", _tied(ties), detail, "cloth_peers_step")
 
 
