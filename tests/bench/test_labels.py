@@ -1,5 +1,7 @@
 """Labels stand apart in every figure: on the page and in its files, at a desk and on a phone."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
@@ -10,6 +12,7 @@ from bench.presentation import report
 from bench.presentation.figures.drawing import power, ticks
 
 WIDTHS = (1440, 390)
+DOCS = Path(__file__).parents[2] / "docs"
 ROBOTS = ("Franka Panda", "UR5", "xArm7", "PR2, right arm", "character", "a robot of mine", "KUKA")
 # Pairs of labels of a figure whose boxes meet, and labels that the figure cuts off. A box is a
 # little wider than its letters and leaves out the room above and below them.
@@ -95,7 +98,7 @@ def test_no_labels_overlap_on_the_page(browser, folder, width):
 def test_no_labels_overlap_in_the_files(browser, folder, width):
     files = sorted((folder / "figures").glob("*.svg"))
     assert len(files) == len(report.all_figures())
-    for file in files:
+    for file in [*files, *DOCS.glob("*_*.svg")]:
         browser.open(file.as_uri(), width)
         assert browser.run(FAULTS) == [], file.name
 
