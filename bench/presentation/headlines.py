@@ -21,6 +21,8 @@ from ..peers import registry
 from .results import Results, by_problem, listed
 from .tables.table import words
 
+# So near to the converged step a solver has solved it.
+NEAR = float(SOLVED)
 # The table of solvers over all robots.
 OVERALL = "robots_overall_one_start"
 # Ties of more solvers than this are counted, not listed.
@@ -212,7 +214,7 @@ def _arrival_times(results: Results) -> Times:
     for point in points(results, ONE_STEP):
         times = found.setdefault(f"{point.particles}/{point.stiffness}", {})
         seconds, before = point.values["seconds"], times.get(point.solver)
-        if point.values["error"] <= float(SOLVED) and (before is None or seconds < before.median):
+        if point.values["error"] <= NEAR and (before is None or seconds < before.median):
             times[point.solver] = Time(seconds, seconds, seconds)
     return found
 
