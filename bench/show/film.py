@@ -34,7 +34,8 @@ def animate(scene: Scene, path: Path, progress: Told) -> None:
         count = len(scene.motions)
         figure = Figure(figsize=(4.8 * count, 4.8 if count == 1 else 5.4), dpi=96)
         base, top = (0.0, 1.0) if count == 1 else (0.18, 0.94)
-        axes = [figure.add_axes((i / count, base, 1 / count, top - base)) for i in range(count)]
+        lefts = [(i + 0.02) / count for i in range(count)]
+        axes = [figure.add_axes((left, base, 0.96 / count, top - base)) for left in lefts]
         if count > 1:
             _bar(scene, figure, figure.add_axes((0.3, 0.08, 0.4, 0.02)))
         update = partial(_frame, axes, scene)
