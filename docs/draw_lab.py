@@ -1,13 +1,19 @@
-"""Draw the pictures of docs/lab.md: `python docs/draw_lab.py`."""
+"""Draw the pictures of README.md, docs/lab.md and docs/show.md: `python docs/draw_lab.py`."""
 
+import re
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from bench.experiments.pictures import ARM, figures, measurement
+from bench.harness.record import Record
+from bench.presentation.figures.sketch import drawn
+from bench.presentation.results import Results
 from reference import ImplicitEuler, scenes
 
 DOCS = Path(__file__).parent
@@ -16,10 +22,42 @@ STYLES = {1e2: ("#0b7a5b", "o"), 1e4: ("#c4500c", "s"), 1e6: ("#8a4a9f", "^")}
 ITERATIONS = 60
 
 
-def draw_scene(scene: str, name: str) -> None:
-    """Draw four moments of a scene by `plumbob show`."""
+def draw_scene(scene: str, name: str, *options: str, folder: Path = DOCS) -> None:
+    """Draw a scene by `plumbob show`, run in a folder."""
     plumbob = Path(sys.executable).with_name("plumbob")
-    subprocess.run([plumbob, "show", scene, "-o", DOCS / name], check=True)
+    command = [plumbob, "show", scene, *options, "-o", DOCS / name]
+    subprocess.run(command, check=True, cwd=folder)
+
+
+def draw_heart_beside(name: str) -> None:
+    """Draw the heart by the solver of docs/show.md beside ours."""
+    page = (DOCS / "show.md").read_text(encoding="utf-8")
+    source = re.search(r'Path\("my_ik.py"\).write_text\("""\n(.*?)"""\)', page, re.DOTALL)
+    assert source
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "my_ik.py").write_text(source[1], encoding="utf-8")
+        draw_scene("heart", name, "--with", "my_ik.py", folder=Path(folder))
+
+
+def draw_plumb_bob(name: str) -> None:
+    """Draw the custom curve as the report does, before and after resampling."""
+    records = [
+        Record("pictures", "", "ccd", {"evened": evened}, arrays=arrays, facts={"task": ARM})
+        for evened in (False, True)
+        for arrays in [measurement.drawing("ccd", evened).arrays]
+    ]
+    sketch = figures.arm_draws(Results(records))
+    assert sketch
+    paper = '<rect width="100%" height="100%" fill="white"/>\n <defs>'
+    text = drawn(sketch).svg.replace("<defs>", paper, 1)
+    (DOCS / name).write_text(text, encoding="utf-8")
+
+
+def shorten(name: str) -> None:
+    """Write the numbers of a picture to a hundredth of a point."""
+    text = (DOCS / name).read_text(encoding="utf-8")
+    short = re.sub(r"\d+\.\d{3,}", lambda number: f"{float(number[0]):.2f}", text)
+    (DOCS / name).write_text(short, encoding="utf-8")
 
 
 def distances(stiffness: float) -> np.ndarray:
@@ -56,3 +94,7 @@ if __name__ == "__main__":
     draw_scene("heart", "lab_arm.svg")
     draw_scene("cloth", "lab_cloth.svg")
     draw_convergence("lab_convergence.svg")
+    draw_heart_beside("show_with.svg")
+    draw_plumb_bob("plumb_bob.svg")
+    for path in DOCS.glob("*_*.svg"):
+        shorten(path.name)

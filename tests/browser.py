@@ -116,7 +116,9 @@ class Browser:
 
     def press(self, key, text=""):
         """Press a key and let it go."""
-        code = {"Enter": 13, "Escape": 27, "Tab": 9, "ArrowDown": 40, " ": 32}[key]
+        code = {"Enter": 13, "Escape": 27, "Tab": 9, "ArrowDown": 40, "ArrowRight": 39, " ": 32}[
+            key
+        ]
         told = {"key": key, "windowsVirtualKeyCode": code, "code": key}
         self.send(
             "Input.dispatchKeyEvent", type="keyDown", **told, **({"text": text} if text else {})

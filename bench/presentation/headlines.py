@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..experiments.cloth_peers import MISSING, ONE_STEP
+from ..experiments.cloth_peers import MISSING, ONE_STEP, SOLVED
 from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.overall.readings import Overall, overall
@@ -24,8 +24,7 @@ from .results import Results, by_problem, listed
 from .tables.table import words
 
 # So near to the converged step a solver has solved it.
-TARGET = "1e-6"
-NEAR = float(TARGET)
+NEAR = float(SOLVED)
 # The table of solvers over all robots.
 OVERALL = "robots_overall_one_start"
 # Ties of more solvers than this are counted, not listed.
@@ -218,7 +217,7 @@ def _arrived(results: Results) -> Headline | None:
     if not most:
         return None
     ties = [solver for solver, count in arrivals.items() if count == most]
-    detail = f"within {TARGET} on {most}/{len(times)} cloths"
+    detail = f"within {SOLVED} on {most}/{len(times)} cloths"
     return Headline("cloth", "Most accurate", _tied(ties), detail, "cloth_peers_step")
 
 

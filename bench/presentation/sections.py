@@ -80,8 +80,8 @@ SECTIONS = (
         "speed",
         "Speed",
         "Speed",
-        "The same work by the compiled and the plain source, and by both engines, in one run on "
-        "one core.",
+        "The same work by the compiled and the plain source, and by both engines, in one run, on "
+        "one core unless all are named.",
         "timing_kinematics",
         "timing_kinematics",
     ),

@@ -14,7 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from ..presentation.figures.drawing import STYLE, power
+from ..presentation.figures.drawing import STYLE
 from ..presentation.figures.scene_drawing import COLOUR_MAP, draw_arm, draw_cloth
 from ..presentation.figures.style import COLOURS, written
 from ..presentation.figures.view import seen
@@ -34,7 +34,8 @@ def animate(scene: Scene, path: Path, progress: Told) -> None:
         count = len(scene.motions)
         figure = Figure(figsize=(4.8 * count, 4.8 if count == 1 else 5.4), dpi=96)
         base, top = (0.0, 1.0) if count == 1 else (0.18, 0.94)
-        axes = [figure.add_axes((i / count, base, 1 / count, top - base)) for i in range(count)]
+        lefts = [(i + 0.02) / count for i in range(count)]
+        axes = [figure.add_axes((left, base, 0.96 / count, top - base)) for left in lefts]
         if count > 1:
             _bar(scene, figure, figure.add_axes((0.3, 0.08, 0.4, 0.02)))
         update = partial(_frame, axes, scene)
@@ -44,19 +45,20 @@ def animate(scene: Scene, path: Path, progress: Told) -> None:
 
 
 def picture(scene: Scene, path: Path, progress: Told) -> None:
-    """Write an SVG: a row of moments for each solver."""
+    """Write an SVG: for each solver what an arm has drawn, or a row of moments of a cloth."""
     with mpl.rc_context({**STYLE, **_WHITE}):
-        count = len(scene.motions)
-        height = 2.8 * count + (0.6 if count > 1 else 0.0)
-        figure = Figure(figsize=(2.4 * MOMENTS, height), layout="constrained")
-        rows = figure.subplots(count, MOMENTS, squeeze=False)
+        count, is_arm = len(scene.motions), scene.curve is not None
+        rows, columns, size = (1, count, 4.8) if is_arm else (count, MOMENTS, 2.4)
+        figure = Figure(figsize=(size * columns, size * rows + 0.6), layout="constrained")
+        panels = figure.subplots(rows, columns, squeeze=False).reshape(count, -1)
         last = len(scene.motions[0].positions) - 1
-        for done, i in enumerate(np.linspace(0, last, MOMENTS).round().astype(int), 1):
-            _frame(list(rows[:, done - 1]), scene, int(i), title=done == 1)
-            progress(done, MOMENTS)
+        moments = np.linspace(0, last, MOMENTS).round().astype(int).tolist()
+        for done, i in enumerate(moments[-panels.shape[1] :], 1):
+            _frame(list(panels[:, done - 1]), scene, i, done == 1, moments if is_arm else ())
+            progress(done, panels.shape[1])
         if count > 1:
-            _bar(scene, figure, None, rows.ravel().tolist())
-        figure.savefig(path, metadata={"Date": None})
+            _bar(scene, figure, None, panels.ravel().tolist())
+        figure.savefig(path, metadata={"Date": None}, bbox_inches="tight")
 
 
 def _bar(scene: Scene, figure: Figure, where: Axes | None, beside: Sequence[Axes] = ()) -> None:
@@ -65,17 +67,21 @@ def _bar(scene: Scene, figure: Figure, where: Axes | None, beside: Sequence[Axes
     colours = ScalarMappable(LogNorm(10.0**low, 10.0**high), COLOUR_MAP)
     more: dict[str, Any] = {"cax": where} if where else {"ax": beside, "shrink": 0.5, "aspect": 40}
     bar = figure.colorbar(colours, orientation="horizontal", **more)
-    bar.ax.xaxis.set_major_formatter(power)
+    bar.ax.xaxis.set_major_formatter(lambda metres, _: length(metres))
     bar.ax.minorticks_off()
-    bar.set_label(f"{scene.measure} [m]")
+    bar.set_label(scene.measure)
 
 
-def _frame(axes: Sequence[Axes], scene: Scene, i: int, title: bool = True) -> tuple[()]:
+def _frame(
+    axes: Sequence[Axes], scene: Scene, i: int, title: bool = True, poses: Sequence[int] = ()
+) -> tuple[()]:
     every = [one.positions.reshape(-1, 3) for one in scene.motions]
     every += [] if scene.curve is None else [scene.curve]
     x, y, _ = seen(np.concatenate(every), scene.view)
     for ax, one in zip(axes, scene.motions, strict=True):
         ax.clear()
+        for k in poses:
+            draw_arm(ax, one.positions[k], alpha=0.15)
         (_arm if scene.curve is not None else _cloth)(ax, scene, one, i)
         if len(scene.motions) > 1:
             _say(ax, one, i, title)
@@ -87,22 +93,24 @@ def _frame(axes: Sequence[Axes], scene: Scene, i: int, title: bool = True) -> tu
 
 
 def _say(ax: Axes, one: Moving, i: int, title: bool) -> None:
-    """Write whose motion this is, and its error in this frame."""
+    """Write whose motion this is, and its error in this frame and up to it."""
     ax.set_title(written(one.label) if title else "", fontweight="bold", loc="left")
-    error = f"error {length(one.errors[i])}" if np.isfinite(one.errors[i]) else "diverged"
+    error, largest = (length(value) for value in (one.errors[i], np.max(one.errors[: i + 1])))
+    error = f"error {error}, largest {largest}" if np.isfinite(one.errors[i]) else "diverged"
     ax.text(0.0, -0.02, error, transform=ax.transAxes, va="top", color=COLOURS["faint"])
 
 
 def _arm(ax: Axes, scene: Scene, one: Moving, i: int) -> None:
     assert scene.curve is not None
     x, y, _ = seen(scene.curve, scene.view)
-    ax.plot(x, y, color=COLOURS["rule"], linewidth=1 if len(scene.motions) == 1 else 3)
+    ax.plot(x, y, color=COLOURS["rule"], linewidth=1 if len(scene.motions) == 1 else 3, zorder=2)
     x, y, _ = seen(one.positions[: i + 1, -1], scene.view)
     if len(scene.motions) == 1:
-        ax.plot(x, y, color=COLOURS["orange"], linewidth=1.8)
+        ax.plot(x, y, color=COLOURS["orange"], linewidth=1.8, zorder=5)
     else:
         ends = np.stack([x, y], axis=-1)
-        lines = LineCollection(list(np.stack([ends[:-1], ends[1:]], axis=1)), linewidths=1.8)
+        segments = list(np.stack([ends[:-1], ends[1:]], axis=1))
+        lines = LineCollection(segments, linewidths=2.4, zorder=5)
         lines.set_color(
             list(COLOUR_MAP(np.nan_to_num(_share(scene, one.errors[1 : i + 1]), nan=1)))
         )

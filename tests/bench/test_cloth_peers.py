@@ -527,7 +527,7 @@ def test_iterations_are_counted_to_each_power_of_ten():
 @pytest.mark.parametrize(("limit", "guess"), [(0.3, 1.0), (0.3, 1e-3), (0.3, 0.25)])
 def test_bisection_finds_a_limit_from_either_side(limit, guess):
     found = peers_cloth.stability_limit(lambda h: h <= limit, guess)
-    assert found == pytest.approx(limit, rel=peers_cloth.STABILITY_DIGITS)
+    assert found == pytest.approx(limit, rel=peers_cloth.BISECTION)
 
 
 @pytest.mark.parametrize("answer", [True, False])

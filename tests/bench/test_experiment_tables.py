@@ -1,19 +1,24 @@
 """Tables of experiments show the numbers of the records, and their sentences follow them."""
 
+import ast
 import csv
 import io
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import bench
 from bench.experiments import SUITES
 from bench.experiments.arm import tables as arm
 from bench.experiments.chain import tables as kinematics
 from bench.experiments.check import tables as check
 from bench.experiments.closed_curves import tables as tracking
 from bench.experiments.cloth import tables as cloth
+from bench.experiments.cloth_peers import tables as cloth_peers
 from bench.experiments.published import tables as published
 from bench.experiments.robots import tables as robots
 from bench.experiments.timing import tables as timing
@@ -50,6 +55,46 @@ def test_every_letter_of_ours_can_be_typeset(records):
         texts = [column.heading for column in table.columns]
         texts += [table.title, table.shows, table.measured, table.summary.sentence]
         assert not [text for text in texts if r"\textbackslash" in escaped(text)], table.name
+
+
+def test_the_error_that_is_asked_about_is_the_one_that_the_answer_counts_to(records):
+    layout, results = cloth_peers.iterations, Results(records)
+    sentence = layout(results).summary.sentence
+    errors = [re.findall(r"1e-\d+", text) for text in (layout.question, sentence)]
+    assert len(errors[0]) == 1
+    assert errors[0] == errors[1]
+    shown = [c.title for c in layout(results).columns if c.title.startswith("to ") and not c.folded]
+    assert f"to {errors[0][0]}" in shown
+
+
+# Numbers of names, of mathematics, of statistics (`metrics.CONFIDENCE`) and of papers.
+FACTS = re.compile(
+    r"Q[123]\.|UR5|PR2|RK4|\((?:[^()]* )?20\d\d\)|Lasenby 2011|Corke 2022|2(?:\.828)? / ω|y = 0"
+    r"|both are 1 at the start|each of 6 components|1e-15|0/|\b95 %|less than 5 %|\b[19]0th\b"
+    r"|^Published: (?:10,000|6,561)|table 1, 20 runs|at most 5 ms for TRAC-IK"
+    r"|float64|25 digits|; 1 is no nearer"
+)
+SOURCES = sorted(
+    path
+    for name in ("tables", "figures", "readings", "headlines", "sections")
+    for path in Path(bench.__file__).parent.rglob(f"{name}.py")
+)
+
+
+def phrases(path):
+    """The string literals of a module that have several words, docstrings left out."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    bodies = [node.body for node in ast.walk(tree) if isinstance(getattr(node, "body", 0), list)]
+    docs = {id(body[0].value) for body in bodies if body and isinstance(body[0], ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docs:
+            yield node.value if " " in node.value else ""
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_no_setting_is_typed_into_a_sentence(path):
+    """A number in a text comes from the constant that the measurement uses, or is a fact."""
+    assert [text for text in phrases(path) if re.search(r"\d", FACTS.sub("", text))] == []
 
 
 def test_every_section_has_a_name_of_its_own():

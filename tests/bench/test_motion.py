@@ -156,6 +156,32 @@ def requests_and_complaints(browser, page):
     ]
 
 
+# How wide and how high what has the colour of the target's curve is on a canvas.
+TARGET = """(() => {
+  const canvas = document.querySelector("canvas"), {width, height} = canvas;
+  const style = getComputedStyle(canvas).getPropertyValue("--rule").match(/[0-9a-f]{2}/g);
+  const rule = style.map(part => parseInt(part, 16)), ends = [[9e9, -9e9], [9e9, -9e9]];
+  const {data} = canvas.getContext("2d").getImageData(0, 0, width, height);
+  for (let i = 0; i < width * height; i++)
+    if (rule.every((part, k) => Math.abs(data[4 * i + k] - part) < 3))
+      [i % width, i / width | 0].forEach((place, k) => {
+        ends[k] = [Math.min(ends[k][0], place), Math.max(ends[k][1], place)]; });
+  return ends.map(([low, high]) => high - low);
+})()"""
+
+
+def test_a_circle_is_almost_round_on_the_page(browser, tmp_path, records):
+    turn = np.linspace(0.0, 2 * np.pi, 80)
+    circle = np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=-1)
+    made = arm_motion(Results(records))._replace(curve=circle)
+    (tmp_path / "circle.html").write_text(motion.page(made), encoding="utf-8")
+    browser.open((tmp_path / "circle.html").as_uri())
+    browser.run(SETTLED)
+    wide, high = browser.run(TARGET)
+    assert wide > 100
+    assert 0.9 < high / wide < 1.02
+
+
 SETTLED = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 

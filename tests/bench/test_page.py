@@ -1,5 +1,7 @@
 """The page in a browser: its first screen, its tables, its addresses; it asks for nothing."""
 
+import base64
+import io
 import itertools
 import json
 import re
@@ -10,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
+from PIL import Image
 
 from bench.harness.record import FINISHED, RecordFile
 from bench.peers import registry
@@ -168,6 +171,73 @@ def test_the_page_is_short_and_never_scrolls_sideways(browser, size):
     assert high <= 15 * 900 if size == DESK else high <= 25 * 844
     browser.run("document.querySelectorAll('details').forEach(fold => { fold.open = true; })")
     assert browser.run("document.documentElement.scrollWidth") <= size[0]
+
+
+# Tables and figures are unfolded and made invisible, but for what marks the edges of their boxes;
+# these are listed with how far they scroll [px]. So little hides but the rim of the last cells.
+HALF_A_CELL = 12
+BARE = """(() => {
+  const style = document.head.appendChild(document.createElement("style"));
+  style.textContent = `.scroll * { color: #0000 !important; border-color: #0000 !important }
+    .scroll svg, .bar, body > header { visibility: hidden !important }`;
+  for (const fold of document.querySelectorAll(".folds > details")) fold.open = true;
+  document.querySelectorAll(".scroll").forEach((box, i) => { box.id = "box" + i; });
+})()"""
+BOXES = """[...document.querySelectorAll(".scroll")].map(box =>
+    [box.id, box.scrollWidth - box.clientWidth, box.scrollHeight - box.clientHeight])"""
+EDGE = """(id, side, at) => {
+  const box = document.getElementById(id), isRight = side === "right";
+  box.scrollTo({[isRight ? "left" : "top"]: at, behavior: "instant"});
+  box.scrollIntoView({block: isRight ? "center" : "end", behavior: "instant"});
+  const {right, bottom} = box.getBoundingClientRect();
+  return [...isRight ? [right - 6, bottom - 24] : [right - 24, bottom - 6], scrollY];
+}"""
+
+
+def edge(browser, *arguments):
+    """The mean brightness at an edge of a box that is scrolled so far, from 0 to 255."""
+    x, y, scrolled = browser.run(f"({EDGE})(...{json.dumps(arguments)})")
+    clip = {"x": x, "y": y + scrolled, "width": 4, "height": 4, "scale": 1}
+    taken = browser.send("Page.captureScreenshot", clip=clip)
+    image = Image.open(io.BytesIO(base64.b64decode(taken["data"]))).convert("L")
+    return np.asarray(image, dtype=float).mean()
+
+
+@pytest.mark.parametrize(
+    ("size", "scheme", "scripts"),
+    [(DESK, "light", True), (DESK, "dark", False), (PHONE, "light", False), (PHONE, "dark", True)],
+)
+def test_an_edge_is_shaded_where_a_table_goes_on(browser, address, size, scheme, scripts):
+    """And only there: not at its end, and not where all of it is seen."""
+    media = [{"name": "prefers-color-scheme", "value": scheme}]
+    browser.send("Emulation.setScriptExecutionDisabled", value=not scripts)
+    browser.send("Emulation.setEmulatedMedia", features=media)
+    try:
+        browser.open(address, *size)
+        cut = dict.fromkeys(("right", "bottom"), 0)
+        browser.run(BARE)
+        boxes = browser.run(BOXES)
+        wide, tall = (sorted(boxes, key=lambda box: box[i]) for i in (1, 2))
+        for name, *amounts in [*wide[:6], *wide[-6:], *tall[-6:]]:
+            for side, amount in zip(cut, amounts, strict=True):
+                start, end = (edge(browser, name, side, at) for at in (0, amount))
+                is_cut = amount > HALF_A_CELL
+                assert (abs(start - end) > 10) == is_cut, (name, side, amount, start, end)
+                cut[side] += is_cut
+        assert cut["right"] >= 6 * (size == PHONE)
+        assert cut["bottom"] >= 6
+    finally:
+        browser.send("Emulation.setEmulatedMedia", features=[])
+        browser.send("Emulation.setScriptExecutionDisabled", value=False)
+
+
+def test_a_table_is_scrolled_by_keys(table):
+    table.resize(*PHONE)
+    table.run(f"""document.querySelector('[id="{MAIN}"] .scroll').focus()""")
+    table.press("ArrowRight")
+    left = f"""new Promise(done => setTimeout(done, 500)).then(
+        () => document.querySelector('[id="{MAIN}"] .scroll').scrollLeft)"""
+    assert table.run(left) > 0
 
 
 def test_every_chapter_has_one_figure_and_one_table_of_six_columns(browser):

@@ -7,12 +7,13 @@ import textwrap
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from bench import cli
 from bench.presentation.motion import motion
 from bench.show import ours
 from bench.show.yours import Yours
-from reference import ImplicitEuler, State, scenes, solve_ik
+from reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
 
 IK = """
     import numpy as np
@@ -150,13 +151,43 @@ def test_both_are_drawn_in_every_form(capsys, tmp_path, scene, suffix):
     if suffix == "svg":
         assert "mine.py" in path.read_text(encoding="utf-8")
         return
-    from PIL import Image
-
     with Image.open(path) as film:
         assert film.width > 1.7 * film.height
         first = film.convert("RGB").tobytes()
         film.seek(film.n_frames - 1)
         assert film.convert("RGB").tobytes() != first
+
+
+def extent(path):
+    """How wide and how high a curve is in a picture: the target in SVG, what is drawn in a GIF."""
+    if path.suffix == ".svg":
+        lines = re.findall(r'd="(M[^"]*)"[^>]*stroke: #d5d9df', path.read_text(encoding="utf-8"))
+        numbers = re.findall(r"-?[\d.]+", max(lines, key=len))
+        return np.ptp(np.array(numbers, dtype=float).reshape(-1, 2), axis=0)
+    with Image.open(path) as film:
+        film.seek(film.n_frames - 1)
+        red, _, blue = np.moveaxis(np.asarray(film.convert("RGB")), -1, 0)
+    return [np.ptp(places) for places in reversed(np.nonzero((red > 180) & (blue < 80)))]
+
+
+@pytest.mark.parametrize("name", ["heart.svg", "star.svg", "circle.svg", "circle.gif"])
+def test_a_curve_in_a_plane_is_seen_upright_and_almost_face_on(capsys, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(ours, "FRAMES", 20)
+    assert show(capsys, name[:-4], "-o", tmp_path / name)[0] == 0
+    points = resample(curves[name[:-4]](), min_spacing=0.3, max_spacing=0.6)
+    wide, high = extent(tmp_path / name) / np.ptp(points[:, [0, 2]], axis=0)
+    assert 0.9 < high / wide < 1.02
+
+
+def test_a_still_shows_the_whole_curve_by_each_solver_and_what_its_colours_mean(capsys, tmp_path):
+    mine = file(tmp_path, "mine.py", IK.format(""))
+    assert show(capsys, "heart", "--with", mine, "-o", "heart.svg")[0] == 0
+    svg = (tmp_path / "heart.svg").read_text(encoding="utf-8")
+    for text in ("mine.py", "Plumbob FABRIK", "distance to the target", "largest"):
+        assert f">{text}" in svg or f"{text} " in svg
+    assert re.search(r">\d+ (nm|µm|mm)<", svg)
+    poses = re.findall(r"stroke: #0b62a8; stroke-opacity: ([\d.]+)", svg)
+    assert 0 < max(map(float, poses)) < 0.3
 
 
 def test_without_a_scene_a_solver_is_shown_with_what_it_can(capsys, tmp_path):

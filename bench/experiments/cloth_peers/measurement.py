@@ -21,7 +21,7 @@ from ...peers import registry
 from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
 from ...peers.registry import EXPLICIT, UNDECLARED, ClothPeer
 from ..published import problem as published
-from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
+from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
 from .problem import (
     FRAME,
@@ -39,19 +39,18 @@ if TYPE_CHECKING:
 
 SUITE = "cloth"
 # One step is timed so often, but for no more than a twentieth of its ladder's time.
-_REPEATS, _REPEATING = 5, 0.05
+REPEATS, _REPEATING = 5, 0.05
 # A ladder ends with the first rung this near to the answer.
 NEAR_ENOUGH = 1e-9
 # A silent frame of a large cloth is given up after so long [s], and so is one being set up.
 _PATIENCE, _START_PATIENCE = 60.0, 300.0
 
-# Errors whose iterations are counted, on a cloth of so many particles a side.
-DECADES = 10.0 ** -np.arange(1, 9)
+# Iterations are counted on a cloth of so many particles a side.
 NEEDED_SIZE = 20
 
 # A mode is unstable if, begun with this amplitude [m], it grows so much in so many steps.
 STABILITY_SIZE, AMPLITUDE, GROWTH, STABILITY_STEPS = 6, 1e-5, 100.0, 400
-STABILITY_DIGITS = 2e-4
+BISECTION = 2e-4
 _DOUBLINGS = 30
 # A solver that does not say that it is explicit, and is stable at so many times symplectic Euler's
 # limit, is taken not to be.
@@ -153,7 +152,7 @@ def one_step_on(peer: ClothPeer, falls: Sequence["Fall"]) -> Measured:
         level, cloth, truth = fall.level, fall.cloth, fall.truth
         spent = 0.0
         for rung in step_rungs(peer, cloth.beat):
-            shape = Shape(1, _REPEATS, _REPEATING * level.budget, cloth.frame)
+            shape = Shape(1, REPEATS, _REPEATING * level.budget, cloth.frame)
             outcome = _tried(job(peer.module, cloth, rung.settings, shape))
             remarks += _remarks(level, rung, outcome)
             if not outcome.solved:
@@ -283,7 +282,7 @@ def iterations_needed(solver: str, stiffness: float) -> Measured:
         errors.append(step_error(iterate.positions, truth))
         if errors[-1] <= NEAR_ENOUGH:
             break
-    needed = [metrics.first_below(np.array(errors), decade) for decade in DECADES]
+    needed = [metrics.first_below(np.array(errors), float(decade)) for decade in DECADES]
     return Measured(
         {
             "needed": [np.nan if count is None else count for count in needed],
@@ -349,7 +348,7 @@ def stability_limit(stable: Callable[[float], bool], h: float) -> float:
             break
     else:
         raise ArithmeticError(f"no limit of stability between {low:g} and {high:g} s")
-    while high - low > STABILITY_DIGITS * high:
+    while high - low > BISECTION * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stable(middle) else (low, middle)
     return 0.5 * (low + high)
@@ -361,7 +360,7 @@ def liu_2013(solver: str) -> Measured:
     exact = implicit_motion(cloth, 1, published.LIU_2013_FRAME)[0]
     x, v = cloth.start.positions, cloth.start.velocities
     settings = {"solver": solver, **published.LIU_2013[solver].settings}
-    shape = Shape(1, _REPEATS, 5.0, published.LIU_2013_FRAME)
+    shape = Shape(1, REPEATS, 5.0, published.LIU_2013_FRAME)
     outcome = worker_process().perform(
         job("bench.peers.cloth.step_solvers", cloth, settings, shape)
     )

@@ -16,16 +16,17 @@ from ...presentation.tables.columns import SOLVER, folded, least, number, text, 
 from ...presentation.tables.layout import Layout
 from ...presentation.tables.table import Column, Summary, Table, listing, words
 from ..published import problem as published
-from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY, figures
+from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, SOLVED, STABILITY, TARGETS, figures
+from .measurement import AMPLITUDE, BISECTION, GROWTH, REPEATS, STABILITY_SIZE, STABILITY_STEPS
+from .problem import FALLING, FRAME, GRAVITY, MASS, SIDE
 from .readings import Point, points
 
-TARGETS = {"1e-3": 1e-3, "1e-6": 1e-6}
-DECADES = tuple(f"1e-{p}" for p in range(1, 9))
 # So near to the truth [m] a motion is hard to tell from it by eye.
 _NEAR = 1e-2
 _CLOTH = (
-    "A cloth of the lab’s springs without dampers, 2 m a side and 1 kg whatever its particles, "
-    "under 9.81 m/s², held at two corners, 0.4 s after it was let go; frames of 1/60 s. "
+    f"A cloth of the lab’s springs without dampers, {SIDE:g} m a side and {MASS:g} kg whatever its "
+    f"particles, under {GRAVITY:g} m/s², held at two corners, {FALLING * FRAME:g} s after it was "
+    f"let go; frames of {words_in(FRAME, 'ms')}. "
 )
 _FAIR = (
     "Every solver works in a process of its own on one core and is timed frame by frame, without "
@@ -75,7 +76,7 @@ def _columns_to(target: str) -> tuple[Column, ...]:
     """Return what the cheapest setting takes to an error, and which it is."""
 
     def cheapest(group: Sequence[Point]) -> Point | None:
-        return _reached(group, TARGETS[target])
+        return _reached(group, float(target))
 
     return (
         Column(
@@ -119,7 +120,7 @@ def _step_summary(groups: Sequence[Sequence[Point]]) -> Summary:
     return Summary(
         "The fastest of all solvers in one step:",
         tuple(
-            f"{cloth}: {listed([f'to {name} {_fastest(of, x)}' for name, x in TARGETS.items()])}"
+            f"{cloth}: {listed([f'to {name} {_fastest(of, float(name))}' for name in TARGETS])}"
             for cloth, of in cloths.items()
         ),
     )
@@ -159,8 +160,8 @@ one_step = WithMissing(
     shows="The error is |x − x*| / |y − x*|, what is left of the distance between the inertial "
     "start y and the converged step x*. Explicit solvers and those that solve one linear "
     "system do another step: their error stays, however long they take.",
-    measured=f"{_CLOTH}{_FAIR}{_TRUTH}. Times are medians of up to five; settings are those of "
-    "a ladder, of which the cheapest that suffices counts.",
+    measured=f"{_CLOTH}{_FAIR}{_TRUTH}. Times are medians of up to {REPEATS}; settings are those "
+    "of a ladder, of which the cheapest that suffices counts.",
     summary=_step_summary,
     figures=(figures.one_step,),
 )
@@ -237,9 +238,9 @@ def _needed_summary(records: Sequence[Record]) -> Summary:
     said = []
     for stiffness in dict.fromkeys(record.settings["stiffness"] for record in records):
         mine = [record for record in records if record.settings["stiffness"] == stiffness]
-        counts = [f"{label(r.solver)} {_count_to(r, '1e-6')}" for r in mine]
+        counts = [f"{label(r.solver)} {_count_to(r, SOLVED)}" for r in mine]
         said.append(f"{words(int(stiffness))} N/m: {listed(counts)}")
-    return Summary("Iterations to an error of 1e-6:", tuple(said))
+    return Summary(f"Iterations to an error of {SOLVED}:", tuple(said))
 
 
 def _count_to(record: Record, decade: str) -> str:
@@ -303,7 +304,7 @@ motion = WithMissing(
 
 
 iterations = Layout(
-    "How many iterations does an error of 1e-8 take?",
+    f"How many iterations does an error of {SOLVED} take?",
     "cloth_iterations",
     "Iterations needed in one step",
     columns=(
@@ -348,9 +349,10 @@ stability = Layout(
     ),
     shows="Symplectic Euler is stable up to h = 2 / ω, the classical Runge-Kutta method up to "
     "2.828 / ω; ω² is the largest eigenvalue of M⁻¹ K at rest.",
-    measured="A cloth of 6 × 6 particles hangs at rest and is pushed by 1e-5 m along its "
-    "highest mode; a step is stable if that has not grown a hundredfold 400 steps later. Found "
-    "by bisection to two ten-thousandths.",
+    measured=f"A cloth of {STABILITY_SIZE} × {STABILITY_SIZE} particles hangs at rest and is "
+    f"pushed by {words(AMPLITUDE)} m along its highest mode; a step is stable if that has grown "
+    f"less than {GROWTH:g}-fold after {STABILITY_STEPS} steps. Found by bisection to a relative "
+    f"error of {words(BISECTION)}.",
     summary=_stability_summary,
     compared=0,
 )
@@ -371,7 +373,7 @@ def _median(record: Record) -> float:
 
 def _liu_summary(records: Sequence[Record]) -> Summary:
     return Summary(
-        "A frame of 6,561 vertices:",
+        f"A frame of {words(_vertices(records))} vertices:",
         tuple(
             f"{label(record.solver)}, {published.LIU_2013[record.solver].done}: "
             f"{words_in(_median(record), 'ms')}, published "
@@ -399,10 +401,10 @@ liu_2013 = Layout(
     measured=lambda records: (
         "Published: 6,561 vertices; read in the abstract and captions, so springs, "
         "stiffness, step and machine are not known to us. Here: "
-        f"{words(_vertices(records))} particles, 81 × 81, "
+        f"{words(_vertices(records))} particles, "
         f"{words(int(published.LIU_2013_STIFFNESS))} N/m, one step of "
         f"{words_in(published.LIU_2013_FRAME, 'ms')} from mid-fall, on one core; "
-        "Newton to a residual of 1e-6."
+        f"Newton to a residual of {words(published.LIU_2013['newton'].settings['tolerance'])}."
     ),
     summary=_liu_summary,
     compared=0,

@@ -10,6 +10,7 @@ from ...presentation.tables.columns import lengths_of_steps, text, titled
 from ...presentation.tables.layout import Layout
 from ...presentation.tables.table import Column, Summary, in_unit, words
 from . import figures
+from .problem import DAMPINGS, SIZE
 
 LISTED = (100, 1_000, 10_000)
 
@@ -66,10 +67,11 @@ energy = Layout(
     "and RK4 are MuJoCo’s: discrete is one Gauss-Newton step of implicit Euler, and without "
     "dampers implicit and implicitfast are symplectic Euler, step for step.",
     measured=lambda records: (
-        "The lab’s cloth of 5 × 5 particles let go from rest, with its damping of 0.2 "
-        f"N s/m and without; {settings(records, 'steps')} steps of {lengths_of_steps(records)} ms, "
-        f"of which every {settings(records, 'every')}th is looked at. Implicit Euler by "
-        f"local/global iterations to a residual of {settings(records, 'tolerance')}."
+        f"The lab’s cloth of {SIZE} × {SIZE} particles let go from rest, with its damping of "
+        f"{DAMPINGS['damped']:g} N s/m and without; {settings(records, 'steps')} steps of "
+        f"{lengths_of_steps(records)} ms, of which every {settings(records, 'every')}th is looked "
+        "at. Implicit Euler by local/global iterations to a residual of "
+        f"{settings(records, 'tolerance')}."
     ),
     summary=_summary,
     figures=(figures.energy,),

@@ -10,6 +10,7 @@ from ...presentation.results import counted, settings
 from ...presentation.tables.columns import SOLVER, folded, least, number, text
 from ...presentation.tables.layout import Layout
 from ...presentation.tables.table import Column, Summary, words
+from .problem import FRAMES, GRAVITY, H
 
 
 def _distance(record: Record) -> float | None:
@@ -81,7 +82,7 @@ certified = Layout(
     "fast the Hessian may change. Where there is no bound the column says why, and error and g "
     "are all there is. The error is |x − x*| / |y − x*|; x* is Newton’s answer to 25 digits.",
     measured=lambda records: (
-        f"The lab’s cloth of {_sizes(records)} particles under 9.81 m/s², half a second "
+        f"The lab’s cloth of {_sizes(records)} particles under {GRAVITY:g} m/s², {FRAMES * H:g} s "
         f"after it was let go; one step of {settings(records, 'h')} s, to a residual of "
         f"{settings(records, 'tolerance')}, the rounding floor, or the solver’s last iteration."
     ),

@@ -83,7 +83,9 @@ def _solve(run: Run, count: int, middle: bool) -> Measured:
 
 def iterations(solver: str, distance: float) -> Measured:
     """Solve for targets at a distance from the root of a straight chain, in random directions."""
-    skeleton, rest = scenes.ball_chain(links=published.FABRIK_LINKS)
+    skeleton, rest = scenes.ball_chain(
+        links=published.FABRIK_LINKS, link_length=published.FABRIK_LENGTH
+    )
     rng = np.random.default_rng(_SEED)
     targets = distance * unit(rng.standard_normal((published.FABRIK_RUNS, 3)))
     solution = solve_ik(skeleton, rest, targets, solver, **_LIMITS)

@@ -74,7 +74,7 @@ FABRIK = {
 }
 # Our guess at the set-up: nine links of 0.1 m from straight, 20 directions, the target at 0.6 m, or
 # out of reach at 1.2 m, to 1e-6 m.
-FABRIK_LINKS = 9
+FABRIK_LINKS, FABRIK_LENGTH = 9, 0.1
 FABRIK_DISTANCES = {"reachable": 0.6, "unreachable": 1.2}
 FABRIK_TOLERANCE = 1e-6
 # The most iterations for a target, here; ours come to 240.

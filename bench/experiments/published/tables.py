@@ -109,9 +109,9 @@ trac_ik = Layout(
     ),
     ranked=lambda rate: not rate.mark,
     subjects=_rates,
-    shows="Full poses at 1e-5 m and rad in each of six components, every search from the "
-    "middle of the limits, at most 5 ms for TRAC-IK; times of all targets, those that failed "
-    f"included. {RULE}",
+    shows=f"Full poses at {words(published.TRAC_IK_TOLERANCE)} m and rad in each of 6 components, "
+    "every search from the middle of the limits, at most 5 ms for TRAC-IK; times of all targets, "
+    f"those that failed included. {RULE}",
     measured="Published: 10,000 reachable random poses on a machine of its time. Here: as many "
     "of our own as the column says, evaluated by MuJoCo at the norm of three such components; "
     "the PR2’s continuous joints have two revolutions in either direction.",
@@ -232,8 +232,9 @@ fabrik = Layout(
     measured=lambda solvers: (
         "Published: Aristidou and Lasenby 2011, table 1, 20 runs, MATLAB, read in a "
         "secondary source; chain, target and tolerance are not stated there. Here a guess: "
-        f"{published.FABRIK_LINKS} links of 0.1 m from straight, {published.FABRIK_RUNS} seeded "
-        f"directions, targets at {' and '.join(map(str, published.FABRIK_DISTANCES.values()))} m, "
+        f"{published.FABRIK_LINKS} links of {published.FABRIK_LENGTH} m from straight, "
+        f"{published.FABRIK_RUNS} seeded directions, targets at "
+        f"{' and '.join(map(str, published.FABRIK_DISTANCES.values()))} m, "
         f"to {settings((r for one in solvers for r in one.here.values()), 'tolerance')} m."
     ),
     summary=_fabrik_summary,

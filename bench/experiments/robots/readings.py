@@ -259,6 +259,6 @@ def how(records: Sequence[Record]) -> str:
     noise = metrics.relative_spread(np.array(paces)) if len(paces) > 1 else math.nan
     return (
         f"{_MEASURED}within {settings(records, 'tolerance')} m and "
-        f"{settings(records, 'tolerance_rotation')} rad, every limit kept to 1e-6 rad. "
-        f"{steadiness(noise)}"
+        f"{settings(records, 'tolerance_rotation')} rad, every limit kept to "
+        f"{words(LIMIT_TOLERANCE)} rad. {steadiness(noise)}"
     ).rstrip()

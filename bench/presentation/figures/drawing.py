@@ -8,7 +8,7 @@ import contextlib
 import io
 import textwrap
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import matplotlib as mpl
@@ -67,6 +67,8 @@ PANEL, ROW, LEGEND = 2.05, 0.3, 0.19
 # Letters of bold type to an inch, of the legend's, and of the name of a row at most.
 _BOLD, _PLAIN, _ROW = 11.0, 13.0, 34
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+# Lines of the smallest letters beside a panel; steps between even ticks, most first.
+_LINES, _STEPS = 14.0, range(6, 1, -1)
 # Marks along a line.
 _MARKS = 5
 
@@ -188,7 +190,9 @@ class _Drawer:
     def __init__(self, chart: Chart, look: Mapping[str, Look]) -> None:
         self._chart, self._look = chart, look
         self._order = list(look)
-        self._ticks = max(3, int(1.8 * WIDTH / max(1, min(chart.columns, len(chart.panels)))))
+        names = max((min(len(name), _ROW) for name in chart.rows), default=6)
+        columns = max(1, min(chart.columns, len(chart.panels)))
+        self._letters = (_PLAIN * WIDTH - names) / columns - 4
         self._numbers = {name: i for i, name in enumerate(chart.solvers)}
 
     def draw(self, ax: Axes, panel: Panel) -> None:
@@ -201,13 +205,13 @@ class _Drawer:
 
     def scale(self, ax: Axes) -> None:
         """Set up the axes of a panel, when all panels that share them have their curves."""
-        _scale(ax, "x", self._chart.x, self._ticks)
+        _scale(ax, "x", self._chart.x, self._letters)
         if self._chart.rows:
             names = [_lines(name, _ROW) for name in self._chart.rows]
             ax.set_yticks(range(len(names)), names)
             ax.set_ylim(len(names) - 0.5, -0.5)
         else:
-            _scale(ax, "y", self._chart.y, 6)
+            _scale(ax, "y", self._chart.y, _LINES, is_upright=True)
 
     def _drawn(self, ax: Axes, one: Series) -> list[Artist]:
         style = _style(self._look.get(one.solver, GREY), marks=one.form != LINE)
@@ -256,32 +260,56 @@ def _every(one: Series, i: int) -> Any:
     return sorted(set((places * (count - 1)).astype(int).tolist()))
 
 
-def _scale(ax: Axes, which: str, axis: Axis, most: int) -> None:
-    """Set an axis up: its limits, and no more labelled ticks than fit."""
+def _scale(ax: Axes, which: str, axis: Axis, room: float, is_upright: bool = False) -> None:
+    """Set an axis up: its scale, its limits, and as many ticks as fit, by letters or by lines."""
     along = ax.xaxis if which == "x" else ax.yaxis
     if axis.log:
         (ax.set_xscale if which == "x" else ax.set_yscale)("log")
     if axis.limits != (None, None):
         (ax.set_xlim if which == "x" else ax.set_ylim)(*axis.limits)
     low, high = sorted(along.get_view_interval())
-    if not axis.log:
-        along.set_major_locator(mpl.ticker.MaxNLocator(most, steps=[1, 2, 5, 10]))
-        return
-    decades = np.log10(high) - np.log10(low) if low > 0 else 1.0
-    if decades >= 1.0:
-        along.set_major_locator(mpl.ticker.LogLocator(numticks=most + 2))
-        along.set_minor_locator(mpl.ticker.NullLocator())
-    if low >= 1e-3 and high <= 1e7:
-        along.set_major_formatter(mpl.ticker.FuncFormatter(_plain))
-        along.set_minor_formatter(mpl.ticker.FuncFormatter(_plain))
-    elif decades >= 1.0:
-        along.set_major_formatter(mpl.ticker.FuncFormatter(power))
+    write = power if axis.log and (low < 1e-3 or high > 1e7) else _plain
+    values = ticks(low, high, axis.log, room, lambda x: 1.8 if is_upright else len(write(x)) + 1.5)
+    along.set_major_locator(mpl.ticker.FixedLocator(values))
+    along.set_minor_locator(mpl.ticker.NullLocator())
+    along.set_major_formatter(mpl.ticker.FuncFormatter(write))
 
 
-def _plain(x: float, _: float) -> str:
-    return f"{x:,.0f}" if x >= 1 else f"{x:g}"
+def ticks(
+    low: float, high: float, log: bool, room: float, size: Callable[[float], float]
+) -> list[float]:
+    """Return as many round values between two ends as have labels that stand apart, or two.
+
+    The label of a value takes its size, with a gap, of the room along the axis.
+    """
+    scale: Callable[[Any], Any] = np.log10 if log else np.asarray
+    sets = [v[(v >= low) & (v <= high)].tolist() for v in _round_values(low, high, log)]
+    sets = [values for values in sets if len(values) > 1]
+    for values in sets:
+        sizes = np.array([*map(size, values)])
+        distances = room * np.diff(scale(values)) / (scale(high) - scale(low))
+        if (distances >= (sizes[1:] + sizes[:-1]) / 2).all():
+            return values
+    return [sets[0][0], sets[0][-1]] if sets else []
 
 
-def power(x: float, _: float) -> str:
+def _round_values(low: float, high: float, log: bool) -> list[Any]:
+    """Return sets of round values from end to end and beyond, the largest first."""
+    even = [mpl.ticker.MaxNLocator(n, steps=[1, 2, 5, 10]).tick_values(low, high) for n in _STEPS]
+    if not log:
+        return even
+    first, last = int(np.floor(np.log10(low))), int(np.ceil(np.log10(high)))
+    decades = [10.0 ** np.arange(first // n * n, last + 1, n) for n in range(1, last - first + 1)]
+    fine = np.outer(decades[0], (1, 2, 5)).ravel()
+    return [fine, *decades, *even] if high < 100 * low else decades
+
+
+def _plain(x: float, _: float = 0) -> str:
+    return f"{x:,.10g}"
+
+
+def power(x: float, _: float = 0) -> str:
     """Return a power of ten in letters of one size, which stay legible and are found as text."""
-    return "10" + f"{np.log10(x):.0f}".translate(_RAISED)
+    exponent = np.floor(np.log10(x) + 1e-9)
+    factor = f"{x / 10**exponent:.3g}·".removeprefix("1·")
+    return f"{factor}10" + f"{exponent:.0f}".translate(_RAISED)

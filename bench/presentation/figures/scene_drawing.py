@@ -22,12 +22,13 @@ COLOUR_MAP = LinearSegmentedColormap.from_list(
 
 
 def draw_arm(ax: Axes, joints: Floats, alpha: float = 1.0) -> None:
-    """Draw one pose of a chain from its joints' positions, (joint, 3)."""
+    """Draw one pose of a chain from its joints' positions, (joint, 3), and mark its root."""
     x, y, _ = seen(joints, ARM_VIEW)
     ax.plot(x, y, "-", color=COLOURS["blue"], alpha=alpha, linewidth=2.4, zorder=3)
     ax.plot(
         x, y, "o", color=COLOURS["blue"], alpha=alpha, markersize=4.5, markeredgewidth=0, zorder=4
     )
+    ax.plot(x[:1], y[:1], "o", color=COLOURS["brass"], markersize=7, zorder=4)
 
 
 def draw_cloth(

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # So many times the least time is drawn as the palest, and the least time as the fullest.
 SLOWEST = 1000.0
+# Maps of more robots than this stand below each other.
+MOST_BESIDE = 5
 
 
 # What a field is: how full it is drawn, from 0 to 1, and what is written on it.
@@ -85,7 +87,8 @@ def _slowness(line: Line, robot: str) -> Field | None:
     if ratio is None:
         return None
     fullness = 1.0 - np.log(max(ratio, 1.0)) / np.log(SLOWEST)
-    said = f"{ratio:,.{1 if ratio < 10 else 0}f}{_star(line, robot)}"
+    size, unit = (ratio, "") if ratio < 999.5 else (ratio / 1e3, "k")  # as wide as a field
+    said = f"{size:.{1 if size < 10 else 0}f}{unit}{_star(line, robot)}"
     return float(np.clip(fullness, 0.0, 1.0)), said
 
 
@@ -97,7 +100,9 @@ def draw_map(data: Map) -> "Canvas":
     """Return the maps as a figure of matplotlib's."""
     from ....presentation.figures.drawing import canvas
 
-    figure, axes = canvas(1.3 + 0.27 * len(data.solvers), len(data.panels), sharey=True)
+    rows = 1 if len(data.robots) <= MOST_BESIDE else len(data.panels)
+    height = rows * (1.3 + 0.27 * len(data.solvers))
+    figure, axes = canvas(height, len(data.panels) // rows, rows, sharey=True)
     for ax, panel in zip(axes, data.panels, strict=True):
         _draw_panel(ax, panel, data.robots)
     axes[0].set_yticks(range(len(data.solvers)), [written(solver) for solver in data.solvers])
