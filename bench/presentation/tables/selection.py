@@ -78,7 +78,7 @@ def filtered(table: Table, rows: Sequence[str]) -> Table:
         table,
         rows=tuple(table.rows[i] for i in left),
         unranked=frozenset(new for new, i in enumerate(left) if i in table.unranked),
-        sources=tuple(table.sources[i] for i in left if i < len(table.sources)),
+        sources=tuple(table.sources[i] for i in left) if table.sources else (),
     )
 
 
