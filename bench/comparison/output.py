@@ -4,15 +4,17 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 
-from ..presentation.tables.table import Column, Summary, Table
-from ..text import shortened, visible
+from ..presentation.tables.aligned import filled
+from ..presentation.tables.columns import text
+from ..presentation.tables.table import Summary, Table, cells
+from ..text import visible
 from .compare import Comparison
 from .rows import ORDER, Row, Verdict, distinguishing
 
 # Lines of the summary on a terminal, its rows among them; rows of the table in a pull request.
 LINES, MOST = 10, 50
-_HEADINGS = ("verdict", "problem", "solver", "settings", "quantity", "what")
-WIDTH = 160
+# Behind so many letters a row on a terminal says what changed.
+_INDENT = 3 + max(map(len, ORDER))
 
 
 def headline(comparison: Comparison, stopped: Sequence[Row]) -> str:
@@ -29,24 +31,30 @@ def counts(comparison: Comparison) -> str:
     return ", ".join(f"{found[verdict]} {verdict}" for verdict in ORDER if found[verdict])
 
 
-def summary(comparison: Comparison, stopped: Sequence[Row]) -> list[str]:
-    """Return at most ten lines, the worst rows first."""
-    told = [row for row in comparison.rows if row.verdict != Verdict.SAME]
-    room = LINES - 3
-    shown = told if len(told) <= room else told[: room - 1]
+def summary(comparison: Comparison, stopped: Sequence[Row], width: int) -> list[str]:
+    """Return ten lines of at most so many letters, or fewer, the worst rows first."""
+    changed = [row for row in comparison.rows if row.verdict != Verdict.SAME]
     names = distinguishing(comparison.rows)
-    lines = [shortened(_line(row, names[row.key]), WIDTH) for row in shown]
-    if len(shown) < len(told):
-        lines.append(f"  and {len(told) - len(shown)} more: --markdown FILE or --json FILE has all")
     drift = f"the machine's drift: {comparison.drift.sentence}"
-    if any(row.verdict == Verdict.UNDECIDED for row in told) and not comparison.is_rerun:
+    if any(row.verdict == Verdict.UNDECIDED for row in changed) and not comparison.is_rerun:
         drift += "; --rerun REV decides"
-    return [headline(comparison, stopped), counts(comparison) or "no rows in common", *lines, drift]
+    first = (headline(comparison, stopped), counts(comparison) or "no rows in common")
+    begin, end = [line for text in first for line in filled(text, width)], filled(drift, width)
+    blocks = [_block(row, names[row.key], width) for row in changed[:LINES]]
+    room = LINES - len(begin) - len(end)
+    lengths = [sum(map(len, blocks[:n])) + (n < len(changed)) for n in range(len(blocks) + 1)]
+    count = max((n for n, length in enumerate(lengths) if length <= room), default=0)
+    lines = [line for block in blocks[:count] for line in block]
+    if count < len(changed):
+        lines.append(f"  and {len(changed) - count} more: --markdown FILE or --json FILE has all")
+    return [*begin, *lines, *end]
 
 
-def _line(row: Row, settings: str) -> str:
+def _block(row: Row, settings: str, width: int) -> list[str]:
+    """Return the lines of a row: its verdict, and behind it what changed."""
     what = f"{row.title} ({settings})" if settings else row.title
-    return f"  {row.verdict:<11}" + visible(f"{what}: {row.why}")
+    first, *more = filled(visible(f"{what}: {row.why}"), width - _INDENT)
+    return [f"  {row.verdict:<{_INDENT - 2}}{first}", *(" " * _INDENT + line for line in more)]
 
 
 def table(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) -> Table:
@@ -54,14 +62,19 @@ def table(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) ->
     told = [row for row in comparison.rows if row.verdict != Verdict.SAME]
     names = distinguishing(comparison.rows)
     points = [f"{_rows(len(told) - MOST)} more are in the JSON"] if len(told) > MOST else []
+    columns = (
+        text("verdict", lambda row: str(row.verdict)),
+        text("problem", lambda row: row.key[1]),
+        text("solver", lambda row: row.key[2]),
+        text("settings", lambda row: names[row.key]),
+        text("quantity", lambda row: row.quantity),
+        text("change", lambda row: row.why),
+    )
     return Table(
         "compare",
         f"plumbob compare: {headline(comparison, stopped)}",
-        tuple(Column(heading, words=True) for heading in _HEADINGS),
-        tuple(
-            (str(row.verdict), *row.key[1:3], names[row.key], row.quantity, row.why)
-            for row in told[:MOST]
-        ),
+        columns,
+        cells(columns, told[:MOST]),
         shows=f"{old} beside {new}.",
         measured=f"{comparison.how} The machine's drift: {comparison.drift.sentence}.",
         summary=Summary(counts(comparison) or "No rows in common", tuple(points)),
