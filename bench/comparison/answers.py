@@ -1,6 +1,5 @@
 """Compare answers exactly: reruns of the same sources are the same to the bit."""
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -85,20 +84,13 @@ def _compared(key: RowKey, name: str, pair: Pair) -> Row:
     before, after = (np.asarray(values[differs], dtype=float) for values in (old, new))
     sign = worse_sign(key[0], name)
     worse = int(np.sum(_is_worse(before, after, sign)))
-    why = _apart(before[0].item(), after[0].item())
+    first = before[0].item(), after[0].item()
+    texts = list(map(words, first))
+    why = ", now ".join(map(repr, first) if texts[0] == texts[1] else texts)
     if old.size > 1:
         why += f" ({len(before)} of {old.size} differ" + (f", {worse} worse)" if sign else ")")
     verdict = _verdict(sign, worse, len(before))
     return Row(key, name, verdict, float(_relative(before, after).max()), why)
-
-
-def _apart(old: float, new: float) -> str:
-    """Return two numbers in as few digits as tell them apart, but three at least."""
-    for digits in range(3, 18):
-        texts = [f"{x:.{digits}g}" if math.isfinite(x) else words(x) for x in (old, new)]
-        if texts[0] != texts[1]:
-            break
-    return ", now ".join(texts)
 
 
 def _verdict(sign: int, worse: int, count: int) -> Verdict:

@@ -3,8 +3,8 @@
 import json
 from collections import Counter
 from collections.abc import Sequence
+from textwrap import wrap
 
-from ..presentation.tables.aligned import filled
 from ..presentation.tables.columns import text
 from ..presentation.tables.table import Summary, Table, cells
 from ..text import visible
@@ -13,8 +13,8 @@ from .rows import ORDER, Row, Verdict, distinguishing
 
 # Lines of the summary on a terminal, its rows among them; rows of the table in a pull request.
 LINES, MOST = 10, 50
-# Behind so many letters a row on a terminal says what changed.
-_INDENT = 3 + max(map(len, ORDER))
+# What stands before the further lines of a row on a terminal, as wide as its verdict.
+_INDENT = " " * (3 + max(map(len, ORDER)))
 
 
 def headline(comparison: Comparison, stopped: Sequence[Row]) -> str:
@@ -32,29 +32,26 @@ def counts(comparison: Comparison) -> str:
 
 
 def summary(comparison: Comparison, stopped: Sequence[Row], width: int) -> list[str]:
-    """Return ten lines of at most so many letters, or fewer, the worst rows first."""
+    """Return ten lines of at most so many letters, the worst rows first, as many as fit."""
     changed = [row for row in comparison.rows if row.verdict != Verdict.SAME]
     names = distinguishing(comparison.rows)
+    begin = [headline(comparison, stopped), counts(comparison) or "no rows in common"]
     drift = f"the machine's drift: {comparison.drift.sentence}"
     if any(row.verdict == Verdict.UNDECIDED for row in changed) and not comparison.is_rerun:
         drift += "; --rerun REV decides"
-    first = (headline(comparison, stopped), counts(comparison) or "no rows in common")
-    begin, end = [line for text in first for line in filled(text, width)], filled(drift, width)
-    blocks = [_block(row, names[row.key], width) for row in changed[:LINES]]
-    room = LINES - len(begin) - len(end)
-    lengths = [sum(map(len, blocks[:n])) + (n < len(changed)) for n in range(len(blocks) + 1)]
-    count = max((n for n, length in enumerate(lengths) if length <= room), default=0)
-    lines = [line for block in blocks[:count] for line in block]
-    if count < len(changed):
-        lines.append(f"  and {len(changed) - count} more: --markdown FILE or --json FILE has all")
-    return [*begin, *lines, *end]
+    for count in range(min(LINES, len(changed)), -1, -1):
+        more = f"  and {len(changed) - count} more: --markdown FILE or --json FILE has all"
+        rows = [_line(row, names[row.key]) for row in changed[:count]]
+        texts = [*begin, *rows, *([more] if count < len(changed) else []), drift]
+        lines = [line for text in texts for line in wrap(text, width, subsequent_indent=_INDENT)]
+        if len(lines) <= LINES:
+            break
+    return lines
 
 
-def _block(row: Row, settings: str, width: int) -> list[str]:
-    """Return the lines of a row: its verdict, and behind it what changed."""
+def _line(row: Row, settings: str) -> str:
     what = f"{row.title} ({settings})" if settings else row.title
-    first, *more = filled(visible(f"{what}: {row.why}"), width - _INDENT)
-    return [f"  {row.verdict:<{_INDENT - 2}}{first}", *(" " * _INDENT + line for line in more)]
+    return f"  {row.verdict:<{len(_INDENT) - 2}}" + visible(f"{what}: {row.why}")
 
 
 def table(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) -> Table:

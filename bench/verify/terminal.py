@@ -62,16 +62,12 @@ def _table(tasks: Sequence[TaskReport], say: Say) -> list[str]:
     columns = (
         text(say(sentence("task")), title),
         text(say(sentence("verdict")), lambda task: say(VERDICTS[task.verdict])),
-        Column(say(sentence("digits")), read=_digits),
+        Column(say(sentence("digits")), read=lambda t: t.digits and f"{t.digits:.1f}"),
         Column(say(sentence("cases passed")), read=lambda t: f"{passed(t)}/{len(t.judgements)}"),
         text(say(sentence("beside the reference")), lambda t: (pace := speed(t)) and say(pace)),
     )
     made = aligned(Table("tasks", "", columns, cells(columns, tasks)), WIDTH)
     return ["".join(span.text for span in line).rstrip() for line in made.lines]
-
-
-def _digits(task: TaskReport) -> str | None:
-    return None if task.digits is None else f"{task.digits:.1f}"
 
 
 def _reservations(task: TaskReport) -> list[Sentence]:

@@ -233,7 +233,7 @@ def test_compare_prints_whole_sentences_in_ten_lines(capsys, tmp_path, monkeypat
     solvers = [re.match(r"arm/circle, (solver \d+), residual: (.*?), now (\S+)", s).groups()
                for s in sentences]  # fmt: skip
     assert len({solver for solver, *_ in solvers}) == len(sentences) > 2
-    assert {pair[1:] for pair in solvers} == {("0.0003", "0.00030000000000003")}
+    assert {pair[1:] for pair in solvers} == {("0.0003", "0.00030000000000002995")}
 
 
 def test_verify_prints_a_line_a_task_under_its_heading():
@@ -253,6 +253,27 @@ def test_verify_prints_a_line_a_task_under_its_heading():
         ["energy", "RIGHT", "15.3", "28/28", "19 x slower"],
         ["robot_inverse_kinematics", "WRONG", "–", "3/7", "–"],
     ]
+
+
+def test_the_list_of_tables_says_how_large_each_is(capsys, tmp_path, monkeypatch, records, width):
+    monkeypatch.chdir(tmp_path)
+    RecordFile(tmp_path / "report").append(records)
+    code, out = plumbob(capsys, "report", "--list")
+    tables = sections.tables(Results([plain(record) for record in records]))
+    headings = ["table", "title", "rows", "columns"]
+    rows = [[t.name, t.title, str(len(t.rows)), str(len(t.columns))] for t in tables]
+    assert assert_printed(out.splitlines(), headings, rows, width) == headings
+    assert code == 0
+
+
+def test_the_list_of_suites_cuts_no_name_and_counts_those_left_out(capsys, width):
+    out = plumbob(capsys, "bench", "--list")[1]
+    names = [claim.name for claim in CLAIMS.values()]
+    assert "…" not in out
+    assert width is None or all(len(line) <= width for line in out.splitlines() if line[0] == " ")
+    text = " ".join(out.split())
+    listed, more = re.search(r"52 problems: (.*?) and (\d+) more", text).groups()
+    assert listed.split("; ") == names[: len(names) - int(more)]
 
 
 def test_brackets_are_units_and_no_markup(capsys, tmp_path, records):

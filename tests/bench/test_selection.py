@@ -204,7 +204,7 @@ def test_the_list_names_every_table_and_its_columns(capsys, folder, records):
     code, out, _ = run(capsys, "--list")
     made = sections.tables(Results([plain(record) for record in records]))
     assert code == 0
-    assert [line.split(":")[0] for line in out.splitlines()] == [table.name for table in made]
+    assert [line.split()[0] for line in out.splitlines()] == ["table", *(t.name for t in made)]
     code, out, _ = run(capsys, "--table", "accuracy", "--list")
     assert out.splitlines()[0] == "1 problem"
     assert "greatest is best" in out

@@ -41,10 +41,11 @@ class Report(NamedTuple):
 
 def report(found: Found, checked: Sequence[Checked]) -> Report:
     """Return the tables of files that were checked."""
+    asked = {reading.engine for one in checked for reading in one.readings}
     columns = (
         text("file", _name),
         text("format", lambda one: one.file.kind),
-        *(text(engine, partial(_outcome, engine)) for engine in NAMES),
+        *(text(engine, partial(_outcome, engine)) for engine in NAMES if engine in asked),
     )
     whole = [one for one in checked if one.file.kind != FRAGMENT]
     points = tuple(point for one in checked for point in _points(one))

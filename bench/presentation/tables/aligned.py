@@ -69,7 +69,7 @@ def _columns(table: Table, width: int) -> tuple[list[int], list[int]]:
     whole = [max(needs[j].natural, cell_len(table.columns[j].heading)) for j in shown]
     if sum(whole) + GAP * (len(shown) - 1) <= width:
         return shown, list(map(int, whole))
-    return shown, [int(w) for w in assigned([needs[j] for j in shown], width, GAP)]
+    return shown, [int(w + 1e-6) for w in assigned([needs[j] for j in shown], width, GAP)]
 
 
 def _need(table: Table, j: int, pieces: int) -> Need:
