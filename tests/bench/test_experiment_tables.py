@@ -84,9 +84,14 @@ def test_targets_without_an_answer_are_said_to_have_none(make):
         unanswered(make.beyond(solver, 0.004), "residual", "bend", "excess", count=count)
         for solver, count in (("ccd", 1), ("mine", 2))
     ]
+    none = [math.nan] * 4
     others = [
         unanswered(make.reached("near", "mine"), "residual"),
         make.worked("Plumbob Newton", error=(math.inf, math.inf)),
+        *(
+            make.raced(solver, "one start", solved=[False] * 4, position=none, rotation=none)
+            for solver in ("Plumbob LM", "mine")
+        ),
     ]
     made = {table.name: table for table in tables(Results([*beyond, *others]))}
     q1 = made["q1_beyond_reach"]
@@ -98,6 +103,9 @@ def test_targets_without_an_answer_are_said_to_have_none(make):
     assert list(map(words, column(q1, "off the line, largest [m]"))) == ["no answer"] * 2
     assert list(map(words, column(made["accuracy"], "residual, largest [m]"))) == ["no answer"]
     assert column(made["cloth_peers_step"], "least error") == ["diverged"]
+    profiles = made["robots_profile_one_start"]
+    assert {cell for row in profiles.rows for cell in row[2:]} == {None}
+    assert len(profiles.rows) == 2
     for table in made.values():
         text = markdown(table)
         assert not re.search(r"\binf(inite)?\b|no answer [m%µ]|not a number", text), table.name
