@@ -124,7 +124,7 @@ def table(runs: Sequence[Run], courses: Sequence[Course], quantity: str) -> Tabl
         text("settings", lambda course: course.settings),
         Column("first", read=lambda course: course.finite[0]),
         Column("last", read=lambda course: course.finite[-1]),
-        Column("factor", read=lambda course: math.exp(course.change)),
+        Column("ratio", read=lambda course: math.exp(course.change)),
         text("course", lambda course: sparkline(course.values)),
     )
     more = f"; {len(courses) - LINES} more rows changed less" if len(courses) > LINES else ""
