@@ -7,26 +7,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from crosscheck.verdict import Verdict as ClaimVerdict
+
     from .presentation.report import Written
     from .presentation.tables.table import Table
 
-# How wide a table is in a pipe, where nobody says.
-IN_A_PIPE = 240
+# In a pipe no line is broken: each row and each sentence stands in one.
+IN_A_PIPE = 10**6
 
 
 def width() -> int:
-    """Return how many letters a line has: the terminal's, or many in a pipe."""
+    """Return how many letters a line may have: the terminal's, or in a pipe any."""
     return shutil.get_terminal_size((IN_A_PIPE, 24)).columns
-
-
-def print_table(table: "Table") -> None:
-    """Print a table with what it says: aligned on a terminal, as Markdown in a pipe."""
-    from .presentation.tables.table import markdown
-
-    if sys.stdout.isatty():
-        print_aligned(table, "a wider terminal, or a pipe")
-    else:
-        print(markdown(table))
 
 
 def print_tables(suites: Sequence[str], output: Path) -> None:
@@ -58,7 +50,7 @@ def print_summary(table: "Table") -> None:
         print("\n".join(f"  {line}" for line in filled(point, width() - 2)))
 
 
-def print_aligned(table: "Table", shown_by: str) -> None:
+def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe") -> None:
     """Print a table with what it says, as wide as the terminal; say what shows columns left out."""
     from .presentation.tables.aligned import filled, left_out
 
@@ -91,25 +83,24 @@ def print_outcome(written: "Written") -> None:
     print("\n".join(outcome(written, width())), flush=True)
 
 
-def print_verdicts(verdicts: Sequence[Any]) -> None:
-    """Print the table of verdicts."""
-    from .presentation.tables.table import Column, Table
+def print_verdicts(verdicts: Sequence["ClaimVerdict"]) -> None:
+    """Print a row for each verdict, then why claims were missed and how many held."""
+    from .harness.metrics import ratio
+    from .presentation.tables.table import Column, Table, cells
 
-    words = {name: Column(name, words=True) for name in ("claim", "verdict")}
-    numbers = (Column(n, folded=n == "cases") for n in ("cases", "largest difference", "tolerance"))
-    rows = [
-        (
-            verdict.claim.name,
-            verdict.cases,
-            verdict.difference,
-            verdict.claim.tolerance.value,
-            "held" if verdict.holds else f"MISSED: {verdict.failure}",
-        )
-        for verdict in verdicts
-    ]
-    table = Table("verdicts", "", (words["claim"], words["verdict"], *numbers), tuple(rows))
-    print_lines(table)
-    print(f"{sum(verdict.holds for verdict in verdicts)} of {len(rows)} claims held")
+    columns = (
+        Column("claim", words=True, read=lambda v: v.claim.name),
+        Column("verdict", words=True, read=lambda v: "held" if v.holds else "MISSED"),
+        Column("cases", read=lambda v: v.cases),
+        Column("largest difference", read=lambda v: v.difference),
+        Column("tolerance", read=lambda v: v.claim.tolerance.value),
+        Column("tolerance used", "%", read=lambda v: ratio(v.difference, v.claim.tolerance.value)),
+    )
+    print_lines(Table("verdicts", "", columns, cells(columns, verdicts)))
+    for verdict in verdicts:
+        if not verdict.holds:
+            print(f"MISSED: {verdict.claim.name} ({verdict.failure})")
+    print(f"{sum(verdict.holds for verdict in verdicts)} of {len(verdicts)} claims held")
 
 
 def progress() -> Any:

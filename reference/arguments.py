@@ -1,6 +1,6 @@
 """What a caller passed, checked: the array asked for, or a ValueError that names the argument."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -198,8 +198,14 @@ def choice(name: str, value: Any, valid: Mapping[str, Any] | Sequence[str]) -> s
         ValueError: if not, with the valid names.
     """
     if not isinstance(value, str) or value not in valid:
-        raise ValueError(f"{name}: expected one of {', '.join(valid)}, got {shown(value)}")
+        raise ValueError(f"{name}: expected one of {name_list(valid)}, got {shown(value)}")
     return value
+
+
+def name_list(names: Iterable[str]) -> str:
+    """Return names with commas between them, all quoted where one has a comma of its own."""
+    texts = list(names)
+    return ", ".join(map(repr, texts) if any("," in text for text in texts) else texts)
 
 
 def instance(name: str, value: Any, kind: type[Kind]) -> Kind:

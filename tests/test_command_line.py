@@ -42,7 +42,7 @@ MISUSE = {
     "option": (["bench", "--fersh"], "--fresh"),
     "option of the main job": (["--fersh"], "--fresh"),
     "suite": (["bench", "clot"], "did you mean 'cloth'?"),
-    "claim unlike any": (["check", "qqq"], "joint positions, Pinocchio; joint rotations"),
+    "claim unlike any": (["check", "qqq"], "'joint positions, Pinocchio', 'joint rot"),
     "claim": (["check", "spring force"], "did you mean 'spring forces'?"),
     "scene": (["show", "hart"], "did you mean 'heart'?"),
     "scene unlike any": (["show", "qqq"], "expected one of arm, cloth, circle"),
@@ -258,7 +258,7 @@ def test_a_missed_claim_exits_1_and_stands_in_the_table(capsys, monkeypatch):
     monkeypatch.setattr("crosscheck.claims.run_claims", judged("they differ"))
     code, out, _ = plumbob(capsys, "check", "spring forces")
     assert code == 1
-    assert "MISSED: they differ" in out
+    assert "MISSED: spring forces (they differ)" in out
     assert "0 of 1 claims held" in out
 
 
@@ -300,13 +300,13 @@ def robots(empty_folder, monkeypatch):
     return folder
 
 
-def test_files_are_checked_and_the_tables_are_markdown(capsys, robots):
+def test_files_are_checked_and_counted(capsys, robots):
     code, out, err = plumbob(capsys, "check", "--files", "robots")
     assert (code, err) == (0, "")
-    assert "| robots/arms/arm\\|1.urdf | URDF | agrees (0.0e+00) | agrees" in out
-    assert "- robots/c.xml: Pinocchio: not read by us: c.xml, line 1: \\<composite\\>: exp" in out
+    assert re.search(r"^robots/arms/arm\|1.urdf +URDF +agrees \(0\) +agrees \(0\)", out, re.M)
+    assert "  robots/c.xml: Pinocchio: not read by us: c.xml, line 1: <composite>: exp" in out
     assert "Of 3 files nothing disagrees; 1 is a part that others include, 1 XML file is of" in out
-    assert "| MJCF | Pinocchio | 2 | 1 | 0 | 1 |" in out
+    assert re.search(r"^MJCF +Pinocchio +2 +1 +0 +1 ", out, re.MULTILINE)
 
 
 def test_files_that_nobody_reads_are_counted(capsys, robots):
@@ -320,12 +320,11 @@ def test_files_that_differ_exit_1(capsys, robots):
     (robots / "b.xml").write_text(CHARACTER(BODY("<frame><joint name='k'/></frame>")))
     code, out, _ = plumbob(capsys, "check", "--files", "robots/b.xml", "robots/arms")
     assert code == 1
-    assert "| robots/b.xml | MJCF | differs (" in out
+    assert re.search(r"^robots/b.xml +MJCF +differs \(", out, re.MULTILINE)
     assert "Of 2 files 1 reading disagrees; 0 are parts that others include, 0 XML files are" in out
 
 
-def test_a_terminal_shows_the_files_in_columns(capsys, robots, monkeypatch):
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+def test_names_of_files_are_no_markup(capsys, robots):
     (robots / "[red]b.xml").write_text(CHARACTER(BODY("")))
     code, out, _ = plumbob(capsys, "check", "--files", "robots")
     assert code == 0

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..help_text import block
-from ..terminal import print_table, print_verdicts, progress
+from ..terminal import print_aligned, print_verdicts, progress
 from .options import MISSED, SUCCESS, known
 
 EXAMPLES = block(
@@ -66,5 +66,5 @@ def check_files(paths: Sequence[str]) -> int:
             bar.update(task, description=one.file.path.name, advance=1)
     files, summary, disagreements = report(found, checked)
     for table in (files, summary):
-        print_table(table)
+        print_aligned(table)
     return MISSED if disagreements else SUCCESS

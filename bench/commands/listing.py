@@ -14,12 +14,13 @@ from ..harness.choice import Choice
 from ..harness.measure import not_installed
 from ..peers import registry
 from ..presentation.results import counted
+from ..terminal import width
 
 NOT_INSTALLED = "not installed"
 # What a block does that measures nothing.
 _EMPTY: tuple[Callable[..., Any], ...] = (not_installed, not_asked)
-# So many names of problems or solvers stand in the list of all suites, on so wide a line.
-_FEW, _WIDTH = 6, 100
+# So many names of problems or solvers at most stand in the list of all suites, in so many lines.
+_FEW, _LINES = 6, 2
 _PACKAGES = {registry.PLUMBOB: "plumbob", registry.PINOCCHIO: "pin", registry.MUJOCO: "mujoco"}
 
 
@@ -98,8 +99,10 @@ def _in_short(what: str, names: Iterable[str]) -> Iterator[str]:
     """Yield how many names there are, and the first of them or of their families."""
     names = list(names)
     families = list(dict.fromkeys(name.partition("/")[0] for name in names))
-    more = f" and {len(families) - _FEW} more" if len(families) > _FEW else ""
-    text = f"{counted(len(names), what)}: {'; '.join(families[:_FEW])}{more}"
-    yield from textwrap.wrap(
-        text, _WIDTH, initial_indent="  ", subsequent_indent="    ", max_lines=2, placeholder=" …"
-    )
+    for few in range(_FEW, 0, -1):
+        more = f" and {len(families) - few} more" if len(families) > few else ""
+        text = f"  {counted(len(names), what)}: {'; '.join(families[:few])}{more}"
+        lines = textwrap.wrap(text, width(), subsequent_indent="    ")
+        if len(lines) <= _LINES:
+            break
+    yield from lines

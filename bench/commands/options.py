@@ -36,10 +36,6 @@ def writable(folder: Path) -> None:
         raise OSError(error.errno, "cannot write here", str(folder)) from None
 
 
-def _listed(names: list[str]) -> str:
-    return ("; " if any("," in name for name in names) else ", ").join(names)
-
-
 def known(kind: str, name: str, valid: Iterable[str]) -> str:
     """Return a name that is valid.
 
@@ -49,6 +45,8 @@ def known(kind: str, name: str, valid: Iterable[str]) -> str:
     names = list(valid)
     if name in names:
         return name
+    from reference.arguments import name_list
+
     near = difflib.get_close_matches(name, names, n=1)
-    hint = f"did you mean {near[0]!r}?" if near else f"expected one of {_listed(names)}"
+    hint = f"did you mean {near[0]!r}?" if near else f"expected one of {name_list(names)}"
     raise ValueError(f"unknown {kind} {name!r}: {hint}")

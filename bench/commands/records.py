@@ -49,12 +49,12 @@ def list_records(
     """Count what is on record, by suite and solver, and where it was measured."""
     from ..harness.record import FINISHED
     from ..presentation.results import plain
-    from ..terminal import print_table
+    from ..terminal import print_aligned
 
     wanted = _selection(suites, solvers, problems, failed, superseded)
     measured = (record for record in _read(folder) if record.suite != FINISHED)
     found = [plain(record) for record in measured if wanted(record)]
-    print_table(_table(folder, found))
+    print_aligned(_table(folder, found))
     return SUCCESS
 
 
@@ -161,35 +161,35 @@ def _rank(record: "Record") -> tuple[bool, str]:
     return not record.failed, record.when
 
 
-def _machines(found: "Iterable[Record]") -> set[str]:
+def _machines(records: "Iterable[Record]") -> set[str]:
     """Return the machines that records were measured on, in words."""
+    from ..presentation.results import counted
     from ..text import visible
 
-    made = (record.stamp.get("machine", {}) for record in found if record.stamp)
-    return {visible(", ".join(map(str, machine.values()))) for machine in made if machine}
+    machines = (record.stamp.get("machine", {}) for record in records if record.stamp)
+    forms = {"cores": lambda n: counted(n, "core"), "memory_gib": "{} GiB".format}
+    texts = (", ".join(forms.get(name, str)(m[name]) for name in m if m[name]) for m in machines)
+    return {visible(text) for text in texts if text}
 
 
-def _table(folder: Path, found: "list[Record]") -> "Table":
-    from ..presentation.tables.table import Column, Summary, Table
+def _table(folder: Path, records: "list[Record]") -> "Table":
+    """Return a row for each suite and solver."""
+    from ..presentation.tables.columns import text
+    from ..presentation.tables.table import Column, Summary, Table, cells
 
     groups: dict[tuple[str, str], list[Record]] = {}
-    for record in found:
+    for record in records:
         groups.setdefault((record.suite, record.solver), []).append(record)
-    counts = ("records", "failed", "superseded")
-    columns = [Column("suite", words=True), Column("solver", words=True), *map(Column, counts)]
-    columns += [Column("latest", words=True), Column("commits", words=True)]
-    places = "; ".join(sorted(_machines(found)))
-    return Table(
-        "records", f"Records in {folder}", tuple(columns),
-        tuple((*key, *_counted(records)) for key, records in groups.items()),
-        summary=Summary(f"{len(found)} records, measured on {places or 'no machine'}"),
-    )  # fmt: skip
-
-
-def _counted(found: "list[Record]") -> tuple[int, int, int, str, str]:
-    commits = {record.commit for record in found} - {""}
-    return (
-        len(found), sum(bool(record.failed) for record in found),
-        sum(record.superseded for record in found),
-        max(record.when for record in found), ", ".join(sorted(commits)),
-    )  # fmt: skip
+    columns = (
+        text("suite", lambda group: group[0].suite),
+        text("solver", lambda group: group[0].solver),
+        Column("records", read=len),
+        Column("failed", read=lambda group: sum(bool(record.failed) for record in group)),
+        Column("superseded", read=lambda group: sum(record.superseded for record in group)),
+        text("latest", lambda group: max(record.when for record in group)),
+        text("commits", lambda group: ", ".join(sorted({r.commit for r in group} - {""}))),
+    )
+    places = "; ".join(sorted(_machines(records)))
+    summary = Summary(f"{len(records)} records, measured on {places or 'no machine'}")
+    rows = cells(columns, groups.values())
+    return Table("records", f"Records in {folder}", columns, rows, summary=summary)

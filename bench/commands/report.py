@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..help_text import block
-from ..terminal import print_outcome
+from ..terminal import print_lines, print_outcome
 from ..text import visible
 from .options import REPORT, SUCCESS, known
 
@@ -125,8 +125,16 @@ def _table(folder: Path, name: str) -> "Table":
 
 
 def _list_tables(folder: Path) -> int:
-    for table in _tables(folder):
-        print(f"{table.name}: {table.title} ({len(table.rows)} × {len(table.columns)})")
+    from ..presentation.tables.columns import text
+    from ..presentation.tables.table import Column, Table, cells
+
+    columns = (
+        text("table", lambda table: table.name),
+        text("title", lambda table: table.title),
+        Column("rows", read=lambda table: len(table.rows)),
+        Column("columns", read=lambda table: len(table.columns)),
+    )
+    print_lines(Table("tables", "", columns, cells(columns, _tables(folder))))
     return SUCCESS
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..harness.metrics import chance_of_pairs
+from ..presentation.tables.table import words
 from .quantities import SOLVED, ended_by_clock, is_answer, is_cut_by_clock, same_bits, worse_sign
 from .rows import Pair, Row, RowKey, Verdict
 
@@ -81,7 +82,9 @@ def _compared(key: RowKey, name: str, pair: Pair) -> Row:
     before, after = (np.asarray(values[differs], dtype=float) for values in (old, new))
     sign = worse_sign(key[0], name)
     worse = int(np.sum(_is_worse(before, after, sign)))
-    why = f"{before[0].item()!r}, now {after[0].item()!r}"
+    first = before[0].item(), after[0].item()
+    texts = list(map(words, first))
+    why = ", now ".join(map(repr, first) if texts[0] == texts[1] else texts)
     if old.size > 1:
         why += f" ({len(before)} of {old.size} differ" + (f", {worse} worse)" if sign else ")")
     verdict = _verdict(sign, worse, len(before))

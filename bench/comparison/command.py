@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..help_text import block
+from ..terminal import print_aligned, width
 
 if TYPE_CHECKING:
     from .compare import Comparison
@@ -68,7 +69,7 @@ def compare(
     else:
         raise ValueError(f"compare: expected OLD and NEW, or --rerun REV, got {len(two)} folders")
     stopped = stops_at(made.rows, limit)
-    print("\n".join(output.summary(made, stopped)))
+    print("\n".join(output.summary(made, stopped, width())))
     if markdown:
         from ..presentation.tables import table as tables
 
@@ -129,8 +130,7 @@ def history(
         raise ValueError(f"--output: expected a file that ends with .svg, got {output}")
     runs = past.read_runs(folders)
     made = past.courses(runs, quantity, only or [])
-    print(f"{quantity}, {len(runs)} runs: {', '.join(run.name for run in runs)}")
-    print("\n".join(past.lines(made)))
+    print_aligned(past.table(runs, made, quantity))
     if output:
         _write(output, past.draw(runs, made, quantity))
     return SUCCESS

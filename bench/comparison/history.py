@@ -1,4 +1,4 @@
-"""A quantity over many runs: a line of blocks on a terminal, and a figure."""
+"""A quantity over many runs: a table with lines of blocks, and a figure."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -8,13 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..harness.record import Record, RecordFile
-from ..text import shortened, visible
-from .rows import RowKey, by_row
+from ..presentation.results import plain
+from ..presentation.tables.columns import text
+from ..presentation.tables.table import Column, Table, cells
+from ..text import visible
+from .rows import Row, RowKey, Verdict, by_row, distinguishing
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 # Rows on a terminal; curves of a figure that are labelled, the others are grey.
 LINES, LABELLED = 20, 6
-WIDTH = 70
 
 
 class Run(NamedTuple):
@@ -28,13 +30,25 @@ class Run(NamedTuple):
 class Course(NamedTuple):
     """The medians of a quantity of a row over runs, NaN where it was not measured."""
 
-    title: str
+    problem: str
+    solver: str
+    settings: str
     values: np.ndarray
+
+    @property
+    def title(self) -> str:
+        """Problem, solver, and what tells the row from others of theirs."""
+        return ", ".join(filter(None, (self.problem, self.solver, self.settings)))
+
+    @property
+    def finite(self) -> np.ndarray:
+        """The values that are numbers."""
+        return self.values[np.isfinite(self.values)]
 
     @property
     def change(self) -> float:
         """The last value over the first, as a logarithm; 0 if there is but one."""
-        known = self.values[np.isfinite(self.values) & (self.values > 0)]
+        known = self.finite[self.finite > 0]
         return math.log(known[-1] / known[0]) if len(known) > 1 else 0.0
 
 
@@ -48,7 +62,7 @@ def read_runs(folders: Iterable[Path]) -> list[Run]:
 
 
 def _read(folder: Path) -> Run:
-    records = RecordFile(folder).read().records
+    records = [plain(record) for record in RecordFile(folder).read().records]
     if not records:
         raise ValueError(f"no records in {folder}: run `plumbob bench` first")
     newest = max(records, key=lambda record: record.when)
@@ -65,7 +79,8 @@ def courses(runs: Sequence[Run], quantity: str, words: Sequence[str] = ()) -> li
         ValueError: if no row has it; the message lists what rows have.
     """
     keys = list(dict.fromkeys(key for run in runs for key in run.rows if _is_meant(key, words)))
-    found = [_course(runs, key, quantity) for key in keys]
+    settings = distinguishing(Row(key, quantity, Verdict.SAME) for key in keys)
+    found = [_course(runs, key, quantity, settings[key]) for key in keys]
     known = [course for course in found if np.isfinite(course.values).any()]
     if not known:
         names = {n for run in runs for key in keys if key in run.rows for n in run.rows[key].arrays}
@@ -80,9 +95,9 @@ def _is_meant(key: RowKey, words: Sequence[str]) -> bool:
     return not words or any(word in part for word in words for part in key[1:3])
 
 
-def _course(runs: Sequence[Run], key: RowKey, quantity: str) -> Course:
+def _course(runs: Sequence[Run], key: RowKey, quantity: str, settings: str) -> Course:
     values = [_median(run.rows.get(key), quantity) for run in runs]
-    return Course(", ".join(key[1:3]), np.array(values))
+    return Course(*key[1:3], settings, np.array(values))
 
 
 def _median(record: Record | None, quantity: str) -> float:
@@ -91,28 +106,30 @@ def _median(record: Record | None, quantity: str) -> float:
 
 
 def sparkline(values: np.ndarray) -> str:
-    """Return a block for each value, the least lowest and a space for none."""
+    """Return a block for each value, the least lowest and a dot for none."""
     known = values[np.isfinite(values)]
     low, high = (known.min(), known.max()) if len(known) else (0.0, 0.0)
     span = (high - low) or 1.0
     return "".join(
-        BLOCKS[int((value - low) / span * (len(BLOCKS) - 1) + 0.5)] if np.isfinite(value) else " "
+        BLOCKS[int((value - low) / span * (len(BLOCKS) - 1) + 0.5)] if np.isfinite(value) else "·"
         for value in values
     )
 
 
-def lines(made: Sequence[Course]) -> list[str]:
-    """Return a line for each of the courses that changed most."""
-    told = [
-        f"{sparkline(course.values)}  {_ends(course)}  {shortened(visible(course.title), WIDTH)}"
-        for course in made[:LINES]
-    ]
-    return told + ([f"and {len(made) - LINES} more"] if len(made) > LINES else [])
-
-
-def _ends(course: Course) -> str:
-    known = course.values[np.isfinite(course.values)]
-    return f"{known[0]:9.3g} → {known[-1]:<9.3g} × {math.exp(course.change):<6.3g}"
+def table(runs: Sequence[Run], courses: Sequence[Course], quantity: str) -> Table:
+    """Return a row for each of the courses that changed most."""
+    columns = (
+        text("problem", lambda course: course.problem),
+        text("solver", lambda course: course.solver),
+        text("settings", lambda course: course.settings),
+        Column("first", read=lambda course: course.finite[0]),
+        Column("last", read=lambda course: course.finite[-1]),
+        Column("ratio", read=lambda course: math.exp(course.change)),
+        text("course", lambda course: sparkline(course.values)),
+    )
+    more = f"; {len(courses) - LINES} more rows changed less" if len(courses) > LINES else ""
+    title = f"{quantity}, {len(runs)} runs: {', '.join(run.name for run in runs)}{more}"
+    return Table("history", title, columns, cells(columns, courses[:LINES]))
 
 
 def draw(runs: Sequence[Run], made: Sequence[Course], quantity: str) -> str:

@@ -3,16 +3,18 @@
 import json
 from collections import Counter
 from collections.abc import Sequence
+from textwrap import wrap
 
-from ..presentation.tables.table import Column, Summary, Table
-from ..text import shortened, visible
+from ..presentation.tables.columns import text
+from ..presentation.tables.table import Summary, Table, cells
+from ..text import visible
 from .compare import Comparison
 from .rows import ORDER, Row, Verdict, distinguishing
 
 # Lines of the summary on a terminal, its rows among them; rows of the table in a pull request.
 LINES, MOST = 10, 50
-_HEADINGS = ("verdict", "problem", "solver", "settings", "quantity", "what")
-WIDTH = 160
+# What stands before the further lines of a row on a terminal, as wide as its verdict.
+_INDENT = " " * (3 + max(map(len, ORDER)))
 
 
 def headline(comparison: Comparison, stopped: Sequence[Row]) -> str:
@@ -29,24 +31,27 @@ def counts(comparison: Comparison) -> str:
     return ", ".join(f"{found[verdict]} {verdict}" for verdict in ORDER if found[verdict])
 
 
-def summary(comparison: Comparison, stopped: Sequence[Row]) -> list[str]:
-    """Return at most ten lines, the worst rows first."""
-    told = [row for row in comparison.rows if row.verdict != Verdict.SAME]
-    room = LINES - 3
-    shown = told if len(told) <= room else told[: room - 1]
+def summary(comparison: Comparison, stopped: Sequence[Row], width: int) -> list[str]:
+    """Return ten lines of at most so many letters, the worst rows first, as many as fit."""
+    changed = [row for row in comparison.rows if row.verdict != Verdict.SAME]
     names = distinguishing(comparison.rows)
-    lines = [shortened(_line(row, names[row.key]), WIDTH) for row in shown]
-    if len(shown) < len(told):
-        lines.append(f"  and {len(told) - len(shown)} more: --markdown FILE or --json FILE has all")
+    begin = [headline(comparison, stopped), counts(comparison) or "no rows in common"]
     drift = f"the machine's drift: {comparison.drift.sentence}"
-    if any(row.verdict == Verdict.UNDECIDED for row in told) and not comparison.is_rerun:
+    if any(row.verdict == Verdict.UNDECIDED for row in changed) and not comparison.is_rerun:
         drift += "; --rerun REV decides"
-    return [headline(comparison, stopped), counts(comparison) or "no rows in common", *lines, drift]
+    for count in range(min(LINES, len(changed)), -1, -1):
+        more = f"  and {len(changed) - count} more: --markdown FILE or --json FILE has all"
+        rows = [_line(row, names[row.key]) for row in changed[:count]]
+        texts = [*begin, *rows, *([more] if count < len(changed) else []), drift]
+        lines = [line for text in texts for line in wrap(text, width, subsequent_indent=_INDENT)]
+        if len(lines) <= LINES:
+            break
+    return lines
 
 
 def _line(row: Row, settings: str) -> str:
     what = f"{row.title} ({settings})" if settings else row.title
-    return f"  {row.verdict:<11}" + visible(f"{what}: {row.why}")
+    return f"  {row.verdict:<{len(_INDENT) - 2}}" + visible(f"{what}: {row.why}")
 
 
 def table(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) -> Table:
@@ -54,14 +59,19 @@ def table(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) ->
     told = [row for row in comparison.rows if row.verdict != Verdict.SAME]
     names = distinguishing(comparison.rows)
     points = [f"{_rows(len(told) - MOST)} more are in the JSON"] if len(told) > MOST else []
+    columns = (
+        text("verdict", lambda row: str(row.verdict)),
+        text("problem", lambda row: row.key[1]),
+        text("solver", lambda row: row.key[2]),
+        text("settings", lambda row: names[row.key]),
+        text("quantity", lambda row: row.quantity),
+        text("change", lambda row: row.why),
+    )
     return Table(
         "compare",
         f"plumbob compare: {headline(comparison, stopped)}",
-        tuple(Column(heading, words=True) for heading in _HEADINGS),
-        tuple(
-            (str(row.verdict), *row.key[1:3], names[row.key], row.quantity, row.why)
-            for row in told[:MOST]
-        ),
+        columns,
+        cells(columns, told[:MOST]),
         shows=f"{old} beside {new}.",
         measured=f"{comparison.how} The machine's drift: {comparison.drift.sentence}.",
         summary=Summary(counts(comparison) or "No rows in common", tuple(points)),

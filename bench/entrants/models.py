@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from reference import Articulation, MassSpring, Skeleton, State, forward_kinematics, rotation
-from reference.arguments import FloatArray, IndexArray
+from reference.arguments import FloatArray, IndexArray, name_list
 from reference.formats import bvh, mjcf, read_obj, urdf
 
 from ..experiments.chain.problem import TargetsForSkeleton, random_rotations
@@ -46,7 +46,7 @@ def _effector(skeleton: Skeleton, names: tuple[str, ...], effector: str | None) 
     """Return a joint by name, else the leaf with the most joints before it."""
     if effector is not None:
         if effector not in names:
-            raise ValueError(f"effector: expected one of {', '.join(names[:20])}, got {effector!r}")
+            raise ValueError(f"effector: expected one of {name_list(names[:20])}, got {effector!r}")
         return names.index(effector)
     leaves = set(range(len(names))) - set(skeleton.parents.tolist())
     return max(sorted(leaves), key=lambda leaf: len(skeleton.path(leaf)))

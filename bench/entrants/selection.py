@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from reference.arguments import name_list
+
 from ..experiments import SCALES, blocks
 from ..experiments.published import TOOLBOX, TRAC_IK
 from ..experiments.robots import REACHABLE, UNREACHABLE
@@ -67,10 +69,10 @@ def choose(suites: Sequence[str], name: str, scale: Scale, wanted: Wanted) -> Ch
     problems += _meant("robot", wanted.robots, _names_of(there, _robot_names))
     choice = Choice(name, scale, tuple(solvers), tuple(problems), is_partial=True)
     if not any(map(choice.takes, there)):
-        asked = " and ".join(filter(None, map(", ".join, (wanted.problems, wanted.robots))))
+        asked = " and ".join(filter(None, map(name_list, (wanted.problems, wanted.robots))))
         raise ValueError(
             f"solver: expected one that is asked {asked or 'something'} in {', '.join(suites)}, "
-            f"got {', '.join(wanted.solvers)}; `plumbob bench {suites[0]} --list` lists all"
+            f"got {name_list(wanted.solvers)}; `plumbob bench {suites[0]} --list` lists all"
         )
     return choice
 
@@ -124,4 +126,4 @@ def _hint(word: str, simple: dict[str, str]) -> str:
         return f"did you mean {simple[near[0]]!r}?"
     listed = sorted(set(simple.values()))
     more = f" and {len(listed) - _LISTED} more; see --list" if len(listed) > _LISTED else ""
-    return f"expected one of {', '.join(listed[:_LISTED])}{more}" if listed else "there is none"
+    return f"expected one of {name_list(listed[:_LISTED])}{more}" if listed else "there is none"

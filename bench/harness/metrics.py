@@ -164,7 +164,7 @@ def ranking(scores: Mapping[str, Floats]) -> Ranking:
     lot (Fisher 1935, section 21). For truth values that is McNemar's exact test (1947). Of several
     rivals the chances are raised by Holm (1979).
     """
-    order = sorted(scores, key=lambda name: -float(np.mean(scores[name])))
+    order = sorted(scores, key=lambda name: -mean(scores[name]))
     if not order:
         return Ranking((), ())
     first, *rivals = order

@@ -20,7 +20,7 @@ from ..experiments.timing.tables import median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..peers import registry
-from .results import Results, by_problem, listed
+from .results import Results, by_problem, counted, listed
 from .tables.table import words
 
 # So near to the converged step a solver has solved it.
@@ -181,8 +181,8 @@ def _fastest(results: Results) -> Headline | None:
     ranking = next(iter(rows.values())).time
     first, second = (rows[solver].penalised + SHIFT for solver in ranking.order[:2])
     ratio = metrics.paired_ratio(second, first)
-    interval = f"({words(ratio.low)}–{words(ratio.high)})"
-    detail = f"{words(ratio.mean)} × {ranking.order[1]} {interval}, {words(ratio.pairs)} poses"
+    interval = f" ({words(ratio.low)}–{words(ratio.high)})" if ratio.pairs > 1 else ""
+    detail = f"{words(ratio.mean)} × {ranking.order[1]}{interval}, {counted(ratio.pairs, 'pose')}"
     return Headline(
         "kinematics", "Fastest, misses penalised", _tied(ranking.first), detail, OVERALL
     )
@@ -192,7 +192,7 @@ def _tied(names: Sequence[str]) -> str:
     """Return who leads: one name, or those that tie."""
     if len(names) <= 1:
         return "".join(names)
-    return f"Tie: {', '.join(names) if len(names) <= MOST_NAMED else f'{len(names)} solvers'}"
+    return f"Tie: {listed(names) if len(names) <= MOST_NAMED else f'{len(names)} solvers'}"
 
 
 # The median of what each work takes each solver [s].

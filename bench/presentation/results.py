@@ -113,8 +113,9 @@ def settings(records: Iterable[Record], name: str) -> str:
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:
-    """Return names as a list in a sentence: "a, b and c"."""
-    return f" {last} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+    """Return names as a list in a sentence: "a, b and c", or "a, 1; b, 2 and c"."""
+    comma = "; " if any(", " in name for name in names) else ", "
+    return f" {last} ".join(filter(None, [comma.join(names[:-1]), *names[-1:]]))
 
 
 def counted(count: int, name: str) -> str:

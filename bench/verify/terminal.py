@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from crosscheck.conformance.judgement import CaseJudgement, Report, TaskReport
 from crosscheck.conformance.sentence import Sentence, sentence
 
+from ..presentation.tables.aligned import aligned
+from ..presentation.tables.columns import text
+from ..presentation.tables.table import Column, Table, cells
 from ..text import visible
 from . import comparison, saved
 from .words import (
@@ -26,7 +29,6 @@ from .words import (
 WIDTH, HEIGHT = 80, 24
 # Lines that the sentences about one task, and about its smallest failing case, may take.
 _WHY, _COMPLAINT = 6, 3
-_DASH = "–"
 # What a line may be broken between: words, and letters of scripts that are written without spaces.
 _PIECE = re.compile(
     r"[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]|[^\s\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]+|\s+"
@@ -57,32 +59,15 @@ def lines(report: Report, context: Presentation) -> list[str]:
 
 def _table(tasks: Sequence[TaskReport], say: Say) -> list[str]:
     """Return a line a task, below a heading."""
-    rows = [
-        [say(one) for one in (
-            sentence("task"), sentence("verdict"), sentence("digits"), sentence("cases passed"),
-            sentence("beside the reference"),
-        )],
-        *(_row(task, say) for task in tasks),
-    ]  # fmt: skip
-    widths = [max(map(width, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            _aligned(cell, size, right=i in (2, 3))
-            for i, (cell, size) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
-
-
-def _row(task: TaskReport, say: Say) -> list[str]:
-    pace = speed(task)
-    return [
-        title(task)[:34],
-        say(VERDICTS[task.verdict]),
-        _DASH if task.digits is None else f"{task.digits:.1f}",
-        f"{passed(task)}/{len(task.judgements)}",
-        _DASH if pace is None else say(pace),
-    ]
+    columns = (
+        text(say(sentence("task")), title),
+        text(say(sentence("verdict")), lambda task: say(VERDICTS[task.verdict])),
+        Column(say(sentence("digits")), read=lambda t: t.digits and f"{t.digits:.1f}"),
+        Column(say(sentence("cases passed")), read=lambda t: f"{passed(t)}/{len(t.judgements)}"),
+        text(say(sentence("beside the reference")), lambda t: (pace := speed(t)) and say(pace)),
+    )
+    made = aligned(Table("tasks", "", columns, cells(columns, tasks)), WIDTH)
+    return ["".join(span.text for span in line).rstrip() for line in made.lines]
 
 
 def _reservations(task: TaskReport) -> list[Sentence]:

@@ -348,6 +348,12 @@ def fell(solver, stiffness=1e3, **changed):
     return record("cloth", f"peers/motion/k{stiffness:g}", solver, settings, arrays, facts=facts)
 
 
+def missing_engine(package):
+    """A cloth engine that is not installed."""
+    facts = {"task": "missing"}
+    return record("cloth", "peers/all", package, notes={"remark": "not here"}, facts=facts)
+
+
 def needed(solver, counts, tried=100):
     """Iterations to each power of ten."""
     settings = {"size": 20, "stiffness": 1e3, "frame": 1 / 60}
@@ -392,6 +398,7 @@ def make():
         stepping=stepping,
         certified=certified,
         raced=raced,
+        reached=reached,
         lacking=lacking,
         republished=republished,
         worked=worked,
@@ -443,6 +450,7 @@ def records():
         read_by_a_peer("PyBullet"),
         *(worked(solver) for solver in ("Plumbob Newton", "MuJoCo Euler")),
         fell("Plumbob Newton"),
+        missing_engine("pybullet"),
         needed("newton", [1, 2, 3, 4, 5, 6, 7, np.nan]),
         bounded("MuJoCo Euler", 0.02),
         as_liu("local_global", 0.03),

@@ -426,6 +426,9 @@ def test_the_door_is_closed_after_the_greeting(folder, monkeypatch):
         (["--solver", "levenberg"], "did you mean 'levenberg_marquardt'?"),
         (["--problem", "chain/naer"], "did you mean 'chain/near'?"),
         (["--robot", "ur6"], "did you mean 'ur5'?"),
+        (["--solver", "qqq"], "expected one of 'DART', 'DART, 20 restarts', 'Drake', 'Drake, I"),
+        (["--problem", "qqq"], "'PR2, right arm', 'UR5', 'chain', 'chain, beyond', 'chain, ed"),
+        (["--robot", "qqq"], "expected one of character, iiwa14, panda"),
         (["--targets", "0"], "targets: expected 1 or more, got 0"),
         (
             ["--solver", "ccd", "--robot", "ur5"],

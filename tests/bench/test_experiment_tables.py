@@ -24,7 +24,7 @@ from bench.experiments.robots import tables as robots
 from bench.experiments.timing import tables as timing
 from bench.presentation.results import Results, label
 from bench.presentation.sections import SECTIONS, tables
-from bench.presentation.tables.table import Share, comma_separated, markdown
+from bench.presentation.tables.table import Share, comma_separated, markdown, words
 from bench.presentation.tables.tex_text import escaped
 
 
@@ -115,6 +115,45 @@ def test_chains_are_counted_as_straight_only_if_they_are(make):
     ccd, fabrik = table.summary.points
     assert ccd.startswith("CCD: 1/2 = 50 % (9.5–90.5); at worst 25.0 % of the reach")
     assert fabrik.startswith("FABRIK: 2/2 = 100 % (34.2–100);")
+
+
+def unanswered(record, *names, count=1):
+    """A record whose last targets have no answer: infinitely far, as entrants are scored."""
+    far = {name: np.array([*record.arrays[name][:-count], *[math.inf] * count]) for name in names}
+    return replace(record, arrays={**record.arrays, **far})
+
+
+def test_targets_without_an_answer_are_said_to_have_none(make):
+    """Nobody reads that a target is missed by an infinite distance."""
+    beyond = [
+        unanswered(make.beyond(solver, 0.004), "residual", "bend", "excess", count=count)
+        for solver, count in (("ccd", 1), ("mine", 2))
+    ]
+    none = [math.nan] * 4
+    others = [
+        unanswered(make.reached("near", "mine"), "residual"),
+        make.worked("Plumbob Newton", error=(math.inf, math.inf)),
+        *(
+            make.raced(solver, "one start", solved=[False] * 4, position=none, rotation=none)
+            for solver in ("Plumbob LM", "mine")
+        ),
+    ]
+    made = {table.name: table for table in tables(Results([*beyond, *others]))}
+    q1 = made["q1_beyond_reach"]
+    assert q1.summary.points == (
+        "CCD: 1/2 = 50 % (9.5–90.5); at worst 0 % of the reach off the line, 0 m above "
+        "distance − reach, 1 iteration; no answer to 1 target",
+        "mine: 0/2 = 0 % (0–65.8); no answer to 2 targets",
+    )
+    assert list(map(words, column(q1, "off the line, largest [m]"))) == ["no answer"] * 2
+    assert list(map(words, column(made["accuracy"], "residual, largest [m]"))) == ["no answer"]
+    assert column(made["cloth_peers_step"], "least error") == ["diverged"]
+    profiles = made["robots_profile_one_start"]
+    assert {cell for row in profiles.rows for cell in row[2:]} == {None}
+    assert len(profiles.rows) == 2
+    for table in made.values():
+        text = markdown(table)
+        assert not re.search(r"\binf(inite)?\b|no answer [m%µ]|not a number", text), table.name
 
 
 def test_iterations_count_for_whoever_needs_fewer(records):

@@ -37,7 +37,7 @@ def test_the_most_accurate_leads_alone_only_where_chance_would_not_do_as_much(ma
     far = [raced(make, "a", 190), raced(make, "b", 100)]
     assert asked(far, "Most accurate")[2:4] == ("a", "solves 95 % of 200 poses (91–97.3)")
     near = [raced(make, "a", 190), raced(make, "b", 188), raced(make, "c", 20)]
-    assert asked(near, "Most accurate").answer == "Tie: a, b"
+    assert asked(near, "Most accurate").answer == "Tie: a and b"
     assert asked([*near, raced(make, "d", 189)], "Most accurate").answer == "Tie: 3 solvers"
 
 
@@ -127,7 +127,7 @@ def test_a_cloth_is_solved_by_who_arrives_and_first_by_its_engine(make):
         make.worked("MuJoCo Euler", error=(0.5, 0.4)),
     ]
     assert asked(records, "Most accurate", "cloth")[2:4] == (
-        "Tie: Plumbob Newton, Plumbob L-BFGS", "within 1e-6 on 1/1 cloths")  # fmt: skip
+        "Tie: Plumbob Newton and Plumbob L-BFGS", "within 1e-6 on 1/1 cloths")  # fmt: skip
     assert asked(records, "Fastest", "cloth").detail == "no rival arrives, 1/1 cloths"
     arrived = make.worked("MuJoCo discrete", error=(0.5, 1e-8), seconds=(1e-3, 8e-3))
     found = asked([*records, arrived], "Fastest", "cloth")

@@ -28,7 +28,7 @@ def runs(tmp_path, monkeypatch, make):
 
 def test_a_sparkline_has_a_block_a_value():
     assert sparkline(np.arange(8.0)) == BLOCKS
-    assert sparkline(np.array([1.0, np.nan, 2.0])) == f"{BLOCKS[0]} {BLOCKS[-1]}"
+    assert sparkline(np.array([1.0, np.nan, 2.0])) == f"{BLOCKS[0]}·{BLOCKS[-1]}"
     assert sparkline(np.array([5.0, 5.0])) == BLOCKS[0] * 2
 
 
@@ -46,10 +46,9 @@ def test_runs_come_in_the_order_of_time_and_the_greatest_change_first(runs):
 def test_the_command_prints_sparklines_and_draws(capsys, runs, tmp_path):
     folders = [run.name for run in runs]
     assert cli.run_command(["history", *folders, "--only", "s", "-o", "h.svg"]) == 0
-    out = capsys.readouterr().out.splitlines()
-    assert out[0].startswith("seconds, 4 runs: run0 0000000, run1")
-    assert out[1].split()[0] == sparkline(np.arange(4.0))
-    assert "2e-06 → 4e-06" in out[1]
+    _, title, _, first, *_ = capsys.readouterr().out.splitlines()
+    assert title.startswith("seconds, 4 runs: run0 0000000, run1")
+    assert first.split()[-5:] == ["s3", "2.0e-6", "4.0e-6", "2.00", sparkline(np.arange(4.0))]
     svg = (tmp_path / "h.svg").read_text()
     assert svg.count("<svg") == 1
     assert "run3 3333333" in svg

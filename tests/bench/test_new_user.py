@@ -151,7 +151,8 @@ def test_a_peer_that_is_missing_is_listed_as_such(folder, monkeypatch):
     assert line.endswith("  not installed")
 
 
-def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder):
+def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
     lines = listed()
     headings = [line.partition(":")[0] for line in lines if line and line[0] != " "]
     assert headings[: len(SUITES)] == list(SUITES)

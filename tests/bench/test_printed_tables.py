@@ -1,27 +1,282 @@
-"""What `plumbob bench SUITE` prints: the tables that its records make, and no others."""
+"""What commands print is what the data say: tables are read back, at any width and in a pipe."""
 
-from bench import terminal
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import printed_table
+import pytest
+
+from bench import cli, terminal
+from bench.comparison.history import sparkline
 from bench.harness.record import RecordFile
+from bench.presentation import sections
+from bench.presentation.results import Results, plain
+from bench.presentation.tables.table import is_blank, without_empty, words
+from bench.verify import terminal as verify_terminal
+from crosscheck.claims import CLAIMS
+from crosscheck.conformance.judgement import Verdict as TaskVerdict
+from crosscheck.verdict import Verdict
+
+# Of a terminal; None is a pipe.
+WIDTHS = (80, 120, 200, None)
 
 
-def test_the_tables_of_the_suites_asked_for_are_printed(capsys, tmp_path, records):
+@pytest.fixture(params=WIDTHS, ids=["80", "120", "200", "pipe"])
+def width(request, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    if request.param:
+        monkeypatch.setenv("COLUMNS", str(request.param))
+    return request.param
+
+
+def plumbob(capsys, *arguments):
+    code = cli.run_command(list(arguments))
+    out, err = capsys.readouterr()
+    assert err == ""
+    return code, out
+
+
+def assert_printed(lines, headings, rows, width):
+    """The printed columns hold the headings and cells of the data, letter by letter, in order.
+
+    In a pipe each row is one line. On a terminal columns may be missing, in the order of the data.
+    """
+    data = {
+        letters(h, *cells): i for i, (h, *cells) in enumerate(zip(headings, *rows, strict=True))
+    }
+    printed = [letters(*column) for column in printed_table.columns(lines)]
+    assert set(printed) <= set(data)
+    places = [data[column] for column in printed]
+    assert places == sorted(places)
+    if width is None:
+        assert printed_table.rows(lines) == [list(headings), *map(list, rows)]
+    else:
+        assert max(map(len, lines)) <= width
+    return [headings[i] for i in places]
+
+
+letters = printed_table.letters
+
+
+def assert_table_printed(out, table, width):
+    """A whole table is printed below what it says; return the headings that stand there."""
+    shown = without_empty(table)
+    unfolded = [j for j, c in enumerate(shown.columns) if width or not c.folded or not j]
+    headings = [shown.columns[j].heading for j in unfolded]
+    rows = [[words(row[j]) for j in unfolded] for row in shown.rows]
+    about = (table.title, table.summary.sentence, *table.summary.points)
+    return assert_printed(printed_table.below(out, about), headings, rows, width)
+
+
+@pytest.fixture
+def verdicts(monkeypatch):
+    """Verdicts of all claims, no two numbers of a row alike; two are missed."""
+    failures = {3: "nothing moved", 8: "not a number"}
+    made = [
+        Verdict(claim, 3 + i, claim.tolerance.value / (2 + 3 * i), 1.0, failures.get(i, ""))
+        for i, claim in enumerate(CLAIMS.values())
+    ]
+    made[8] = replace(made[8], difference=float("nan"))
+    monkeypatch.setattr("crosscheck.claims.run_claims", lambda *_: made)
+    return made
+
+
+def test_check_prints_each_verdict_under_its_heading(capsys, verdicts, width):
+    code, out = plumbob(capsys, "check")
+    headings = ["claim", "verdict", "cases", "largest difference", "tolerance"]
+    headings += ["tolerance used [%]"]
+    rows = [
+        [
+            v.claim.name, "MISSED" if v.failure else "held", str(v.cases), words(v.difference),
+            words(v.claim.tolerance.value), words(100 * v.difference / v.claim.tolerance.value),
+        ]
+        for v in verdicts
+    ]  # fmt: skip
+    assert assert_printed(printed_table.below(out, ()), headings, rows, width) == headings
+    assert code == 1
+    assert out.splitlines()[-3:] == [
+        "MISSED: IK answers, Pinocchio (nothing moved)",
+        "MISSED: spring forces (not a number)",
+        f"{len(verdicts) - 2} of {len(verdicts)} claims held",
+    ]
+
+
+def test_every_table_of_a_suite_is_printed_as_it_is(capsys, tmp_path, records, width):
+    RecordFile(tmp_path).append(records)
+    every = sections.tables(Results([plain(record) for record in records]))
+    terminal.print_tables([record.suite for record in records], tmp_path)
+    out = capsys.readouterr().out
+    for table in every:
+        if not is_blank(table):
+            shown = assert_table_printed(out, table, width)
+            left = [c.heading for c in without_empty(table).columns if c.heading not in shown]
+            assert all(letters(heading) in letters(out) for heading in left)
+    assert not re.search(r"\\[_*<|]", out)
+
+
+def test_the_tables_of_other_suites_are_not_printed(capsys, tmp_path, records):
     RecordFile(tmp_path).append(records)
     terminal.print_tables(["ik"], tmp_path)
     out = capsys.readouterr().out
     assert "Robots, restarts: success, time and accuracy" in out
-    assert "Plumbob LM" in out
-    assert "2/4 = 50 %" in out
     assert "Claims held" not in out
-
-
-def test_brackets_are_units_and_no_markup(capsys, tmp_path, records):
-    RecordFile(tmp_path).append(records)
-    terminal.print_tables(["check"], tmp_path)
-    terminal.print_tables(["timing"], tmp_path)
-    assert "[ns]" in capsys.readouterr().out
 
 
 def test_tables_without_rows_are_not_printed(capsys, tmp_path):
     RecordFile(tmp_path).append([])
     terminal.print_tables(["ik"], tmp_path)
     assert capsys.readouterr().out == ""
+
+
+def test_records_are_listed_as_counted(capsys, tmp_path, monkeypatch, make, width):
+    monkeypatch.chdir(tmp_path)
+    stamp = {"machine": {"processor": "abacus", "cores": 2, "memory_gib": None, "system": "x86_64"}}
+    made = [make.drawn(solver, warm, 1.0) for solver in ("my_ik", "ccd") for warm in (True, False)]
+    made = [replace(record, stamp=stamp, conditions={"commit": "a" * 40}) for record in made]
+    made[0] = replace(made[0], notes={"failed": "no"}, arrays={}, conditions={})
+    RecordFile(tmp_path / "report").append(made)
+    code, out = plumbob(capsys, "records", "list")
+    about = ("Records in report", "4 records, measured on abacus, 2 cores, x86_64")
+    headings = ["suite", "solver", "records", "failed", "superseded", "latest", "commits"]
+    rows = [["arm", "my_ik", "2", "1", "0"], ["arm", "ccd", "2", "0", "0"]]
+    rows = [[*row, made[0].when, "aaaaaaa"] for row in rows]
+    shown = assert_printed(printed_table.below(out, about), headings, rows, width)
+    assert code == 0
+    assert set(headings) - set(shown) <= {"commits"}
+
+
+def test_files_are_listed_with_what_each_engine_reads(capsys, tmp_path, monkeypatch, width):
+    from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF
+    from crosscheck.robots import files
+
+    def checked(name, kind, *readings):
+        file = files.File(tmp_path / "robots" / name, kind, tmp_path / "robots")
+        return files.Checked(file, tuple(files.Reading(*reading) for reading in readings))
+
+    every = [
+        checked("my_arm.urdf", URDF, ("MuJoCo", files.AGREES, 2e-16), ("Pinocchio", files.UNREAD)),
+        checked("b.xml", MJCF, ("Pinocchio", files.DIFFERS, 0.5), ("MuJoCo", files.AGREES, 3e-15)),
+        checked("walk.bvh", BVH, ("second reader", files.AGREES, 4e-14)),
+        checked("part.xml", FRAGMENT),
+    ]
+    found = files.Found(tuple(one.file for one in every), 1)
+    monkeypatch.setattr(files, "find", lambda paths: found)
+    monkeypatch.setattr(files, "check", lambda given: every)
+    code, out = plumbob(capsys, "check", "--files", "robots")
+    assert code == 1
+    headings = ["file", "format", "Pinocchio", "MuJoCo", "second reader"]
+    rows = [
+        ["robots/my_arm.urdf", "URDF", "not read", "agrees (2.0e-16)", "–"],
+        ["robots/b.xml", "MJCF", "differs (0.500)", "agrees (3.0e-15)", "–"],
+        ["robots/walk.bvh", "BVH", "–", "–", "agrees (4.0e-14)"],
+    ]
+    about = (re.search(r"^Files\n(.*\n)*?(?=file +format)", out, re.MULTILINE)[0],)
+    assert assert_printed(printed_table.below(out, about), headings, rows, width) == headings
+    about = "Of 3 files 1 reading disagrees; 1 is a part that others include, 1 XML file is of "
+    headings = ["format", "beside", "files", "agrees", "differs", "not read", "agrees within"]
+    rows = [
+        ["URDF", "Pinocchio", "1", "0", "0", "1", "–"],
+        ["URDF", "MuJoCo", "1", "1", "0", "0", "2.0e-16"],
+        ["MJCF", "Pinocchio", "1", "0", "1", "0", "–"],
+        ["MJCF", "MuJoCo", "1", "1", "0", "0", "3.0e-15"],
+        ["BVH", "second reader", "1", "1", "0", "0", "4.0e-14"],
+    ]
+    lines = printed_table.below(out, (about, "other kinds"))
+    assert assert_printed(lines, headings, rows, width) == headings
+
+
+def test_history_prints_the_first_and_the_last_value_of_each_row(
+    capsys, tmp_path, monkeypatch, make, width
+):
+    monkeypatch.chdir(tmp_path)
+    for day, factor in (("1", 1.0), ("2", 1.5), ("3", 4.0)):
+        records = [make.drawn("my_ik, 20 restarts", warm, 1.0) for warm in (False, True)]
+        records = [
+            replace(r, when=f"2000-01-0{day}T00:00:00+00:00", stamp={},
+                    arrays={"seconds": np.array([1e-5 * (1 + 9 * r.settings["warm"]) * factor])})
+            for r in records[: 2 if day != "2" else 1]
+        ]  # fmt: skip
+        RecordFile(tmp_path / f"run{day}").append(records)
+    code, out = plumbob(capsys, "history", "run1", "run2", "run3")
+    headings = ["problem", "solver", "settings", "first", "last", "ratio", "course"]
+    rows = [
+        ["arm/circle", "my_ik, 20 restarts", "warm false", "1.0e-5", "4.0e-5", "4.00"],
+        ["arm/circle", "my_ik, 20 restarts", "warm true", "1.0e-4", "4.0e-4", "4.00"],
+    ]
+    for row, values in zip(rows, ([1.0, 1.5, 4.0], [1.0, np.nan, 4.0]), strict=True):
+        row.append(sparkline(np.array(values)))
+    about = ("seconds, 3 runs: run1, run2, run3",)
+    assert assert_printed(printed_table.below(out, about), headings, rows, width) == headings
+    assert code == 0
+
+
+def test_compare_prints_whole_sentences_in_ten_lines(capsys, tmp_path, monkeypatch, make, width):
+    monkeypatch.chdir(tmp_path)
+    old = [make.drawn(f"solver {i}", False, 1.0) for i in range(12)]
+    number = 3e-4 * (1 + 1e-13)
+    new = [replace(r, arrays={**r.arrays, "residual": np.full(3, number)}) for r in old]
+    old = [replace(r, arrays={**r.arrays, "residual": np.full(3, 3e-4)}) for r in old]
+    RecordFile(tmp_path / "old").append(old)
+    RecordFile(tmp_path / "new").append(new)
+    code, out = plumbob(capsys, "compare", "old", "new")
+    lines = out.splitlines()
+    assert code == 0
+    assert len(lines) <= 10
+    assert width is None or max(map(len, lines)) <= width
+    assert "…" not in out
+    assert lines[:2] == ["12 rows worse", "12 LESS RIGHT"]
+    sentences = re.split(r"LESS RIGHT ", " ".join(" ".join(lines[2:]).split()))[1:]
+    more = 12 - len(sentences)
+    assert f"and {more} more: --markdown FILE or --json FILE has all" in sentences[-1]
+    solvers = [re.match(r"arm/circle, (solver \d+), residual: (.*?), now (\S+)", s).groups()
+               for s in sentences]  # fmt: skip
+    assert len({solver for solver, *_ in solvers}) == len(sentences) > 2
+    assert {pair[1:] for pair in solvers} == {("0.0003", "0.00030000000000002995")}
+
+
+def test_verify_prints_a_line_a_task_under_its_heading():
+    def task(name, verdict, digits, passed, total, slowdown):
+        judgements = [SimpleNamespace(verdict=TaskVerdict.RIGHT)] * passed
+        judgements += [SimpleNamespace(verdict=TaskVerdict.WRONG)] * (total - passed)
+        return SimpleNamespace(task=name, method="", verdict=verdict, digits=digits,
+                               judgements=judgements, slowdown=slowdown)  # fmt: skip
+
+    tasks = [
+        task("energy", TaskVerdict.RIGHT, 15.34, 28, 28, 19.0),
+        task("robot_inverse_kinematics", TaskVerdict.WRONG, None, 3, 7, None),
+    ]
+    lines = verify_terminal._table(tasks, str)
+    assert printed_table.rows(lines) == [
+        ["task", "verdict", "digits", "cases passed", "beside the reference"],
+        ["energy", "RIGHT", "15.3", "28/28", "19 x slower"],
+        ["robot_inverse_kinematics", "WRONG", "–", "3/7", "–"],
+    ]
+
+
+def test_the_list_of_tables_says_how_large_each_is(capsys, tmp_path, monkeypatch, records, width):
+    monkeypatch.chdir(tmp_path)
+    RecordFile(tmp_path / "report").append(records)
+    code, out = plumbob(capsys, "report", "--list")
+    tables = sections.tables(Results([plain(record) for record in records]))
+    headings = ["table", "title", "rows", "columns"]
+    rows = [[t.name, t.title, str(len(t.rows)), str(len(t.columns))] for t in tables]
+    assert assert_printed(out.splitlines(), headings, rows, width) == headings
+    assert code == 0
+
+
+def test_the_list_of_suites_cuts_no_name_and_counts_those_left_out(capsys, width):
+    out = plumbob(capsys, "bench", "--list")[1]
+    names = [claim.name for claim in CLAIMS.values()]
+    assert "…" not in out
+    assert width is None or all(len(line) <= width for line in out.splitlines() if line[0] == " ")
+    text = " ".join(out.split())
+    listed, more = re.search(r"52 problems: (.*?) and (\d+) more", text).groups()
+    assert listed.split("; ") == names[: len(names) - int(more)]
+
+
+def test_brackets_are_units_and_no_markup(capsys, tmp_path, records):
+    RecordFile(tmp_path).append(records)
+    terminal.print_tables(["timing"], tmp_path)
+    assert "[ns]" in capsys.readouterr().out

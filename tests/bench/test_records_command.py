@@ -1,5 +1,6 @@
 """Records are listed, merged and dropped, and by nothing else."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -39,7 +40,9 @@ def test_merged_records_are_the_later_ones_and_none_that_failed_before_one_that_
     code, out, err = plumbob(capsys, "merge", *order, "--into", "both")
     assert (code, err) == (0, "")
     assert out.startswith("4 added to both, 0 of them in place of earlier ones; 2 left")
-    assert "both now holds times of 2 machines: a <b>slide</b> rule, 1, 0.5, x; abacus" in out
+    assert (
+        "both now holds times of 2 machines: a <b>slide</b> rule, 1 core, 0.5 GiB, x; abacus" in out
+    )
     both = read("both")
     assert encode(both["a"]) == encode(read("desktop")["a"])
     assert encode(both["b"]) == encode(read("laptop")["b"])
@@ -53,8 +56,8 @@ def test_what_is_listed_is_counted_by_suite_and_solver(capsys, here):
     code, out, _ = plumbob(capsys, "list", "desktop")
     assert code == 0
     assert "3 records, measured on" in out
-    assert "| arm | b | 1 | 1 | 0 |" in out
-    assert "| arm | b |" not in plumbob(capsys, "list", "desktop", "--solver", "a")[1]
+    assert re.search(r"^arm +b +1 +1 +0 ", out, re.MULTILINE)
+    assert not re.search(r"^arm +b ", plumbob(capsys, "list", "desktop", "--solver", "a")[1], re.M)
 
 
 def test_only_what_fits_all_that_is_given_is_dropped(capsys, here):

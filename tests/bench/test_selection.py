@@ -3,6 +3,7 @@
 import csv
 import html.parser
 import io
+import itertools
 import re
 from dataclasses import replace
 
@@ -24,6 +25,7 @@ from bench.presentation.tables.table import (
     best_cells,
     comma_separated,
     markdown,
+    words,
 )
 
 COLUMNS = (
@@ -65,7 +67,7 @@ def test_columns_are_named_by_heading_title_or_number(text, numbers):
         ("solvr", "no column 'solvr': did you mean 'solver'?"),
         ("time, medina", "did you mean 'time, median"),
         ("solvd", "did you mean 'solved (95 % interval)'?"),
-        ("qqq", "expected one of robot; "),
+        ("qqq", "expected one of 'robot', 'solver', 'time, median [µs]', "),
         ("0", "numbers from 1 to 5, got 0"),
         ("2-9", "numbers from 1 to 5, got 2-9"),
         ("4-2", "numbers from 1 to 5, got 4-2"),
@@ -202,7 +204,7 @@ def test_the_list_names_every_table_and_its_columns(capsys, folder, records):
     code, out, _ = run(capsys, "--list")
     made = sections.tables(Results([plain(record) for record in records]))
     assert code == 0
-    assert [line.split(":")[0] for line in out.splitlines()] == [table.name for table in made]
+    assert [line.split()[0] for line in out.splitlines()] == ["table", *(t.name for t in made)]
     code, out, _ = run(capsys, "--table", "accuracy", "--list")
     assert out.splitlines()[0] == "1 problem"
     assert "greatest is best" in out
@@ -252,3 +254,52 @@ def test_misuse_exits_2_with_one_sentence(capsys, folder, arguments, sentence):
     assert (code, out) == (2, "")
     assert sentence in err
     assert err.count("\n") == 1
+
+
+def rows_of(form, text):
+    """The cells that an export holds below its headings; of LaTeX only its lines."""
+    if form == "csv":
+        return list(csv.reader(io.StringIO(text)))[1:]
+    if form == "html":
+        return Cells(text).rows[1:]
+    if form == "md":
+        lines = [line for line in text.splitlines() if line.startswith("| ")][2:]
+        plain = [re.sub(r"\\(.)", r"\1", line.replace("**", "")) for line in lines]
+        return [[cell.strip() for cell in line[1:-1].split(" |")] for line in plain]
+    return [line for line in text.splitlines() if line.endswith("\\\\")]
+
+
+def as_ascii(cell):
+    """A cell with powers of ten as "1.2e-5", as HTML does not write them."""
+    return re.sub(r"\s?·\s?10(−?\d+)", r"e\1", cell).replace("−", "-").replace("|", "")
+
+
+def chosen(capsys, table, form, **options):
+    """The rows of an export with these options, as they are printed."""
+    arguments = itertools.chain(*((f"--{name}", text) for name, text in options.items()))
+    code, out, err = run(capsys, "--table", table.name, "--format", form, *arguments)
+    assert (code, err) == (0, ""), (table.name, options)
+    return rows_of(form, out)
+
+
+@pytest.mark.parametrize("form", ["md", "tex", "csv", "html"])
+def test_every_table_can_be_exported_with_every_option(capsys, folder, records, monkeypatch, form):
+    """Those with rows of absent engines, too, about which nothing was measured."""
+    every = sections.tables(Results([plain(record) for record in records]))
+    monkeypatch.setattr("bench.commands.report._tables", lambda folder: every)
+    assert any(not source.suite for table in every for source in table.sources)
+    for table in every:
+        count = len(table.columns)
+        numbers = ",".join(str(j) for j in range(count, 0, -1))
+        whole = chosen(capsys, table, form, columns=numbers, sort="1")
+        assert len(whole) == len(table.rows) or form == "tex"
+        if not table.rows:
+            continue
+        name = words(table.rows[-1][0])
+        left = chosen(capsys, table, form, rows=f"1={name}", columns="1", sort=str(count))
+        wanted = [row for row in table.rows if words(row[0]) == name]
+        assert len(left) == len(wanted) or form == "tex"
+        if form in ("md", "html"):
+            assert {cell for row in left for cell in row} == {name}
+            last = [as_ascii(words(row[-1])) for row in table.rows]
+            assert sorted(as_ascii(row[0]) for row in whole) == sorted(last)

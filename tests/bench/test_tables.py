@@ -38,7 +38,7 @@ def table(*rows, columns=COLUMNS):
         (-4.4e-16, "-4.4e-16"),
         (2e9, "2.0e9"),
         (float("nan"), "not a number"),
-        (float("-inf"), "-infinite"),
+        (float("inf"), "no answer"),
         (12345, "12,345"),
         (True, "yes"),
         (None, "–"),

@@ -15,7 +15,6 @@ from ...presentation.tables.columns import (
     MEDIAN,
     P95,
     SOLVER,
-    largest,
     places,
     spread,
     spread_of,
@@ -59,14 +58,18 @@ def _beyond_summary(records: Sequence[Record]) -> Summary:
 
 def _straightness(records: Sequence[Record]) -> str:
     bends = _over_reach(records, "bend")
-    straight = metrics.share(bends <= STRAIGHT)
-    made = np.concatenate([columns.iterations_said(record) for record in records])
-    counts = counted(int(made.max()), "iteration") if made.size else "iterations unsaid"
+    straight, answered = words(metrics.share(bends <= STRAIGHT)), np.isfinite(bends)
+    unanswered = f"; no answer to {counted(int(np.sum(~answered)), 'target')}"
+    if not answered.any():
+        return f"{straight}{unanswered}"
+    iterations = np.concatenate([columns.iterations_said(record) for record in records])
+    excess = np.concatenate([record.arrays["excess"] for record in records])[answered]
     return (
-        f"{words(straight)}; at worst "
-        f"{words_in(metrics.spread(bends).largest, '%')} of the reach off the line, "
-        f"{words(largest(records, 'excess'))} m above distance − reach, "
-        f"{counts}"
+        f"{straight}; at worst "
+        f"{words_in(metrics.spread(bends[answered]).largest, '%')} of the reach off the line, "
+        f"{words(metrics.spread(excess).largest)} m above distance − reach, "
+        + (counted(int(iterations.max()), "iteration") if iterations.size else "iterations unsaid")
+        + unanswered * (not answered.all())
     )
 
 

@@ -1,6 +1,7 @@
 """What comes of files of anyone beside the engines, as tables and sentences."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +20,8 @@ from crosscheck.robots.files import (
     Reading,
 )
 
-from ...presentation.tables.table import Column, Summary, Table
+from ...presentation.tables.columns import text
+from ...presentation.tables.table import Column, Summary, Table, cells, words
 
 OUTCOMES = (AGREES, DIFFERS, DEVIATES, UNREAD, REFUSED, NEITHER, LOST)
 NAMES = tuple(dict.fromkeys(engine for engines in ENGINES.values() for engine in engines))
@@ -39,49 +41,60 @@ class Report(NamedTuple):
 
 def report(found: Found, checked: Sequence[Checked]) -> Report:
     """Return the tables of files that were checked."""
-    rows = [_row(one) for one in checked if one.file.kind != FRAGMENT]
-    files = Table(
-        "files",
-        "Files",
-        tuple(Column(name, words=True) for name in ("file", "format", *NAMES)),
-        tuple(rows),
-        shows=SHOWS,
-        summary=Summary("", tuple(point for one in checked for point in _points(one))),
+    asked = {reading.engine for one in checked for reading in one.readings}
+    columns = (
+        text("file", _name),
+        text("format", lambda one: one.file.kind),
+        *(text(engine, partial(_outcome, engine)) for engine in NAMES if engine in asked),
     )
+    whole = [one for one in checked if one.file.kind != FRAGMENT]
+    points = tuple(point for one in checked for point in _points(one))
+    files = Table("files", "Files", columns, cells(columns, whole), summary=Summary(SHOWS, points))
     return Report(files, *_summary(found, checked))
 
 
 def _summary(found: Found, checked: Sequence[Checked]) -> tuple[Table, int]:
     """Return a row for each kind and engine, of the outcomes that there are, and disagreements."""
-    readings: dict[tuple[str, str], list[Reading]] = {
+    groups: dict[tuple[str, str], list[Reading]] = {
         (kind, engine): [] for kind, engines in ENGINES.items() for engine in engines
     }
     for one in checked:
         for reading in one.readings:
-            readings[one.file.kind, reading.engine].append(reading)
-    found_outcomes = {r.outcome for of in readings.values() for r in of}
-    outcomes = [name for name in OUTCOMES if name in (AGREES, DIFFERS, *found_outcomes)]
-    disagreements = sum(r.outcome == DIFFERS for of in readings.values() for r in of)
-    names = [Column(name, words=True) for name in ("format", "beside")]
-    summary = Table(
-        "summary",
-        "Who reads and who agrees",
-        (*names, *map(Column, ("files", *outcomes, "agrees within"))),
-        tuple((*of, *_count(these, outcomes)) for of, these in readings.items() if these),
-        summary=Summary(_sentence(found, checked, disagreements)),
+            groups[one.file.kind, reading.engine].append(reading)
+    found_outcomes = {r.outcome for of in groups.values() for r in of}
+    disagreements = sum(r.outcome == DIFFERS for of in groups.values() for r in of)
+    columns = (
+        text("format", lambda group: group[0][0]),
+        text("beside", lambda group: group[0][1]),
+        Column("files", read=lambda group: len(group[1])),
+        *(
+            Column(outcome, read=partial(_count, outcome))
+            for outcome in OUTCOMES
+            if outcome in (AGREES, DIFFERS, *found_outcomes)
+        ),
+        Column("agrees within", read=_largest_difference),
     )
-    return summary, disagreements
+    summary = Summary(_sentence(found, checked, disagreements))
+    rows = cells(columns, (group for group in groups.items() if group[1]))
+    title = "Who reads and who agrees"
+    return Table("summary", title, columns, rows, summary=summary), disagreements
 
 
-def _row(one: Checked) -> tuple[str, ...]:
-    said = {reading.engine: _cell(reading) for reading in one.readings}
-    return (_name(one), one.file.kind, *(said.get(name, "–") for name in NAMES))
+def _outcome(engine: str, checked: Checked) -> str | None:
+    """Return what came of an engine's reading, with the difference; None if it was not asked."""
+    reading = next((r for r in checked.readings if r.engine == engine), None)
+    if reading is None or reading.difference is None:
+        return reading and reading.outcome
+    return f"{reading.outcome} ({words(reading.difference)})"
 
 
-def _cell(reading: Reading) -> str:
-    if reading.difference is None:
-        return reading.outcome
-    return f"{reading.outcome} ({reading.difference:.1e})"
+def _count(outcome: str, group: tuple[object, Sequence[Reading]]) -> int:
+    return sum(reading.outcome == outcome for reading in group[1])
+
+
+def _largest_difference(group: tuple[object, Sequence[Reading]]) -> float | None:
+    """Return the largest difference of the readings that agree, None where none does."""
+    return max((r.difference or 0.0 for r in group[1] if r.outcome == AGREES), default=None)
 
 
 def _name(one: Checked) -> str:
@@ -94,13 +107,6 @@ def _points(one: Checked) -> list[str]:
     said = [f"{r.engine}: {r.outcome}: {r.why}" for r in one.readings if r.why]
     notes = dict.fromkeys(note for r in one.readings for note in r.notes)
     return [f"{_name(one)}: {sentence}" for sentence in (*said, *notes)]
-
-
-def _count(readings: list[Reading], outcomes: list[str]) -> list[int | float | None]:
-    """Return how many files there are, how many of each outcome, and the largest difference."""
-    agreed = [r.difference or 0.0 for r in readings if r.outcome == AGREES]
-    counts = [sum(r.outcome == outcome for r in readings) for outcome in outcomes]
-    return [len(readings), *counts, max(agreed, default=None)]
 
 
 def _sentence(found: Found, checked: Sequence[Checked], disagreements: int) -> str:

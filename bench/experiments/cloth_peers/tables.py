@@ -13,7 +13,7 @@ from ...peers import registry
 from ...presentation.entered import entered
 from ...presentation.results import Results, label, listed
 from ...presentation.tables.columns import SOLVER, folded, least, number, text, words_in
-from ...presentation.tables.layout import Layout
+from ...presentation.tables.layout import Layout, source
 from ...presentation.tables.table import Column, Summary, Table, listing, words
 from ..published import problem as published
 from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, SOLVED, STABILITY, TARGETS, figures
@@ -61,15 +61,16 @@ def _groups(found: Sequence[Point]) -> list[list[Point]]:
 
 @dataclass(frozen=True, eq=False)
 class WithMissing(Layout):
-    """A layout whose tables end with a row for each engine that is missing, its remark last."""
+    """A layout whose tables end with a row for each engine that is missing."""
 
     def __call__(self, results: Results) -> Table:
         """Return the table with a row for each subject and for each engine that is missing."""
         table = super().__call__(results)
-        blank = (None,) * (len(table.columns) - 3)
         missing = results.all("cloth", task=MISSING)
-        rows = [("every cloth", r.solver, *blank, r.notes["remark"]) for r in missing]
-        return replace(table, rows=(*table.rows, *rows))
+        texts = [{"cloth": "every cloth", "solver": r.solver, **r.notes} for r in missing]
+        rows = [tuple(row.get(column.title) for column in table.columns) for row in texts]
+        sources = (*table.sources, *map(source, missing))
+        return replace(table, rows=(*table.rows, *rows), sources=sources)
 
 
 def _columns_to(target: str) -> tuple[Column, ...]:
@@ -100,6 +101,11 @@ def _reached(group: Sequence[Point], target: float) -> Point | None:
 
 def _best(group: Sequence[Point]) -> Point:
     return min(group, key=lambda point: point.values["error"])
+
+
+def _least_error(group: Sequence[Point]) -> float | str:
+    error = _best(group).values["error"]
+    return "diverged" if np.isinf(error) else error
 
 
 def _remark(group: Sequence[Point]) -> str:
@@ -152,7 +158,7 @@ one_step = WithMissing(
         text("cloth", lambda group: _cloth_of(group[0])),
         text("solver", lambda group: group[0].solver),
         *(column for target in TARGETS for column in _columns_to(target)),
-        Column("least error", read=lambda group: _best(group).values["error"], best="least"),
+        Column("least error", read=_least_error, best="least"),
         replace(text("least by", lambda group: _best(group).rung), folded=True),
         text("remark", _remark),
     ),

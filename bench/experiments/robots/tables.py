@@ -564,8 +564,9 @@ def profile(kind: str) -> Layout:
     )
 
 
-def _curve(row: Profile) -> np.ndarray:
-    return row.curve
+def _curve(row: Profile) -> Sequence[Cell]:
+    """Return the shares, None of no targets."""
+    return [None if np.isnan(share) else share for share in row.curve]
 
 
 def _profile_summary(rows: Sequence[Profile]) -> Summary:

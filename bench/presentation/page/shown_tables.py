@@ -144,7 +144,7 @@ def _solver_column(table: Table) -> int | None:
 
 
 def _names_solvers(table: Table, j: int) -> bool:
-    named = zip(table.rows, table.sources, strict=False)  # rows without a source come last
+    named = zip(table.rows, table.sources, strict=bool(table.sources))
     found = [(row[j], source.solvers) for row, source in named if source.solvers]
     return bool(found) and all(
         len(names) == 1 and cell in (*names, label(names[0])) for cell, names in found
@@ -162,7 +162,7 @@ def _rows(table: Table, classes: Sequence[str], best: set[tuple[int, int]]) -> l
         ]
         if row[0] == before:
             cells[0] = cells[0]._replace(classes=f"{cells[0].classes} same".strip())
-        source = table.sources[i] if i < len(table.sources) else Source()
+        source = table.sources[i] if table.sources else Source()
         made.append(Row(_address(table, row, named), cells, source.command))
         before = row[0]
     return made

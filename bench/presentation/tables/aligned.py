@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 from rich.cells import cell_len
 
+from reference.arguments import name_list
+
 from ...text import chunks
 from .fitting import Need, assigned, fits, fitting
-from .table import Table, best_cells, words
+from .table import Table, best_cells, without_empty, words
 
 GAP = 2
 # Words are broken into pieces of so many letters where columns do not fit otherwise; where even
@@ -39,6 +41,7 @@ class Aligned(NamedTuple):
 
 def aligned(table: Table, width: int) -> Aligned:
     """Return a table in lines of at most so many letters, as long as its names and numbers are."""
+    table = without_empty(table)
     shown, widths = _columns(table, width)
     best = best_cells(table)
     head = [filled(table.columns[j].heading, w) for j, w in zip(shown, widths, strict=True)]
@@ -63,7 +66,10 @@ def _columns(table: Table, width: int) -> tuple[list[int], list[int]]:
             break
     else:
         width = int(sum(needs[j].least for j in shown)) + GAP * (len(shown) - 1)
-    return shown, [int(w) for w in assigned([needs[j] for j in shown], width, GAP)]
+    whole = [max(needs[j].natural, cell_len(table.columns[j].heading)) for j in shown]
+    if sum(whole) + GAP * (len(shown) - 1) <= width:
+        return shown, list(map(int, whole))
+    return shown, [int(w + 1e-6) for w in assigned([needs[j] for j in shown], width, GAP)]
 
 
 def _need(table: Table, j: int, pieces: int) -> Need:
@@ -156,4 +162,4 @@ def _joined(atoms: Iterable[str], most: int) -> list[str]:
 def left_out(table: Table, missing: Sequence[str], shown_by: str) -> str:
     """Return a sentence on the columns that are left out, and what shows them."""
     columns = f"{len(missing)} of {len(table.columns)} columns"
-    return f"{columns} left out ({', '.join(missing)}); all: {shown_by}"
+    return f"{columns} left out ({name_list(missing)}); all: {shown_by}"

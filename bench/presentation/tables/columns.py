@@ -1,5 +1,6 @@
 """Columns that many tables have: a heading, and how its cell is read from a record."""
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -131,6 +132,8 @@ def largest(records: Sequence[Record], name: str) -> float:
 
 def words_in(value: float, unit: str) -> str:
     """Return a value in SI units as words in another unit, with that: "1.20 ms"."""
+    if math.isinf(value):
+        return words(value)
     separator = "" if unit == "°" else " "
     return f"{words(in_unit(value, unit))}{separator}{unit}"
 

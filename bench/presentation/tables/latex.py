@@ -9,13 +9,12 @@ import functools
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 from ...harness.metrics import Share
 from ...text import chunks, shortened
 from .fitting import Need, assigned, fits, fitting, parts
-from .table import Cell, Table, best_cells, naming, words
+from .table import Cell, Table, best_cells, naming, without_empty, words
 from .tex_text import NARROW, breakable, escaped, fragments, wide
 
 # A column and a page of most journals [pt], 84 and 177 mm.
@@ -73,7 +72,7 @@ def paper(width: str) -> Paper:
 
 def latex(table: Table, width: str = "page") -> str:
     """Return the table as LaTeX for a column, a page, or another width."""
-    page, table = paper(width), _without_empty(table)
+    page, table = paper(width), without_empty(table)
     best = best_cells(table)
     columns = [_Typeset(table, j, best) for j in range(len(table.columns))]
     size, numbers = _size(table, columns, page.width)
@@ -83,19 +82,6 @@ def latex(table: Table, width: str = "page") -> str:
     about = [_PACKAGES, *_comments(table, len(numbers))]
     body = _long(table, made, page, size) if is_long else _float(table, made, page, size)
     return "\n".join([*about, *body, ""])
-
-
-def _without_empty(table: Table) -> Table:
-    """Return a table without columns in which nothing stands, such as remarks that nobody made."""
-    filled = [j for j in range(len(table.columns)) if any(words(row[j]) for row in table.rows)]
-    kept = filled or list(range(len(table.columns)))
-    best = {(i, kept.index(j)) for i, j in best_cells(table) if j in kept}
-    return replace(
-        table,
-        columns=tuple(table.columns[j] for j in kept),
-        rows=tuple(tuple(row[j] for j in kept) for row in table.rows),
-        best=frozenset(best),
-    )
 
 
 def _size(table: Table, columns: Sequence["_Typeset"], width: float) -> tuple[int, list[int]]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from ...harness.record import Record
 from ..results import Results
 from .provenance import provenance
-from .table import NO_SUMMARY, Column, Source, Summary, Table
+from .table import NO_SUMMARY, Column, Source, Summary, Table, cells
 
 if TYPE_CHECKING:
     from ..figures.sketch import Sketch
@@ -55,7 +55,7 @@ class Layout:
             self.name,
             self.title,
             columns,
-            tuple(tuple(column.cell(subject) for column in columns) for subject in subjects),
+            cells(columns, subjects),
             self.shows if isinstance(self.shows, str) else self.shows(subjects),
             self.measured if isinstance(self.measured, str) else self.measured(subjects),
             self.summary(subjects) if subjects else NO_SUMMARY,

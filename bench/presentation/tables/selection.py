@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+from reference.arguments import name_list
+
 from ...harness.metrics import Share
 from .table import NO_SUMMARY, Cell, Table, best_cells, words
 
@@ -76,7 +78,7 @@ def filtered(table: Table, rows: Sequence[str]) -> Table:
         table,
         rows=tuple(table.rows[i] for i in left),
         unranked=frozenset(new for new, i in enumerate(left) if i in table.unranked),
-        sources=tuple(table.sources[i] for i in left if i < len(table.sources)),
+        sources=tuple(table.sources[i] for i in left) if table.sources else (),
     )
 
 
@@ -197,5 +199,5 @@ def _unknown(table: Table, name: str, option: str) -> str:
     known = {_plain(word): c.heading for c in table.columns for word in (c.heading, c.title)}
     known = {word[: len(_plain(name))]: heading for word, heading in known.items()} | known
     near: list[Any] = difflib.get_close_matches(_plain(name), known, n=1)
-    hint = f"did you mean {known[near[0]]!r}?" if near else f"expected one of {'; '.join(headings)}"
+    hint = f"did you mean {known[near[0]]!r}?" if near else f"expected one of {name_list(headings)}"
     return f"{option}: {table.name} has no column {name!r}: {hint}"

@@ -9,8 +9,8 @@ import itertools
 import math
 import re
 import shlex
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ...harness.metrics import Share
@@ -29,6 +29,8 @@ NO_SUMMARY = Summary()
 
 # How a share is written: with the interval that holds the true rate.
 INTERVAL = "95 % interval"
+# How an infinite number is written: as far from the target as one without an answer.
+NO_ANSWER = "no answer"
 # What one metre, second, radian, byte or whole is in other units.
 UNITS = {"ms": 1e3, "µs": 1e6, "ns": 1e9, "°": 180.0 / math.pi, "%": 100.0, "GiB": 2.0**-30}
 
@@ -113,6 +115,11 @@ class Source(NamedTuple):
 MOST = 3
 
 
+def cells(columns: Sequence[Column], subjects: Iterable[Any]) -> tuple[tuple[Cell, ...], ...]:
+    """Return a row for each subject, with a cell under each column as that reads it."""
+    return tuple(tuple(column.cell(subject) for column in columns) for subject in subjects)
+
+
 @dataclass(frozen=True)
 class Table:
     """A named table.
@@ -127,7 +134,7 @@ class Table:
         summary: what the numbers say, generated from them.
         compared: rows whose first so many cells agree are compared with one another; 0: all are.
         unranked: the numbers of rows that are never best, such as those of a solver cut short.
-        sources: what is behind each row; rows without one come last.
+        sources: what is behind each row; empty where no row says it.
         provenance: how many samples, on which machine, with which versions.
         best: row and column of the cells that are best, where not the columns say it.
     """
@@ -146,9 +153,11 @@ class Table:
     best: frozenset[tuple[int, int]] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse ragged rows and headings that stand twice."""
+        """Refuse ragged rows, headings that stand twice, and sources of some rows only."""
         if len({column.heading for column in self.columns}) < len(self.columns):
             raise ValueError(f"columns: expected distinct headings in table {self.name}")
+        if len(self.sources) not in (0, len(self.rows)):
+            raise ValueError(f"sources: expected none or one a row in table {self.name}")
         for row in self.rows:
             if len(row) != len(self.columns):
                 raise ValueError(
@@ -204,6 +213,19 @@ def _ties(cell: Cell, best: Cell) -> bool:
     if isinstance(cell, Share) and isinstance(best, Share):
         return cell.low <= best.high and best.low <= cell.high
     return words(cell) == words(best)
+
+
+def without_empty(table: Table) -> Table:
+    """Return a table without columns in which nothing stands, such as remarks that nobody made."""
+    filled = [j for j in range(len(table.columns)) if any(words(row[j]) for row in table.rows)]
+    kept = filled or list(range(len(table.columns)))
+    best = {(i, kept.index(j)) for i, j in best_cells(table) if j in kept}
+    return replace(
+        table,
+        columns=tuple(table.columns[j] for j in kept),
+        rows=tuple(tuple(row[j] for j in kept) for row in table.rows),
+        best=frozenset(best),
+    )
 
 
 # So many columns at most name a row.
@@ -270,7 +292,7 @@ def comma_separated(table: Table) -> str:
 
 def _number(value: float) -> str:
     if not math.isfinite(value):
-        return "not a number" if math.isnan(value) else ("infinite" if value > 0 else "-infinite")
+        return "not a number" if math.isnan(value) else NO_ANSWER
     if value == 0:
         return "0"
     power = int(f"{value:.2e}".split("e")[1])
