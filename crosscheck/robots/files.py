@@ -22,7 +22,7 @@ from .comparisons import differences
 from .deviations import known_deviations
 from .independent_bvh import global_poses
 from .models import Model
-from .sweep import sweep_model
+from .sweep import sweep_in_parts
 
 SECOND_READER = "second reader"
 ENGINES = {URDF: tuple(ROBOT_ENGINES), MJCF: tuple(ROBOT_ENGINES), BVH: (SECOND_READER,)}
@@ -145,8 +145,8 @@ def _largest_difference(engine: str, file: File) -> float:
     """Return the largest difference in random configurations or frames, or NaN."""
     if engine == SECOND_READER:
         return _compare_motions(file)
-    swept = sweep_model(engine, Model(file.path.name, file.path, file.root))
-    return float(np.max(differences(swept)))
+    parts = sweep_in_parts(engine, Model(file.path.name, file.path, file.root))
+    return float(np.max(differences(parts)))
 
 
 def _compare_motions(file: File) -> float:

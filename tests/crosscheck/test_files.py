@@ -3,13 +3,15 @@
 import os
 import signal
 import time
+import tracemalloc
+from functools import partial
 
 import numpy as np
 import pytest
 
 from crosscheck.child_process import ChildProcess, LostError
 from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
-from crosscheck.robots import files, independent_bvh
+from crosscheck.robots import comparisons, files, independent_bvh
 from crosscheck.robots.deviations import INCLUDE
 from crosscheck.robots.files import (
     AGREES,
@@ -25,6 +27,7 @@ from crosscheck.robots.files import (
     compare,
     find,
 )
+from crosscheck.robots.sweep import sweep_in_parts
 from crosscheck.tolerances import POSITION
 from reference import Skeleton, rotation
 from reference.formats import bvh, mjcf
@@ -221,6 +224,61 @@ def test_a_difference_is_excused_only_by_a_known_cause_where_mujoco_agrees(
     theirs = files.Reading("Pinocchio", DIFFERS, 0.5), files.Reading("MuJoCo", UNREAD)
     monkeypatch.undo()
     assert files._with_causes(file, list(theirs)) == theirs
+
+
+def tree_of_hinges(count):
+    """A URDF of hinges, three on each link."""
+    links = "".join(f'<link name="l{i}"/>' for i in range(count + 1))
+    joints = "".join(
+        f"""<joint name="j{i}" type="continuous"><parent link="l{(i - 1) // 3}"/>
+        <child link="l{i}"/><origin xyz="0.1 0.2 0.3"/><axis xyz="0 {i % 2} 1"/></joint>"""
+        for i in range(1, count + 1)
+    )
+    return f'<robot name="tree">{links}{joints}</robot>'
+
+
+def test_a_model_of_many_freedoms_is_compared_in_little_memory(folder):
+    """Five Jacobians of 1,001 links by 1,000 freedoms take 240 MB, and are needed several times."""
+    file = find([folder(a_urdf=tree_of_hinges(1000))]).files[0]
+    files.prepare()
+    tracemalloc.start()
+    try:
+        reading = compare("MuJoCo", file)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert reading.outcome == AGREES
+    assert peak < 400e6
+
+
+@pytest.mark.parametrize("engine", ["Pinocchio", "MuJoCo"])
+def test_the_parts_of_a_model_differ_by_as_much_as_the_whole(engine, folder, monkeypatch):
+    """To the bit; and a fault in the last link alone is seen from every size of the parts."""
+    file = find([folder(a_urdf=tree_of_hinges(40))]).files[0]
+    model = files.Model("a.urdf", file.path)
+    numbers = 41 * 5 * 6 * 40
+
+    def compared(part):
+        parts = list(sweep_in_parts(engine, model, part))
+        return len(parts), comparisons.differences(parts)
+
+    count, whole = compared(np.inf)
+    assert count == 1
+    assert max(whole) < POSITION.value
+    sizes = (numbers, numbers / 2, numbers / 7, numbers / 40.5, 1)
+    assert [compared(size)[0] for size in sizes] == [1, 2, 7, 41, 41]
+    assert all(compared(size)[1] == whole for size in sizes)
+    right = comparisons.reference_kinematics
+
+    def with_a_fault(robot, q, links):
+        J = right(robot, q, links)
+        J.jacobians[:, links == 40, 3:] += np.nan if np.isnan(fault) else fault
+        return J
+
+    monkeypatch.setattr(comparisons, "reference_kinematics", with_a_fault)
+    for fault in (1e-3, np.nan):
+        for size in (np.inf, *sizes):
+            np.testing.assert_allclose(compared(size)[1].jacobians, fault, rtol=1e-9)
 
 
 BLIND = {
