@@ -101,7 +101,7 @@ def check(files: Iterable[File], patience: float = 60.0) -> Iterator[Checked]:
 
     Args:
         files: as `find` returns them.
-        patience: time limit for an engine and a file [s].
+        patience: limit of processor time for an engine and a file [s].
     """
     files = tuple(files)
     included = {path for file in files for path in _includes(file)}

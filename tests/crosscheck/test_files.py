@@ -367,6 +367,23 @@ def crash(code):
     os.kill(os.getpid(), code) if code == signal.SIGSEGV else os._exit(code)
 
 
+def spin(seconds):
+    """Work for so much processor time [s]."""
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
+class SlowToReceive:
+    """An argument that takes so much processor time [s] to be unpickled."""
+
+    def __init__(self, seconds):
+        self.seconds = seconds
+
+    def __reduce__(self):
+        return spin, (self.seconds,)
+
+
 def loud():
     os.write(1, b"loud")
     os.write(2, b"loud")
@@ -381,12 +398,25 @@ def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
             child.call(crash, signal.SIGSEGV)
         with pytest.raises(LostError, match="ends with code 3"):
             child.call(crash, 3)
-        with pytest.raises(LostError, match=r"takes longer than 0\.5 s"):
+        with pytest.raises(LostError, match=r"takes more than 0\.5 s of processor time"):
+            child.call(spin, 60.0)
+        with pytest.raises(LostError, match="gives no answer within 5 s"):
             child.call(time.sleep, 60)
         assert child.call(loud) not in (first, os.getpid())
         process = child._child.process
     assert process.returncode is not None
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_call_that_waits_for_the_processor_is_not_lost():
+    """Only its own processor time counts: no waiting, no start, nothing between two calls."""
+    with ChildProcess(partial(spin, 1.0), patience=0.5) as child:
+        process = child.call(os.getpid)
+        for _ in range(3):
+            child.call(time.sleep, 1.0)
+            child.call(spin, 0.3)
+            child.call(str, SlowToReceive(0.3))
+        assert child.call(os.getpid) == process
 
 
 def test_the_second_reader_reads_what_the_first_wrote(rng):
