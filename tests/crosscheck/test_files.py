@@ -12,7 +12,7 @@ import pytest
 from crosscheck.child_process import ChildProcess, LostError
 from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
 from crosscheck.robots import comparisons, files, independent_bvh
-from crosscheck.robots.deviations import INCLUDE
+from crosscheck.robots.deviations import FRAME, INCLUDE
 from crosscheck.robots.files import (
     AGREES,
     DEVIATES,
@@ -221,9 +221,46 @@ def test_a_difference_is_excused_only_by_a_known_cause_where_mujoco_agrees(
     monkeypatch.setattr(files, "known_deviations", lambda path: [])
     assert outcomes(root)["a.xml"]["Pinocchio"].outcome == DIFFERS
     file = find([root]).files[0]
-    theirs = files.Reading("Pinocchio", DIFFERS, 0.5), files.Reading("MuJoCo", UNREAD)
+    theirs = files.Reading("Pinocchio", DIFFERS, 0.5), files.Reading("MuJoCo", LOST)
     monkeypatch.undo()
-    assert files._with_causes(file, list(theirs)) == theirs
+    assert files._with_causes(Here(None, 60.0), file, list(theirs)) == theirs
+
+
+OLD = '<option collision="all"/>'
+INNER = '<frame><joint name="k"/></frame>'  # which Pinocchio passes over
+
+
+def test_mujoco_confirms_a_known_cause_in_a_file_whose_settings_it_refuses(folder, here):
+    """An option of older MuJoCo is in the file, in one that it includes or in both."""
+    main = "<mujoco>{}<worldbody>{}</worldbody></mujoco>".format
+    included = f"<mujoco>{OLD}<default/></mujoco>"
+    root = folder(
+        a_xml=main(OLD, BODY("b", 0, INNER)), part__old_xml=included,
+        b_xml=main('<include file="part/old.xml"/>' + OLD, BODY("b", 0, INNER)),
+        c_xml=main('<include file="part/old.xml"/>', BODY("b", 0, INNER)),
+    )  # fmt: skip
+    readings = outcomes(root)
+    for name in ("a.xml", "b.xml", "c.xml"):
+        assert readings[name]["MuJoCo"].outcome == UNREAD
+        assert "unrecognized attribute: 'collision'" in readings[name]["MuJoCo"].why
+        assert readings[name]["Pinocchio"].outcome == DEVIATES
+        assert FRAME in readings[name]["Pinocchio"].why
+        assert readings[name]["Pinocchio"].difference > 0.01
+
+
+def test_a_known_cause_excuses_nothing_where_nobody_confirms_it(folder, here, monkeypatch):
+    """MuJoCo refuses more than settings; or it reads the copy otherwise than the reference."""
+    refused = BODY("b", 0, INNER).replace("size", "colour")
+    root = folder(
+        a_xml=character(refused), b_xml=character(BODY("b", 0, INNER)).replace(">", f">{OLD}", 1)
+    )
+    assert outcomes(root)["a.xml"]["MuJoCo"].outcome == UNREAD
+    assert outcomes(root)["a.xml"]["Pinocchio"].outcome == DIFFERS
+    assert outcomes(root)["b.xml"]["Pinocchio"].outcome == DEVIATES
+    read = mjcf.read
+    other = folder(other__b_xml=character(BODY("b", 1, INNER))) / "other" / "b.xml"
+    monkeypatch.setattr(mjcf, "read", lambda path, **options: read(other))
+    assert outcomes(root)["b.xml"]["Pinocchio"].outcome == DIFFERS
 
 
 def tree_of_hinges(count):
