@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from reference.arguments import FloatArray
+
 from ..engines.robot_engine import UnreadableError
 from ..verdict import Comparison
 from .models import comparable
@@ -29,7 +31,7 @@ def rotations(family: str, engine: str, cases: int) -> Iterator[Comparison]:
 def jacobians(family: str, engine: str, cases: int) -> Iterator[Comparison]:
     """Compare the Jacobians of all links, linear velocities relative to the links' extent."""
     for swept, ours in _read(family, engine, cases):
-        size = np.repeat([extent(ours) or 1.0, 1.0], 3)[:, None]  # of the rows, (6, 1)
+        size: FloatArray = np.repeat([extent(ours) or 1.0, 1.0], 3)[:, None]  # of the rows, (6, 1)
         theirs = swept.theirs.jacobians / size
         yield Comparison(ours.jacobians / size, theirs, np.zeros_like(theirs), 1.0)
 
