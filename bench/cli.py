@@ -1,6 +1,7 @@
 """The command line. Engines, the reference and matplotlib are imported inside the commands."""
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,8 +28,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code.
 
     A reader that has seen enough, such as `head`, ends the program without a word. The signal for
-    it stays ignored: it would also strike where a worker has ended that we are writing to.
+    it stays ignored: it would also strike where a worker has ended that we are writing to. Signals
+    to end become exceptions, so that commands clean up, unless they are ignored, as under nohup.
     """
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, _leave)
     try:
         code = run_command(arguments)
         sys.stdout.flush()
@@ -115,6 +120,12 @@ app.command(cls=verify.SolverCommand, epilog=show.EXAMPLES)(show.show)
 app.command(cls=Command, epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)
 app.command(cls=Command, epilog=comparison.HISTORY_EXAMPLES)(comparison.history)
 app.add_typer(records.app, name="records")
+
+
+def _leave(number: int, _: object) -> None:
+    """Leave by an exception; the same signal again, as from a shell, does not interrupt that."""
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(128 + number)
 
 
 def _complain(message: str) -> int:

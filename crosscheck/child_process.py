@@ -18,6 +18,8 @@ from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 
+# A call may last so many times its limit of processor time: others may use the processor, too.
+_WALL = 10
 # A process whose connection has ended is given so long [s] to end by itself.
 _LEAVE = 1.0
 # In safe-path mode (-P) nothing is imported from the working directory; our packages come from
@@ -143,8 +145,8 @@ class ChildProcess:
 
     Attributes:
         prepare: called first in every process, to load and compile.
-        patience: how long a call may take [s].
-        start_patience: how long the start and `prepare` may take [s].
+        patience: how much processor time a call may take [s].
+        start_patience: how much `prepare` may take [s].
     """
 
     def __init__(
@@ -165,11 +167,11 @@ class ChildProcess:
         """Return what a function of a module returns, which must not raise.
 
         Raises:
-            LostError: if the process ended or took too long.
+            LostError: if the process ended, or the call took too much processor time or too long.
         """
         try:
             if self._child is None:
-                self._child = PipedProcess(_CALLS)
+                self._child = PipedProcess(_CALLS, one_thread())
                 _perform(self._child, self.start_patience, self.prepare)
             result: Result = _perform(self._child, self.patience, function, *arguments)
             return result
@@ -185,13 +187,15 @@ class ChildProcess:
 
 
 def _perform(child: PipedProcess, patience: float, *call: object) -> Any:
-    child.send(call)
+    child.send((patience, *call))
     try:
-        return child.receive(patience)
+        return child.receive(_WALL * patience)
     except TimeoutError:
-        raise LostError(f"it takes longer than {patience:g} s") from None
+        raise LostError(f"it gives no answer within {_WALL * patience:g} s") from None
     except EOFError:
-        raise LostError(f"the process ends {child.ending() or 'the connection'}") from None
+        if (ending := child.ending()) == "by SIGPROF":
+            raise LostError(f"it takes more than {patience:g} s of processor time") from None
+        raise LostError(f"the process ends {ending or 'the connection'}") from None
 
 
 def perform_calls(descriptor: int) -> None:
@@ -199,10 +203,14 @@ def perform_calls(descriptor: int) -> None:
     connection = attach(descriptor)
     while True:
         try:
-            function, *arguments = connection.recv()
+            patience, function, *arguments = connection.recv()
         except EOFError:
             return
-        connection.send(function(*arguments))
+        # SIGPROF ends the process after so much processor time, whatever code it is in.
+        signal.setitimer(signal.ITIMER_PROF, patience)
+        result = function(*arguments)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        connection.send(result)
 
 
 def one_thread() -> dict[str, str]:

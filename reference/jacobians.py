@@ -57,14 +57,19 @@ def jacobian(articulation: Model, q: ArrayLike, effector: int | str | None = Non
     return _jacobians(model, one, given)[..., 0, :, :]
 
 
-def jacobians(articulation: Model, q: ArrayLike) -> FloatArray:
+def jacobians(articulation: Model, q: ArrayLike, joints: ArrayLike | None = None) -> FloatArray:
     """Return the Jacobians of all joints, (..., joint, 6, freedom), as `jacobian` does of one.
 
+    With `joints`, indices of shape (joint,), return only theirs.
+
     Raises:
-        ValueError: as for `jacobian`.
+        ValueError: as for `jacobian`, or if an index is out of range.
     """
-    model, given = _coordinates("q", articulation, q)
-    return _jacobians(model, np.arange(model.joint_count), given)
+    model, coordinates = _coordinates("q", articulation, q)
+    count = model.joint_count
+    effectors = np.arange(count) if joints is None else joints
+    effectors = arguments.indices("joints", effectors, "joint", least=0, below=count)
+    return _jacobians(model, effectors, coordinates)
 
 
 def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:

@@ -310,7 +310,7 @@ def _derivatives():
         d + "jacobian, balls": Call(
             differential.jacobian, {"articulation": balls, "q": local, "effector": -1}, free="q"
         ),
-        d + "jacobians": Call(differential.jacobians, given, free="q"),
+        d + "jacobians": Call(differential.jacobians, {**given, "joints": [2, 0]}, free="q"),
         d + "integrate": Call(differential.integrate, {**given, "v": v}, free="q v"),
         d + "difference": Call(
             differential.difference, {"articulation": model, "q1": q, "q0": q0}, free="q1 q0"

@@ -24,7 +24,8 @@ Fail = Annotated[
     str, typer.Option(metavar="LIMITS", help="Exit 1 beyond these: accuracy,time:10%,gone.")
 ]
 Rerun = Annotated[
-    str, typer.Option(metavar="REV", help="Measure this revision and ours side by side.")
+    str,
+    typer.Option(metavar="REV", help="In a clone of Plumbob, measure this revision beside ours."),
 ]
 Suites = Annotated[_Words, typer.Option("--suite", help="With --rerun: only these suites.")]
 Only = Annotated[
@@ -100,17 +101,17 @@ def _of_folders(old: Path, new: Path) -> "Comparison":
 
 def _side_by_side(revision: str, suites: list[str], words: list[str], pairs: int) -> "Comparison":
     from ..experiments import SUITES
-    from ..harness.machine import ROOT
-    from .rerun import Plan, rerun
+    from .rerun import Plan, clone_root, rerun
 
     for suite in suites:
         if suite not in SUITES:
             raise ValueError(f"unknown suite {suite!r}: expected one of {', '.join(SUITES)}")
+    root = clone_root(Path.cwd())
 
     def tell(what: str) -> None:
         print(f"plumbob: {what}", file=sys.stderr, flush=True)
 
-    return rerun(Plan(revision, tuple(suites), tuple(words), pairs), ROOT, tell)
+    return rerun(Plan(revision, tuple(suites), tuple(words), pairs), root, tell)
 
 
 def history(

@@ -5,8 +5,11 @@ fast or slow by the accident of its addresses too.
 """
 
 import contextlib
+import fcntl
 import json
 import math
+import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -16,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.child_process import one_thread
+from crosscheck.child_process import kill_group, one_thread
 
 from ..harness.metrics import adjusted
 from ..harness.record import Record, decode
@@ -32,6 +35,7 @@ Taken = dict[tuple[RowKey, str], list[tuple[float, float]]]
 Ratios = dict[tuple[RowKey, str], Ratio]
 
 SEED = 20130
+PREFIX = "plumbob-rerun-"
 HOW = (
     "Both revisions are measured side by side in fresh processes, {pairs} times each, the order "
     "drawn by lot. Answers are compared to the bit. Times are decided by Wilcoxon's signed-rank "
@@ -67,38 +71,62 @@ def rerun(plan: Plan, root: Path, tell: Callable[[str], None] = lambda _: None) 
         ValueError: if there is no such revision, nothing to measure in both, or a process ends
             before it has measured all.
     """
-    with (
-        tempfile.TemporaryDirectory(prefix="plumbob-") as folder,
-        checked_out(root, plan.revision, Path(folder, "old")) as old,
-    ):
-        new = Path(folder, "new")
+    with _temporary_folder() as folder:
+        old, new = folder / "old", folder / "new"
+        _check_out(root, plan.revision, old)
         new.symlink_to(root, target_is_directory=True)  # so that both paths are as long
         return _measured((old, new), plan, tell)
 
 
-@contextlib.contextmanager
-def checked_out(root: Path, revision: str, folder: Path) -> Iterator[Path]:
-    """Yield a folder that holds a revision for as long as the block lasts.
+def clone_root(folder: Path) -> Path:
+    """Return the root of the clone of Plumbob that holds a folder.
 
     Raises:
-        ValueError: if there is no such revision, or no repository.
+        ValueError: if the folder is in no clone of Plumbob.
     """
-    _git(root, "rev-parse", "--verify", "--quiet", f"{revision}^{{commit}}")
-    _git(root, "worktree", "add", "--detach", "--quiet", str(folder), revision)
-    try:
-        yield folder
-    finally:
-        _git(root, "worktree", "remove", "--force", str(folder))
+    top_level = ["git", "-C", str(folder), "rev-parse", "--show-toplevel"]
+    git = subprocess.run(top_level, capture_output=True, check=False)
+    root = folder / os.fsdecode(git.stdout.removesuffix(b"\n"))
+    project = root / "pyproject.toml"
+    if project.is_file() and b'\nname = "plumbob"\n' in project.read_bytes():
+        return root
+    raise ValueError(
+        "--rerun: expected to be run in a clone of Plumbob, whose revisions it measures, "
+        f"got {folder}: change to a clone, or compare two folders of records"
+    )
 
 
-def _git(root: Path, *arguments: str) -> None:
-    done = subprocess.run(["git", "-C", str(root), *arguments], capture_output=True, check=False)
-    if done.returncode:
-        said = " ".join(done.stderr.decode(errors="replace").split())
-        what = arguments[-1].removesuffix("^{commit}")
-        raise ValueError(
-            f"--rerun: expected a revision that git can check out, got {what!r} {said}"
-        )
+@contextlib.contextmanager
+def _temporary_folder() -> Iterator[Path]:
+    """Yield a locked folder; remove those whose process was killed, which ended its lock."""
+    for old in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/old"):
+        with contextlib.suppress(OSError), old.with_name("lock").open() as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(old.parent)
+    with tempfile.TemporaryDirectory(prefix=PREFIX) as name, Path(name, "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield Path(name)
+
+
+def _check_out(root: Path, revision: str, folder: Path) -> None:
+    """Write the files of a revision to a new folder, of which the repository knows nothing.
+
+    Raises:
+        ValueError: if there is no such revision, or no room to write it.
+    """
+    archive, commit = f"{folder}.zip", f"{revision}^{{commit}}"
+    command = ["git", "-C", str(root), "archive", "-o", archive, "--end-of-options", commit]
+    git = subprocess.run(command, capture_output=True, check=False)
+    reason = " ".join(git.stderr.decode(errors="replace").split())
+    if git.returncode == 0:
+        try:
+            shutil.unpack_archive(archive, folder)
+            return
+        except OSError as error:
+            reason = str(error)
+    raise ValueError(
+        f"--rerun: expected a revision that git can check out, got {revision!r} {reason}"
+    )
 
 
 class Revision:
@@ -110,6 +138,7 @@ class Revision:
             [sys.executable, "-P", revision_process.__file__, str(folder), scale, *suites],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, cwd=folder.parent,
             env={**one_thread(), "PYTHONPATH": str(folder)}, text=True, encoding="utf-8",
+            process_group=0,
         )  # fmt: skip
 
     def blocks(self) -> list[list[str]]:
@@ -134,8 +163,8 @@ class Revision:
         return line
 
     def close(self) -> None:
-        """End the process; what it has started ends with it."""
-        self._process.kill()
+        """End the process and what it has started."""
+        kill_group(self._process)
         self._process.communicate()
         self._said.close()
 

@@ -15,6 +15,9 @@ from .file_kind import URDF, file_kind, xml_root
 from .robot_engine import LinkPoses, UnreadableError, select_columns
 
 COMPOSITE = "JointModelComposite"
+# Its data hold eight tensors of n³ numbers for n freedoms: 4 GB for so many.
+MAXIMUM_FREEDOMS = 400
+FREEDOMS = {"fixed": 0, "ball": 3, "planar": 3, "free": 6, "freejoint": 6, "floating": 6}
 # Pinocchio's name of the world; a joint of that name crashes the process.
 WORLD = "universe"
 
@@ -47,6 +50,7 @@ class PinocchioRobot:
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
         try:
             root = xml_root(path)
+            _check_freedoms(root)
             is_urdf = file_kind(path) == URDF
             self.model = pinocchio_urdf(path, root, mimic) if is_urdf else _mjcf(path, root)
         except (ValueError, RuntimeError, LookupError, OSError) as error:
@@ -102,6 +106,16 @@ class PinocchioRobot:
             first = self.joints[name].v
             J[..., first : first + 3] = J[..., first : first + 3] @ R.T
         return select_columns(J, self._at, freedoms)
+
+
+def _check_freedoms(root: ElementTree.Element) -> None:
+    body = root.find("worldbody/body")  # it reads no second one
+    elements = root if body is None else body.iter()
+    joints = [element for element in elements if element.tag in ("joint", "freejoint")]
+    count = sum(FREEDOMS.get(joint.get("type", joint.tag), 1) for joint in joints)
+    if count > MAXIMUM_FREEDOMS:
+        limit = f"expected at most {MAXIMUM_FREEDOMS}, got {count:,}"
+        raise ValueError(f"it takes 64 n³ bytes for n freedoms: {limit}")
 
 
 def pinocchio_urdf(path: Path, root: ElementTree.Element, mimic: bool) -> pinocchio.Model:

@@ -1,7 +1,7 @@
 """Comparisons of the poses and Jacobians of the links of robots and characters."""
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +31,7 @@ def rotations(family: str, engine: str, cases: int) -> Iterator[Comparison]:
 def jacobians(family: str, engine: str, cases: int) -> Iterator[Comparison]:
     """Compare the Jacobians of all links, linear velocities relative to the links' extent."""
     for swept, ours in _read(family, engine, cases):
-        size = jacobian_scales(ours)
+        size: FloatArray = np.repeat([extent(ours) or 1.0, 1.0], 3)[:, None]  # of the rows, (6, 1)
         theirs = swept.theirs.jacobians / size
         yield Comparison(ours.jacobians / size, theirs, np.zeros_like(theirs), 1.0)
 
@@ -50,23 +50,23 @@ class Differences(NamedTuple):
     jacobians: float
 
 
-def differences(swept: Sweep) -> Differences:
-    """Return the largest differences between the reference and the engine; 0 without links."""
-    ours = reference_kinematics(swept.robot, swept.q, swept.links)
-    errors = [np.abs(a - b) for a, b in zip(ours, swept.theirs, strict=True)]
-    errors[0] /= extent(ours) or 1.0
-    errors[2] /= jacobian_scales(ours)
-    return Differences(*(float(values.max(initial=0.0)) for values in errors))
+def differences(parts: Iterable[Sweep]) -> Differences:
+    """Return the largest differences between the reference and the engine in parts of a model."""
+    boxes, largest = [], []
+    for part in parts:
+        ours = reference_kinematics(part.robot, part.q, part.links)
+        x, R, J = (np.abs(a - b) for a, b in zip(ours, part.theirs, strict=True))
+        boxes += [ours.positions.min(axis=(0, 1)), ours.positions.max(axis=(0, 1))]
+        largest.append([e.max(initial=0.0) for e in (x, R, J[..., :3, :], J[..., 3:, :])])
+    size = np.ptp(boxes, axis=0).max() or 1.0
+    position, rotation, linear, angular = np.max(largest, axis=0)
+    jacobian = np.maximum(linear / size, angular)
+    return Differences(float(position / size), float(rotation), float(jacobian))
 
 
 def extent(links: LinkKinematics) -> float:
     """Return the largest side of the box around all links in all configurations [m]."""
     return float(np.ptp(links.positions.reshape(-1, 3), axis=0).max())
-
-
-def jacobian_scales(links: LinkKinematics) -> FloatArray:
-    """Return the scales of the rows of a Jacobian, (6, 1): the extent [m], and one radian."""
-    return np.repeat([extent(links) or 1.0, 1.0], 3)[:, None]
 
 
 def _read(

@@ -1,6 +1,8 @@
 """A model in random configurations, read and evaluated by the reference and by an engine."""
 
 import functools
+import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +18,8 @@ from ..engines.robot_engine import RobotEngine, UnreadableError
 from .models import Model, random_coordinates, slots
 
 CONFIGURATIONS = 5
+# Jacobians are compared for so many links at a time that they hold at most this many numbers.
+PART = 2**22
 
 
 class LinkKinematics(NamedTuple):
@@ -50,8 +54,8 @@ class Sweep(NamedTuple):
     free_mimics: str
 
 
-def sweep_model(engine: str, model: Model) -> Sweep:
-    """Read a model and evaluate it by an engine in random configurations.
+def sweep_in_parts(engine: str, model: Model, part: float = PART) -> Iterator[Sweep]:
+    """Read a model and evaluate it by an engine in random configurations, some links at a time.
 
     If the reference or the engine refuses the mimic joints, these move independently for both.
 
@@ -60,13 +64,16 @@ def sweep_model(engine: str, model: Model) -> Sweep:
         ValueError: if only the reference does not read it.
     """
     try:
-        return _sweep(engine, model, "")
+        yield from _sweep(engine, model, part)
     except (UnreadableError, ValueError) as error:
-        return _sweep(engine, model, str(error).replace(str(model.path), model.path.name))
+        reason = str(error).replace(str(model.path), model.path.name)
+        yield from _sweep(engine, model, part, reason)
 
 
-# Cached, because there are several claims about every model.
-sweep = functools.cache(sweep_model)
+@functools.cache  # because there are several claims about every model
+def sweep(engine: str, model: Model) -> Sweep:
+    """Return the sweep of all links; raise as `sweep_in_parts` does."""
+    return next(sweep_in_parts(engine, model, np.inf))
 
 
 def reference_kinematics(robot: Robot, q: FloatArray, links: np.ndarray) -> LinkKinematics:
@@ -75,20 +82,22 @@ def reference_kinematics(robot: Robot, q: FloatArray, links: np.ndarray) -> Link
     return LinkKinematics(
         pose.positions[:, links],
         rotation.to_matrix(pose.rotations[:, links]),
-        jacobians.jacobians(robot.articulation, q)[:, links],
+        jacobians.jacobians(robot.articulation, q, joints=links),
     )
 
 
-def _sweep(engine: str, model: Model, free_mimics: str) -> Sweep:
+def _sweep(engine: str, model: Model, part: float, free_mimics: str = "") -> Iterator[Sweep]:
     theirs = ROBOT_ENGINES[engine](model.path, mimic=not free_mimics)
     robot = model.read(mimic=not free_mimics)
     articulation = robot.articulation
     q = random_coordinates(articulation, samples.generator(model.name, 0), CONFIGURATIONS)
     known = [j for j, name in enumerate(articulation.names) if name in theirs.links]
-    names = [articulation.names[j] for j in known]
     if not known:
         raise UnreadableError("it gives none of the links its name")
-    return Sweep(robot, q, np.array(known), _kinematics(theirs, robot, q, names), free_mimics)
+    numbers = len(known) * CONFIGURATIONS * 6 * articulation.freedom_count
+    for links in np.array_split(known, min(len(known), math.ceil(numbers / part) or 1)):
+        names = [articulation.names[j] for j in links]
+        yield Sweep(robot, q, links, _kinematics(theirs, robot, q, names), free_mimics)
 
 
 def _kinematics(

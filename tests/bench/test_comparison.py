@@ -326,8 +326,6 @@ MISUSE = {
     "no records": (["old", "nowhere"], "no records in nowhere"),
     "limits": (["old", "new", "--fail", "speed"], "--fail: expected accuracy"),
     "suite": (["--rerun", "HEAD", "--suite", "x"], "unknown suite 'x': expected one of check"),
-    "revision": (["--rerun", "no-such-rev"], "--rerun: expected a revision that git can check"),
-    "option": (["--rerun", "--force"], "--rerun: expected a revision that git can check out"),
 }
 
 

@@ -1,6 +1,10 @@
 """Two revisions side by side: with itself one differs in nothing, planted faults are found."""
 
+import os
+import signal
 import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +35,16 @@ def measure(solver):
 def blocks(suite, scale):
     print("an engine speaks")
     return ["ours", "steady"]
+"""
+# One that starts a process of its own and then works for longer than any test.
+ENDLESS = """
+
+def measure(solver):
+    import os, pathlib, subprocess, time
+    child = subprocess.Popen(["sleep", "600"])
+    with open(os.environ["PIDS"], "a") as file:
+        print(os.getpid(), child.pid, file=file, flush=True)
+    time.sleep(600)
 """
 RUN = """
 from ..experiments import measure as arrays
@@ -67,6 +81,7 @@ def repository(tmp_path):
         (folder / name / "__init__.py").write_text("")
     (folder / "bench" / "harness" / "record.py").write_text(RECORD)
     (folder / "bench" / "harness" / "run.py").write_text(RUN)
+    (folder / "pyproject.toml").write_text('[project]\nname = "plumbob"\n')
     write(folder)
     git(folder, "init", "-q")
     git(folder, "add", ".")
@@ -91,6 +106,62 @@ def worktrees(folder):
         ["git", "-C", str(folder), "worktree", "list"], check=True, capture_output=True, text=True
     )
     return len(listed.stdout.splitlines())
+
+
+@pytest.fixture
+def temporary(tmp_path):
+    """The folder for temporary files of the processes that `start` starts."""
+    (tmp_path / "temporary").mkdir()
+    return tmp_path / "temporary"
+
+
+@pytest.fixture
+def start(repository, temporary):
+    """Return the function that starts the command in the clone, as a shell does."""
+    processes = []
+    environment = {
+        **os.environ, "TMPDIR": str(temporary), "PIDS": str(temporary.with_name("pids"))
+    }  # fmt: skip
+
+    def begin(*arguments, program=(sys.executable, "-P", "-m", "plumbob")):
+        words = [*program, "compare", "--rerun", "before", *arguments]
+        process = subprocess.Popen(
+            words, cwd=repository, env=environment, process_group=0, stderr=subprocess.PIPE,
+            text=True, preexec_fn=let_signals_end,
+        )  # fmt: skip
+        processes.append(process)
+        return process
+
+    yield begin
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def let_signals_end():
+    """What started pytest may ignore some, and what a process ignores its children ignore too."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def eventually(condition):
+    """Whether a condition comes true in a minute; a busy machine may take long to get there."""
+    deadline = time.monotonic() + 60.0
+    while not (value := condition()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return value
+
+
+def is_running(pid):
+    status = Path(f"/proc/{pid}/status")
+    return status.exists() and "State:\tZ" not in status.read_text()
+
+
+def measure_endlessly(repository):
+    with (repository / "bench" / "experiments" / "__init__.py").open("a") as file:
+        file.write(ENDLESS)
+    git(repository, "commit", "-q", "-a", "-m", "endless")
+    git(repository, "tag", "-f", "before")
 
 
 def test_a_revision_beside_itself_answers_alike(repository):
@@ -137,8 +208,102 @@ def test_a_process_that_ends_is_said_to_and_nothing_is_left(repository):
     assert worktrees(repository) == 1
 
 
-def test_the_command_says_what_it_does_and_exits_1(capsys, repository, monkeypatch):
-    monkeypatch.setattr(machine, "ROOT", repository)
+@pytest.mark.skipif(not Path("/proc").exists(), reason="reads the states of processes in /proc")
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [
+        (signal.SIGINT, 130),
+        (signal.SIGTERM, 128 + signal.SIGTERM),
+        (signal.SIGHUP, 128 + signal.SIGHUP),
+        (signal.SIGKILL, -signal.SIGKILL),
+    ],
+)
+def test_a_signal_leaves_no_worktree_no_file_and_no_process(
+    number, code, repository, temporary, start
+):
+    """Ctrl-C goes to the terminal's whole group; what SIGKILL leaves, the next start removes."""
+    measure_endlessly(repository)
+    process = start()
+    pids = temporary.with_name("pids")
+    assert eventually(lambda: pids.exists() and len(pids.read_text().split()) == 2)
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    started = {*pids.read_text().split(), *children}
+    assert len(started) == 3
+    assert all(map(is_running, started))
+    if number == signal.SIGINT:
+        os.killpg(process.pid, number)
+    else:
+        process.send_signal(number)
+    assert process.wait(timeout=60) == code
+    assert eventually(lambda: not any(map(is_running, started)))
+    assert worktrees(repository) == 1
+    if number == signal.SIGKILL:
+        assert list(temporary.iterdir())
+        assert start("--only", "no such solver").wait(timeout=60) == 2
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_rerun_beside_another_one_leaves_its_files(repository, temporary, start):
+    measure_endlessly(repository)
+    start()
+    assert eventually(temporary.with_name("pids").exists)
+    [folder] = temporary.iterdir()
+    assert start("--only", "no such solver").wait(timeout=60) == 2
+    assert (folder / "old" / "bench").is_dir()
+
+
+@pytest.mark.parametrize("content", [bytes(20_000), os.urandom(20_000)], ids=["files", "archive"])
+def test_a_full_disk_leaves_nothing(content, repository, temporary, start):
+    """A limit on the size of files stands for a full disk; only zeros fit in as an archive."""
+    (repository / "large").write_bytes(content)
+    git(repository, "add", ".")
+    git(repository, "commit", "-q", "-m", "large")
+    git(repository, "tag", "-f", "before")
+    shell = ("sh", "-c", f'ulimit -f 8; exec "{sys.executable}" -P -m plumbob "$@"', "sh")
+    process = start(program=shell)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "--rerun: expected a revision that git can check out, got 'before'" in err
+    assert err.count("\n") == 1
+    assert worktrees(repository) == 1
+    assert list(temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize("revision", ["no-such-revision", "--force", "HEAD:bench"])
+def test_what_is_no_revision_is_refused(revision, capsys, repository, monkeypatch):
+    monkeypatch.chdir(repository)
+    assert cli.run_command(["compare", f"--rerun={revision}"]) == 2
+    out, err = capsys.readouterr()
+    message = (
+        f"plumbob: --rerun: expected a revision that git can check out, got {revision!r} fatal: "
+    )
+    assert out == ""
+    assert err.startswith(message)
+    assert err.count("\n") == 1
+
+
+def test_another_project_is_refused_and_nothing_is_measured(capsys, tmp_path, monkeypatch):
+    project = tmp_path / "project"
+    project.mkdir()
+    refusal = (
+        "plumbob: --rerun: expected to be run in a clone of Plumbob, whose revisions it measures, "
+        f"got {project}: change to a clone, or compare two folders of records\n"
+    )
+    monkeypatch.chdir(project)
+    for prepare in (
+        lambda: None,
+        lambda: git(project, "init", "-q"),
+        lambda: (project / "pyproject.toml").write_text('[project]\nname = "mine"\n'),
+        lambda: (project / "pyproject.toml").write_text("no TOML"),
+    ):
+        prepare()
+        assert cli.run_command(["compare", "--rerun", "HEAD"]) == 2
+        assert capsys.readouterr() == ("", refusal)
+
+
+def test_the_command_measures_the_clone_in_which_it_is_run(capsys, repository, monkeypatch):
+    """Also in a folder of it, and where it is not the clone that Plumbob is installed from."""
+    monkeypatch.chdir(repository / "bench")
     write(repository, digit=0.75)
     arguments = ["--rerun", "before", "--fail", "accuracy", "--pairs", "2"]
     code = cli.run_command(["compare", *arguments])

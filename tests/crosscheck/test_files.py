@@ -3,14 +3,16 @@
 import os
 import signal
 import time
+import tracemalloc
+from functools import partial
 
 import numpy as np
 import pytest
 
 from crosscheck.child_process import ChildProcess, LostError
 from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
-from crosscheck.robots import files, independent_bvh
-from crosscheck.robots.deviations import INCLUDE
+from crosscheck.robots import comparisons, files, independent_bvh
+from crosscheck.robots.deviations import FRAME, INCLUDE
 from crosscheck.robots.files import (
     AGREES,
     DEVIATES,
@@ -25,6 +27,7 @@ from crosscheck.robots.files import (
     compare,
     find,
 )
+from crosscheck.robots.sweep import sweep_in_parts
 from crosscheck.tolerances import POSITION
 from reference import Skeleton, rotation
 from reference.formats import bvh, mjcf
@@ -218,9 +221,101 @@ def test_a_difference_is_excused_only_by_a_known_cause_where_mujoco_agrees(
     monkeypatch.setattr(files, "known_deviations", lambda path: [])
     assert outcomes(root)["a.xml"]["Pinocchio"].outcome == DIFFERS
     file = find([root]).files[0]
-    theirs = files.Reading("Pinocchio", DIFFERS, 0.5), files.Reading("MuJoCo", UNREAD)
+    theirs = files.Reading("Pinocchio", DIFFERS, 0.5), files.Reading("MuJoCo", LOST)
     monkeypatch.undo()
-    assert files._with_causes(file, list(theirs)) == theirs
+    assert files._with_causes(Here(None, 60.0), file, list(theirs)) == theirs
+
+
+OLD = '<option collision="all"/>'
+INNER = '<frame><joint name="k"/></frame>'  # which Pinocchio passes over
+
+
+def test_mujoco_confirms_a_known_cause_in_a_file_whose_settings_it_refuses(folder, here):
+    """An option of older MuJoCo is in the file, in one that it includes or in both."""
+    main = "<mujoco>{}<worldbody>{}</worldbody></mujoco>".format
+    included = f"<mujoco>{OLD}<default/></mujoco>"
+    root = folder(
+        a_xml=main(OLD, BODY("b", 0, INNER)), part__old_xml=included,
+        b_xml=main('<include file="part/old.xml"/>' + OLD, BODY("b", 0, INNER)),
+        c_xml=main('<include file="part/old.xml"/>', BODY("b", 0, INNER)),
+    )  # fmt: skip
+    readings = outcomes(root)
+    for name in ("a.xml", "b.xml", "c.xml"):
+        assert readings[name]["MuJoCo"].outcome == UNREAD
+        assert "unrecognized attribute: 'collision'" in readings[name]["MuJoCo"].why
+        assert readings[name]["Pinocchio"].outcome == DEVIATES
+        assert FRAME in readings[name]["Pinocchio"].why
+        assert readings[name]["Pinocchio"].difference > 0.01
+
+
+def test_a_known_cause_excuses_nothing_where_nobody_confirms_it(folder, here, monkeypatch):
+    """MuJoCo refuses more than settings; or it reads the copy otherwise than the reference."""
+    refused = BODY("b", 0, INNER).replace("size", "colour")
+    root = folder(
+        a_xml=character(refused), b_xml=character(BODY("b", 0, INNER)).replace(">", f">{OLD}", 1)
+    )
+    assert outcomes(root)["a.xml"]["MuJoCo"].outcome == UNREAD
+    assert outcomes(root)["a.xml"]["Pinocchio"].outcome == DIFFERS
+    assert outcomes(root)["b.xml"]["Pinocchio"].outcome == DEVIATES
+    read = mjcf.read
+    other = folder(other__b_xml=character(BODY("b", 1, INNER))) / "other" / "b.xml"
+    monkeypatch.setattr(mjcf, "read", lambda path, **options: read(other))
+    assert outcomes(root)["b.xml"]["Pinocchio"].outcome == DIFFERS
+
+
+def tree_of_hinges(count):
+    """A URDF of hinges, three on each link."""
+    links = "".join(f'<link name="l{i}"/>' for i in range(count + 1))
+    joints = "".join(
+        f"""<joint name="j{i}" type="continuous"><parent link="l{(i - 1) // 3}"/>
+        <child link="l{i}"/><origin xyz="0.1 0.2 0.3"/><axis xyz="0 {i % 2} 1"/></joint>"""
+        for i in range(1, count + 1)
+    )
+    return f'<robot name="tree">{links}{joints}</robot>'
+
+
+def test_a_model_of_many_freedoms_is_compared_in_little_memory(folder):
+    """Five Jacobians of 1,001 links by 1,000 freedoms take 240 MB, and are needed several times."""
+    file = find([folder(a_urdf=tree_of_hinges(1000))]).files[0]
+    files.prepare()
+    tracemalloc.start()
+    try:
+        reading = compare("MuJoCo", file)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert reading.outcome == AGREES
+    assert peak < 400e6
+
+
+@pytest.mark.parametrize("engine", ["Pinocchio", "MuJoCo"])
+def test_the_parts_of_a_model_differ_by_as_much_as_the_whole(engine, folder, monkeypatch):
+    """To the bit; and a fault in the last link alone is seen from every size of the parts."""
+    file = find([folder(a_urdf=tree_of_hinges(40))]).files[0]
+    model = files.Model("a.urdf", file.path)
+    numbers = 41 * 5 * 6 * 40
+
+    def compared(part):
+        parts = list(sweep_in_parts(engine, model, part))
+        return len(parts), comparisons.differences(parts)
+
+    count, whole = compared(np.inf)
+    assert count == 1
+    assert max(whole) < POSITION.value
+    sizes = (numbers, numbers / 2, numbers / 7, numbers / 40.5, 1)
+    assert [compared(size)[0] for size in sizes] == [1, 2, 7, 41, 41]
+    assert all(compared(size)[1] == whole for size in sizes)
+    right = comparisons.reference_kinematics
+
+    def with_a_fault(robot, q, links):
+        J = right(robot, q, links)
+        J.jacobians[:, links == 40, 3:] += np.nan if np.isnan(fault) else fault
+        return J
+
+    monkeypatch.setattr(comparisons, "reference_kinematics", with_a_fault)
+    for fault in (1e-3, np.nan):
+        for size in (np.inf, *sizes):
+            np.testing.assert_allclose(compared(size)[1].jacobians, fault, rtol=1e-9)
 
 
 BLIND = {
@@ -309,6 +404,23 @@ def crash(code):
     os.kill(os.getpid(), code) if code == signal.SIGSEGV else os._exit(code)
 
 
+def spin(seconds):
+    """Work for so much processor time [s]."""
+    end = time.process_time() + seconds
+    while time.process_time() < end:
+        pass
+
+
+class SlowToReceive:
+    """An argument that takes so much processor time [s] to be unpickled."""
+
+    def __init__(self, seconds):
+        self.seconds = seconds
+
+    def __reduce__(self):
+        return spin, (self.seconds,)
+
+
 def loud():
     os.write(1, b"loud")
     os.write(2, b"loud")
@@ -323,12 +435,25 @@ def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
             child.call(crash, signal.SIGSEGV)
         with pytest.raises(LostError, match="ends with code 3"):
             child.call(crash, 3)
-        with pytest.raises(LostError, match=r"takes longer than 0\.5 s"):
+        with pytest.raises(LostError, match=r"takes more than 0\.5 s of processor time"):
+            child.call(spin, 60.0)
+        with pytest.raises(LostError, match="gives no answer within 5 s"):
             child.call(time.sleep, 60)
         assert child.call(loud) not in (first, os.getpid())
         process = child._child.process
     assert process.returncode is not None
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_call_that_waits_for_the_processor_is_not_lost():
+    """Only its own processor time counts: no waiting, no start, nothing between two calls."""
+    with ChildProcess(partial(spin, 1.0), patience=0.5) as child:
+        process = child.call(os.getpid)
+        for _ in range(3):
+            child.call(time.sleep, 1.0)
+            child.call(spin, 0.3)
+            child.call(str, SlowToReceive(0.3))
+        assert child.call(os.getpid) == process
 
 
 def test_the_second_reader_reads_what_the_first_wrote(rng):

@@ -116,6 +116,12 @@ def test_the_jacobian_of_a_joint_is_its_row_of_all(arm, q, backend):
         assert (jacobian(arm, q, name) == everything[j]).all()
         assert (jacobian(arm, q, j) == everything[j]).all()
     assert (jacobian(arm, q, -1) == everything[-1]).all()
+    several = [4, 0, 4]
+    assert (jacobians(arm, np.array([q, q]), several) == everything[several]).all()
+    assert jacobians(arm, q, []).shape == (0, *everything.shape[1:])
+    for wrong in ([arm.joint_count], [-1], [0.5], 0):
+        with pytest.raises(ValueError, match="joints: expected "):
+            jacobians(arm, q, wrong)
 
 
 def test_joints_off_the_path_have_columns_of_zero(arm, q, backend):

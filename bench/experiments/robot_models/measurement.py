@@ -41,7 +41,7 @@ def compare(engine: str, model: Model) -> Measured:
             "links": len(swept.links),
             "joints": len(slots(swept.robot)) + len(articulation.mimics),
             "freedoms": articulation.freedom_count,
-            **differences(swept)._asdict(),
+            **differences([swept])._asdict(),
         },
         {"cause": CAUSES.get((engine, model.name), ""), "free mimics": swept.free_mimics},
     )
