@@ -6,6 +6,7 @@ import numpy as np
 
 from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.judgement import CaseJudgement
+from reference.arguments import digits_apart
 
 from .geometry import outputs, pose
 
@@ -70,16 +71,8 @@ def written(row: Row) -> tuple[str, str]:
         for a, b in zip(row.theirs, row.ours, strict=True)
     ]
     worst = int(np.argmax(apart))
-    for digits in (4, 8, 12, 17):
-        theirs, ours = ([_number(one, digits) for one in side] for side in (row.theirs, row.ours))
-        if theirs[worst] != ours[worst]:
-            break
-    return _line(theirs), _line(ours)
-
-
-def _number(number: float, digits: int) -> str:
-    return f"{number:>{digits + 5}.{digits}g}".replace("nan", "NaN")
-
-
-def _line(numbers: list[str]) -> str:
-    return "  ".join(numbers)
+    digits = digits_apart(row.theirs[worst], row.ours[worst], 4)
+    sides = [[f"{x:.{digits}g}".replace("nan", "NaN") for x in side] for side in row[1:]]
+    width = max(len(text) for side in sides for text in side)
+    theirs, ours = ("  ".join(text.rjust(width) for text in side) for side in sides)
+    return theirs, ours
