@@ -1,5 +1,6 @@
 """The command line. Engines, the reference and matplotlib are imported inside the commands."""
 
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -29,6 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     A reader that has seen enough, such as `head`, ends the program without a word. The signal for
     it stays ignored: it would also strike where a worker has ended that we are writing to.
     """
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a letter that it lacks costs no verdict
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = run_command(arguments)
         sys.stdout.flush()

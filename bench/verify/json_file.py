@@ -7,6 +7,7 @@ import msgspec
 from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.greeting import Greeting
 from crosscheck.conformance.judgement import CaseJudgement, Finding, Report, TaskReport
+from crosscheck.conformance.message import plain
 
 from ..text import all_visible
 from .words import GOOD, Say, advice, passed
@@ -87,7 +88,7 @@ class ReportRecord(msgspec.Struct, frozen=True):
 
 def text(report: Report, say: Say) -> str:
     """Return the file's text."""
-    packed = msgspec.json.encode(record(report, say))
+    packed = msgspec.json.encode(record(report, say), enc_hook=plain)
     return msgspec.json.format(packed, indent=1).decode() + "\n"
 
 
@@ -142,6 +143,5 @@ def _case(one: CaseJudgement, say: Say) -> CaseRecord:
 
 def _finding(one: Finding, say: Say) -> FindingRecord:
     return FindingRecord(
-        one.law, _name(one), float(one.error), float(one.tolerance), one.unit, say(one.sentence),
-        None if one.where is None else int(one.where),
-    )  # fmt: skip
+        one.law, _name(one), one.error, one.tolerance, one.unit, say(one.sentence), one.where
+    )

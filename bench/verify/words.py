@@ -36,7 +36,7 @@ class Presentation(NamedTuple):
     say: Say
     language: str
     solver: Sequence[str]
-    files: Mapping[tuple[str, str], Path]
+    files: Mapping[tuple[str, str], Path] = {}
 
 
 def speaker(language: str) -> Say:
