@@ -10,7 +10,7 @@ from crosscheck.conformance.judgement import CaseJudgement, Finding, Report, Tas
 from crosscheck.conformance.message import plain
 
 from ..text import all_visible
-from .words import GOOD, Say, advice, passed
+from .words import GOOD, Say, advice, passed, remarks
 
 FORMAT: Literal["plumbob verify"] = "plumbob verify"
 VERSION: Literal[1] = 1
@@ -97,7 +97,7 @@ def record(report: Report, say: Say) -> ReportRecord:
     return ReportRecord(
         FORMAT, VERSION, _name(report), report.verdict in GOOD, report.seed,
         _greeting(report.greeting),
-        [say(one) for one in report.remarks], say(advice(report.tasks)),
+        [say(one) for one in remarks(report)], say(advice(report.tasks)),
         [_task(task, say) for task in report.tasks],
     )  # fmt: skip
 

@@ -66,8 +66,10 @@ def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJ
         return CaseJudgement(one.case, one.answer, (), {"forces": expected}, None, seconds)
     given, allowed = one.answer.values["forces"], tolerance(p, greeting.epsilon)
     findings = _findings(one, asked, p, expected, allowed)
-    gap = float(np.abs(given - expected).max()) / max(float(np.abs(expected).max()), 1e-300)
-    digits = float(min(16.0, max(0.0, -np.log10(max(gap, 1e-16))))) if np.isfinite(gap) else None
+    size, gap = float(np.abs(expected).max()), float(np.abs(given - expected).max())
+    digits = None
+    if size > allowed and np.isfinite(gap):
+        digits = float(min(16.0, max(0.0, -np.log10(max(gap / size, 1e-16)))))
     return CaseJudgement(
         one.case, one.answer, tuple(findings), {"forces": expected}, digits, seconds
     )
