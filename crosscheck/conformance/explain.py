@@ -188,6 +188,21 @@ def either(said: Sequence[Sentence]) -> Sentence:
     )
 
 
+def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -> Sentence | None:
+    """Return the law that broke first along the computation, and the joint where there are some."""
+    for one in judgements:
+        for finding in one.findings:
+            if finding.verdict >= Verdict.WRONG:
+                return sentence(
+                    "The first law to break is '{law}', at joint {joint} of the case '{case}': "
+                    "{why}"
+                    if at_joints and finding.where is not None
+                    else "The first law to break is '{law}', in the case '{case}': {why}",
+                    law=finding.law, joint=finding.where, case=one.case.name, why=finding.sentence,
+                )  # fmt: skip
+    return None
+
+
 def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
     """Return hints at what no variant explains."""
     findings = [finding for one in judgements for finding in one.findings]

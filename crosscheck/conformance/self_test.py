@@ -21,7 +21,7 @@ from ..engines.mujoco_mass_spring import MujocoMassSpring
 from .case import Case
 from .functions import FunctionContestant
 from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
-from .judgement import Report, Verdict
+from .judgement import Verdict
 from .kinematics.faults import FAULTS, Switches, switches
 from .kinematics.predictions import predict_forward, predict_track, solve
 from .kinematics.robot_inverse_kinematics import FAULTS as ROBOT_FAULTS
@@ -93,14 +93,10 @@ class Trial(NamedTuple):
         return self.verdict <= Verdict.RIGHT_BUT and self.named
 
 
-def judged(subject: Subject) -> Report:
-    """Judge a subject as `verify` judges anyone."""
-    return verify(FunctionContestant({subject.task: subject.function}, subject.greeting))
-
-
 def attempt(subject: Subject) -> Trial:
-    """Return what the judge says of a subject."""
-    report = judged(subject).tasks[0]
+    """Judge a subject as `verify` judges anyone."""
+    contestant = FunctionContestant({subject.task: subject.function}, subject.greeting)
+    report = verify(contestant).tasks[0]
     least = Verdict.RIGHT_BUT if subject.fault else Verdict.WRONG
     laws = frozenset(
         finding.law

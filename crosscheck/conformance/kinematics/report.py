@@ -8,10 +8,10 @@ import numpy as np
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import explain, hints_of
+from ..explain import explain, first_broken, hints_of
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict, smallest_failure
-from ..sentence import Sentence, sentence
+from ..judgement import CaseJudgement, Diagnosis, TaskReport, smallest_failure
+from ..sentence import Sentence
 from .faults import describe
 from .predictions import variants
 
@@ -71,23 +71,6 @@ def report(
     hints = hints_of(judgements)
     broken = None
     if smallest is not None and not diagnosis.explained:
-        broken = _first_broken(smallest)
+        broken = first_broken([smallest], at_joints=True)
     told = Diagnosis(diagnosis.explanations, diagnosis.behaviour, broken, hints, diagnosis.tried)
     return TaskReport(task, method, judgements, told)
-
-
-def _first_broken(smallest: CaseJudgement) -> Sentence | None:
-    """Return which law broke first along the computation, in the smallest failing case."""
-    for finding in smallest.findings:
-        if finding.verdict >= Verdict.WRONG and finding.where is not None:
-            return sentence(
-                "The first law to break is '{law}', at joint {joint} of the case '{case}': {why}",
-                law=finding.law, joint=finding.where, case=smallest.case.name,
-                why=finding.sentence,
-            )  # fmt: skip
-        if finding.verdict >= Verdict.WRONG:
-            return sentence(
-                "The first law to break is '{law}', in the case '{case}': {why}",
-                law=finding.law, case=smallest.case.name, why=finding.sentence,
-            )  # fmt: skip
-    return None

@@ -16,7 +16,7 @@ from reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import either, together
+from ..explain import either, first_broken, together
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -267,7 +267,7 @@ def _diagnose(
                 matches.append(faults)
         if matches:
             return Diagnosis((_explanation(matches),), tried=tried)
-    return Diagnosis(first_broken=laws.first_broken(judgements), tried=tried)
+    return Diagnosis(first_broken=first_broken(judgements), tried=tried)
 
 
 def _matches(faults: Sequence[Fault], p: Problem, given: Mapping[str, Any], epsilon: float) -> bool:

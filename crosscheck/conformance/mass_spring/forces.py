@@ -12,7 +12,7 @@ from reference.mass_spring import forces as reference_forces
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import Variant, either, explain, together
+from ..explain import Variant, either, explain, first_broken, together
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -165,7 +165,7 @@ def _diagnose(
     explanations, tried = explain(
         variants(), [one for one, _ in order], partial(_relative, greeting.epsilon), describe
     )
-    first = None if explanations else laws.first_broken(judgements)
+    first = None if explanations else first_broken(judgements)
     return Diagnosis(explanations, None, first, (), tried)
 
 

@@ -1,6 +1,6 @@
 """Laws that a step keeps whatever its solver is, and the laws of what it declares."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +9,7 @@ from reference.arguments import FloatArray
 from reference.judging.step import judge_step
 
 from ..contestant import Answer, Asked
-from ..judgement import CaseJudgement, Finding, Verdict
+from ..judgement import Finding, Verdict
 from ..sentence import Sentence, sentence
 from .model import Model, simulate
 from .problem import Problem, accelerations, damper_forces, state_of, system_of
@@ -294,17 +294,3 @@ def predicted(p: Problem, model: Model) -> Mapping[str, Any]:
             return simulate(p, model)
         except np.linalg.LinAlgError:
             return {}
-
-
-def first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
-    """Return the first case and law that broke."""
-    for one in judgements:
-        for finding in one.findings:
-            if finding.verdict >= Verdict.WRONG:
-                return sentence(
-                    "The law that broke first is {law}, in the case {case}: {said}",
-                    law=finding.law,
-                    case=one.case.name,
-                    said=finding.sentence,
-                )
-    return None

@@ -13,7 +13,7 @@ from reference.implicit_euler import ImplicitEuler
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import hints_of, together
+from ..explain import first_broken, hints_of, together
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -314,7 +314,7 @@ def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
 
     The cases add one aspect after another.
     """
-    told = laws.first_broken(judgements)
+    told = first_broken(judgements)
     first = next((one for one in judgements if one.verdict > Verdict.RIGHT_BUT), None)
     if told is None or first is None or first.case.name != told.values["case"]:
         return told

@@ -354,7 +354,7 @@ def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family)
         judged("one", "flight", first), judged("two", family, Verdict.WRONG),
         judged("three", "cloth", Verdict.WRONG),
     ]))  # fmt: skip
-    assert "in the case two: It is off." in told
+    assert "in the case 'two': It is off." in told
     assert (str(stepping._TRACES[family]) in told) is (first is not Verdict.UNDECIDED)
     assert stepping._first_broken([judged("one", "flight", first)]) is None
 
