@@ -12,6 +12,8 @@ from .geometry import outputs, pose
 
 # Differences below this part of the largest one are not where two answers part.
 _PARTING = 0.01
+# An output that differs by less than this part of another one is rounded, not wrong.
+_ROUNDED = 1e-4
 
 
 class Row(NamedTuple):
@@ -30,7 +32,13 @@ def rows(judgement: CaseJudgement, most: int = 3) -> list[Row]:
     for name, ours in judgement.expected.items():
         if name in judgement.answer.values:
             found += _of_output(name, judgement.answer.values[name], ours, most)
-    return (found or _effector(judgement))[:most]
+    largest = max(map(_gap, found), default=0.0)
+    parted = [row for row in found if _gap(row) >= _ROUNDED * largest]
+    return (parted or _effector(judgement))[:most]
+
+
+def _gap(row: Row) -> float:
+    return float(np.nan_to_num(np.abs(np.subtract(row.theirs, row.ours)), nan=np.inf).max())
 
 
 def _of_output(name: str, theirs: Any, ours: Any, most: int) -> list[Row]:

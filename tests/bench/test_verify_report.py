@@ -440,6 +440,15 @@ def test_numbers_are_shown_from_where_answers_part():
     assert [row.label for row in comparison.rows(one)] == ["positions[2]", "positions[3]"]
 
 
+def test_an_output_that_is_only_rounded_is_not_shown_beside_a_wrong_one():
+    ours = {"positions": np.eye(3)[:2], "rotations": np.eye(4)[:2]}
+    theirs = {name: value + 1e-8 for name, value in ours.items()}
+    one = answered("forward_kinematics", {}, theirs, ours)
+    assert {row.label[:9] for row in comparison.rows(one, 9)} == {"positions", "rotations"}
+    theirs["positions"] = theirs["positions"] + 1e-3
+    assert {row.label[:9] for row in comparison.rows(one, 9)} == {"positions"}
+
+
 def test_quaternions_of_opposite_sign_do_not_part():
     ours = np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]])
     one = answered("forward_kinematics", {}, {"rotations": -ours}, {"rotations": ours})
