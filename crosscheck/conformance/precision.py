@@ -13,7 +13,7 @@ import numpy as np
 
 from .contestant import Answer, Asked
 from .greeting import Greeting
-from .judgement import TaskReport, Verdict
+from .judgement import TaskReport
 from .sentence import Sentence, sentence
 
 # So many numbers of an output decide, since 99 % of doubles have 15 digits or more; requests of
@@ -28,9 +28,9 @@ AS_SINGLE = sentence(
     '"precision": "single" in the greeting (of a Python file, in PLUMBOB).'
 )
 OFF = sentence(
-    "The answers are off by what single precision loses and are judged as such. Look for a float "
-    'or a constant of few digits; if it is meant, declare "precision": "single" in the greeting '
-    "(of a Python file, in PLUMBOB)."
+    "The answers are as inexact as in single precision and are judged as such. Look for a float or "
+    'a constant of few digits; if it is meant, declare "precision": "single" in the greeting (of a '
+    "Python file, in PLUMBOB)."
 )
 
 
@@ -109,7 +109,6 @@ def _long(values: Iterable[Any]) -> np.ndarray:
 
 
 def is_off_by_single(report: TaskReport) -> bool:
-    """Return whether answers are off by what single precision loses, and nothing explains it."""
+    """Return whether answers are off by what single precision loses, in most cases."""
     digits = [one.digits for one in report.judgements if one.digits is not None] or [0.0]
-    is_lost = min(digits) >= LEFT[0] and float(np.median(digits)) <= LEFT[1]
-    return report.verdict is Verdict.WRONG and is_lost and not report.diagnosis.explained
+    return min(digits) >= LEFT[0] and float(np.median(digits)) <= LEFT[1]

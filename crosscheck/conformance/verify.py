@@ -90,9 +90,11 @@ def judge_cases(
     judge = DISCIPLINES[task].judge
     greeting, why = precision.shown(asked, contestant.greeting)
     report = judge(asked, greeting, method)
-    if greeting.precision == "double" and precision.is_off_by_single(report):
+    unexplained = report.verdict is Verdict.WRONG and not report.diagnosis.explained
+    if unexplained and greeting.precision == "double":
         single = judge(asked, msgspec.structs.replace(greeting, precision="single"), method)
-        if single.verdict <= Verdict.RIGHT_BUT:
+        is_right = single.verdict <= Verdict.RIGHT_BUT and precision.is_off_by_single(report)
+        if is_right or single.diagnosis.explained:
             report, why = single, precision.OFF
     return replace(report, precision=why)
 

@@ -82,7 +82,21 @@ PRINTERS = {
     "to_string": (printed("%f"), "have only 6 significant digits"),
     "twelve digits": (printed("%.12g"), "have only 12 significant digits"),
 }
-EACH_PRINTER = pytest.mark.parametrize("printer", PRINTERS)
+
+
+def of_each_task(printers, quick=()):
+    """Parametrise over tasks and printers; steps take seconds and run by default with some."""
+    return pytest.mark.parametrize(
+        ("task", "printer"),
+        [
+            pytest.param(
+                task, printer,
+                marks=pytest.mark.slow if task == "mass_spring_step" and printer not in quick
+                else (),
+            )
+            for task in TASKS for printer in printers
+        ],
+    )  # fmt: skip
 
 
 def contestant(task, function, rounded=np.asarray, **greeting):
@@ -96,8 +110,7 @@ def judged(*arguments, **greeting):
     return verify(contestant(*arguments, **greeting)).tasks[0]
 
 
-@EACH_TASK
-@EACH_PRINTER
+@of_each_task(PRINTERS, ("float", "cout"))
 def test_a_right_solver_is_right_to_the_digits_that_it_prints(task, printer):
     rounded, words = PRINTERS[printer]
     report = judged(task, TASKS[task][0](None), rounded)
@@ -107,8 +120,7 @@ def test_a_right_solver_is_right_to_the_digits_that_it_prints(task, printer):
     assert report.diagnosis.explanations == ()
 
 
-@EACH_TASK
-@pytest.mark.parametrize("printer", ["float", "float, nine digits", "cout", "to_string"])
+@of_each_task(["float", "float, nine digits", "cout", "to_string"], ("cout",))
 def test_a_wrong_solver_stays_wrong_and_its_fault_is_named(task, printer):
     make, key, _ = TASKS[task]
     rounded, words = PRINTERS[printer]
@@ -127,8 +139,7 @@ def test_double_precision_is_believed_of_every_case_alone(task):
         assert judge_cases(door, task, method, [case]).precision is None, case.name
 
 
-@EACH_TASK
-@pytest.mark.parametrize("printer", ["float", "cout"])
+@of_each_task(["float", "cout"])
 def test_one_answer_of_few_digits_excuses_nothing(task, printer):
     make, rounded = TASKS[task][0](None), PRINTERS[printer][0]
     asked = []
@@ -154,15 +165,30 @@ def test_a_fault_as_small_as_single_precision_in_some_cases_is_no_precision():
     assert report.verdict is Verdict.WRONG
 
 
-def test_answers_off_by_single_precision_are_judged_so_and_the_float_is_hinted_at():
-    right = forward_kinematics(None)
+@EACH_TASK
+@pytest.mark.parametrize("is_right", [True, False])
+def test_answers_of_inputs_in_single_precision_are_judged_so_and_a_float_is_hinted_at(
+    task, is_right
+):
+    make, key, _ = TASKS[task]
+    solver = make(None if is_right else key)
 
-    def function(local_rotations, offsets, **inputs):
-        return right(local_rotations=as_float(local_rotations), offsets=as_float(offsets), **inputs)
+    def function(**inputs):
+        arrays = {
+            name: as_float(value)
+            for name, value in inputs.items()
+            if isinstance(value, np.ndarray) and value.dtype.kind == "f"
+        }
+        return solver(**(inputs | arrays))
 
-    report = judged("forward_kinematics", function)
-    assert report.verdict is Verdict.RIGHT_BUT
+    report = judged(task, function)
     assert "Look for a float" in str(report.precision)
+    if is_right:
+        assert report.verdict is Verdict.RIGHT_BUT
+        assert report.diagnosis.explanations == ()
+    else:
+        assert report.verdict is Verdict.WRONG
+        assert key in report.diagnosis.explanations[0].faults
 
 
 @EACH_TASK
