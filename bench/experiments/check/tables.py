@@ -15,8 +15,8 @@ def _verdict(record: Record) -> str:
     if record.arrays["held"]:
         return "held"
     difference, tolerance = float(record.arrays["difference"]), float(record.arrays["tolerance"])
-    texts = distinct_texts(difference, tolerance, 2)
-    return "MISSED: {} ({}, tolerance {})".format(record.notes["missed"], *texts)
+    by = " by {}, more than {}".format(*distinct_texts(difference, tolerance, 2))
+    return f"MISSED: {record.notes['missed']}{by if difference > tolerance else ''}"
 
 
 def _summary(records: Sequence[Record]) -> Summary:
