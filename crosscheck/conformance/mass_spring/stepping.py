@@ -208,7 +208,10 @@ def _diagnose(
     behaviour = None
     if found and not found[0].faults and undeclared:
         behaviour = sentence(
-            "It behaves like {model}.", model=describe_model(honest_options(found, greeting.step))
+            "In small cases it behaves like {model}, which it is held against."
+            if any(one.verdict >= Verdict.WRONG for one in judgements)
+            else "It behaves like {model}.",
+            model=describe_model(honest_options(found, greeting.step)),
         )
     hints = hints_of(judgements)
     diagnosis = Diagnosis(explanations, behaviour, None, hints, search.tried)

@@ -342,6 +342,21 @@ def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told():
     assert not any("Another model than converged" in words for words in sentences)
 
 
+def test_a_step_that_is_wrong_in_large_systems_is_not_said_to_behave_like_a_right_one():
+    right = Stepper(LINEARISED)
+
+    def step(**inputs):
+        found = right(**inputs)
+        found["positions"] = found["positions"] + 0.01 * (len(inputs["masses"]) > 8)
+        return found
+
+    step.__signature__ = right.__signature__
+    for function, words in ((step, "In small cases it behaves like"), (right, "It behaves like")):
+        found = report(function)
+        assert str(found.diagnosis.behaviour).startswith(f"{words} one linearised implicit step")
+        assert (found.verdict is Verdict.WRONG) is (function is step)
+
+
 @pytest.mark.parametrize("first", [Verdict.RIGHT, Verdict.RIGHT_BUT, Verdict.UNDECIDED])
 @pytest.mark.parametrize("family", ["springs", "dampers", "pins", "h changes", "cloth"])
 def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family):
