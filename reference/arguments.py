@@ -318,8 +318,8 @@ def _bounded(kind: str, name: str, value: ArrayLike, *trailing: int | str) -> Fl
     if not np.isfinite(result).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
         raise ValueError(f"{name}: expected finite numbers, got {result[where]} at index {where}")
-    got, bound = distinct_texts(largest, LARGEST_COORDINATE)
-    raise ValueError(f"{name}: expected {kind} of at most {bound}, got {got}")
+    number, bound = distinct_texts(largest, LARGEST_COORDINATE)
+    raise ValueError(f"{name}: expected {kind} of at most {bound}, got {number}")
 
 
 def _converted(name: str, value: Any) -> np.ndarray:

@@ -33,8 +33,8 @@ def rows(judgement: CaseJudgement, most: int = 3) -> list[Row]:
         if name in judgement.answer.values:
             found += _of_output(name, judgement.answer.values[name], ours, most)
     largest = max(map(_gap, found), default=0.0)
-    parted = [row for row in found if _gap(row) >= _ROUNDED * largest]
-    return (parted or _effector(judgement))[:most]
+    wrong_rows = [row for row in found if _gap(row) >= _ROUNDED * largest]
+    return (wrong_rows or _effector(judgement))[:most]
 
 
 def _gap(row: Row) -> float:

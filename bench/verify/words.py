@@ -85,10 +85,10 @@ def introduction(report: Report) -> Sentence:
 def remarks(report: Report) -> Iterator[Sentence]:
     """Yield what is said beside the verdicts, precision first, with its tasks if not of all."""
     reasons = {str(task.precision): task.precision for task in report.tasks if task.precision}
-    for text, what in reasons.items():
+    for text, reason in reasons.items():
         tasks = [title(task) for task in report.tasks if str(task.precision) == text]
-        of_some = sentence("{tasks}: {what}", tasks=", ".join(tasks), what=what)
-        yield of_some if len(tasks) < len(report.tasks) else what
+        partial = sentence("{tasks}: {reason}", tasks=", ".join(tasks), reason=reason)
+        yield partial if len(tasks) < len(report.tasks) else reason
     yield from report.remarks
 
 

@@ -5,7 +5,7 @@ fewest faults are tried first, so that a combination is named only where no part
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import groupby
+from itertools import chain, groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -190,22 +190,23 @@ def either(said: Sequence[Sentence]) -> Sentence:
 
 def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -> Sentence | None:
     """Return the law that broke first along the computation, and the joint where there are some."""
-    for one in judgements:
-        for finding in one.findings:
+    for judgement in judgements:
+        for finding in judgement.findings:
             if finding.verdict >= Verdict.WRONG:
                 return sentence(
                     "The first law to break is '{law}', at joint {joint} of the case '{case}': "
                     "{why}"
                     if at_joints and finding.where is not None
                     else "The first law to break is '{law}', in the case '{case}': {why}",
-                    law=finding.law, joint=finding.where, case=one.case.name, why=finding.sentence,
+                    law=finding.law, joint=finding.where, case=judgement.case.name,
+                    why=finding.sentence,
                 )  # fmt: skip
     return None
 
 
 def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
     """Return hints at what no variant explains."""
-    findings = [finding for one in judgements for finding in one.findings]
+    findings = chain.from_iterable(judgement.findings for judgement in judgements)
     broken = {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
     hints = []
     if broken & {"equal answers", "equal requests"}:

@@ -45,19 +45,21 @@ class Rounded(Greeting, frozen=True):
         return max(super().epsilon, 10.0 ** (1 - self.digits) / 8.0)
 
 
-def shown(asked: Sequence[Asked], greeting: Greeting) -> tuple[Greeting, Sentence | None]:
+def judging_greeting(
+    asked: Sequence[Asked], greeting: Greeting
+) -> tuple[Greeting, Sentence | None]:
     """Return the greeting that answers are judged by, and why it is another than was sent."""
     outputs = [numbers for numbers in _outputs(asked).values() if len(numbers) >= LEAST]
-    greetings = [_judged_as(numbers, greeting) for numbers in outputs]
+    greetings = [_greeting_of(numbers, greeting) for numbers in outputs]
     return max(greetings, key=lambda pair: pair[0].epsilon, default=(greeting, None))
 
 
-def _judged_as(numbers: np.ndarray, greeting: Greeting) -> tuple[Greeting, Sentence | None]:
-    digits, why = _digits(numbers), AS_SINGLE
+def _greeting_of(numbers: np.ndarray, greeting: Greeting) -> tuple[Greeting, Sentence | None]:
+    digits, reason = _digits(numbers), AS_SINGLE
     if digits in SINGLE or (numbers.astype(np.float32) == numbers).all():
         digits = SINGLE[1]
     elif FEWEST <= digits <= MOST:
-        why = sentence(
+        reason = sentence(
             "The answers have only {digits} significant digits (cout, %g and to_string print 6) "
             "and are judged by those. Print 17, or 9 and declare "
             '"precision": "single" in the greeting.',
@@ -67,15 +69,16 @@ def _judged_as(numbers: np.ndarray, greeting: Greeting) -> tuple[Greeting, Sente
         return greeting, None
     precision = "single" if digits <= SINGLE[1] else greeting.precision
     fields = msgspec.structs.asdict(greeting) | {"precision": precision, "digits": digits}
-    judged = Rounded(**fields)
-    return (judged, why) if judged.epsilon > greeting.epsilon else (greeting, None)
+    coarse = Rounded(**fields)
+    return (coarse, reason) if coarse.epsilon > greeting.epsilon else (greeting, None)
 
 
 def _digits(numbers: np.ndarray) -> int:
     """Return to how many significant digits numbers are rounded, or decimal places if to those."""
-    parts = _decimals(numbers)
-    digits, places = [len(one.digits) for one in parts], [-int(one.exponent) for one in parts]
-    is_fixed = places.count(max(places)) > max(digits.count(max(digits)), len(parts) / 2)
+    decimals = _decimals(numbers)
+    digits = [len(decimal.digits) for decimal in decimals]
+    places = [-int(decimal.exponent) for decimal in decimals]
+    is_fixed = places.count(max(places)) > max(digits.count(max(digits)), len(digits) / 2)
     return max(places) if is_fixed and max(digits) <= MOST else max(digits)
 
 
@@ -90,25 +93,26 @@ def _outputs(asked: Sequence[Asked]) -> dict[str, np.ndarray]:
     Of a request in short decimals a double may answer so. A residual is a claim, not an answer.
     """
     outputs: dict[str, np.ndarray] = {}
-    for one in asked:
-        inputs = _long(one.case.inputs.values())
-        full = sum(len(decimal.digits) > MOST for decimal in _decimals(inputs))
-        if isinstance(one.answer, Answer) and full > FULL * len(inputs):
-            for name, value in one.answer.values.items():
+    for question in asked:
+        inputs = _long_numbers(question.case.inputs.values())
+        count = sum(len(decimal.digits) > MOST for decimal in _decimals(inputs))
+        if isinstance(question.answer, Answer) and count > FULL * len(inputs):
+            for name, value in question.answer.values.items():
                 if name != "residual":
-                    numbers = np.setdiff1d(_long([value]), inputs)
+                    numbers = np.setdiff1d(_long_numbers([value]), inputs)
                     outputs[name] = np.union1d(outputs.get(name, ()), numbers)
     return outputs
 
 
-def _long(values: Iterable[Any]) -> np.ndarray:
+def _long_numbers(values: Iterable[Any]) -> np.ndarray:
     """Return those finite numbers that need more than 12 bits: not 0, 1 or a half."""
-    numbers = np.concatenate([np.ravel(one) for one in values if not isinstance(one, str)])
+    numbers = np.concatenate([np.ravel(value) for value in values if not isinstance(value, str)])
     numbers = numbers[np.isfinite(numbers)].astype(float)
     return numbers[2.0**12 * np.frexp(numbers)[0] % 1.0 != 0.0]
 
 
 def is_off_by_single(report: TaskReport) -> bool:
     """Return whether answers are off by what single precision loses, in most cases."""
-    digits = [one.digits for one in report.judgements if one.digits is not None] or [0.0]
+    counts = (judgement.digits for judgement in report.judgements)
+    digits = [count for count in counts if count is not None] or [0.0]
     return min(digits) >= LEFT[0] and float(np.median(digits)) <= LEFT[1]

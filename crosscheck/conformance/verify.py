@@ -88,15 +88,15 @@ def judge_cases(
     """Ask a solver some cases of a task and judge its answers; arguments as of `verify`."""
     asked = list(_ask(contestant, cases, partial(notify, task)))
     judge = DISCIPLINES[task].judge
-    greeting, why = precision.shown(asked, contestant.greeting)
+    greeting, reason = precision.judging_greeting(asked, contestant.greeting)
     report = judge(asked, greeting, method)
     unexplained = report.verdict is Verdict.WRONG and not report.diagnosis.explained
     if unexplained and greeting.precision == "double":
         single = judge(asked, msgspec.structs.replace(greeting, precision="single"), method)
         is_right = single.verdict <= Verdict.RIGHT_BUT and precision.is_off_by_single(report)
         if is_right or single.diagnosis.explained:
-            report, why = single, precision.OFF
-    return replace(report, precision=why)
+            report, reason = single, precision.OFF
+    return replace(report, precision=reason)
 
 
 def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple[str, str]]:

@@ -195,8 +195,8 @@ def _limits(joint: _Joint, crossed: str) -> tuple[float, float]:
     (lower,), (upper,) = limit.limits("lower", (0.0,)), limit.limits("upper", (0.0,))
     if lower <= upper:
         return lower, upper
-    got = distinct_texts(lower, upper)
-    problem = "expected lower <= upper, got lower {}, upper {}".format(*got)
+    bounds = distinct_texts(lower, upper)
+    problem = "expected lower <= upper, got lower {}, upper {}".format(*bounds)
     if crossed == "refused" or max(abs(lower), abs(upper)) > LARGEST_COORDINATE:
         raise joint.element.error(problem)
     warn(str(joint.element.error(f"{problem}; read as {crossed}")))

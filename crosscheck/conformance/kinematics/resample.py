@@ -233,8 +233,8 @@ def _gaps(points: FloatArray, at: FloatArray, case: Case, bound: float) -> Findi
             error=error,
         )
         verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else Verdict.WRONG
-        allowed = UNEVEN + 4.0 * bound / max(float(kinds[2].mean()), bound)
-        return laws.bounded("spacing", error, allowed, "", told, verdict=verdict)
+        tolerance = UNEVEN + 4.0 * bound / max(float(kinds[2].mean()), bound)
+        return laws.bounded("spacing", error, tolerance, "", told, verdict=verdict)
     return _widest(kinds, case, bound)
 
 

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import chain, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -224,16 +224,16 @@ def _diagnose(
 
 def _nearest(asked: Sequence[Asked], problems: Problems, greeting: Greeting) -> Sentence:
     """Return which of the steps that are known comes nearest to the answers to the probes."""
-    probes = [one for one in asked if one.case.facts.get("probe")]
+    probes = [question for question in asked if question.case.facts.get("probe")]
     usual = {option.aspect: option for option in honest_options((), greeting.step)}
     steps = []
-    for how, damper in product(honest(greeting.step)["integrator"], DAMPERS):
-        velocity = HONEST_VELOCITIES[how.fields["integrator"].explicit]
-        step = usual | {"integrator": how, "damper": damper, "velocity": velocity}
+    for integrator, damper in product(honest(greeting.step)["integrator"], DAMPERS):
+        velocity = HONEST_VELOCITIES[integrator.fields["integrator"].explicit]
+        step = usual | {"integrator": integrator, "damper": damper, "velocity": velocity}
         if compatible(step):
             errors = _errors(tuple(step.values()), probes, problems, greeting)
             steps.append((float(np.median(errors)), max(errors), tuple(step.values())))
-    median, worst, options = min(steps, key=lambda one: one[0])
+    median, worst, options = min(steps, key=lambda step: step[0])
     return sentence(
         "The nearest step that is known is {model}; it differs by {median:.2g} of a displacement "
         "in the median small case, by {worst:.2g} in the worst.",
@@ -244,7 +244,7 @@ def _nearest(asked: Sequence[Asked], problems: Problems, greeting: Greeting) -> 
 def _what_holds(judgements: Sequence[CaseJudgement]) -> Sentence:
     """Return the laws that no answer breaks."""
     verdicts: dict[str, Verdict] = {}
-    for finding in (finding for one in judgements for finding in one.findings):
+    for finding in chain.from_iterable(judgement.findings for judgement in judgements):
         verdicts[finding.law] = max(finding.verdict, verdicts.get(finding.law, Verdict.RIGHT))
     names = ", ".join(law for law, verdict in verdicts.items() if not verdict)
     return sentence("What holds in every case: {laws}.", laws=names or "–")
@@ -289,14 +289,14 @@ def _errors(
 ) -> list[float]:
     """Return how far each answer is from a step with these options, relative to what it moves."""
     errors = []
-    for one in asked:
-        if isinstance(one.answer, Answer):
-            plain = problems[one.case.name]
+    for question in asked:
+        if isinstance(question.answer, Answer):
+            plain = problems[question.case.name]
             p, model = apply(options, plain, Model(damper="none"))
             expected = laws.predicted(p, model)
             allowed = rounding(plain, model, greeting.epsilon)
             errors.append(
-                apart(plain, expected, one.answer.values, allowed) if expected else np.inf
+                apart(plain, expected, question.answer.values, allowed) if expected else np.inf
             )
     return errors
 
@@ -317,12 +317,13 @@ def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
 
     The cases add one aspect after another.
     """
-    told = first_broken(judgements)
-    first = next((one for one in judgements if one.verdict > Verdict.RIGHT_BUT), None)
-    if told is None or first is None or first.case.name != told.values["case"]:
-        return told
-    trace = _TRACES.get(first.case.family, _TRACES["cloth"])
-    return sentence("{broken} {trace}", broken=told, trace=trace)
+    law = first_broken(judgements)
+    doubtful = (one.case for one in judgements if one.verdict > Verdict.RIGHT_BUT)
+    case = next(doubtful, None)
+    if law is None or case is None or case.name != law.values["case"]:
+        return law
+    trace = _TRACES.get(case.family, _TRACES["cloth"])
+    return sentence("{law} {trace}", law=law, trace=trace)
 
 
 _TRACES: Mapping[str, Sentence] = {

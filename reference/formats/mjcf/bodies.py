@@ -144,8 +144,8 @@ class _Tree:
             return -INFINITY, INFINITY
         if lower >= upper or (kind == "ball" and lower != 0.0):
             least = "0" if kind == "ball" else "the least"
-            got = " to ".join(distinct_texts(lower, upper))
-            raise joint.error(f"expected a range from {least} up, got {got}")
+            bounds = " to ".join(distinct_texts(lower, upper))
+            raise joint.error(f"expected a range from {least} up, got {bounds}")
         return lower, upper
 
     def check_aligned(self, joint: Element) -> None:
