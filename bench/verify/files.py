@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -62,7 +63,8 @@ class Files(NamedTuple):
             for task in report.tasks
         }
         context = context._replace(files={key: path for key, path in paths.items() if path})
-        terminal.show(report, context)
+        with suppress(BrokenPipeError, SystemExit):  # files are wanted though nobody reads this
+            terminal.show(report, context)
         makers = (
             lambda: json_file.text(report, context.say),
             lambda: junit.text(report, context.say),

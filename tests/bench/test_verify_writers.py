@@ -115,6 +115,18 @@ def test_the_verdict_is_on_the_screen_before_any_file_is_written(report, monkeyp
     assert order == ["screen", "verdict.json", "verdict.xml", "index.html"]
 
 
+def test_files_are_written_though_nobody_reads_the_screen(report, monkeypatch):
+    def closed(*_):
+        raise SystemExit(1) from BrokenPipeError()
+
+    monkeypatch.setattr(terminal, "show", closed)
+    context = Presentation(speaker("en"), "en", ["my.py"])
+    Files(None, None, None, Path("out")).write(report, Question(), context)
+    assert {"verdict.json", "verdict.xml", "index.html"} <= {
+        one.name for one in Path("out").glob("*")
+    }
+
+
 def test_numbers_of_numpy_are_written_like_any_other(report):
     (task,) = report.tasks
     object.__setattr__(task.diagnosis.explanations[0], "distance", np.float64(1e-16))
