@@ -1,5 +1,6 @@
 """The command line. Engines, the reference and matplotlib are imported inside the commands."""
 
+import io
 import os
 import signal
 import sys
@@ -34,6 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _leave)
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a letter that it lacks costs no verdict
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         code = run_command(arguments)
         sys.stdout.flush()

@@ -304,6 +304,18 @@ def shown(value: Any) -> str:
         return type(value).__name__
 
 
+def digits_apart(number: float, bound: float, least: int = 6) -> int:
+    """Return with how many significant digits, at least some, two numbers differ as written."""
+    counts = (n for n in range(least, 17) if f"{number:.{n}g}" != f"{bound:.{n}g}")
+    return next(counts, 17)
+
+
+def distinct_texts(number: float, bound: float, least: int = 6) -> tuple[str, str]:
+    """Write a number and its bound, for a message, with as many digits as tell them apart."""
+    digits = digits_apart(number, bound, least)
+    return f"{number:.{digits}g}", f"{bound:.{digits}g}"
+
+
 def _bounded(kind: str, name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
     result = floats(name, value, *trailing)
     largest = np.abs(result).max(initial=0.0)
@@ -312,7 +324,8 @@ def _bounded(kind: str, name: str, value: ArrayLike, *trailing: int | str) -> Fl
     if not np.isfinite(result).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
         raise ValueError(f"{name}: expected finite numbers, got {result[where]} at index {where}")
-    raise ValueError(f"{name}: expected {kind} of at most {LARGEST_COORDINATE:g}, got {largest:g}")
+    number, bound = distinct_texts(largest, LARGEST_COORDINATE)
+    raise ValueError(f"{name}: expected {kind} of at most {bound}, got {number}")
 
 
 def _converted(name: str, value: Any) -> np.ndarray:

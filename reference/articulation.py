@@ -534,9 +534,9 @@ def _checked_limits(
     crossed = np.flatnonzero(bounds[0] > bounds[1])
     if len(crossed):
         j = crossed[0]
+        number, limit = arguments.distinct_texts(bounds[0][j], bounds[1][j])
         raise ValueError(
-            f"lower: expected at most the upper limit, {bounds[1][j]:g}, got {bounds[0][j]:g} "
-            f"for joint {j}"
+            f"lower: expected at most the upper limit, {limit}, got {number} for joint {j}"
         )
     return bounds[0], bounds[1]
 
@@ -557,9 +557,11 @@ def _check_twists(joints: RecordArray) -> None:
     beyond = np.flatnonzero((joints["kind"] == BALL) & ((lower > np.pi) | (upper < -np.pi)))
     if len(beyond):
         j = beyond[0]
+        start, _ = arguments.distinct_texts(lower[j], np.pi)
+        end, _ = arguments.distinct_texts(upper[j], -np.pi)
         raise ValueError(
-            f"lower: expected limits of a ball's twist within -pi to pi, got {lower[j]:g} to "
-            f"{upper[j]:g} for joint {j}"
+            f"lower: expected limits of a ball's twist within -pi to pi, got {start} to "
+            f"{end} for joint {j}"
         )
 
 

@@ -4,6 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from reference.arguments import distinct_texts
+
 from ..harness.metrics import chance_of_pairs
 from ..presentation.tables.table import words
 from .quantities import SOLVED, ended_by_clock, is_answer, is_cut_by_clock, same_bits, worse_sign
@@ -17,7 +19,8 @@ def compare_answers(key: RowKey, pair: Pair) -> Row:
     ended one of them sooner. The first array that is worse decides, else the first that differs.
     """
     if pair.old.size != pair.new.size:
-        why = f"measured on {pair.old.size:g} and on {pair.new.size:g}: not compared"
+        old, new = distinct_texts(pair.old.size, pair.new.size)
+        why = f"measured on {old} and on {new}: not compared"
         return Row(key, "", Verdict.UNDECIDED, why=why)
     found = [_compared(key, name, pair) for name in _common(key, pair)]
     different = [row for row in found if row.verdict != Verdict.SAME]

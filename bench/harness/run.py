@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from reference.arguments import distinct_texts
+
 from ..experiments import SCALES, Block, blocks
 from .choice import Choice
 from .executor import HERE, Executor, NotMeasured
@@ -220,7 +222,7 @@ def why_again(block: Block, present: Mapping[Key, Record], executor: Executor) -
     if record.superseded:
         return "its settings are asked for again"
     if record.size < block.size:
-        return f"a larger size ({record.size:g}, now {block.size:g})"
+        return "a larger size ({}, now {})".format(*distinct_texts(record.size, block.size))
     if record.facts.get("problem_digest") != block.facts.get("problem_digest"):
         return f"{block.problem} is another problem now"
     before, digest = record.facts.get("digest", ""), block.facts.get("digest", "")

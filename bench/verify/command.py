@@ -104,7 +104,8 @@ def verify(  # noqa: PLR0913 -- one parameter an option
 ) -> int:
     """Judge your solver: is it right, how far off is it, and which mistake is it?
 
-    Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 for a wrong command.
+    Exit code 0 if every task is RIGHT or RIGHT BUT, 1 if not, 2 for a wrong command
+    or a file that could not be written.
     """
     _keep_to_one_thread()
     from crosscheck.conformance.language import language_of
@@ -166,7 +167,7 @@ def _judge(
         raise ValueError(say(sentence(
             "solver: expected one that can be started: {why}", why=error.failure.sentence
         ))) from None  # fmt: skip
-    return files.write(report, Presentation(say, language, words, files.saved(report, question)))
+    return files.write(report, question, Presentation(say, language, words))
 
 
 def _print(lines: Iterable[str]) -> int:

@@ -6,11 +6,14 @@ import numpy as np
 
 from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.judgement import CaseJudgement
+from reference.arguments import digits_apart
 
 from .geometry import outputs, pose
 
 # Differences below this part of the largest one are not where two answers part.
 _PARTING = 0.01
+# An output that differs by less than this part of another one is rounded, not wrong.
+_ROUNDED = 1e-4
 
 
 class Row(NamedTuple):
@@ -29,7 +32,13 @@ def rows(judgement: CaseJudgement, most: int = 3) -> list[Row]:
     for name, ours in judgement.expected.items():
         if name in judgement.answer.values:
             found += _of_output(name, judgement.answer.values[name], ours, most)
-    return (found or _effector(judgement))[:most]
+    largest = max(map(_gap, found), default=0.0)
+    wrong_rows = [row for row in found if _gap(row) >= _ROUNDED * largest]
+    return (wrong_rows or _effector(judgement))[:most]
+
+
+def _gap(row: Row) -> float:
+    return float(np.nan_to_num(np.abs(np.subtract(row.theirs, row.ours)), nan=np.inf).max())
 
 
 def _of_output(name: str, theirs: Any, ours: Any, most: int) -> list[Row]:
@@ -70,16 +79,8 @@ def written(row: Row) -> tuple[str, str]:
         for a, b in zip(row.theirs, row.ours, strict=True)
     ]
     worst = int(np.argmax(apart))
-    for digits in (4, 8, 12, 17):
-        theirs, ours = ([_number(one, digits) for one in side] for side in (row.theirs, row.ours))
-        if theirs[worst] != ours[worst]:
-            break
-    return _line(theirs), _line(ours)
-
-
-def _number(number: float, digits: int) -> str:
-    return f"{number:>{digits + 5}.{digits}g}".replace("nan", "NaN")
-
-
-def _line(numbers: list[str]) -> str:
-    return "  ".join(numbers)
+    digits = digits_apart(row.theirs[worst], row.ours[worst], 4)
+    sides = [[f"{x:.{digits}g}".replace("nan", "NaN") for x in side] for side in row[1:]]
+    width = max(len(text) for side in sides for text in side)
+    theirs, ours = ("  ".join(text.rjust(width) for text in side) for side in sides)
+    return theirs, ours

@@ -1,10 +1,14 @@
 """The files that `verify` writes: JSON, JUnit XML, a page, failing cases."""
 
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from crosscheck.conformance.judgement import Report
+from crosscheck.conformance.sentence import Sentence, sentence
 
 from ..harness.record import check_regular
 from ..text import visible
@@ -13,7 +17,7 @@ from .question import Question
 from .words import GOOD, Presentation
 
 FAILURES = Path("plumbob_failures")
-RIGHT, WRONG = 0, 1
+RIGHT, WRONG, FAILED = 0, 1, 2
 
 
 class Files(NamedTuple):
@@ -45,29 +49,49 @@ class Files(NamedTuple):
             self.html or self.folder / "index.html",
         )
 
-    def saved(self, report: Report, question: Question) -> Mapping[tuple[str, str], Path]:
-        """Save the smallest failing case of each task, unless it is one that was asked again."""
+    def write(self, report: Report, question: Question, context: Presentation) -> int:
+        """Print the screen, write the files, and return the exit code.
+
+        A file that cannot be written is one sentence on standard error, and the exit code is 2.
+        """
+        failures: list[Sentence] = []
         folder = self.folder / "failures" if self.folder else FAILURES
+        options = folder, question.seed, question.thorough
         paths = {
             (task.task, task.method): question.rerun
-            or saved.save(task, folder, question.seed, question.thorough)
+            or _attempt(folder, partial(saved.save, task, *options), failures)
             for task in report.tasks
         }
-        return {key: path for key, path in paths.items() if path is not None}
-
-    def write(self, report: Report, context: Presentation) -> int:
-        """Print the screen, write the files, and return the exit code."""
+        context = context._replace(files={key: path for key, path in paths.items() if path})
+        with suppress(BrokenPipeError, SystemExit):  # files are wanted though nobody reads this
+            terminal.show(report, context)
         makers = (
             lambda: json_file.text(report, context.say),
             lambda: junit.text(report, context.say),
             lambda: page.render(report, context),
         )
-        written = []
-        for path, make in zip(self._paths(), makers, strict=True):
-            if path is not None:
-                path.write_text(make(), encoding="utf-8")
-                written.append(visible(str(path)))
-        terminal.show(report, context)
-        if written:
-            print(" ".join(written))
-        return RIGHT if report.verdict in GOOD else WRONG
+        written = [
+            _attempt(path, partial(_write, path, make), failures)
+            for path, make in zip(self._paths(), makers, strict=True)
+            if path is not None
+        ]
+        if any(written):
+            print(" ".join(visible(str(path)) for path in written if path))
+        for failure in failures:
+            print(f"plumbob: {context.say(failure)}", file=sys.stderr)
+        return FAILED if failures else RIGHT if report.verdict in GOOD else WRONG
+
+
+def _write(path: Path, make: Callable[[], str]) -> Path:
+    path.write_text(make(), encoding="utf-8")
+    return path
+
+
+def _attempt(path: Path, write: Callable[[], Path | None], failures: list[Sentence]) -> Path | None:
+    """Return the file that is written; where that fails, note why and return None."""
+    try:
+        return write()
+    except Exception as error:
+        why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
+        failures.append(sentence("{file} could not be written: {why}", file=path, why=why))
+        return None

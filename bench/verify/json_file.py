@@ -7,9 +7,10 @@ import msgspec
 from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.greeting import Greeting
 from crosscheck.conformance.judgement import CaseJudgement, Finding, Report, TaskReport
+from crosscheck.conformance.message import plain
 
 from ..text import all_visible
-from .words import GOOD, Say, advice, passed
+from .words import GOOD, Say, advice, passed, remarks
 
 FORMAT: Literal["plumbob verify"] = "plumbob verify"
 VERSION: Literal[1] = 1
@@ -87,7 +88,7 @@ class ReportRecord(msgspec.Struct, frozen=True):
 
 def text(report: Report, say: Say) -> str:
     """Return the file's text."""
-    packed = msgspec.json.encode(record(report, say))
+    packed = msgspec.json.encode(record(report, say), enc_hook=plain)
     return msgspec.json.format(packed, indent=1).decode() + "\n"
 
 
@@ -96,7 +97,7 @@ def record(report: Report, say: Say) -> ReportRecord:
     return ReportRecord(
         FORMAT, VERSION, _name(report), report.verdict in GOOD, report.seed,
         _greeting(report.greeting),
-        [say(one) for one in report.remarks], say(advice(report.tasks)),
+        [say(one) for one in remarks(report)], say(advice(report.tasks)),
         [_task(task, say) for task in report.tasks],
     )  # fmt: skip
 
@@ -142,6 +143,5 @@ def _case(one: CaseJudgement, say: Say) -> CaseRecord:
 
 def _finding(one: Finding, say: Say) -> FindingRecord:
     return FindingRecord(
-        one.law, _name(one), float(one.error), float(one.tolerance), one.unit, say(one.sentence),
-        None if one.where is None else int(one.where),
-    )  # fmt: skip
+        one.law, _name(one), one.error, one.tolerance, one.unit, say(one.sentence), one.where
+    )

@@ -31,7 +31,7 @@ def _suite(task: TaskReport, say: Say) -> ElementTree.Element:
     _count(suite, task.judgements)
     for one in task.judgements:
         suite.append(_case(one, title(task), say))
-    if told := "\n".join(map(say, explanations(task))):
+    if told := "\n".join(map(say, filter(None, (task.precision, *explanations(task))))):
         ElementTree.SubElement(suite, "system-out").text = told
     return suite
 

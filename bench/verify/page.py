@@ -21,6 +21,7 @@ from .words import (
     explanations,
     introduction,
     passed,
+    remarks,
     speed,
     title,
 )
@@ -70,9 +71,9 @@ def render(report: Report, context: Presentation) -> str:
         language={"zh": "zh-CN"}.get(context.language, context.language),
         words=WORDS,
         verdicts=VERDICTS,
-        introduction=introduction(report.greeting),
+        introduction=introduction(report),
         advice=advice(report.tasks),
-        remarks=report.remarks,
+        remarks=list(remarks(report)),
         tasks=[_task(task, context) for task in report.tasks],
     )  # fmt: skip
 

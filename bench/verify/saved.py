@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 
 from crosscheck.conformance.case import Case
 from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.judgement import CaseJudgement, TaskReport
+from crosscheck.conformance.message import plain
 from crosscheck.conformance.sentence import Sentence, sentence
 
 FORMAT, VERSION = "plumbob failing case", 1
@@ -52,10 +52,10 @@ def save(report: TaskReport, folder: Path, seed: int, thorough: bool) -> Path | 
     content = _File(
         report.task, report.method, seed, thorough, failure.case.name,
         format=FORMAT, version=VERSION, about=str(failure.case.about),
-        request={"id": 1, "task": report.task, **_numbers(failure.case.inputs)},
-        answer=_answer(failure), expected=_numbers(failure.expected),
+        request={"id": 1, "task": report.task, **failure.case.inputs},
+        answer=_answer(failure), expected=failure.expected,
     )  # fmt: skip
-    text = msgspec.json.format(msgspec.json.encode(content), indent=1)
+    text = msgspec.json.format(msgspec.json.encode(content, enc_hook=plain), indent=1)
     path.write_bytes(text + b"\n")
     return path
 
@@ -67,16 +67,8 @@ def _plain(name: str) -> str:
 
 def _answer(failure: CaseJudgement) -> Any:
     if isinstance(failure.answer, Answer):
-        return _numbers(failure.answer.values)
+        return failure.answer.values
     return {"error": str(failure.answer.sentence)}
-
-
-def _numbers(values: Any) -> dict[str, Any]:
-    """Return arrays as lists; what JSON has no number for becomes null."""
-    return {
-        name: value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-        for name, value in values.items()
-    }
 
 
 def load(path: Path) -> Saved:

@@ -1,6 +1,7 @@
 """What `verify` prints: one screen with a line a task, what is wrong, and what to do next."""
 
 import re
+import sys
 import unicodedata
 from collections.abc import Sequence
 
@@ -22,13 +23,17 @@ from .words import (
     explanations,
     introduction,
     passed,
+    remarks,
     speed,
     title,
 )
 
-WIDTH, HEIGHT = 80, 24
-# Lines that the sentences about one task, and about its smallest failing case, may take.
+# Nothing is cut to an endless screen, which a pipe is.
+WIDTH, HEIGHT, ENDLESS = 80, 24, sys.maxsize
+# Lines that the sentences about one task, and about its smallest failing case, may take, or else a
+# third and an eighth of the room.
 _WHY, _COMPLAINT = 6, 3
+_CUT = " …"
 # What a line may be broken between: words, and letters of scripts that are written without spaces.
 _PIECE = re.compile(
     r"[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]|[^\s\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]+|\s+"
@@ -37,24 +42,28 @@ _PIECE = re.compile(
 _CLOSING, _OPENING = "，。、；：！？）》」』”’", "（《「『"
 
 
-def lines(report: Report, context: Presentation) -> list[str]:
-    """Return what is printed, at most 80 columns wide."""
+def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[str]:
+    """Return what is printed, at most 80 columns wide and cut to about so many lines."""
     say = context.say
     bad = [task for task in report.tasks if task.verdict not in GOOD]
-    shown = [*wrapped(say(introduction(report.greeting)), WIDTH), *_table(report.tasks, say)]
-    for remark in report.remarks:
+    shown = [*wrapped(say(introduction(report)), WIDTH), *_table(report.tasks, say)]
+    for remark in remarks(report):
         shown += wrapped(say(remark), WIDTH)
     end = wrapped(say(advice(report.tasks)), WIDTH)
     reserved = [(task, list(_reservations(task))) for task in report.tasks if task.verdict in GOOD]
     reserved = [(task, words) for task, words in reserved if words]
-    free = 0 if bad else HEIGHT - len(shown) - len(end) - 1
+    free = 0 if bad and height < ENDLESS else height - len(shown) - len(end) - 1
     for task, words in reserved:
         shown += _reserved(task, words, say, max(_COMPLAINT, free // len(reserved)))
-    others = [line for task in bad[1:] for line in _brief(task, say)]
-    if bad:
-        room = HEIGHT - len(shown) - len(end) - len(others) - 2
+    if bad and height < ENDLESS:
+        others = [line for task in bad[1:] for line in _brief(task, say)]
+        room = height - len(shown) - len(end) - len(others) - 2
         shown += ["", *_trouble(bad[0], context, room), *others]
-    return [*shown, "", *end] if len(shown) + len(end) < HEIGHT else [*shown, *end]
+    else:
+        shown += [line for task in bad for line in ("", *_trouble(task, context, height))]
+    if any(line.endswith(_CUT) for line in shown):
+        end = [*wrapped(say(sentence("Cut at …: --html FILE or | cat shows all.")), WIDTH), *end]
+    return [*shown, "", *end] if len(shown) + len(end) < height else [*shown, *end]
 
 
 def _table(tasks: Sequence[TaskReport], say: Say) -> list[str]:
@@ -71,7 +80,7 @@ def _table(tasks: Sequence[TaskReport], say: Say) -> list[str]:
 
 
 def _reservations(task: TaskReport) -> list[Sentence]:
-    """Return what is said of a right answer: another model, what it behaves like."""
+    """Return what is said of answers that none is wrong of: another model, what it behaves like."""
     worst = max(task.judgements, key=lambda one: one.verdict, default=None)
     found = complaints(worst)[:1] if worst is not None else []
     return [*found, *explanations(task)]
@@ -85,21 +94,22 @@ def _reserved(task: TaskReport, words: Sequence[Sentence], say: Say, most: int) 
 def _brief(task: TaskReport, say: Say) -> list[str]:
     """Return what is wrong with a task in two lines."""
     failure = task.smallest_failure
-    words = [*explanations(task), *(complaints(failure) if failure else ())]
-    return _cut(wrapped(": ".join([title(task), *map(say, words[:1])]), WIDTH), 2)
+    words = [*explanations(task), *complaints(failure)] if failure else _reservations(task)
+    return _cut(wrapped(f"{title(task)}: {' '.join(map(say, words))}", WIDTH), 2)
 
 
 def _trouble(task: TaskReport, context: Presentation, room: int) -> list[str]:
     """Return what is wrong with a task, in so many lines if that can be."""
     say = context.say
-    why = [line for told in explanations(task) for line in wrapped(say(told), WIDTH, "  ")]
     failure = task.smallest_failure
+    words = explanations(task) if failure else _reservations(task)
+    why = [line for told in words for line in wrapped(say(told), WIDTH, "  ")]
     if failure is None:
-        return [f"{title(task)}:", *_cut(why, _WHY)]
-    case = _cut(_failing(task, failure, say), _COMPLAINT)
+        return [f"{title(task)}:", *_cut(why, max(_WHY, room // 3))]
+    case = _cut(_failing(task, failure, say), max(_COMPLAINT, room // 8))
     again = _again(task, context)
     room -= 1 + len(case) + len(again)
-    why = _cut(why, max(2, min(_WHY, room - 3)))
+    why = _cut(why, max(2, min(max(_WHY, room // 3), room - 3)))
     return [f"{title(task)}:", *why, *case, *_numbers(failure, say, room - len(why) - 1), *again]
 
 
@@ -148,7 +158,7 @@ def _stacked(rows: Sequence[comparison.Row], label: int, say: Say) -> list[str]:
     heads = say(sentence("yours")), say(sentence("expected"))
     size = max(map(width, heads))
     return [
-        f"    {_aligned(name, label)}  {_aligned(head, size)}  {text}"[:WIDTH]
+        f"    {_aligned(name, label)}  {_aligned(head, size)}  {text}"
         for row in rows
         for name, head, text in zip((row.label, ""), heads, comparison.written(row), strict=True)
     ]
@@ -174,7 +184,7 @@ def wrapped(text: str, size: int, indent: str = "") -> list[str]:
         if width(line + piece) <= size or not line.strip():
             line += piece
             continue
-        moved = line[-1] if piece in _CLOSING or line[-1] in _OPENING else ""
+        moved = _PIECE.findall(line)[-1] if piece in _CLOSING or line[-1] in _OPENING else ""
         shown.append(line.removesuffix(moved).rstrip())
         line = indent + moved + piece.lstrip()
     return [*shown, line.rstrip()] if line.strip() else shown
@@ -196,7 +206,7 @@ def _cut(shown: list[str], most: int) -> list[str]:
     last = shown[most - 1]
     while width(last) > WIDTH - 2:
         last = last[:-1]
-    return [*shown[: most - 1], f"{last} …"]
+    return [*shown[: most - 1], last + _CUT]
 
 
 def show(report: Report, context: Presentation) -> None:
@@ -206,7 +216,8 @@ def show(report: Report, context: Presentation) -> None:
 
     console = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
     colours = {context.say(words): _COLOURS[verdict.name] for verdict, words in VERDICTS.items()}
-    for line in lines(report, context):
+    height = max(HEIGHT, console.height) if console.is_terminal else ENDLESS
+    for line in lines(report, context, height):
         text = Text(line)
         for word, colour in colours.items():
             text.highlight_regex(rf"(?<=  ){re.escape(word)}(?=  )", colour)

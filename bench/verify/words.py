@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crosscheck.conformance.contestant import Answer
-from crosscheck.conformance.greeting import Greeting
-from crosscheck.conformance.judgement import CaseJudgement, TaskReport, Verdict
+from crosscheck.conformance.judgement import LEAST_SHARE, CaseJudgement, Report, TaskReport, Verdict
 from crosscheck.conformance.language import translator
 from crosscheck.conformance.sentence import Sentence, sentence
 
@@ -36,7 +35,7 @@ class Presentation(NamedTuple):
     say: Say
     language: str
     solver: Sequence[str]
-    files: Mapping[tuple[str, str], Path]
+    files: Mapping[tuple[str, str], Path] = {}
 
 
 def speaker(language: str) -> Say:
@@ -71,13 +70,26 @@ def speed(report: TaskReport) -> Sentence | None:
     return sentence("{times:,.0f} x faster", times=1 / times)
 
 
-def introduction(greeting: Greeting) -> Sentence:
-    """Return who is judged: its name, version, language and precision."""
+def introduction(report: Report) -> Sentence:
+    """Return who is judged: its name, version, language and precision, if that is so."""
+    greeting = report.greeting
     words = " ".join(filter(None, (greeting.name, greeting.version)))
     language = sentence(", {language}", language=greeting.language) if greeting.language else ""
+    if any(task.precision for task in report.tasks):
+        return sentence("{name}{language}", name=words, language=language)
     if greeting.precision == "single":
         return sentence("{name}{language}, single precision", name=words, language=language)
     return sentence("{name}{language}, double precision", name=words, language=language)
+
+
+def remarks(report: Report) -> Iterator[Sentence]:
+    """Yield what is said beside the verdicts, precision first, with its tasks if not of all."""
+    reasons = {str(task.precision): task.precision for task in report.tasks if task.precision}
+    for text, reason in reasons.items():
+        tasks = [title(task) for task in report.tasks if str(task.precision) == text]
+        partial = sentence("{tasks}: {reason}", tasks=", ".join(tasks), reason=reason)
+        yield partial if len(tasks) < len(report.tasks) else reason
+    yield from report.remarks
 
 
 def complaints(judgement: CaseJudgement) -> list[Sentence]:
@@ -93,7 +105,9 @@ def explanations(report: TaskReport) -> Iterator[Sentence]:
     """Yield why answers are wrong, nearest first, and what the solver behaves like."""
     for one in report.diagnosis.explanations:
         yield sentence(
-            "{what} (explains {share:.0%} of the answers compared)",
+            "{what} (explains {share:.0%} of the answers compared)"
+            if one.share >= LEAST_SHARE
+            else "The nearest known mistake explains only {share:.0%} of the answers: {what}",
             what=one.sentence,
             share=one.share,
         )
@@ -112,9 +126,13 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
             "--thorough asks more."
         )
     first = bad[0]
+    if first.verdict is Verdict.UNDECIDED and first.diagnosis.hints:
+        return sentence(
+            'Next: declare the step that you make, by "step" in the greeting (docs/protocol.md).'
+        )
     if first.verdict is Verdict.UNDECIDED:
         return sentence("Next: ask the long list of cases with --thorough.")
-    if first.verdict is Verdict.BROKEN and not first.diagnosis.explanations:
+    if first.verdict is Verdict.BROKEN and not first.diagnosis.explained:
         return sentence(
             "Next: let {task} answer every case first; what it breaks on is saved above.",
             task=title(first),

@@ -5,20 +5,20 @@ fewest faults are tried first, so that a combination is named only where no part
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import groupby
+from itertools import chain, groupby
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from .case import Case
 from .contestant import Answer, Asked
-from .judgement import Explanation
+from .judgement import LEAST_SHARE, CaseJudgement, Explanation, Verdict
 from .sentence import Sentence, sentence
 
 # A variant is compared with all answers only if it reproduces one of so many, the telling ones.
 TRIAL = 4
-# How many explanations are told, and the least share of the answers that one must reproduce.
-MOST_TOLD, LEAST_SHARE = 3, 0.5
+# How many explanations are told.
+MOST_TOLD = 3
 
 
 class Variant(NamedTuple):
@@ -186,3 +186,43 @@ def either(said: Sequence[Sentence]) -> Sentence:
         other=said[1],
         another=said[2],
     )
+
+
+def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -> Sentence | None:
+    """Return the law that broke first along the computation, and the joint where there are some."""
+    for judgement in judgements:
+        for finding in judgement.findings:
+            if finding.verdict >= Verdict.WRONG:
+                return sentence(
+                    "The first law to break is '{law}', at joint {joint} of the case '{case}': "
+                    "{why}"
+                    if at_joints and finding.where is not None
+                    else "The first law to break is '{law}', in the case '{case}': {why}",
+                    law=finding.law, joint=finding.where, case=judgement.case.name,
+                    why=finding.sentence,
+                )  # fmt: skip
+    return None
+
+
+def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
+    """Return hints at what no variant explains."""
+    findings = chain.from_iterable(judgement.findings for judgement in judgements)
+    broken = {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
+    hints = []
+    if broken & {"equal answers", "equal requests"}:
+        hints.append(
+            sentence(
+                "Equal requests get different answers. Look for state that is left over from the "
+                "request before, and for memory that is read before it is written or dangles (in "
+                "Eigen, a product kept with auto); a sanitizer (-fsanitize=address,undefined, or "
+                "valgrind) finds the latter."
+            )
+        )
+    if "untouched inputs" in broken:
+        hints.append(
+            sentence(
+                "The solver writes into the skeleton that it is given, so that every later answer "
+                "is about another skeleton. Copy what you change."
+            )
+        )
+    return tuple(hints)

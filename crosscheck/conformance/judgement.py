@@ -11,6 +11,9 @@ from .contestant import Answer, Failure
 from .greeting import Greeting
 from .sentence import Sentence
 
+# The least share of the answers that a fault must reproduce to be told as what is wrong.
+LEAST_SHARE = 0.5
+
 
 class Verdict(IntEnum):
     """How good answers are, from best to worst; the worst law decides."""
@@ -108,6 +111,11 @@ class Diagnosis:
     hints: tuple[Sentence, ...] = ()
     tried: int = 0
 
+    @property
+    def explained(self) -> bool:
+        """Whether a fault is likely."""
+        return any(one.share >= LEAST_SHARE for one in self.explanations)
+
 
 def smallest_failure(judgements: Sequence[CaseJudgement], explained: bool) -> CaseJudgement | None:
     """Return the failing case with the fewest numbers, or None.
@@ -129,22 +137,25 @@ class TaskReport:
         task: its name; method: of inverse kinematics, else "".
         judgements: one a case.
         diagnosis: of what is wrong or inferred.
+        precision: why it is judged by another precision than the greeting's, or None.
     """
 
     task: str
     method: str
     judgements: Sequence[CaseJudgement]
     diagnosis: Diagnosis
+    precision: Sentence | None = None
 
     @property
     def smallest_failure(self) -> CaseJudgement | None:
         """As of the function `smallest_failure`."""
-        return smallest_failure(self.judgements, bool(self.diagnosis.explanations))
+        return smallest_failure(self.judgements, self.diagnosis.explained)
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of all cases."""
-        return max((one.verdict for one in self.judgements), default=Verdict.UNDECIDED)
+        """The worst of all cases, with a reservation where the precision is another."""
+        worst = max((one.verdict for one in self.judgements), default=Verdict.UNDECIDED)
+        return max(worst, Verdict.RIGHT_BUT) if self.precision else worst
 
     @property
     def digits(self) -> float | None:

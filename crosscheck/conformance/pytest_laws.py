@@ -9,7 +9,7 @@ import pytest
 from .contestant import Failure
 from .doors.host import Solver
 from .functions import FunctionContestant
-from .judgement import CaseJudgement, TaskReport, Verdict
+from .judgement import LEAST_SHARE, CaseJudgement, TaskReport, Verdict
 from .message import decode_greeting
 from .sentence import Sentence
 from .verify import DISCIPLINES, judge_cases, trials
@@ -78,7 +78,7 @@ def _check(report: TaskReport, name: str) -> None:
     if one.verdict is Verdict.UNDECIDED:
         pytest.skip("; ".join(map(str, _words(one))) or "nobody can tell")
     if one.verdict > Verdict.UNDECIDED:
-        why = [explanation.sentence for explanation in report.diagnosis.explanations]
+        why = [one.sentence for one in report.diagnosis.explanations if one.share >= LEAST_SHARE]
         pytest.fail("\n".join(map(str, [*_words(one), *why])), pytrace=False)
 
 

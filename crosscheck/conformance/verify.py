@@ -1,13 +1,17 @@
 """Ask a solver every case of its tasks, judge its answers, and say why they are wrong."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
+import msgspec
+
+from . import precision
 from .case import Case
 from .contestant import Asked, Contestant, Failure, FailureKind
 from .greeting import Greeting
-from .judgement import Report, TaskReport
+from .judgement import Report, TaskReport, Verdict
 from .kinematics import (
     forward_kinematics,
     inverse_kinematics,
@@ -15,7 +19,8 @@ from .kinematics import (
     robot_inverse_kinematics,
     track,
 )
-from .mass_spring import energy, forces, motion, step
+from .mass_spring import energy, forces
+from .mass_spring.stepping import Stepping
 
 # After so many answers of a task were waited for in vain, the rest of the task is not asked.
 MOST_HANGS = 2
@@ -40,8 +45,8 @@ DISCIPLINES: Mapping[str, Discipline] = {
     "resample": resample,
     "mass_spring_forces": forces,
     "energy": energy,
-    "mass_spring_step": step,
-    "mass_spring_motion": motion,
+    "mass_spring_step": Stepping("mass_spring_step"),
+    "mass_spring_motion": Stepping("mass_spring_motion"),
     "robot_inverse_kinematics": robot_inverse_kinematics,
 }
 
@@ -82,7 +87,16 @@ def judge_cases(
 ) -> TaskReport:
     """Ask a solver some cases of a task and judge its answers; arguments as of `verify`."""
     asked = list(_ask(contestant, cases, partial(notify, task)))
-    return DISCIPLINES[task].judge(asked, contestant.greeting, method)
+    judge = DISCIPLINES[task].judge
+    greeting, reason = precision.judging_greeting(asked, contestant.greeting)
+    report = judge(asked, greeting, method)
+    unexplained = report.verdict is Verdict.WRONG and not report.diagnosis.explained
+    if unexplained and greeting.precision == "double":
+        single = judge(asked, msgspec.structs.replace(greeting, precision="single"), method)
+        is_right = single.verdict <= Verdict.RIGHT_BUT and precision.is_off_by_single(report)
+        if is_right or single.diagnosis.explained:
+            report, reason = single, precision.OFF
+    return replace(report, precision=reason)
 
 
 def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple[str, str]]:

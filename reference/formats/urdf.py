@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from .. import arguments
-from ..arguments import LARGEST_COORDINATE
+from ..arguments import LARGEST_COORDINATE, distinct_texts
 from ..articulation import Mimic
 from ..quaternion import exponential, multiply, rotate
 from . import xml
@@ -195,7 +195,8 @@ def _limits(joint: _Joint, crossed: str) -> tuple[float, float]:
     (lower,), (upper,) = limit.limits("lower", (0.0,)), limit.limits("upper", (0.0,))
     if lower <= upper:
         return lower, upper
-    problem = f"expected lower <= upper, got lower {lower:g}, upper {upper:g}"
+    bounds = distinct_texts(lower, upper)
+    problem = "expected lower <= upper, got lower {}, upper {}".format(*bounds)
     if crossed == "refused" or max(abs(lower), abs(upper)) > LARGEST_COORDINATE:
         raise joint.element.error(problem)
     warn(str(joint.element.error(f"{problem}; read as {crossed}")))

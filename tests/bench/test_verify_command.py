@@ -287,3 +287,14 @@ def test_laws_run_under_plain_pytest(folder):
     assert "positions differ by" in run.stdout
     assert "Its own rotation is applied to a joint's own offset." in run.stdout
     assert "raceback" not in run.stdout
+
+
+def test_letters_that_a_terminal_lacks_cost_no_output():
+    code = "from bench.cli import main; main(['verify', '--list', '--lang', 'zh'])"
+    root = str(Path(cli.__file__).parents[1])
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONPATH": root}
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, timeout=120
+    )
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "forward_kinematics(parents, offsets, local_rotations)" in run.stdout

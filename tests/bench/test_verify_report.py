@@ -33,6 +33,7 @@ from reference import Skeleton, forward_kinematics
 
 HOSTILE = '<script>alert(1)</script>\x1b[31m\u202e & "quotes" \' ]]>'
 TASKS = tuple(SMALL)
+MEND = sentence("Mend this.")
 
 
 def right_positions(parents, offsets, local_rotations):
@@ -154,6 +155,77 @@ def test_the_screen_shows_their_numbers_beside_ours(wrong):
         assert side in text
     assert "yours" in text
     assert "expected" in text
+
+
+def test_nothing_is_cut_in_a_pipe(wrong, capsys):
+    terminal.show(wrong, shown(files=FILES))
+    text = capsys.readouterr().out
+    assert "…" not in text
+    told = normal(text)
+    for task in wrong.tasks:
+        assert normal(f"{terminal.title(task)}:") in told
+        for words in (*explanations(task), complaints(task.smallest_failure)[0]):
+            assert normal(speaker("en")(words)) in told
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+def test_what_a_screen_cuts_is_marked_and_where_all_of_it_is_said(wrong, language):
+    context = shown(language)
+    said = speaker(language)(sentence("Cut at …: --html FILE or | cat shows all."))
+    task = a_wrong_task(1.0, sentence("Mend this and that. " * 30))
+    for tasks in ([task], [wrong.tasks[0], task]):
+        report = Report(wrong.greeting, tasks, 0)
+        lines = terminal.lines(report, context)
+        assert any(line.endswith("…") for line in lines)
+        assert said in lines
+        assert len(lines) <= terminal.HEIGHT
+        whole = "\n".join(terminal.lines(report, context, terminal.ENDLESS))
+        assert "…" not in whole
+        assert normal(whole).count("Mend this and that.") == 30
+    assert said not in terminal.lines(Report(wrong.greeting, wrong.tasks[:1], 0), context)
+
+
+def test_a_larger_screen_shows_more(wrong):
+    tasks = [a_wrong_task(1.0, sentence("Mend this and that. " * 30)), wrong.tasks[0]]
+    lines = terminal.lines(Report(wrong.greeting, tasks, 0), shown())
+    more = terminal.lines(Report(wrong.greeting, tasks, 0), shown(), 60)
+    assert len(lines) < len(more) <= 60
+
+
+def test_numbers_side_by_side_are_whole():
+    ours = np.array([[0.48315384, 0.24848917, -0.82854335, 0.1364]])
+    for apart in (1e-8, 1e-15):
+        theirs = ours + np.array([[0.0, 0.0, 0.0, apart]])
+        one = answered("forward_kinematics", {}, {"rotations": theirs}, {"rotations": ours})
+        text = "\n".join(terminal._numbers(one, speaker("en"), 6))
+        row = comparison.rows(one)[0]
+        assert all(number in text for side in comparison.written(row) for number in side.split())
+        assert apart < 1e-10 or max(map(len, text.split("\n"))) <= terminal.WIDTH
+
+
+def a_wrong_task(share, words=MEND):
+    """A report of a wrong task in which a fault explains such a share of the answers."""
+    case = Case("one", "energy", {"masses": np.ones(1)}, "x", sentence("It is all."))
+    finding = Finding("a law", Verdict.WRONG, 1.0, 0.0, "m", sentence("One is off."))
+    judged = CaseJudgement(case, Answer({}, 1e-3), (finding,), {})
+    why = Explanation(("a fault",), words, share, 0.0)
+    return TaskReport("energy", "", [judged], Diagnosis((why,)))
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+@pytest.mark.parametrize("share", [0.17, 0.49, 0.5, 1.0])
+def test_a_fault_that_explains_few_answers_is_not_told_as_what_is_wrong(share, language):
+    report = Report(Greeting(1, ("energy",)), [a_wrong_task(share)], 0)
+    say = speaker(language)
+    for text in (
+        normal(" ".join(terminal.lines(report, shown(language)))),
+        normal(junit.text(report, say)),
+        normal(" ".join(Page(page.render(report, shown(language))).texts)),
+    ):
+        assert f"{share:.0%}" in text
+        near = {"en": "nearest known mistake explains only", "zh": "最接近的已知错误只能解释"}
+        assert (near[language] in text) is (share < 0.5)
+    assert json.loads(json_file.text(report, say))["tasks"][0]["explanations"][0]["share"] == share
 
 
 def test_a_right_solver_is_told_so(right):
@@ -366,6 +438,15 @@ def test_numbers_are_shown_from_where_answers_part():
     assert [row.label for row in comparison.rows(one)] == ["positions[4]"]
     theirs[4] = 0.0
     assert [row.label for row in comparison.rows(one)] == ["positions[2]", "positions[3]"]
+
+
+def test_an_output_that_is_only_rounded_is_not_shown_beside_a_wrong_one():
+    ours = {"positions": np.eye(3)[:2], "rotations": np.eye(4)[:2]}
+    theirs = {name: value + 1e-8 for name, value in ours.items()}
+    one = answered("forward_kinematics", {}, theirs, ours)
+    assert {row.label[:9] for row in comparison.rows(one, 9)} == {"positions", "rotations"}
+    theirs["positions"] = theirs["positions"] + 1e-3
+    assert {row.label[:9] for row in comparison.rows(one, 9)} == {"positions"}
 
 
 def test_quaternions_of_opposite_sign_do_not_part():

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+from reference.arguments import distinct_texts
+
 from ...harness import metrics
 from ...harness.record import Record
 from ...peers.registry import MUJOCO, PINOCCHIO
@@ -15,7 +17,11 @@ ENGINES = (PINOCCHIO, MUJOCO)
 
 
 def _verdict(record: Record) -> str:
-    return "held" if record.arrays["held"] else f"MISSED: {record.notes['missed']}"
+    if record.arrays["held"]:
+        return "held"
+    difference, tolerance = float(record.arrays["difference"]), float(record.arrays["tolerance"])
+    by = " by {}, more than {}".format(*distinct_texts(difference, tolerance, 2))
+    return f"MISSED: {record.notes['missed']}{by if difference > tolerance else ''}"
 
 
 def _summary(records: Sequence[Record]) -> Summary:

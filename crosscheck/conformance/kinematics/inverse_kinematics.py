@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from reference.arguments import distinct_texts
 from reference.inverse_kinematics import solve_ik
 from reference.skeleton import Skeleton
 
@@ -267,10 +268,11 @@ def claims(distance: float, slack: float, values: Mapping[str, Any], case: Case)
         found.append(Finding("claims", Verdict.RIGHT_BUT, distance, tolerance, "m", told))
     if "residual" in values and np.isfinite(values["residual"]):
         error = abs(values["residual"] - distance)
+        claimed, actual = distinct_texts(values["residual"], distance, 3)
         told = sentence(
-            "It reports a residual of {claimed:.3g} m; the effector is {distance:.3g} m off.",
-            claimed=values["residual"],
-            distance=distance,
+            "It reports a residual of {claimed} m; the effector is {distance} m off.",
+            claimed=claimed,
+            distance=actual,
         )
         found.append(laws.bounded("claims", error, slack + 1e-3 * distance, "m", told))
     return found

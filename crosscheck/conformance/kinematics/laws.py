@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from reference.arguments import FloatArray
+from reference.arguments import FloatArray, distinct_texts
 
 from ..contestant import Answer, Asked, Failure
 from ..greeting import Greeting
@@ -68,10 +68,10 @@ def unit(lengths: FloatArray, tolerance: float) -> Finding:
     off = np.abs(lengths - 1.0)
     joint = int(np.argmax(off))
     told = sentence(
-        "The quaternion of joint {joint} has the length {length:.6g}, not 1; normalise after each "
+        "The quaternion of joint {joint} has the length {length}, not 1; normalise after each "
         "product.",
         joint=joint,
-        length=lengths[joint],
+        length=distinct_texts(lengths[joint], 1.0)[0],
     )
     return bounded(
         "unit quaternions", off[joint], tolerance, "", told, verdict=Verdict.RIGHT_BUT, where=joint

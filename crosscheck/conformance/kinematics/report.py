@@ -8,10 +8,10 @@ import numpy as np
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import explain
+from ..explain import explain, first_broken, hints_of
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict, smallest_failure
-from ..sentence import Sentence, sentence
+from ..judgement import CaseJudgement, Diagnosis, TaskReport, smallest_failure
+from ..sentence import Sentence
 from .faults import describe
 from .predictions import variants
 
@@ -67,53 +67,10 @@ def report(
     greeting: Greeting,
 ) -> TaskReport:
     """Return the report, with what a diagnosis without explanations has to say."""
-    smallest = smallest_failure(judgements, bool(diagnosis.explanations))
-    hints = _hints(judgements)
+    smallest = smallest_failure(judgements, diagnosis.explained)
+    hints = hints_of(judgements)
     broken = None
-    if smallest is not None and not diagnosis.explanations:
-        broken = _first_broken(smallest)
+    if smallest is not None and not diagnosis.explained:
+        broken = first_broken([smallest], at_joints=True)
     told = Diagnosis(diagnosis.explanations, diagnosis.behaviour, broken, hints, diagnosis.tried)
     return TaskReport(task, method, judgements, told)
-
-
-def _first_broken(smallest: CaseJudgement) -> Sentence | None:
-    """Return which law broke first along the computation, in the smallest failing case."""
-    for finding in smallest.findings:
-        if finding.verdict >= Verdict.WRONG and finding.where is not None:
-            return sentence(
-                "The first law to break is '{law}', at joint {joint} of the case '{case}': {why}",
-                law=finding.law, joint=finding.where, case=smallest.case.name,
-                why=finding.sentence,
-            )  # fmt: skip
-        if finding.verdict >= Verdict.WRONG:
-            return sentence(
-                "The first law to break is '{law}', in the case '{case}': {why}",
-                law=finding.law, case=smallest.case.name, why=finding.sentence,
-            )  # fmt: skip
-    return None
-
-
-def _hints(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
-    broken = {
-        finding.law
-        for told in judgements
-        for finding in told.findings
-        if finding.verdict >= Verdict.WRONG
-    }
-    hints = []
-    if "equal answers" in broken:
-        hints.append(
-            sentence(
-                "Equal requests get different answers. Look for state that is left over from the "
-                "request before, and for memory that is read before it is written; a sanitizer "
-                "(-fsanitize=address,undefined, or valgrind) finds the latter."
-            )
-        )
-    if "untouched inputs" in broken:
-        hints.append(
-            sentence(
-                "The solver writes into the skeleton that it is given, so that every later answer "
-                "is about another skeleton. Copy what you change."
-            )
-        )
-    return tuple(hints)

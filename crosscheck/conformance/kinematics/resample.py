@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from reference import curves
-from reference.arguments import FloatArray
+from reference.arguments import FloatArray, distinct_texts
 
 from ..case import Case
 from ..contestant import Answer, Asked
@@ -233,7 +233,8 @@ def _gaps(points: FloatArray, at: FloatArray, case: Case, bound: float) -> Findi
             error=error,
         )
         verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else Verdict.WRONG
-        return laws.bounded("spacing", error, UNEVEN, "", told, verdict=verdict)
+        tolerance = UNEVEN + 4.0 * bound / max(float(kinds[2].mean()), bound)
+        return laws.bounded("spacing", error, tolerance, "", told, verdict=verdict)
     return _widest(kinds, case, bound)
 
 
@@ -242,11 +243,12 @@ def _closing(points: FloatArray, at: FloatArray, line: Line, bound: float) -> Fi
     back = float(np.linalg.norm(points[-1] - points[0])) > bound
     gap = line.length - float(at[-1]) if back else 0.0
     widest = float(np.diff(at).max()) * (1.0 + UNEVEN)
+    side, others = distinct_texts(gap, widest, 3)
     told = sentence(
         "The side that closes the curve is left out: from the last point to the start it is "
-        "{gap:.3g} m, between others at most {widest:.3g} m.",
-        gap=gap,
-        widest=widest,
+        "{gap} m, between others at most {widest} m.",
+        gap=side,
+        widest=others,
     )
     return laws.bounded("closing side", gap, widest + 2.0 * bound, "m", told)
 
@@ -261,10 +263,12 @@ def _widest(kinds: Sequence[FloatArray], case: Case, bound: float) -> Finding:
     spacing, line = case.inputs["spacing"], case.facts["line"]
     bridges = len(line.strokes) - 1
     wide = min(float(np.sort(gaps)[: len(gaps) - bridges].max(initial=0.0)) for gaps in kinds)
+    gap, limit = distinct_texts(wide, spacing, 3)
     told = sentence(
-        "Neighbouring points are {gap:.3g} m apart, more than the {spacing:.3g} m asked for.",
-        gap=wide, spacing=spacing,
-    )  # fmt: skip
+        "Neighbouring points are {gap} m apart, more than the {spacing} m asked for.",
+        gap=gap,
+        spacing=limit,
+    )
     if wide > spacing * (1.0 + 1e-6) + 2.0 * bound:
         return Finding("spacing", Verdict.WRONG, wide, spacing, "m", told)
     narrow = int((kinds[2] < LEAST_GAP * spacing - 2.0 * bound).sum())

@@ -9,6 +9,7 @@ from reference.arguments import FloatArray
 
 from ..case import Case
 from ..contestant import Answer, Asked
+from ..explain import either
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -180,7 +181,8 @@ def _diagnosis(judgements: Sequence[CaseJudgement]) -> Diagnosis:
     if not most:
         return Diagnosis(tried=len(FAULTS))
     named = [key for key in counts if counts[key] == most]
-    told = Explanation(tuple(named), FAULTS[named[0]].sentence, most / len(missed), 0.0)
+    words = either([FAULTS[key].sentence for key in named[:3]])
+    told = Explanation(tuple(named), words, most / len(missed), 0.0)
     return Diagnosis((told,), tried=len(FAULTS))
 
 

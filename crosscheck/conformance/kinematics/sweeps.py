@@ -84,7 +84,12 @@ def compare(
     off = [name for name, (error, bound) in errors.items() if not error <= bound]
     behaviour = None
     if not declared:
-        behaviour = sentence("Its sweeps are those of {method}.", method=NAMES[method])
+        behaviour = sentence(
+            "It is held against {method}, which its sweeps resemble."
+            if off
+            else "Its sweeps are those of {method}.",
+            method=NAMES[method],
+        )
     verdict, told, damped = Verdict.RIGHT, laws.HOLDS, None
     if off:
         verdict, told = _verdict(swept, method, others_hold, greeting)

@@ -16,7 +16,7 @@ from reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import either, together
+from ..explain import either, first_broken, together
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -106,9 +106,10 @@ def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJ
     allowed = tolerance(p, greeting.epsilon)
     findings = _findings(one, asked, p, allowed)
     errors = [abs(given[name] - expected[name]) for name in ("kinetic", "elastic") if name in given]
-    size = max(abs(expected["kinetic"]), abs(expected["elastic"]), 1e-300)
-    worst = max(errors, default=np.nan) / size
-    digits = float(min(16.0, max(0.0, -np.log10(max(worst, 1e-16))))) if worst >= 0 else None
+    size, worst = max(expected["kinetic"], expected["elastic"]), max(errors, default=np.nan)
+    digits = None
+    if size > allowed and worst >= 0.0:
+        digits = float(min(16.0, max(0.0, -np.log10(max(worst / size, 1e-16)))))
     return CaseJudgement(one.case, one.answer, tuple(findings), expected, digits, seconds)
 
 
@@ -266,7 +267,7 @@ def _diagnose(
                 matches.append(faults)
         if matches:
             return Diagnosis((_explanation(matches),), tried=tried)
-    return Diagnosis(first_broken=laws.first_broken(judgements), tried=tried)
+    return Diagnosis(first_broken=first_broken(judgements), tried=tried)
 
 
 def _matches(faults: Sequence[Fault], p: Problem, given: Mapping[str, Any], epsilon: float) -> bool:

@@ -12,7 +12,7 @@ from reference.mass_spring import forces as reference_forces
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import Variant, either, explain, together
+from ..explain import Variant, either, explain, first_broken, together
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -66,8 +66,10 @@ def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJ
         return CaseJudgement(one.case, one.answer, (), {"forces": expected}, None, seconds)
     given, allowed = one.answer.values["forces"], tolerance(p, greeting.epsilon)
     findings = _findings(one, asked, p, expected, allowed)
-    gap = float(np.abs(given - expected).max()) / max(float(np.abs(expected).max()), 1e-300)
-    digits = float(min(16.0, max(0.0, -np.log10(max(gap, 1e-16))))) if np.isfinite(gap) else None
+    size, gap = float(np.abs(expected).max()), float(np.abs(given - expected).max())
+    digits = None
+    if size > allowed and np.isfinite(gap):
+        digits = float(min(16.0, max(0.0, -np.log10(max(gap / size, 1e-16)))))
     return CaseJudgement(
         one.case, one.answer, tuple(findings), {"forces": expected}, digits, seconds
     )
@@ -163,7 +165,7 @@ def _diagnose(
     explanations, tried = explain(
         variants(), [one for one, _ in order], partial(_relative, greeting.epsilon), describe
     )
-    first = None if explanations else laws.first_broken(judgements)
+    first = None if explanations else first_broken(judgements)
     return Diagnosis(explanations, None, first, (), tried)
 
 

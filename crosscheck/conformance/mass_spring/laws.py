@@ -1,6 +1,6 @@
 """Laws that a step keeps whatever its solver is, and the laws of what it declares."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +9,7 @@ from reference.arguments import FloatArray
 from reference.judging.step import judge_step
 
 from ..contestant import Answer, Asked
-from ..judgement import CaseJudgement, Finding, Verdict
+from ..judgement import Finding, Verdict
 from ..sentence import Sentence, sentence
 from .model import Model, simulate
 from .problem import Problem, accelerations, damper_forces, state_of, system_of
@@ -17,6 +17,8 @@ from .rounding import SOLVED, Rounding, apart, difference
 
 # Up to this share of what a step changes, an answer is called imprecise; beyond it is another step.
 IMPRECISE = 1e-3
+# So many times what rounding allows is imprecise as well.
+ROUNDED = 30.0
 # A small step's mean acceleration is off by about h omega, some hundredths.
 CONSISTENT = 0.1
 
@@ -80,7 +82,7 @@ def declared_step(one: Context) -> Finding | None:
         return None
     law = "declared step"
     if not one.known:
-        said = sentence("No step that is known gives these positions; none was declared.")
+        said = sentence("The step is none of those that are known; none was declared.")
         return Finding(law, Verdict.UNDECIDED, np.inf, SOLVED, "", said)
     if not one.expected or not np.isfinite(one.expected["positions"]).all():
         said = sentence("The declared step has no finite result here.")
@@ -93,16 +95,19 @@ def declared_step(one: Context) -> Finding | None:
         "Positions are up to {gap:.2g} m from those of {model}, at particle {where}.",
         gap=float(gap.max()), model=one.says, where=where,
     )  # fmt: skip
-    verdict = _graded(error)
+    moved = float(np.abs(one.expected["positions"] - one.problem.positions).max())
+    verdict = _graded(error, moved, one.allowed.positions)
     if verdict is Verdict.WRONG and not one.problem.steps:
         verdict = _excused(one)
     return Finding(law, verdict, error, SOLVED, "", said, where)
 
 
-def _graded(error: float) -> Verdict:
+def _graded(error: float, size: float, allowed: float) -> Verdict:
+    """Return what follows from an error relative to a size with its rounding."""
     if error <= SOLVED:
         return Verdict.RIGHT
-    return Verdict.RIGHT_BUT if error <= IMPRECISE else Verdict.WRONG
+    gap = error * (size + allowed / SOLVED)
+    return Verdict.RIGHT_BUT if gap <= IMPRECISE * size + ROUNDED * allowed else Verdict.WRONG
 
 
 def _excused(one: Context) -> Verdict:
@@ -155,13 +160,16 @@ def minimiser(one: Context) -> Finding | None:
     if found.error <= SOLVED or rounded or found.same_minimiser is False:
         said = sentence("The step is the converged one of implicit Euler.")
         return Finding("minimiser", Verdict.RIGHT, found.error, SOLVED, "", said)
+    if not one.known:
+        said = sentence("It is {distance:.2g} m from the minimiser of implicit Euler.",
+                        distance=found.distance)  # fmt: skip
+        return Finding("minimiser", Verdict.UNDECIDED, found.error, SOLVED, "", said)
     said = sentence(
         "Another model than converged implicit Euler: {model} is {error:.2g} of the distance "
         "from y to x* off.",
         model=one.says, error=found.error,
     )  # fmt: skip
-    verdict = Verdict.RIGHT_BUT if one.known else Verdict.UNDECIDED
-    return Finding("minimiser", verdict, found.error, SOLVED, "", said)
+    return Finding("minimiser", Verdict.RIGHT_BUT, found.error, SOLVED, "", said)
 
 
 def velocities(one: Context) -> Finding | None:
@@ -174,10 +182,13 @@ def velocities(one: Context) -> Finding | None:
     if by_displacement and one.model.substeps == 1 and x is not None and not p.steps:
         wanted = (x - p.positions) / p.h * one.model.scaling
     gap = difference(p, "velocities", wanted, one.answered["velocities"])
-    scale = np.abs(wanted).max(initial=0.0) + one.allowed.velocities / SOLVED
+    size = float(np.abs(wanted).max(initial=0.0))
+    error = gap / (size + one.allowed.velocities / SOLVED)
     said = sentence("Velocities are up to {gap:.2g} m/s from what the step makes them.", gap=gap)
-    verdict = _graded(gap / scale) if np.isfinite(gap) else Verdict.UNDECIDED
-    return Finding("velocities", verdict, gap / scale, SOLVED, "", said)
+    verdict = Verdict.UNDECIDED
+    if np.isfinite(gap):
+        verdict = _graded(error, size, one.allowed.velocities)
+    return Finding("velocities", verdict, error, SOLVED, "", said)
 
 
 def momentum(one: Context) -> Finding | None:
@@ -283,17 +294,3 @@ def predicted(p: Problem, model: Model) -> Mapping[str, Any]:
             return simulate(p, model)
         except np.linalg.LinAlgError:
             return {}
-
-
-def first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
-    """Return the first case and law that broke."""
-    for one in judgements:
-        for finding in one.findings:
-            if finding.verdict >= Verdict.WRONG:
-                return sentence(
-                    "The law that broke first is {law}, in the case {case}: {said}",
-                    law=finding.law,
-                    case=one.case.name,
-                    said=finding.sentence,
-                )
-    return None

@@ -70,7 +70,7 @@ def apart(
     }
     worst = [difference(p, name, predicted[name], answered[name]) / scales[name]
              for name in scales if name in answered]  # fmt: skip
-    return max(worst) if worst and np.isfinite(worst).all() else np.inf
+    return float(max(worst)) if worst and np.isfinite(worst).all() else np.inf
 
 
 def difference(p: Problem, name: str, one: Any, other: Any) -> float:

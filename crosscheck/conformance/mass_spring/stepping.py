@@ -2,21 +2,25 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from dataclasses import replace
+from itertools import chain, product
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from reference.explicit import symplectic_euler
 from reference.implicit_euler import ImplicitEuler
 
+from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import together
+from ..explain import first_broken, hints_of, together
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
 from . import laws
+from .cases import task_cases
 from .faults import ASPECTS, Option, apply
-from .honest import domains
+from .honest import DAMPERS, HONEST_VELOCITIES, compatible, domains, honest
 from .laws import Context
 from .model import Model
 from .problem import Problem, problem_of, state_of, system_of
@@ -24,24 +28,34 @@ from .rounding import SOLVED, apart, rounding
 from .search import Found, Search, probes_of
 
 MOST_TOLD = 3
+Problems = Mapping[str, Problem]
 LAWS: tuple[Callable[[Context], Finding | None], ...] = (
     laws.pins, laws.declared_step, laws.velocities, laws.momentum, laws.minimiser,
 )  # fmt: skip
 
 
-def judge(task: str, asked: Sequence[Asked], greeting: Greeting) -> TaskReport:
-    """Hold the answers of a stepping solver against what it declares, and name its faults."""
-    problems = problems_of(asked, greeting)
-    search = Search(probes_of(asked, problems), greeting.step, greeting.epsilon)
-    found = search.run()
-    right = honest_options(found, greeting.step)
-    known = greeting.step.method is not None or bool(found and not found[0].faults)
-    judgements = [
-        _judge_case(one, asked, problems[one.case.name], greeting, right, known) for one in asked
-    ]
-    diagnosis = _diagnose(asked, problems, judgements, search, found, greeting)
-    judgements = _with_faults(judgements, diagnosis, known)
-    return TaskReport(task, "", judgements, diagnosis)
+class Stepping(NamedTuple):
+    """The discipline of a task that makes one step, or several."""
+
+    task: str
+
+    def cases(self, greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
+        """Return cases that suit the solver, the smallest first."""
+        return task_cases(self.task, greeting, seed, thorough)
+
+    def judge(self, asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+        """Hold answers against the step that is declared, or inferred, and name the faults."""
+        problems = problems_of(asked, greeting)
+        search = Search(probes_of(asked, problems), greeting.step, greeting.epsilon)
+        found = search.run()
+        right = honest_options(found, greeting.step)
+        known = greeting.step.method is not None or bool(found and not found[0].faults)
+        judgements = [
+            _judge_case(one, asked, problems[one.case.name], greeting, right, known)
+            for one in asked
+        ]
+        diagnosis = _diagnose(asked, problems, judgements, search, found, greeting)
+        return TaskReport(self.task, "", _with_faults(judgements, diagnosis, known), diagnosis)
 
 
 def problems_of(asked: Sequence[Asked], greeting: Greeting) -> dict[str, Problem]:
@@ -178,13 +192,12 @@ def _reference_seconds(p: Problem, model: Model) -> float:
 
 def _diagnose(
     asked: Sequence[Asked],
-    problems: Mapping[str, Problem],
+    problems: Problems,
     judgements: Sequence[CaseJudgement],
     search: Search,
     found: Sequence[Found],
     greeting: Greeting,
 ) -> Diagnosis:
-    wrong = any(one.verdict >= Verdict.WRONG for one in judgements)
     explanations: tuple[Explanation, ...] = ()
     if found and found[0].faults:
         explanations = _explanations(found, asked, problems, greeting)
@@ -195,18 +208,50 @@ def _diagnose(
     behaviour = None
     if found and not found[0].faults and undeclared:
         behaviour = sentence(
-            "It behaves like {model}.", model=describe_model(honest_options(found, greeting.step))
+            "In small cases it behaves like {model}, which it is held against."
+            if any(one.verdict >= Verdict.WRONG for one in judgements)
+            else "It behaves like {model}.",
+            model=describe_model(honest_options(found, greeting.step)),
         )
-    unexplained = wrong and not explanations
-    first = _first_broken(judgements, search) if unexplained else None
-    return Diagnosis(explanations, behaviour, first, _hints(judgements, wrong), search.tried)
+    hints = hints_of(judgements)
+    diagnosis = Diagnosis(explanations, behaviour, None, hints, search.tried)
+    if diagnosis.explained:
+        return diagnosis
+    if search.probes and behaviour is None and greeting.step.method is None:
+        hints += (_nearest(asked, problems, greeting), _what_holds(judgements))
+    return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)
+
+
+def _nearest(asked: Sequence[Asked], problems: Problems, greeting: Greeting) -> Sentence:
+    """Return which of the steps that are known comes nearest to the answers to the probes."""
+    probes = [question for question in asked if question.case.facts.get("probe")]
+    usual = {option.aspect: option for option in honest_options((), greeting.step)}
+    steps = []
+    for integrator, damper in product(honest(greeting.step)["integrator"], DAMPERS):
+        velocity = HONEST_VELOCITIES[integrator.fields["integrator"].explicit]
+        step = usual | {"integrator": integrator, "damper": damper, "velocity": velocity}
+        if compatible(step):
+            errors = _errors(tuple(step.values()), probes, problems, greeting)
+            steps.append((float(np.median(errors)), max(errors), tuple(step.values())))
+    median, worst, options = min(steps, key=lambda step: step[0])
+    return sentence(
+        "The nearest step that is known is {model}; it differs by {median:.2g} of a displacement "
+        "in the median small case, by {worst:.2g} in the worst.",
+        model=describe_model(options), median=median, worst=worst,
+    )  # fmt: skip
+
+
+def _what_holds(judgements: Sequence[CaseJudgement]) -> Sentence:
+    """Return the laws that no answer breaks."""
+    verdicts: dict[str, Verdict] = {}
+    for finding in chain.from_iterable(judgement.findings for judgement in judgements):
+        verdicts[finding.law] = max(finding.verdict, verdicts.get(finding.law, Verdict.RIGHT))
+    names = ", ".join(law for law, verdict in verdicts.items() if not verdict)
+    return sentence("What holds in every case: {laws}.", laws=names or "–")
 
 
 def _explanations(
-    found: Sequence[Found],
-    asked: Sequence[Asked],
-    problems: Mapping[str, Problem],
-    greeting: Greeting,
+    found: Sequence[Found], asked: Sequence[Asked], problems: Problems, greeting: Greeting
 ) -> tuple[Explanation, ...]:
     """Return the faults found with the share of all answers that they reproduce, in classes."""
     scored = sorted(
@@ -231,23 +276,29 @@ def _key(faults: Sequence[Option]) -> str:
 
 
 def _score(
-    one: Found, asked: Sequence[Asked], problems: Mapping[str, Problem], greeting: Greeting
+    one: Found, asked: Sequence[Asked], problems: Problems, greeting: Greeting
 ) -> tuple[float, float, Found]:
     """Return the share of answers that are reproduced, and the largest difference of those."""
-    hits, distance, count = 0, 0.0, 0
-    for each in asked:
-        if not isinstance(each.answer, Answer):
-            continue
-        count += 1
-        p, model = apply(one.options, problems[each.case.name], Model(damper="none"))
-        expected = laws.predicted(p, model)
-        if not expected:
-            continue
-        plain = problems[each.case.name]
-        error = apart(plain, expected, each.answer.values, rounding(plain, model, greeting.epsilon))
-        if error <= SOLVED:
-            hits, distance = hits + 1, max(distance, error)
-    return hits / max(count, 1), distance, one
+    errors = _errors(one.options, asked, problems, greeting)
+    hits = [error for error in errors if error <= SOLVED]
+    return len(hits) / max(len(errors), 1), max(hits, default=0.0), one
+
+
+def _errors(
+    options: tuple[Option, ...], asked: Sequence[Asked], problems: Problems, greeting: Greeting
+) -> list[float]:
+    """Return how far each answer is from a step with these options, relative to what it moves."""
+    errors = []
+    for question in asked:
+        if isinstance(question.answer, Answer):
+            plain = problems[question.case.name]
+            p, model = apply(options, plain, Model(damper="none"))
+            expected = laws.predicted(p, model)
+            allowed = rounding(plain, model, greeting.epsilon)
+            errors.append(
+                apart(plain, expected, question.answer.values, allowed) if expected else np.inf
+            )
+    return errors
 
 
 def _describe(faults: Sequence[Option]) -> Sentence:
@@ -256,24 +307,23 @@ def _describe(faults: Sequence[Option]) -> Sentence:
 
 
 def _fault_sentence(one: Option) -> Sentence:
-    from .honest import honest
-
     if any(one.key == other.key for other in honest(Step()).get(one.aspect, ())):
         return sentence("Other than declared, it behaves like this: {what}.", what=one.sentence)
     return one.sentence
 
 
-def _first_broken(judgements: Sequence[CaseJudgement], search: Search) -> Sentence | None:
-    """Return the first case and law that broke, the cases adding one aspect after another."""
-    for one in judgements:
-        for finding in one.findings:
-            if finding.verdict >= Verdict.WRONG:
-                return sentence(
-                    "The law that broke first is {law}, in the case {case}: {said} {trace}",
-                    law=finding.law, case=one.case.name, said=finding.sentence,
-                    trace=_TRACES.get(one.case.family, _TRACES["cloth"]),
-                )  # fmt: skip
-    return None
+def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
+    """Return the first law that broke, and where to look if all cases before are right.
+
+    The cases add one aspect after another.
+    """
+    law = first_broken(judgements)
+    doubtful = (one.case for one in judgements if one.verdict > Verdict.RIGHT_BUT)
+    case = next(doubtful, None)
+    if law is None or case is None or case.name != law.values["case"]:
+        return law
+    trace = _TRACES.get(case.family, _TRACES["cloth"])
+    return sentence("{law} {trace}", law=law, trace=trace)
 
 
 _TRACES: Mapping[str, Sentence] = {
@@ -291,41 +341,17 @@ _TRACES: Mapping[str, Sentence] = {
 }
 
 
-def _hints(judgements: Sequence[CaseJudgement], wrong: bool) -> tuple[Sentence, ...]:
-    """Return hints at what no variant explains."""
-    unequal = any(
-        finding.law == "equal requests" and finding.verdict >= Verdict.WRONG
-        for one in judgements
-        for finding in one.findings
-    )
-    if not unequal or not wrong:
-        return ()
-    return (
-        sentence(
-            "Equal requests differ: state is left over from the request before, or a value is "
-            "never initialised or dangles (in Eigen, a product kept with auto). Build with "
-            "-fsanitize=address,undefined, or run valgrind."
-        ),
-    )
-
-
 def _with_faults(
     judgements: Sequence[CaseJudgement], diagnosis: Diagnosis, known: bool
 ) -> list[CaseJudgement]:
     """Return the judgements, undecided steps wrong where a fault explains them."""
-    if known or not diagnosis.explanations:
+    if known or not diagnosis.explained:
         return list(judgements)
-    return [
-        CaseJudgement(
-            one.case, one.answer, tuple(_wrong(finding) for finding in one.findings),
-            one.expected, one.digits, one.reference_seconds,
-        )
-        for one in judgements
-    ]  # fmt: skip
+    return [replace(one, findings=tuple(map(_wrong, one.findings))) for one in judgements]
 
 
 def _wrong(finding: Finding) -> Finding:
     if finding.law != "declared step" or finding.verdict is not Verdict.UNDECIDED:
         return finding
-    said = sentence("No honest step gives these positions; a faulty one does.")
-    return Finding(finding.law, Verdict.WRONG, finding.error, finding.tolerance, "", said)
+    said = sentence("No honest step gives its answers; a faulty one does.")
+    return replace(finding, verdict=Verdict.WRONG, sentence=said)

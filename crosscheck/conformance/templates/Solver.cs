@@ -28,6 +28,7 @@ static class Solver {
     static void MassSpringStep(Request ask, Dictionary<string, object> answer) =>
         throw new Exception("mass_spring_step is not written yet");
 
+    // GREETING_FIELDS
     static void Main() {
         var tasks = new Dictionary<string, Action<Request, Dictionary<string, object>>> {
             ["forward_kinematics"] = ForwardKinematics,
@@ -36,7 +37,8 @@ static class Solver {
         };
         var offered = new List<string>(tasks.Keys);
         tasks["greeting"] = (ask, answer) => {
-            (answer["protocol"], answer["tasks"], answer["language"]) = (1, offered, "C#");
+            (answer["protocol"], answer["tasks"]) = (1, offered);
+            (answer["language"], answer["precision"]) = ("C#", "double");
         };
         using var answers = new StreamWriter(Console.OpenStandardOutput()) { AutoFlush = true };
         Console.SetOut(Console.Error); // what else is printed does no harm

@@ -52,6 +52,7 @@ void solve(const plumbob::Request& in, plumbob::Answer& out) {
     out.set("local_rotations", local_rotations);
 }
 
+// GREETING_FIELDS
 int main() {
     return plumbob::serve(R"("name": "my solver", "language": "C++", "precision": "double",
         "tasks": ["forward_kinematics", "inverse_kinematics", "mass_spring_step"])", solve);

@@ -1,5 +1,6 @@
 // A starter for `plumbob verify -- node solver.js` (docs/protocol.md). Offer only what you have.
 const readline = require("node:readline");
+// GREETING_FIELDS
 const greeting = {
   protocol: 1, name: "my solver", language: "JavaScript", precision: "double",
   tasks: ["forward_kinematics", "inverse_kinematics", "mass_spring_step"],

@@ -7,6 +7,7 @@ use plumbob::{member, Request, System};
 type Vec3 = [f64; 3]; // [m]
 type Quat = [f64; 4]; // unit quaternion, w first
 
+// GREETING_FIELDS
 const GREETING: &str = r#""name": "my solver", "language": "Rust", "precision": "double",
     "tasks": ["forward_kinematics", "inverse_kinematics", "mass_spring_step"]"#;
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arguments import frozen
+from ...arguments import distinct_texts, frozen
 from ...quaternion import exponential, rotate, scale, subtract
 from ..robot import INFINITY, ORIGIN, Link, Robot, Vector, assemble
 from ..source import warn
@@ -144,7 +144,8 @@ class _Tree:
             return -INFINITY, INFINITY
         if lower >= upper or (kind == "ball" and lower != 0.0):
             least = "0" if kind == "ball" else "the least"
-            raise joint.error(f"expected a range from {least} up, got {lower:g} to {upper:g}")
+            bounds = " to ".join(distinct_texts(lower, upper))
+            raise joint.error(f"expected a range from {least} up, got {bounds}")
         return lower, upper
 
     def check_aligned(self, joint: Element) -> None:

@@ -279,6 +279,17 @@ def one_branch_moved(answer, inputs):
     return x
 
 
+@pytest.mark.parametrize("key", ["world rotation on the left", "joints not placed anew"])
+def test_what_is_inferred_does_not_contradict_what_is_wrong(key):
+    """Sweeps that are not those of CCD are not said to be."""
+    (fault,) = (one for one in FAULTS["ccd"] if one.key == key)
+    found = judged(faulty("ccd", [fault]))
+    said = [f.sentence for one in found.judgements for f in one.findings if f.verdict]
+    assert any("Its sweep is not that of CCD" in str(words) for words in said)
+    assert str(found.diagnosis.behaviour) == "It is held against CCD, which its sweeps resemble."
+    assert str(judged(faulty("ccd", [])).diagnosis.behaviour) == "Its sweeps are those of CCD."
+
+
 def test_claimed_residual_has_to_be_true():
     report = judged(changed(residual=lambda a, i: 0.0), "ccd")
     assert "claims" in broken(report)

@@ -1,6 +1,7 @@
 """Faults of mass-spring solvers are caught by laws and named; honest solvers are not accused."""
 
 import dataclasses
+import re
 import sys
 from itertools import islice
 from pathlib import Path
@@ -20,11 +21,14 @@ from mass_spring_solvers import (
     report,
 )
 
+from bench.verify import terminal
+from bench.verify.words import Presentation, speaker
+from crosscheck.conformance.case import Case
 from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.functions import FunctionContestant
 from crosscheck.conformance.greeting import Greeting, Step, System
-from crosscheck.conformance.judgement import Verdict
-from crosscheck.conformance.mass_spring import energy, forces
+from crosscheck.conformance.judgement import CaseJudgement, Finding, Report, Verdict
+from crosscheck.conformance.mass_spring import energy, forces, stepping
 from crosscheck.conformance.mass_spring.cases import task_cases
 from crosscheck.conformance.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
 from crosscheck.conformance.mass_spring.model import Integrator, Model, simulate
@@ -34,6 +38,7 @@ from crosscheck.conformance.mass_spring.problem import (
     state_of,
     system_of,
 )
+from crosscheck.conformance.sentence import sentence
 from crosscheck.conformance.verify import verify
 from crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
 from reference.explicit import runge_kutta, symplectic_euler
@@ -294,6 +299,79 @@ def test_faults_of_a_solver_that_declares_nothing_are_named(name):
     found = report(step, system=system, precision=precision)
     assert found.verdict is Verdict.WRONG
     assert any(set(one.split(" + ")) == set(keys) for one in named(found))
+
+
+def extended_position_based(**inputs):
+    """A step of extended position-based dynamics, which is none of those that are known."""
+    p = problem_of(inputs)
+    weights = 1.0 / p.masses
+    weights[p.pinned] = 0.0
+    x = p.positions + p.h * (p.velocities + p.h * p.gravity) * (weights > 0.0)[:, None]
+    multipliers = np.zeros(len(p.springs))
+    for _ in range(7):
+        for s, (i, j) in enumerate(p.springs):
+            d = x[i] - x[j]
+            length = np.linalg.norm(d)
+            compliance = 1.0 / max(p.stiffnesses[s] * p.h**2, 1e-9)
+            gap = length - p.rest_lengths[s] + compliance * multipliers[s]
+            change = -gap / (weights[i] + weights[j] + compliance)
+            multipliers[s] += change
+            x[i] += weights[i] * change * d / length
+            x[j] -= weights[j] * change * d / length
+    return {"positions": x, "velocities": (x - p.positions) / p.h}
+
+
+def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told():
+    found = report(extended_position_based)
+    assert found.verdict is Verdict.UNDECIDED
+    nearest, holds = map(str, found.diagnosis.hints)
+    assert re.search(r"nearest step that is known is \d+ local/global iterations from y", nearest)
+    median, worst = (float(x) for x in re.search(r"by (\S+) of .* by (\S+) in", nearest).groups())
+    assert 0.0 < median <= worst < 0.1
+    laws_that_hold = set(holds.removesuffix(".").partition(": ")[2].split(", "))
+    assert laws_that_hold == {"pins", "momentum", "equal requests", "symmetry", "consistency"}
+    screen = " ".join(" ".join(terminal.lines(
+        Report(Greeting(1, ("mass_spring_step",)), [found], 0),
+        Presentation(speaker("en"), "en", ["x.py"]), terminal.ENDLESS,
+    )).split())  # fmt: skip
+    assert nearest in screen
+    assert holds in screen
+    assert 'Next: declare the step that you make, by "step" in the greeting' in screen
+    sentences = {str(f.sentence) for one in found.judgements for f in one.findings if f.verdict}
+    assert not any("inf" in words.split() for words in sentences)
+    assert not any("Another model than converged" in words for words in sentences)
+
+
+def test_a_step_that_is_wrong_in_large_systems_is_not_said_to_behave_like_a_right_one():
+    right = Stepper(LINEARISED)
+
+    def step(**inputs):
+        found = right(**inputs)
+        found["positions"] = found["positions"] + 0.01 * (len(inputs["masses"]) > 8)
+        return found
+
+    step.__signature__ = right.__signature__
+    for function, words in ((step, "In small cases it behaves like"), (right, "It behaves like")):
+        found = report(function)
+        assert str(found.diagnosis.behaviour).startswith(f"{words} one linearised implicit step")
+        assert (found.verdict is Verdict.WRONG) is (function is step)
+
+
+@pytest.mark.parametrize("first", [Verdict.RIGHT, Verdict.RIGHT_BUT, Verdict.UNDECIDED])
+@pytest.mark.parametrize("family", ["springs", "dampers", "pins", "h changes", "cloth"])
+def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family):
+    def judged(name, family, verdict):
+        case = Case(name, "mass_spring_step", {}, family, sentence(""))
+        finding = Finding("a law", verdict, 1.0, 0.0, "m", sentence("It is off."))
+        return CaseJudgement(case, Answer({}, 0.0), (finding,), {})
+
+    told = str(stepping._first_broken([
+        judged("one", "flight", first), judged("two", family, Verdict.WRONG),
+        judged("three", "cloth", Verdict.WRONG),
+    ]))  # fmt: skip
+    assert "in the case 'two': It is off." in told
+    assert (str(stepping._TRACES[family]) in told) is (first is not Verdict.UNDECIDED)
+    assert stepping._first_broken([judged("one", "flight", first)]) is None
 
 
 def test_noise_is_named():

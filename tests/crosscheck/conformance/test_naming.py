@@ -66,7 +66,7 @@ NAMES = {
 }
 # What is said in other words than an explanation's: a hint, or the model that a finding states.
 SAID = {
-    "step_random_start": "Equal requests differ",
+    "step_random_start": "Equal requests get different answers",
     "step_geometric_dropped": "without the geometric term",
 }
 # Caught, but not named: the catalogue has none that reproduces them.

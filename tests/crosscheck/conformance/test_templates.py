@@ -1,6 +1,7 @@
 """The starters build, greet, survive stray prints, and lack nothing but the user's code."""
 
 import json
+import re
 import shlex
 import shutil
 import subprocess
@@ -12,9 +13,10 @@ import msgspec
 import planted_programs
 import pytest
 
-from crosscheck.conformance.greeting import Greeting
+from crosscheck.conformance.doors import open_contestant
+from crosscheck.conformance.greeting import Greeting, Step, System
 from crosscheck.conformance.task import TASKS
-from crosscheck.conformance.templates import LANGUAGES, template
+from crosscheck.conformance.templates import GREETING_FIELDS, LANGUAGES, template
 
 REQUESTS = planted_programs.requests()
 OFFERED = ["forward_kinematics", "inverse_kinematics", "mass_spring_step"]
@@ -115,9 +117,37 @@ def test_a_filled_in_starter_answers_through_stray_prints(language, tmp_path):
 def test_what_the_user_fills_in_has_sixty_lines_at_most(language):
     first, *others = LANGUAGES[language].files
     lines = template(language)[first].splitlines()
-    assert len(lines) <= 60
+    assert len(lines) - len(GREETING_FIELDS.split("\n")) <= 60
     assert max(map(len, lines)) <= 100
     assert all(name in template(language) for name in others)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_starter_lists_every_field_of_the_greeting_and_its_values(language):
+    text = template(language)[LANGUAGES[language].files[0]]
+    words = re.findall(r"\w+", " ".join(re.findall(r"(?://|#) (.*)", text)))
+    for kind in (Greeting, System, Step):
+        for field in msgspec.structs.fields(kind):
+            assert field.name in words
+            for values in re.findall(r"Literal\[(.*?)\]", str(field.type)):
+                assert set(re.findall(r"'(\w+)'", values)) <= set(words), field.name
+    assert "GREETING_FIELDS" not in text
+
+
+def test_a_starter_greets_with_its_precision_and_says_that_there_is_another(replies):
+    assert replies[0]["precision"] == "double"
+
+
+def test_the_python_starter_declares_what_it_greets_with(tmp_path):
+    path = tmp_path / "solver.py"
+    text = template("python")["solver.py"].replace('"precision": "double"', '"precision": "single"')
+    path.write_text(text)
+    for door in (open_contestant(str(path)), open_contestant([sys.executable, str(path)])):
+        try:
+            assert door.greeting.precision == "single"
+            assert list(door.greeting.tasks) == OFFERED
+        finally:
+            door.close()
 
 
 def test_starters_offer_tasks_that_exist():

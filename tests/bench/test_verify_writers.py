@@ -1,0 +1,134 @@
+"""Every fault of the catalogue passes every writer, and no writer costs the verdict."""
+
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.verify import files, json_file, junit, page, saved, terminal
+from bench.verify.files import Files
+from bench.verify.question import Question
+from bench.verify.words import Presentation, speaker
+from crosscheck.conformance.functions import FunctionContestant
+from crosscheck.conformance.self_test import subjects
+from crosscheck.conformance.verify import verify
+
+FAULTY = {f"{one.family}, {one.name}": one for one in subjects() if one.fault}
+SOME = ("forces, gravity g/m", "steps, gravity g/m")
+
+
+def rounded(subject):
+    """Judge a subject whose answers are the last bit off: the explanation has a distance."""
+
+    def function(**inputs):
+        answer = subject.function(**inputs)
+        return {name: value * (1.0 + 2.0**-52) for name, value in answer.items()}
+
+    function.__signature__ = getattr(subject.function, "__signature__", None)
+    contestant = FunctionContestant({subject.task: function}, subject.greeting)
+    return verify(contestant)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(one, marks=() if one in SOME or i % 40 == 0 else pytest.mark.slow)
+        for i, one in enumerate(FAULTY)
+    ],
+)
+def test_every_fault_passes_every_writer(name, tmp_path):
+    report = rounded(FAULTY[name])
+    (task,) = report.tasks
+    explanations = task.diagnosis.explanations
+    path = saved.save(task, tmp_path, 0, False)
+    assert saved.load(path).name == task.smallest_failure.case.name
+    for language in ("en", "zh"):
+        say = speaker(language)
+        context = Presentation(say, language, ["my.py"], {(task.task, task.method): path})
+        screen = "".join("".join(terminal.lines(report, context)).split())
+        record = json.loads(json_file.text(report, say), parse_constant=pytest.fail)["tasks"][0]
+        assert [one["faults"] for one in record["explanations"]] == [
+            list(one.faults) for one in explanations
+        ]
+        for one, written in zip(explanations, record["explanations"], strict=True):
+            assert (written["share"], written["distance"]) == (one.share, one.distance)
+            assert written["text"] == say(one.sentence)
+        root = ET.fromstring(junit.text(report, say).encode())
+        html = page.render(report, context)
+        if explanations:
+            told = say(explanations[0].sentence)
+            assert "".join(told.split())[:40] in screen
+            assert told in "".join(root.itertext())
+            assert told[:20].replace("'", "&#39;") in html
+
+
+@pytest.fixture
+def report(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    Path("out").mkdir()
+    return rounded(FAULTY["forces, gravity g/m"])
+
+
+def raises(*_):
+    raise TypeError("Encoding objects of type sphinx is unsupported\nsecond line")
+
+
+@pytest.mark.parametrize("language", ["en", "zh"])
+@pytest.mark.parametrize("writer", ["json_file", "junit", "page", "saved"])
+def test_a_failing_writer_costs_no_verdict(writer, language, report, monkeypatch, capsys):
+    names = {"json_file": "text", "junit": "text", "page": "render", "saved": "save"}
+    monkeypatch.setattr(getattr(files, writer), names[writer], raises)
+    context = Presentation(speaker(language), language, ["my.py"])
+    code = Files(None, None, None, Path("out")).write(report, Question(), context)
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert "mass_spring_forces" in out
+    assert err.startswith("plumbob: out/")
+    assert err.count("\n") == 1
+    assert "TypeError: Encoding objects of type sphinx" in err
+    wanted = {"json_file": "verdict.json", "junit": "verdict.xml", "page": "index.html"}
+    lost = {wanted.get(writer)}
+    assert {one.name for one in Path("out").glob("*.*")} == set(wanted.values()) - lost
+
+
+def test_a_case_that_cannot_be_saved_costs_no_verdict(report, capsys):
+    Path("plumbob_failures").write_text("a file")
+    code = Files(None, None, None, None).write(
+        report, Question(), Presentation(speaker("en"), "en", ["my.py"])
+    )
+    out, err = capsys.readouterr()
+    assert code == 2
+    assert "Gravity is divided by the mass" in out
+    assert "--rerun" not in out
+    assert err == "plumbob: plumbob_failures could not be written: File exists\n"
+
+
+def test_the_verdict_is_on_the_screen_before_any_file_is_written(report, monkeypatch):
+    order = []
+    monkeypatch.setattr(terminal, "show", lambda *_: order.append("screen"))
+    monkeypatch.setattr(Path, "write_text", lambda path, *_, **__: order.append(path.name))
+    Files(None, None, None, Path("out")).write(
+        report, Question(), Presentation(speaker("en"), "en", ["my.py"])
+    )
+    assert order == ["screen", "verdict.json", "verdict.xml", "index.html"]
+
+
+def test_files_are_written_though_nobody_reads_the_screen(report, monkeypatch):
+    def closed(*_):
+        raise SystemExit(1) from BrokenPipeError()
+
+    monkeypatch.setattr(terminal, "show", closed)
+    context = Presentation(speaker("en"), "en", ["my.py"])
+    Files(None, None, None, Path("out")).write(report, Question(), context)
+    assert {"verdict.json", "verdict.xml", "index.html"} <= {
+        one.name for one in Path("out").glob("*")
+    }
+
+
+def test_numbers_of_numpy_are_written_like_any_other(report):
+    (task,) = report.tasks
+    object.__setattr__(task.diagnosis.explanations[0], "distance", np.float64(1e-16))
+    record = json.loads(json_file.text(report, speaker("en")))
+    assert record["tasks"][0]["explanations"][0]["distance"] == 1e-16
