@@ -11,6 +11,7 @@ from bench.cli import run_command
 from bench.entrants import opening
 from bench.experiments.chain import figures as chain_figures
 from bench.experiments.cloth_peers import figures as cloth_figures
+from bench.experiments.robots.problem import ROBOTS, robot
 from bench.harness.record import RecordFile
 from bench.presentation.figures.sketch import drawn
 from bench.presentation.results import Results, plain
@@ -400,6 +401,29 @@ def test_one_start_of_robots_and_restarts_through_the_door_are_those_of_the_solv
     assert once.arrays["solved"].sum() >= 1
     assert again.arrays["solved"].sum() > once.arrays["solved"].sum()
     assert not (once.arrays["claimed"].astype(bool) & ~once.arrays["solved"]).any()
+
+
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
+def test_a_request_calls_the_tool_as_the_protocol_says(name):
+    """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
+    from bench.entrants.robot import robot_inputs
+    from bench.experiments.robots.evaluate import evaluator_of
+    from crosscheck.conformance.kinematics.robot_models import tool_pose
+    from crosscheck.conformance.task import TASKS
+    from reference import forward_kinematics
+    from reference.formats import urdf
+
+    inputs = robot_inputs(robot(name))
+    (field,) = [field for field in TASKS["robot_inverse_kinematics"].inputs if field.name == "urdf"]
+    assert field.about.endswith("its tool the link `tool`")
+    model = urdf.parse(inputs["urdf"]).articulation
+    for q in robot(name).draw(np.random.default_rng(3), 5):
+        positions, _ = evaluator_of(name).forward(q)
+        pose = forward_kinematics(model, q)
+        np.testing.assert_allclose(
+            pose.positions[model.names.index("tool")], positions[0], atol=1e-12
+        )
+        np.testing.assert_allclose(tool_pose(inputs, q).position, positions[0], atol=1e-12)
 
 
 @pytest.mark.slow

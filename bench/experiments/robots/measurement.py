@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import WorkerProcess
+from ...harness.isolation import WorkerProcess, raised
 from ...harness.worker import Solved
 from ...peers import registry
 from ...peers.registry import Entry, Peer
@@ -152,13 +152,14 @@ def solve(run: Run, targets: Targets) -> Measured:
     arrays = _evaluated(run, targets, done) if done else {}
     return Measured(
         {**arrays, "setup": np.array(outcome.setup)},
-        {"remark": outcome.trouble},
+        {"remark": outcome.note},
         {
             "strata": list(STRATA),
             "tips": list(robot.effectors),  # as the file of records calls them
             "joints": len(robot.joints),
             "freedom": int(evaluator_of(run.robot).model.nv),
             "wanted": "pose" if robot.posed else "position",
+            "trouble": raised(done),
         },
     )
 
