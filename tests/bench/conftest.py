@@ -383,6 +383,8 @@ def make():
         drifted=drifted,
         beyond=beyond,
         claim=claim,
+        entered=entered,
+        reached=reached,
         first_called=first_called,
         in_parts=in_parts,
         timed=timed,

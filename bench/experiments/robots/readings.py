@@ -67,8 +67,13 @@ def records_of(results: Results, kind: str, task: str = REACHABLE) -> list[Recor
     known = [peer.called(entry) for peer in registry.PEERS for entry in peer.entries]
     solvers = list(dict.fromkeys([*known, *(record.solver for record in wanted)]))
     wanted.sort(key=lambda r: (robots.index(r.title), solvers.index(r.solver)))
-    most = {robot: _commonest(mine) for robot, mine in by_robot(wanted).items()}
-    return [_marked(record, most.get(record.title, 0)) for record in wanted]
+    return marked(wanted)
+
+
+def marked(records: Sequence[Record]) -> list[Record]:
+    """Return records with a mark where they are not of all targets, or of others than most are."""
+    sizes = {robot: _commonest(mine) for robot, mine in by_robot(records).items()}
+    return [_marked(record, sizes.get(record.title, 0)) for record in records]
 
 
 def _commonest(records: Sequence[Record]) -> int:
