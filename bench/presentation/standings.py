@@ -12,6 +12,7 @@ from ..experiments.robots.readings import KINDS, SHIFT, marked, measured, record
 from ..harness import metrics
 from ..harness.record import Record
 from ..peers import registry
+from .figures.chart import is_ours
 from .results import Results, counted, label, listed
 from .tables.columns import words_in
 from .tables.table import words
@@ -39,7 +40,7 @@ class Headline(NamedTuple):
 
 
 def standings(results: Results) -> list[Headline]:
-    """Return what went wrong with solvers of the user's, then where each stands, by task."""
+    """Return where each solver of the user's stands, task by task, ranks before what went wrong."""
     chains = measured(results.all("ik", task=chain.CHAIN))
     fields = {"accuracy": marked([r for r in chains if r.facts["stratum"] != chain.BEYOND])}
     tasks = {"accuracy": "chain of balls"}
@@ -55,7 +56,8 @@ def standings(results: Results) -> list[Headline]:
     motions = [point for point in points(results, cloth_peers.MOTION) if point.is_whole]
     ranked += _on_cloths("step", "error", "error {}", steps)
     ranked += _on_cloths("motion", "true", "{} m from the truth", motions)
-    return [*_troubles(results, "ik"), *_troubles(results, "cloth"), *ranked]
+    headlines = [*_troubles(results, "ik"), *_troubles(results, "cloth"), *ranked]
+    return sorted(headlines, key=lambda headline: not headline.answer.startswith("rank"))
 
 
 def _troubles(results: Results, suite: str) -> Iterator[Headline]:
@@ -64,9 +66,9 @@ def _troubles(results: Results, suite: str) -> Iterator[Headline]:
     for record in results.all(suite, failed=True, entrant=True):
         records.setdefault(str(record.facts.get("door")), []).append(record)
     for mine in records.values():
-        if sentences := [f"{r.title}: {why}" for r in mine if (why := r.failed or r.trouble)]:
-            asked, rank = f"{mine[0].solver}, suite {suite}", f"trouble on {len(sentences)}"
-            rank += f" of {counted(len(mine), 'problem')}"
+        if sentences := [f"{r.problem}: {why}" for r in mine if (why := r.failed or r.trouble)]:
+            asked = f"{min((record.solver for record in mine), key=len)}, suite {suite}"
+            rank = f"trouble on {len(sentences)} of {counted(len(mine), 'problem')}"
             yield Headline("", asked, rank, sentences[0], f"entered_{suite}")
 
 
@@ -91,7 +93,7 @@ def _on_targets(records: Sequence[Record], solver: str) -> tuple[str, str]:
 def of_finishers(finished: int, count: int) -> str:
     """Return of how many solvers something is said, of how many that took part."""
     solvers = counted(count, "solver")
-    return f"of {solvers}" if finished == count else f"of {finished} that finished, of {solvers}"
+    return f"of {solvers}" if finished == count else f"of the {finished} of {solvers} that finished"
 
 
 def solved(share: metrics.Share, noun: str) -> str:
@@ -111,7 +113,7 @@ def _times(row: Overall, rows: Mapping[str, Overall]) -> str:
 
 def _fastest(rivals: Sequence[str]) -> list[str]:
     """Return the first of some solvers, and the first of ours if that is another."""
-    ours = [solver for solver in rivals if _is_ours(solver)]
+    ours = [solver for solver in rivals if is_ours(solver)]
     return list(dict.fromkeys((*rivals[:1], *ours[:1])))
 
 
@@ -127,13 +129,9 @@ def speed(ratio: metrics.Ratio, rival: str) -> str:
     return f"{words(mean)} times {word} than {_written(rival)}{interval}"
 
 
-def _is_ours(solver: str) -> bool:
-    return registry.find(solver).engine.casefold() == registry.PLUMBOB.casefold()
-
-
 def _written(solver: str) -> str:
     """Return how a solver is written beside those of others."""
-    is_clear = not _is_ours(solver) or label(solver).startswith(registry.PLUMBOB)
+    is_clear = not is_ours(solver) or label(solver).startswith(registry.PLUMBOB)
     return label(solver) if is_clear else f"{registry.PLUMBOB} {label(solver)}"
 
 

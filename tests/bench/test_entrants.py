@@ -84,12 +84,18 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
     assert len(near.facts["digest"]) == 12
     assert near.conditions["solver_commit"] == ""
     assert (near.arrays["residual"] <= 1e-4).all()
+    assert near.arrays["solved"].all()
+    for solver in ("My FABRIK", "ccd", "fabrik"):  # so that its time can stand beside ours
+        (record,) = [one for one in records(solver) if one.problem == "chain/near"]
+        assert record.arrays["seconds"].shape == record.arrays["solved"].shape == (2,), solver
+        assert (record.arrays["seconds"] > 0.0).all()
     made = {table.name: table for table in tables(Results(records()), ["ik"])}
     for name in ("accuracy", "q1_beyond_reach", "published_fabrik", "entered_ik"):
         assert "My FABRIK" in cells(made[name]), name
     for draw in (chain_figures.ik_residuals, chain_figures.iterations):
         assert "My FABRIK" in drawn(draw(Results(records()))).svg
-    assert "My FABRIK" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert re.search(r"^My FABRIK, chain of balls: rank \d of 3 solvers", printed, re.MULTILINE)
 
 
 def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
@@ -291,6 +297,7 @@ def test_a_solver_that_hangs_is_ended(folder, monkeypatch):
     assert "silence" in record.notes["remark"]
     assert "cut at 1 of 2 targets" in record.notes["remark"]
     assert np.isfinite(record.arrays["residual"]).tolist() == [True, False]
+    assert record.arrays["solved"].size == 1  # which has no rank: it did not finish
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_a_solver_cut_short_is_not_ranked(make):
         answer, detail = asked(records, question)[2:4]
         assert answer == "a"
         assert " on the arm, " in detail
-        assert detail.endswith("of 2 that finished, of 3 solvers")
+        assert detail.endswith("of the 2 of 3 solvers that finished")
         assert "slow" not in detail
     assert headlines.headlines(Results([records[0], cut])) == []
 

@@ -1,5 +1,6 @@
 """The user's solvers come first: where they stand, what they raised, and a bench's last lines."""
 
+import contextlib
 import re
 import sys
 import threading
@@ -7,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from browser import CHROMIUM, Browser
 
 from bench import terminal
 from bench.cli import run_command
@@ -76,7 +78,7 @@ def test_a_solver_that_is_cut_off_has_no_rank_and_one_that_solves_nothing_neithe
 def test_a_rank_is_among_those_that_finished(make):
     rivals = [solving(make, "pink", 100), solving(make, "mink", 18, begun=18)]
     standing = only([*rivals, solving(make, "Mine", 20, mine=True)])
-    assert standing.answer == "rank 2 of 2 that finished, of 3 solvers"
+    assert standing.answer == "rank 2 of the 2 of 3 solvers that finished"
 
 
 def chained(make, solver, residuals, seconds, stratum="near", mine=False):
@@ -143,14 +145,14 @@ def test_many_cloths_have_few_sentences_and_the_rank_on_all(make):
 RAISED = "It raised ValueError in line 3 of mine.py: no, on 4 of 200 targets"
 
 
-def test_what_a_solver_raised_comes_first_with_how_often(make):
+def test_what_a_solver_raised_stands_below_its_ranks_with_how_often(make):
     good = solving(make, "Mine", 20, mine=True)
-    bad = solving(make, "Mine", 3, mine=True, kind="restarts", trouble=RAISED)
-    first, *others = standings(Results([good, bad]))
-    assert first.asked == "Mine, suite ik"
-    assert first.answer == "trouble on 1 of 2 problems"
-    assert first.detail == f"the arm: {RAISED}"
-    assert len(others) == 2
+    bad = solving(make, "Mine, 20 restarts", 0, mine=True, kind="restarts", trouble=RAISED)
+    rank, trouble, unranked = standings(Results([bad, good]))
+    assert rank.answer == "rank 1 of 1 solver"
+    assert (trouble.asked, trouble.answer) == ("Mine, suite ik", "trouble on 1 of 2 problems")
+    assert trouble.detail == f"robots/arm: {RAISED}"
+    assert unranked.answer == "not ranked, solves nothing"
 
 
 def test_a_problem_that_could_not_be_measured_is_not_forgotten(make):
@@ -159,7 +161,7 @@ def test_a_problem_that_could_not_be_measured_is_not_forgotten(make):
     failed = replace(failed, arrays={}, notes={"failed": "It raised ValueError: no"})
     standing = only([failed])
     assert standing.answer == "trouble on 1 of 1 problem"
-    assert standing.detail == "chain, near: It raised ValueError: no"
+    assert standing.detail == "chain/near: It raised ValueError: no"
 
 
 def run_folder(make, tmp_path):
@@ -177,7 +179,7 @@ def test_the_first_screen_of_the_page_begins_with_the_solver_of_the_user(make, t
     page = report.write(run_folder(make, tmp_path)).page.read_text("utf-8")
     screen = page[page.index('<section id="answers"') : page.index("</section>")]
     (heading,) = re.findall("<h1[^>]*>(.*?)</h1>", screen)
-    assert heading == "Mine, suite ik: trouble on 1 of 2 problems"
+    assert heading == "Mine, robots, one start: rank 3 of 3 solvers"
     for standing in standings(Results(RecordFile(tmp_path).read().records)):
         assert f'<a href="#{standing.table}">{standing.answer}</a>' in screen
         assert standing.asked in screen
@@ -197,13 +199,13 @@ def test_a_bench_ends_with_the_solver_of_the_user_and_who_leads(
     said = " ".join(lines)
     for standing in standings(Results(RecordFile(tmp_path).read().records)):
         assert f"{standing.asked}: {standing.answer}; {standing.detail}." in said
-    assert lines[0].startswith("Mine, suite ik: trouble on 1 of 2 problems; ")
-    assert said.index("robots, restarts: rank") < said.index("kinematics, most accurate")
+    assert lines[0].startswith("Mine, robots, one start: rank 3 of 3 solvers; ")
+    assert said.index("trouble on 1 of 2 problems") < said.index("kinematics, most accurate")
 
 
 def test_a_report_ends_with_the_solver_of_the_user_first(make, tmp_path):
     lines = outcome.outcome(report.write(run_folder(make, tmp_path)), 200)
-    assert lines[0].startswith("Mine, suite ik: ")
+    assert lines[0].startswith("Mine, robots, one start: ")
     assert any(line.startswith("Right? ") for line in lines)
 
 
@@ -261,7 +263,7 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
     assert err.count(why) == 1
     said = " ".join(out.split())
     rank = "My raiser, suite ik: trouble on 2 of 2 problems"
-    assert f"{rank}; UR5: {why}, on 12 of 12 targets." in said
+    assert f"{rank}; robots/ur5: {why}, on 12 of 12 targets." in said
     results = Results([plain(record) for record in RecordFile("out").read().records])
     made = {table.name: table for table in tables(results, ["ik"])}
     for name, title in (
@@ -272,3 +274,37 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
         (j,) = [j for j, column in enumerate(made[name].columns) if column.title == title]
         assert not made[name].columns[j].folded or name == "entered_ik"
         assert f"{why}, on 12 of 12 targets" in made[name].rows[0][j], name
+
+
+def test_what_fails_alike_is_said_once_and_counted(tmp_path, monkeypatch, capsys):
+    from bench.commands.bench import run_suites
+    from bench.harness import run
+
+    why = {"chain/near": "It raised", "chain/far": "It raised", "robots/all": "It crashed"}
+    events = [run.Event(run.FAILED, "ik", f"{at}, Mine", message) for at, message in why.items()]
+    monkeypatch.setattr(run, "run", lambda *_: iter(events))
+    monkeypatch.setattr(run, "count", lambda *_: len(events))
+    assert run_suites(["ik"], "quick", tmp_path, False) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        "plumbob: ik: chain/near, Mine and 1 more: It raised",
+        "plumbob: ik: robots/all, Mine: It crashed",
+    ]
+
+
+def test_in_a_browser_the_solver_of_the_user_is_in_sight_at_once(make, tmp_path):
+    """At a desk and on a phone, and nothing scrolls sideways."""
+    if not CHROMIUM:
+        pytest.skip("the page is looked at in Chromium, which is not installed")
+    page = report.write(run_folder(make, tmp_path)).page.as_uri()
+    (tmp_path / "profile").mkdir()
+    with contextlib.closing(Browser(tmp_path / "profile")) as browser:
+        for width, height in ((1440, 900), (390, 844)):
+            browser.open(page, width, height)
+            heading, answer = browser.run(
+                "[...document.querySelectorAll('#answers h1, #answers .card dd:first-of-type')]"
+                ".slice(0, 2).map(e => [e.textContent.trim(), e.getBoundingClientRect().bottom])"
+            )
+            assert heading[0] == "Mine, robots, one start: rank 3 of 3 solvers"
+            assert answer[0].startswith("rank 3 of 3 solvers 75 % of 200 targets solved")
+            assert heading[1] < answer[1] < height
+            assert browser.run("document.documentElement.scrollWidth") <= width
