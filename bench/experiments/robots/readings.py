@@ -32,13 +32,13 @@ MARK = "mark"
 OUTCOMES = ("solved", "beyond a limit", "wrong claim", "missed", "no answer", "not begun")
 
 _MEASURED = (
-    "Every solver has the same text of the robot, the same targets and the same seeded random "
-    "starts. It works in a process of its own, on one core (TRAC-IK on two), and is timed target "
-    "by target, as in a loop of solves: after the target before, solved again without counting "
-    "where that takes less than a millisecond; conversions are left out. The solvers of a robot "
-    "follow each other in an order drawn by lot. What one returns is "
-    "evaluated by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a "
-    "busy machine. Solved means: "
+    "Every solver has the same text of the robot (a solver of yours the same robot as the protocol "
+    "writes it), the same targets and the same seeded random starts. It works in a process of its "
+    "own, on one core (TRAC-IK on two), and is timed target by target, as in a loop of solves: "
+    "after the target before, solved again without counting where that takes less than a "
+    "millisecond; conversions are left out. The solvers of a robot follow each other in an order "
+    "drawn by lot. What one returns is evaluated by MuJoCo’s kinematics of the same text. "
+    "TRAC-IK’s limits of time pass sooner on a busy machine. Solved means: "
 )
 # The rule for solvers that a budget of time cut short.
 RULE = (
