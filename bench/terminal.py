@@ -1,8 +1,10 @@
 """The terminal: tables as text, the bar of a long run."""
 
+import contextlib
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,10 +12,13 @@ if TYPE_CHECKING:
     from crosscheck.verdict import Verdict as ClaimVerdict
 
     from .presentation.report import Written
+    from .presentation.results import Results
     from .presentation.tables.table import Table
 
 # In a pipe no line is broken: each row and each sentence stands in one.
 IN_A_PIPE = 10**6
+# After so long [s] a pipe gets its first line on progress, then ever more seldom.
+PAUSE, LONGEST_PAUSE = 10.0, 60.0
 
 
 def width() -> int:
@@ -22,21 +27,31 @@ def width() -> int:
 
 
 def print_tables(suites: Sequence[str], output: Path) -> None:
-    """Print the tables with numbers that come from these suites, and who was not asked for some."""
-    from .harness.record import RecordFile
-    from .presentation.entered import remarks_of_entrants
-    from .presentation.results import Results, plain, sift
+    """Print the tables with numbers that come from these suites."""
     from .presentation.sections import tables
-    from .presentation.tables.aligned import filled
     from .presentation.tables.table import is_blank
 
-    records = [plain(record) for record in RecordFile(output).read().records]
-    records, _ = sift(lambda results: tables(results, suites), records)
-    for made in tables(Results(records), suites):
+    for made in _made(lambda results: tables(results, suites), suites, output):
         if not is_blank(made):
             print_aligned(made, f"plumbob report {output} --table {made.name}")
-    for sentence in remarks_of_entrants(Results(records), suites):
-        print("\n" + "\n".join(filled(sentence, width())))
+
+
+def print_ending(suites: Sequence[str], output: Path) -> None:
+    """Print what a bench of these suites came to, in about eight lines."""
+    from .presentation.outcome import ending
+
+    lines = _made(lambda results: ending(results, suites, width()), suites, output)
+    print("\n".join(lines))
+
+
+def _made(make: "Callable[[Results], Any]", suites: Sequence[str], output: Path) -> Any:
+    """Return what is made of a folder's records of these suites, but for those that do not fit."""
+    from .harness.record import FINISHED, RecordFile
+    from .presentation.results import Results, plain, sift
+
+    stored = RecordFile(output).read().records
+    records, _ = sift(make, [plain(r) for r in stored if r.suite in (*suites, FINISHED)])
+    return make(Results(records))
 
 
 def print_summary(table: "Table") -> None:
@@ -131,6 +146,28 @@ def progress() -> Any:
         refresh_per_second=2,
         disable=not sys.stderr.isatty(),
     )
+
+
+@contextlib.contextmanager
+def lines_in_a_pipe(bar: Any) -> Iterator[None]:
+    """Print how far a bar is, now and then, where standard error is no terminal."""
+    end = threading.Event()
+
+    def report() -> None:
+        pause = PAUSE
+        while not end.wait(pause):
+            pause = min(1.5 * pause, LONGEST_PAUSE)
+            for task in bar.tasks:
+                left = time_left(task.elapsed, task.completed, task.total, task.fields)
+                line = f"{task.completed:g}/{task.total:g}, {left}: {task.description}"
+                print(line, file=sys.stderr, flush=True)
+
+    if not sys.stderr.isatty():
+        threading.Thread(target=report, daemon=True).start()
+    try:
+        yield
+    finally:
+        end.set()
 
 
 def time_left(

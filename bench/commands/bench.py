@@ -4,17 +4,17 @@ import re
 import shlex
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from ..experiments import SUITES
-from ..harness.progress import listening
+from ..harness.progress import TROUBLE, Progress, listening
 from ..help_text import block
-from ..terminal import print_tables, progress
+from ..terminal import lines_in_a_pipe, print_ending, print_tables, progress
 from ..text import visible
 from ..verify.command import program_of
 from .options import MISSED, REPORT, SUCCESS, Fresh, Output, known, writable
@@ -23,6 +23,7 @@ from .report import write_report
 if TYPE_CHECKING:
     from ..harness.choice import Choice
     from ..harness.executor import Executor
+    from ..harness.run import Event
 
 # The width of the names of suites in the help.
 INDENT = 2 + max(map(len, SUITES))
@@ -76,6 +77,7 @@ Pins = Annotated[
 ]
 Listing = Annotated[bool, typer.Option("--list", help="List problems and solvers, and stop.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would be measured, and stop.")]
+Verbose = Annotated[bool, typer.Option("--verbose", help="Print every table as well.")]
 Executed = Annotated[str, typer.Option(metavar="local|dask://HOST:PORT", help="Where to measure.")]
 Mixed = Annotated[
     bool, typer.Option("--mix-machines", help="With Dask: let one table hold times of several.")
@@ -112,6 +114,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     pins: Pins = None,
     listing: Listing = False,
     dry: DryRun = False,
+    verbose: Verbose = False,
     executor: Executed = "local",
     mix_machines: Mixed = False,
 ) -> int:
@@ -131,10 +134,11 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     writable(output)
     with closing(executor_at(executor, mix_machines)) as where:
         code = run_suites(chosen, choice, output, fresh, where)
-    if suites:
+    if verbose:
         print_tables(chosen, output)
+    print_ending(chosen, output)
     folder = "" if output == REPORT else f" -o {shlex.quote(str(output))}"
-    print(visible(f"plumbob report{folder} writes these tables and the page."))
+    print(visible(f"All tables: this command with --verbose; page: plumbob report{folder}"))
     return code
 
 
@@ -196,30 +200,52 @@ def run_suites(
     RecordFile(output).read()  # before anything is measured that could not be kept
     if fresh:
         run.forget(suites, scale, output)
-    done, failures = {run.KEPT: 0, run.MEASURED: 0, run.FAILED: 0}, []
-    not_run: list[str] = []
-    again: Counter[str] = Counter()
-    with progress() as bar:
-        task = bar.add_task("starting", total=run.count(suites, scale))
-        with listening(lambda progress: bar.update(task, description=visible(progress.what))):
+    events: list[run.Event] = []
+    with progress() as bar, lines_in_a_pipe(bar):
+        task, done = bar.add_task("starting", total=run.count(suites, scale)), Counter[str]()
+        with listening(_listener(bar, task, events if executor in (None, HERE) else ())):
             for event in run.run(suites, scale, output, executor or HERE):
-                bar.update(task, description=visible(f"{event.suite}: {event.what}"))
-                if event.state in done:
-                    done[event.state] += 1
-                    bar.update(task, advance=1, kept=done[run.KEPT])
-                if event.state == run.MEASURING and event.message:
-                    again[event.message] += 1
-                if event.state == run.NOT_RUN:
-                    not_run.append(f"{event.suite}: {event.message}")
-                if event.state == run.FAILED:
-                    failures.append(f"{event.suite}: {event.what}: {event.message}")
+                events.append(event)
+                done[event.state] += 1
+                advance = event.state in (run.KEPT, run.MEASURED, run.FAILED)
+                what = visible(f"{event.suite}: {event.what}")
+                bar.update(task, description=what, advance=advance, kept=done[run.KEPT])
     kept = visible(f"{done[run.KEPT]} kept as on record, in {output}")
     print(f"{done[run.MEASURED]} measured, {kept}")
-    for sentence in (*(f"measured again: {n}, for {why}" for why, n in again.items()), *not_run):
+    again = Counter(e.message for e in events if e.state == run.MEASURING and e.message)
+    sentences = [f"measured again: {count}, for {why}" for why, count in again.items()]
+    sentences += [f"{e.suite}: {e.message}" for e in events if e.state == run.NOT_RUN]
+    for sentence in sentences:
         print(visible(sentence))
     if warning := RecordFile(output).read().warning:
         print(f"plumbob: {visible(warning)}", file=sys.stderr)
-    for failure in [*failures, *run.missed_claims(suites, output)]:
+    failed: dict[str, list[str]] = {}
+    for event in events:
+        if event.state == run.FAILED:
+            failed.setdefault(event.message, []).append(f"{event.suite}: {event.what}")
+    failures = [
+        f"{first}{f' and {len(more)} more' if more else ''}: {why}"
+        for why, (first, *more) in failed.items()
+    ]
+    failures += run.missed_claims(suites, output)
+    for failure in failures:
         print(f"plumbob: {visible(failure)}", file=sys.stderr)
-        done[run.FAILED] += 1
-    return MISSED if done[run.FAILED] else SUCCESS
+    return MISSED if failures else SUCCESS
+
+
+def _listener(bar: Any, task: Any, events: "Sequence[Event]") -> Callable[[Progress], None]:
+    """Return what shows progress, and says at once that a solver gives no answer, the first time.
+
+    `events` are those so far if blocks are measured one after the other, else none.
+    """
+    solvers: set[str] = set()
+
+    def listen(progress: Progress) -> None:
+        if progress.state != TROUBLE:
+            bar.update(task, description=visible(progress.what))
+        elif progress.what not in solvers:
+            solvers.add(progress.what)
+            place = events[-1].what if events else progress.what
+            print(visible(f"{place}: {progress.message}"), file=sys.stderr, flush=True)
+
+    return listen

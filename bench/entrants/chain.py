@@ -11,7 +11,8 @@ from reference.arguments import FloatArray
 from ..experiments.chain.measurement import Limits
 from ..harness import metrics
 from ..harness.block import Measured
-from ..harness.isolation import Outcome, WorkerProcess
+from ..harness.isolation import Outcome, WorkerProcess, raised
+from ..harness.worker import NoAnswerError
 from .chain_job import ChainJob
 from .entrant import Spec
 
@@ -53,17 +54,19 @@ def solve_chain(
     most = np.full(count, limits.max_iterations)
     outcome = _asked(spec, method, problem, limits.tolerance, most, budget)
     if not outcome.solved:
-        raise RuntimeError(outcome.trouble or "it answered nothing")
+        raise NoAnswerError(outcome.trouble or "It answered nothing.")
     positions, made = _understood(outcome, problem)
     arrays = _arrays(problem, positions, made)
     arrays["claimed"] = np.array([one.claimed for one in outcome.solved])
     arrays["seconds"] = np.array([one.seconds for one in outcome.solved])
-    remarks = [outcome.trouble, _cut(outcome, count, budget)]
+    arrays["solved"] = arrays["residual"][: len(outcome.solved)] <= limits.tolerance
+    remarks = [outcome.note, _cut(outcome, count, budget)]
     if followed and not outcome.lost:
         history = _followed(spec, method, problem, limits, budget)
         arrays |= history
         remarks += [] if history else ["not followed, for it counts no iterations"]
-    return Measured(arrays, {"remark": "; ".join(filter(None, remarks))})
+    facts = {"trouble": raised(outcome.solved)}
+    return Measured(arrays, {"remark": "; ".join(filter(None, remarks))}, facts)
 
 
 def _cut(outcome: Outcome, count: int, budget: float) -> str:

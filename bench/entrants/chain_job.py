@@ -9,8 +9,8 @@ from reference import Skeleton, forward_kinematics
 from reference.arguments import FloatArray, IndexArray
 
 from ..harness.stopwatch import Budget
-from ..harness.worker import Done, Message, Ready, Solved, Unfit, describe
-from .contestants import EntrantError, asked
+from ..harness.worker import Done, Message, NoAnswerError, Ready, Solved, Unfit, describe
+from .contestants import asked
 from .entrant import Spec
 
 TASK = "inverse_kinematics"
@@ -50,8 +50,8 @@ class ChainJob(NamedTuple):
         try:
             solver.answer(TASK, self._inputs(0) | {"max_iterations": 1})  # may compile
             forward_kinematics(Skeleton(self.parents, self.offsets), self.starts[0])  # likewise
-        except EntrantError as error:
-            yield Unfit(str(error))
+        except NoAnswerError as error:
+            yield Unfit(describe(error))
             return
         yield Ready(0.0, solver.remark)
         budget = Budget(self.budget)
@@ -78,9 +78,8 @@ class ChainJob(NamedTuple):
         try:
             answer = asked(self.spec).answer(TASK, self._inputs(i))
             positions = joint_positions(Skeleton(self.parents, self.offsets), answer.values)
-        except (EntrantError, ValueError) as error:
-            trouble = str(error) if isinstance(error, EntrantError) else describe(error)
-            return Solved(nothing, -1, 0.0, trouble)
+        except (NoAnswerError, ValueError) as error:
+            return Solved(nothing, -1, 0.0, describe(error))
         made = answer.values.get("iterations", np.nan)
         claimed = int(answer.values.get("converged", -1))
         return Solved(np.concatenate([[made], positions.ravel()]), claimed, answer.seconds, "")

@@ -8,16 +8,14 @@ from crosscheck.conformance.contestant import Answer, Contestant, Failure
 from crosscheck.conformance.doors import Limits, open_contestant
 from crosscheck.conformance.sentence import sentence
 
+from ..harness.progress import TROUBLE, announce
 from ..harness.stopwatch import behind_door
+from ..harness.worker import NoAnswerError
 from .entrant import Spec
 
 # The bench itself loses patience with a silent worker sooner: see `bench.harness.isolation`.
 LIMITS = Limits(first=900.0, request=900.0)
 _ABOUT = sentence("")
-
-
-class EntrantError(Exception):
-    """An entrant gave no answer; the message says why."""
 
 
 class Asked:
@@ -30,13 +28,13 @@ class Asked:
 
     def __init__(self, spec: Spec) -> None:
         self.contestant: Contestant = open_contestant(spec, LIMITS)
-        self.remark = ""
+        self.remark, self._has_failed = "", False
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> Answer:
         """Return what it answers.
 
         Raises:
-            EntrantError: if there is no answer.
+            NoAnswerError: if there is none.
         """
         case = Case("of the bench", task, inputs, "bench", _ABOUT)
         found = behind_door(lambda: self._answered(case), lambda answer: answer.seconds)
@@ -47,7 +45,11 @@ class Asked:
     def _answered(self, case: Case) -> Answer:
         found = self.contestant.answer(case)
         if isinstance(found, Failure):
-            raise EntrantError(str(found.sentence))
+            why = str(found.sentence)
+            if not self._has_failed:
+                announce(self.contestant.greeting.name, TROUBLE, why)
+            self._has_failed = True
+            raise NoAnswerError(why)
         return found
 
 

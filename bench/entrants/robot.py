@@ -4,13 +4,15 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.conformance.kinematics import robot_models
 from reference import rotation
 from reference.arguments import FloatArray
 
 from ..experiments.robots.evaluate import Tolerance
 from ..experiments.robots.problem import Robot, links
+from ..harness.worker import NoAnswerError
 from ..peers.ik.protocol import Solve, SolverOutput, UnableError
-from .contestants import EntrantError, asked, remark
+from .contestants import asked, remark
 from .entrant import Spec
 
 __all__ = ["TASK", "prepare", "remark", "robot_inputs"]
@@ -41,7 +43,7 @@ def prepare(robot: Robot, tolerance: Tolerance, spec: Spec = "") -> Any:
         def solve() -> SolverOutput:
             values = solver.answer(TASK, inputs).values
             if "q" not in values:
-                raise EntrantError("answered no q")
+                raise NoAnswerError("It answered no q.")
             return SolverOutput(values["q"], values.get("converged"))
 
         return solve
@@ -59,7 +61,7 @@ def robot_inputs(robot: Robot) -> dict[str, Any]:
             axes.append(link.axis)
             transform = np.eye(4)
     count, origins = len(frames), np.array(frames)
-    return {
+    inputs = {
         "parents": np.arange(count) - 1,
         "origins": origins[:, :3, 3],
         "orientations": rotation.from_matrix(origins[:, :3, :3]),
@@ -71,5 +73,5 @@ def robot_inputs(robot: Robot) -> dict[str, Any]:
         "tool_position": transform[:3, 3],
         "tool_rotation": rotation.from_matrix(transform[:3, :3]),
         "max_iterations": ITERATIONS,
-        "urdf": robot.text,
     }
+    return inputs | {"urdf": robot_models.urdf(inputs)}

@@ -35,7 +35,7 @@ EXPERIMENTS = [
         ("check", "check", "right", UNTIMED),
         ("self_test", "self_test", "right", UNTIMED),
         ("robot_models", "robot_models", "right", UNTIMED),
-        ("chain", "ik", "kinematics", UNTIMED),
+        ("chain", "ik", "kinematics", TIMED),
         ("closed_curves", "tracking", "kinematics", UNTIMED),
         ("arm", "arm", "kinematics", UNTIMED),
         ("pictures", "pictures", "kinematics", UNTIMED),

@@ -23,11 +23,11 @@ class Outcome(NamedTuple):
     Attributes:
         setup: how long the solver took to be set up [s].
         solved: the targets that were done, in order.
-        trouble: why there are no more, or what was raised and how often, and what the solver's
-            adapter has to say; else "".
+        trouble: why there are no more, or what was raised and how often; else "".
         lost: whether the worker was lost over the next target.
         found: what was measured, if that was the job.
         silent: whether the worker was ended since it was silent.
+        remark: what the solver's adapter has to say, else "".
     """
 
     setup: float
@@ -36,6 +36,12 @@ class Outcome(NamedTuple):
     lost: bool = False
     found: Mapping[str, Any] | None = None
     silent: bool = False
+    remark: str = ""
+
+    @property
+    def note(self) -> str:
+        """Trouble and remark."""
+        return "; ".join(filter(None, (self.trouble, self.remark)))
 
 
 class WorkerProcess:
@@ -56,13 +62,12 @@ class WorkerProcess:
 
     def perform(self, job: Work) -> Outcome:
         """Perform a job and collect its messages, however it ends."""
-        outcome, ready, remark = Outcome(0.0, [], ""), False, ""
+        outcome, ready = Outcome(0.0, [], ""), False
         with contextlib.closing(self.stream(job)) as messages:
             for message in messages:
                 match message:
                     case Ready():
-                        outcome, ready = outcome._replace(setup=message.setup), True
-                        remark = message.remark
+                        outcome, ready = outcome._replace(**message._asdict()), True
                     case Progress():
                         announce(*message)
                     case Solved():
@@ -75,8 +80,7 @@ class WorkerProcess:
                         outcome = outcome._replace(trouble=why, lost=ready, silent=silent)
                     case Done():
                         outcome = outcome._replace(trouble=raised(outcome.solved))
-        trouble = "; ".join(filter(None, [outcome.trouble, remark]))
-        return outcome._replace(trouble=trouble)
+        return outcome
 
     def find(self, job: Work) -> Mapping[str, Any]:
         """Return what a job measures.

@@ -8,6 +8,7 @@ import numpy as np
 from .block import Block, Measured
 from .machine import conditions, stamp
 from .record import Key, Record, key
+from .worker import describe
 
 
 def block_key(block: Block) -> Key:
@@ -28,7 +29,7 @@ def measure(block: Block) -> Record:
     except Exception as error:  # whatever a solver raises is a result of that solver
         if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
             raise KeyboardInterrupt from None
-        measured = failure(f"{type(error).__name__}: {error}")
+        measured = failure(describe(error))
     return record_of(block, measured, time.perf_counter() - begin)
 
 

@@ -5,6 +5,9 @@ from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from typing import NamedTuple
 
+# The state of a user's solver that gives no answer for the first time; the message says why.
+TROUBLE = "trouble"
+
 
 class Progress(NamedTuple):
     """What is being done; `state` and `message` where that changes the state of a case."""

@@ -115,6 +115,11 @@ class Record:
     conditions: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def trouble(self) -> str:
+        """What its solver raised, and how often; "" if nothing."""
+        return str(self.facts.get("trouble", ""))
+
+    @property
     def title(self) -> str:
         """How the problem is written."""
         return str(self.facts.get("title", self.problem))

@@ -97,9 +97,14 @@ class Calculation(NamedTuple):
             yield Unfit(describe(error))
 
 
+class NoAnswerError(Exception):
+    """A solver gave no answer; the message is a sentence that says why."""
+
+
 def describe(error: Exception) -> str:
-    """Return what an exception says, on one line."""
-    return " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    """Return what an exception says, on one line; its type too unless it is a `NoAnswerError`."""
+    kind = "" if isinstance(error, NoAnswerError) else f"{type(error).__name__}: "
+    return " ".join(f"{kind}{error}".split())[:300]
 
 
 def serve(connection: Connection) -> None:

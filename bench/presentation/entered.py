@@ -28,8 +28,9 @@ class Entered(NamedTuple):
 
     @property
     def remarks(self) -> list[str]:
-        """Why it was not asked for all."""
-        return [why for record in self.records if (why := _why_not_asked(record))]
+        """Why it was not asked for all, and what it raised."""
+        remarks = [_why_not_asked(record) or record.trouble for record in self.records]
+        return list(dict.fromkeys(filter(None, remarks)))
 
     def fact(self, name: str) -> str:
         """Return what its last record says of it."""

@@ -1,11 +1,12 @@
 """The first screen’s answers: is it right, who is most accurate and fastest, who is absent.
 
 All are made from the records. As in the tables, who is not told from the first by
-`metrics.ranking` ties with it.
+`metrics.ranking` ties with it. Solvers that did not finish are not ranked, and a headline says of
+how many it speaks.
 """
 
 from collections import Counter
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from operator import itemgetter
 from typing import NamedTuple
 
@@ -15,41 +16,22 @@ from ..experiments.cloth_peers import MISSING, ONE_STEP, SOLVED
 from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.overall.readings import Overall, overall
-from ..experiments.robots.readings import KINDS, SHIFT, measured
+from ..experiments.robots.readings import KINDS, SHIFT, measured, records_of
 from ..experiments.timing.tables import median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..peers import registry
 from .results import Results, by_problem, counted, listed
+from .standings import Headline, of_finishers, solved, speed, standings
 from .tables.table import words
 
 # So near to the converged step a solver has solved it.
 NEAR = float(SOLVED)
-# The table of solvers over all robots.
-OVERALL = "robots_overall_one_start"
 # Ties of more solvers than this are counted, not listed.
 MOST_NAMED = 2
 SUBJECTS = {"kinematics": "Forward kinematics", "ik": "Inverse kinematics", "cloth": "Cloth step"}
 _OURS = registry.COMPILED.name
 _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT_NAME}
-
-
-class Headline(NamedTuple):
-    """An answer in a line.
-
-    Attributes:
-        chapter: the section of the report that it belongs to.
-        asked: what is asked.
-        answer: who.
-        detail: by how much, over how many.
-        table: the name of the table that it can be read in.
-    """
-
-    chapter: str
-    asked: str
-    answer: str
-    detail: str
-    table: str
 
 
 class Verdict(NamedTuple):
@@ -76,17 +58,20 @@ class Answers(NamedTuple):
         headlines: who is most accurate and who is fastest.
         scale: at which scale was measured, "" if that is not known.
         absent: peers that took no part.
+        standings: where solvers of the user's stand.
     """
 
     verdict: Verdict | None
     headlines: list[Headline]
     scale: str
     absent: list[str]
+    standings: Sequence[Headline] = ()
 
 
 def answers(results: Results) -> Answers:
     """Return all that the first screen says."""
-    return Answers(verdict(results), headlines(results), scale(results), absent(results))
+    known = verdict(results), headlines(results), scale(results), absent(results)
+    return Answers(*known, standings(results))
 
 
 def verdict(results: Results) -> Verdict | None:
@@ -105,9 +90,9 @@ def _used(claim: Record) -> float:
 
 def headlines(results: Results) -> list[Headline]:
     """Return who is most accurate and who is fastest, chapter by chapter, as far as measured."""
-    made = [_most_accurate(results), _fastest(results), _arrived(results), _soonest(results)]
-    made += [_timed(results, subject) for subject in SUBJECTS]
-    return [headline for headline in made if headline]
+    others = [_arrived(results), _soonest(results), *(_timed(results, s) for s in SUBJECTS)]
+    of_robots = [headline for kind in KINDS for headline in _on_robots(results, kind)]
+    return [*of_robots, *filter(None, others)]
 
 
 def scale(results: Results) -> str:
@@ -153,39 +138,31 @@ def _for_cloth(engines: Iterable[str]) -> list[str]:
     return [f"{engine} (cloth)" for engine in dict.fromkeys(engines)]
 
 
-def _compared(results: Results) -> dict[str, Overall]:
-    """Return the solvers over the set of robots on which most of them can be ranked."""
+def _on_robots(results: Results, kind: str) -> Iterator[Headline]:
+    """Yield who solves the most and who takes the least time, of those that finished.
+
+    They are compared over the robots on which most of them can be ranked.
+    """
     sets: dict[str, dict[str, Overall]] = {}
-    for row in overall(results, next(iter(KINDS))):
+    for row in overall(results, kind):
         if row.is_ranked:
             sets.setdefault(row.robots, {})[row.solver] = row
-    return max(sets.values(), key=len, default={})
-
-
-def _most_accurate(results: Results) -> Headline | None:
-    rows = _compared(results)
+    rows = max(sets.values(), key=len, default={})
     if len(rows) < 2:
-        return None
-    ranking = next(iter(rows.values())).success
-    share = rows[ranking.order[0]].share
-    rate, low, high = (f"{100 * x:.3g}" for x in (share.hits / share.total, share.low, share.high))
-    detail = f"solves {rate} % of {words(share.total)} poses ({low}–{high})"
-    return Headline("kinematics", "Most accurate", _tied(ranking.first), detail, OVERALL)
-
-
-def _fastest(results: Results) -> Headline | None:
-    """Return who takes the least time, unsolved poses with their penalty, and the next."""
-    rows = _compared(results)
-    if len(rows) < 2:
-        return None
-    ranking = next(iter(rows.values())).time
-    first, second = (rows[solver].penalised + SHIFT for solver in ranking.order[:2])
-    ratio = metrics.paired_ratio(second, first)
-    interval = f" ({words(ratio.low)}–{words(ratio.high)})" if ratio.pairs > 1 else ""
-    detail = f"{words(ratio.mean)} × {ranking.order[1]}{interval}, {counted(ratio.pairs, 'pose')}"
-    return Headline(
-        "kinematics", "Fastest, misses penalised", _tied(ranking.first), detail, OVERALL
-    )
+        return
+    row = next(iter(rows.values()))
+    count = len({record.solver for record in measured(records_of(results, kind))})
+    where = f" on {row.robots}" if len(row.records) == 1 else ""
+    field = of_finishers(len(rows), count)
+    table = f"robots_overall_{KINDS[kind]}"
+    detail = f"{solved(rows[row.success.order[0]].share, 'poses')}{where}, {field}"
+    first, soonest = ([s for s in of.first if rows[s].share.hits] for of in (row.success, row.time))
+    yield Headline("kinematics", f"Most accurate, {kind}", _tied(first), detail, table)
+    fastest, second = (rows[solver].penalised + SHIFT for solver in row.time.order[:2])
+    ahead = speed(metrics.paired_ratio(second, fastest), row.time.order[1])
+    ahead = ahead if len(soonest) == 1 else "too near to tell"
+    detail = f"{ahead}{where}, misses penalised" + (f", {field}" if len(rows) < count else "")
+    yield Headline("kinematics", f"Fastest, {kind}", _tied(soonest), detail, table)
 
 
 def _tied(names: Sequence[str]) -> str:
@@ -201,33 +178,40 @@ Times = dict[str, dict[str, float]]
 
 def _arrival_times(results: Results) -> Times:
     """Return how long it takes to solve the step of each cloth [s], for those that solve it."""
-    found: Times = {}
+    works: Times = {}
     for point in points(results, ONE_STEP):
-        times = found.setdefault(f"{point.particles}/{point.stiffness}", {})
+        times = works.setdefault(point.cloth, {})
         if point.values["error"] <= NEAR:
             seconds = point.values["seconds"]
             times[point.solver] = min(seconds, times.get(point.solver, seconds))
-    return found
+    return works
 
 
 def _arrived(results: Results) -> Headline | None:
     times = _arrival_times(results)
     arrivals = Counter(solver for mine in times.values() for solver in mine)
-    most = max(arrivals.values(), default=0)
-    if not most:
+    count = len({point.solver for point in points(results, ONE_STEP)})
+    if not arrivals or count < 2:
         return None
-    ties = [solver for solver, count in arrivals.items() if count == most]
-    detail = f"within {SOLVED} on {most}/{len(times)} cloths"
-    return Headline("cloth", "Most accurate", _tied(ties), detail, "cloth_peers_step")
+    most = max(arrivals.values())
+    ties = [solver for solver, hits in arrivals.items() if hits == most]
+    cloths = f"{most} of {counted(len(times), 'cloth')}"
+    detail = f"to {SOLVED} on {cloths} in the time given"
+    return Headline("cloth", "Most steps solved", _tied(ties), detail, "cloth_peers_step")
 
 
 def _soonest(results: Results) -> Headline | None:
     """Return whose engine solves a step first."""
+    solvers = dict.fromkeys(point.solver for point in points(results, ONE_STEP))
+    engines = {solver: registry.find(solver).engine or solver for solver in solvers}
+    count = len(set(engines.values()))
     best: Times = {}
     for cloth, times in _arrival_times(results).items():
-        for solver in sorted(times, key=lambda solver: times[solver]):
-            best.setdefault(cloth, {}).setdefault(registry.find(solver).engine, times[solver])
-    return _first("cloth", "Fastest", "cloths", best, "cloth_peers_step")
+        ranked = sorted(times, key=lambda solver: times[solver], reverse=True)
+        best[cloth] = {engines[solver]: times[solver] for solver in ranked}
+    alone = f"the only one of {count} engines to get there in the time given"
+    found = _first("cloth", f"Fastest to {SOLVED}", "cloth", best, "cloth_peers_step", alone=alone)
+    return found if count > 1 else None
 
 
 def _timed(results: Results, subject: str) -> Headline | None:
@@ -239,16 +223,16 @@ def _timed(results: Results, subject: str) -> Headline | None:
         if len(rivals) > 1:
             works[problem] = {_short(r.solver): median_time(r) for r in rivals}
             ranking = ranked_by_time(rivals)
-            if ranking is None or ranking.first != (
-                min(works[problem], key=works[problem].__getitem__),
-            ):
+            fastest = min(works[problem], key=works[problem].__getitem__)
+            if ranking is None or ranking.first != (fastest,):
                 ties.add(problem)
-    return _first("speed", SUBJECTS[subject], "cases", works, f"timing_{subject}", ties)
+    return _first("speed", SUBJECTS[subject], "case", works, f"timing_{subject}", ties=ties)
 
 
 def _first(
-    chapter: str, asked: str, of: str, works: Times, table: str, ties: Container[str] = ()
-) -> Headline | None:
+    chapter: str, asked: str, noun: str, works: Times, table: str, *,
+    alone: str = "", ties: Container[str] = (),
+) -> Headline | None:  # fmt: skip
     """Return who is first most often, in how many cases, and by what factors; ties are nobody's."""
     ranked = {work: sorted(times.items(), key=itemgetter(1)) for work, times in works.items()}
     order = [times for times in ranked.values() if times]
@@ -257,20 +241,27 @@ def _first(
         return None
     if not decided:
         tied = _tied([name for name, _ in order[0]])
-        return Headline(chapter, asked, tied, f"nobody leads, 0/{len(order)} {of}", table)
-    firsts = Counter(ranked[0][0] for ranked in decided)
+        detail = f"too near to tell on {counted(len(order), noun)}"
+        return Headline(chapter, asked, tied, detail, table)
+    firsts = Counter(times[0][0] for times in decided)
     most = max(firsts.values())
     leaders = [name for name, count in firsts.items() if count == most]
-    detail = f"{most}/{len(works)} {of}"
+    total = counted(len(works), noun)
+    detail = f"each on {most} of {total}"
     if len(leaders) == 1:
-        detail = f"{_ahead([r for r in decided if r[0][0] == leaders[0]])}, {detail}"
+        detail = _ahead([r for r in decided if r[0][0] == leaders[0]], total, alone)
     return Headline(chapter, asked, _tied(leaders), detail, table)
 
 
-def _ahead(won: Sequence[Sequence[tuple[str, float]]]) -> str:
-    """Say by what factors the cases were won."""
-    factors = [ranked[1][1] / ranked[0][1] for ranked in won if len(ranked) > 1]
-    return f"{_range(factors)} × the next" if factors else "no rival arrives"
+def _ahead(won: Sequence[Sequence[tuple[str, float]]], total: str, alone: str) -> str:
+    """Say by what factors cases were won, and in how many nobody else took part to the end."""
+    factors = [times[1][1] / times[0][1] for times in won if len(times) > 1]
+    unopposed = len(won) - len(factors)
+    sentences = [f"{alone} on {unopposed} of {total}"] if unopposed else []
+    if factors:
+        ahead = f"{_range(factors)} times faster than the next on {len(factors)} of {total}"
+        sentences.insert(0, ahead)
+    return listed(sentences)
 
 
 def _range(factors: Sequence[float]) -> str:

@@ -1,35 +1,61 @@
-"""What a report comes to, in ten lines: right or not, who leads, what is missing, where it is."""
+"""What a report or a bench comes to, in ten lines: the user's solvers, who leads, what lacks."""
 
 from collections.abc import Sequence
 
 from ..text import visible
-from .headlines import Headline, Verdict
+from .entered import remarks_of_entrants
+from .headlines import Answers, Verdict, answers
+from .page.shown_tables import gist
 from .report import Written
-from .results import counted, listed
+from .results import Results, counted, listed
+from .sections import tables
+from .standings import Headline
 from .tables.aligned import filled
-from .tables.table import words
+from .tables.table import is_blank, words
 
-# Chapter and question of the headlines that are printed, as far as there are any, then others.
-_FIRST = (("kinematics", "Most accurate"), ("kinematics", "Fastest"), ("cloth", "Fastest"))
-HEADLINES = 3
-LINES = 10
+# What the headlines ask that are printed first, and how many are printed.
+_FIRST, HEADLINES = ("Most accurate", "Fastest to"), 3
+# Lines of a report, beside those on the user's solvers, and tables that a bench may sum up.
+LINES, TABLES = 10, 4
 
 
 def outcome(written: Written, width: int) -> list[str]:
-    """Return what a report came to in lines for a terminal: ten of 80 letters, or fewer."""
+    """Return what a report came to in lines for a terminal.
+
+    They are ten of 80 letters, or fewer, after those on the user's solvers.
+    """
     answers, page = written.answers, str(written.page)
-    said = [_verdict(answers.verdict), *map(_headline, three(answers.headlines))]
-    scale = f"{answers.scale}. " if answers.scale else ""
-    if answers.absent:
-        said.append(_named(f"{scale}Absent: ", answers.absent, "; `make peers` adds.", width))
-    elif scale:
-        said.append(scale)
-    said.append(f"{page}: the page, {len(written.tables)} tables (plumbob report --list)")
+    sentences = [_verdict(answers.verdict), *map(_headline, three(answers.headlines))]
+    sentences += _field(answers, width)
+    sentences.append(f"{page}: the page, {len(written.tables)} tables (plumbob report --list)")
     named = listed(answers.absent)
     missing = [one for one in written.missing if not named or named not in one]
-    *lines, last = (filled(visible(sentence), width) for sentence in said)
-    room = LINES - sum(map(len, (*lines, last)))
-    return [line for part in (*lines, _missing(missing, width, room), last) for line in part]
+    *lines, last = (filled(visible(sentence), width) for sentence in sentences)
+    lines.append(_missing(missing, width, LINES - sum(map(len, (*lines, last)))))
+    first = (filled(visible(_headline(standing)), width) for standing in answers.standings)
+    return [line for part in (*first, *lines, last) for line in part]
+
+
+def ending(results: Results, suites: Sequence[str], width: int) -> list[str]:
+    """Return what a bench of some suites came to in lines for a terminal."""
+    known = answers(results)
+    first, leaders = known.standings, three(known.headlines)
+    sentences = [*map(_headline, (*first, *leaders)), *remarks_of_entrants(results, suites)]
+    if "check" in suites:
+        sentences.insert(len(first), _verdict(known.verdict))
+    if not sentences:
+        full = [table for table in tables(results, suites) if not is_blank(table)]
+        sentences = [f"{table.title}: {gist(table.summary)}" for table in full[:TABLES]]
+    sentences += _field(known, width)
+    return [line for sentence in sentences for line in filled(visible(sentence), width)]
+
+
+def _field(answers: Answers, width: int) -> list[str]:
+    """Return a sentence on the scale and on who is absent, if there is anything to say."""
+    scale = f"{answers.scale}. " if answers.scale else ""
+    if answers.absent:
+        return [_named(f"{scale}Absent: ", answers.absent, "; `make peers` adds.", width)]
+    return [scale] if scale else []
 
 
 def _missing(sentences: Sequence[str], width: int, room: int) -> list[str]:
@@ -56,17 +82,14 @@ def _verdict(verdict: Verdict | None) -> str:
 
 
 def three(headlines: Sequence[Headline]) -> list[Headline]:
-    """Return those that are printed: who is accurate and fast at kinematics and cloths."""
-
-    def rank(headline: Headline) -> int:
-        wanted = (headline.chapter == c and headline.asked.startswith(a) for c, a in _FIRST)
-        return next((i for i, is_it in enumerate(wanted) if is_it), len(_FIRST))
-
-    return sorted(headlines, key=rank)[:HEADLINES]
+    """Return those that are printed: who is accurate at kinematics, and who is fast at cloths."""
+    return sorted(headlines, key=lambda h: not h.asked.startswith(_FIRST))[:HEADLINES]
 
 
 def _headline(headline: Headline) -> str:
     asked = headline.asked[:1].lower() + headline.asked[1:]
+    if not headline.chapter:
+        return f"{headline.asked}: {headline.answer}; {headline.detail}."
     return f"{headline.chapter}, {asked}: {headline.answer}, {headline.detail}."
 
 

@@ -20,16 +20,19 @@ class Results:
 
     def __init__(self, records: Iterable[Record]) -> None:
         """Leave out those that say why there are none, and those under settings of before."""
-        self.records = [r for r in records if not r.failed and not r.superseded]
+        current = [record for record in records if not record.superseded]
+        self.records = [record for record in current if not record.failed]
+        self.failed = [record for record in current if record.failed]
 
     @property
     def entrants(self) -> frozenset[str]:
         """The solvers that a user has entered."""
         return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
 
-    def all(self, suite: str, **wanted: Any) -> list[Record]:
-        """Return the records of a suite whose facts and settings are these."""
-        return [record for record in self.records if record.suite == suite and _has(record, wanted)]
+    def all(self, suite: str, failed: bool = False, **wanted: Any) -> list[Record]:
+        """Return a suite's records with these facts and settings; failed ones only on demand."""
+        records = [*self.records, *self.failed] if failed else self.records
+        return [record for record in records if record.suite == suite and _has(record, wanted)]
 
     def one(self, suite: str, problem: str, solver: str, **wanted: Any) -> Record | None:
         """Return the record of exactly this problem and solver, or None."""

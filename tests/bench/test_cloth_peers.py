@@ -453,7 +453,8 @@ def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, los
     assert arrays["frames"].tolist() == [frames]
     assert arrays["diverged"].tolist() == [lost]
     assert np.isfinite(arrays["true"]).all() == (not lost)
-    assert facts == {"rungs": ["as it is"], "remarks": [why] if why else []}
+    remarks = [why] if why else []
+    assert facts == {"rungs": ["as it is"], "remarks": remarks, "trouble": why}
 
 
 class InThisProcess:

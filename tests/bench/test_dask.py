@@ -388,8 +388,8 @@ def assert_same_tables(suites, executor, folder):
 
 
 def test_two_workers_give_the_same_tables_to_the_bit_as_one_process(executor, few, tmp_path):
-    few(arm=20, ik=14)
-    assert_same_tables(["ik", "arm"], executor, tmp_path)
+    few(arm=20, tracking=14)
+    assert_same_tables(["tracking", "arm"], executor, tmp_path)
 
 
 @pytest.mark.slow

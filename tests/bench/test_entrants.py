@@ -11,6 +11,7 @@ from bench.cli import run_command
 from bench.entrants import opening
 from bench.experiments.chain import figures as chain_figures
 from bench.experiments.cloth_peers import figures as cloth_figures
+from bench.experiments.robots.problem import ROBOTS, robot
 from bench.harness.record import RecordFile
 from bench.presentation.figures.sketch import drawn
 from bench.presentation.results import Results, plain
@@ -83,12 +84,18 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
     assert len(near.facts["digest"]) == 12
     assert near.conditions["solver_commit"] == ""
     assert (near.arrays["residual"] <= 1e-4).all()
+    assert near.arrays["solved"].all()
+    for solver in ("My FABRIK", "ccd", "fabrik"):  # so that its time can stand beside ours
+        (record,) = [one for one in records(solver) if one.problem == "chain/near"]
+        assert record.arrays["seconds"].shape == record.arrays["solved"].shape == (2,), solver
+        assert (record.arrays["seconds"] > 0.0).all()
     made = {table.name: table for table in tables(Results(records()), ["ik"])}
     for name in ("accuracy", "q1_beyond_reach", "published_fabrik", "entered_ik"):
         assert "My FABRIK" in cells(made[name]), name
     for draw in (chain_figures.ik_residuals, chain_figures.iterations):
         assert "My FABRIK" in drawn(draw(Results(records()))).svg
-    assert "My FABRIK" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert re.search(r"^My FABRIK, chain of balls: rank \d of 3 solvers", printed, re.MULTILINE)
 
 
 def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
@@ -290,6 +297,7 @@ def test_a_solver_that_hangs_is_ended(folder, monkeypatch):
     assert "silence" in record.notes["remark"]
     assert "cut at 1 of 2 targets" in record.notes["remark"]
     assert np.isfinite(record.arrays["residual"]).tolist() == [True, False]
+    assert record.arrays["solved"].size == 1  # which has no rank: it did not finish
 
 
 @pytest.mark.parametrize(
@@ -400,6 +408,29 @@ def test_one_start_of_robots_and_restarts_through_the_door_are_those_of_the_solv
     assert once.arrays["solved"].sum() >= 1
     assert again.arrays["solved"].sum() > once.arrays["solved"].sum()
     assert not (once.arrays["claimed"].astype(bool) & ~once.arrays["solved"]).any()
+
+
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
+def test_a_request_calls_the_tool_as_the_protocol_says(name):
+    """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
+    from bench.entrants.robot import robot_inputs
+    from bench.experiments.robots.evaluate import evaluator_of
+    from crosscheck.conformance.kinematics.robot_models import tool_pose
+    from crosscheck.conformance.task import TASKS
+    from reference import forward_kinematics
+    from reference.formats import urdf
+
+    inputs = robot_inputs(robot(name))
+    (field,) = [field for field in TASKS["robot_inverse_kinematics"].inputs if field.name == "urdf"]
+    assert field.about.endswith("its tool the link `tool`")
+    model = urdf.parse(inputs["urdf"]).articulation
+    for q in robot(name).draw(np.random.default_rng(3), 5):
+        positions, _ = evaluator_of(name).forward(q)
+        pose = forward_kinematics(model, q)
+        np.testing.assert_allclose(
+            pose.positions[model.names.index("tool")], positions[0], atol=1e-12
+        )
+        np.testing.assert_allclose(tool_pose(inputs, q).position, positions[0], atol=1e-12)
 
 
 @pytest.mark.slow

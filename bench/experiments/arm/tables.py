@@ -15,6 +15,7 @@ from ...presentation.tables.columns import (
     P95,
     SOLVER,
     allowed,
+    effort,
     iterations,
     remark,
     share,
@@ -23,7 +24,7 @@ from ...presentation.tables.columns import (
     titled,
 )
 from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Summary, words
+from ...presentation.tables.table import Column, Summary, words
 from ..chain import BEYOND, CHAIN
 from ..chain import figures as chain
 from . import CURVE
@@ -73,6 +74,9 @@ accuracy = Layout(
         SOLVER,
         share("within tolerance", _met, best="greatest"),
         *spread("residual", "residual", "m", (LARGEST,)),
+        Column(
+            "time, median", "µs", read=lambda r: effort(r).median if "seconds" in r.arrays else None
+        ),
         *iterations((MEDIAN,)),
         allowed(),
         remark(),
@@ -94,7 +98,8 @@ accuracy = Layout(
     measured=lambda records: (
         "Residuals recomputed by forward kinematics of the rotations returned, whatever "
         "the solver says. Starts: the arm’s rest pose, the last frame’s solution, or seeded random "
-        f"rotations. At most {settings(records, 'max_iterations')} iterations."
+        f"rotations. At most {settings(records, 'max_iterations')} iterations. Targets of the "
+        "chain are timed one by one, each by a call from Python."
     ),
     summary=_summary,
     figures=(chain.ik_residuals,),

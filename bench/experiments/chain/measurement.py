@@ -13,6 +13,7 @@ from reference.arguments import FloatArray
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
+from ...harness.stopwatch import timed
 from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
 from . import BEYOND, CHAIN
@@ -58,15 +59,30 @@ def blocks_of(
 def solve_targets(
     problem: TargetsForSkeleton, solver: str, limits: Limits, record: bool = False
 ) -> Measured:
-    """Solve all targets with a solver of ours; residuals are recomputed from the answers."""
+    """Solve all targets with a solver of ours; residuals are recomputed from the answers.
+
+    `record` keeps residuals by iteration, and times.
+    """
     asked = (problem.skeleton, problem.starts, problem.targets, solver)
     solution = solve_ik(*asked, **limits._asdict(), record=record)
-    arrays = _answers(problem, solution.local_rotations, solution.iterations)
+    arrays = _answers(problem, limits, solution.local_rotations, solution.iterations)
     arrays["outcome"] = np.asarray(solution.outcome)
     if record:
         kept = metrics.convergence(solution.history[:, : HISTORY + 1])
         arrays |= {f"history_{name}": values for name, values in kept._asdict().items()}
+        arrays["seconds"] = _seconds(problem, solver, limits)
     return Measured(arrays)
+
+
+def _seconds(problem: TargetsForSkeleton, solver: str, limits: Limits) -> FloatArray:
+    """Return how long each target takes by a call of its own [s], (target,)."""
+    starts = np.broadcast_to(problem.starts, (len(problem.targets), *problem.starts.shape[-2:]))
+    solves = [
+        partial(solve_ik, problem.skeleton, start, target, solver, **limits._asdict())
+        for start, target in zip(starts, problem.targets, strict=True)
+    ]
+    solves[0]()  # may compile
+    return np.array([timed(solve)[1] for solve in solves])
 
 
 def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) -> Measured:
@@ -74,12 +90,13 @@ def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) ->
     engine = SKELETON_ENGINES[name](problem.skeleton)
     effector, root = problem.skeleton.joint_count - 1, problem.skeleton.offsets[0]
     targets = within_reach(problem.targets, root, problem.skeleton.reach())
-    answers = [
-        levenberg_marquardt(engine, q, target, effector, **limits._asdict())
+    results = [
+        timed(partial(levenberg_marquardt, engine, q, target, effector, **limits._asdict()))
         for q, target in zip(coordinates(engine, problem.starts), targets, strict=True)
     ]
-    found = np.array([answer.q[engine.columns] for answer in answers])
-    return Measured(_answers(problem, found, [answer.iterations for answer in answers]))
+    rotations = np.array([answer.q[engine.columns] for answer, _ in results])
+    arrays = _answers(problem, limits, rotations, [answer.iterations for answer, _ in results])
+    return Measured(arrays | {"seconds": np.array([seconds for _, seconds in results])})
 
 
 def residuals(skeleton: Skeleton, local_rotations: FloatArray, targets: FloatArray) -> FloatArray:
@@ -89,13 +106,14 @@ def residuals(skeleton: Skeleton, local_rotations: FloatArray, targets: FloatArr
 
 
 def _answers(
-    problem: TargetsForSkeleton, found: FloatArray, iterations: Any
+    problem: TargetsForSkeleton, limits: Limits, found: FloatArray, iterations: Any
 ) -> dict[str, np.ndarray]:
     positions = forward_kinematics(problem.skeleton, found).positions
     distance = np.linalg.norm(problem.targets - problem.skeleton.offsets[0], axis=-1)
     residual = residuals(problem.skeleton, found, problem.targets)
     return {
         "residual": residual,
+        "solved": residual <= limits.tolerance,
         "iterations": np.asarray(iterations),
         "distance": distance,
         "bend": metrics.bend(positions, problem.targets),

@@ -173,7 +173,7 @@ def _tried(job: ClothJob) -> Outcome:
         return Outcome(0.0, [], _given_up[what])
     outcome = worker_process().perform(job)
     if outcome.silent and not outcome.lost:
-        _given_up[what] = outcome.trouble
+        _given_up[what] = outcome.note
     return outcome
 
 
@@ -185,11 +185,12 @@ class Remark(NamedTuple):
 
     particles: int
     sentence: str
+    is_trouble: bool
 
 
 def _remarks(level: Level, rung: Rung, outcome: Outcome) -> list[Remark]:
-    sentence = f"{level.size} × {level.size}, {rung.label}: {outcome.trouble}"
-    return [Remark(level.size, sentence)] if outcome.trouble else []
+    sentence = f"{level.size} × {level.size}, {rung.label}: {outcome.note}"
+    return [Remark(level.size, sentence, bool(outcome.trouble))] if outcome.note else []
 
 
 def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
@@ -386,7 +387,9 @@ def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[Remark]) -> 
     arrays = {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
     arrays["remark_particles"] = np.array([remark.particles for remark in remarks])
     sentences = [remark.sentence for remark in remarks]
-    return Measured(arrays, facts={"rungs": [row[-1] for row in rows], "remarks": sentences})
+    facts: dict[str, Any] = {"rungs": [row[-1] for row in rows], "remarks": sentences}
+    facts["trouble"] = next((remark.sentence for remark in remarks if remark.is_trouble), "")
+    return Measured(arrays, facts=facts)
 
 
 @functools.cache

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from ...harness.record import Record
 from ...presentation.results import Results
+from ...presentation.tables.table import words
 
 
 class Point(NamedTuple):
@@ -30,6 +31,11 @@ class Point(NamedTuple):
     def own(self) -> str:
         """The name of a user's cloth, "" of ours."""
         return str(self.record.facts.get("cloth", ""))
+
+    @property
+    def cloth(self) -> str:
+        """How its cloth is written."""
+        return self.own or f"{self.particles} × {self.particles}, {words(int(self.stiffness))} N/m"
 
     @property
     def is_whole(self) -> bool:

@@ -39,15 +39,11 @@ _TRUTH = (
 )
 
 
-def _cloth_of(point: Point) -> str:
-    return point.own or f"{point.particles} × {point.particles}, {words(int(point.stiffness))} N/m"
-
-
 def _cloths(found: Sequence[Point]) -> dict[str, list[Point]]:
     """Return the points on each cloth."""
     cloths: dict[str, list[Point]] = {}
     for point in found:
-        cloths.setdefault(_cloth_of(point), []).append(point)
+        cloths.setdefault(point.cloth, []).append(point)
     return cloths
 
 
@@ -55,7 +51,7 @@ def _groups(found: Sequence[Point]) -> list[list[Point]]:
     """Return the points of each solver on each cloth, in order."""
     groups: dict[tuple[str, str], list[Point]] = {}
     for point in found:
-        groups.setdefault((_cloth_of(point), point.solver), []).append(point)
+        groups.setdefault((point.cloth, point.solver), []).append(point)
     return list(groups.values())
 
 
@@ -122,7 +118,7 @@ def _seconds(point: Point) -> float:
 def _step_summary(groups: Sequence[Sequence[Point]]) -> Summary:
     cloths: dict[str, list[Sequence[Point]]] = {}
     for group in groups:
-        cloths.setdefault(_cloth_of(group[0]), []).append(group)
+        cloths.setdefault(group[0].cloth, []).append(group)
     return Summary(
         "The fastest of all solvers in one step:",
         tuple(
@@ -155,7 +151,7 @@ one_step = WithMissing(
     "cloth_peers_step",
     "One step of a falling cloth by every solver",
     columns=(
-        text("cloth", lambda group: _cloth_of(group[0])),
+        text("cloth", lambda group: group[0].cloth),
         text("solver", lambda group: group[0].solver),
         *(column for target in TARGETS for column in _columns_to(target)),
         Column("least error", read=_least_error, best="least"),
@@ -286,7 +282,7 @@ motion = WithMissing(
     "cloth_peers_motion",
     "A falling cloth by every solver, frame after frame",
     columns=(
-        text("cloth", _cloth_of),
+        text("cloth", lambda point: point.cloth),
         text("solver", lambda point: point.solver),
         text("a frame by", lambda point: point.rung),
         Column("frames", read=lambda point: int(point.values["frames"]), folded=True),

@@ -34,7 +34,7 @@ def blocks(suite: str) -> Iterator[Block]:
 def beside(peer: Peer, name: str) -> Measured:
     """Compare in a process of the engine's own; keep what it says where it cannot."""
     outcome = worker_process().perform(Calculation(differences, (peer.module, name)))
-    return Measured(outcome.found or {}, {"remark": outcome.trouble})
+    return Measured(outcome.found or {}, {"remark": outcome.note})
 
 
 def differences(module: str, name: str) -> Mapping[str, float]:

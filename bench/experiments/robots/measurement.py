@@ -143,13 +143,14 @@ def solve(run: Run, targets: Targets) -> Measured:
     arrays = _evaluated(run, targets, outcome.solved) if outcome.solved else {}
     return Measured(
         {**arrays, "setup": np.array(outcome.setup)},
-        {"remark": outcome.trouble},
+        {"remark": outcome.note},
         {
             "strata": list(STRATA),
             "tips": list(robot.effectors),  # as the file of records calls them
             "joints": len(robot.joints),
             "freedom": int(evaluator_of(run.robot).model.nv),
             "wanted": "pose" if robot.posed else "position",
+            "trouble": raised(outcome.solved),
         },
     )
 

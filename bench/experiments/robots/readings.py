@@ -33,13 +33,13 @@ CRASH = "exception or crash"
 OUTCOMES = ("solved", "beyond a limit", "wrong claim", "missed", CRASH, "no answer", "not begun")
 
 _MEASURED = (
-    "Every solver has the same text of the robot, the same targets and the same seeded random "
-    "starts. It works in a process of its own, on one core (TRAC-IK on two), and is timed target "
-    "by target, as in a loop of solves: after the target before, solved again without counting "
-    "where that takes less than a millisecond; conversions are left out. The solvers of a robot "
-    "follow each other in an order drawn by lot. What one returns is "
-    "evaluated by MuJoCo’s kinematics of the same text. TRAC-IK’s limits of time pass sooner on a "
-    "busy machine. Solved means: "
+    "Every solver has the same text of the robot (a solver of yours the same robot as the protocol "
+    "writes it), the same targets and the same seeded random starts. It works in a process of its "
+    "own, on one core (TRAC-IK on two), and is timed target by target, as in a loop of solves: "
+    "after the target before, solved again without counting where that takes less than a "
+    "millisecond; conversions are left out. The solvers of a robot follow each other in an order "
+    "drawn by lot. What one returns is evaluated by MuJoCo’s kinematics of the same text. "
+    "TRAC-IK’s limits of time pass sooner on a busy machine. Solved means: "
 )
 # The rule for solvers that a budget of time cut short.
 RULE = (
@@ -68,8 +68,13 @@ def records_of(results: Results, kind: str, task: str = REACHABLE) -> list[Recor
     known = [peer.called(entry) for peer in registry.PEERS for entry in peer.entries]
     solvers = list(dict.fromkeys([*known, *(record.solver for record in wanted)]))
     wanted.sort(key=lambda r: (robots.index(r.title), solvers.index(r.solver)))
-    most = {robot: _commonest(mine) for robot, mine in by_robot(wanted).items()}
-    return [_marked(record, most.get(record.title, 0)) for record in wanted]
+    return marked(wanted)
+
+
+def marked(records: Sequence[Record]) -> list[Record]:
+    """Return records with a mark where they are not of all targets, or of others than most are."""
+    sizes = {robot: _commonest(mine) for robot, mine in by_robot(records).items()}
+    return [_marked(record, sizes.get(record.title, 0)) for record in records]
 
 
 def _commonest(records: Sequence[Record]) -> int:

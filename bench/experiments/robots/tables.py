@@ -216,8 +216,10 @@ def success(kind: str) -> Layout:
 
 
 def _mark(record: Record) -> str:
-    """Return why a record is not ranked, or holds no numbers."""
-    return str(record.notes.get(MARK if "solved" in record.arrays else "remark", ""))
+    """Return why a record is not ranked, or holds no numbers, and what its solver raised."""
+    if "solved" not in record.arrays:
+        return str(record.notes.get("remark", ""))
+    return "; ".join(filter(None, (record.notes.get(MARK), record.trouble)))
 
 
 def _if_measured(column: Column) -> Column:
@@ -339,7 +341,7 @@ def strata(kind: str) -> Layout:
 def _strata_columns(records: Sequence[Record]) -> tuple[Column, ...]:
     names = records[0].facts["strata"] if records else []
     columns = [share(n, partial(solved, stratum=i), best="greatest") for i, n in enumerate(names)]
-    mark = text("mark", lambda record: record.notes.get(MARK, ""))
+    mark = text("mark", _mark)
     folded = [replace(column, folded=len(columns) > SHOWN) for column in columns[SHOWN:]]
     return (*NAMES, *columns[:SHOWN], *folded, replace(mark, folded=True))
 
@@ -404,7 +406,7 @@ def unreachable(kind: str) -> Layout:
             Column("claimed as solved", read=lambda missed: false_claims(missed.record)),
             _beyond("beyond the best known", MEDIAN, lambda missed: missed.beyond_best, "least"),
             _of_record(Column("time, median", "µs", read=_median_of_times)),
-            _of_record(text("mark", lambda record: record.notes.get(MARK, ""))),
+            _of_record(text("mark", _mark)),
             *(
                 replace(column, folded=True)
                 for column in (
@@ -574,7 +576,8 @@ def _profile_summary(rows: Sequence[Profile]) -> Summary:
     points = []
     for robot, mine in by_robot(rows[0].records).items():
         hits = fastest(mine)
-        ranking = metrics.ranking({r.solver: hits[r.solver] for r in mine if is_ranked(r)})
+        ranked = {r.solver: hits[r.solver] for r in mine if is_ranked(r) and hits[r.solver].size}
+        ranking = metrics.ranking(ranked)
         if ranking.order and hits[ranking.order[0]].any():
             share = words(metrics.share(hits[ranking.order[0]]))
             points.append(f"{robot}: {leaders(ranking)}, on {share} of the targets")

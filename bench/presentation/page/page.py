@@ -15,9 +15,10 @@ from markupsafe import Markup
 from ...harness.record import Record
 from ..figures import svg
 from ..figures.sketch import Drawing
-from ..headlines import Answers, Headline
+from ..headlines import Answers
 from ..motion import motion
 from ..sections import SECTIONS, Section, offered
+from ..standings import Headline
 from ..tables.columns import words_in
 from ..tables.layout import Figure, Layout
 from ..tables.table import Table

@@ -106,12 +106,12 @@ def shown_table(
         heads,
         rows,
         "ties" if any(cell.ties for row in rows for cell in row.cells) else "best" * bool(best),
-        _gist(table.summary),
+        gist(table.summary),
         list(drawings),
     )
 
 
-def _gist(summary: Summary) -> str:
+def gist(summary: Summary) -> str:
     """Return what is said in a line: of a list that is announced, the first point."""
     if not summary.sentence.endswith(":") or not summary.points:
         return summary.sentence

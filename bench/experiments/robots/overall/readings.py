@@ -1,7 +1,7 @@
 """What the records say of a solver over all robots, and how far it is from the best on each."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import NamedTuple
 
 import numpy as np
@@ -83,14 +83,21 @@ class Overall(NamedTuple):
         return sum(outcomes(record)[outcome] for record in self.records)
 
     @property
+    def cut(self) -> str:
+        """Why it is not ranked, "" if it is."""
+        if self.is_ranked:
+            return ""
+        begun = sum(record.arrays["solved"].size for record in self.records)
+        count = sum(map(total, self.records))
+        return f"cut at {words(begun)} of {words(count)}" if begun < count else "other targets"
+
+    @property
     def marks(self) -> str:
-        """Where it is first or ties with the first, and where it was cut short."""
-        if not self.is_ranked:
-            begun = sum(record.arrays["solved"].size for record in self.records)
-            asked = sum(map(total, self.records))
-            return f"cut at {words(begun)} of {words(asked)}" if begun < asked else "other targets"
-        said = (("most solved", self.success), ("least time", self.time))
-        return ", ".join(f"{what}{_tie(of)}" for what, of in said if self.solver in of.first)
+        """Where it is first or ties with the first, where it was cut short, what it raised."""
+        rankings = (("most solved", self.success), ("least time", self.time))
+        first = (f"{what}{_tie(of)}" for what, of in rankings if self.solver in of.first)
+        troubles = [record.trouble for record in self.records if record.trouble]
+        return "; ".join(filter(None, (self.cut, ", ".join(first), *troubles[:1])))
 
 
 def _tie(ranking: Ranking) -> str:
@@ -102,19 +109,28 @@ def overall(results: Results, kind: str) -> list[Overall]:
 
     Solvers are compared only over robots that all of them take.
     """
-    robots = by_robot(measured(records_of(results, kind)))
-    takes: dict[str, dict[str, Record]] = {}
-    for robot, records in robots.items():
-        for record in records:
-            takes.setdefault(record.solver, {})[robot] = record
-    sets = sorted({frozenset(mine) for mine in takes.values()}, key=lambda s: (-len(s), sorted(s)))
-    made: list[Overall] = []
-    for chosen in sets[:SETS]:
-        names = [robot for robot in robots if robot in chosen]
-        title = _title(names, len(robots))
-        takers = {s: [mine[r] for r in names] for s, mine in takes.items() if chosen <= mine.keys()}
-        made += _ranked([Overall(title, solver, records) for solver, records in takers.items()])
-    return made
+    records = measured(records_of(results, kind))
+    sets = {frozenset(mine) for mine in _by_solver(records).values()}
+    largest = sorted(sets, key=lambda robots: (-len(robots), sorted(robots)))[:SETS]
+    return [row for robots in largest for row in overall_on(robots, records)]
+
+
+def overall_on(robots: Set[str], records: Sequence[Record]) -> list[Overall]:
+    """Return every solver that takes all of these robots, over them."""
+    present = by_robot(records)
+    names = [robot for robot in present if robot in robots]
+    title = _title(names, len(present))
+    takers = {s: mine for s, mine in _by_solver(records).items() if robots <= mine.keys()}
+    return _ranked([Overall(title, s, [mine[r] for r in names]) for s, mine in takers.items()])
+
+
+def _by_solver(records: Sequence[Record]) -> dict[str, dict[str, Record]]:
+    """Return the record of each robot that a solver takes."""
+    solvers: dict[str, dict[str, Record]] = {}
+    for robot, mine in by_robot(records).items():
+        for record in mine:
+            solvers.setdefault(record.solver, {})[robot] = record
+    return solvers
 
 
 def _title(names: Sequence[str], count: int) -> str:
@@ -165,13 +181,9 @@ def most_solved(made: Sequence[Line]) -> Counter[str]:
 
 def lines(results: Results, kind: str) -> list[Line]:
     """Return every solver with what it comes to on each robot."""
-    robots = by_robot(measured(records_of(results, kind)))
-    best = {name: min(map(_score, records)) for name, records in robots.items()}
-    found: dict[str, dict[str, Record]] = {}
-    for name, records in robots.items():
-        for record in records:
-            found.setdefault(record.solver, {})[name] = record
-    return [Line(solver, mine, best) for solver, mine in found.items()]
+    records = measured(records_of(results, kind))
+    best = {name: min(map(_score, mine)) for name, mine in by_robot(records).items()}
+    return [Line(solver, mine, best) for solver, mine in _by_solver(records).items()]
 
 
 def _score(record: Record) -> float:

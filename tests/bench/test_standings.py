@@ -1,0 +1,310 @@
+"""The user's solvers come first: where they stand, what they raised, and a bench's last lines."""
+
+import contextlib
+import re
+import sys
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, Browser
+
+from bench import terminal
+from bench.cli import run_command
+from bench.entrants import opening
+from bench.harness import metrics
+from bench.harness.record import RecordFile
+from bench.presentation import outcome, report
+from bench.presentation.results import Results, plain
+from bench.presentation.sections import tables
+from bench.presentation.standings import CLOTHS, standings
+
+N = 200
+
+
+def solving(make, solver, hits, seconds=1e-3, begun=N, kind="one start", mine=False, **facts):
+    """A record of N targets of a robot, the first so many solved, each in these seconds."""
+    arrays = {"solved": np.arange(begun) < hits, "claimed": np.ones(begun)}
+    arrays |= {"seconds": np.full(begun, seconds), "stratum": np.zeros(begun, int)}
+    arrays |= dict.fromkeys(("position", "rotation", "beyond"), np.zeros(begun))
+    made = replace(make.raced(solver, kind, **arrays), size=float(N))
+    facts |= {"entrant": True, "door": "mine.py"} if mine else {}
+    return replace(made, facts={**made.facts, **facts})
+
+
+def only(records):
+    (standing,) = standings(Results(records))
+    return standing
+
+
+def test_rank_share_and_times_are_those_of_the_records(make):
+    """Beside the best and beside ours, with 95 % intervals."""
+    mine = solving(make, "Mine", 150, 4e-3, mine=True)
+    others = [solving(make, "pink", 190, 1e-3), solving(make, "Plumbob LM", 195, 2e-3)]
+    standing = only([*others, mine])
+    assert standing.asked == "Mine, robots, one start"
+    assert standing.answer == "rank 3 of 3 solvers"
+    share = metrics.share(np.arange(N) < 150)
+    low, high = (round(100 * x, 1) for x in (share.low, share.high))
+    assert standing.detail.startswith(
+        f"75 % of 200 targets solved ({low}–{high}); Plumbob LM: 97.5 %; ")  # fmt: skip
+    # Of targets that both solve, the times are 4 to 1 and 4 to 2; penalties make it more.
+    factors = re.findall(r"([\d.]+) times slower than (pink|Plumbob LM)", standing.detail)
+    assert [name for _, name in factors] == ["pink", "Plumbob LM"]
+    assert float(factors[0][0]) > 4.0
+    assert float(factors[1][0]) > 2.0
+    assert standing.table == "robots_overall_one_start"
+
+
+def test_the_best_is_told_by_how_much_it_is_faster(make):
+    mine = solving(make, "Mine", N, 1e-3, mine=True)
+    others = [solving(make, "pink", 100, 4e-3), solving(make, "Plumbob LM", N, 8e-3)]
+    standing = only([*others, mine])
+    assert standing.answer == "rank 1 of 3 solvers (tie)"
+    assert "7.93 times faster than Plumbob LM" in standing.detail
+    assert standings(Results(others)) == []
+
+
+def test_a_solver_that_is_cut_off_has_no_rank_and_one_that_solves_nothing_neither(make):
+    rivals = [solving(make, "pink", 100), solving(make, "mink", 50)]
+    cut = only([*rivals, solving(make, "Mine", 3, begun=18, mine=True)])
+    assert cut.answer == "not ranked, cut at 18 of 200"
+    assert cut.detail == "1.5 % of 200 targets solved (0.5–4.3)"
+    none = only([*rivals, solving(make, "Mine", 0, mine=True)])
+    assert none.answer == "not ranked, solves nothing"
+
+
+def test_a_rank_is_among_those_that_finished(make):
+    rivals = [solving(make, "pink", 100), solving(make, "mink", 18, begun=18)]
+    standing = only([*rivals, solving(make, "Mine", 20, mine=True)])
+    assert standing.answer == "rank 2 of the 2 of 3 solvers that finished"
+
+
+def chained(make, solver, residuals, seconds, stratum="near", mine=False):
+    """A record of the chain, its targets within 1e-4 m solved."""
+    made = make.reached(stratum, solver)
+    solved = np.asarray(residuals) <= 1e-4
+    arrays = {**made.arrays, "residual": residuals, "solved": solved}
+    arrays["seconds"] = np.full(len(residuals), seconds)
+    made = replace(made, arrays=arrays, size=float(len(residuals)))
+    return make.entered(made) if mine else made
+
+
+def test_on_chains_ours_are_called_so_and_what_is_beyond_reach_does_not_count(make):
+    reached, missed = np.full(20, 1e-5), np.full(20, 1.0)
+    records = [
+        chained(make, "fabrik", reached, 1e-4),
+        chained(make, "lm/MuJoCo", reached, 2e-4),
+        chained(make, "Mine", np.r_[reached[:5], missed[:15]], 1e-3, mine=True),
+        chained(make, "Mine", missed, 1e-3, "beyond", mine=True),
+    ]
+    standing = only(records)
+    assert standing.asked == "Mine, chain of balls"
+    assert standing.answer == "rank 3 of 3 solvers"
+    assert standing.detail.startswith("25 % of 20 targets solved")
+    assert "times slower than Plumbob FABRIK (" in standing.detail
+    assert standing.table == "accuracy"
+
+
+def test_on_cloths_a_rank_is_by_the_error_and_a_time_beside_who_comes_as_near(make):
+    records = [
+        make.worked("Plumbob Newton", error=(1e-3, 1e-9), seconds=(5e-3, 6e-3)),
+        make.worked("MuJoCo Euler", error=(0.5, 0.2), seconds=(1e-3, 2e-3)),
+        make.entered(make.worked("Mine", error=(0.5, 0.2), seconds=(1e-3, 4e-3))),
+    ]
+    standing = only(records)
+    assert (standing.asked, standing.answer) == ("Mine, step of 1 cloth", "rank 2 of 3")
+    assert standing.detail == (
+        "20 × 20, 1,000 N/m: error 0.200 in 4.00 ms, 2.00 times slower than MuJoCo Euler and "
+        "1.25 times faster than Plumbob Newton"
+    )
+    alone = only([records[1], make.entered(make.worked("Mine", error=(0.5, 0.1)))])
+    assert alone.answer == "rank 1 of 2"
+    assert alone.detail.endswith("nobody else as near")
+
+
+def test_motions_are_ranked_by_the_distance_from_the_truth(make):
+    """Of settings that got to the end: others are nearer, but diverged or were cut short."""
+    records = [make.fell("Plumbob Newton"), make.entered(make.fell("Mine", true=[0.0, 1e-2, 0.0]))]
+    standing = only(records)
+    assert (standing.asked, standing.answer) == ("Mine, motion of 1 cloth", "rank 1 of 2")
+    assert "0.0100 m from the truth in 1.00 ms" in standing.detail
+
+
+def test_many_cloths_have_few_sentences_and_the_rank_on_all(make):
+    stiffnesses = [10.0**k for k in range(2, 7)]
+    records = [make.worked("MuJoCo Euler", k, error=(0.1, 0.01)) for k in stiffnesses]
+    records += [make.entered(make.worked("Mine", k, error=(0.1, 0.02))) for k in stiffnesses]
+    standing = only(records)
+    assert standing.asked == "Mine, step of 5 cloths"
+    assert standing.answer == "rank 2 of 2"
+    assert standing.detail.count("N/m: ") == CLOTHS
+
+
+RAISED = "It raised ValueError in line 3 of mine.py: no, on 4 of 200 targets"
+
+
+def test_what_a_solver_raised_stands_below_its_ranks_with_how_often(make):
+    good = solving(make, "Mine", 20, mine=True)
+    bad = solving(make, "Mine, 20 restarts", 0, mine=True, kind="restarts", trouble=RAISED)
+    rank, trouble, unranked = standings(Results([bad, good]))
+    assert rank.answer == "rank 1 of 1 solver"
+    assert (trouble.asked, trouble.answer) == ("Mine, suite ik", "trouble on 1 of 2 problems")
+    assert trouble.detail == f"robots/arm: {RAISED}"
+    assert unranked.answer == "not ranked, solves nothing"
+
+
+def test_a_problem_that_could_not_be_measured_is_not_forgotten(make):
+    """A record that failed stands in no table."""
+    failed = make.entered(make.reached("near", "Mine"))
+    failed = replace(failed, arrays={}, notes={"failed": "It raised ValueError: no"})
+    standing = only([failed])
+    assert standing.answer == "trouble on 1 of 1 problem"
+    assert standing.detail == "chain/near: It raised ValueError: no"
+
+
+def run_folder(make, tmp_path):
+    """A folder with records of a solver of the user's beside others, on all robots and a cloth."""
+    records = [solving(make, "Mine", 150, mine=True), solving(make, "Mine, 20 restarts", 150,
+               kind="restarts", mine=True, trouble=RAISED)]  # fmt: skip
+    for kind in ("one start", "restarts"):
+        records += [solving(make, s, 190, kind=kind) for s in ("pink", "Plumbob LM")]
+        records += [make.lacking(f"{peer}, {kind}", kind, "not installed") for peer in "abc"]
+    RecordFile(tmp_path).append(records)
+    return tmp_path
+
+
+def test_the_first_screen_of_the_page_begins_with_the_solver_of_the_user(make, tmp_path):
+    page = report.write(run_folder(make, tmp_path)).page.read_text("utf-8")
+    screen = page[page.index('<section id="answers"') : page.index("</section>")]
+    (heading,) = re.findall("<h1[^>]*>(.*?)</h1>", screen)
+    assert heading == "Mine, robots, one start: rank 3 of 3 solvers"
+    for standing in standings(Results(RecordFile(tmp_path).read().records)):
+        assert f'<a href="#{standing.table}">{standing.answer}</a>' in screen
+        assert standing.asked in screen
+    assert screen.index("Your solver") < screen.index("Not checked yet")
+    assert RAISED in screen
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_a_bench_ends_with_the_solver_of_the_user_and_who_leads(
+    make, tmp_path, monkeypatch, capsys, width
+):
+    monkeypatch.setenv("COLUMNS", str(width))
+    terminal.print_ending(["ik"], run_folder(make, tmp_path))
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= {80: 16, 120: 12}[width]  # eight sentences, of which most take two lines
+    assert max(map(len, lines)) <= width
+    said = " ".join(lines)
+    for standing in standings(Results(RecordFile(tmp_path).read().records)):
+        assert f"{standing.asked}: {standing.answer}; {standing.detail}." in said
+    assert lines[0].startswith("Mine, robots, one start: rank 3 of 3 solvers; ")
+    assert said.index("trouble on 1 of 2 problems") < said.index("kinematics, most accurate")
+
+
+def test_a_report_ends_with_the_solver_of_the_user_first(make, tmp_path):
+    lines = outcome.outcome(report.write(run_folder(make, tmp_path)), 200)
+    assert lines[0].startswith("Mine, robots, one start: ")
+    assert any(line.startswith("Right? ") for line in lines)
+
+
+def test_a_bench_without_leaders_ends_with_what_its_tables_say(tmp_path, records, capsys):
+    RecordFile(tmp_path).append(records)
+    terminal.print_ending(["arm"], tmp_path)
+    lines = capsys.readouterr().out.splitlines()
+    assert 1 <= len(lines) <= outcome.TABLES + 1
+    assert lines[0].startswith("Targets beyond reach: ")
+
+
+def test_a_pipe_gets_a_line_now_and_then_and_a_terminal_none(monkeypatch, capsys):
+    """With count, time left and what is being done."""
+    monkeypatch.setattr(terminal, "PAUSE", 1e-3)
+    monkeypatch.setattr(terminal, "LONGEST_PAUSE", 1e-3)
+    printed = threading.Event()
+    monkeypatch.setattr(sys.stderr, "flush", printed.set, raising=False)
+    with terminal.progress() as bar, terminal.lines_in_a_pipe(bar):
+        bar.add_task("ik: chain/near, Mine", total=12, completed=5, kept=5)
+        assert printed.wait(60.0)
+    assert capsys.readouterr().err.startswith("5/12, ? left: ik: chain/near, Mine\n")
+    threads = threading.active_count()
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    with terminal.lines_in_a_pipe(bar):
+        assert threading.active_count() <= threads
+
+
+RAISER = """PLUMBOB = {"name": "My raiser"}
+
+
+def robot_inverse_kinematics(start, target_position):
+    raise ValueError("too far")
+"""
+
+
+def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monkeypatch, capsys):
+    """On standard error before its block is on record; once, though two entries raise it."""
+    monkeypatch.setattr(opening, "installed", list)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "raiser.py").write_text(RAISER)
+    append, printed_before = RecordFile.append, []
+
+    def note_what_is_printed(file, records):
+        printed_before.append(sys.stderr.getvalue())
+        append(file, records)
+
+    monkeypatch.setattr(RecordFile, "append", note_what_is_printed)
+    code = run_command(["bench", "ik", "--quick", "--targets", "20", "--problem", "robots/ur5",
+                        "--with", "raiser.py", "--solver", "My raiser", "-o", "out"])  # fmt: skip
+    assert code == 0
+    out, err = capsys.readouterr()
+    why = "It raised ValueError in line 5 of raiser.py: too far"
+    line = f"robots/ur5, My raiser: {why}\n"
+    assert printed_before[0] == line
+    assert err.count(why) == 1
+    said = " ".join(out.split())
+    rank = "My raiser, suite ik: trouble on 2 of 2 problems"
+    assert f"{rank}; robots/ur5: {why}, on 12 of 12 targets." in said
+    results = Results([plain(record) for record in RecordFile("out").read().records])
+    made = {table.name: table for table in tables(results, ["ik"])}
+    for name, title in (
+        ("robots_success_one_start", "mark"),
+        ("robots_overall_one_start", "mark"),
+        ("entered_ik", "remark"),
+    ):
+        (j,) = [j for j, column in enumerate(made[name].columns) if column.title == title]
+        assert not made[name].columns[j].folded or name == "entered_ik"
+        assert f"{why}, on 12 of 12 targets" in made[name].rows[0][j], name
+
+
+def test_what_fails_alike_is_said_once_and_counted(tmp_path, monkeypatch, capsys):
+    from bench.commands.bench import run_suites
+    from bench.harness import run
+
+    why = {"chain/near": "It raised", "chain/far": "It raised", "robots/all": "It crashed"}
+    events = [run.Event(run.FAILED, "ik", f"{at}, Mine", message) for at, message in why.items()]
+    monkeypatch.setattr(run, "run", lambda *_: iter(events))
+    monkeypatch.setattr(run, "count", lambda *_: len(events))
+    assert run_suites(["ik"], "quick", tmp_path, False) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        "plumbob: ik: chain/near, Mine and 1 more: It raised",
+        "plumbob: ik: robots/all, Mine: It crashed",
+    ]
+
+
+def test_in_a_browser_the_solver_of_the_user_is_in_sight_at_once(make, tmp_path):
+    """At a desk and on a phone, and nothing scrolls sideways."""
+    if not CHROMIUM:
+        pytest.skip("the page is looked at in Chromium, which is not installed")
+    page = report.write(run_folder(make, tmp_path)).page.as_uri()
+    (tmp_path / "profile").mkdir()
+    with contextlib.closing(Browser(tmp_path / "profile")) as browser:
+        for width, height in ((1440, 900), (390, 844)):
+            browser.open(page, width, height)
+            heading, answer = browser.run(
+                "[...document.querySelectorAll('#answers h1, #answers .card dd:first-of-type')]"
+                ".slice(0, 2).map(e => [e.textContent.trim(), e.getBoundingClientRect().bottom])"
+            )
+            assert heading[0] == "Mine, robots, one start: rank 3 of 3 solvers"
+            assert answer[0].startswith("rank 3 of 3 solvers 75 % of 200 targets solved")
+            assert heading[1] < answer[1] < height
+            assert browser.run("document.documentElement.scrollWidth") <= width
