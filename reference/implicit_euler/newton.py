@@ -2,6 +2,11 @@
 
 Where springs are compressed the Hessian M + h² K may be indefinite. A multiple of M is then added
 until it is positive definite, a Levenberg shift in the metric of M.
+
+Such steps leave a saddle point unless the gradient shows no direction to leave it in, as at a
+straight rod that is squeezed. An end is therefore accepted only where the Hessian has no negative
+eigenvalue. It is factorised once more for that, unless it was positive definite at both iterates
+before, as it is in ordinary steps.
 """
 
 from collections.abc import Iterator
@@ -9,12 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from ..mass_spring import MassSpring
+from ..arguments import FloatArray
+from ..mass_spring import MassSpring, lengths
 from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor
+from ..springs import COINCIDENT
 from .factor_cache import hessian_factor
 from .line_search import line_search
 from .objective import Iterate, Objective
+from .terms import SUM_ROUNDING
 
 FIRST_SHIFT = 1e-2  # times M
 SHIFT_GROWTH, SHIFT_DECAY = 4.0, 2.0
@@ -33,12 +41,26 @@ class Newton:
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield the objective's start, then the iterate after each iteration."""
-        iterate, shift = objective.start, 0.0
+        iterate, shift, last_shift = objective.start, 0.0, np.inf
         while True:
             yield iterate
             factor, shift = self._factor(objective.hessian_at(iterate.positions), shift)
             step = -factor.solve(iterate.gradient.ravel()).reshape(-1, 3)
             iterate = line_search(objective, iterate, step)
+            iterate.is_convex = shift == last_shift == 0.0
+            last_shift = shift
+
+    def is_saddle(self, objective: Objective, iterate: Iterate) -> bool:
+        """Return whether the Hessian at an iterate has a negative eigenvalue, beyond rounding."""
+        if iterate.is_convex:
+            return False
+        hessian = objective.hessian_at(iterate.positions)
+        hessian.data[self._diagonal] += np.repeat(hessian_rounding(objective, iterate.positions), 3)
+        try:
+            self._analysed.refactorize(hessian)
+        except NotPositiveDefiniteError:
+            return True
+        return False
 
     def _factor(self, hessian: Any, shift: float) -> tuple[Factor, float]:
         """Return the factor of the Hessian plus a multiple of M, and the multiple.
@@ -53,3 +75,16 @@ class Newton:
                 return self._analysed.refactorize(hessian), shift
             except NotPositiveDefiniteError:
                 shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)
+
+
+def hessian_rounding(objective: Objective, x: FloatArray) -> FloatArray:
+    """Return the diagonal that bounds what rounding may add to the Hessian, (particle,) [kg].
+
+    Rounded coordinates change the relative length of a spring, and its stiffness across with it.
+    """
+    springs, k = objective.effective, objective.h**2 * objective.effective.stiffnesses
+    (i, j), length, reach = springs.springs.T, lengths(springs, x), np.linalg.norm(x, axis=1)
+    ends = reach[i] + reach[j] + springs.rest_lengths
+    terms = k * (1.0 + np.divide(ends, length, out=np.zeros_like(ends), where=length > COINCIDENT))
+    total = sum(np.bincount(end, terms, len(x)) for end in (i, j))
+    return SUM_ROUNDING * (springs.masses + total)
