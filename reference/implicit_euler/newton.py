@@ -14,15 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import FloatArray
-from ..mass_spring import MassSpring, lengths
+from ..mass_spring import MassSpring
 from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor
-from ..springs import COINCIDENT
+from .certificate import rounding_errors
 from .factor_cache import hessian_factor
 from .line_search import line_search
 from .objective import Iterate, Objective
-from .terms import SUM_ROUNDING
 
 FIRST_SHIFT = 1e-2  # times M
 SHIFT_GROWTH, SHIFT_DECAY = 4.0, 2.0
@@ -52,10 +50,10 @@ class Newton:
 
     def is_saddle(self, objective: Objective, iterate: Iterate) -> bool:
         """Return whether the Hessian at an iterate has a negative eigenvalue, beyond rounding."""
-        if iterate.is_convex:
+        if iterate.is_convex or not objective.system.free.any():
             return False
         hessian = objective.hessian_at(iterate.positions)
-        hessian.data[self._diagonal] += np.repeat(hessian_rounding(objective, iterate.positions), 3)
+        hessian.data[self._diagonal] += rounding_errors(objective, iterate.positions).hessian
         try:
             self._analysed.refactorize(hessian)
         except NotPositiveDefiniteError:
@@ -75,16 +73,3 @@ class Newton:
                 return self._analysed.refactorize(hessian), shift
             except NotPositiveDefiniteError:
                 shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)
-
-
-def hessian_rounding(objective: Objective, x: FloatArray) -> FloatArray:
-    """Return the diagonal that bounds what rounding may add to the Hessian, (particle,) [kg].
-
-    Rounded coordinates change the relative length of a spring, and its stiffness across with it.
-    """
-    springs, k = objective.effective, objective.h**2 * objective.effective.stiffnesses
-    (i, j), length, reach = springs.springs.T, lengths(springs, x), np.linalg.norm(x, axis=1)
-    ends = reach[i] + reach[j] + springs.rest_lengths
-    terms = k * (1.0 + np.divide(ends, length, out=np.zeros_like(ends), where=length > COINCIDENT))
-    total = sum(np.bincount(end, terms, len(x)) for end in (i, j))
-    return SUM_ROUNDING * (springs.masses + total)

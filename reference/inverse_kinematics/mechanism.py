@@ -82,21 +82,27 @@ class ConfigurationData(NamedTuple):
     """A mechanism's coordinates with their forward kinematics; effectors come behind the joints.
 
     Attributes:
+        state: what an attempt continues from, (coordinate + 2,): `q` and `far` are parts of it.
         q: (coordinate,).
+        far: the damping and the squared error [m²] of the last step towards a target out of reach,
+            zero before the first.
         positions: in the world [m], (joint + effector, 3).
         rotations: in the world, (joint + effector, 4).
     """
 
+    state: FloatArray
     q: FloatArray
+    far: FloatArray
     positions: FloatArray
     rotations: FloatArray
 
 
 def new_data(mechanism):
     """Return the data of a configuration, to be filled."""
-    count = len(mechanism.joints) + len(mechanism.effectors)
+    count, n = len(mechanism.joints) + len(mechanism.effectors), mechanism.coordinates
+    state = np.zeros(n + 2)
     return ConfigurationData(
-        np.empty(mechanism.coordinates), np.empty((count, 3)), np.empty((count, 4))
+        state, state[:n], state[n:], np.empty((count, 3)), np.empty((count, 4))
     )
 
 

@@ -42,6 +42,8 @@ REACHED, SETTLED, LIMITED, GIVEN_UP = range(4)
 # far the configuration it starts from is from the target [m].
 MADE, STATE, COST, WAIT, RANK = range(5)
 INFINITY = math.inf
+# Merits closer than so much of themselves differ by rounding: the attempt that settled is better.
+TIE = 1e-14
 
 
 class Limits(NamedTuple):
@@ -102,7 +104,8 @@ def solve_with_restarts(state, target, limits, criteria, history):
         The iterations of all attempts, and whether the best one settled.
     """
     progress, random = state.progress, len(state.progress) - 2
-    reset(progress)
+    in_reach = criteria.distance <= limits.tolerance  # or else no error will halve for long
+    reset(progress, PATIENCE if random > 0 and in_reach else INFINITY)
     distance, _, _ = error(state, target)
     store_if_inside(history, 0, distance)
     perturbed = perturb(state, target, criteria, progress[0])
@@ -138,12 +141,12 @@ def new_progress(attempts):
     return np.empty((attempts + 1, RANK + 1))
 
 
-def reset(progress):
+def reset(progress, patience):
     """Note that no attempt has been made."""
     for k in range(len(progress) - 1):
         row = progress[k]
         row[MADE], row[STATE], row[COST] = 0.0, LIMITED, INFINITY
-        row[WAIT] = PATIENCE if len(progress) > 2 else INFINITY
+        row[WAIT] = patience
 
 
 def solve_once(state, target, criteria, attempt, most, history, done):
@@ -189,7 +192,8 @@ def rate(state, target, attempt, k, best):
     if attempt[STATE] == GIVEN_UP:
         attempt[WAIT] *= MORE_PATIENT
         return False
-    return attempt[STATE] == REACHED or attempt[COST] < best
+    limit = (1.0 + TIE) * best if attempt[STATE] == SETTLED else best
+    return attempt[STATE] == REACHED or attempt[COST] < limit
 
 
 def most_promising(progress):

@@ -46,8 +46,7 @@ class StepJudgement:
         reference_certificate: the certificate of where Newton's method ended.
         same_minimiser: whether the minimiser near x is proven to be the one near x* (True) or
             another one (False); None if neither is proven.
-        minimiser: where Newton's method ended, x* or, if there is none, a saddle point, the last
-            iterate or x_n; shape (particle, 3) [m].
+        minimiser: x*, shape (particle, 3) [m]; if there is none, where Newton's method ended.
         iterations: number of iterations of Newton's method.
         outcome: the outcome of Newton's method; there is no x* unless it is `solved`.
     """
