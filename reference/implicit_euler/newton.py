@@ -3,10 +3,9 @@
 Where springs are compressed the Hessian M + h² K may be indefinite. A multiple of M is then added
 until it is positive definite, a Levenberg shift in the metric of M.
 
-Such steps leave a saddle point unless the gradient shows no direction to leave it in, as at a
-straight rod that is squeezed. An end is therefore accepted only where the Hessian has no negative
-eigenvalue. It is factorised once more for that, unless it was positive definite at both iterates
-before, as it is in ordinary steps.
+Such steps leave a saddle point where the gradient shows a way out, but not at a squeezed straight
+rod. An end is therefore accepted only without a negative eigenvalue: the Hessian is factorised once
+more, unless it was positive definite at both iterates before, as in ordinary steps.
 """
 
 from collections.abc import Iterator

@@ -80,21 +80,22 @@ def damped_step(mechanism, data, system, damping):
             return
 
 
-def far_damping(mechanism, target, data, system, near):
-    """Return the damping [m²] towards a target proven out of reach, `near` towards any other.
+def far_damping(mechanism, target, data, system, damping):
+    """Return the damping [m²] towards a target proven out of reach, `damping` towards any other.
 
     The Hessian of |e|²/2 has second derivatives of the effectors too, up to the reach times |e|,
     which J' J leaves out. With a damping too small for them steps swing about the nearest pose for
-    ever; with one too large they creep. It therefore follows the error (Marquardt 1963).
+    ever; with one too large they creep. It therefore follows the error (Marquardt 1963), by the
+    factor and the squared error of the last step in `data.far_step`.
     """
     if least_residual(mechanism, target) <= 0.0:
-        return near
-    square, share, before = squared(system.e), data.far[0], data.far[1]
-    share = share * GROWTH if square > before else max(share / DECAY, LEAST_FAR_DAMPING)
-    if before == 0.0:
-        share = FAR_DAMPING
-    data.far[0], data.far[1] = share, square
-    return share * mechanism.reach * math.sqrt(square)
+        return damping
+    square, factor, last_square = squared(system.e), data.far_step[0], data.far_step[1]
+    factor = factor * GROWTH if square > last_square else max(factor / DECAY, LEAST_FAR_DAMPING)
+    if last_square == 0.0:
+        factor = FAR_DAMPING
+    data.far_step[0], data.far_step[1] = factor, square
+    return factor * mechanism.reach * math.sqrt(square)
 
 
 def activate_limits(mechanism, data, system):

@@ -18,8 +18,8 @@ from .result import store_if_inside
 
 # One iteration of a solver: update(state, target).
 update = Slot("update")
-# error(state, target): the largest distance [m] and angle [rad] from effector to target, and the
-# sum of all distances and levered angles [m], which shows progress.
+# error(state, target): the largest distance [m] and angle [rad] from effector to target, the sum of
+# all distances and levered angles [m], which shows progress, and the distance that has to be small.
 error = Slot("error")
 # merit(state, target): what says which attempt is better, the less the better [m].
 merit = Slot("merit")
@@ -42,8 +42,6 @@ REACHED, SETTLED, LIMITED, GIVEN_UP = range(4)
 # far the configuration it starts from is from the target [m].
 MADE, STATE, COST, WAIT, RANK = range(5)
 INFINITY = math.inf
-# Merits closer than so much of themselves differ by rounding: the attempt that settled is better.
-TIE = 1e-14
 
 
 class Limits(NamedTuple):
@@ -106,7 +104,7 @@ def solve_with_restarts(state, target, limits, criteria, history):
     progress, random = state.progress, len(state.progress) - 2
     in_reach = criteria.distance <= limits.tolerance  # or else no error will halve for long
     reset(progress, PATIENCE if random > 0 and in_reach else INFINITY)
-    distance, _, _ = error(state, target)
+    distance, _, _, _ = error(state, target)
     store_if_inside(history, 0, distance)
     perturbed = perturb(state, target, criteria, progress[0])
     best, ending, done, drawn, periods = INFINITY, LIMITED, 0, 0, 1
@@ -158,19 +156,19 @@ def solve_once(state, target, criteria, attempt, most, history, done):
     Returns:
         The iterations made.
     """
-    distance, angle, total = error(state, target)
+    _, angle, total, bound = error(state, target)
     milestone, since = total, 0
     first, ending = int(attempt[MADE]), LIMITED
     made = first
     while ending == LIMITED:
-        if distance <= criteria.distance and angle <= criteria.angle:
+        if bound <= criteria.distance and angle <= criteria.angle:
             ending = REACHED
         if ending == REACHED or made >= most:
             break
         before = total
         update(state, target)
         made += 1
-        distance, angle, total = error(state, target)
+        distance, angle, total, bound = error(state, target)
         store_if_inside(history, done + made - first, distance)
         since += 1
         if total < PROGRESS * milestone:
@@ -179,7 +177,7 @@ def solve_once(state, target, criteria, attempt, most, history, done):
             ending = SETTLED
         elif since >= attempt[WAIT]:
             ending = GIVEN_UP
-    if ending != LIMITED and distance <= criteria.distance and angle <= criteria.angle:
+    if ending != LIMITED and bound <= criteria.distance and angle <= criteria.angle:
         ending = REACHED
     attempt[MADE], attempt[STATE] = made, ending
     return made - first
@@ -192,8 +190,7 @@ def rate(state, target, attempt, k, best):
     if attempt[STATE] == GIVEN_UP:
         attempt[WAIT] *= MORE_PATIENT
         return False
-    limit = (1.0 + TIE) * best if attempt[STATE] == SETTLED else best
-    return attempt[STATE] == REACHED or attempt[COST] < limit
+    return attempt[STATE] == REACHED or attempt[COST] < best
 
 
 def most_promising(progress):

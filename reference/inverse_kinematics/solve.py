@@ -274,11 +274,11 @@ def _restarted(
     One start on a chain of unlimited balls has already had the iterations of all attempts. Towards
     a target out of reach it has one nearest point to come to, and no start comes to another.
     """
-    final = [outcome for outcome in Outcome if outcome.unreachable or outcome.solved]
-    if np.isin(found.outcome, final).all():
+    final_outcomes = [outcome for outcome in Outcome if outcome.unreachable or outcome.solved]
+    if np.isin(found.outcome, final_outcomes).all():
         return found
     more = solve_on_mechanism(skeleton, start, targets, settings)
-    open_ = ~np.isin(found.outcome, final)
+    open_ = ~np.isin(found.outcome, final_outcomes)
     reached = np.asarray(more.outcome) == Outcome.CONVERGED
     better = open_ & (reached | (np.asarray(more.merit) < found.merit))
     iterations = found.iterations + np.where(open_, more.iterations, 0)

@@ -169,7 +169,7 @@ def normalise_target(target):
 def begin(state, q):
     """Bring a mechanism to coordinates of the articulation, within their limits."""
     gather(state.mechanism, q, state.data.q)
-    clear(state.data.far)
+    clear(state.data.far_step)
     for j in range(len(state.mechanism.joints)):
         clamp_joint(state.mechanism.joints, j, state.data.q)
     update_forward_kinematics(state.mechanism, state.data)
@@ -178,17 +178,16 @@ def begin(state, q):
 def mechanism_criteria(mechanism, least, limits):
     """Return when an attempt ends, where no pose has a lesser residual than `least` [m].
 
-    A single target out of reach counts as reached within the tolerance of the least distance.
+    Targets out of reach count as reached within the tolerance of their least distances.
     """
     margin = POSITION_ROUNDING * mechanism.reach
     slack, slack_rotation = (
         min(margin, 0.5 * limits.tolerance),
         min(POSITION_ROUNDING, 0.5 * limits.tolerance_rotation),
     )
-    nearest = least if len(mechanism.effectors) == 1 else 0.0
     far = least > limits.tolerance
     return Criteria(
-        nearest + limits.tolerance - slack,
+        least + limits.tolerance - slack,
         limits.tolerance_rotation - slack_rotation,
         max(margin, FAR_MARGIN * limits.tolerance) if far else margin,
         limits.far_iterations if far else limits.max_iterations,
@@ -220,7 +219,7 @@ def update_mechanism(state, target):
 
 
 def mechanism_error(state, target):
-    """Return the largest distance [m] and angle [rad] to the target, and all in one [m]."""
+    """Return the largest distance [m] and angle [rad] to the target, their sum, and a bound [m]."""
     return residuals(state.mechanism, target, state.data)
 
 
@@ -269,7 +268,7 @@ def draw_mechanism(state, target, n):
     if n == 1:
         rank_restarts(state, target)
     take_nearest(state, state.data.q)
-    clear(state.data.far)
+    clear(state.data.far_step)
     update_forward_kinematics(state.mechanism, state.data)
 
 

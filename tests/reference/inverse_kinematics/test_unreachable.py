@@ -209,3 +209,20 @@ def test_one_position_beyond_a_skeleton_is_not_restarted(solver, backend):
         assert solution.outcome.unreachable
         assert solution.iterations == iterations == longer.iterations
         assert solution.residual == residual == longer.residual
+
+
+@pytest.mark.parametrize("solver", ["levenberg_marquardt", "ccd", "fabrik"], indirect=True)
+def test_one_hand_out_of_reach_and_the_other_at_its_target_end_all_attempts(solver, backend):
+    """No pose is better: one is at its target, the other as near as its links let it be."""
+    offsets = [[0, 0, 0], [0.3, 0, 0], [0.4, 0, 0], [0.3, 0, 0]]
+    offsets += [[-0.3, 0, 0], [-0.4, 0, 0], [-0.3, 0, 0]]
+    body = Skeleton([-1, 0, 1, 2, 0, 4, 5], offsets)
+    model = Articulation(body, ["fixed"] + ["ball"] * 6)
+    targets = [Target([0.5, 0.5, 0.1], effector=3), Target([-1.0, 3.0, 0.0], effector=6)]
+    q = model.random(np.random.default_rng(8))
+    once, again = (solve_ik(model, q, targets, solver, restarts=n) for n in (0, 20))
+    assert once.outcome is again.outcome is Outcome.UNREACHABLE
+    assert again.iterations == once.iterations
+    distances = [np.linalg.norm(again.positions[t.effector] - t.position) for t in targets]
+    assert distances[0] <= 1e-4
+    assert distances[1] <= np.linalg.norm([-0.7, 3.0, 0.0]) - 0.7 + 1e-4
