@@ -249,6 +249,8 @@ def least_distance(mechanism, target, e):
     if first >= 0:
         start = load_vector(mechanism.joints["offset"], first)
     position, reach = load_vector(target["position"], e), effectors["reach"][e]
-    share = POSITION_ROUNDING * (1 + len(mechanism.joints))
-    rounding = share * (reach + norm(start) + norm(position))
-    return max(0.0, norm(subtract(position, start)) - reach - rounding)
+    offset = subtract(position, start)
+    if dot(offset, offset) <= reach * reach:
+        return 0.0
+    rounding = POSITION_ROUNDING * (reach + norm(start) + norm(position))
+    return max(0.0, norm(offset) - reach - rounding * (1 + len(mechanism.joints)))

@@ -91,8 +91,8 @@ def limits_of(numbers):
 def solve_with_restarts(state, target, limits, criteria, history):
     """Attempt from the start, then from random configurations, until one reaches the target.
 
-    While others may follow an attempt is given up early. If none reaches the target, all are
-    finished, and the first makes as many iterations as all of them may: its ends after one
+    While others may follow an attempt at a target in reach is given up early. If none reaches it,
+    all are finished, and the first makes as many iterations as all of them may: its ends after one
     attempt's iterations, two and so on count as attempts too. So what restarts give is the best
     of more than one start gives, or fewer restarts, and can be no worse.
 
@@ -102,8 +102,7 @@ def solve_with_restarts(state, target, limits, criteria, history):
         The iterations of all attempts, and whether the best one settled.
     """
     progress, random = state.progress, len(state.progress) - 2
-    in_reach = criteria.distance <= limits.tolerance  # or else no error will halve for long
-    reset(progress, PATIENCE if random > 0 and in_reach else INFINITY)
+    reset(progress, PATIENCE if random > 0 and criteria.distance <= limits.tolerance else INFINITY)
     distance, _, _, _ = error(state, target)
     store_if_inside(history, 0, distance)
     perturbed = perturb(state, target, criteria, progress[0])

@@ -75,8 +75,7 @@ new_workspace = Slot("new_workspace")
 # A start that settles within so few iterations away from its target is stuck, such as a straight
 # chain, perhaps folded since, whose target lies on its own line.
 STUCK = 6
-# Out of reach an error that changes by so much of the tolerance has settled. Where iterations gain
-# only a ten-thousandth of what is left, a ten-thousandth of the tolerance remains.
+# Out of reach an error that changes by no more than this share of the tolerance has settled.
 FAR_MARGIN = 1e-8
 # A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
 PERTURBATION_AXIS = (0.48, 0.6, 0.64)
