@@ -13,6 +13,7 @@ class Outcome(IntEnum):
     DIVERGED = 4
     AT_ROUNDING = 5
     UNREACHABLE_UNSETTLED = 6
+    SADDLE = 7
 
     @property
     def unreachable(self) -> bool:
@@ -42,4 +43,6 @@ _SENTENCES = {
     "leave it, and the iterations no longer make it smaller.",
     Outcome.UNREACHABLE_UNSETTLED: "No pose reaches the target: geometry forbids it; all "
     "iterations were used before they settled, and some pose may be nearer.",
+    Outcome.SADDLE: "The iterations ended at a saddle point: the residual is small enough, but the "
+    "objective falls in some direction.",
 }

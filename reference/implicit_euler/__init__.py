@@ -60,7 +60,8 @@ class StepResult:
         residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles; infinity if the
             start overflows or the result exceeds 1e75, in which case the state is the initial one.
         iterations: number of iterations.
-        outcome: why the solver stopped.
+        outcome: why the solver stopped. CONVERGED and AT_ROUNDING are about the gradient only and
+            may stand at a saddle point, except for `newton`, which says SADDLE there.
         at_floor: whether |grad g(x)| is no more than rounding errors can cause.
         history: the residual before and after each iteration, shape (iterations + 1,).
         objectives: g before and after each iteration, shape (iterations + 1,) [kg m²].
@@ -206,29 +207,33 @@ class ImplicitEuler:
             stuck, last = iterate is last, iterate
             if residuals[-1] < residuals[best]:
                 best = len(residuals) - 1
-            outcome = self._outcome(iterate, residuals, best, stuck)
+            outcome = self._outcome(objective, iterate, residuals, best, stuck)
             if outcome is not None:
                 return last, outcome, residuals, values
         return last, Outcome.DIVERGED, residuals, values
 
     def _outcome(
-        self, iterate: Iterate, residuals: list[float], best: int, stuck: bool
+        self, objective: Objective, iterate: Iterate, residuals: list[float], best: int, stuck: bool
     ) -> Outcome | None:
         """Return the outcome if the solver stops at this iterate, else None.
 
         The floor is an upper bound, often a thousand times the actual rounding error. A gradient
         below it therefore stops the solver only once the least residual, the one at index `best`,
-        is no longer improved, or if the start is at rest.
+        is no longer improved, or if the start is at rest. Newton's method goes on from where the
+        Hessian is indefinite as long as it can.
         """
         count = len(residuals) - 1
         final = count >= self._iteration_limit
         if self.tolerance > 0 or final:
-            if residuals[-1] <= self.tolerance:
-                return Outcome.CONVERGED
-            since = count - best
+            since, converged = count - best, residuals[-1] <= self.tolerance
             ended = stuck or (since >= PATIENCE and since >= PATIENCE_RATIO * count)
-            if (ended and iterate.at_floor) or (count == 0 and iterate.at_rest):
-                return Outcome.AT_ROUNDING
+            at_rest = (ended and iterate.at_floor) or (count == 0 and iterate.at_rest)
+            if converged or at_rest:
+                newton = self._solver if isinstance(self._solver, Newton) else None
+                if not (newton and newton.is_saddle(objective, iterate)):
+                    return Outcome.CONVERGED if converged else Outcome.AT_ROUNDING
+                if at_rest or stuck or final:
+                    return Outcome.SADDLE
             if stuck:
                 return Outcome.STALLED
         return Outcome.ITERATION_LIMIT if final else None

@@ -12,8 +12,9 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from ..mass_spring import MassSpring
+from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor, factorize
-from .objective import global_matrix
+from .objective import effective_stiffnesses, global_matrix
 
 # Factors by the digest of their matrix and by the digest of its sparsity pattern.
 _by_matrix: WeakValueDictionary[bytes, Factor] = WeakValueDictionary()
@@ -33,7 +34,14 @@ def global_factor(system: MassSpring, h: float) -> Factor:
     Raises:
         NotPositiveDefiniteError: if it is singular to rounding because masses are too small.
     """
-    return prefactored(global_matrix(system, h))
+    try:
+        return prefactored(global_matrix(system, h))
+    except NotPositiveDefiniteError:
+        stiffest = float((h * h * effective_stiffnesses(system, h)).max(initial=0.0))
+        raise NotPositiveDefiniteError(
+            "masses, stiffnesses, h: expected M + h² L positive definite to rounding, got masses "
+            f"from {system.masses[system.free].min():g} kg and h² k up to {stiffest:g} kg"
+        ) from None
 
 
 def hessian_factor(system: MassSpring) -> Factor:

@@ -2,6 +2,10 @@
 
 Where springs are compressed the Hessian M + h² K may be indefinite. A multiple of M is then added
 until it is positive definite, a Levenberg shift in the metric of M.
+
+Such steps leave a saddle point where the gradient shows a way out, but not at a squeezed straight
+rod. An end is therefore accepted only without a negative eigenvalue: the Hessian is factorised once
+more, unless it was positive definite at both iterates before, as in ordinary steps.
 """
 
 from collections.abc import Iterator
@@ -12,6 +16,7 @@ import numpy as np
 from ..mass_spring import MassSpring
 from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor
+from .certificate import rounding_errors
 from .factor_cache import hessian_factor
 from .line_search import line_search
 from .objective import Iterate, Objective
@@ -33,12 +38,26 @@ class Newton:
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield the objective's start, then the iterate after each iteration."""
-        iterate, shift = objective.start, 0.0
+        iterate, shift, last_shift = objective.start, 0.0, np.inf
         while True:
             yield iterate
             factor, shift = self._factor(objective.hessian_at(iterate.positions), shift)
             step = -factor.solve(iterate.gradient.ravel()).reshape(-1, 3)
             iterate = line_search(objective, iterate, step)
+            iterate.is_convex = shift == last_shift == 0.0
+            last_shift = shift
+
+    def is_saddle(self, objective: Objective, iterate: Iterate) -> bool:
+        """Return whether the Hessian at an iterate has a negative eigenvalue, beyond rounding."""
+        if iterate.is_convex or not objective.system.free.any():
+            return False
+        hessian = objective.hessian_at(iterate.positions)
+        hessian.data[self._diagonal] += rounding_errors(objective, iterate.positions).hessian
+        try:
+            self._analysed.refactorize(hessian)
+        except NotPositiveDefiniteError:
+            return True
+        return False
 
     def _factor(self, hessian: Any, shift: float) -> tuple[Factor, float]:
         """Return the factor of the Hessian plus a multiple of M, and the multiple.

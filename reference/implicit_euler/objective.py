@@ -62,6 +62,7 @@ class Iterate:
         value: g(x) [kg m²].
         gradient_norm: |grad g(x)|.
         floor_bound: an upper bound of `floor` that is cheaper to compute.
+        is_convex: whether Newton's method found the Hessian positive definite on its way here.
     """
 
     def __init__(
@@ -79,6 +80,7 @@ class Iterate:
         self.value = value
         self.gradient_norm = gradient_norm
         self.floor_bound = floor_bound
+        self.is_convex = False
         self._compute_rounding = rounding
 
     @functools.cached_property

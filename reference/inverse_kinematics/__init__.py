@@ -55,6 +55,7 @@ def solve_ik(
     tolerances are equally good. To that end an attempt that was given up early is finished if no
     other reaches the target, and the first goes on for as many iterations as all may make: up to
     (1 + 2 restarts) `max_iterations` in all, for one position on a Skeleton (2 + 3 restarts).
+    Attempts at a target proven out of reach end as soon as one is as near as geometry allows.
 
     Args:
         skeleton: the tree; an Articulation for joints of other kinds and for limits, or a Robot

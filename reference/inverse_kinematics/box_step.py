@@ -15,10 +15,13 @@ from ..jacobians import move_joint
 from ..quaternion import normalised
 from .jacobian import LEAST_DAMPING
 from .joint_updates import load_ball, store_ball
-from .mechanism import update_forward_kinematics
+from .mechanism import least_residual, update_forward_kinematics
 from .task_jacobian import clear, fill_errors, fill_jacobian
 
 FULL_CIRCLE = 2.0 * math.pi
+# The damping towards a target out of reach, over the reach times the error: of the first step, the
+# least, by how much it grows where the error rose and shrinks where it fell.
+FAR_DAMPING, LEAST_FAR_DAMPING, GROWTH, DECAY = 0.2, 0.001, 8.0, 1.3
 
 
 class TaskSystem(NamedTuple):
@@ -75,6 +78,24 @@ def damped_step(mechanism, data, system, damping):
             any_active = True
         elif not (any_active and release(system)):
             return
+
+
+def far_damping(mechanism, target, data, system, damping):
+    """Return the damping [m²] towards a target proven out of reach, `damping` towards any other.
+
+    The Hessian of |e|²/2 has second derivatives of the effectors too, up to the reach times |e|,
+    which J' J leaves out. With a damping too small for them steps swing about the nearest pose for
+    ever; with one too large they creep. It therefore follows the error (Marquardt 1963), by the
+    factor and the squared error of the last step in `data.far_step`.
+    """
+    if least_residual(mechanism, target) <= 0.0:
+        return damping
+    square, factor, last_square = squared(system.e), data.far_step[0], data.far_step[1]
+    factor = factor * GROWTH if square > last_square else max(factor / DECAY, LEAST_FAR_DAMPING)
+    if last_square == 0.0:
+        factor = FAR_DAMPING
+    data.far_step[0], data.far_step[1] = factor, square
+    return factor * mechanism.reach * math.sqrt(square)
 
 
 def activate_limits(mechanism, data, system):

@@ -1,10 +1,10 @@
 """Damped least squares with one fixed damping (Wampler 1986; Nakamura & Hanafusa 1986).
 
-Steps towards a target beyond reach die down on unlimited chains only, where they lead to the
-nearest point within reach; elsewhere they may swing about it.
+Towards a target beyond reach such steps would swing: a chain draws it near, a mechanism has the
+damping of `box_step.far_damping`.
 """
 
-from .box_step import damped_step, linearise_task, take_step
+from .box_step import damped_step, far_damping, linearise_task, take_step
 from .jacobian import linearise, rotate_joints, solve_damped
 
 # The square of the damping factor, over the reach squared: a tenth of the reach.
@@ -24,5 +24,5 @@ def damped_least_squares_update(mechanism, target, data, system):
     """Change the coordinates by J' (J J' + (0.1 reach)^2 1)^-1 e, within their limits."""
     linearise_task(mechanism, target, data, system)
     damping = DAMPING * mechanism.reach * mechanism.reach
-    damped_step(mechanism, data, system, damping)
+    damped_step(mechanism, data, system, far_damping(mechanism, target, data, system, damping))
     take_step(mechanism, data, system)

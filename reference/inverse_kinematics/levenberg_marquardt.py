@@ -5,10 +5,11 @@
 cannot be reached, the step is short and safe; near it the damping vanishes with the square of the
 error, and convergence is quadratic even where the Jacobian loses rank. Where rotations are asked
 for mu is a tenth of |e|^2, the factor of Chan & Lawrence 1988, which needs fewer iterations there.
+Towards a target proven out of reach a mechanism has the mu of `box_step.far_damping`.
 """
 
 from ..quaternion import dot
-from .box_step import damped_step, linearise_task, squared, take_step
+from .box_step import damped_step, far_damping, linearise_task, squared, take_step
 from .jacobian import LEAST_DAMPING, linearise, rotate_joints, solve_damped
 
 # Of the squared error: for positions, and for positions and rotations.
@@ -31,5 +32,5 @@ def levenberg_marquardt_update(mechanism, target, data, system):
     positions = 3 * len(mechanism.effectors) == mechanism.equations
     share = DAMPING if positions else DAMPING_OF_POSES
     damping = share * squared(system.e) + BIAS * mechanism.reach * mechanism.reach
-    damped_step(mechanism, data, system, damping)
+    damped_step(mechanism, data, system, far_damping(mechanism, target, data, system, damping))
     take_step(mechanism, data, system)

@@ -82,21 +82,26 @@ class ConfigurationData(NamedTuple):
     """A mechanism's coordinates with their forward kinematics; effectors come behind the joints.
 
     Attributes:
+        state: what an attempt continues from, `q` and then `far_step`, (coordinate + 2,).
         q: (coordinate,).
+        far_step: see `box_step.far_damping`, (2,); zero before the first step.
         positions: in the world [m], (joint + effector, 3).
         rotations: in the world, (joint + effector, 4).
     """
 
+    state: FloatArray
     q: FloatArray
+    far_step: FloatArray
     positions: FloatArray
     rotations: FloatArray
 
 
 def new_data(mechanism):
     """Return the data of a configuration, to be filled."""
-    count = len(mechanism.joints) + len(mechanism.effectors)
+    count, n = len(mechanism.joints) + len(mechanism.effectors), mechanism.coordinates
+    state = np.zeros(n + 2)
     return ConfigurationData(
-        np.empty(mechanism.coordinates), np.empty((count, 3)), np.empty((count, 4))
+        state, state[:n], state[n:], np.empty((count, 3)), np.empty((count, 4))
     )
 
 
@@ -194,17 +199,20 @@ def errors(mechanism, target, data, e):
 
 
 def residuals(mechanism, target, data):
-    """Return the largest distance [m] and angle [rad] from effector to target, and their sum [m].
+    """Return the largest distance [m] and angle [rad] from effector to target, their sum, a bound.
 
-    The sum is of all distances, and of all angles times the lever: it shows the progress of one
-    effector while another, further from its target, stays.
+    The sum [m] is of all distances, and of all angles times the lever: it shows the progress of one
+    effector while another, further from its target, stays. No effector is further above its own
+    least distance than the bound [m] is above the largest of those.
     """
-    largest, angle, total = 0.0, 0.0, 0.0
+    largest, largest_angle, total, least, excess = 0.0, 0.0, 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
-        apart, off = errors(mechanism, target, data, e)
-        largest, angle = max(largest, apart), max(angle, off)
-        total = total + apart + LEVER * mechanism.reach * off
-    return largest, angle, total
+        distance, angle = errors(mechanism, target, data, e)
+        largest, largest_angle = max(largest, distance), max(largest_angle, angle)
+        total = total + distance + LEVER * mechanism.reach * angle
+        lower_bound = least_distance(mechanism, target, e)
+        least, excess = max(least, lower_bound), max(excess, distance - lower_bound)
+    return largest, largest_angle, total, least + excess
 
 
 def merit_of(mechanism, target, data):
@@ -223,18 +231,26 @@ def weighted_square(mechanism, weight, distance, angle):
 
 
 def least_residual(mechanism, target):
-    """Return a lower bound of the largest distance from effector to target over all poses [m].
+    """Return a lower bound of the largest distance from effector to target over all poses [m]."""
+    least = 0.0
+    for e in range(len(mechanism.effectors)):
+        least = max(least, least_distance(mechanism, target, e))
+    return least
+
+
+def least_distance(mechanism, target, e):
+    """Return a lower bound of the distance from one effector to its target over all poses [m].
 
     Links and the travel of slides reach no further than their sum. Distances and sums of lengths
     are known to a few roundings for each joint.
     """
-    effectors = mechanism.effectors
-    share, least = POSITION_ROUNDING * (1 + len(mechanism.joints)), 0.0
-    for e in range(len(effectors)):
-        start, first = load_vector(effectors["position"], e), effectors["first"][e]
-        if first >= 0:
-            start = load_vector(mechanism.joints["offset"], first)
-        wanted, reach = load_vector(target["position"], e), effectors["reach"][e]
-        rounding = share * (reach + norm(start) + norm(wanted))
-        least = max(least, norm(subtract(wanted, start)) - reach - rounding)
-    return least
+    effectors, first = mechanism.effectors, mechanism.effectors["first"][e]
+    start = load_vector(effectors["position"], e)
+    if first >= 0:
+        start = load_vector(mechanism.joints["offset"], first)
+    position, reach = load_vector(target["position"], e), effectors["reach"][e]
+    offset = subtract(position, start)
+    if dot(offset, offset) <= reach * reach:
+        return 0.0
+    rounding = POSITION_ROUNDING * (reach + norm(start) + norm(position))
+    return max(0.0, norm(offset) - reach - rounding * (1 + len(mechanism.joints)))

@@ -18,8 +18,8 @@ from .result import store_if_inside
 
 # One iteration of a solver: update(state, target).
 update = Slot("update")
-# error(state, target): the largest distance [m] and angle [rad] from effector to target, and the
-# sum of all distances and levered angles [m], which shows progress.
+# error(state, target): the largest distance [m] and angle [rad] from effector to target, the sum of
+# all distances and levered angles [m], which shows progress, and the distance that has to be small.
 error = Slot("error")
 # merit(state, target): what says which attempt is better, the less the better [m].
 merit = Slot("merit")
@@ -91,8 +91,8 @@ def limits_of(numbers):
 def solve_with_restarts(state, target, limits, criteria, history):
     """Attempt from the start, then from random configurations, until one reaches the target.
 
-    While others may follow an attempt is given up early. If none reaches the target, all are
-    finished, and the first makes as many iterations as all of them may: its ends after one
+    While others may follow an attempt at a target in reach is given up early. If none reaches it,
+    all are finished, and the first makes as many iterations as all of them may: its ends after one
     attempt's iterations, two and so on count as attempts too. So what restarts give is the best
     of more than one start gives, or fewer restarts, and can be no worse.
 
@@ -102,8 +102,8 @@ def solve_with_restarts(state, target, limits, criteria, history):
         The iterations of all attempts, and whether the best one settled.
     """
     progress, random = state.progress, len(state.progress) - 2
-    reset(progress)
-    distance, _, _ = error(state, target)
+    reset(progress, PATIENCE if random > 0 and criteria.distance <= limits.tolerance else INFINITY)
+    distance, _, _, _ = error(state, target)
     store_if_inside(history, 0, distance)
     perturbed = perturb(state, target, criteria, progress[0])
     best, ending, done, drawn, periods = INFINITY, LIMITED, 0, 0, 1
@@ -138,12 +138,12 @@ def new_progress(attempts):
     return np.empty((attempts + 1, RANK + 1))
 
 
-def reset(progress):
+def reset(progress, patience):
     """Note that no attempt has been made."""
     for k in range(len(progress) - 1):
         row = progress[k]
         row[MADE], row[STATE], row[COST] = 0.0, LIMITED, INFINITY
-        row[WAIT] = PATIENCE if len(progress) > 2 else INFINITY
+        row[WAIT] = patience
 
 
 def solve_once(state, target, criteria, attempt, most, history, done):
@@ -155,19 +155,19 @@ def solve_once(state, target, criteria, attempt, most, history, done):
     Returns:
         The iterations made.
     """
-    distance, angle, total = error(state, target)
+    _, angle, total, bound = error(state, target)
     milestone, since = total, 0
     first, ending = int(attempt[MADE]), LIMITED
     made = first
     while ending == LIMITED:
-        if distance <= criteria.distance and angle <= criteria.angle:
+        if bound <= criteria.distance and angle <= criteria.angle:
             ending = REACHED
         if ending == REACHED or made >= most:
             break
         before = total
         update(state, target)
         made += 1
-        distance, angle, total = error(state, target)
+        distance, angle, total, bound = error(state, target)
         store_if_inside(history, done + made - first, distance)
         since += 1
         if total < PROGRESS * milestone:
@@ -176,7 +176,7 @@ def solve_once(state, target, criteria, attempt, most, history, done):
             ending = SETTLED
         elif since >= attempt[WAIT]:
             ending = GIVEN_UP
-    if ending != LIMITED and distance <= criteria.distance and angle <= criteria.angle:
+    if ending != LIMITED and bound <= criteria.distance and angle <= criteria.angle:
         ending = REACHED
     attempt[MADE], attempt[STATE] = made, ending
     return made - first

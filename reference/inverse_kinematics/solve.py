@@ -269,15 +269,16 @@ def _restarted(
     found: IKSolution,
     settings: Settings,
 ) -> IKSolution:
-    """Return the better of what one start and restarts find, where that is not reached or nearest.
+    """Return the better of what one start and restarts find, where a target in reach is missed.
 
-    One start on a chain of unlimited balls has already had the iterations of all attempts.
+    One start on a chain of unlimited balls has already had the iterations of all attempts. Towards
+    a target out of reach it has one nearest point to come to, and no start comes to another.
     """
-    settled = [int(Outcome.CONVERGED), int(Outcome.UNREACHABLE)]
-    if np.isin(found.outcome, settled).all():
+    final_outcomes = [outcome for outcome in Outcome if outcome.unreachable or outcome.solved]
+    if np.isin(found.outcome, final_outcomes).all():
         return found
     more = solve_on_mechanism(skeleton, start, targets, settings)
-    open_ = ~np.isin(found.outcome, settled)
+    open_ = ~np.isin(found.outcome, final_outcomes)
     reached = np.asarray(more.outcome) == Outcome.CONVERGED
     better = open_ & (reached | (np.asarray(more.merit) < found.merit))
     iterations = found.iterations + np.where(open_, more.iterations, 0)

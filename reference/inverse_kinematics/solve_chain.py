@@ -128,7 +128,7 @@ def update_chain(state, target):
 def chain_error(state, target):
     """Return the distance from effector to target [m] as the loops want it."""
     distance = effector_error(state.chain, target)
-    return distance, 0.0, distance
+    return distance, 0.0, distance, distance
 
 
 def chain_merit(state, target):

@@ -65,6 +65,7 @@ from .result import (
     RESIDUAL_ROTATION,
     outcome_of,
 )
+from .task_jacobian import clear
 
 # One iteration of a solver: step(mechanism, target, data, workspace).
 step = Slot("step")
@@ -74,6 +75,8 @@ new_workspace = Slot("new_workspace")
 # A start that settles within so few iterations away from its target is stuck, such as a straight
 # chain, perhaps folded since, whose target lies on its own line.
 STUCK = 6
+# Out of reach an error that changes by no more than this share of the tolerance has settled.
+FAR_MARGIN = 1e-8
 # A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
 PERTURBATION_AXIS = (0.48, 0.6, 0.64)
 
@@ -88,7 +91,7 @@ class MechanismState(NamedTuple):
         restarts: coordinates of the mechanism for further attempts, (restart, coordinate).
         effector_frames: where they put the effectors, positions [m] and rotations, (restart,
             effector, 7).
-        saved: coordinates of the mechanism, (attempt + 1, coordinate).
+        saved: states of its configuration, (attempt + 1, coordinate + 2).
         progress: see `restarts.py`.
     """
 
@@ -146,7 +149,7 @@ def new_state(mechanism, restarts, effector_frames):
     rows = len(restarts) + 2
     return MechanismState(
         mechanism, new_data(mechanism), new_workspace(mechanism), restarts, effector_frames,
-        np.empty((rows, mechanism.coordinates)), new_progress(rows - 1),
+        np.empty((rows, mechanism.coordinates + 2)), new_progress(rows - 1),
     )  # fmt: skip
 
 
@@ -165,6 +168,7 @@ def normalise_target(target):
 def begin(state, q):
     """Bring a mechanism to coordinates of the articulation, within their limits."""
     gather(state.mechanism, q, state.data.q)
+    clear(state.data.far_step)
     for j in range(len(state.mechanism.joints)):
         clamp_joint(state.mechanism.joints, j, state.data.q)
     update_forward_kinematics(state.mechanism, state.data)
@@ -173,20 +177,18 @@ def begin(state, q):
 def mechanism_criteria(mechanism, least, limits):
     """Return when an attempt ends, where no pose has a lesser residual than `least` [m].
 
-    A single position out of reach counts as reached within the tolerance of the least distance.
+    Targets out of reach count as reached within the tolerance of their least distances.
     """
     margin = POSITION_ROUNDING * mechanism.reach
     slack, slack_rotation = (
         min(margin, 0.5 * limits.tolerance),
         min(POSITION_ROUNDING, 0.5 * limits.tolerance_rotation),
     )
-    single = len(mechanism.effectors) == 1 and not mechanism.effectors["oriented"][0]
-    nearest = least if single else 0.0
     far = least > limits.tolerance
     return Criteria(
-        nearest + limits.tolerance - slack,
+        least + limits.tolerance - slack,
         limits.tolerance_rotation - slack_rotation,
-        margin,
+        max(margin, FAR_MARGIN * limits.tolerance) if far else margin,
         limits.far_iterations if far else limits.max_iterations,
     )
 
@@ -216,7 +218,7 @@ def update_mechanism(state, target):
 
 
 def mechanism_error(state, target):
-    """Return the largest distance [m] and angle [rad] to the target, and all in one [m]."""
+    """Return the largest distance [m] and angle [rad] to the target, their sum, and a bound [m]."""
     return residuals(state.mechanism, target, state.data)
 
 
@@ -250,13 +252,13 @@ def perturb_joint(joints, q, j, angle):
 
 
 def save_mechanism(state, k):
-    """Save the coordinates."""
-    copy_row(state.data.q, state.saved[k])
+    """Save where the mechanism is."""
+    copy_row(state.data.state, state.saved[k])
 
 
 def restore_mechanism(state, k):
     """Bring the mechanism back to where it was."""
-    copy_row(state.saved[k], state.data.q)
+    copy_row(state.saved[k], state.data.state)
     update_forward_kinematics(state.mechanism, state.data)
 
 
@@ -265,6 +267,7 @@ def draw_mechanism(state, target, n):
     if n == 1:
         rank_restarts(state, target)
     take_nearest(state, state.data.q)
+    clear(state.data.far_step)
     update_forward_kinematics(state.mechanism, state.data)
 
 

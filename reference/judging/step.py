@@ -43,10 +43,10 @@ class StepJudgement:
         residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles.
         certificate: the certificate of x with the pins moved to their positions at the end of the
             step.
-        reference_certificate: the certificate of x*, which might be a saddle point.
+        reference_certificate: the certificate of where Newton's method ended.
         same_minimiser: whether the minimiser near x is proven to be the one near x* (True) or
             another one (False); None if neither is proven.
-        minimiser: x*, shape (particle, 3) [m]; x_n if there is none.
+        minimiser: x*, shape (particle, 3) [m]; if there is none, where Newton's method ended.
         iterations: number of iterations of Newton's method.
         outcome: the outcome of Newton's method; there is no x* unless it is `solved`.
     """

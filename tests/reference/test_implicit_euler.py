@@ -625,7 +625,7 @@ class TestOutcome:
     def test_the_laws_of_rounding_see_a_solve_that_ends_early(self, cloth, fault, monkeypatch):
         """The rule as it was, and one that takes a rise of an accelerated residual for the end."""
 
-        def outcome(self, iterate, residuals, best, stuck):
+        def outcome(self, objective, iterate, residuals, best, stuck):
             early = fault == "at the floor" or len(residuals) - 1 > best
             if residuals[-1] <= self.tolerance or (iterate.at_floor and early):
                 return Outcome.AT_ROUNDING

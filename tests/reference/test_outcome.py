@@ -7,8 +7,9 @@ from reference.outcome import Outcome
 
 def test_the_outcomes_are_those_of_the_interface():
     names = ["CONVERGED", "UNREACHABLE", "STALLED", "ITERATION_LIMIT", "DIVERGED", "AT_ROUNDING"]
-    names.append("UNREACHABLE_UNSETTLED")
+    names += ["UNREACHABLE_UNSETTLED", "SADDLE"]
     assert [outcome.name for outcome in Outcome] == names
+    assert [int(outcome) for outcome in Outcome] == list(range(len(names)))
 
 
 @pytest.mark.parametrize("outcome", Outcome)

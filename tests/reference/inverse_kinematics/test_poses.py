@@ -129,7 +129,7 @@ def test_rotations_count_by_lever_and_reach(chain_of_joints, machine, rng):
     mechanism, rows, data, _ = machine(model, q, targets)
     rows["weight"] = [t.weight for t in targets]
     here, lever = forward_kinematics(model, q), LEVER * mechanism.reach
-    total = largest = furthest = nearness = 0.0
+    total = largest = furthest = nearness = least = excess = 0.0
     for e, (position, Q, joint, weight) in enumerate(targets):
         distance = np.linalg.norm(position - here.positions[joint])
         angle = rotation.angle(here.rotations[joint], Q)
@@ -137,12 +137,18 @@ def test_rotations_count_by_lever_and_reach(chain_of_joints, machine, rng):
         total += weight * (distance**2 + lever**2 * (3.0 - np.trace(matrices[0].T @ matrices[1])))
         largest, furthest = max(largest, angle), max(furthest, distance)
         nearness += distance + lever * angle
+        links = np.linalg.norm(model.skeleton.offsets[1 : joint + 1], axis=1).sum()
+        own = max(0.0, np.linalg.norm(position - model.skeleton.offsets[0]) - links)
+        least, excess = max(least, own), max(excess, distance - own)
         turned = rotation.multiply(rotation_error(mechanism, rows, data, e), here.rotations[joint])
         assert rotation.angle(turned, Q) < 1e-13
     assert cost(mechanism, rows, data) == pytest.approx(total, rel=1e-13)
     assert rotation_weight(mechanism) == pytest.approx(0.5 * lever**2, rel=1e-15)
     found = residuals(mechanism, rows, data)
-    np.testing.assert_allclose(found, [furthest, largest, nearness], rtol=1e-13, atol=0)
+    expected = [furthest, largest, nearness, least + excess]
+    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=0)
+    assert least > 0.0
+    assert least + excess > furthest
 
 
 @pytest.mark.parametrize("change", [lambda x: x, np.array, lambda x: pickle.loads(pickle.dumps(x))])

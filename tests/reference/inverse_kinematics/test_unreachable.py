@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from reference import (
     Articulation,
@@ -132,3 +133,96 @@ def test_two_positions_out_of_reach_have_the_greater_bound():
     assert solution.outcome is Outcome.UNREACHABLE
     assert solution.residual == pytest.approx(4.0, abs=1e-9)
     assert solution.excess <= 1e-9
+
+
+def arm_with_limits(rng):
+    """Return seven hinges with limits, and a position beyond all of them."""
+    axes = rotation.rotate(rotation.random(rng, 8), [0.0, 0.0, 1.0])
+    skeleton = Skeleton(range(-1, 7), 0.4 * rng.standard_normal((8, 3)))
+    direction = rotation.rotate(rotation.random(rng), [0.0, 0.0, 1.0])
+    position = skeleton.offsets[0] + rng.uniform(1.05, 4.0) * skeleton.reach() * direction
+    return Articulation(skeleton, "hinge", axes, lower=-1.8, upper=1.8), position
+
+
+@pytest.mark.parametrize("oriented", [False, True])
+@pytest.mark.parametrize("solver", ["levenberg_marquardt", "damped_least_squares"])
+def test_no_damped_step_swings_about_the_nearest_pose_for_ever(solver, oriented, rng):
+    """Where the damping does not follow the error, a tenth of the poses does, or most of them."""
+    settled = 0
+    for _ in range(20):
+        model, position = arm_with_limits(rng)
+        target = Target(position, rotation.random(rng) if oriented else None, model.joint_count - 1)
+        solution = solve_ik(model, model.random(rng), target, solver)
+        assert solution.outcome.unreachable
+        settled += solution.outcome is Outcome.UNREACHABLE
+    assert settled == 20
+
+
+def nearest_by_scipy(model, position, rng):
+    """Return the least distance to a position that SciPy finds from 15 starts."""
+
+    def distance(q):
+        return float(np.sum((forward_kinematics(model, q).positions[-1] - position) ** 2))
+
+    bounds = [(-1.8, 1.8)] * model.coordinate_count
+    starts = model.random(rng, 15)
+    ends = [minimize(distance, q, method="L-BFGS-B", bounds=bounds, tol=1e-14) for q in starts]
+    return float(np.sqrt(min(end.fun for end in ends)))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_with_restarts_no_other_search_comes_nearer(seed):
+    """Twenty restarts in at most 300 iterations each, where they took a thousand and more."""
+    rng = np.random.default_rng(seed)
+    model, position = arm_with_limits(rng)
+    solution = solve_ik(model, model.random(rng), position)
+    assert solution.outcome is Outcome.UNREACHABLE
+    assert solution.residual <= nearest_by_scipy(model, position, rng) + 1e-4
+    assert solution.iterations <= 21 * 300
+
+
+@pytest.mark.parametrize("oriented", [False, True])
+def test_an_answer_as_near_as_geometry_allows_ends_all_attempts(oriented, backend):
+    """The last ball rotates the effector on the spot: position and rotation are both at best."""
+    arm, rest = scenes.lab_arm()
+    model = Articulation(arm, "ball")
+    R = rotation.random(np.random.default_rng(2))
+    target = Target([3.0, 0.5, 4.0], R if oriented else None, arm.joint_count - 1)
+    once, again = (
+        solve_ik(model, rest.ravel(), target, "levenberg_marquardt", restarts=n) for n in (0, 20)
+    )
+    assert once.outcome is again.outcome is Outcome.UNREACHABLE
+    assert again.iterations <= once.iterations
+    assert max(once.excess, again.excess, again.residual_rotation) <= 1e-4
+
+
+@pytest.mark.parametrize("solver", ["ccd", "jacobian_transpose", "levenberg_marquardt"])
+def test_one_position_beyond_a_skeleton_is_not_restarted(solver, backend):
+    """All attempts' iterations go to the one solve; a batch does the same."""
+    chain, rest = scenes.ball_chain(links=12)
+    targets = np.array([[0.0, 30.0, 4.0], [1.1, 13.0, 0.0]])
+    options = {"max_iterations": 3, "restarts": 4}
+    batch = solve_ik(chain, rest, targets, solver, **options)
+    for target, iterations, residual in zip(targets, batch.iterations, batch.residual, strict=True):
+        solution = solve_ik(chain, rest, target, solver, **options)
+        longer = solve_ik(chain, rest, target, solver, max_iterations=15)
+        assert solution.outcome.unreachable
+        assert solution.iterations == iterations == longer.iterations
+        assert solution.residual == residual == longer.residual
+
+
+@pytest.mark.parametrize("solver", ["levenberg_marquardt", "ccd", "fabrik"], indirect=True)
+def test_one_hand_out_of_reach_and_the_other_at_its_target_end_all_attempts(solver, backend):
+    """No pose is better: one is at its target, the other as near as its links let it be."""
+    offsets = [[0, 0, 0], [0.3, 0, 0], [0.4, 0, 0], [0.3, 0, 0]]
+    offsets += [[-0.3, 0, 0], [-0.4, 0, 0], [-0.3, 0, 0]]
+    body = Skeleton([-1, 0, 1, 2, 0, 4, 5], offsets)
+    model = Articulation(body, ["fixed"] + ["ball"] * 6)
+    targets = [Target([0.5, 0.5, 0.1], effector=3), Target([-1.0, 3.0, 0.0], effector=6)]
+    q = model.random(np.random.default_rng(8))
+    once, again = (solve_ik(model, q, targets, solver, restarts=n) for n in (0, 20))
+    assert once.outcome is again.outcome is Outcome.UNREACHABLE
+    assert again.iterations == once.iterations
+    distances = [np.linalg.norm(again.positions[t.effector] - t.position) for t in targets]
+    assert distances[0] <= 1e-4
+    assert distances[1] <= np.linalg.norm([-0.7, 3.0, 0.0]) - 0.7 + 1e-4

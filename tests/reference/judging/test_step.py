@@ -137,14 +137,26 @@ def test_another_minimiser_is_recognised(buckled):
 
 
 def test_a_saddle_that_newton_comes_to_is_not_called_a_minimiser(buckled):
-    """y is one, and its gradient is zero."""
+    """y is one, and its gradient is zero. Beside it the other answer is still proven."""
     system, state = buckled(0.0)
     found = judge_step(system, state, 1.0, newton_from(system, state, buckled(0.1)[1].positions))
     assert not found.reference_certificate.covered
     assert found.certificate.covered
     assert found.same_minimiser is None
-    assert "not proven to be a minimiser" in found.summary
+    assert found.outcome is Outcome.SADDLE
+    assert found.error == math.inf
+    assert "found no minimiser to compare with (SADDLE)" in found.summary
     assert "Proven: a minimiser lies within" in found.summary
+
+
+def test_a_minimiser_that_cannot_be_proven_is_called_so():
+    """A rope between slack and taut, where the Hessian jumps."""
+    system = MassSpring(
+        [1, 1], [[0, 1]], 1.0, 9.0, pinned=[0], gravity=(0, 0, 0), tension_only=True
+    )
+    found = judge_step(system, State(np.eye(3)[:2] * [0, 1, 0], np.zeros((2, 3))), h, np.eye(3)[:2])
+    assert found.outcome.solved
+    assert "not proven to be a minimiser" in found.summary
 
 
 def test_the_summary_claims_no_more_than_is_proven(soft):

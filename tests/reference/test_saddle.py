@@ -1,0 +1,198 @@
+"""Laws of saddle points: Newton's method tells them from minima, and says nothing wrong of rest."""
+
+import numpy as np
+import pytest
+
+from reference import STEP_SOLVERS, ImplicitEuler, MassSpring, Outcome, State, judge_step, scenes
+from reference.implicit_euler.certificate import Coverage
+from reference.sparse import CholeskyFactor
+
+SEEDS = range(20)
+OTHERS = [name for name in STEP_SOLVERS if name != "newton"]
+
+
+def rod(share, particles=5, stiffness=128.0, pinned=True):
+    """A straight rod along x of springs of 1 m, at rest at a share of their length, no gravity.
+
+    Binary fractions cancel without rounding, so that the gradient is exactly zero.
+    """
+    springs = [[i, i + 1] for i in range(particles - 1)]
+    pins = [0, particles - 1] if pinned else []
+    system = MassSpring(np.ones(particles), springs, 1.0, stiffness, pinned=pins, gravity=(0, 0, 0))
+    x = np.arange(particles)[:, None] * [share, 0.0, 0.0]
+    return system, State(x, np.zeros_like(x))
+
+
+def least_eigenvalue(integrator, state, x, **loads):
+    """Return the least eigenvalue of the Hessian over the free particles [kg], dense."""
+    free = np.repeat(integrator.system.free, 3)
+    H = integrator.objective(state, **loads).hessian(x).toarray()
+    return float(np.linalg.eigvalsh(H[np.ix_(free, free)])[0])
+
+
+@pytest.mark.parametrize("start", ["y", "x_n"])
+def test_a_squeezed_straight_rod_is_a_saddle_and_a_stretched_one_a_minimum(start, backend):
+    for share in (0.5, 1.0, 1.5):
+        expected = Outcome.SADDLE if share < 1.0 else Outcome.CONVERGED
+        system, state = rod(share)
+        integrator = ImplicitEuler(system, h=1.0, start=start)
+        result = integrator.step(state)
+        assert (result.outcome, result.iterations) == (expected, 0)
+        assert result.residual == 0.0
+        np.testing.assert_array_equal(result.state.positions, state.positions)
+        is_minimum = expected is Outcome.CONVERGED
+        assert integrator.certify(state, result).covered == is_minimum
+        assert (least_eigenvalue(integrator, state, state.positions) > 0) == is_minimum
+
+
+def test_a_saddle_whose_gradient_is_rounding_is_one_too(backend):
+    """The particles are where Newton's gradient is as small as rounding lets it be, not zero."""
+    system, state = rod(0.8, particles=6)
+    result = ImplicitEuler(system, h=1.0).step(state)
+    assert result.residual > 0.0
+    assert (result.outcome, result.iterations) == (Outcome.SADDLE, 0)
+
+
+@pytest.mark.parametrize("solver", OTHERS)
+def test_the_other_solvers_are_about_the_gradient_only(solver):
+    system, state = rod(0.5)
+    result = ImplicitEuler(system, h=1.0, solver=solver).step(state)
+    assert (result.outcome, result.iterations) == (Outcome.CONVERGED, 0)
+
+
+@pytest.mark.parametrize("share", [1.0, 1.0625])
+@pytest.mark.parametrize("tolerance", [1e-10, 1e-300])
+def test_a_saddle_that_newton_comes_to_is_one(share, tolerance, backend):
+    """A pin pushes a rod at rest, and a stretched one."""
+    system, state = rod(share)
+    pins = [[0.0, 0.0, 0.0], [3.5, 0.0, 0.0]]
+    integrator = ImplicitEuler(system, h=1.0, tolerance=tolerance)
+    result = integrator.step(state, pin_positions=pins)
+    known = integrator.certify(state, result, pin_positions=pins)
+    assert result.iterations > 0
+    assert result.outcome is Outcome.SADDLE
+    assert known.coverage is Coverage.NOT_CONVEX
+    x = result.state.positions
+    assert least_eigenvalue(integrator, state, x, pin_positions=pins) < 0
+    assert np.abs(x[:, 1:]).max() == 0.0
+
+
+def test_a_force_that_takes_a_stretched_rod_to_a_saddle_in_one_iteration_is_seen(backend):
+    """The Hessian is positive definite at the start, and g quadratic along the rod."""
+    system, state = rod(1.5, particles=3, pinned=False)
+    force = 32.0 * np.array([[1.0, 0, 0], [0, 0, 0], [-1.0, 0, 0]])
+    integrator = ImplicitEuler(system, h=1.0)
+    assert least_eigenvalue(integrator, state, state.positions) > 0
+    result = integrator.step(state, force)
+    assert result.outcome is Outcome.SADDLE
+    assert np.ptp(result.state.positions[:, 0]) < 2.0
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-6, 1e-10])
+def test_newton_goes_on_from_an_indefinite_hessian_to_a_minimum(tolerance, backend):
+    """A rod just off its line buckles, whatever the tolerance that it passes on its way."""
+    system, state = rod(0.9, stiffness=512.0)
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        off = np.where(system.free[:, None], 1e-3 * rng.standard_normal((5, 3)), 0.0)
+        moved = State(state.positions + off, state.velocities)
+        integrator = ImplicitEuler(system, h=1.0, tolerance=tolerance)
+        result = integrator.step(moved)
+        assert result.outcome is Outcome.CONVERGED
+        assert least_eigenvalue(integrator, moved, result.state.positions) > 0
+
+
+def test_all_iterations_are_run_without_a_tolerance_and_the_end_is_judged(backend):
+    result = ImplicitEuler(rod(0.5)[0], h=1.0, tolerance=0, max_iterations=3).step(rod(0.5)[1])
+    assert (result.outcome, result.iterations) == (Outcome.SADDLE, 3)
+
+
+@pytest.mark.parametrize("place", [0.0, 1e3])
+@pytest.mark.parametrize("stiffness", [1e3, 1e12])
+def test_rounding_is_not_called_a_saddle(stiffness, place, backend):
+    """At rest, in any direction, rounding squeezes springs by 1e-16: h² k / m is up to 1e15."""
+    rng = np.random.default_rng(7)
+    for _ in range(10):
+        link = rng.standard_normal(3)
+        x = place + np.arange(12)[:, None] * link
+        springs = [[i, i + 1] for i in range(11)]
+        length = float(np.linalg.norm(link))
+        system = MassSpring(np.full(12, 1e-3), springs, length, stiffness, gravity=(0, 0, 0))
+        result = ImplicitEuler(system, h=1.0, tolerance=1.0).step(State(x, np.zeros_like(x)))
+        assert result.outcome.solved
+
+
+def _squeezed_net(seed):
+    """Return integrator and result of a net in a plane, squeezed or stretched, and the details."""
+    rng = np.random.default_rng(seed)
+    x = np.array([[i, j, 0.0] for i in range(4) for j in range(4)])
+    springs = [[a, b] for a in range(16) for b in range(a) if np.linalg.norm(x[a] - x[b]) < 1.5]
+    rest = [np.linalg.norm(x[a] - x[b]) for a, b in springs]
+    system = MassSpring(
+        np.ones(16), springs, rest, 10.0 ** rng.uniform(0, 3), pinned=[0, 3, 12, 15],
+        gravity=(0, 0, 0),
+    )  # fmt: skip
+    bump = rng.choice([0.0, 1e-4]) * rng.standard_normal((16, 1)) * [0, 0, 1]
+    state = State(x + np.where(system.free[:, None], bump, 0.0), np.zeros((16, 3)))
+    pins = x[system.pinned] * rng.uniform(0.7, 1.2)
+    integrator = ImplicitEuler(system, h=1.0, max_iterations=1000)
+    return integrator, integrator.step(state, pin_positions=pins), state, pins
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_newton_calls_an_end_agrees_with_the_eigenvalues(seed):
+    """Squeezed in its plane a net is at a saddle; just out of it, it buckles to a minimum."""
+    integrator, result, state, pins = _squeezed_net(seed)
+    end = result.state.positions
+    least = least_eigenvalue(integrator, state, end, pin_positions=pins)
+    assert result.outcome in (Outcome.CONVERGED, Outcome.SADDLE)
+    assert (least < 0) == (result.outcome is Outcome.SADDLE)
+    covered = integrator.certify(state, result, pin_positions=pins).covered
+    assert not (covered and result.outcome is Outcome.SADDLE)
+
+
+def test_the_law_above_meets_saddles_and_minima():
+    outcomes = [_squeezed_net(seed)[1].outcome for seed in SEEDS]
+    assert outcomes.count(Outcome.SADDLE) >= 3
+    assert outcomes.count(Outcome.CONVERGED) > 3
+
+
+def test_ordinary_steps_factorise_once_an_iteration(monkeypatch):
+    """The end of a swinging cloth's step is accepted without a further factor."""
+    count, refactorize = [0], CholeskyFactor.refactorize
+
+    def counted(self, matrix):
+        count[0] += 1
+        return refactorize(self, matrix)
+
+    monkeypatch.setattr(CholeskyFactor, "refactorize", counted)
+    system, state = scenes.lab_cloth(size=8, stiffness=1e4, damping=0.2, gravity=9.81)
+    integrator = ImplicitEuler(system, h=1 / 60)
+    for _ in range(10):
+        count[0] = 0
+        result = integrator.step(state)
+        state = result.state
+        assert result.outcome is Outcome.CONVERGED
+        assert result.iterations > 1
+        assert count[0] == result.iterations
+
+
+def test_a_judged_step_says_that_newton_came_to_a_saddle():
+    system, state = rod(0.5)
+    found = judge_step(system, state, 1.0, state.positions)
+    assert found.outcome is Outcome.SADDLE
+    assert found.error == found.distance == np.inf
+    assert not found.certificate.covered
+    assert "Newton's method found no minimiser to compare with (SADDLE)" in found.summary
+    assert found.certificate.coverage is Coverage.NOT_CONVEX
+
+
+@pytest.mark.parametrize("solver", ["local_global", "chebyshev", "lbfgs", "newton_cg"])
+@pytest.mark.parametrize(("mass", "stiffness", "step"), [(1e-6, 1e9, 1e3), (1.0, 1e75, 1e74)])
+def test_masses_that_vanish_beside_the_springs_are_named(solver, mass, stiffness, step):
+    springs = [[0, 1], [1, 2], [2, 3]]
+    system = MassSpring(np.full(4, mass), springs, 1.0, stiffness)
+    with pytest.raises(ValueError, match=r"^masses, stiffnesses, h: expected M \+ h² L") as error:
+        ImplicitEuler(system, h=step, solver=solver)
+    assert f"{mass:g} kg" in str(error.value)
+    assert f"{stiffness * step**2:g} kg" in str(error.value)
