@@ -12,6 +12,7 @@ from hostile_programs import LIMITS, LOOP, case, program, running
 
 from crosscheck.conformance.contestant import Answer, Failure, FailureKind, NoGreetingError
 from crosscheck.conformance.doors.program import ProgramContestant
+from crosscheck.conformance.judgement import Diagnosis, TaskReport
 from crosscheck.conformance.verify import DISCIPLINES, verify
 
 FORK = "if os.fork() == 0:\n    {before}\n    os.close(1)\n    while True: tick()\n"
@@ -403,20 +404,26 @@ def test_an_answer_too_many_is_told_at_the_next_case(tmp_path):
 
 
 def test_the_rest_of_the_cases_goes_on(tmp_path, monkeypatch):
+    judged = []
+
     class Discipline:
-        cases = staticmethod(lambda *_: [case(joints) for joints in (2, 3, 2, 3, 2)])
-        judge = staticmethod(lambda asked, *_: asked)
+        @staticmethod
+        def cases(*_):
+            return [case(joints) for joints in (2, 3, 2, 3, 2)]
+
+        @staticmethod
+        def judge(asked, *_):
+            judged.extend(asked)
+            return TaskReport("forward_kinematics", "", (), Diagnosis())
 
     monkeypatch.setitem(DISCIPLINES, "forward_kinematics", Discipline)
     stays = f"try:{LOOP}".replace("\n", "\n    ") + "\nfinally:\n    while True: tick()"
     contestant = program(tmp_path, "os.abort()", loop=stays)
-    report = verify(contestant, ["forward_kinematics"])
+    verify(contestant, ["forward_kinematics"])
     contestant.close()
-    found = [type(one.answer) for one in report.tasks[0]]
-    assert found == [Answer, Failure, Answer, Failure, Answer]
-    assert [isinstance(one.again, Answer) for one in report.tasks[0]] == [
-        kind is Answer for kind in found
-    ]
+    kinds = [type(question.answer) for question in judged]
+    assert kinds == [Answer, Failure, Answer, Failure, Answer]
+    assert [type(question.again) for question in judged] == kinds
     assert [str(one) for one in contestant.remarks] == ["It does not leave when its input ends."]
     assert not running(tmp_path)
 
