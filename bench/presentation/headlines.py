@@ -160,8 +160,8 @@ def _on_robots(results: Results, kind: str) -> Iterator[Headline]:
     yield Headline("kinematics", f"Most accurate, {kind}", _tied(first), detail, table)
     fastest, second = (rows[solver].penalised + SHIFT for solver in row.time.order[:2])
     ahead = speed(metrics.paired_ratio(second, fastest), row.time.order[1])
-    ahead = ahead if len(soonest) == 1 else "too near to tell"
-    detail = f"{ahead}{where}, misses penalised" + (f", {field}" if len(rows) < count else "")
+    ahead = f"{ahead}{where}, misses penalised" if len(soonest) == 1 else f"too near to tell{where}"
+    detail = ahead + (f", {field}" if len(rows) < count else "")
     yield Headline("kinematics", f"Fastest, {kind}", _tied(soonest), detail, table)
 
 
@@ -196,7 +196,7 @@ def _arrived(results: Results) -> Headline | None:
     most = max(arrivals.values())
     ties = [solver for solver, hits in arrivals.items() if hits == most]
     cloths = f"{most} of {counted(len(times), 'cloth')}"
-    detail = f"to {SOLVED} on {cloths} in the time given"
+    detail = f"to {SOLVED} on {cloths} in time"
     return Headline("cloth", "Most steps solved", _tied(ties), detail, "cloth_peers_step")
 
 
@@ -209,7 +209,7 @@ def _soonest(results: Results) -> Headline | None:
     for cloth, times in _arrival_times(results).items():
         ranked = sorted(times, key=lambda solver: times[solver], reverse=True)
         best[cloth] = {engines[solver]: times[solver] for solver in ranked}
-    alone = f"the only one of {count} engines to get there in the time given"
+    alone = f"the only one of {count} engines to get there in time"
     found = _first("cloth", f"Fastest to {SOLVED}", "cloth", best, "cloth_peers_step", alone=alone)
     return found if count > 1 else None
 

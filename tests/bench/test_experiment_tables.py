@@ -69,7 +69,7 @@ def test_the_error_that_is_asked_about_is_the_one_that_the_answer_counts_to(reco
 
 # Numbers of names, of mathematics, of statistics (`metrics.CONFIDENCE`) and of papers.
 FACTS = re.compile(
-    r"Q[123]\.|UR5|PR2|RK4|\((?:[^()]* )?20\d\d\)|Lasenby 2011|Corke 2022|2(?:\.828)? / ω|y = 0"
+    r"Q[123]\.|UR5|PR2|RK4|\((?:[^()]* )?20\d\d\)|(?:Lasenby|Corke) 20\d\d|2(?:\.828)? / ω|y = 0"
     r"|both are 1 at the start|each of 6 components|1e-15|0/|\b95 %|less than 5 %|\b[19]0th\b"
     r"|^Published: (?:10,000|6,561)|table 1, 20 runs|at most 5 ms for TRAC-IK"
     r"|float64|25 digits|; 1 is no nearer"

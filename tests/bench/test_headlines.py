@@ -166,8 +166,8 @@ def test_a_cloth_is_solved_by_who_arrives_and_first_by_its_engine(make):
     ]
     solved = asked(records, "Most steps solved", "cloth")
     assert solved[2:4] == ("Tie: Plumbob Newton and Plumbob L-BFGS",
-                           "to 1e-6 on 1 of 1 cloth in the time given")  # fmt: skip
-    alone = "the only one of 2 engines to get there in the time given on 1 of 1 cloth"
+                           "to 1e-6 on 1 of 1 cloth in time")  # fmt: skip
+    alone = "the only one of 2 engines to get there in time on 1 of 1 cloth"
     assert asked(records, "Fastest to 1e-6", "cloth").detail == alone
     arrived = make.worked("MuJoCo discrete", error=(0.5, 1e-8), seconds=(1e-3, 8e-3))
     found = asked([*records, arrived], "Fastest to 1e-6", "cloth")
@@ -176,7 +176,7 @@ def test_a_cloth_is_solved_by_who_arrives_and_first_by_its_engine(make):
     found = asked([*records, arrived, *stiff], "Fastest to 1e-6", "cloth")
     assert found.detail == (
         "4.00 times faster than the next on 1 of 2 cloths and the only one of 2 engines to get "
-        "there in the time given on 1 of 2 cloths"
+        "there in time on 1 of 2 cloths"
     )
 
 
