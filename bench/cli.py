@@ -59,7 +59,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
             raise KeyboardInterrupt
         return code if isinstance(code, int) else SUCCESS
     except (KeyboardInterrupt, typer.Abort):
-        print("plumbob: interrupted; what was finished is on record", file=sys.stderr)
+        print("plumbob: interrupted; a bench keeps what it has finished", file=sys.stderr)
         return INTERRUPTED
     except _UsageError as error:
         return _complain(error.format_message())

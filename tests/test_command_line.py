@@ -242,7 +242,7 @@ def test_ctrl_c_exits_130_and_says_what_is_kept(capsys, monkeypatch):
     code, out, err = plumbob(capsys)
     assert code == 130
     assert out == ""
-    assert err == "plumbob: interrupted; what was finished is on record\n"
+    assert err == "plumbob: interrupted; a bench keeps what it has finished\n"
 
 
 def judged(missed):

@@ -28,7 +28,7 @@ from .compare import Comparison, decide
 from .intervals import ERROR_RATE, Deviation, Ratio, pairs_needed, ratio_of_pairs
 from .quantities import is_clocked
 from .rows import Pair, RowKey, by_row, come_and_gone, pairs, row_key, worst_first
-from .times import FLOOR, Drift, known_drift
+from .times import FLOOR, UNKNOWN, Drift, known_drift
 
 # Pairs of median times, old and new, of each time of each row.
 Taken = dict[tuple[RowKey, str], list[tuple[float, float]]]
@@ -249,6 +249,8 @@ def _drift(taken: Taken, count: int) -> Drift:
     logs = [np.log(np.array(values)[:, 0]) for values in taken.values()]
     if not logs:
         return known_drift(0.0, "no times were compared")
+    if count < 2:
+        return known_drift(UNKNOWN, "assumed, for one pair does not tell")
     spread = math.sqrt(2 * np.mean([np.var(values, ddof=1) for values in logs]))
     freedom = len(logs) * (count - 1)
     return Drift(Deviation(spread, freedom), f"the old revision beside itself, {count} times")

@@ -165,7 +165,7 @@ def understand(task: Task, counts: Mapping[str, int], returned: object) -> dict[
     if isinstance(returned, Mapping):
         known = [field for field in task.outputs if returned.get(field.name) is not None]
         values = {one.name: checked(one, counts, returned[one.name]) for one in known}
-        found = "the keys " + ", ".join(map(str, returned))
+        found = f"the keys {', '.join(map(str, returned))}" if returned else "an empty dict"
     else:
         parts = list(returned) if isinstance(returned, tuple) else [returned]
         values = _by_shape(task, counts, parts)

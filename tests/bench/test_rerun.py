@@ -185,6 +185,11 @@ def test_a_planted_digit_is_first_of_all(repository):
     assert "2 times each" in made.how
 
 
+def test_one_pair_does_not_tell_how_far_the_machine_drifts(repository):
+    made = side_by_side(repository, words=("stead",), pairs=1)
+    assert made.drift.sentence == "10.5 % (assumed, for one pair does not tell)"
+
+
 @pytest.mark.slow
 def test_a_planted_fifth_is_found(repository):
     write(repository, loops=LOOPS * 6 // 5)

@@ -176,6 +176,13 @@ def test_methods_of_inverse_kinematics_are_found(inside, text, methods):
         assert contestant.answer(inverse(method)).values["positions"][0, 0] == value
 
 
+def test_an_answer_without_outputs_is_described(inside):
+    failure = inside(f"{FORWARD}return {{}}\n").answer(case(2))
+    assert str(failure.sentence).endswith("got an empty dict")
+    failure = inside(f"{FORWARD}return {{'x': 1, 'y': 2}}\n").answer(case(2))
+    assert str(failure.sentence).endswith("got the keys x, y")
+
+
 def test_a_method_is_no_answer_to_another_task(inside):
     contestant = inside(
         "def ccd(target): 1 / 0\ndef track(offsets): return {'positions': offsets[None]}"
