@@ -122,8 +122,8 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
     bad = [one for one in tasks if one.verdict not in GOOD]
     if not bad:
         return sentence(
-            "Next: keep it so. --junit FILE serves your CI, plumbob.testing your pytest; "
-            "--thorough asks more."
+            "Next: --junit FILE for your CI, plumbob.testing for your pytest, --thorough for "
+            "more cases."
         )
     first = bad[0]
     if first.verdict is Verdict.UNDECIDED and first.diagnosis.hints:
@@ -139,8 +139,8 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
         )
     if len(bad) > 1:
         return sentence(
-            "Next: mend {task} first, since the others may rest on it; then run this again.",
+            "Next: correct {task} first, since the others may rest on it; then run this again.",
             task=title(first),
         )
-    return sentence("Next: mend {task}, rerun the saved case, then run all again.",
+    return sentence("Next: correct {task}, rerun the saved case, then run all again.",
                     task=title(first))  # fmt: skip

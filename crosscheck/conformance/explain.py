@@ -157,31 +157,42 @@ def _explanation(matches: Sequence[Match], describe: Callable[[Sequence[str]], S
 
 
 def together(said: Sequence[Sentence]) -> Sentence:
-    """Return the sentences of up to three faults that a solver has at once, as one."""
+    """Return the sentences of up to three mistakes that a solver has at once, as one."""
     if len(said) == 1:
         return said[0]
     if len(said) == 2:
-        return sentence("Two faults at once. {one} And: {other}", one=said[0], other=said[1])
+        return sentence("Two mistakes at once: (1) {one} (2) {other}", one=said[0], other=said[1])
     return sentence(
-        "Three faults at once. {one} And: {other} And: {another}",
+        "Three mistakes at once: (1) {one} (2) {other} (3) {another}",
         one=said[0],
         other=said[1],
         another=said[2],
     )
 
 
-def either(said: Sequence[Sentence]) -> Sentence:
-    """Return the sentences of faults that no answer tells apart, up to three of them, as one."""
-    if len(said) == 1:
-        return said[0]
+def either(explanations: Sequence[Sequence[Sentence]]) -> Sentence:
+    """Return explanations that no answer tells apart as one sentence.
+
+    An explanation is the mistakes that a solver has at once. Those that all explanations share are
+    said once; of the rest up to three alternatives are said.
+    """
+    shared = [one for one in explanations[0] if all(one in mistakes for mistakes in explanations)]
+    rests = [[one for one in mistakes if one not in shared] for mistakes in explanations]
+    if not all(rests):
+        return together(explanations[0])
+    return together([*shared, _alternatives(list(map(together, rests)))])
+
+
+def _alternatives(said: Sequence[Sentence]) -> Sentence:
     if len(said) == 2:
         return sentence(
-            "One of two, which the answers do not tell apart. {one} Or: {other}",
+            "One of two explanations, which the answers do not tell apart: (a) {one} (b) {other}",
             one=said[0],
             other=said[1],
         )
     return sentence(
-        "One of several, which the answers do not tell apart. {one} Or: {other} Or: {another}",
+        "One of several explanations, which the answers do not tell apart: (a) {one} (b) {other} "
+        "(c) {another}",
         one=said[0],
         other=said[1],
         another=said[2],

@@ -145,7 +145,7 @@ def test_the_screen_says_what_is_wrong_where_and_what_next(wrong):
     assert "plumbob verify --rerun plumbob_failures/forward_kinematics.json my_ik.py" in text
     assert "forward_kinematics WRONG" in text
     assert "inverse_kinematics ccd BROKEN" in text
-    assert "Next: mend forward_kinematics first" in text
+    assert "Next: correct forward_kinematics first" in text
 
 
 def test_the_screen_shows_their_numbers_beside_ours(wrong):
@@ -231,7 +231,7 @@ def test_a_fault_that_explains_few_answers_is_not_told_as_what_is_wrong(share, l
 def test_a_right_solver_is_told_so(right):
     text = "\n".join(terminal.lines(right, shown()))
     assert re.search(r"forward_kinematics  RIGHT +1\d\.\d +4/4", text)
-    assert "Next: keep it so." in text
+    assert "Next: --junit FILE for your CI" in text
     assert "saved" not in text
 
 

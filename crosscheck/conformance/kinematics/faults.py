@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import NamedTuple
 
-from ..explain import either, together
+from ..explain import either
 from ..sentence import Sentence, sentence
 from .textbook import Ccd, Fabrik, Forward, Stop
 
@@ -602,10 +602,10 @@ def _is_likely(three: Sequence[Fault]) -> bool:
 
 def describe(method: str, keys: Sequence[str]) -> Sentence:
     """Return the sentences of a class of faults that no answer tells apart."""
-    return either([_describe_one(method, key) for key in keys])
+    return either([list(_describe(method, key)) for key in keys])
 
 
-def _describe_one(method: str, key: str) -> Sentence:
+def _describe(method: str, key: str) -> Iterator[Sentence]:
     if not key:
-        return sentence("It does what the textbook does.")
-    return together([by_key(method)[one].sentence for one in key.split(" + ")])
+        yield sentence("It does what the textbook does.")
+    yield from (by_key(method)[one].sentence for one in key.split(" + ") if one)

@@ -181,7 +181,7 @@ def _diagnosis(judgements: Sequence[CaseJudgement]) -> Diagnosis:
     if not most:
         return Diagnosis(tried=len(FAULTS))
     named = [key for key in counts if counts[key] == most]
-    words = either([FAULTS[key].sentence for key in named[:3]])
+    words = either([[FAULTS[key].sentence] for key in named[:3]])
     told = Explanation(tuple(named), words, most / len(missed), 0.0)
     return Diagnosis((told,), tried=len(FAULTS))
 

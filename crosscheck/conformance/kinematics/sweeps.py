@@ -85,7 +85,7 @@ def compare(
     behaviour = None
     if not declared:
         behaviour = sentence(
-            "It is held against {method}, which its sweeps resemble."
+            "Its sweeps resemble those of {method}, with which it is compared."
             if off
             else "Its sweeps are those of {method}.",
             method=NAMES[method],

@@ -16,7 +16,7 @@ from reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import either, first_broken, together
+from ..explain import either, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -278,5 +278,5 @@ def _matches(faults: Sequence[Fault], p: Problem, given: Mapping[str, Any], epsi
 
 def _explanation(matches: Sequence[Sequence[Fault]]) -> Explanation:
     keys = tuple(" + ".join(one.key for one in faults) for faults in matches)[:3]
-    said = [together([one.sentence for one in faults]) for faults in matches]
-    return Explanation(keys, either(said), 1.0, 0.0)
+    said = either([[one.sentence for one in faults] for faults in matches])
+    return Explanation(keys, said, 1.0, 0.0)

@@ -12,7 +12,7 @@ from reference.mass_spring import forces as reference_forces
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import Variant, either, explain, first_broken, together
+from ..explain import Variant, either, explain, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -152,7 +152,7 @@ _BY_KEY = {one.key: one.sentence for one in FORCE_FAULTS}
 
 def describe(keys: Sequence[str]) -> Sentence:
     """Return the sentences of faults, given the keys of a class that no answer tells apart."""
-    return either([together([_BY_KEY[one] for one in key.split(" + ")]) for key in keys])
+    return either([[_BY_KEY[one] for one in key.split(" + ")] for key in keys])
 
 
 def _diagnose(

@@ -165,9 +165,9 @@ def minimiser(one: Context) -> Finding | None:
                         distance=found.distance)  # fmt: skip
         return Finding("minimiser", Verdict.UNDECIDED, found.error, SOLVED, "", said)
     said = sentence(
-        "Another model than converged implicit Euler: {model} is {error:.2g} of the distance "
-        "from y to x* off.",
-        model=one.says, error=found.error,
+        "Not converged implicit Euler: the positions miss its minimiser x* by {error:.2g} of "
+        "|y - x*|, what springs move in a step.",
+        error=found.error,
     )  # fmt: skip
     return Finding("minimiser", Verdict.RIGHT_BUT, found.error, SOLVED, "", said)
 

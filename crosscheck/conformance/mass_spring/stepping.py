@@ -13,7 +13,7 @@ from reference.implicit_euler import ImplicitEuler
 
 from ..case import Case
 from ..contestant import Answer, Asked
-from ..explain import first_broken, hints_of, together
+from ..explain import either, first_broken, hints_of
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
@@ -208,7 +208,7 @@ def _diagnose(
     behaviour = None
     if found and not found[0].faults and undeclared:
         behaviour = sentence(
-            "In small cases it behaves like {model}, which it is held against."
+            "In small cases it behaves like {model}, with which it is compared."
             if any(one.verdict >= Verdict.WRONG for one in judgements)
             else "It behaves like {model}.",
             model=describe_model(honest_options(found, greeting.step)),
@@ -259,16 +259,11 @@ def _explanations(
         key=lambda score: (-score[0], score[1]),
     )
     best = [score for score in scored if score[0] == scored[0][0]]
-    keys = tuple(dict.fromkeys(_key(score[2].faults) for score in best))[:MOST_TOLD]
-    said = [_describe(score[2].faults) for score in best]
-    together = said[0]
-    if len(keys) > 1:
-        together = sentence(
-            "One of these, which no answer tells apart: {one} Or: {other}",
-            one=said[0], other=said[1],
-        )  # fmt: skip
+    alternatives = {_key(score[2].faults): score[2].faults for score in best}
+    keys = tuple(alternatives)[:MOST_TOLD]
+    said = either([list(map(_fault_sentence, alternatives[key])) for key in keys])
     share, distance, _ = best[0]
-    return (Explanation(keys, together, share, distance),)
+    return (Explanation(keys, said, share, distance),)
 
 
 def _key(faults: Sequence[Option]) -> str:
@@ -301,12 +296,8 @@ def _errors(
     return errors
 
 
-def _describe(faults: Sequence[Option]) -> Sentence:
-    """Return the sentences of up to three faults; honest choices that were denied as such."""
-    return together([_fault_sentence(one) for one in faults])
-
-
 def _fault_sentence(one: Option) -> Sentence:
+    """Return what is said of a fault; of an honest choice that was denied, that it is one."""
     if any(one.key == other.key for other in honest(Step()).get(one.aspect, ())):
         return sentence("Other than declared, it behaves like this: {what}.", what=one.sentence)
     return one.sentence

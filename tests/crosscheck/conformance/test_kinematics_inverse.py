@@ -286,7 +286,10 @@ def test_what_is_inferred_does_not_contradict_what_is_wrong(key):
     found = judged(faulty("ccd", [fault]))
     said = [f.sentence for one in found.judgements for f in one.findings if f.verdict]
     assert any("Its sweep is not that of CCD" in str(words) for words in said)
-    assert str(found.diagnosis.behaviour) == "It is held against CCD, which its sweeps resemble."
+    assert (
+        str(found.diagnosis.behaviour)
+        == "Its sweeps resemble those of CCD, with which it is compared."
+    )
     assert str(judged(faulty("ccd", [])).diagnosis.behaviour) == "Its sweeps are those of CCD."
 
 

@@ -6,6 +6,7 @@ import io
 import pytest
 
 from crosscheck.conformance import catalogue
+from crosscheck.conformance.explain import either
 from crosscheck.conformance.language import LANGUAGES, language_of, translator
 from crosscheck.conformance.sentence import sentence
 
@@ -102,3 +103,12 @@ def test_sentences_within_sentences_are_translated():
 def test_a_language_that_is_unknown_is_refused():
     with pytest.raises(ValueError, match="lang: expected one of en, zh, got 'fr'"):
         translator("fr")
+
+
+def test_mistakes_that_all_explanations_share_are_said_once():
+    a, b, c = map(sentence, ("A.", "B.", "C."))
+    choice = "One of two explanations, which the answers do not tell apart: (a) "
+    assert str(either([[a]])) == "A."
+    assert str(either([[a, b]])) == "Two mistakes at once: (1) A. (2) B."
+    assert str(either([[a], [b]])) == f"{choice}A. (b) B."
+    assert str(either([[a, c], [b, c]])) == f"Two mistakes at once: (1) C. (2) {choice}A. (b) B."
