@@ -19,6 +19,8 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
+# A file's tests run one after another, as many files at once as there are cores.
+PARALLEL = -n auto --dist loadfile
 # The pins are made and checked by uv, in an environment of its own; no Python is downloaded.
 UV ?= build/uv/bin/uv
 export UV_PYTHON_DOWNLOADS := never
@@ -32,10 +34,10 @@ report: .venv/installed
 	$(BIN)/plumbob
 
 test: .venv/installed
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(PARALLEL)
 
 test-all: .venv/installed
-	$(BIN)/python -m pytest -m "slow or not slow"
+	$(BIN)/python -m pytest $(PARALLEL) -m "slow or not slow"
 
 peers: .venv/peers/installed
 

@@ -1,6 +1,7 @@
 """Fixtures that several rooms share."""
 
 import importlib.util
+import os
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,9 @@ import pytest
 from hypothesis import settings
 
 from reference.backend import compiled
+
+# What is printed must not depend on the terminal of whoever runs the tests.
+os.environ.pop("COLUMNS", None)
 
 # The first example of a law may compile a kernel: no deadline.
 settings.register_profile("plumbob", max_examples=20, deadline=None, derandomize=True)

@@ -96,6 +96,7 @@ class TimingJob(NamedTuple):
 def _run(timed: Timed, options: list[str]) -> str:
     """Run pytest; return the last lines of what it says."""
     os.environ["PYTEST_ADDOPTS"] = ""  # options of the user's own test runs are not meant here
+    os.environ.pop("PYTEST_XDIST_WORKER", None)  # nor are their parallel processes
     said = io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
         pytest.main(options, [timed])
