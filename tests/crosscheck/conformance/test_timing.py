@@ -12,13 +12,15 @@ UNTIMED = sentence("Not timed.")
 def test_the_call_of_the_reference_that_compiles_is_not_its_time(monkeypatch):
     now, calls = [0.0], []
     monkeypatch.setattr(timing.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(timing.time, "sleep", lambda seconds: calls.append("pause"))
 
     def reference():
-        now[0] += 1.5 if calls else 100.0
-        calls.append(None)
+        now[0] += 1.5 if "call" in calls else 100.0
+        calls.append("call")
         return "answer"
 
     assert timing.timed(reference) == ("answer", 1.5)
+    assert calls == timing.CALLS * ["pause", "call"]  # as a solver waits for each request
 
 
 @pytest.mark.parametrize(
