@@ -38,8 +38,8 @@ class Asked:
         """
         case = Case("of the bench", task, inputs, "bench", _ABOUT)
         found = behind_door(lambda: self._answered(case), lambda answer: answer.seconds)
-        if not found.timed_by_itself:
-            self.remark = "timed by the round trip of a request, for its answers hold no seconds"
+        if found.untimed or not found.seconds:
+            self.remark = 'timed by the round trip of a request, for want of valid "seconds"'
         return found
 
     def _answered(self, case: Case) -> Answer:

@@ -16,13 +16,13 @@ MOST_AT_DOORS = 10.0
 
 
 def behind_door(call: Callable[[], T], own: Callable[[T], float]) -> T:
-    """Return what a call returns that takes so long by the solver's own count [s].
+    """Return what a call returns that takes so long by the solver's own count, 0 for none [s].
 
     What a door costs beside it is not the solver's time, and is charged to no budget.
     """
     begin = time.perf_counter()
     result = call()
-    counted = own(result)
+    counted = own(result) or time.perf_counter() - begin
     _own.append(counted)
     _doors[0] += max(0.0, time.perf_counter() - begin - counted)
     return result

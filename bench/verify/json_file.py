@@ -30,7 +30,10 @@ class FindingRecord(msgspec.Struct, frozen=True):
 
 
 class CaseRecord(msgspec.Struct, frozen=True):
-    """A case; `failure` is the kind of a missing answer, or null; times in seconds."""
+    """A case; `failure` is the kind of a missing answer, or null.
+
+    `seconds` is the solver's own time, null if only the round trip was timed.
+    """
 
     name: str
     family: str
@@ -133,7 +136,8 @@ def _case(one: CaseJudgement, say: Say) -> CaseRecord:
     case, answer = one.case, one.answer
     return CaseRecord(
         case.name, case.family, say(case.about), _name(one), one.digits,
-        answer.seconds if isinstance(answer, Answer) else None, one.reference_seconds,
+        answer.seconds if isinstance(answer, Answer) and not answer.untimed else None,
+        one.reference_seconds,
         None if isinstance(answer, Answer) else answer.kind.value,
         None if isinstance(answer, Answer) else say(answer.sentence),
         [_finding(finding, say) for finding in one.findings],

@@ -55,7 +55,9 @@ def passed(report: TaskReport) -> int:
 
 
 def speed(report: TaskReport) -> Sentence | None:
-    """Return the time of a solver beside the reference's, or None where there is none."""
+    """Return the time of a solver beside the reference's, or None if that is not measured."""
+    if report.untimed:
+        return sentence("not timed")
     times = report.slowdown
     if times is None:
         return None
@@ -83,12 +85,13 @@ def introduction(report: Report) -> Sentence:
 
 
 def remarks(report: Report) -> Iterator[Sentence]:
-    """Yield what is said beside the verdicts, precision first, with its tasks if not of all."""
+    """Yield reasons for a precision, with their tasks if not all, and for the lack of a time."""
     reasons = {str(task.precision): task.precision for task in report.tasks if task.precision}
     for text, reason in reasons.items():
         tasks = [title(task) for task in report.tasks if str(task.precision) == text]
         partial = sentence("{tasks}: {reason}", tasks=", ".join(tasks), reason=reason)
         yield partial if len(tasks) < len(report.tasks) else reason
+    yield from [task.untimed for task in report.tasks if task.untimed][:1]
     yield from report.remarks
 
 

@@ -17,15 +17,15 @@ class Answer:
     Attributes:
         values: by the names of the task's outputs, as float64 arrays, numbers and booleans, of the
             task's shapes; NaN where it gave none.
-        seconds: how long it took, without the door where that can be told; 0 if unknown [s].
+        seconds: the solver's own time; if `untimed`, of the round trip, or 0 of a file [s].
         remarks: what was odd without voiding the answer: prints, changed inputs.
-        timed_by_itself: whether the seconds are the solver's own count, without the door.
+        untimed: why the seconds are not the solver's own time, None if they are.
     """
 
     values: Mapping[str, Any]
     seconds: float
     remarks: tuple[Sentence, ...] = ()
-    timed_by_itself: bool = False
+    untimed: Sentence | None = None
 
 
 class FailureKind(StrEnum):

@@ -68,7 +68,7 @@ def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) ->
         values = understand(task, task.counts(inputs), returned)
     except ValueError as error:
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=str(error)))
-    return Answer(values, seconds, _changed(inputs, given), timed_by_itself=True)
+    return Answer(values, seconds, _changed(inputs, given))
 
 
 def takes(function: Callable[..., Any], name: str) -> bool:

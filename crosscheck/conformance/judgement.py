@@ -1,6 +1,5 @@
 """What is found about answers: laws that hold or not, verdicts, and their sum over a task."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -9,7 +8,7 @@ from typing import Any
 from .case import Case
 from .contestant import Answer, Failure
 from .greeting import Greeting
-from .sentence import Sentence
+from .sentence import Sentence, sentence
 
 # The least share of the answers that a fault must reproduce to be told as what is wrong.
 LEAST_SHARE = 0.5
@@ -164,14 +163,30 @@ class TaskReport:
         return min(known, default=None)
 
     @property
+    def untimed(self) -> Sentence | None:
+        """Why its time cannot stand beside the reference's, None if it can or that is unknown."""
+        answers = [answer for answer, _ in self._timed]
+        reasons = [answer.untimed for answer in answers if answer.untimed]
+        if answers and not reasons and not any(answer.seconds for answer in answers):
+            return sentence('Not timed: "seconds" is 0 in all answers. Use a finer clock.')
+        return reasons[0] if reasons else None
+
+    @property
     def slowdown(self) -> float | None:
-        """The geometric mean, over the cases, of its time over the reference's."""
-        logs = [
-            math.log(one.answer.seconds / one.reference_seconds)
+        """Its time for all cases over the reference's, None if one of them is unknown."""
+        if self.untimed or not self._timed:
+            return None
+        own = sum(answer.seconds for answer, _ in self._timed)
+        return own / sum(seconds for _, seconds in self._timed)
+
+    @property
+    def _timed(self) -> list[tuple[Answer, float]]:
+        """The answers to cases that the reference is timed at, and its times [s]."""
+        return [
+            (one.answer, one.reference_seconds)
             for one in self.judgements
-            if isinstance(one.answer, Answer) and one.reference_seconds and one.answer.seconds > 0.0
+            if isinstance(one.answer, Answer) and one.reference_seconds
         ]
-        return math.exp(sum(logs) / len(logs)) if logs else None
 
 
 @dataclass(frozen=True, eq=False)

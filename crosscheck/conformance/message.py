@@ -156,7 +156,7 @@ def decode_answer(
         fields: the object.
         task: the request's.
         inputs: the request's, for the shapes of the answer.
-        seconds: from the request to the answer; the solver's own time is taken if it is less.
+        seconds: from the request to the answer, taken if there is no time of the solver's own.
     """
     if fields.get("error") is not None:
         return decode_error(fields)
@@ -164,9 +164,9 @@ def decode_answer(
         values = understand(task, task.counts(inputs), fields)
     except ValueError as error:
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=shown(str(error), 400)))
-    own = _own_seconds(fields, seconds)
-    remarks = _decode_remarks(fields, inputs)
-    return Answer(values, seconds if own is None else own, remarks, own is not None)
+    untimed = _why_untimed(fields.get("seconds"), seconds)
+    own = seconds if untimed else float(fields["seconds"])
+    return Answer(values, own, _decode_remarks(fields, inputs), untimed)
 
 
 def decode_error(fields: Mapping[str, Any]) -> Failure:
@@ -181,10 +181,20 @@ def decode_error(fields: Mapping[str, Any]) -> Failure:
     return Failure(FailureKind.REFUSED, sentence("It says that it cannot: {why}", why=why))
 
 
-def _own_seconds(fields: Mapping[str, Any], seconds: float) -> float | None:
-    """Return the solver's own time, None if it gives none that can be."""
-    own = fields.get("seconds")
-    return float(own) if isinstance(own, int | float) and 0.0 < own < seconds else None
+def _why_untimed(own: object, seconds: float) -> Sentence | None:
+    """Return why "seconds" of an answer is not the solver's own time, None if it may be."""
+    if own is None:
+        return sentence(
+            "Not timed: only the round trips of requests are known, and these are mostly the time "
+            'of the pipe. Send the time of your function alone as "seconds" (docs/protocol.md).'
+        )
+    if isinstance(own, int | float) and not isinstance(own, bool) and 0.0 <= own < seconds:
+        return None
+    return sentence(
+        'Not timed: expected "seconds" as a number from 0 to the time that the answer took, got '
+        "{own}.",
+        own=shown(repr(own), 40),
+    )
 
 
 def _decode_remarks(fields: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[Sentence, ...]:

@@ -21,6 +21,7 @@ from .kinematics import (
 )
 from .mass_spring import energy, forces
 from .mass_spring.stepping import Stepping
+from .timing import with_lesser_time
 
 # After so many answers of a task were waited for in vain, the rest of the task is not asked.
 MOST_HANGS = 2
@@ -130,4 +131,4 @@ def _ask(
     for i, (case, answer) in enumerate(zip(cases, first, strict=False)):
         notify(len(cases) + i, 2 * len(cases))
         again = answer if isinstance(answer, Failure) else contestant.answer(case)
-        yield Asked(case, answer, again)
+        yield Asked(case, with_lesser_time(answer, again), again)

@@ -12,6 +12,7 @@ from bench.entrants import opening
 from bench.experiments.chain import figures as chain_figures
 from bench.experiments.cloth_peers import figures as cloth_figures
 from bench.experiments.robots.problem import ROBOTS, robot
+from bench.harness import stopwatch
 from bench.harness.record import RecordFile
 from bench.presentation.figures.sketch import drawn
 from bench.presentation.results import Results, plain
@@ -228,21 +229,32 @@ def test_a_budget_goes_by_the_seconds_that_a_solver_behind_a_slow_door_counts(fo
     assert ("cut by its time budget" in found.notes["remark"]) == (done < 6)
 
 
-def test_a_budget_ends_though_a_solver_counts_nothing(monkeypatch):
-    from bench.harness import stopwatch
-
+@pytest.fixture
+def pass_by(monkeypatch):
+    """Let seconds pass on the stopwatch's clock, which stands still otherwise."""
     now = [0.0]
     monkeypatch.setattr(stopwatch.time, "perf_counter", lambda: now[0])
 
-    def pass_by(seconds):
+    def advance(seconds):
         now[0] += seconds
 
+    return advance
+
+
+def test_a_call_that_a_solver_counts_no_time_of_takes_its_round_trip(pass_by):
+    def call():
+        return stopwatch.behind_door(lambda: pass_by(1.5), lambda _: 0.0)
+
+    assert stopwatch.timed(call) == (None, 1.5)
+
+
+def test_a_budget_ends_though_a_solver_counts_almost_nothing(pass_by):
     budget = stopwatch.Budget(1.0)
     for _ in range(int(stopwatch.MOST_AT_DOORS) - 1):
         assert not budget.is_spent
-        stopwatch.behind_door(lambda: pass_by(1.0), lambda _: 0.0)
+        stopwatch.behind_door(lambda: pass_by(1.0), lambda _: 1e-12)
     assert not budget.is_spent
-    stopwatch.behind_door(lambda: pass_by(1.0), lambda _: 0.0)
+    stopwatch.behind_door(lambda: pass_by(1.0), lambda _: 1e-12)
     assert budget.is_spent
     budget = stopwatch.Budget(1.0)
     stopwatch.behind_door(lambda: pass_by(1.5), lambda _: 1.5)

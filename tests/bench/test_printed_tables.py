@@ -237,21 +237,24 @@ def test_compare_prints_whole_sentences_in_ten_lines(capsys, tmp_path, monkeypat
 
 
 def test_verify_prints_a_line_a_task_under_its_heading():
-    def task(name, verdict, digits, passed, total, slowdown):
+    def task(name, verdict, digits, passed, total, slowdown, untimed=None):
         judgements = [SimpleNamespace(verdict=TaskVerdict.RIGHT)] * passed
         judgements += [SimpleNamespace(verdict=TaskVerdict.WRONG)] * (total - passed)
         return SimpleNamespace(task=name, method="", verdict=verdict, digits=digits,
-                               judgements=judgements, slowdown=slowdown)  # fmt: skip
+                               judgements=judgements, slowdown=slowdown,
+                               untimed=untimed)  # fmt: skip
 
     tasks = [
         task("energy", TaskVerdict.RIGHT, 15.34, 28, 28, 19.0),
         task("robot_inverse_kinematics", TaskVerdict.WRONG, None, 3, 7, None),
+        task("track", TaskVerdict.RIGHT, None, 7, 7, None, "Not timed: no seconds."),
     ]
     lines = verify_terminal._table(tasks, str)
     assert printed_table.rows(lines) == [
         ["task", "verdict", "digits", "cases passed", "beside the reference"],
         ["energy", "RIGHT", "15.3", "28/28", "19 x slower"],
         ["robot_inverse_kinematics", "WRONG", "–", "3/7", "–"],
+        ["track", "RIGHT", "–", "7/7", "not timed"],
     ]
 
 

@@ -105,6 +105,62 @@ def test_a_program_stands_behind_two_hyphens_with_its_own_options(capsys):
     assert json.loads(Path("a.json").read_text())["solver"]["name"] == "--lang zh --fast"
 
 
+# A time in seconds of each request by its number, of eight: four cases, each asked twice; the
+# reference's is 1e-5 in every case.
+TIMES = {
+    "1e-6": "10 x faster",
+    "2e-6 if number < 5 else 1e-6": "10 x faster",
+    "1e-6 if number < 5 else 2e-6": "10 x faster",
+    "4e-6 if number % 4 == 0 else 0": "10 x faster",
+}
+
+
+@pytest.mark.parametrize("seconds", TIMES)
+def test_a_time_beside_the_reference_is_the_programs_own(capsys, folder, seconds):
+    code, out, _ = verified_program(capsys, folder, seconds)
+    assert f"  {TIMES[seconds]}\n" in out
+    assert "Not timed" not in out
+    (task,) = json.loads(Path("out/verdict.json").read_text())["tasks"]
+    own, reference = (sum(c[k] for c in task["cases"]) for k in ("seconds", "reference_seconds"))
+    assert task["slowdown"] == pytest.approx(own / reference) == pytest.approx(0.1)
+    assert f"<td>{TIMES[seconds]}</td>" in Path("out/index.html").read_text()
+
+
+UNTIMED = {
+    "None": "Not timed: only the round trips of requests are known",
+    "None if number == 3 else 1e-6": "Not timed: only the round trips of requests are known",
+    "100": 'expected "seconds" as a number from 0 to the time that the answer took, got 100.',
+    "-1e-6": "got -1e-06.",
+    "0": 'Not timed: "seconds" is 0 in all answers.',
+}
+
+
+@pytest.mark.parametrize("seconds", UNTIMED)
+def test_a_program_without_a_time_of_its_own_stands_not_beside_the_reference(
+    capsys, folder, seconds
+):
+    code, out, _ = verified_program(capsys, folder, seconds)
+    assert "  not timed\n" in out
+    assert UNTIMED[seconds] in " ".join(out.split())
+    (task,) = (result := json.loads(Path("out/verdict.json").read_text()))["tasks"]
+    assert task["slowdown"] is None
+    assert any(UNTIMED[seconds] in remark for remark in result["remarks"])
+    assert all(one["seconds"] in (None, 0, 1e-6) for one in task["cases"])
+    page = Path("out/index.html").read_text()
+    assert "<td>not timed</td>" in page
+    for text in (out, page):
+        assert " x slower" not in text
+        assert " x faster" not in text
+
+
+def verified_program(capsys, folder, seconds):
+    """The exit code, stdout and stderr of `plumbob verify` of a program that says this time."""
+    answered = 'number = asked["id"]; answer["seconds"] = ' + seconds
+    text = PROGRAM.replace('answer["positions"]', f'{answered}; answer["positions"]')
+    (folder / "timed.py").write_text(text)
+    return plumbob(capsys, "-o", "out", "--", sys.executable, "timed.py")
+
+
 def test_answers_are_judged_in_files(capsys, folder):
     code, out, _ = plumbob(capsys, "--export-cases", "cases", "--task", "forward_kinematics",
                            "--seed", "3")  # fmt: skip

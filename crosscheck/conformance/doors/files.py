@@ -1,9 +1,9 @@
 """A folder of exported cases, and the answers that a solver has written beside them."""
 
 import json
-import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,8 @@ from .tables import read_table
 GREETING, SETTINGS, REQUEST, ANSWER = "greeting.json", "export.json", "request.json", "answer.json"
 # A table that answers has this before the name of the output: some are named as inputs are.
 PREFIX = "answer_"
+# A solver's own time is less: thirty years [s].
+LONGEST = 1e9
 
 
 def place_of(case: Case) -> str:
@@ -156,9 +158,10 @@ def _read_answer(place: Path, case: Case) -> Answer | Failure:
     fields = _fields(place, task, case)
     if not fields:
         return Failure(FailureKind.ABSENT, _absent(place, task))
-    answer = message.decode_answer(fields, task, case.inputs, math.inf)
-    if isinstance(answer, Answer) and answer.seconds == math.inf:
-        return Answer(answer.values, 0.0, answer.remarks)
+    answer = message.decode_answer(fields, task, case.inputs, LONGEST)
+    if isinstance(answer, Answer) and answer.untimed:
+        untimed = sentence('Not timed: the answers hold no valid "seconds".')
+        return replace(answer, seconds=0.0, untimed=untimed)
     return answer
 
 

@@ -5,16 +5,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference import rotation
+from reference import Skeleton, forward_kinematics, rotation
 
 from ..case import Case
 from ..contestant import Answer, Asked
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
+from ..timing import timed
 from . import laws, rounding, skeletons
-from .predictions import forward
-from .report import diagnosed, report, timed
+from .report import diagnosed, report
 from .skeletons import Posed
 
 TASK = "forward_kinematics"
@@ -153,7 +153,9 @@ def _likeness(case: Case, greeting: Greeting) -> float:
 
 def _judged(one: Asked, greeting: Greeting) -> CaseJudgement:
     case, answer = one.case, one.answer
-    (x, R), seconds = timed(lambda: forward(case.inputs))
+    skeleton = Skeleton(case.inputs["parents"], case.inputs["offsets"])
+    local_rotations = case.inputs["local_rotations"]
+    (x, R), seconds = timed(lambda: forward_kinematics(skeleton, local_rotations))
     expected = {"positions": x, "rotations": R}
     if not isinstance(answer, Answer):
         return CaseJudgement(case, answer, (), expected, None, seconds)

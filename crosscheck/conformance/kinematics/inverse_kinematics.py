@@ -15,10 +15,11 @@ from ..contestant import Answer, Asked
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
+from ..timing import timed
 from . import laws, pose_laws, problems, rounding, sweeps
 from .pose_laws import Posed
 from .predictions import solve
-from .report import diagnosed, report, timed
+from .report import diagnosed, report
 
 TASK = "inverse_kinematics"
 cases = problems.cases
@@ -105,7 +106,8 @@ def understood(one: Asked) -> Posed | None:
 
 def _judged(one: Asked, posed: Posed | None, method: str, greeting: Greeting) -> Told:
     case, answer = one.case, one.answer
-    _, seconds = timed(lambda: _reference(case.inputs, method or "fabrik"))
+    skeleton = Skeleton(case.inputs["parents"], case.inputs["offsets"])
+    _, seconds = timed(lambda: _reference(skeleton, case.inputs, method or "fabrik"))
     if not isinstance(answer, Answer):
         return Told(one, None, CaseJudgement(case, answer, (), {}, None, seconds))
     findings = laws.Findings(greeting)
@@ -136,8 +138,7 @@ def _expected(
     return {"local_rotations": local, "positions": x}, digits
 
 
-def _reference(inputs: Mapping[str, Any], method: str) -> Any:
-    skeleton = Skeleton(inputs["parents"], inputs["offsets"])
+def _reference(skeleton: Skeleton, inputs: Mapping[str, Any], method: str) -> Any:
     return solve_ik(
         skeleton,
         inputs["local_rotations"],

@@ -1,10 +1,6 @@
-"""The report of a task: its diagnosis, the smallest failure, the reference's time."""
+"""The report of a task: its diagnosis, and the smallest failure."""
 
-import time
 from collections.abc import Callable, Sequence
-from typing import TypeVar
-
-import numpy as np
 
 from ..case import Case
 from ..contestant import Answer, Asked
@@ -15,21 +11,8 @@ from ..sentence import Sentence
 from .faults import describe
 from .predictions import variants
 
-Returned = TypeVar("Returned")
 # So many cases are compared with every variant: the small and wrong ones first.
 COMPARED = 12
-# The reference's call is timed so often, for the least time.
-TIMED = 3
-
-
-def timed(function: Callable[[], Returned]) -> tuple[Returned, float]:
-    """Return what the reference answers and the least time it took [s]."""
-    least = np.inf
-    for _ in range(TIMED):
-        start = time.perf_counter()
-        answer = function()
-        least = min(least, time.perf_counter() - start)
-    return answer, least
 
 
 def diagnosed(

@@ -13,9 +13,10 @@ from ..contestant import Answer, Asked
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
+from ..timing import timed
 from . import laws, rounding
 from .polylines import Line, even_by_count, even_by_spacing
-from .report import report, timed
+from .report import report
 from .resample_faults import diagnosis
 from .skeletons import generator
 

@@ -26,6 +26,8 @@ from .textbook import Damping
 NAMES = {"ccd": "CCD", "fabrik": "FABRIK"}
 # A textbook's sweeps are those of a solver if so many of them are.
 MOST = 0.5
+# A rotation smaller than this share of CCD's, or angle [rad], is no damped one: it may be rounding.
+SMALLEST = 1e-3
 # So many faults at once may hide which method it is.
 SEEN_FAULTS = 2
 LAW = "one sweep"
@@ -207,11 +209,12 @@ def damping_of(swept: Sequence[Swept], greeting: Greeting) -> Sentence | None:
     """Return by how much a CCD scales or caps its rotations, if that explains all sweeps."""
     for faults in ((), *(((one,)) for one in FAULTS["ccd"] if one.key == "root to tip")):
         gain, most = _damping(swept, switches(faults))
-        if gain < 0.999 and _explains(swept, "ccd", greeting, faults, Damping(gain=gain)):
+        scaled, capped = Damping(gain=gain), Damping(most=most)
+        if SMALLEST < gain < 0.999 and _explains(swept, "ccd", greeting, faults, scaled):
             return sentence(
                 "It is CCD with each rotation scaled by {gain:.4g}, which is slower.", gain=gain
             )
-        if _explains(swept, "ccd", greeting, faults, Damping(most=most)):
+        if most > SMALLEST and _explains(swept, "ccd", greeting, faults, capped):
             return sentence(
                 "It is CCD with each rotation capped at {angle:.4g} rad, which is slower.",
                 angle=most,

@@ -17,11 +17,12 @@ from ..explain import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
+from ..timing import timed
 from . import laws, pose_laws, problems, rounding, skeletons, sweeps
 from .faults import Follow, Switches
 from .predictions import forward, path_to, predict_track
 from .problems import Problem
-from .report import diagnosed, report, timed
+from .report import diagnosed, report
 from .skeletons import Posed
 
 TASK = "track"
@@ -196,7 +197,9 @@ def _seen(one: Asked) -> Asked:
 
 def _judged(one: Asked, method: str, greeting: Greeting) -> CaseJudgement:
     case, answer = one.case, one.answer
-    _, seconds = timed(lambda: _reference(case.inputs, method if method in KNOWN else "ccd"))
+    skeleton = Skeleton(case.inputs["parents"], case.inputs["offsets"])
+    usual = method if method in KNOWN else "ccd"
+    _, seconds = timed(lambda: _reference(skeleton, case.inputs, usual))
     if not isinstance(answer, Answer):
         return CaseJudgement(case, answer, (), {}, None, seconds)
     findings = laws.Findings(greeting)
@@ -234,9 +237,9 @@ def _goes_on(one: Asked, method: str, greeting: Greeting) -> Finding:
     )
 
 
-def _reference(inputs: Mapping[str, Any], method: str) -> Any:
+def _reference(skeleton: Skeleton, inputs: Mapping[str, Any], method: str) -> Any:
     return track(
-        Skeleton(inputs["parents"], inputs["offsets"]),
+        skeleton,
         inputs["curve"],
         method,
         start=inputs["local_rotations"],

@@ -4,7 +4,6 @@ Zero of the gravitational energy is where the solver has it: the states of a cas
 several places, and only differences to the first of them count.
 """
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -20,6 +19,7 @@ from ..explain import either, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
+from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import GRAVITY, SPRINGS, Option
@@ -95,10 +95,9 @@ def tolerance(p: Problem, epsilon: float) -> float:
 def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJudgement:
     p = problem_of(one.case.inputs)
     system, state = system_of(p), state_of(p)
-    start = time.perf_counter()
-    potential_energy(system, state.positions)
-    kinetic_energy(system, state)
-    seconds = time.perf_counter() - start
+    _, seconds = timed(
+        lambda: potential_energy(system, state.positions) + kinetic_energy(system, state)
+    )
     expected = right(p)
     if not isinstance(one.answer, Answer):
         return CaseJudgement(one.case, one.answer, (), expected, None, seconds)

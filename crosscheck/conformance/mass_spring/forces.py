@@ -1,6 +1,5 @@
 """The task mass_spring_forces: its cases and its judgement."""
 
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import combinations
@@ -16,6 +15,7 @@ from ..explain import Variant, either, explain, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
+from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import FORCE_FAULTS, Option
@@ -58,10 +58,7 @@ def tolerance(p: Problem, epsilon: float) -> float:
 def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJudgement:
     p = problem_of(one.case.inputs)
     system, state = system_of(p), state_of(p)
-    reference_forces(system, state)
-    start = time.perf_counter()
-    expected = reference_forces(system, state)
-    seconds = time.perf_counter() - start
+    expected, seconds = timed(lambda: reference_forces(system, state))
     if not isinstance(one.answer, Answer):
         return CaseJudgement(one.case, one.answer, (), {"forces": expected}, None, seconds)
     given, allowed = one.answer.values["forces"], tolerance(p, greeting.epsilon)

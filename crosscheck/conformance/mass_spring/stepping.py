@@ -1,6 +1,5 @@
 """Judge steps and motions: against what is declared, or else inferred, and against laws."""
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, product
@@ -17,6 +16,7 @@ from ..explain import either, first_broken, hints_of
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
+from ..timing import timed
 from . import laws
 from .cases import task_cases
 from .faults import ASPECTS, Option, apply
@@ -177,17 +177,11 @@ def _digits(expected: Mapping[str, Any], answered: Mapping[str, Any]) -> float |
 def _reference_seconds(p: Problem, model: Model) -> float:
     """Return the compiled reference's time for as many steps of the same kind [s]."""
     system, state = system_of(p), state_of(p)
-    best = np.inf
-    for _ in range(2):
-        start = time.perf_counter()
-        if model.integrator.explicit:
-            symplectic_euler(system, state, p.h)
-            scale = model.substeps * (p.steps or 1)
-        else:
-            ImplicitEuler(system, h=p.h).step(state)
-            scale = p.steps or 1
-        best = min(best, (time.perf_counter() - start) * scale)
-    return best
+    if model.integrator.explicit:
+        _, seconds = timed(lambda: symplectic_euler(system, state, p.h))
+        return seconds * model.substeps * (p.steps or 1)
+    _, seconds = timed(lambda: ImplicitEuler(system, h=p.h).step(state))
+    return seconds * (p.steps or 1)
 
 
 def _diagnose(

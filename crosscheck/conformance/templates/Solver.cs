@@ -42,18 +42,19 @@ static class Solver {
         };
         using var answers = new StreamWriter(Console.OpenStandardOutput()) { AutoFlush = true };
         Console.SetOut(Console.Error); // what else is printed does no harm
-        var options = new JsonSerializerOptions { IncludeFields = true };
-        options.Converters.Add(new NullIsNaN());
+        JsonSerializerOptions json = new() { IncludeFields = true, Converters = { new NullNaN() } };
         while (Console.ReadLine() is string line) {
-            var ask = JsonSerializer.Deserialize<Request>(line, options)!;
+            var ask = JsonSerializer.Deserialize<Request>(line, json)!;
             var reply = new Dictionary<string, object> { ["id"] = ask.id };
-            try { tasks[ask.task](ask, reply); } catch (Exception e) { reply["error"] = e.Message; }
-            answers.WriteLine(JsonSerializer.Serialize(reply, options));
+            var watch = System.Diagnostics.Stopwatch.StartNew();
+            try { tasks[ask.task](ask, reply); reply["seconds"] = watch.Elapsed.TotalSeconds; }
+            catch (Exception e) { reply["error"] = e.Message; }
+            answers.WriteLine(JsonSerializer.Serialize(reply, json));
         }
     }
 }
 
-class NullIsNaN : JsonConverter<double> {
+class NullNaN : JsonConverter<double> {
     public override bool HandleNull => true;
     public override double Read(ref Utf8JsonReader reader, Type type, JsonSerializerOptions _) =>
         reader.TokenType == JsonTokenType.Null ? double.NaN : reader.GetDouble();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -178,6 +179,14 @@ class Answer {
 
     template <class T> void set(const std::string& name, const T& value) {
         text += ",\"" + name + "\":" + write(value);
+    }
+
+    // Call the solver, and set the time that it takes alone.
+    template <class Call> void time(Call call) {
+        auto start = std::chrono::steady_clock::now();
+        call();
+        std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+        set("seconds", seconds.count());
     }
 };
 

@@ -243,6 +243,17 @@ pub fn member<T: Show>(name: &str, value: &T) -> String {
     format!(",\"{}\":{}", name, value.show())
 }
 
+// Call the solver; return its outputs, and as a member the time that it takes alone.
+pub fn timed<T, F>(call: F) -> Result<(T, String), String>
+where
+    F: FnOnce() -> Result<T, String>,
+{
+    let start = std::time::Instant::now();
+    let outputs = call()?;
+    let seconds = start.elapsed().as_secs_f64();
+    Ok((outputs, member("seconds", &seconds)))
+}
+
 // Where the answers go. What is printed on standard output from here on goes to the errors.
 #[cfg(unix)]
 fn take_output() -> std::fs::File {

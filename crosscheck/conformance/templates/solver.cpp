@@ -37,19 +37,22 @@ void solve(const plumbob::Request& in, plumbob::Answer& out) {
         System s{in["masses"], in["rest_lengths"], in["stiffnesses"], in["dampings"],
                  in["springs"], in["pinned"], in["gravity"]};
         Positions x = in["positions"], v = in["velocities"];
-        mass_spring_step(s, x, v, in["h"]);
+        double h = in["h"];
+        out.time([&] { mass_spring_step(s, x, v, h); });
         return out.set("positions", x), out.set("velocities", v);
     }
     std::vector<int> parents = in["parents"];
     Positions offsets = in["offsets"], x(parents.size());
-    Rotations local_rotations = in["local_rotations"], r(parents.size());
+    Rotations q = in["local_rotations"], r(parents.size());
     if (in.task == "forward_kinematics") {
-        forward_kinematics(parents, offsets, local_rotations, x, r);
+        out.time([&] { forward_kinematics(parents, offsets, q, x, r); });
         return out.set("positions", x), out.set("rotations", r);
     }
-    inverse_kinematics(parents, offsets, local_rotations, in["target"], in["effector"],
-                       in["tolerance"], in["max_iterations"]);
-    out.set("local_rotations", local_rotations);
+    Vec3 target = in["target"];
+    double tolerance = in["tolerance"];
+    int effector = in["effector"], limit = in["max_iterations"];
+    out.time([&] { inverse_kinematics(parents, offsets, q, target, effector, tolerance, limit); });
+    out.set("local_rotations", q);
 }
 
 // GREETING_FIELDS

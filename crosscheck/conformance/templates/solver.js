@@ -45,7 +45,9 @@ const tasks = {
 function answer(request) {
   if (request.task === "greeting") return greeting;
   try {
-    return tasks[request.task](request);
+    const start = performance.now(); // [ms]
+    const outputs = tasks[request.task](request);
+    return { seconds: (performance.now() - start) / 1000, ...outputs };
   } catch (error) {
     return { error: error.message };
   }

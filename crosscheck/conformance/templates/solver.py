@@ -6,6 +6,7 @@ Delete the functions that you do not have. The first command passes NumPy arrays
 import json
 import os
 import sys
+import time
 from typing import Any
 
 # GREETING_FIELDS
@@ -43,8 +44,9 @@ def _answer(task: str, **inputs: Any) -> dict[str, Any]:
     if task == "greeting":
         return {"protocol": 1, "tasks": list(known), **PLUMBOB}
     try:
-        returned: dict[str, Any] = known[task](**inputs)
-        return returned
+        start = time.perf_counter()
+        outputs = known[task](**inputs)
+        return {"seconds": time.perf_counter() - start, **outputs}
     except Exception as error:
         return {"error": str(error)}
 

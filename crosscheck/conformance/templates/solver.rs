@@ -2,7 +2,7 @@
 // Build: rustc -O solver.rs     Offer only what you have: see GREETING.
 #![allow(unused)]
 mod plumbob;
-use plumbob::{member, Request, System};
+use plumbob::{member, timed, Request, System};
 
 type Vec3 = [f64; 3]; // [m]
 type Quat = [f64; 4]; // unit quaternion, w first
@@ -35,19 +35,21 @@ fn mass_spring_step(system: &System, positions: Vec<Vec3>, velocities: Vec<Vec3>
 fn solve(task: &str, ask: &Request) -> Result<String, String> {
     if task == "mass_spring_step" {
         let system = ask.system()?;
-        let (x, v) = (ask.get("positions")?, ask.get("velocities")?);
-        let (x, v) = mass_spring_step(&system, x, v, ask.get("h")?)?;
-        return Ok(member("positions", &x) + &member("velocities", &v));
+        let (x, v, h) = (ask.get("positions")?, ask.get("velocities")?, ask.get("h")?);
+        let ((x, v), seconds) = timed(|| mass_spring_step(&system, x, v, h))?;
+        return Ok(member("positions", &x) + &member("velocities", &v) + &seconds);
     }
     let (parents, offsets): (Vec<_>, Vec<_>) = (ask.get("parents")?, ask.get("offsets")?);
     let local: Vec<_> = ask.get("local_rotations")?;
     if task == "forward_kinematics" {
-        let (x, r) = forward_kinematics(&parents, &offsets, &local)?;
-        return Ok(member("positions", &x) + &member("rotations", &r));
+        let ((x, r), seconds) = timed(|| forward_kinematics(&parents, &offsets, &local))?;
+        return Ok(member("positions", &x) + &member("rotations", &r) + &seconds);
     }
-    let solved = inverse_kinematics(&parents, &offsets, &local, ask.get("target")?,
-        ask.get("effector")?, ask.get("tolerance")?, ask.get("max_iterations")?)?;
-    Ok(member("local_rotations", &solved))
+    let (target, effector) = (ask.get("target")?, ask.get("effector")?);
+    let (tolerance, max_iterations) = (ask.get("tolerance")?, ask.get("max_iterations")?);
+    let (local, seconds) = timed(|| inverse_kinematics(&parents, &offsets, &local, target,
+        effector, tolerance, max_iterations))?;
+    Ok(member("local_rotations", &local) + &seconds)
 }
 
 fn main() {

@@ -94,8 +94,8 @@ def test_fault_is_caught_and_named(method, fault, outputs):
     report = judged(faulty(method, [fault], outputs), method)
     assert report.verdict is (Verdict.RIGHT_BUT if fault.honest else Verdict.WRONG)
     assert broken(report, Verdict.RIGHT_BUT) - {"target reached"} or not fault.honest
-    expected = next((two for two in TWINS[outputs] if fault.key in two), {fault.key})
-    assert named(report) == [expected]
+    twins = next((two for two in TWINS[outputs] if fault.key in two), {fault.key})
+    assert named(report) == [twins & {one.key for one in FAULTS[method]}]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -104,6 +104,15 @@ def test_fault_is_named_where_no_method_is_declared(method, every):
     for fault in FAULTS[method][::every]:
         report = judged(faulty(method, [fault]))
         assert named(report)[0] == {fault.key}
+
+
+@pytest.mark.parametrize("method", ["", *METHODS])
+def test_a_solver_that_does_not_move_is_no_slower_solver(method):
+    report = judged(lambda local_rotations: {"local_rotations": local_rotations}, method)
+    assert report.verdict is Verdict.WRONG
+    findings = [finding.sentence for one in report.judgements for finding in one.findings]
+    sentences = [*findings, report.diagnosis.behaviour, report.diagnosis.first_broken]
+    assert not any("slower" in str(one) for one in sentences)
 
 
 def pairs(method):

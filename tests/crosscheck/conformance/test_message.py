@@ -220,14 +220,31 @@ def test_an_exception_has_its_line():
     assert str(failure.sentence) == "It raised KeyError in line 3 of a{0.b}.py: no"
 
 
-@pytest.mark.parametrize(
-    ("own", "seconds"), [(0.25, 0.25), (2.0, 1.0), (-1, 1.0), (0, 1.0), ("1", 1.0), (None, 1.0)]
-)
-def test_a_solver_may_time_itself(own, seconds):
+@pytest.mark.parametrize("own", [0.25, 0, 0.0])
+def test_a_solver_may_time_itself(own):
+    answer = timed_answer(own)
+    assert (answer.seconds, answer.untimed) == (own, None)
+
+
+@pytest.mark.parametrize("own", [2.0, 1.0, -1, "1", True, np.nan, np.inf, 10**400, [0.1]])
+def test_seconds_that_cannot_be_are_no_time_of_the_solver(own):
+    answer = timed_answer(own)
+    assert answer.seconds == 1.0
+    assert f"got {own!r}"[:40] in str(answer.untimed)
+
+
+def test_a_solver_without_seconds_is_told_that_only_round_trips_are_known():
+    answer = timed_answer(None)
+    assert answer.seconds == 1.0
+    assert "only the round trips" in str(answer.untimed)
+
+
+def timed_answer(own):
+    """An answer after a round trip of a second."""
     fields = {"positions": np.zeros((2, 3)).tolist(), "seconds": own}
     answer = decode_answer(fields, TASKS["forward_kinematics"], skeleton(), 1.0)
     assert isinstance(answer, Answer)
-    assert answer.seconds == seconds
+    return answer
 
 
 def greeting(**fields):

@@ -21,29 +21,33 @@ from crosscheck.conformance.templates import GREETING_FIELDS, LANGUAGES, templat
 REQUESTS = planted_programs.requests()
 OFFERED = ["forward_kinematics", "inverse_kinematics", "mass_spring_step"]
 # In each language: where the user's forward kinematics goes and what could stand there, with a
-# print. It puts every joint where its offset is: right for a root alone.
+# print and a wait of 50 ms. It puts every joint where its offset is: right for a root alone.
 FILLED = {
     "cpp": (
         'throw plumbob::missing("forward_kinematics");',
-        'std::puts("stray"); x = offsets; r = local_rotations;',
+        'std::puts("stray"); usleep(50000); x = offsets; r = local_rotations;',
     ),
     "rust": (
         'Err("forward_kinematics is not written yet".into())',
-        'println!("stray"); Ok((offsets.to_vec(), local_rotations.to_vec()))',
+        'println!("stray"); std::thread::sleep(std::time::Duration::from_millis(50)); '
+        "Ok((offsets.to_vec(), local_rotations.to_vec()))",
     ),
     "javascript": (
         'missing("forward_kinematics");\n    return { positions, rotations };',
-        'console.log("stray"); return { positions: offsets, rotations: local_rotations };',
+        'console.log("stray"); Atomics.wait(new Int32Array(new SharedArrayBuffer(4)), 0, 0, 50); '
+        "return { positions: offsets, rotations: local_rotations };",
     ),
     "csharp": (
         'throw new Exception("forward_kinematics is not written yet");',
         '(Print("stray"), answer["positions"] = ask.offsets, '
         'answer["rotations"] = ask.local_rotations).ToString();\n'
-        "    static int Print(string what) { Console.WriteLine(what); return 0; }",
+        "    static int Print(string what) { Console.WriteLine(what); Thread.Sleep(50); "
+        "return 0; }",
     ),
     "python": (
         'raise RuntimeError("forward_kinematics is not written yet")',
-        'print("stray"); return {"positions": offsets, "rotations": local_rotations}',
+        'print("stray"); time.sleep(0.05); '
+        'return {"positions": offsets, "rotations": local_rotations}',
     ),
 }
 
@@ -97,7 +101,7 @@ def test_a_starter_fails_only_where_code_is_missing(replies):
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_a_filled_in_starter_answers_through_stray_prints(language, tmp_path):
+def test_a_filled_in_starter_answers_and_times_itself_through_stray_prints(language, tmp_path):
     missing, code = FILLED[language]
     assert sum(text.count(missing) for text in template(language).values()) == 1
     run = build(language, tmp_path, lambda text: text.replace(missing, code))
@@ -111,6 +115,7 @@ def test_a_filled_in_starter_answers_through_stray_prints(language, tmp_path):
     assert reply["positions"] == pose["offsets"]  # to the last digit
     assert reply["rotations"] == pose["local_rotations"]
     assert "stray" in printed
+    assert reply["seconds"] > 0.04  # a wait may end a little early by another clock
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
