@@ -252,3 +252,16 @@ def test_an_answer_turns_with_the_world_and_the_numbering(rng, name, share, verd
     )
     assert found.verdict is verdict
     assert found.error == pytest.approx(share, rel=1e-5)
+
+
+@pytest.mark.parametrize("substeps", [1, 2, 4])
+def test_an_unstable_explicit_step_multiplies_its_rounding(substeps):
+    """By hs² k / m in each substep after the first, of a length that is unstable."""
+    stiff, soft = (triangle().changed(stiffnesses=np.full(3, k), h=0.1) for k in (1e5, 1.0))
+    model = Model(Integrator("symplectic"), substeps, "explicit", velocity="separate")
+    implicit = LINEARISED._replace(substeps=substeps)
+    stiffest = 2.0 * (2e5 + (0.2 + 0.3) / 0.1) / 0.5  # of the lightest particle's two springs
+    growth = (stiffest * (0.1 / substeps) ** 2) ** (substeps - 1)
+    ratio = rounding(stiff, model, EPSILON).positions / rounding(stiff, implicit, EPSILON).positions
+    assert ratio == pytest.approx(growth)
+    assert rounding(soft, model, EPSILON) == rounding(soft, implicit, EPSILON)
