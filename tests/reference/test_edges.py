@@ -1,0 +1,188 @@
+"""What happens at a limit, in one frame of many, to one certificate of two: the rarer branches."""
+
+import numpy as np
+import pytest
+
+from reference import (
+    Articulation,
+    Mimic,
+    Skeleton,
+    Target,
+    curves,
+    forward_kinematics,
+    rotation,
+    scenes,
+    tracking,
+)
+from reference.articulation import swing_twist
+from reference.curve import resample
+from reference.implicit_euler.certificate import Certificate, Coverage
+from reference.inverse_kinematics.box_step import activate_limits, new_task_system, take_step
+from reference.inverse_kinematics.mechanism import new_data
+from reference.inverse_kinematics.reduce import prepare
+from reference.inverse_kinematics.restarts import (
+    COST,
+    GIVEN_UP,
+    SETTLED,
+    STATE,
+    WAIT,
+    Limits,
+    most_promising,
+    new_progress,
+)
+from reference.inverse_kinematics.solve_mechanism import mechanism_criteria
+from reference.judging import judge_pose
+
+# ---- limits
+
+
+@pytest.mark.parametrize(("followed", "end"), [(False, 4.2 - 2.0 * np.pi), (True, 4.0)])
+def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_circle(followed, end):
+    """A revolution less would rotate the follower by half of one."""
+    chain = Skeleton(range(-1, 2), np.eye(3))
+    mimics = {1: Mimic(0, 0.5)} if followed else {}
+    arm = Articulation(chain, ["hinge", "hinge", "fixed"], lower=-4.0, upper=4.0, mimics=mimics)
+    mechanism = prepare(arm, (2,), (False,)).mechanism
+    for step, expected in ((0.3, end), (-7.8, -3.9)):
+        data, system = new_data(mechanism), new_task_system(mechanism)
+        data.q[:], system.step[:], system.J[:], system.e[:] = 0.0, 0.0, 1.0, 0.0
+        system.active[:] = 0.0
+        data.q[0], system.step[0] = 3.9, step
+        assert activate_limits(mechanism, data, system) is (followed and step > 0.0)
+        take_step(mechanism, data, system)
+        assert data.q[0] == pytest.approx(expected, abs=1e-14)
+
+
+def test_directions_of_a_limited_ball_are_drawn_evenly_from_its_cone(rng):
+    """The cosine of the tilt is even between that of the cone and one: so is a cap's area."""
+    cone, draws = 1.2, 20_000
+    ball = Articulation(Skeleton([-1], np.zeros((1, 3))), "ball", lower=-0.5, upper=1.0, cones=cone)
+    pairs = [swing_twist(tuple(Q), (0.0, 0.0, 1.0)) for Q in ball.random(rng, draws)]
+    swings, twists = np.array([swing for swing, _ in pairs]), np.array([t for _, t in pairs])
+    cosines = rotation.rotate(swings, [0.0, 0.0, 1.0])[:, 2]
+    for values, least, most in ((cosines, np.cos(cone), 1.0), (twists, -0.5, 1.0)):
+        shares = (values - least) / (most - least)
+        # The quantiles of so many even draws err by 1 / (2 root of the count), 0.004.
+        quantiles = np.quantile(shares, [0.1, 0.25, 0.5, 0.75, 0.9])
+        np.testing.assert_allclose(quantiles, [0.1, 0.25, 0.5, 0.75, 0.9], rtol=0, atol=0.02)
+        assert shares.min() >= -1e-9
+        assert shares.max() <= 1.0 + 1e-9
+
+
+# ---- restarts
+
+
+def test_of_attempts_given_up_the_least_patient_goes_on_and_then_the_nearest():
+    progress = new_progress(5)
+    progress[:, STATE] = GIVEN_UP, GIVEN_UP, GIVEN_UP, SETTLED, GIVEN_UP, GIVEN_UP
+    progress[:, WAIT] = 12.0, 3.0, 3.0, 3.0, 3.0, 0.0
+    progress[:, COST] = 0.1, 0.5, 0.3, 0.2, 0.4, 0.0
+    order = []
+    while (k := most_promising(progress)) >= 0:
+        order.append(k)
+        progress[k, STATE] = SETTLED
+    assert order == [2, 4, 1, 0]
+
+
+@pytest.mark.parametrize(("least", "iterations"), [(0.0, 7), (1e-3, 7), (1.1e-3, 3)])
+def test_a_target_further_out_than_the_tolerance_has_iterations_of_its_own(least, iterations):
+    arm = Articulation(Skeleton([-1, 0], np.eye(2, 3)), ["hinge", "fixed"])
+    mechanism = prepare(arm, (1,), (False,)).mechanism
+    criteria = mechanism_criteria(mechanism, least, Limits(1e-3, 1e-3, 7, 3, 0, False))
+    assert criteria.max_iterations == iterations
+    assert least < criteria.distance <= least + 1e-3
+
+
+# ---- motions
+
+
+def solves_of(monkeypatch):
+    """Return the list that every later solve of a motion is added to."""
+    solves, solve = [], tracking.solve_checked
+
+    def recorded(*arguments):
+        solves.append(solve(*arguments))
+        return solves[-1]
+
+    monkeypatch.setattr(tracking, "solve_checked", recorded)
+    return solves
+
+
+def test_the_iterations_of_a_coherent_motion_are_those_of_both_solves_and_of_all_frames(
+    monkeypatch,
+):
+    """Without a tolerance every frame is solved once more from the smooth trajectory."""
+    arm, solves = scenes.lab_arm()[0], solves_of(monkeypatch)
+    motion = tracking.track(
+        arm,
+        curves["circle"](6),
+        "levenberg_marquardt",
+        coherent=True,
+        tolerance=0.0,
+        max_iterations=40,
+    )
+    first, _, again, _ = (np.asarray(solve.iterations) for solve in solves)
+    assert again.sum() > 0
+    assert len(first) == len(again) == 6
+    over_all_frames = motion.iterations - first - again
+    assert np.ptp(over_all_frames) == 0
+    assert over_all_frames[0] > 0
+
+
+@pytest.mark.parametrize(("tilt", "met"), [(0.0, True), (0.5, False)])
+def test_a_frame_has_met_its_target_if_its_rotation_has_too(monkeypatch, tilt, met):
+    """The effector is on its target whatever the hinge does; its tilt is out of reach."""
+    arm = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0, 0, 1.0]]), ["hinge", "fixed"])
+    reached = []
+
+    def smooth(mechanism, rows, q, constrained, closed):
+        reached.extend(constrained)
+        return q, 0
+
+    monkeypatch.setattr(tracking.trajectory, "smooth", smooth)
+    turns = rotation.exponential(np.outer(np.arange(3), [0.0, 0.0, 0.1]))
+    wanted = rotation.multiply(turns, rotation.exponential([tilt, 0.0, 0.0]))
+    curve = Target(np.tile([0.0, 0.0, 1.0], (3, 1)), wanted, 1)
+    motion = tracking.track(arm, curve, coherent=True)
+    assert motion.residual.max() <= 1e-12
+    assert reached == [met] * 3
+
+
+def test_points_before_the_end_are_dropped_until_it_is_far_enough():
+    """The last stretch is walked back and forth: three kept points are near the end."""
+    points = np.zeros((6, 3))
+    points[:, 0] = [0.0, 1.0, 1.95, 1.95, 1.0, 1.4]
+    points[:, 2] = [0.0, 0.0, 0.0, 0.9, 0.9, 0.45]
+    spaced = resample(points, min_spacing=0.85, max_spacing=10.0)
+    gaps = np.linalg.norm(np.diff(spaced, axis=0), axis=1)
+    assert gaps.min() >= 0.85
+    np.testing.assert_array_equal(spaced[[0, -1]], points[[0, -1]])
+
+
+# ---- certificates and judgements
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_one_result_s_minimiser_within_the_other_s_ball_is_the_same(swapped):
+    """The certificate of a poor result says little; that of the good one beside it is enough."""
+    poor = Certificate(1.0, Coverage.COVERED, distance=0.9, unique_within=1.0)
+    good = Certificate(1e-9, Coverage.COVERED, distance=0.05, unique_within=0.06)
+    one, other = (good, poor) if swapped else (poor, good)
+    assert one.shares_minimiser(other, 0.94) is True  # 0.94 + 0.05 is within 1.0
+    assert one.shares_minimiser(other, 0.949) is True
+    assert one.shares_minimiser(other, 0.951) is False  # further apart than 0.9 + 0.05
+    assert one.shares_minimiser(good, 0.02) is (None if one is good else True)
+
+
+def test_links_that_slide_or_move_freely_have_no_length():
+    tree = Skeleton([-1, 0, 1, 2], np.eye(4, 3))
+    model = Articulation(tree, ["hinge", "slide", "free", "hinge"])
+    q = model.random(np.random.default_rng(1))
+    pose = forward_kinematics(model, q)
+    found = judge_pose(model, q, pose.positions[3], 3, positions=pose.positions)
+    assert found.position_error <= 1e-14
+    assert found.length_error <= 1e-14
+    lengthened = pose.positions.copy()
+    lengthened[3] += 0.1 * (lengthened[3] - lengthened[2])
+    found = judge_pose(model, q, pose.positions[3], 3, positions=lengthened)
+    assert found.length_error == pytest.approx(0.1 * tree.link_lengths[3])
