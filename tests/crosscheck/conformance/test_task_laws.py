@@ -30,7 +30,7 @@ from crosscheck.conformance.kinematics.polylines import Line, even_by_count
 from crosscheck.conformance.kinematics.predictions import predict_track
 from crosscheck.conformance.mass_spring import energy, forces
 from crosscheck.conformance.mass_spring.problem import all_forces, problem_of
-from crosscheck.conformance.precision import is_off_by_single
+from crosscheck.conformance.precision import AS_SINGLE, is_off_by_single, judging_greeting
 from crosscheck.conformance.sentence import sentence
 
 EPSILON = 2.0**-52
@@ -292,6 +292,19 @@ def test_answers_are_off_by_single_precision_from_five_digits_to_nine(digits, ex
     """The least decides where a fault is small in most cases, the median where it is in few."""
     told = [judgement(1, WRONG, count) for count in (*digits, None)]
     assert is_off_by_single(TaskReport("", "", told, Diagnosis())) is expected
+
+
+@pytest.mark.parametrize("single", ["positions", "velocities"])
+def test_the_least_precise_output_is_what_all_answers_are_judged_by(rng, single):
+    case = Case("", "mass_spring_step", {"positions": rng.standard_normal(30)}, "", sentence(""))
+    answer = {name: rng.standard_normal(30) for name in ("positions", "velocities")}
+    greeting = Greeting(1, ("mass_spring_step",))
+    whole = Asked(case, Answer(answer, 0.0), None)
+    assert judging_greeting([whole], greeting) == (greeting, None)
+    answer = answer | {single: answer[single].astype(np.float32).astype(float)}
+    coarse, reason = judging_greeting([Asked(case, Answer(answer, 0.0), None)], greeting)
+    assert coarse.epsilon == pytest.approx(2.0**-23, rel=0.1)
+    assert reason is AS_SINGLE
 
 
 def test_a_fault_is_told_only_if_it_explains_more_than_no_fault_does():
