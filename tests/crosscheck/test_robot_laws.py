@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from crosscheck.kinematics import full_reach
 from crosscheck.robots.comparisons import Differences, differences
 from crosscheck.robots.sweep import LinkKinematics, Sweep, reference_kinematics
+from reference import Skeleton
 from reference.formats import urdf
 
 ARM = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/>
@@ -43,3 +45,10 @@ def test_lengths_are_over_the_extent_of_all_links_and_angles_over_a_radian(
         for i in range(3)
     ]
     assert differences(parts) == pytest.approx(Differences(*expected), abs=1e-15)
+
+
+def test_positions_of_a_skeleton_are_over_the_longest_way_from_its_root():
+    """Two branches of three and of four metres; the root's own offset does not count."""
+    parents, lengths = [-1, 0, 1, 0, 3, 3], [9.0, 1.0, 2.0, 3.0, 1.0, 0.5]
+    tree = Skeleton(parents, np.outer(lengths, [0.6, 0.0, 0.8]))
+    assert full_reach(tree) == pytest.approx(4.0)
