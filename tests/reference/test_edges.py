@@ -16,8 +16,6 @@ from reference import (
     solve_ik,
     tracking,
 )
-from reference.articulation import swing_twist
-from reference.curve import resample
 from reference.formats import urdf
 from reference.implicit_euler.certificate import Certificate, Coverage
 from reference.inverse_kinematics.box_step import activate_limits, new_task_system, take_step
@@ -54,22 +52,6 @@ def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_ci
         assert activate_limits(mechanism, data, system) is (followed and step > 0.0)
         take_step(mechanism, data, system)
         assert data.q[0] == pytest.approx(expected, abs=1e-14)
-
-
-def test_directions_of_a_limited_ball_are_drawn_evenly_from_its_cone(rng):
-    """The cosine of the tilt is even between that of the cone and one: so is a cap's area."""
-    cone, draws = 1.2, 20_000
-    ball = Articulation(Skeleton([-1], np.zeros((1, 3))), "ball", lower=-0.5, upper=1.0, cones=cone)
-    pairs = [swing_twist(tuple(Q), (0.0, 0.0, 1.0)) for Q in ball.random(rng, draws)]
-    swings, twists = np.array([swing for swing, _ in pairs]), np.array([t for _, t in pairs])
-    cosines = rotation.rotate(swings, [0.0, 0.0, 1.0])[:, 2]
-    for values, least, most in ((cosines, np.cos(cone), 1.0), (twists, -0.5, 1.0)):
-        shares = (values - least) / (most - least)
-        # The quantiles of so many even draws err by 1 / (2 root of the count), 0.004.
-        quantiles = np.quantile(shares, [0.1, 0.25, 0.5, 0.75, 0.9])
-        np.testing.assert_allclose(quantiles, [0.1, 0.25, 0.5, 0.75, 0.9], rtol=0, atol=0.02)
-        assert shares.min() >= -1e-9
-        assert shares.max() <= 1.0 + 1e-9
 
 
 # ---- restarts
@@ -149,17 +131,6 @@ def test_a_frame_has_met_its_target_if_its_rotation_has_too(monkeypatch, tilt, m
     motion = tracking.track(arm, curve, coherent=True)
     assert motion.residual.max() <= 1e-12
     assert reached == [met] * 3
-
-
-def test_points_before_the_end_are_dropped_until_it_is_far_enough():
-    """The last stretch is walked back and forth: three kept points are near the end."""
-    points = np.zeros((6, 3))
-    points[:, 0] = [0.0, 1.0, 1.95, 1.95, 1.0, 1.4]
-    points[:, 2] = [0.0, 0.0, 0.0, 0.9, 0.9, 0.45]
-    spaced = resample(points, min_spacing=0.85, max_spacing=10.0)
-    gaps = np.linalg.norm(np.diff(spaced, axis=0), axis=1)
-    assert gaps.min() >= 0.85
-    np.testing.assert_array_equal(spaced[[0, -1]], points[[0, -1]])
 
 
 # ---- certificates and judgements
