@@ -380,6 +380,26 @@ class TestStep:
         objective = ImplicitEuler(cloth[0], h=h).objective(cloth[1])
         assert line_search(objective, objective.start, objective.start.gradient) is objective.start
 
+    @pytest.mark.parametrize(
+        ("share", "halvings"), [(-3e-4, 0), (-3e-5, 1), (3e-5, 1), (0.5, 1), (1.5, 2)]
+    )
+    def test_the_line_search_takes_no_step_that_ends_higher_or_hardly_lower(
+        self, network, altered, share, halvings
+    ):
+        """A change of g by `share` of the slope: Armijo's 1e-4 downwards is the least taken."""
+        system, state = network
+        linear = altered(system, rest_lengths=0.0, dampings=0.0, tension_only=False)
+        objective = ImplicitEuler(linear, h=h).objective(state)
+        start = objective.evaluate(state.positions)
+        gradient = start.gradient.ravel()
+        bend = gradient @ (objective.hessian(start.positions) @ gradient)
+        # g(x + t s) = g(x) + t slope + t² bend / 2 exactly: here it changes by share t |slope|.
+        step = -2.0 * (1.0 + share) * (gradient @ gradient) / bend * start.gradient
+        rise = objective.value(start.positions + step) - start.value
+        assert rise == pytest.approx(-share * np.sum(start.gradient * step), rel=1e-6)
+        end = line_search(objective, start, step)
+        np.testing.assert_array_equal(end.positions, start.positions + step / 2**halvings)
+
     def test_newton_converges_quadratically(self, cloth):
         residuals = stepped(*cloth).history
         assert residuals[0] == 1
@@ -392,6 +412,21 @@ class TestStep:
         assert residuals[-1] < 1e-10
         assert len(residuals) <= 8
         assert residuals[-2] < residuals[-3] ** 1.3
+
+    @pytest.mark.parametrize("tolerance", [0.1, 1e-3, 1e-6])
+    def test_conjugate_gradients_end_at_their_tolerance(self, cloth, tolerance):
+        """Of r' P r, the square of the residual's norm: no later than the first below, no earlier.
+
+        P is (M + h² L)^-1, and an iteration takes the norm down by ten or so here.
+        """
+        integrator = ImplicitEuler(cloth[0], h=h, solver="newton_cg")
+        objective = integrator.objective(cloth[1])
+        start = objective.start
+        step = integrator._solver._step(objective, start, tolerance)
+        left = objective.hessian(start.positions) @ step.ravel() + start.gradient.ravel()
+        Q = np.kron(global_matrix(cloth[0], h).toarray(), np.eye(3))
+        norms = [np.sqrt(r @ np.linalg.solve(Q, r)) for r in (left, start.gradient.ravel())]
+        assert 1e-3 * tolerance < norms[0] / norms[1] <= tolerance
 
     def test_the_hessian_product_is_that_of_the_hessian(self, network, rng, backend):
         objective = ImplicitEuler(network[0], h=h).objective(network[1])

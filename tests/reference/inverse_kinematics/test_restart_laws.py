@@ -16,7 +16,10 @@ from reference import (
     solve_ik,
 )
 from reference.inverse_kinematics.mechanism import LEVER
+from reference.inverse_kinematics.problem import checked_targets
 from reference.inverse_kinematics.reduce import prepare
+from reference.inverse_kinematics.settings import checked_settings
+from reference.inverse_kinematics.solve import solve_checked, solve_on_chain, solve_on_mechanism
 
 COUNTS = range(13)
 # Merits come from positions recomputed: some roundings of a few metres.
@@ -221,3 +224,23 @@ def test_the_merit_of_one_position_is_its_residual(solver):
     model, q, targets = problem("arm", 1)
     solution = solve_ik(model, q, targets[0].position, solver, max_iterations=3)
     assert solution.merit == solution.residual
+
+
+def test_a_chain_s_answer_is_the_better_of_one_start_s_and_its_restarts_with_both_histories(rng):
+    """Two sweeps arrive nowhere: which of the two is nearer differs from target to target."""
+    chain = Skeleton(range(-1, 4), rng.uniform(-1.0, 1.0, (5, 3)))
+    goals = forward_kinematics(chain, rotation.random(rng, 40, 5)).positions[:, -1]
+    settings = checked_settings("ccd", 1e-12, 1e-12, 2, 1, 3, True, False)
+    targets, start = checked_targets(chain, goals, None), rotation.random(rng, 5)
+    one = solve_on_chain(chain, start, targets[0], settings)
+    more = solve_on_mechanism(chain, start, targets, settings)
+    best = solve_checked(chain, start, targets, settings)
+    np.testing.assert_array_equal(best.merit, np.minimum(one.merit, more.merit))
+    assert 5 < np.count_nonzero(one.merit < more.merit) < 35
+    np.testing.assert_array_equal(best.iterations, one.iterations + more.iterations)
+    for row in range(40):
+        made, further = one.iterations[row], more.iterations[row]
+        residuals = [*one.history[row, : made + 1], *more.history[row, 1 : further + 1]]
+        np.testing.assert_array_equal(best.history[row, : made + further + 1], residuals)
+        nearer = one if one.merit[row] < more.merit[row] else more
+        np.testing.assert_array_equal(best.positions[row], nearer.positions[row])

@@ -209,6 +209,27 @@ def test_a_held_step_is_the_least_squares_solution_within_the_limits(rng, machin
     assert active > 100
 
 
+def test_a_held_step_solves_for_the_errors_that_active_freedoms_leave(
+    rng, machine, chain_of_joints
+):
+    """A released freedom gives back what its limit took; one that is active takes it once."""
+    free_freedoms = 0
+    for _ in range(30):
+        _, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)
+        linearise_task(mechanism, target, data, workspace.system)
+        system, e = workspace.system, workspace.system.e.copy()
+        damped_step(mechanism, data, system, 0.1 * mechanism.reach**2)
+        active = system.active != 0.0
+        left = e - system.J[active].T @ system.step[active]
+        np.testing.assert_allclose(system.e, left, rtol=0, atol=ROUNDING)
+        free = system.J[~active] @ system.z
+        np.testing.assert_allclose(system.step[~active], free, rtol=0, atol=ROUNDING)
+        beyond = system.active * (system.J @ system.z - system.step)
+        assert (beyond[active] >= -ROUNDING).all()  # none would rather step back
+        free_freedoms += np.count_nonzero(~active)
+    assert free_freedoms > 20
+
+
 def test_a_transposed_step_leaves_out_what_limits_stop(rng, machine, chain_of_joints):
     for _ in range(20):
         _, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)

@@ -1,0 +1,200 @@
+"""What happens at a limit, in one frame of many, to one certificate of two: the rarer branches."""
+
+import numpy as np
+import pytest
+
+from reference import (
+    Articulation,
+    Mimic,
+    Outcome,
+    Skeleton,
+    Target,
+    curves,
+    forward_kinematics,
+    rotation,
+    scenes,
+    solve_ik,
+    tracking,
+)
+from reference.formats import urdf
+from reference.implicit_euler.certificate import Certificate, Coverage
+from reference.inverse_kinematics.box_step import activate_limits, new_task_system, take_step
+from reference.inverse_kinematics.mechanism import new_data
+from reference.inverse_kinematics.reduce import prepare
+from reference.inverse_kinematics.restarts import (
+    COST,
+    GIVEN_UP,
+    SETTLED,
+    STATE,
+    WAIT,
+    Limits,
+    most_promising,
+    new_progress,
+)
+from reference.inverse_kinematics.solve_mechanism import mechanism_criteria
+from reference.judging import judge_pose
+
+# ---- limits
+
+
+@pytest.mark.parametrize(("followed", "end"), [(False, 4.2 - 2.0 * np.pi), (True, 4.0)])
+def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_circle(followed, end):
+    """A revolution less would rotate the follower by half of one."""
+    chain = Skeleton(range(-1, 2), np.eye(3))
+    mimics = {1: Mimic(0, 0.5)} if followed else {}
+    arm = Articulation(chain, ["hinge", "hinge", "fixed"], lower=-4.0, upper=4.0, mimics=mimics)
+    mechanism = prepare(arm, (2,), (False,)).mechanism
+    for step, expected in ((0.3, end), (-7.8, -3.9)):
+        data, system = new_data(mechanism), new_task_system(mechanism)
+        data.q[:], system.step[:], system.J[:], system.e[:] = 0.0, 0.0, 1.0, 0.0
+        system.active[:] = 0.0
+        data.q[0], system.step[0] = 3.9, step
+        assert activate_limits(mechanism, data, system) is (followed and step > 0.0)
+        take_step(mechanism, data, system)
+        assert data.q[0] == pytest.approx(expected, abs=1e-14)
+
+
+# ---- restarts
+
+
+def test_of_attempts_given_up_the_least_patient_goes_on_and_then_the_nearest():
+    progress = new_progress(5)
+    progress[:, STATE] = GIVEN_UP, GIVEN_UP, GIVEN_UP, SETTLED, GIVEN_UP, GIVEN_UP
+    progress[:, WAIT] = 12.0, 3.0, 3.0, 3.0, 3.0, 0.0
+    progress[:, COST] = 0.1, 0.5, 0.3, 0.2, 0.4, 0.0
+    order = []
+    while (k := most_promising(progress)) >= 0:
+        order.append(k)
+        progress[k, STATE] = SETTLED
+    assert order == [2, 4, 1, 0]
+
+
+@pytest.mark.parametrize(("least", "iterations"), [(0.0, 7), (1e-3, 7), (1.1e-3, 3)])
+def test_a_target_further_out_than_the_tolerance_has_iterations_of_its_own(least, iterations):
+    arm = Articulation(Skeleton([-1, 0], np.eye(2, 3)), ["hinge", "fixed"])
+    mechanism = prepare(arm, (1,), (False,)).mechanism
+    criteria = mechanism_criteria(mechanism, least, Limits(1e-3, 1e-3, 7, 3, 0, False))
+    assert criteria.max_iterations == iterations
+    assert least < criteria.distance <= least + 1e-3
+
+
+# ---- motions
+
+
+def recorded(monkeypatch, module, name):
+    """Return the list that what every later call of a function returns is added to."""
+    results, function = [], getattr(module, name)
+
+    def call(*arguments):
+        results.append(function(*arguments))
+        return results[-1]
+
+    monkeypatch.setattr(module, name, call)
+    return results
+
+
+def test_the_iterations_of_a_coherent_motion_are_those_of_both_solves_and_of_all_frames(
+    monkeypatch,
+):
+    """Without a tolerance every frame is solved once more from the smooth trajectory."""
+    solves = recorded(monkeypatch, tracking, "solve_checked")
+    trajectories = recorded(monkeypatch, tracking.trajectory, "smooth")
+    motion = tracking.track(
+        scenes.lab_arm()[0],
+        curves["circle"](6),
+        "levenberg_marquardt",
+        coherent=True,
+        tolerance=0.0,
+        max_iterations=40,
+    )
+    first, _, again, _ = (np.asarray(solve.iterations) for solve in solves)
+    ((_, steps),) = trajectories
+    assert again.sum() > 0
+    assert steps > 0
+    np.testing.assert_array_equal(motion.iterations, first + steps + again)
+
+
+@pytest.mark.parametrize(("tilt", "met"), [(0.0, True), (0.5, False)])
+def test_a_frame_has_met_its_target_if_its_rotation_has_too(monkeypatch, tilt, met):
+    """The effector is on its target whatever the hinge does; its tilt is out of reach."""
+    arm = Articulation(Skeleton([-1, 0], [[0, 0, 0], [0, 0, 1.0]]), ["hinge", "fixed"])
+    reached = []
+
+    def smooth(mechanism, rows, q, constrained, closed):
+        reached.extend(constrained)
+        return q, 0
+
+    monkeypatch.setattr(tracking.trajectory, "smooth", smooth)
+    turns = rotation.exponential(np.outer(np.arange(3), [0.0, 0.0, 0.1]))
+    wanted = rotation.multiply(turns, rotation.exponential([tilt, 0.0, 0.0]))
+    curve = Target(np.tile([0.0, 0.0, 1.0], (3, 1)), wanted, 1)
+    motion = tracking.track(arm, curve, coherent=True)
+    assert motion.residual.max() <= 1e-12
+    assert reached == [met] * 3
+
+
+# ---- certificates and judgements
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_one_result_s_minimiser_within_the_other_s_ball_is_the_same(swapped):
+    """The certificate of a poor result says little; that of the good one beside it is enough."""
+    poor = Certificate(1.0, Coverage.COVERED, distance=0.9, unique_within=1.0)
+    good = Certificate(1e-9, Coverage.COVERED, distance=0.05, unique_within=0.06)
+    one, other = (good, poor) if swapped else (poor, good)
+    assert one.shares_minimiser(other, 0.94) is True  # 0.94 + 0.05 is within 1.0
+    assert one.shares_minimiser(other, 0.949) is True
+    assert one.shares_minimiser(other, 0.951) is False  # further apart than 0.9 + 0.05
+    assert one.shares_minimiser(good, 0.02) is (None if one is good else True)
+
+
+def test_links_that_slide_or_move_freely_have_no_length():
+    tree = Skeleton([-1, 0, 1, 2], np.eye(4, 3))
+    model = Articulation(tree, ["hinge", "slide", "free", "hinge"])
+    q = model.random(np.random.default_rng(1))
+    pose = forward_kinematics(model, q)
+    found = judge_pose(model, q, pose.positions[3], 3, positions=pose.positions)
+    assert found.position_error <= 1e-14
+    assert found.length_error <= 1e-14
+    lengthened = pose.positions.copy()
+    lengthened[3] += 0.1 * (lengthened[3] - lengthened[2])
+    found = judge_pose(model, q, pose.positions[3], 3, positions=lengthened)
+    assert found.length_error == pytest.approx(0.1 * tree.link_lengths[3])
+
+
+SCREW_AND_RACK = """<robot name="machine">
+<link name="base"/><link name="nut"/><link name="rod"/><link name="rack"/><link name="wheel"/>
+<link name="hand"/>
+<joint name="turn" type="continuous"><parent link="base"/><child link="nut"/>
+<axis xyz="0 0 1"/></joint>
+<joint name="rise" type="prismatic"><parent link="nut"/><child link="rod"/><axis xyz="0 0 1"/>
+<limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="turn" multiplier="0.8"/></joint>
+<joint name="slide" type="prismatic"><parent link="rod"/><child link="rack"/><axis xyz="1 0 0"/>
+<limit lower="-9" upper="9" effort="1" velocity="1"/></joint>
+<joint name="roll" type="revolute"><parent link="rack"/><child link="wheel"/><axis xyz="0 1 0"/>
+<limit lower="-9" upper="9" effort="1" velocity="1"/>
+<mimic joint="slide" multiplier="-0.5"/></joint>
+<joint name="hold" type="fixed"><parent link="wheel"/><child link="hand"/>
+<origin xyz="4 1 2"/></joint></robot>"""
+
+
+def test_a_file_s_screw_and_rack_are_solved_as_fast_as_newton_solves():
+    """A follower in another unit than its leader's has a wrong column, and steps swing or creep."""
+    robot = urdf.parse(SCREW_AND_RACK)
+    goal = forward_kinematics(robot.articulation, [0.6, 0.5])
+    hand = robot.articulation.index("hand")
+    target = Target(goal.positions[hand], goal.rotations[hand], hand)
+    solution = solve_ik(
+        robot,
+        [0.2, 0.1],
+        target,
+        "levenberg_marquardt",
+        tolerance=1e-12,
+        tolerance_rotation=1e-12,
+        record=True,
+    )
+    assert solution.outcome is Outcome.CONVERGED
+    np.testing.assert_allclose(solution.coordinates, [0.6, 0.5], rtol=0, atol=1e-11)
+    errors = solution.history[(solution.history > 1e-12) & (solution.history < 0.1)]
+    assert len(errors) >= 2
+    assert (errors[1:] < 3.0 * errors[:-1] ** 1.7).all()
