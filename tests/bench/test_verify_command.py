@@ -95,6 +95,32 @@ def test_a_python_file_gets_its_verdict(capsys, solver, code, words):
     assert (found, err) == (code, "")
 
 
+SURROGATES = {
+    "right": SOLVERS["right.py"],
+    "wrong": SOLVERS["wrong.py"],
+    "broken": "def forward_kinematics(parents):\n    raise RuntimeError('no \\udcff luck \\ud800')\n",
+}
+
+
+@pytest.mark.parametrize("verdict", SURROGATES)
+def test_a_half_of_a_surrogate_pair_costs_no_file(capsys, folder, verdict):
+    """Names of files and what a solver says hold such halves; UTF-8 has no bytes for them."""
+    greeting = 'PLUMBOB = {"name": "Mine \\ud800", "version": "1\\udcff"}\n'
+    (folder / "solver\udcff.py").write_text(greeting + SURROGATES[verdict])
+    code, out, err = plumbob(capsys, "solver\udcff.py", "-o", "out\udcff")
+    assert (code, err) == (0 if verdict == "right" else 1, "")
+    assert f"forward_kinematics  {verdict.upper()} " in out
+    assert out.encode()
+    place = Path("out\udcff")
+    stored = json.loads((place / "verdict.json").read_text())
+    assert stored["verdict"] == verdict
+    assert stored["solver"]["name"] == "Mine \\ud800"
+    assert ET.parse(place / "verdict.xml").getroot().get("tests") == "4"
+    assert r"Mine \ud800" in (place / "index.html").read_text()
+    if verdict != "right":
+        assert json.loads((place / "failures" / "forward_kinematics.json").read_text())["answer"]
+
+
 def test_a_program_stands_behind_two_hyphens_with_its_own_options(capsys):
     code, out, _ = plumbob(
         capsys, "--json", "a.json", "--", sys.executable, "program.py", "--lang", "zh", "--fast"
