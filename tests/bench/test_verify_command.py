@@ -98,7 +98,7 @@ def test_a_python_file_gets_its_verdict(capsys, solver, code, words):
 SURROGATES = {
     "right": SOLVERS["right.py"],
     "wrong": SOLVERS["wrong.py"],
-    "broken": "def forward_kinematics(parents):\n    raise RuntimeError('no \\udcff luck \\ud800')\n",
+    "broken": SOLVERS["broken.py"].replace("luck", r"\udcff luck \ud800"),
 }
 
 
