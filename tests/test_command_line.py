@@ -501,3 +501,34 @@ def test_an_animation_of_a_scene_moves(capsys, empty_folder, scene):
         first = film.convert("RGB").tobytes()
         film.seek(film.n_frames - 1)
         assert film.convert("RGB").tobytes() != first
+
+
+NUMBA = {
+    "no compiler, check": (["check", "spring forces"], "NUMBA_DISABLE_JIT=1", 0, ""),
+    "no compiler, bench": (
+        ["bench", "arm", "--quick"],
+        "NUMBA_DISABLE_JIT=1",
+        2,
+        "plumbob: NUMBA_DISABLE_JIT: expected it unset where times are taken, got it set\n",
+    ),
+    "no threads": (
+        ["check", "spring forces"],
+        "NUMBA_NUM_THREADS=0",
+        2,
+        "plumbob: NUMBA_NUM_THREADS: expected what numba takes: "
+        "Number of threads specified must be > 0.\n",
+    ),
+}
+
+
+@pytest.mark.parametrize(("arguments", "variable", "code", "err"), NUMBA.values(), ids=NUMBA)
+def test_variables_of_numba_cost_no_traceback(empty_folder, arguments, variable, code, err):
+    name, value = variable.split("=")
+    root = str(Path(cli.__file__).parents[1])
+    done = subprocess.run(
+        [sys.executable, "-m", "plumbob", *arguments], cwd=empty_folder, check=False, text=True,
+        capture_output=True, env={**os.environ, "PYTHONPATH": root, name: value},
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (code, err)
+    assert ("1 of 1 claims held" in done.stdout) == (code == 0)
+    assert not list(empty_folder.rglob("records.jsonl"))
