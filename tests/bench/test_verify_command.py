@@ -324,3 +324,20 @@ def test_letters_that_a_terminal_lacks_cost_no_output():
     )
     assert (run.returncode, run.stderr) == (0, "")
     assert "forward_kinematics(parents, offsets, local_rotations)" in run.stdout
+
+
+@pytest.mark.parametrize("solver", ["right.py", "wrong.py"])
+def test_a_full_disk_behind_the_screen_costs_no_file(folder, solver):
+    code = "from bench.cli import main; main()"
+    root = str(Path(cli.__file__).parents[1])
+    with Path("/dev/full").open("w") as full:
+        run = subprocess.run(
+            [sys.executable, "-c", code, "verify", solver, "-o", "out"], stdout=full, text=True,
+            stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": root}, timeout=120,
+        )  # fmt: skip
+    assert (run.returncode, run.stderr) == (
+        2, "plumbob: /dev/stdout could not be written: No space left on device\n"
+    )  # fmt: skip
+    verdict = json.loads((folder / "out" / "verdict.json").read_text())["verdict"]
+    assert f"{verdict}.py" == solver
+    assert (folder / "out" / "verdict.xml").exists()
