@@ -1,6 +1,5 @@
 """The command line. Engines, the reference and matplotlib are imported inside the commands."""
 
-import contextlib
 import io
 import os
 import signal
@@ -154,6 +153,9 @@ def _complain(message: str) -> int:
 
 
 def _say(line: str, code: int) -> int:
-    with contextlib.suppress(OSError):  # on a full disk the code alone has to say it
+    try:
         print(line, file=sys.stderr)
-    return code
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            raise
+    return code  # on a full disk it alone says what happened
