@@ -5,12 +5,13 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from . import compile_notice
+from . import compile_notice, entry_point
 from .commands import bench, check, records, report, show
 from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh
 from .comparison import command as comparison
@@ -35,13 +36,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _leave)
+    entry_point.open_closed_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):  # a letter that it lacks costs no verdict
         sys.stdout.reconfigure(errors="backslashreplace")
+    interrupts: list[int] = []
+    entry_point.handle_interrupt(partial(_interrupt, interrupts))
     try:
         code = run_command(arguments)
         sys.stdout.flush()
     except BrokenPipeError:
         code = UNREAD
+    except (Exception, KeyboardInterrupt):
+        if not interrupts:
+            raise
+        code = _say_interrupted()  # a module that is interrupted as it starts raises ImportError
+    entry_point.leave_at_interrupt()
     if code == UNREAD:  # what is not yet written has nowhere to go
         for stream in (sys.stdout, sys.stderr):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
@@ -59,8 +68,7 @@ def run_command(arguments: Sequence[str] | None = None) -> int:
             raise KeyboardInterrupt
         return code if isinstance(code, int) else SUCCESS
     except (KeyboardInterrupt, typer.Abort):
-        print("plumbob: interrupted; a bench keeps what it has finished", file=sys.stderr)
-        return INTERRUPTED
+        return _say_interrupted()
     except _UsageError as error:
         return _complain(error.format_message())
     except SystemExit as error:
@@ -131,6 +139,23 @@ def _leave(number: int, _: object) -> None:
     sys.exit(128 + number)
 
 
+def _interrupt(interrupts: list[int], number: int, _: object) -> None:
+    interrupts.append(number)
+    raise KeyboardInterrupt
+
+
+def _say_interrupted() -> int:
+    return _say(entry_point.INTERRUPTION, INTERRUPTED)
+
+
 def _complain(message: str) -> int:
-    print(f"plumbob: {visible(message)}", file=sys.stderr)
-    return MISUSED
+    return _say(f"plumbob: {visible(message)}", MISUSED)
+
+
+def _say(line: str, code: int) -> int:
+    try:
+        print(line, file=sys.stderr)
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            raise
+    return code  # on a full disk it alone says what happened

@@ -26,7 +26,7 @@ def all_visible(value: Any) -> Any:
         return visible(value)
     if isinstance(value, Mapping):
         return {all_visible(key): all_visible(inner) for key, inner in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return [all_visible(inner) for inner in value]
     return value
 

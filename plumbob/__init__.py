@@ -3,7 +3,14 @@
 On a terminal a line on stderr says what is compiled, once it takes more than a second.
 """
 
+import sys
 from importlib.metadata import version
+
+from bench import entry_point
+
+# `python -m plumbob` comes through here before it reaches the command line.
+if sys.argv[:1] == ["-m"] and sys.orig_argv[-len(sys.argv)] == "plumbob":
+    entry_point.leave_at_interrupt()
 
 from bench import compile_notice
 from reference import *

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from bench import cli, terminal
 from bench.commands import bench, report
 from bench.harness.record import Record, RecordFile
+from bench.presentation.figures import sketch
 from crosscheck.claims import CLAIMS
 from crosscheck.verdict import Verdict
 
@@ -169,6 +171,75 @@ def test_damaged_lines_cost_a_sentence_and_nothing_else(capsys, empty_folder):
     assert (code, err) == (0, "")
     assert "Missing: Left out of records.jsonl, for they are no records: line 1 (" in out
     assert "; line 3 (" in out
+
+
+DEEP = "[" * 10**5 + "]" * 10**5
+NESTED = {
+    "setting": ('"operations": 1', f'"operations": {DEEP}'),
+    "machine": ('"stamp": {}', f'"stamp": {{"machine": {DEEP}}}'),
+    "array": ("1.0, 1.0", f"1.0, {DEEP}"),
+    "later format": ('{"format": 3,', f'{{"format": 4, "more": {DEEP},'),
+    "unknown field": ('{"format": 3,', f'{{"format": 3, "more": {DEEP},'),
+}
+
+
+@pytest.mark.parametrize(("part", "nested"), NESTED.values(), ids=NESTED)
+@pytest.mark.parametrize("arguments", [["report"], ["records", "list"]], ids=" ".join)
+def test_a_line_nested_without_end_costs_itself(capsys, empty_folder, arguments, part, nested):
+    file = RecordFile("out")
+    file.append([a_record()])
+    line = file.path.read_text()
+    file.path.write_text(line + line.replace(part, nested))
+    code, out, err = plumbob(capsys, *arguments, "out")
+    assert (code, err) == (0, "")
+    if arguments == ["report"]:
+        assert "Left out of records.jsonl, for they are no records: line 2 (" in out
+    file.path.write_text(line.replace(part, nested))
+    code, out, err = plumbob(capsys, *arguments, "out")
+    assert (code, out) == (2, "")
+    assert err.startswith("plumbob: out/records.jsonl, line 1: not a record (")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("arguments", [["report"], ["report", "--table", "timing_kinematics"]])
+def test_a_folder_without_a_record_to_show_exits_2_and_names_one(capsys, arguments):
+    records = [a_record("ccd"), a_record("fabrik"), a_record("newton")]
+    RecordFile("out").append([replace(record, arrays={}) for record in records])
+    code, out, err = plumbob(capsys, arguments[0], "out", *arguments[1:])
+    assert (code, out) == (2, "")
+    assert err.startswith("plumbob: no record in out can be shown: The record of kinematics/x/one")
+    assert ", ccd is left out, for no table can be made of what it holds (KeyError" in err
+    assert err.endswith("So are 2 others.\n")
+
+
+def test_a_folder_of_superseded_records_says_so(capsys):
+    RecordFile("out").append([a_record(notes={"superseded": "other settings"})])
+    code, _, err = plumbob(capsys, "report", "out")
+    assert code == 2
+    assert err == (
+        "plumbob: no record in out can be shown: All are superseded: run `plumbob bench` first\n"
+    )
+
+
+def test_a_figure_that_cannot_be_drawn_costs_itself_and_a_sentence(capsys, monkeypatch):
+    def fail(*_):
+        raise ValueError("arange: cannot compute length")
+
+    monkeypatch.setattr(sketch, "_files", fail)
+    monkeypatch.setattr(sketch, "_drawn", type(sketch._drawn)())
+    RecordFile("out").append([a_record()])
+    code, out, err = plumbob(capsys, "report", "out")
+    assert (code, err) == (0, "")
+    assert "The figure timing_kinematics cannot be drawn (ValueError: arange: cannot" in out
+    assert "ccd" in Path("out", "tables", "timing_kinematics.csv").read_text()
+
+
+def test_a_quantity_without_a_finite_number_is_not_called_unknown(capsys):
+    RecordFile("out").append([replace(a_record(), arrays={"seconds": np.full(5, np.nan)})])
+    code, _, err = plumbob(capsys, "history", "out", "--quantity", "seconds")
+    assert (code, err) == (
+        2, "plumbob: quantity: expected finite numbers of 'seconds', got none\n"
+    )  # fmt: skip
 
 
 HOSTILE = ("[red]x", "[/]", ":smile:", "\x1b[2J", "\x00", "right\u202eleft", "$\\frac{$", "{0}")
@@ -430,3 +501,34 @@ def test_an_animation_of_a_scene_moves(capsys, empty_folder, scene):
         first = film.convert("RGB").tobytes()
         film.seek(film.n_frames - 1)
         assert film.convert("RGB").tobytes() != first
+
+
+NUMBA = {
+    "no compiler, check": (["check", "spring forces"], "NUMBA_DISABLE_JIT=1", 0, ""),
+    "no compiler, bench": (
+        ["bench", "arm", "--quick"],
+        "NUMBA_DISABLE_JIT=1",
+        2,
+        "plumbob: NUMBA_DISABLE_JIT: expected it unset where times are taken, got it set\n",
+    ),
+    "no threads": (
+        ["check", "spring forces"],
+        "NUMBA_NUM_THREADS=0",
+        2,
+        "plumbob: NUMBA_NUM_THREADS: expected what numba takes: "
+        "Number of threads specified must be > 0.\n",
+    ),
+}
+
+
+@pytest.mark.parametrize(("arguments", "variable", "code", "err"), NUMBA.values(), ids=NUMBA)
+def test_variables_of_numba_cost_no_traceback(empty_folder, arguments, variable, code, err):
+    name, value = variable.split("=")
+    root = str(Path(cli.__file__).parents[1])
+    done = subprocess.run(
+        [sys.executable, "-m", "plumbob", *arguments], cwd=empty_folder, check=False, text=True,
+        capture_output=True, env={**os.environ, "PYTHONPATH": root, name: value},
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (code, err)
+    assert ("1 of 1 claims held" in done.stdout) == (code == 0)
+    assert not list(empty_folder.rglob("records.jsonl"))

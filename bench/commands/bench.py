@@ -193,11 +193,15 @@ def run_suites(
     executor: "Executor | None" = None,
 ) -> int:
     """Run suites with a progress bar; return 1 if a claim is missed or a block failed."""
+    from reference.backend.compilation import numba_settings
+
     from ..harness import run
     from ..harness.executor import HERE
     from ..harness.record import RecordFile
 
     RecordFile(output).read()  # before anything is measured that could not be kept
+    if numba_settings().DISABLE_JIT:
+        raise ValueError("NUMBA_DISABLE_JIT: expected it unset where times are taken, got it set")
     if fresh:
         run.forget(suites, scale, output)
     events: list[run.Event] = []

@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
+from ..entry_point import INTERRUPTED as INTERRUPTED
+
 REPORT = Path("report")
-SUCCESS, MISSED, MISUSED, INTERRUPTED, UNREAD = 0, 1, 2, 130, 141
+SUCCESS, MISSED, MISUSED, UNREAD = 0, 1, 2, 141
 
 Output = Annotated[
     Path, typer.Option("--output", "-o", metavar="DIR", help="Folder of records and report.")

@@ -108,15 +108,16 @@ def _tables(folder: Path) -> list["Table"]:
         ValueError: if there are no records.
     """
     from ..harness.record import RecordFile, check_folder
-    from ..presentation.results import Results, plain, sift
+    from ..presentation.results import Results, check_any, plain, sift
     from ..presentation.sections import tables
 
     check_folder(folder)
     stored, _ = RecordFile(folder).read()
     if not stored:
         raise ValueError(f"no records in {folder}: run `plumbob bench` first")
-    kept, _ = sift(lambda results: tables(results), [plain(record) for record in stored])
-    return tables(Results(kept))
+    records, left_out = sift(lambda results: tables(results), [plain(record) for record in stored])
+    check_any(folder, records, left_out)
+    return tables(Results(records))
 
 
 def _table(folder: Path, name: str) -> "Table":

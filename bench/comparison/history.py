@@ -86,6 +86,8 @@ def courses(runs: Sequence[Run], quantity: str, words: Sequence[str] = ()) -> li
         names = {n for run in runs for key in keys if key in run.rows for n in run.rows[key].arrays}
         if not keys:
             raise ValueError(f"only: expected part of a problem or solver, got {' '.join(words)!r}")
+        if quantity in names:
+            raise ValueError(f"quantity: expected finite numbers of {quantity!r}, got none")
         valid = ", ".join(sorted(names))
         raise ValueError(f"quantity: expected one of {valid}, got {quantity!r}")
     return sorted(known, key=lambda course: -abs(course.change))

@@ -10,6 +10,7 @@ import json
 import math
 import os
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
@@ -100,12 +101,20 @@ def clone_root(folder: Path) -> Path:
 def _temporary_folder() -> Iterator[Path]:
     """Yield a locked folder; remove those whose process was killed, which ended its lock."""
     for old in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/old"):
-        with contextlib.suppress(OSError), old.with_name("lock").open() as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            shutil.rmtree(old.parent)
+        with contextlib.suppress(OSError):
+            _remove_abandoned(old.parent)
     with tempfile.TemporaryDirectory(prefix=PREFIX) as name, Path(name, "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield Path(name)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove a folder of this user's that no process holds; others may have put any there."""
+    status = folder.lstat()
+    if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid():
+        with Path(folder, "lock").open() as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(folder)
 
 
 def _check_out(root: Path, revision: str, folder: Path) -> None:

@@ -20,11 +20,12 @@ from typing import Any, NamedTuple
 from ..entrants.entrant import Entrant
 from ..entrants.sources import digest_of
 from ..experiments import Block, Scale, blocks
+from ..harness.folder_lock import open_lock
 from ..harness.isolation import WorkerProcess
 from ..harness.machine import difference, stamp
 from ..harness.measure import block_key, measure
 from ..harness.progress import Progress, listening
-from ..harness.record import Key, check_regular, encode
+from ..harness.record import Key, encode
 from ..harness.worker import Calculation, describe
 
 # A block that says nothing for so long [s] is given up.
@@ -130,9 +131,10 @@ def _machine_to_itself(whole: bool) -> Iterator[None]:
     as in containers, do not see this either.
     """
     path = Path(tempfile.gettempdir(), f"plumbob-{os.getuid()}.lock")
-    check_regular(path)
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    descriptor = open_lock(path, 0o600)
     try:
+        if os.fstat(descriptor).st_uid != os.getuid():  # who could hold it for ever
+            raise ValueError(f"{path}: expected a file of this user, got another user's")
         fcntl.flock(descriptor, fcntl.LOCK_EX if whole else fcntl.LOCK_SH)
         yield
     finally:

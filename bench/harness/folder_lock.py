@@ -23,13 +23,26 @@ def locked(folder: str | os.PathLike[str]) -> Iterator[None]:
     """
     path = Path(folder, LOCK_NAME)
     path.parent.mkdir(parents=True, exist_ok=True)
-    check_regular(path)
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    descriptor = open_lock(path, 0o644)
     try:
         _lock(descriptor, path)
         yield
     finally:
         os.close(descriptor)
+
+
+def open_lock(path: Path, mode: int) -> int:
+    """Return the descriptor of a lock file, which is made with this mode where there is none.
+
+    A link is not followed: it could lead to any file of the user's, to be made or emptied.
+
+    Raises:
+        ValueError: if there is a link, or anything else that is no file.
+    """
+    if path.is_symlink():
+        raise ValueError(f"{path}: expected a file, got a link")
+    check_regular(path)
+    return os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, mode)
 
 
 def _lock(descriptor: int, path: Path) -> None:

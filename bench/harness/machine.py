@@ -34,6 +34,7 @@ PRESENTATION = (
     "bench/cli.py",
     "bench/commands",
     "bench/comparison",
+    "bench/entry_point.py",
     "bench/help_text.py",
     "bench/presentation",
     "bench/show",

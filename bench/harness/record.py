@@ -401,7 +401,7 @@ def decode(line: bytes | str) -> Record:
 
 def _of_later_format(line: bytes | str) -> str:
     """Return what to say of a line of a format that is not known yet, "" if it is none."""
-    with contextlib.suppress(msgspec.MsgspecError):
+    with contextlib.suppress(msgspec.MsgspecError, RecursionError):
         if (found := msgspec.json.decode(line, type=_Head).format) > FORMAT:
             return f"format {found} of a newer Plumbob; this one reads 1 to {FORMAT}"
     return ""

@@ -12,7 +12,7 @@ from .figures.sketch import Drawing, Sketch, drawn
 from .headlines import Answers, absent, answers, not_asked
 from .motion.motion import Scene
 from .page.page import Shown, render
-from .results import Results, listed, plain, sift
+from .results import Results, check_any, listed, plain, reason, sift
 from .sections import MOTIONS, SECTIONS
 from .tables.latex import latex
 from .tables.layout import Figure, Layout
@@ -35,7 +35,7 @@ def write(folder: Path) -> Written:
     """Write the report of a folder's records into it.
 
     Raises:
-        ValueError: if there are no records, or they cannot be read.
+        ValueError: if there are no records, or none that can be read and shown.
         OSError: if the folder cannot be written to.
     """
     check_folder(folder)
@@ -43,8 +43,10 @@ def write(folder: Path) -> Written:
     if not stored:
         raise ValueError(f"no records in {folder}: run `plumbob bench` first")
     sketched, left_out = sound([plain(record) for record in stored if not record.superseded])
-    shown = _drawn(sketched, folder / "figures")
-    missing = [*([warning] if warning else []), *left_out, *_missing(shown.records)]
+    check_any(folder, sketched.records, left_out)
+    shown, not_drawn = _drawn(sketched, folder / "figures")
+    sentences = [warning, *left_out, *not_drawn, *_missing(shown.records)]
+    missing = [sentence for sentence in sentences if sentence]
     _write_files(folder, sketched.texts, shown.drawings.values())
     page = folder / "index.html"
     _write(page, render(shown, _newest(shown.records), missing))
@@ -84,10 +86,17 @@ def _sketched(records: Sequence[Record]) -> Sketched:
     return Sketched(records, tables, texts, drawable, answers(results), scenes)
 
 
-def _drawn(sketched: Sketched, folder: Path) -> Shown:
-    """Draw the figures, but for those that the folder has already."""
-    drawings = {figure: drawn(one, folder) for figure, one in sketched.sketches.items()}
-    return Shown(sketched.records, sketched.tables, drawings, sketched.answers, sketched.scenes)
+def _drawn(sketched: Sketched, folder: Path) -> tuple[Shown, list[str]]:
+    """Draw figures, but for those in the folder; return sentences on those that cannot be drawn."""
+    drawings: dict[Figure, Drawing] = {}
+    sentences: list[str] = []
+    for figure, sketch in sketched.sketches.items():
+        try:
+            drawings[figure] = drawn(sketch, folder)
+        except Exception as error:  # a record may hold numbers that no axis can
+            sentences.append(f"The figure {sketch.name} cannot be drawn ({reason(error)}).")
+    shown = Shown(sketched.records, sketched.tables, drawings, sketched.answers, sketched.scenes)
+    return shown, sentences
 
 
 def all_figures() -> list[Figure]:

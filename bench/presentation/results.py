@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from ..harness.metrics import Ranking
@@ -82,8 +83,27 @@ def _joined(
 
 def _does_not_fit(record: Record, error: Exception) -> str:
     names = ", ".join(shortened(name, 40) for name in (record.problem, record.solver))
-    why = shortened(visible(f"{type(error).__name__}: {error}"), 100)
-    return f"The record of {names} is left out, for no table can be made of what it holds ({why})."
+    return (
+        f"The record of {names} is left out, for no table can be made of what it holds "
+        f"({reason(error)})."
+    )
+
+
+def reason(error: Exception) -> str:
+    """Return an error in at most 100 letters."""
+    return shortened(visible(f"{type(error).__name__}: {error}"), 100)
+
+
+def check_any(folder: Path, records: Sequence[Record], left_out: Sequence[str]) -> None:
+    """Make sure that some records can be shown.
+
+    Raises:
+        ValueError: with the first sentence on what was left out, if there are no records.
+    """
+    if not records:
+        sentence = left_out[0] if left_out else "All are superseded: run `plumbob bench` first"
+        others = f" So are {len(left_out) - 1} others." if len(left_out) > 1 else ""
+        raise ValueError(f"no record in {folder} can be shown: {sentence}{others}")
 
 
 def label(solver: str) -> str:

@@ -17,6 +17,7 @@ from .question import Question
 from .words import GOOD, Presentation
 
 FAILURES = Path("plumbob_failures")
+SCREEN = Path("/dev/stdout")
 RIGHT, WRONG, FAILED = 0, 1, 2
 
 
@@ -63,8 +64,7 @@ class Files(NamedTuple):
             for task in report.tasks
         }
         context = context._replace(files={key: path for key, path in paths.items() if path})
-        with suppress(BrokenPipeError, SystemExit):  # files are wanted though nobody reads this
-            terminal.show(report, context)
+        screen = _attempt(SCREEN, partial(_show, report, context), failures)
         makers = (
             lambda: json_file.text(report, context.say),
             lambda: junit.text(report, context.say),
@@ -75,11 +75,17 @@ class Files(NamedTuple):
             for path, make in zip(self._paths(), makers, strict=True)
             if path is not None
         ]
-        if any(written):
+        if screen and any(written):
             print(" ".join(visible(str(path)) for path in written if path))
         for failure in failures:
             print(f"plumbob: {context.say(failure)}", file=sys.stderr)
         return FAILED if failures else RIGHT if report.verdict in GOOD else WRONG
+
+
+def _show(report: Report, context: Presentation) -> Path:
+    with suppress(BrokenPipeError, SystemExit):  # files are wanted though nobody reads this
+        terminal.show(report, context)
+    return SCREEN
 
 
 def _write(path: Path, make: Callable[[], str]) -> Path:

@@ -91,23 +91,18 @@ class ReportRecord(msgspec.Struct, frozen=True):
 
 def text(report: Report, say: Say) -> str:
     """Return the file's text."""
-    packed = msgspec.json.encode(record(report, say), enc_hook=plain)
-    return msgspec.json.format(packed, indent=1).decode() + "\n"
+    fields = all_visible(msgspec.to_builtins(record(report, say), enc_hook=plain))
+    return msgspec.json.format(msgspec.json.encode(fields), indent=1).decode() + "\n"
 
 
 def record(report: Report, say: Say) -> ReportRecord:
     """Return the report in plain numbers and words."""
     return ReportRecord(
         FORMAT, VERSION, _name(report), report.verdict in GOOD, report.seed,
-        _greeting(report.greeting),
+        report.greeting,
         [say(one) for one in remarks(report)], say(advice(report.tasks)),
         [_task(task, say) for task in report.tasks],
     )  # fmt: skip
-
-
-def _greeting(greeting: Greeting) -> Greeting:
-    fields = msgspec.json.decode(msgspec.json.encode(greeting))
-    return msgspec.convert(all_visible(fields), Greeting)
 
 
 def _name(judged: Report | TaskReport | CaseJudgement | Finding) -> VerdictName:
@@ -122,7 +117,7 @@ def _task(task: TaskReport, say: Say) -> TaskRecord:
         for one in found.explanations
     ]
     return TaskRecord(
-        task.task, all_visible(task.method), _name(task), task.digits, task.slowdown, passed(task),
+        task.task, task.method, _name(task), task.digits, task.slowdown, passed(task),
         explained,
         say(found.behaviour) if found.behaviour else None,
         say(found.first_broken) if found.first_broken else None,

@@ -32,6 +32,19 @@ def on_compile(listener: Listener) -> Iterator[None]:
         _listeners.remove(listener)
 
 
+def numba_settings() -> Any:
+    """Return numba's settings, which come from environment variables.
+
+    Raises:
+        ValueError: if numba refuses its number of threads.
+    """
+    try:
+        import numba
+    except ValueError as error:
+        raise ValueError(f"NUMBA_NUM_THREADS: expected what numba takes: {error}") from None
+    return numba.config
+
+
 @functools.cache
 def watch_numba() -> None:
     """Let numba report each compilation, once a process."""

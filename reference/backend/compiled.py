@@ -175,7 +175,12 @@ def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
 
 @functools.cache
 def _entry(kernel: PythonKernel, relaxed: bool, label: str | None) -> PythonKernel:
-    """Compile what Python calls; cached on disk together with all that it calls."""
+    """Compile what Python calls; cached on disk together with all that it calls.
+
+    Where NUMBA_DISABLE_JIT turns numba's compiler off, the interpreter runs the kernel.
+    """
+    if compilation.numba_settings().DISABLE_JIT:
+        return kernel
     from . import disk_cache, linking
 
     compilation.watch_numba()

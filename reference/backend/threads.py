@@ -13,6 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 from .. import arguments
+from .compilation import numba_settings
 
 # More slices than cores, so that a core that is done early can take another slice.
 SLICES_PER_CORE = 4
@@ -98,10 +99,7 @@ def _result(part: Future[Any]) -> Any:
 
 def _all_cores() -> int:
     """Return how many cores the process may use, as numba counts them."""
-    import numba
-
-    config: Any = numba.config
-    return config.NUMBA_NUM_THREADS
+    return numba_settings().NUMBA_NUM_THREADS
 
 
 def _pool(size: int) -> ThreadPoolExecutor:

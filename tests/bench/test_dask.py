@@ -330,6 +330,23 @@ def test_a_machine_is_shared_by_answers_and_not_by_times(tmp_path, monkeypatch):
     assert waited
 
 
+def test_a_link_in_place_of_the_lock_of_a_machine_leads_to_no_file(tmp_path, monkeypatch):
+    """Everyone may write to the folder of temporary files."""
+    monkeypatch.setattr(work.tempfile, "gettempdir", lambda: str(tmp_path))
+    (tmp_path / f"plumbob-{os.getuid()}.lock").symlink_to(tmp_path / "file")
+    with pytest.raises(ValueError, match="got a link"), work._machine_to_itself(True):
+        pass
+    assert not (tmp_path / "file").exists()
+
+
+def test_a_lock_of_another_user_is_not_waited_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(work.tempfile, "gettempdir", lambda: str(tmp_path))
+    user = os.getuid()
+    monkeypatch.setattr(work.os, "getuid", lambda: user + 1)
+    with pytest.raises(ValueError, match="another user's"), work._machine_to_itself(True):
+        pass
+
+
 def test_what_a_worker_does_is_heard(made_up, monkeypatch):
     """Long steps are said while they last, as in one process."""
     cluster = MadeUpCluster(w1="h1/x")

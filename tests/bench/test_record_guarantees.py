@@ -151,6 +151,23 @@ def test_a_record_of_a_later_format_is_said_to_be_one(make):
         decode(json.dumps({**content, "format": 4}))
 
 
+@pytest.mark.parametrize("content", ["what the user wrote", None])
+def test_a_link_in_place_of_the_lock_leads_to_no_file(tmp_path, content):
+    """A folder from elsewhere may hold one; a lock file is emptied for the number of a process."""
+    file = tmp_path / "file"
+    if content is not None:
+        file.write_text(content)
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "records.lock").symlink_to(file)
+    with (
+        pytest.raises(ValueError, match=f"{folder}/records.lock: expected a file, got a link"),
+        locked(folder),
+    ):
+        pass
+    assert (file.read_text() if file.exists() else None) == content
+
+
 def test_two_runs_into_one_folder_exclude_each_other(solvers, tmp_path):
     with locked(tmp_path), pytest.raises(ValueError, match=rf"{tmp_path}: .*process {os.getpid()}"):
         go(tmp_path)

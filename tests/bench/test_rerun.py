@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from bench import cli
-from bench.comparison.rerun import Plan, rerun
+from bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
 from bench.comparison.rows import Verdict
 from bench.harness import machine
 
@@ -325,3 +326,16 @@ def test_this_revision_beside_itself_differs_in_nothing():
     made = rerun(Plan("HEAD", ("timing",), ("10 balls/one pose",)), root)
     assert len(made.rows) >= 4
     assert called(made) == {}
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_only_own_folders_of_runs_that_were_killed_are_removed(tmp_path, monkeypatch, own):
+    """Everyone may write to the folder of temporary files."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    folder = tmp_path / f"{PREFIX}killed"
+    (folder / "old").mkdir(parents=True)
+    (folder / "lock").touch()
+    user = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: user if own else user + 1)
+    with _temporary_folder():
+        assert folder.exists() != own

@@ -3,6 +3,7 @@
 import csv
 import io
 import itertools
+import math
 import re
 
 import numpy as np
@@ -107,6 +108,25 @@ def test_csv_keeps_all_digits_and_any_text():
     assert float(rows[1][1]) == third
     assert rows[1][2:4] == ["1", "1"]
     assert rows[2] == ["-", "", "", "", "", ""]
+
+
+FORMULAS = ["=1+1", "+a", "-x", "@SUM(A1)", "-2+cmd|' /C calc'!A0", "\t=1", "\r\n=1", " =1", "-e5"]
+FORMULAS += ["＝1", "'", "'=1", "''a", "--", "=5", '=HYPERLINK("http://x","y")']
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_a_text_in_csv_is_no_formula_and_less_one_apostrophe_the_text(name):
+    columns = (Column("name", words=True), Column(name, words=True))
+    text = tables.comma_separated(table((name, name), columns=columns))
+    for row in csv.reader(io.StringIO(text)):
+        assert row[1][0] == "'"
+        assert row[1].removeprefix("'") in (name, " ".join(name.split()))
+
+
+@pytest.mark.parametrize("cell", [-1, -1.5, -1e-300, -math.inf, "-5", "-1.2e-5", "+.5", "-", "–"])
+def test_a_number_in_csv_and_the_mark_of_none_stand_as_they_are(cell):
+    text = tables.comma_separated(table((cell, cell)))
+    assert list(csv.reader(io.StringIO(text)))[1] == [str(cell), str(cell)]
 
 
 def test_an_answer_stands_in_markdown_with_its_points():

@@ -95,6 +95,32 @@ def test_a_python_file_gets_its_verdict(capsys, solver, code, words):
     assert (found, err) == (code, "")
 
 
+SURROGATES = {
+    "right": SOLVERS["right.py"],
+    "wrong": SOLVERS["wrong.py"],
+    "broken": SOLVERS["broken.py"].replace("luck", r"\udcff luck \ud800"),
+}
+
+
+@pytest.mark.parametrize("verdict", SURROGATES)
+def test_a_half_of_a_surrogate_pair_costs_no_file(capsys, folder, verdict):
+    """Names of files and what a solver says hold such halves; UTF-8 has no bytes for them."""
+    greeting = 'PLUMBOB = {"name": "Mine \\ud800", "version": "1\\udcff"}\n'
+    (folder / "solver\udcff.py").write_text(greeting + SURROGATES[verdict])
+    code, out, err = plumbob(capsys, "solver\udcff.py", "-o", "out\udcff")
+    assert (code, err) == (0 if verdict == "right" else 1, "")
+    assert f"forward_kinematics  {verdict.upper()} " in out
+    assert out.encode()
+    place = Path("out\udcff")
+    stored = json.loads((place / "verdict.json").read_text())
+    assert stored["verdict"] == verdict
+    assert stored["solver"]["name"] == "Mine \\ud800"
+    assert ET.parse(place / "verdict.xml").getroot().get("tests") == "4"
+    assert r"Mine \ud800" in (place / "index.html").read_text()
+    if verdict != "right":
+        assert json.loads((place / "failures" / "forward_kinematics.json").read_text())["answer"]
+
+
 def test_a_program_stands_behind_two_hyphens_with_its_own_options(capsys):
     code, out, _ = plumbob(
         capsys, "--json", "a.json", "--", sys.executable, "program.py", "--lang", "zh", "--fast"
@@ -354,3 +380,20 @@ def test_letters_that_a_terminal_lacks_cost_no_output():
     )
     assert (run.returncode, run.stderr) == (0, "")
     assert "forward_kinematics(parents, offsets, local_rotations)" in run.stdout
+
+
+@pytest.mark.parametrize("solver", ["right.py", "wrong.py"])
+def test_a_full_disk_behind_the_screen_costs_no_file(folder, solver):
+    code = "from bench.cli import main; main()"
+    root = str(Path(cli.__file__).parents[1])
+    with Path("/dev/full").open("w") as full:
+        run = subprocess.run(
+            [sys.executable, "-c", code, "verify", solver, "-o", "out"], stdout=full, text=True,
+            stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": root}, timeout=120,
+        )  # fmt: skip
+    assert (run.returncode, run.stderr) == (
+        2, "plumbob: /dev/stdout could not be written: No space left on device\n"
+    )  # fmt: skip
+    verdict = json.loads((folder / "out" / "verdict.json").read_text())["verdict"]
+    assert f"{verdict}.py" == solver
+    assert (folder / "out" / "verdict.xml").exists()

@@ -278,7 +278,10 @@ def markdown(table: Table) -> str:
 
 
 def comma_separated(table: Table) -> str:
-    """Return the table as CSV, all digits kept; a share becomes hits, total and interval."""
+    """Return the table as CSV, all digits kept; a share becomes hits, total and interval.
+
+    A text that a spreadsheet would compute stands behind an apostrophe.
+    """
     spread_out = [
         any(isinstance(row[i], Share) for row in table.rows) for i in range(len(table.columns))
     ]
@@ -315,6 +318,8 @@ def _trimmed(digits: str) -> str:
     return digits.rstrip("0").rstrip(".")
 
 
+# An apostrophe, or what a spreadsheet takes for a formula; not a number, nor a sign alone.
+_FORMULA = re.compile(r"'|[=@＝＠]|[-+－＋](?![\d.]*$|[\d.]+e[-+]?\d+$)", re.IGNORECASE)
 # Marks anywhere, and what begins a list, a rule or a heading; a number is none of these.
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>|#&~$]|^[-+=](?=[-+=\s]|$)|(?<=^\d)[.)](?=\s|$))")
 
@@ -335,7 +340,7 @@ def _csv_head(table: Table, spread_out: list[bool]) -> list[str]:
     head: list[str] = []
     for column, several in zip(table.columns, spread_out, strict=True):
         head += [f"{column.title}, {part}" for part in parts] if several else [column.heading]
-    return head
+    return [_csv_text(words(heading)) for heading in head]
 
 
 def _csv(cell: Cell, spread_out: bool) -> list[Any]:
@@ -343,4 +348,9 @@ def _csv(cell: Cell, spread_out: bool) -> list[Any]:
         return list(cell) if isinstance(cell, Share) else ["", "", "", ""]
     if cell is None:
         return [""]
-    return [words(cell)] if isinstance(cell, bool | str) else [repr(cell)]
+    return [_csv_text(words(cell))] if isinstance(cell, bool | str) else [repr(cell)]
+
+
+def _csv_text(text: str) -> str:
+    """Return a text as a cell that no spreadsheet computes; one apostrophe less is the text."""
+    return f"'{text}" if _FORMULA.match(text) else text
