@@ -29,9 +29,11 @@ from .task import TASKS, Task
 GREETING = "greeting"
 _OF_ANY_ANSWER = ("id", "seconds", "printed")
 _BOM = b"\xef\xbb\xbf"
-# Texts, so that they are left as they are, and words for what is no number.
+# Texts, so that they are left as they are, and words for what is no number. A text without an end
+# is matched as well: looking for the end of each text within it would take quadratic time.
 _WORDS = re.compile(
-    r'"(?:[^"\\]|\\.)*"|([+-]?)\b(nan(?:\(\w*\))?|inf(?:inity)?)(?!\w)', re.IGNORECASE
+    r'"(?:[^"\\]|\\.)*+"?|([+-]?)\b(nan(?:\(\w*\))?|inf(?:inity)?)(?!\w)',
+    re.IGNORECASE | re.DOTALL,
 )
 _PLACE = re.compile(r" \((?:byte|char) (\d+)\)$")
 _NAMES: Mapping[Any, str] = {str: "a text", int: "an integer", float: "a number", bool: "a boolean"}

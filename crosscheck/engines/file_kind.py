@@ -9,8 +9,9 @@ from reference.formats.source import LARGEST
 URDF, MJCF, BVH = "URDF", "MJCF", "BVH"
 # The content of an <include> in other files, not a model by itself.
 FRAGMENT = "fragment"
-# The root element, after a declaration, a document type and comments.
-FIRST = re.compile(r"\s*(?:<\?.*?\?>|<!--.*?-->|<![A-Za-z].*?>|\s+)*<([^\s<>/!?]+)", re.DOTALL)
+# The root element, after a declaration, a document type and comments; possessive, so that a file
+# without a root element is read once.
+FIRST = re.compile(r"(?:<\?.*?\?>|<!--.*?-->|<![A-Za-z].*?>|\s++)*+<([^\s<>/!?]+)", re.DOTALL)
 BY_SUFFIX = {".urdf": URDF, ".bvh": BVH}
 BY_ROOT = {"robot": URDF, "mujoco": MJCF, "mujocoinclude": FRAGMENT}
 XML = (".xml", ".mjcf")
