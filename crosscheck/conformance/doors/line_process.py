@@ -58,7 +58,7 @@ class Limits(NamedTuple):
         request: for any other request [s].
         leave: to end once its input has ended [s].
         memory: together with all that it starts [B].
-        line: the longest line that it may answer [B].
+        line: the longest line that it may answer, read within seconds whatever it holds [B].
         prints: the most lines beside an answer.
     """
 
@@ -66,7 +66,7 @@ class Limits(NamedTuple):
     request: float = 10.0
     leave: float = 2.0
     memory: int = 4 << 30
-    line: int = 1 << 26
+    line: int = 1 << 24
     prints: int = 10_000
 
 
