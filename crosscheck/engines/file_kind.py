@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-from reference.formats.source import LARGEST
+from reference.formats.source import read_bytes
 
 URDF, MJCF, BVH = "URDF", "MJCF", "BVH"
 # The content of an <include> in other files, not a model by itself.
@@ -24,8 +24,8 @@ def xml_root(path: Path) -> ElementTree.Element:
         ValueError: if it cannot be opened, or is not well-formed.
     """
     try:
-        return ElementTree.fromstring(path.read_bytes().lstrip())
-    except (OSError, ElementTree.ParseError) as error:
+        return ElementTree.fromstring(read_bytes(path).lstrip())
+    except ElementTree.ParseError as error:
         raise ValueError(str(error)) from None
 
 
@@ -36,13 +36,12 @@ def file_kind(path: Path) -> str:
     another format.
 
     Raises:
-        OSError: if it cannot be opened.
+        ValueError: if it cannot be read.
     """
     suffix = path.suffix.lower()
     if suffix in BY_SUFFIX or suffix not in XML:
         return BY_SUFFIX.get(suffix, "")
-    with path.open("rb") as file:
-        text = file.read(LARGEST).decode(errors="replace").removeprefix("\ufeff")
+    text = read_bytes(path).decode(errors="replace").removeprefix("\ufeff")
     found = FIRST.match(text)
     kind = BY_ROOT.get(found[1], "") if found else ""
     if kind == MJCF and not ("<worldbody" in text or "<include" in text):
