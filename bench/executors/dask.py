@@ -330,8 +330,9 @@ def _connected(address: str, patience: float) -> Any:
 async def _identity(address: str) -> Mapping[str, Any]:
     """Return what a Dask process says of itself; a Client would wait for it without a limit."""
     from distributed.core import rpc
+    from distributed.security import Security
 
-    async with rpc(address) as process:
+    async with rpc(address, connection_args=Security().get_connection_args("client")) as process:
         identity: Mapping[str, Any] = await process.identity()
         return identity
 

@@ -371,7 +371,8 @@ def _start(command: Sequence[str], folder: Path | None, marker: int) -> Any:
             cwd=folder,
             env=os.environ | {MARKER: str(marker)},
             start_new_session=True,
-            preexec_fn=partial(carry, marker),  # a limit set later would miss what is forked first
+            # A limit that is set later would miss what the program starts at once.
+            preexec_fn=partial(carry, marker) if HAS_PROC else None,
         )
     except (OSError, ValueError) as error:
         raise LostError(FailureKind.CRASHED, _not_started(command[0], error)) from None
