@@ -9,8 +9,6 @@ from typing import Any
 
 import msgspec
 
-from reference.formats.source import read_bytes
-
 from .. import message
 from ..case import Case
 from ..contestant import Answer, Failure, FailureKind, NoGreetingError
@@ -182,6 +180,8 @@ def _fields(place: Path, task: Task, case: Case) -> Mapping[str, Any]:
 
 
 def _content(path: Path) -> bytes:
+    from reference.formats.source import read_bytes  # which the host of Python solvers never needs
+
     return read_bytes(path, largest=LIMITS.line)
 
 
