@@ -103,8 +103,9 @@ def record(report: Report, say: Say) -> ReportRecord:
 
 
 def _greeting(greeting: Greeting) -> Greeting:
-    fields = msgspec.json.decode(msgspec.json.encode(greeting))
-    return msgspec.convert(all_visible(fields), Greeting)
+    texts = {name: all_visible(getattr(greeting, name)) for name in ("name", "version", "language")}
+    methods = tuple(all_visible(method) for method in greeting.methods)
+    return msgspec.structs.replace(greeting, **texts, methods=methods)  # beyond limits, perhaps
 
 
 def _name(judged: Report | TaskReport | CaseJudgement | Finding) -> VerdictName:
