@@ -83,6 +83,16 @@ def _minimum(value, expected, schema, root, path):
     return [f"{path}: expected {expected} or more"] if low else []
 
 
+def _maximum(value, expected, schema, root, path):
+    high = _is(value, "number") and value > expected
+    return [f"{path}: expected {expected} or less"] if high else []
+
+
+def _max_length(value, expected, schema, root, path):
+    long = isinstance(value, str) and len(value) > expected
+    return [f"{path}: expected {expected} characters at most"] if long else []
+
+
 def _const(value, expected, schema, root, path):
     return [] if value == expected else [f"{path}: expected {expected}"]
 
@@ -109,6 +119,8 @@ _RULES = {
     "minItems": _min_items,
     "maxItems": _max_items,
     "minimum": _minimum,
+    "maximum": _maximum,
+    "maxLength": _max_length,
     "const": _const,
     "enum": _enum,
     "anyOf": _any_of,

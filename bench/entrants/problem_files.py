@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from reference import MassSpring, Skeleton, State
-from reference.formats.source import read_text
+from reference.formats.source import read_bytes, read_text
 
 from ..experiments.chain.problem import TargetsForSkeleton
 from ..experiments.robots.problem import ALL
@@ -56,7 +56,7 @@ def _in(path: Path, effector: str | None, pins: str | None) -> list[OwnProblem]:
         return [one for file in files for one in _in(file, effector, pins)]
     if not path.is_file():
         raise ValueError(f"problem: expected a file or a folder, got {path}, which does not exist")
-    suffix, digest = path.suffix.lower(), _digest(path.read_bytes())
+    suffix, digest = path.suffix.lower(), _digest(read_bytes(path))
     name = clean(path.stem)
     if suffix == ".py":
         return [_of_dict(*made) for made in _in_python(path)]

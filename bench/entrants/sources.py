@@ -46,12 +46,16 @@ def source_files(spec: Spec) -> list[Path]:
 
 def _files_of_command(words: Sequence[str]) -> list[Path]:
     paths = [Path(word).resolve() for word in words if "/" in word or "." in word]
-    return [path for path in paths if path.is_file() and path.stat().st_size <= _LARGEST]
+    return [path for path in paths if _is_source(path)]
+
+
+def _is_source(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size <= _LARGEST
 
 
 def _with_imports(path: Path, seen: set[Path]) -> Iterator[Path]:
     """Yield a file and those of its folder that it imports, however deep."""
-    if path in seen or not path.is_file():
+    if path in seen or not _is_source(path):
         return
     seen.add(path)
     yield path

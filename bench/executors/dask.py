@@ -317,10 +317,24 @@ def _connected(address: str, patience: float) -> Any:
     for name in ("distributed", "distributed.client", "asyncio"):  # what they say is said by us
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
+        if asyncio.run(asyncio.wait_for(_identity(address), patience)).get("type") != "Scheduler":
+            raise ValueError
         return Client(address, timeout=patience, set_as_default=False, name="plumbob")
     except (OSError, TimeoutError):
-        why = f"expected a Dask scheduler, got no answer within {patience:g} s"
-        raise ValueError(f"{DASK}{address}: {why}") from None
+        why = f"got no answer within {patience:g} s"
+    except Exception:  # whatever reading the answer of another program raises
+        why = "got an answer of something else"
+    raise ValueError(f"{DASK}{address}: expected a Dask scheduler, {why}")
+
+
+async def _identity(address: str) -> Mapping[str, Any]:
+    """Return what a Dask process says of itself; a Client would wait for it without a limit."""
+    from distributed.core import rpc
+    from distributed.security import Security
+
+    async with rpc(address, connection_args=Security().get_connection_args("client")) as process:
+        identity: Mapping[str, Any] = await process.identity()
+        return identity
 
 
 def _machine(of: Mapping[str, Any]) -> str:

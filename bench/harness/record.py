@@ -24,6 +24,8 @@ FORMAT = 3
 # formats 1 and 2 have no conditions.
 _FORMATS = (1, 2, FORMAT)
 FILE_NAME = "records.jsonl"
+# Reading a file takes several times its size of memory; the whole bench writes a hundredth of this.
+LARGEST = 1 << 30
 # The suite of the records that say of each other suite that it was gone through to its end.
 FINISHED = "finished"
 
@@ -309,14 +311,16 @@ def check_regular(path: Path) -> None:
     """Make sure that a file is one that can be read to its end, or is not there.
 
     Raises:
-        ValueError: if it is a folder, a pipe or a device.
+        ValueError: if it is a folder, a pipe or a device, or larger than `LARGEST`.
     """
     try:
-        mode = path.stat().st_mode
+        mode, size = path.stat().st_mode, path.stat().st_size
     except (FileNotFoundError, NotADirectoryError):
         return
     if not stat.S_ISREG(mode):
         raise ValueError(f"{path}: expected a file, got a {_kind(mode)}")
+    if size > LARGEST:
+        raise ValueError(f"{path}: expected at most {LARGEST} bytes, got {size}")
 
 
 def check_folder(path: Path) -> None:

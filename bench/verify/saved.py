@@ -17,8 +17,11 @@ from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.judgement import CaseJudgement, TaskReport
 from crosscheck.conformance.message import plain
 from crosscheck.conformance.sentence import Sentence, sentence
+from reference.formats.source import read_bytes
 
 FORMAT, VERSION = "plumbob failing case", 1
+# A case with the longest answer that is read, written anew with indentation, has fewer bytes.
+_LARGEST = 1 << 28
 
 
 class Saved(msgspec.Struct, frozen=True):
@@ -75,11 +78,10 @@ def load(path: Path) -> Saved:
     """Return what was saved.
 
     Raises:
-        ValueError: if the file holds something else.
-        OSError: if it cannot be read.
+        ValueError: if the file holds something else or cannot be read.
     """
     try:
-        found = msgspec.json.decode(path.read_bytes(), type=_File)
+        found = msgspec.json.decode(read_bytes(path, largest=_LARGEST), type=_File)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
         found = None
     if found is None or found.format != FORMAT or found.version != VERSION:

@@ -16,6 +16,9 @@ from .greeting import Greeting
 from .sentence import Sentence, did_you_mean, sentence
 from .task import TASKS, Field, Task
 
+# The most points of an answer whose number the request leaves open: no case needs a tenth of them,
+# and the judge looks at each.
+MOST_POINTS = 1000
 _TYPES: Mapping[str, type] = {"number": np.float64, "integer": np.int64, "boolean": np.bool_}
 
 
@@ -157,7 +160,7 @@ def understand(task: Task, counts: Mapping[str, int], returned: object) -> dict[
 
     A dict is read by its keys, and those that are no outputs are left aside; a tuple by the order
     of the task's outputs, each value going to the next one of its shape; anything else as a tuple
-    of one. Extents that the request does not fix may be any.
+    of one. Extents that the request does not fix may be up to `MOST_POINTS`.
 
     Raises:
         ValueError: if nothing is understood, or an output has another shape or is no number.
@@ -173,6 +176,12 @@ def understand(task: Task, counts: Mapping[str, int], returned: object) -> dict[
     if not values:
         names = ", ".join(f"{one.name} {_shape(one.shape)}" for one in task.outputs)
         raise ValueError(f"{task.name}: expected some of {names}, got {found}")
+    for field in task.outputs:
+        is_open = {count for count in field.shape if isinstance(count, str)} - counts.keys()
+        if is_open and field.name in values and len(values[field.name]) > MOST_POINTS:
+            raise ValueError(
+                f"{field.name}: expected at most {MOST_POINTS} rows, got {len(values[field.name])}"
+            )
     return values
 
 
@@ -219,6 +228,8 @@ def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:
 def _array(field: Field, value: object) -> Any:
     kind = _TYPES[field.kind]
     try:
+        if _holds_text(value):  # of which NumPy makes an array as wide as the longest one
+            raise ValueError
         array = np.asarray(value)
         if array.dtype == object:  # None among the numbers
             array = np.asarray(value, dtype=np.float64)
@@ -230,6 +241,12 @@ def _array(field: Field, value: object) -> Any:
             f"{field.name}: expected {field.kind}s of shape {_shape(field.shape)}, "
             f"got {_describe(value)}"
         ) from None
+
+
+def _holds_text(value: object) -> bool:
+    return isinstance(value, str) or (
+        isinstance(value, list | tuple) and any(map(_holds_text, value))
+    )
 
 
 def _whole(array: Any) -> bool:

@@ -4,11 +4,28 @@ A solver is judged first against what it declares. What it leaves out (None) is 
 answers.
 """
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
+from msgspec import Meta
 
 PROTOCOL = 1
+
+# The most that a greeting may hold, each with its reason; the JSON Schema says so too.
+Name = Annotated[str, Meta(max_length=100, description="the verdict shows it in one line")]
+MethodName = Annotated[str, Meta(max_length=40, description="it heads rows of tables")]
+Methods = Annotated[
+    tuple[MethodName, ...], Meta(max_length=20, description="each is asked all cases of two tasks")
+]
+Joints = Annotated[int, Meta(ge=1, description="no skeleton has fewer")]
+Iterations = Annotated[
+    int, Meta(ge=1, le=1000, description="the judge computes as many for each case")
+]
+Substeps = Annotated[
+    int, Meta(ge=1, le=1000, description="the judge computes as many for each case")
+]
+# The most iterations of all substeps of a step, for the same reason.
+MOST_ITERATIONS = 1000
 
 Precision = Literal["single", "double"]
 Method = Literal["explicit", "symplectic", "linearised", "local_global", "newton", "converged"]
@@ -33,8 +50,8 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     method: Method | None = None
     start: Literal["x_n", "y"] | None = None
-    iterations: int | None = None
-    substeps: int | None = None
+    iterations: Iterations | None = None
+    substeps: Substeps | None = None
     damper: Literal["none", "explicit", "length_rate", "end_velocity", "global_factor"] | None = (
         None
     )
@@ -88,13 +105,13 @@ class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     protocol: int
     tasks: tuple[str, ...]
-    name: str = "solver"
-    version: str = ""
-    language: str = ""
+    name: Name = "solver"
+    version: Name = ""
+    language: Name = ""
     precision: Precision = "double"
     chains_only: bool = False
-    max_joints: int | None = None
-    methods: tuple[str, ...] = ("",)
+    max_joints: Joints | None = None
+    methods: Methods = ("",)
     system: System = System()
     step: Step = Step()
 

@@ -14,7 +14,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from types import NoneType, UnionType
-from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -22,16 +22,18 @@ import numpy as np
 from .case import Case
 from .contestant import Answer, Failure, FailureKind
 from .functions import checked, raised, understand
-from .greeting import PROTOCOL, Greeting
+from .greeting import MOST_ITERATIONS, PROTOCOL, Greeting
 from .sentence import Sentence, did_you_mean, sentence
 from .task import TASKS, Task
 
 GREETING = "greeting"
 _OF_ANY_ANSWER = ("id", "seconds", "printed")
 _BOM = b"\xef\xbb\xbf"
-# Texts, so that they are left as they are, and words for what is no number.
+# Texts, so that they are left as they are, and words for what is no number. A text without an end
+# is matched as well: looking for the end of each text within it would take quadratic time.
 _WORDS = re.compile(
-    r'"(?:[^"\\]|\\.)*"|([+-]?)\b(nan(?:\(\w*\))?|inf(?:inity)?)(?!\w)', re.IGNORECASE
+    r'"(?:[^"\\]|\\.)*+"?|([+-]?)\b(nan(?:\(\w*\))?|inf(?:inity)?)(?!\w)',
+    re.IGNORECASE | re.DOTALL,
 )
 _PLACE = re.compile(r" \((?:byte|char) (\d+)\)$")
 _NAMES: Mapping[Any, str] = {str: "a text", int: "an integer", float: "a number", bool: "a boolean"}
@@ -226,18 +228,24 @@ def decode_greeting(fields: Mapping[str, Any], what: str = "greeting") -> Greeti
     given = {name: value for name, value in fields.items() if name not in _OF_ANY_ANSWER}
     if given.get("protocol") != PROTOCOL:
         raise ValueError(
-            f"{what}: protocol: expected {PROTOCOL}, got {given.get('protocol', 'none')!r}"
+            f"{what}: protocol: expected {PROTOCOL}, got {excerpt(given.get('protocol', 'none'))}"
         )
     tasks = given.get("tasks")
     if not isinstance(tasks, list | tuple) or not tasks:
-        raise ValueError(f"{what}: tasks: expected some of {', '.join(TASKS)}, got {tasks!r}")
+        raise ValueError(
+            f"{what}: tasks: expected some of {', '.join(TASKS)}, got {excerpt(tasks)}"
+        )
     for task in tasks:
         one_of(f"{what}: tasks", task, TASKS)
     given["tasks"] = tuple(dict.fromkeys(tasks))
     _check_fields(given, Greeting, what)
     greeting = msgspec.convert(given, Greeting)
-    if greeting.max_joints is not None and greeting.max_joints < 1:
-        raise ValueError(f"{what}: max_joints: expected 1 or more, got {greeting.max_joints}")
+    total = (greeting.step.iterations or 1) * (greeting.step.substeps or 1)
+    if total > MOST_ITERATIONS:
+        raise ValueError(
+            f"{what}: step: iterations: expected at most {MOST_ITERATIONS} in all substeps "
+            f"together, got {total}"
+        )
     return msgspec.structs.replace(greeting, methods=greeting.methods or ("",))
 
 
@@ -248,28 +256,46 @@ def _check_fields(given: Mapping[str, Any], kind: type[msgspec.Struct], path: st
         wanted = known[name]
         if isinstance(wanted, type) and issubclass(wanted, msgspec.Struct):
             if not isinstance(value, dict):
-                raise ValueError(f"{path}: {name}: expected an object, got {value!r}")
+                raise ValueError(f"{path}: {name}: expected an object, got {excerpt(value)}")
             _check_fields(value, wanted, f"{path}: {name}")
             continue
         try:
             number = msgspec.convert(value, wanted)
         except msgspec.ValidationError:
             raise ValueError(
-                f"{path}: {name}: expected {_words(wanted)}, got {shown(repr(value), 60)}"
+                f"{path}: {name}: expected {_words(wanted)}, got {excerpt(value)}"
             ) from None
         if isinstance(number, float) and not math.isfinite(number):
             raise ValueError(f"{path}: {name}: expected a finite number, got {value!r}")
 
 
+def excerpt(value: object) -> str:
+    """Return a value as Python writes it; of a long text or list the beginning and the length."""
+    text = shown(repr(value), 60)
+    if not text.endswith("...") or not isinstance(value, str | list | tuple):
+        return text
+    return f"{len(value)} {'characters' if isinstance(value, str) else 'entries'}: {text}"
+
+
 def _words(kind: Any) -> str:
     """Return what values a type has."""
+    if get_origin(kind) is Annotated:
+        base, limits = get_args(kind)
+        return f"{_words(base)}{_limits_in_words(limits, get_origin(base) is tuple)}"
     if get_origin(kind) is Literal:
         return " or ".join(map(repr, get_args(kind)))
     if get_origin(kind) in (Union, UnionType):
         return " or ".join(_words(one) for one in get_args(kind) if one is not NoneType)
     if get_origin(kind) is tuple:
-        return "a list of texts"
+        return f"a list of {_words(get_args(kind)[0]).replace('a text', 'texts')}"
     return _NAMES[kind]
+
+
+def _limits_in_words(limits: msgspec.Meta, is_list: bool) -> str:
+    if limits.max_length is not None:
+        most = limits.max_length
+        return f", at most {most} of them" if is_list else f" of at most {most} characters"
+    return f" from {limits.ge} to {limits.le}" if limits.le else f" of {limits.ge} or more"
 
 
 def one_of(name: str, value: object, known: Iterable[str]) -> str:
@@ -282,6 +308,6 @@ def one_of(name: str, value: object, known: Iterable[str]) -> str:
     if isinstance(value, str) and value in options:
         return value
     raise ValueError(
-        f"{name}: expected one of {', '.join(options)}, got {shown(repr(value), 60)}"
+        f"{name}: expected one of {', '.join(options)}, got {excerpt(value)}"
         f"{did_you_mean(value, options)}"
     )

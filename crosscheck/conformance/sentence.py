@@ -9,6 +9,9 @@ import difflib
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
+# Of a longer name only the beginning is compared [characters].
+_LONGEST_NAME = 100
+
 
 class Sentence(NamedTuple):
     """A template with named fields, and their values: numbers, names or sentences."""
@@ -36,6 +39,6 @@ def sentence(template: str, /, **values: object) -> Sentence:
 def did_you_mean(value: object, options: Iterable[str]) -> str:
     """Return a question after the nearest option, or "" if none is near."""
     simple = {one.replace("_", "").lower(): one for one in options}
-    word = str(value).replace("_", "").replace("-", "").lower()
+    word = str(value)[:_LONGEST_NAME].replace("_", "").replace("-", "").lower()
     near = difflib.get_close_matches(word, simple, n=1, cutoff=0.6)
     return f"; did you mean {simple[near[0]]}?" if near else ""

@@ -52,6 +52,8 @@ class Task(NamedTuple):
         for field in self.inputs:
             if inputs.get(field.name) is not None:
                 counts |= zip(field.shape, np.shape(inputs[field.name]), strict=True)
+        if "steps" in inputs:
+            counts["frame"] = inputs["steps"]
         return {word: count for word, count in counts.items() if isinstance(word, str)}
 
 

@@ -4,13 +4,14 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-from reference.formats.source import LARGEST
+from reference.formats.source import read_bytes
 
 URDF, MJCF, BVH = "URDF", "MJCF", "BVH"
 # The content of an <include> in other files, not a model by itself.
 FRAGMENT = "fragment"
-# The root element, after a declaration, a document type and comments.
-FIRST = re.compile(r"\s*(?:<\?.*?\?>|<!--.*?-->|<![A-Za-z].*?>|\s+)*<([^\s<>/!?]+)", re.DOTALL)
+# The root element, after a declaration, a document type and comments; possessive, so that a file
+# without a root element is read once.
+FIRST = re.compile(r"(?:<\?.*?\?>|<!--.*?-->|<![A-Za-z].*?>|\s++)*+<([^\s<>/!?]+)", re.DOTALL)
 BY_SUFFIX = {".urdf": URDF, ".bvh": BVH}
 BY_ROOT = {"robot": URDF, "mujoco": MJCF, "mujocoinclude": FRAGMENT}
 XML = (".xml", ".mjcf")
@@ -23,8 +24,8 @@ def xml_root(path: Path) -> ElementTree.Element:
         ValueError: if it cannot be opened, or is not well-formed.
     """
     try:
-        return ElementTree.fromstring(path.read_bytes().lstrip())
-    except (OSError, ElementTree.ParseError) as error:
+        return ElementTree.fromstring(read_bytes(path).lstrip())
+    except ElementTree.ParseError as error:
         raise ValueError(str(error)) from None
 
 
@@ -35,13 +36,12 @@ def file_kind(path: Path) -> str:
     another format.
 
     Raises:
-        OSError: if it cannot be opened.
+        ValueError: if it cannot be read.
     """
     suffix = path.suffix.lower()
     if suffix in BY_SUFFIX or suffix not in XML:
         return BY_SUFFIX.get(suffix, "")
-    with path.open("rb") as file:
-        text = file.read(LARGEST).decode(errors="replace").removeprefix("\ufeff")
+    text = read_bytes(path).decode(errors="replace").removeprefix("\ufeff")
     found = FIRST.match(text)
     kind = BY_ROOT.get(found[1], "") if found else ""
     if kind == MJCF and not ("<worldbody" in text or "<include" in text):

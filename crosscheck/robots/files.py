@@ -226,7 +226,7 @@ def _without_settings(file: File, folder: Path) -> File:
 def _kind(path: Path) -> str:
     try:
         return file_kind(path)
-    except OSError:
+    except ValueError:
         return ""
 
 

@@ -27,7 +27,7 @@ def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST) -> str:
         ValueError: if the file does not exist, is not regular, cannot be read, is larger than
             `largest` bytes, contains a NUL byte or is not UTF-8.
     """
-    data = _bytes(path, largest)
+    data = read_bytes(path, largest=largest)
     if b"\0" in data:
         raise ValueError(f"{path}: expected text, got a NUL byte at offset {data.index(0)}")
     try:
@@ -51,7 +51,13 @@ def checked_path(path: str | os.PathLike[str]) -> str:
     return given
 
 
-def _bytes(path: str | os.PathLike[str], largest: int) -> bytes:
+def read_bytes(path: str | os.PathLike[str], *, largest: int = LARGEST) -> bytes:
+    """Return the content of a file; read at most `largest` + 1 bytes of it.
+
+    Raises:
+        ValueError: if the file does not exist, is not regular, cannot be read, or is larger than
+            `largest` bytes.
+    """
     path = checked_path(path)
     try:
         if not Path(path).exists():

@@ -1,9 +1,11 @@
 """Workers of a Dask cluster: the same answers as one process, each row once, whoever is lost."""
 
+import contextlib
 import json
 import os
 import pickle
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -114,6 +116,43 @@ def test_a_scheduler_that_does_not_answer_is_misuse_soon():
     with pytest.raises(ValueError, match=r"expected a Dask scheduler, got no answer within 0\.5 s"):
         dask.DaskExecutor("127.0.0.1:9", answer=0.5)
     assert time.monotonic() - begin < 10
+
+
+OTHERS = {
+    "silence": (b"", "got no answer within 0.5 s"),
+    "garbage": (b"garbage " * 1000, "got an answer of something else"),
+    "zeros": (bytes(8000), "got an answer of something else"),
+    "HTTP": (b"HTTP/1.0 400 Bad Request\r\n\r\n", "got an answer of something else"),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_another_server_at_the_address_is_misuse_soon(name):
+    """A Client waits for its answer for ever, so that this one has a process of its own."""
+    pytest.importorskip("distributed", reason=INSTALLED)
+    answer, why = OTHERS[name]
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        threading.Thread(target=_serve, args=(server, answer), daemon=True).start()
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        program = (
+            "from bench.executors.dask import DaskExecutor\n"
+            f"try: DaskExecutor('{address}', answer=0.5)\n"
+            "except ValueError as error: print(error)"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", program],
+            cwd=ROOT, capture_output=True, text=True, check=True, timeout=90,
+        )  # fmt: skip
+    assert done.stdout == f"dask://{address}: expected a Dask scheduler, {why}\n"
+    assert not done.stderr
+
+
+def _serve(server, answer):
+    connections = []
+    with contextlib.suppress(OSError):
+        while True:
+            connections.append(server.accept()[0])
+            connections[-1].sendall(answer)
 
 
 # A cluster made up: hosts, workers and machines that come and go as we say.

@@ -47,7 +47,7 @@ def read_greeting(folder: Path) -> Greeting:
     path = folder / GREETING
     if not path.is_file():
         raise ValueError(f"answers: expected a folder of exported cases, got {folder}")
-    return message.decode_greeting(_object(path.read_bytes(), GREETING), GREETING)
+    return message.decode_greeting(_object(_content(path), GREETING), GREETING)
 
 
 def _object(data: bytes, name: str) -> dict[str, Any]:
@@ -79,7 +79,7 @@ class FileContestant:
         self.folder = folder
         if not (folder / SETTINGS).is_file():
             raise ValueError(f"answers: expected a folder of exported cases, got {folder}")
-        settings = _object((folder / SETTINGS).read_bytes(), SETTINGS)
+        settings = _object(_content(folder / SETTINGS), SETTINGS)
         self.seed, self.thorough = int(settings.get("seed", 0)), bool(settings.get("thorough"))
 
     @property
@@ -149,7 +149,7 @@ def _is_asked(place: Path, case: Case) -> bool:
     path = place / REQUEST
     if not path.is_file():
         return False
-    then, now = _object(path.read_bytes(), REQUEST), json.loads(message.encode_case(0, case))
+    then, now = _object(_content(path), REQUEST), json.loads(message.encode_case(0, case))
     return then | {"id": 0} == now
 
 
@@ -183,9 +183,9 @@ def _fields(place: Path, task: Task, case: Case) -> Mapping[str, Any]:
 
 
 def _content(path: Path) -> bytes:
-    if path.stat().st_size > LIMITS.line:
-        raise ValueError(f"{path.name}: expected at most {LIMITS.line} bytes, got more")
-    return path.read_bytes()
+    from reference.formats.source import read_bytes  # which the host of Python solvers never needs
+
+    return read_bytes(path, largest=LIMITS.line)
 
 
 def _absent(place: Path, task: Task) -> Sentence:

@@ -31,6 +31,7 @@ from ..message import (
     decode_greeting,
     decode_request,
     encode_answer,
+    excerpt,
 )
 from ..sentence import did_you_mean
 from ..task import TASKS
@@ -59,7 +60,9 @@ class Solver:
 
     def __init__(self, found: object, name: str, declared: object) -> None:
         if not isinstance(declared, Mapping) or not all(isinstance(one, str) for one in declared):
-            raise OfferError(f"PLUMBOB: expected a dict with texts as keys, got {declared!r}")
+            raise OfferError(
+                f"PLUMBOB: expected a dict with texts as keys, got {excerpt(declared)}"
+            )
         methods = declared.get("methods") or ()
         methods = methods if isinstance(methods, list | tuple) else ()
         self.functions = _functions(found, methods)

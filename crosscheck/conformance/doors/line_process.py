@@ -14,16 +14,16 @@ import selectors
 import signal
 import subprocess
 import time
-import uuid
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..contestant import Failure, FailureKind
 from ..message import shown
 from ..sentence import Sentence, sentence
-from .processes import HAS_PROC, MARKER, dismiss, end_group, family, guard
+from .processes import HAS_PROC, MARKER, carry, dismiss, end_group, family, guard, new_marker
 
 # How often a process that lets one wait is looked at [s], as often as the looking is cheap.
 TICK = 0.05 if HAS_PROC else 0.5
@@ -58,7 +58,7 @@ class Limits(NamedTuple):
         request: for any other request [s].
         leave: to end once its input has ended [s].
         memory: together with all that it starts [B].
-        line: the longest line that it may answer [B].
+        line: the longest line that it may answer, read within seconds whatever it holds [B].
         prints: the most lines beside an answer.
     """
 
@@ -66,7 +66,7 @@ class Limits(NamedTuple):
     request: float = 10.0
     leave: float = 2.0
     memory: int = 4 << 30
-    line: int = 1 << 26
+    line: int = 1 << 24
     prints: int = 10_000
 
 
@@ -103,7 +103,7 @@ class LineProcess:
 
     def __init__(self, command: Sequence[str], folder: Path | None, limits: Limits) -> None:
         self._limits = limits
-        self._marker = uuid.uuid4().hex
+        self._marker = new_marker()
         self._process = _start(command, folder, self._marker)
         self._unsent = bytearray()
         self._sent = 0
@@ -116,7 +116,12 @@ class LineProcess:
         for pipe in (self._process.stdout, self._process.stderr):
             self._selector.register(pipe, selectors.EVENT_READ)
         self._end = weakref.finalize(
-            self, _end, self._process, guard(self._process.pid), self._marker, self._selector
+            self,
+            _end,
+            self._process,
+            guard(self._process.pid, self._marker),
+            self._marker,
+            self._selector,
         )
 
     def send(self, line: bytes) -> None:
@@ -256,7 +261,7 @@ class LineProcess:
             self._exchange(0.0)
             if len(self._received) == before:
                 raise self._silent()
-        members = family(self._process.pid)
+        members = family(self._process.pid, self._marker)
         if sum(one.memory for one in members) > self._limits.memory:
             raise LostError(
                 FailureKind.MEMORY,
@@ -355,7 +360,7 @@ def _read(pipe: Any) -> bytes | None:
         return None
 
 
-def _start(command: Sequence[str], folder: Path | None, marker: str) -> Any:
+def _start(command: Sequence[str], folder: Path | None, marker: int) -> Any:
     try:
         process: Any = subprocess.Popen(
             command,
@@ -364,8 +369,10 @@ def _start(command: Sequence[str], folder: Path | None, marker: str) -> Any:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             cwd=folder,
-            env=os.environ | {MARKER: marker},
+            env=os.environ | {MARKER: str(marker)},
             start_new_session=True,
+            # A limit that is set later would miss what the program starts at once.
+            preexec_fn=partial(carry, marker) if HAS_PROC else None,
         )
     except (OSError, ValueError) as error:
         raise LostError(FailureKind.CRASHED, _not_started(command[0], error)) from None
@@ -401,7 +408,7 @@ def _not_started(program: str, error: Exception) -> Sentence:
 
 
 def _end(
-    process: Any, guard: subprocess.Popen[bytes], marker: str, selector: selectors.BaseSelector
+    process: Any, guard: subprocess.Popen[bytes], marker: int, selector: selectors.BaseSelector
 ) -> None:
     end_group(process.pid, marker)
     with contextlib.suppress(subprocess.TimeoutExpired):  # what the system does not let go

@@ -1,12 +1,16 @@
 """What a program has started: found, measured and ended.
 
 A program's family is its process group and session, all that descend from it, and all that carry
-its marker in the environment that they were started with: those that fork twice and leave the
-session are found by it. Where /proc is missing (macOS), `ps` is asked and the marker is not seen.
+its marker: those that fork twice and leave the session are found by it. The marker is a number. It
+stands in the environment and, on Linux, is the limit of real-time computing: processes inherit
+limits through every fork, setsid and exec, and one of tens of thousands of years limits nothing.
+Where /proc is missing (macOS), `ps` is asked and the marker is not seen.
 """
 
 import contextlib
 import os
+import resource
+import secrets
 import signal
 import subprocess
 import time
@@ -18,9 +22,16 @@ MARKER = "PLUMBOB_CONTESTANT"
 # What forks while it is being ended is looked for again, so often and after so long [s].
 ROUNDS, PAUSE = 200, 0.005
 _PROC = Path("/proc")
+_LIMIT = getattr(resource, "RLIMIT_RTTIME", None)
 _TICKS = os.sysconf("SC_CLK_TCK")
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 HAS_PROC = (_PROC / "self" / "stat").exists()
+# Until the input ends; then the group, and thrice, for those that fork meanwhile, what carries $2.
+_GUARD = (
+    'read line || { kill -KILL "-$1"; for again in 1 2 3; do '
+    'for file in $(grep -ls " $2 " /proc/[0-9]*/limits); do '
+    'file=${file%/limits}; kill -KILL "${file#/proc/}"; done; done; }'
+)
 
 
 class Process(NamedTuple):
@@ -41,12 +52,29 @@ class Process(NamedTuple):
     runs: bool
 
 
-def family(leader: int, marker: str = "") -> list[Process]:
+def new_marker() -> int:
+    """Return a number that no other program carries, at most a limit that this process has."""
+    hard = resource.getrlimit(_LIMIT)[1] if _LIMIT is not None else 0
+    return (hard if hard >= 1 << 60 else 1 << 61) - secrets.randbits(48)
+
+
+def carry(marker: int) -> None:
+    """Let this process and all that it starts carry a marker, where the system allows it.
+
+    A child calls this between fork and exec, where other threads' locks stay locked: so it does
+    nothing else.
+    """
+    if _LIMIT is not None:
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(_LIMIT, (marker, marker))
+
+
+def family(leader: int, marker: int = 0) -> list[Process]:
     """Return the running processes that a program has started, itself among them.
 
     Args:
         leader: the program's process, leader of its group and session.
-        marker: what MARKER is in its environment; "" saves the search for it.
+        marker: what the program carries; 0 saves the search for it.
     """
     running = {one.pid: one for one in _running()}
     found = {
@@ -62,7 +90,7 @@ def family(leader: int, marker: str = "") -> list[Process]:
     return [running[pid] for pid in sorted(found - {os.getpid()})]
 
 
-def end_group(leader: int, marker: str = "") -> None:
+def end_group(leader: int, marker: int = 0) -> None:
     """Kill a program and all that it has started.
 
     The leader must not have been waited for, so that its number is still its own.
@@ -79,10 +107,10 @@ def end_group(leader: int, marker: str = "") -> None:
         time.sleep(PAUSE)
 
 
-def guard(leader: int) -> subprocess.Popen[bytes]:
-    """Start a process that kills a program's group should this one die, by whatever means."""
+def guard(leader: int, marker: int) -> subprocess.Popen[bytes]:
+    """Start a process that kills a program's family should this one die, by whatever means."""
     return subprocess.Popen(
-        ["/bin/sh", "-c", 'read line || kill -KILL "-$1"', "sh", str(leader)],
+        ["/bin/sh", "-c", _GUARD, "sh", str(leader), str(marker)],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -134,7 +162,9 @@ def _seconds(used: str) -> float:
     return 86400.0 * int(days or 0) + seconds
 
 
-def _carries(pid: int, marker: str) -> bool:
+def _carries(pid: int, marker: int) -> bool:
     with contextlib.suppress(OSError):
+        if _LIMIT is not None and resource.prlimit(pid, _LIMIT)[1] == marker:
+            return True
         return f"{MARKER}={marker}".encode() in (_PROC / str(pid) / "environ").read_bytes()
     return False

@@ -229,7 +229,23 @@ def test_what_a_file_says_of_itself_is_its_greeting(inside):
         ),
         (
             "PLUMBOB = {'max_joints': object()}\ndef energy(masses): pass",
-            "PLUMBOB: max_joints: expected an integer, got",
+            "PLUMBOB: max_joints: expected an integer of 1 or more, got",
+        ),
+        (
+            "PLUMBOB = {'name': 'x' * 10**6}\ndef energy(masses): pass",
+            "PLUMBOB: name: expected a text of at most 100 characters, got 1000000 characters: ",
+        ),
+        (
+            "PLUMBOB = {'step': {'substeps': 100000}}\ndef energy(masses): pass",
+            "PLUMBOB: step: substeps: expected an integer from 1 to 1000, got 100000",
+        ),
+        (
+            "PLUMBOB = {'methods': ['ccd'] * 5000}\ndef ccd(target): pass",
+            "PLUMBOB: methods: expected a list of .*, at most 20 of them, got 5000 entries",
+        ),
+        (
+            "PLUMBOB = ['x' * 10**6] * 3\ndef energy(masses): pass",
+            "PLUMBOB: expected a dict with texts as keys, got 3 entries: ",
         ),
         ("PLUMBOB = {3: 4}\ndef energy(masses): pass", "PLUMBOB: expected a dict with texts"),
         ("def f(:\n  pass", "raised: It raised SyntaxError in line 1 of my_ik.py: invalid syntax"),

@@ -2,6 +2,7 @@
 
 import json
 import re
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis.extra import numpy as arrays
 
 from crosscheck.conformance.case import Case
 from crosscheck.conformance.contestant import Answer, Failure, FailureKind
+from crosscheck.conformance.functions import understand
 from crosscheck.conformance.message import (
     decode_answer,
     decode_greeting,
@@ -277,9 +279,9 @@ def test_a_greeting_says_all():
         ({"precision": "float"}, "precision: expected 'single' or 'double', got 'float'"),
         ({"presicion": "single"}, "got 'presicion'; did you mean precision?"),
         ({"chains_only": "yes"}, "chains_only: expected a boolean, got 'yes'"),
-        ({"max_joints": 1.5}, "max_joints: expected an integer, got 1.5"),
-        ({"max_joints": 0}, "max_joints: expected 1 or more, got 0"),
-        ({"methods": "ccd"}, "methods: expected a list of texts, got 'ccd'"),
+        ({"max_joints": 1.5}, "max_joints: expected an integer of 1 or more, got 1.5"),
+        ({"max_joints": 0}, "max_joints: expected an integer of 1 or more, got 0"),
+        ({"methods": "ccd"}, "methods: expected a list of texts of .*, got 'ccd'"),
         ({"step": "implicit"}, "step: expected an object, got 'implicit'"),
         ({"step": {"damper": "some"}}, "step: damper: expected 'none' or 'explicit' or"),
         ({"step": {"substep": 3}}, "step: expected one of .*; did you mean substeps?"),
@@ -290,6 +292,72 @@ def test_a_greeting_says_all():
 def test_a_greeting_that_is_not_understood_says_what_to_mend(fields, words):
     with pytest.raises(ValueError, match=f"greeting: .*{words}"):
         decode_greeting(greeting(**fields))
+
+
+LONG, MANY = "x" * 10**6, [f"m{i}" for i in range(5000)]
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"protocol": LONG}, "protocol: expected 1, got 1000000 characters: 'xxx"),
+        ({"tasks": LONG}, "tasks: expected some of .*, got 1000000 characters: 'xxx"),
+        ({"tasks": [LONG]}, "tasks: expected one of .*, got 1000000 characters: 'xxx"),
+        ({LONG: 1}, "expected one of .*, got 1000000 characters: 'xxx"),
+        ({"step": MANY}, "step: expected an object, got 5000 entries: \\['m0', "),
+        ({"name": LONG}, "name: expected a text of at most 100 characters, got 1000000 char"),
+        ({"version": LONG}, "version: expected a text of at most 100 characters, got 1000000"),
+        ({"language": LONG}, "language: expected a text of at most 100 characters, got 1000000"),
+        ({"methods": MANY}, "methods: expected a list of .*, at most 20 of them, got 5000 entries"),
+        ({"methods": ["x" * 41]}, "methods: expected a list of texts of at most 40 characters, "),
+        ({"step": {"iterations": 10**5}}, "step: iterations: expected an integer from 1 to 1000,"),
+        ({"step": {"iterations": 0}}, "step: iterations: expected .* from 1 to 1000, got 0"),
+        ({"step": {"substeps": 10**5}}, "substeps: expected .* from 1 to 1000, got 100000"),
+        ({"step": {"substeps": -1}}, "step: substeps: expected .* from 1 to 1000, got -1"),
+        (
+            {"step": {"substeps": 50, "iterations": 50}},
+            "iterations: expected at most 1000 in all substeps together, got 2500",
+        ),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_a_greeting_beyond_a_limit_is_refused_in_a_short_sentence(fields, words):
+    with pytest.raises(ValueError, match=f"greeting: .*{words}") as error:
+        decode_greeting(greeting(**fields))
+    assert len(str(error.value)) < 400
+
+
+def test_a_greeting_at_its_limits_is_understood():
+    fields = greeting(name="x" * 100, methods=MANY[:20], step={"iterations": 2, "substeps": 500})
+    assert decode_greeting(fields).methods == tuple(MANY[:20])
+
+
+def test_a_motion_of_more_frames_than_steps_is_no_answer():
+    motion = {name: np.zeros((2, 3)) for name in ("positions", "velocities")}
+    words = re.escape("positions: expected shape (4, 2, 3), got (5, 2, 3)")
+    line = encode_answer(1, positions=np.zeros((5, 2, 3)))
+    failure = decoded(line, "mass_spring_motion", **motion, steps=4)
+    assert re.search(words, str(failure.sentence))
+
+
+def test_an_answer_of_any_length_ends_at_a_limit():
+    """The judge looks at every point of a resampled curve."""
+    inputs = {"curve": np.zeros((2, 3)), "strokes": np.zeros(1, dtype=int), "closed": False}
+    right = decoded(encode_answer(1, points=np.zeros((1000, 3))), "resample", **inputs)
+    assert right.values["points"].shape == (1000, 3)
+    failure = decoded(encode_answer(1, points=np.zeros((1001, 3))), "resample", **inputs)
+    assert "points: expected at most 1000 rows, got 1001" in str(failure.sentence)
+
+
+def test_texts_among_numbers_take_no_memory_in_proportion_to_the_longest():
+    """As NumPy's arrays of texts do: 4,000 bytes times a million, here."""
+    values = ["x" * 1000, *[""] * 10**6]
+    tracemalloc.start()
+    with pytest.raises(ValueError, match="positions: expected numbers"):
+        understand(TASKS["forward_kinematics"], {"joint": 2}, {"positions": values})
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 100e6
 
 
 def test_a_name_far_from_all_has_no_hint():

@@ -37,12 +37,12 @@ def brood(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-I", "-S", str(file)],
         stdout=subprocess.PIPE,
-        env=os.environ | {MARKER: tmp_path.name},
+        env=os.environ | {MARKER: "1234567"},
         start_new_session=True,
     )
     process.stdout.readline()
     yield process
-    end_group(process.pid, tmp_path.name)
+    end_group(process.pid, 1234567)
     process.communicate()
     assert not running(tmp_path)
 
@@ -67,9 +67,9 @@ def wait_for(condition, seconds=5.0):
 def test_a_family_is_group_descendants_and_what_carries_the_marker(brood, source, tmp_path):
     wait_for(lambda: len(family(brood.pid)) == 3)
     if source == "proc":
-        wait_for(lambda: len(family(brood.pid, tmp_path.name)) == 4)
-    assert len(family(brood.pid, "of another")) == 3
-    assert os.getpid() not in [one.pid for one in family(brood.pid, tmp_path.name)]
+        wait_for(lambda: len(family(brood.pid, 1234567)) == 4)
+    assert len(family(brood.pid, 7654321)) == 3
+    assert os.getpid() not in [one.pid for one in family(brood.pid, 1234567)]
 
 
 def test_memory_is_measured(brood, source):
@@ -79,7 +79,7 @@ def test_memory_is_measured(brood, source):
 
 def test_a_group_is_ended_with_all_that_can_be_found(brood, source, tmp_path):
     wait_for(lambda: len(family(brood.pid)) == 3)
-    end_group(brood.pid, tmp_path.name)
+    end_group(brood.pid, 1234567)
     assert family(brood.pid) == []
     assert brood.wait() == -signal.SIGKILL
 
@@ -153,13 +153,12 @@ def test_a_judge_that_is_killed_takes_the_program_with_it(tmp_path, end):
 def test_each_contestant_has_one_guard_and_it_leaves(tmp_path):
     contestant = program(tmp_path, "pass")
     contestant.answer(case(2))
-    pid = contestant._process._process.pid
+    pid, marker = contestant._process._process.pid, contestant._process._marker
 
     def guards():
         listed = subprocess.run(["ps", "-A", "-ww", "-o", "args="], capture_output=True, check=True)
-        return listed.stdout.splitlines().count(
-            f'/bin/sh -c read line || kill -KILL "-$1" sh {pid}'.encode()
-        )
+        lines = listed.stdout.decode().splitlines()
+        return sum("read line ||" in one and one.endswith(f" sh {pid} {marker}") for one in lines)
 
     assert guards() == 1
     contestant.close()

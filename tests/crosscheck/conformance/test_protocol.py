@@ -15,7 +15,8 @@ from crosscheck.conformance import schema
 from crosscheck.conformance.case import Case
 from crosscheck.conformance.contestant import Answer, Failure, FailureKind
 from crosscheck.conformance.doors import LIMITS, open_contestant
-from crosscheck.conformance.greeting import PROTOCOL, Greeting
+from crosscheck.conformance.functions import MOST_POINTS
+from crosscheck.conformance.greeting import MOST_ITERATIONS, PROTOCOL, Greeting
 from crosscheck.conformance.message import encode_case, encode_greeting
 from crosscheck.conformance.sentence import sentence
 from crosscheck.conformance.task import TASKS
@@ -121,6 +122,28 @@ def test_the_page_names_what_a_greeting_may_hold_and_how_long_one_waits():
         assert method in PAGE
     assert f"take {LIMITS.first:.0f} s, any other {LIMITS.request:.0f} s" in PAGE
     assert f"{LIMITS.memory >> 30} GiB" in PAGE
+    assert f"an answer may have {LIMITS.line >> 20} MiB" in PAGE
+
+
+def limits_of(parts):
+    """The limits of fields: name, number or words, and reason."""
+    for part in parts.values():
+        for name, field in part.get("properties", {}).items():
+            for kind in [field, *field.get("anyOf", []), *filter(None, [field.get("items")])]:
+                most = [kind[key] for key in ("maxLength", "maxItems", "maximum") if key in kind]
+                if most and "description" in kind:
+                    yield name, most[0], kind["description"]
+
+
+def test_the_page_says_every_limit_of_a_greeting():
+    table = PAGE.split("beyond these limits is refused.")[1].split("\n## ")[0].splitlines()
+    parts = {name: SCHEMA["$defs"][name] for name in ("greeting", "System", "Step")}
+    limits = list(limits_of(parts))
+    assert len(limits) == 7
+    for name, most, reason in limits:
+        assert any(f"`{name}`" in row and f"{most}" in row and reason in row for row in table), name
+    assert f"and {MOST_ITERATIONS} iterations in all substeps" in PAGE
+    assert f"An answer has at most {MOST_POINTS} points." in " ".join(PAGE.split())
 
 
 @pytest.mark.parametrize("task", TASKS)
