@@ -30,7 +30,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, floats, instance
+from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, instance, number
 from ..mass_spring import lengths
 from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor, factorize
@@ -123,9 +123,10 @@ class Certificate:
             ValueError: if the other is no certificate, or the distance no number of at least 0.
         """
         instance("other", other, Certificate)
-        apart = float(floats("apart", apart))
-        if not apart >= 0.0:
-            raise ValueError(f"apart: expected a distance of at least 0, got {apart}")
+        return self.shares_minimiser_within(other, number("apart", apart, least=0.0))
+
+    def shares_minimiser_within(self, other: "Certificate", apart: float) -> bool | None:
+        """Do what `shares_minimiser` does, of a distance that is not checked."""
         if not (self.covered and other.covered):
             return None
         one, two = apart * SLACK + other.distance, apart * SLACK + self.distance

@@ -207,13 +207,15 @@ class Objective:
         return _rounding_bounds(positions, y, external, h, *springs)
 
     def residual(self, iterate: Iterate) -> float:
-        """Return |grad g(x)| / max(|grad g(y)|, floor).
+        """Return |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows at x or at y.
 
         Raises:
             ValueError: if it is no iterate, such as the positions of one.
         """
         if instance("iterate", iterate, Iterate).gradient_norm == 0.0:
             return 0.0
+        if not (iterate.finite and self.inertial.finite):
+            return math.inf
         scale = self.inertial.gradient_norm
         if scale < iterate.floor_bound:
             scale = max(scale, iterate.floor)
