@@ -31,9 +31,10 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, instance, number
-from ..mass_spring import lengths
+from ..backend.compiled import Kernel
 from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor, factorize
+from ..springs import spring_lengths
 from .objective import Objective
 
 EPS = float(np.finfo(float).eps)
@@ -145,10 +146,15 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     """
     system = instance("objective", objective, Objective).system
     x = coordinates("positions", positions, system.particle_count, 3)
-    with np.errstate(over="ignore", invalid="ignore"):
-        here = objective.iterate_at(x)
-        if not (here.finite and objective.inertial.finite):
-            return Certificate(math.inf, Coverage.OVERFLOWN)
+    with np.errstate(all="ignore"):  # bounds that overflow prove nothing, nor does NaN
+        return _certificate(objective, x)
+
+
+def _certificate(objective: Objective, x: FloatArray) -> Certificate:
+    """Return the certificate of checked positions."""
+    system, here = objective.system, objective.iterate_at(x)
+    if not (here.finite and objective.inertial.finite):
+        return Certificate(math.inf, Coverage.OVERFLOWN)
     residual = objective.residual(here)
     if not np.array_equal(x[system.pinned], objective.y[system.pinned]):
         return Certificate(residual, Coverage.PINS_ASTRAY)
@@ -201,8 +207,8 @@ def least_curvature(H: Any, error: float) -> tuple[float, Factor | None]:
             if _is_definite(factor, H - shift * scipy.sparse.eye_array(n, format="csc")):
                 return shift - allowance, factor
             shift /= 2.0
-    except NotPositiveDefiniteError:
-        pass
+    except (NotPositiveDefiniteError, scipy.sparse.linalg.ArpackError, ZeroDivisionError):
+        pass  # the last two where numbers of the inverse overflow or vanish
     return 0.0, None
 
 
@@ -229,7 +235,7 @@ def hessian_change(objective: Objective, x: FloatArray, radius: float) -> tuple[
         COVERED and L, or the reason why g may not be twice differentiable there and NaN.
     """
     system, ends = objective.effective, objective.effective.springs
-    k, r, length = objective.h**2 * system.stiffnesses, system.rest_lengths, lengths(system, x)
+    k, r, length = objective.h**2 * system.stiffnesses, system.rest_lengths, _lengths(x, ends)
     free_ends = system.free[ends].sum(axis=1)
     error = GRADIENT_ROUNDING * EPS * (length + _rest_length_terms(objective))
     reach = SLACK * np.sqrt(free_ends) * radius + error
@@ -268,7 +274,7 @@ def rounding_errors(objective: Objective, x: FloatArray) -> RoundingErrors:
     rounding errors of y, of the external forces and of the effective springs.
     """
     system, h, springs = objective.system, objective.h, objective.effective.springs
-    k, length = h * h * objective.effective.stiffnesses, lengths(objective.effective, x)
+    k, length = h * h * objective.effective.stiffnesses, _lengths(x, springs)
     rest_terms, m, free = _rest_length_terms(objective), system.masses, system.free
     coordinate_norms = _norms(x) + _norms(objective.y) + _norms(objective.x_n)
     loads = _norms(objective.external) + m * np.linalg.norm(system.gravity)
@@ -328,3 +334,6 @@ def _sum_over_springs(
 
 def _norms(vectors: FloatArray) -> FloatArray:
     return np.linalg.norm(vectors, axis=1)
+
+
+_lengths = Kernel(spring_lengths)
