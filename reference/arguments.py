@@ -349,7 +349,7 @@ class KeepsReadOnly:
 
 
 def snapshot(name: str, value: Any) -> Any:
-    """Return a copy of an array or a list, so that a later change has no effect; else the value.
+    """Return a copy of an array or a list, which later changes do not reach; else the value.
 
     Raises:
         ValueError: if there is no memory for it.

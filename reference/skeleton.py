@@ -142,7 +142,9 @@ def _checked_tree(parents: ArrayLike, offsets: ArrayLike) -> tuple[IndexArray, F
     count = len(offsets)
     if count == 0:
         raise ValueError("offsets: expected at least one joint, got none")
-    arguments.sizes("offsets", np.linalg.norm(offsets, axis=-1)[1:], "link")
+    links = np.linalg.norm(offsets, axis=-1)
+    links[0] = 0.0
+    arguments.sizes("offsets", links, "joint")
     parents = arguments.indices("parents", parents, count, least=-1, below=count)
     roots = np.flatnonzero(parents == -1)
     if len(roots) != 1:

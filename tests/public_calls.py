@@ -506,7 +506,7 @@ def _scenes():
 
 def _trees_of_numbers():
     """Return calls whose arguments are the numbers of a skeleton or a robot as well."""
-    tree_of = functools.partial(Skeleton, [-1, 0, 1, 1, 3, 4])
+    tree_of = functools.partial(Skeleton, [-1, 0, 1, 1, 3, 4], names=list("abcdef"))
     kinds = ["fixed", "hinge", "slide", "ball", "hinge", "free"]
 
     def robot_of(offsets, axes, lower, upper, cones, multiplier, shift):
@@ -543,7 +543,10 @@ def _trees_of_numbers():
     points, turns = RNG().uniform(-0.5, 0.5, (4, 3)), rotation.random(RNG(), 4)
     v = RNG().uniform(-1.0, 1.0, (3, model.freedom_count))
     tolerances = {"tolerance": 1e-4, "tolerance_rotation": 1e-4}
-    smooth = functools.partial(reference.track, coherent=True, closed=True, max_iterations=8)
+    smooth = functools.partial(
+        reference.track, effector="f", coherent=True, closed=True, max_iterations=8
+    )
+    judged = functools.partial(reference.judge_pose, effector="f")
     posed = {"position": points[0], "rotation": turns[0], "weight": 2.0}
     place = reference.forward_kinematics(tree(), local).positions
     table = {
@@ -553,9 +556,9 @@ def _trees_of_numbers():
         "jacobians.integrate": (differential.integrate, None, {"q": q, "v": v}),
         "jacobians.difference": (differential.difference, None, {"q1": q, "q0": q0}),
         "tracking.track": (smooth, {"curve": points, **tolerances}, {"curve": points}),
-        "judging.pose.judge_pose": (reference.judge_pose,
-                                    {"pose": local, "target": points[0], "positions": place},
-                                    {"pose": q[0], "target": points[0], "positions": place}),
+        "judging.pose.judge_pose": (
+            judged, {"pose": local, "target": points[0], "positions": place},
+            {"pose": q[0], "target": points[0], "positions": place}),
         "formats.bvh.writer.format": (bvh.format, {"local_rotations": local[None]}, None),
         "articulation.Articulation.random": (drawn, None, {}),
     }  # fmt: skip
@@ -566,21 +569,19 @@ def _trees_of_numbers():
         table[f"inverse_kinematics.solve_ik, {solver} poses"] = (
             functools.partial(reached, solver=solver), None, posed | tolerances,
         )  # fmt: skip
-    names = "q local_rotations target mimics names effector parents"
+    given = {"names": "q local_rotations target mimics names effector parents",
+             "free": "local_rotations q q0 q1 v curve target position rotation"}  # fmt: skip
+    limited = {"single": "axes lower upper cones", "infinite": "lower upper cones"}
     made = {}
     for name, (function, of_tree, of_model) in table.items():
         key, raises = "reference." + name, (FloatingPointError,) * (function is smooth)
         if of_tree is not None:
             made[key + ", numbers"] = Call(
-                of_balls(function), balls | of_tree, names=names, raises=raises
+                of_balls(function), balls | of_tree, raises=raises, **given
             )
         if of_model is not None:
             made[key + ", robot of numbers"] = Call(
-                of_robot(function),
-                parts | of_model,
-                infinite="lower upper cones",
-                names=names,
-                raises=raises,
+                of_robot(function), parts | of_model, raises=raises, **given, **limited
             )
     return made
 
