@@ -20,7 +20,7 @@ from reference.arguments import array, integer, shown
 
 PROGRAM = Path(border_walk.__file__)
 # What the walks have to be about, so that none of them shrinks unnoticed.
-FEWEST = {"arrays": 2_500, "bounds": 500, "magnitudes": 1_300, "objects": 15_000, "random": 300}
+FEWEST = {"arrays": 9_000, "bounds": 1_200, "magnitudes": 4_500, "objects": 40_000, "random": 600}
 # Arguments that are no number or array in any call, and why.
 WITHOUT_NUMBERS = {
     "reference.implicit_euler.ImplicitEuler.certify: result": "of a StepResult in one call",
