@@ -123,7 +123,7 @@ class Iterate:
         return not (self.value <= other.value or self.value <= other.value + self.value_floor)
 
 
-def checked_result(method: Callable[..., Any]) -> Callable[..., Any]:
+def _finite_result(method: Callable[..., Any]) -> Callable[..., Any]:
     """Let a method of an Objective raise a FloatingPointError where its result overflows."""
 
     @functools.wraps(method)
@@ -238,7 +238,7 @@ class Objective:
             scale = max(scale, iterate.floor)
         return float(iterate.gradient_norm / scale)
 
-    @checked_result
+    @_finite_result
     def value(self, positions: ArrayLike) -> float:
         """Return g(x) [kg m²], up to a constant that depends on the pins.
 
@@ -247,7 +247,7 @@ class Objective:
         """
         return self.evaluate(positions).value
 
-    @checked_result
+    @_finite_result
     def gradient(self, positions: ArrayLike) -> FloatArray:
         """Return grad g(x) = M (x - y) - h² f(x) [kg m], shape (particle, 3), zero at the pins.
 
@@ -256,7 +256,7 @@ class Objective:
         """
         return self.evaluate(positions).gradient
 
-    @checked_result
+    @_finite_result
     def hessian(self, positions: ArrayLike, *, geometric: bool = True) -> Any:
         """Return M + h² K [kg], sparse (3 particle, 3 particle); an identity at the pins.
 
@@ -275,7 +275,7 @@ class Objective:
         hessian.data[springs.diagonal] += np.repeat(self.system.free_masses, 3)
         return hessian
 
-    @checked_result
+    @_finite_result
     def pin_gradient(self, positions: ArrayLike, *, geometric: bool = True) -> FloatArray:
         """Return h² K times the displacement of the pins from x_n to y, shape (particle, 3) [kg m].
 
@@ -298,7 +298,7 @@ class Objective:
         pulls = np.einsum("sab,sb->sa", K, displacement[i] - displacement[j])
         return self.system.with_separate_dampers.free_incidence @ pulls
 
-    @checked_result
+    @_finite_result
     def quadratic_form(self, positions: ArrayLike, d: ArrayLike) -> float:
         """Return g as a quadratic form in x for constant rest vectors d, shape (spring, 3).
 
