@@ -545,6 +545,15 @@ class TestResidual:
         assert result.at_floor
         assert norm <= 2 * floor
 
+    @pytest.mark.parametrize("name", ["value", "quadratic_form"])
+    def test_an_objective_that_overflows_is_an_error(self, name, backend):
+        system = MassSpring([1e75, 1e75], [[0, 1]], 1.0, 1.0)
+        x, v = np.array([[0.0, 0, 0], [2, 0, 0]]), np.full((2, 3), 1e75)
+        objective = ImplicitEuler(system, h=1e75).objective(State(x, v))
+        given = [np.zeros((1, 3))] if name == "quadratic_form" else []
+        with pytest.raises(FloatingPointError, match=f"^{name}: a number left the finite ones"):
+            getattr(objective, name)(x, *given)
+
     @pytest.mark.parametrize("h", [1e72, 1e74])
     def test_beside_a_gradient_that_overflows_no_residual_is_small(self, network, h, backend):
         system, state = network
