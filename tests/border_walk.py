@@ -31,9 +31,8 @@ LARGE = (1e70, 1e76, 1e155, 1e200, 1e308)
 REFUSED, ANYTHING = object(), object()
 SMALL = (1e-70, 1e-155, 1e-200, 1e-308)
 # Magnitudes at, between and beyond the bounds of the rule, for single numbers of an argument.
-EXTREMES = (
-    0.0, 5e-324, 1e-310, 1e-155, 1e-76, 1e-75, 1e-37, 1e-10, 1e10, 1e37, 1e75, 1e76, 1e155, 1e308,
-)  # fmt: skip
+EXTREMES = (0.0, 5e-324, 1e-310, 1e-155, 1e-76, 1e-75, 1e-37, 1e-10)
+EXTREMES += (1e10, 1e37, 1e75, 1e76, 1e155, 1e308)
 
 
 class Unconvertible:

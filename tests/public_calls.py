@@ -536,9 +536,14 @@ def _trees_of_numbers():
     balls = {"offsets": np.array(tree().offsets)}
     model, local = robot(), rotation.random(RNG(), 6)
     parts = {
-        **balls, "axes": np.array(model.axes), "lower": np.full(6, -1.0), "upper": np.full(6, 1.5),
-        "cones": np.full(6, 2.0), "multiplier": 0.5, "shift": 0.1,
-    }  # fmt: skip
+        **balls,
+        "axes": np.array(model.axes),
+        "lower": np.full(6, -1.0),
+        "upper": np.full(6, 1.5),
+        "cones": np.full(6, 2.0),
+        "multiplier": 0.5,
+        "shift": 0.1,
+    }
     q, q0 = model.random(RNG(), 2, 3)
     points, turns = RNG().uniform(-0.5, 0.5, (4, 3)), rotation.random(RNG(), 4)
     v = RNG().uniform(-1.0, 1.0, (3, model.freedom_count))
@@ -550,27 +555,36 @@ def _trees_of_numbers():
     posed = {"position": points[0], "rotation": turns[0], "weight": 2.0}
     place = reference.forward_kinematics(tree(), local).positions
     table = {
-        "kinematics.forward_kinematics": (reference.forward_kinematics,
-                                          {"local_rotations": local}, {"local_rotations": q}),
+        "kinematics.forward_kinematics": (
+            reference.forward_kinematics,
+            {"local_rotations": local},
+            {"local_rotations": q},
+        ),
         "jacobians.jacobians": (differential.jacobians, {"q": local}, {"q": q}),
         "jacobians.integrate": (differential.integrate, None, {"q": q, "v": v}),
         "jacobians.difference": (differential.difference, None, {"q1": q, "q0": q0}),
         "tracking.track": (smooth, {"curve": points, **tolerances}, {"curve": points}),
         "judging.pose.judge_pose": (
-            judged, {"pose": local, "target": points[0], "positions": place},
-            {"pose": q[0], "target": points[0], "positions": place}),
+            judged,
+            {"pose": local, "target": points[0], "positions": place},
+            {"pose": q[0], "target": points[0], "positions": place},
+        ),
         "formats.bvh.writer.format": (bvh.format, {"local_rotations": local[None]}, None),
         "articulation.Articulation.random": (drawn, None, {}),
-    }  # fmt: skip
+    }
     for solver in inverse_kinematics.IK_SOLVERS:
         solve = functools.partial(reference.solve_ik, solver=solver, max_iterations=8, restarts=1)
         given = {"local_rotations": local, "target": points[0], **tolerances}
         table[f"inverse_kinematics.solve_ik, {solver}"] = solve, given, None
         table[f"inverse_kinematics.solve_ik, {solver} poses"] = (
-            functools.partial(reached, solver=solver), None, posed | tolerances,
-        )  # fmt: skip
-    given = {"names": "q local_rotations target mimics names effector parents",
-             "free": "local_rotations q q0 q1 v curve target position rotation"}  # fmt: skip
+            functools.partial(reached, solver=solver),
+            None,
+            posed | tolerances,
+        )
+    given = {
+        "names": "q local_rotations target mimics names effector parents",
+        "free": "local_rotations q q0 q1 v curve target position rotation",
+    }
     limited = {"single": "axes lower upper cones", "infinite": "lower upper cones"}
     made = {}
     for name, (function, of_tree, of_model) in table.items():
@@ -590,19 +604,29 @@ def _systems_of_numbers():
     """Return calls whose arguments are the numbers of a system and its state as well."""
     model, state = system()
     parts = {
-        "masses": np.array(model.masses), "rest_lengths": np.full(7, 0.9),
-        "stiffnesses": np.full(7, 50.0), "dampings": np.full(7, 0.5),
+        "masses": np.array(model.masses),
+        "rest_lengths": np.full(7, 0.9),
+        "stiffnesses": np.full(7, 50.0),
+        "dampings": np.full(7, 0.5),
         "gravity": np.array([0.0, -9.81, 1.0]),
-    }  # fmt: skip
+    }
     moving = {"positions": np.array(state.positions), "velocities": np.array(state.velocities)}
-    loads = {"external_forces": RNG().uniform(-1.0, 1.0, (5, 3)),
-             "pin_positions": np.array([[0.1, 0.0, 0.0]])}  # fmt: skip
+    loads = {
+        "external_forces": RNG().uniform(-1.0, 1.0, (5, 3)),
+        "pin_positions": np.array([[0.1, 0.0, 0.0]]),
+    }
 
     def of_system(function):
         def call(gravity, positions, velocities, **given):
             values = {name: given.pop(name) for name in parts if name != "gravity"}
-            made = MassSpring(values.pop("masses"), model.springs, **values, pinned=[0],
-                              gravity=gravity, tension_only=model.tension_only)  # fmt: skip
+            made = MassSpring(
+                values.pop("masses"),
+                model.springs,
+                **values,
+                pinned=[0],
+                gravity=gravity,
+                tension_only=model.tension_only,
+            )
             return function(made, State(positions, velocities), **given)
 
         return call
@@ -620,11 +644,15 @@ def _systems_of_numbers():
     def measured(made, state):
         x = state.positions
         return [
-            mass_spring.potential_energy(made, x), mass_spring.kinetic_energy(made, state),
-            mass_spring.damper_forces(made, state), mass_spring.stiffness_matrix(made, x),
-            mass_spring.damping_matrix(made, x), mass_spring.rest_vectors(made, x),
-            mass_spring.stretches(made, x), mass_spring.derivation(made),
-        ]  # fmt: skip
+            mass_spring.potential_energy(made, x),
+            mass_spring.kinetic_energy(made, state),
+            mass_spring.damper_forces(made, state),
+            mass_spring.stiffness_matrix(made, x),
+            mass_spring.damping_matrix(made, x),
+            mass_spring.rest_vectors(made, x),
+            mass_spring.stretches(made, x),
+            mass_spring.derivation(made),
+        ]
 
     def judged(made, state, h, result, **loads):
         return reference.judge_step(made, state, h, result, state.velocities, **loads)
@@ -633,8 +661,13 @@ def _systems_of_numbers():
         g = ImplicitEuler(made, h=h).objective(state, **loads)
         x = state.positions
         residual = min(g.residual(g.evaluate(x)), 1e308)  # infinite where g overflows
-        return [g.evaluate(x), residual, g.hessian(x), g.pin_gradient(x),
-                g.quadratic_form(x, g.rest_vectors(x))]  # fmt: skip
+        return [
+            g.evaluate(x),
+            residual,
+            g.hessian(x),
+            g.pin_gradient(x),
+            g.quadratic_form(x, g.rest_vectors(x)),
+        ]
 
     timed = loads | {"h": 0.01}
     table = {
@@ -648,15 +681,19 @@ def _systems_of_numbers():
     }
     for solver in implicit_euler.STEP_SOLVERS:
         table[f"implicit_euler.ImplicitEuler.step, {solver}"] = (
-            stepped(solver), timed | {"tolerance": 1e-10},
-        )  # fmt: skip
+            stepped(solver),
+            timed | {"tolerance": 1e-10},
+        )
     return {
         f"reference.{name}, numbers": Call(
-            of_system(function), parts | moving | given, single="rest_lengths stiffnesses dampings",
-            names="state springs", raises=(FloatingPointError,),
+            of_system(function),
+            parts | moving | given,
+            single="rest_lengths stiffnesses dampings",
+            names="state springs",
+            raises=(FloatingPointError,),
         )
         for name, (function, given) in table.items()
-    }  # fmt: skip
+    }
 
 
 IT = "it"  # stands for a path
