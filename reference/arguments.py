@@ -30,6 +30,8 @@ SMALLEST_POSITIVE = 1e-75
 LARGEST_COUNT = 10**8
 # The most numbers in an array whose shape is an argument, and the most lengths of that shape.
 LARGEST_ARRAY, MOST_LENGTHS = 4 * LARGEST_COUNT, 32
+# Kinds of arrays that hold no numbers.
+KINDS = {"b": "booleans", "c": "complex numbers", "O": "objects", "U": "text", "M": "dates"}
 # What arrays are counted in.
 LARGEST_INTEGER = 2**63 - 1
 
@@ -79,7 +81,8 @@ def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
         return value
     given = _converted(name, value)
     if given.dtype.kind not in "fiu":
-        got = f"{given.dtype} values" if isinstance(value, np.ndarray) else shown(value)
+        got = KINDS.get(given.dtype.kind) if isinstance(value, np.ndarray) else None
+        got = got or shown(value)
         raise ValueError(f"{name}: expected an array of numbers, got {got}")
     check_shape(name, given, *trailing)
     return copied(name, given, np.float64)
