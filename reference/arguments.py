@@ -1,5 +1,13 @@
-"""What a caller passed, checked: the array asked for, or a ValueError that names the argument."""
+"""What a caller passed, checked: the array asked for, or a ValueError that names the argument.
 
+One rule bounds all magnitudes: no number is beyond 1e75, and a size, which is a number that may not
+be negative, is 0 or at least 1e-75. `array`, `sizes` and `number` keep it; only what looks at the
+numbers itself, such as a kernel, may take them from `floats`.
+"""
+
+import contextlib
+import copy
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -14,12 +22,16 @@ Kind = TypeVar("Kind")
 
 FLOAT64 = np.dtype(np.float64)
 
-# The one rule for magnitudes: no number given is beyond this, so that its fourth power is finite.
+# No number is beyond this, so that its fourth power is finite.
 LARGEST_COORDINATE = 1e75
-# Nor is a number that has to be positive below this.
+# No size but 0 is below this, so that one can divide by its fourth power.
 SMALLEST_POSITIVE = 1e-75
 # The most particles, joints, points, poses or restarts: arrays of more fit no memory.
 LARGEST_COUNT = 10**8
+# The most numbers in an array whose shape is an argument, and the most lengths of that shape.
+LARGEST_ARRAY, MOST_LENGTHS = 4 * LARGEST_COUNT, 32
+# Kinds of arrays that hold no numbers.
+KINDS = {"b": "booleans", "c": "complex numbers", "O": "objects", "U": "text", "M": "dates"}
 # What arrays are counted in.
 LARGEST_INTEGER = 2**63 - 1
 
@@ -42,6 +54,21 @@ def coordinates(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray
     return _bounded("coordinates", name, value, *trailing)
 
 
+def sizes(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
+    """Return the same as `array`, of sizes: masses, lengths, stiffnesses.
+
+    Raises:
+        ValueError: as for `array`, or if one is negative, or not 0 but below 1e-75.
+    """
+    result = array(name, value, *trailing)
+    wrong = np.flatnonzero((result < SMALLEST_POSITIVE) & (result != 0.0))
+    if len(wrong):
+        size = result.flat[wrong[0]]
+        expected = "none below 0" if size < 0.0 else f"0 or at least {SMALLEST_POSITIVE:g}"
+        raise ValueError(f"{name}: expected {expected}, got {size} at index {wrong[0]}")
+    return result
+
+
 def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
     """Return the same as `array`, any number let through, for kernels that look themselves.
 
@@ -54,7 +81,9 @@ def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
         return value
     given = _converted(name, value)
     if given.dtype.kind not in "fiu":
-        raise ValueError(f"{name}: expected an array of numbers, got {shown(value)}")
+        got = KINDS.get(given.dtype.kind) if isinstance(value, np.ndarray) else None
+        got = got or shown(value)
+        raise ValueError(f"{name}: expected an array of numbers, got {got}")
     check_shape(name, given, *trailing)
     return copied(name, given, np.float64)
 
@@ -64,14 +93,15 @@ def number(
 ) -> float:
     """Return a float, at least `least`, greater than `above`, and at most 1e75.
 
-    One that has to be greater than zero has to be at least 1e-75, so that one can divide by it.
+    If the range has no negative numbers it is a size: 0, where that is in the range, or at least
+    1e-75.
 
     Raises:
         ValueError: if it is not a finite number in that range.
     """
-    if above == 0.0:
-        least = max(least, SMALLEST_POSITIVE)
-    if type(value) is float and least <= value <= LARGEST_COORDINATE and value > above:
+    is_size = max(least, above) >= 0.0
+    lowest = max(least, SMALLEST_POSITIVE) if is_size else least  # of numbers other than 0
+    if type(value) is float and lowest <= value <= LARGEST_COORDINATE and value > above:
         return value
     if isinstance(value, str | bool):
         raise ValueError(f"{name}: expected a number, got {shown(value)}")
@@ -84,6 +114,9 @@ def number(
         raise ValueError(f"{name}: expected a number greater than {above:g}, got {value}")
     if result < least:
         raise ValueError(f"{name}: expected a number of at least {least:g}, got {value}")
+    if result < lowest and result != 0.0:
+        zero = "0 or " if least == 0.0 > above else ""
+        raise ValueError(f"{name}: expected {zero}a number of at least {lowest:g}, got {value}")
     if result > LARGEST_COORDINATE:
         raise ValueError(
             f"{name}: expected a number of at most {LARGEST_COORDINATE:g}, got {value}"
@@ -120,6 +153,21 @@ def count(name: str, value: Any, *, least: int) -> int:
     return result
 
 
+def lengths(name: str, value: Sequence[Any], width: int) -> tuple[int, ...]:
+    """Return the leading axes of an array that will be made, its last axis so wide.
+
+    Raises:
+        ValueError: if one is not an integer of at least 0, or the array fits into no memory.
+    """
+    axes = tuple(integer(name, length, least=0) for length in value)
+    if len(axes) > MOST_LENGTHS or math.prod(max(n, 1) for n in (*axes, width)) > LARGEST_ARRAY:
+        raise ValueError(
+            f"{name}: expected at most {MOST_LENGTHS} lengths, of an array of at most "
+            f"{LARGEST_ARRAY:,} numbers, got {shape(axes):.80}"
+        )
+    return axes
+
+
 def indices(
     name: str, value: ArrayLike, *trailing: int | str, least: int, below: int
 ) -> IndexArray:
@@ -129,7 +177,7 @@ def indices(
         ValueError: if they are not integers (booleans are none), out of range, or of another shape.
     """
     given = _converted(name, value)
-    if given.size > 0 and given.dtype.kind not in "iu":
+    if given.dtype.kind not in ("iu" if given.size else "iuf"):  # no numbers at all are floats
         raise ValueError(f"{name}: expected integer indices, got {given.dtype} values")
     check_shape(name, given, *trailing)
     result = copied(name, given, np.int64)
@@ -288,6 +336,32 @@ def frozen(values: np.ndarray) -> np.ndarray:
     view = values.view()
     view.setflags(write=False)
     return view
+
+
+class KeepsReadOnly:
+    """A model whose copies and pickles show the same arrays read-only as it does."""
+
+    def __getstate__(self) -> tuple[dict[str, Any], list[str]]:
+        values = vars(self)
+        arrays = [name for name, value in values.items() if isinstance(value, np.ndarray)]
+        return values, [name for name in arrays if not values[name].flags.writeable]
+
+    def __setstate__(self, state: tuple[dict[str, Any], list[str]]) -> None:
+        values, names = state
+        self.__dict__.update(values, **{name: frozen(values[name]) for name in names})
+
+
+def snapshot(name: str, value: Any) -> Any:
+    """Return a copy of an array or a list, which later changes do not reach; else the value.
+
+    Raises:
+        ValueError: if there is no memory for it.
+    """
+    if isinstance(value, np.ndarray) and not np.ma.is_masked(value):
+        return copied(name, value, value.dtype)
+    with contextlib.suppress(Exception):  # what cannot be copied is refused where it is used
+        return copy.deepcopy(value) if isinstance(value, list) else value
+    return value
 
 
 def shape(lengths: Sequence[int | str]) -> str:

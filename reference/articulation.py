@@ -17,7 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import arguments, rotation
-from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray, RecordArray, frozen
+from .arguments import (
+    LARGEST_COORDINATE,
+    SMALLEST_POSITIVE,
+    FloatArray,
+    IndexArray,
+    KeepsReadOnly,
+    RecordArray,
+    frozen,
+)
 from .backend.compiled import Kernel
 from .quaternion import (
     IDENTITY,
@@ -98,7 +106,7 @@ class Mimic(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class Articulation:
+class Articulation(KeepsReadOnly):
     """A tree of joints of several kinds, with limits.
 
     Its coordinates q, shape (..., coordinate), take the place of local rotations wherever a
@@ -248,10 +256,11 @@ class Articulation:
         metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
 
         Raises:
-            ValueError: if rng is no generator, or a length not an integer of at least 0.
+            ValueError: if rng is no generator, a length is not an integer of at least 0, or they
+                fit into no memory.
         """
         arguments.generator("rng", rng)
-        shape = tuple(arguments.integer("shape", length, least=0) for length in shape)
+        shape = arguments.lengths("shape", shape, self.coordinate_count)
         q = np.empty((math.prod(shape), self.coordinate_count))
         for j in self._leading:
             where = self.coordinates_of(int(j))
@@ -520,8 +529,10 @@ def _checked_axes(axes: ArrayLike, count: int) -> FloatArray:
     given = arguments.coordinates("axes", axes, "...", 3)
     _one_a_joint("axes", given.shape[:-1], count)
     lengths = np.linalg.norm(given, axis=-1, keepdims=True)
-    if (lengths == 0.0).any():
-        raise ValueError("axes: expected axes that are not zero, got (0, 0, 0)")
+    if (lengths < SMALLEST_POSITIVE).any():
+        raise ValueError(
+            f"axes: expected lengths of at least {SMALLEST_POSITIVE:g}, got {lengths.min():g}"
+        )
     return arguments.spread(given / lengths, (count, 3))
 
 
@@ -567,8 +578,7 @@ def _check_twists(joints: RecordArray) -> None:
 
 def _checked_cones(cones: ArrayLike, count: int) -> FloatArray:
     given = _checked_bound("cones", cones, count)
-    if not (given >= 0.0).all():
-        raise ValueError(f"cones: expected angles of at least 0, got {given.min():g}")
+    arguments.sizes("cones", np.where(given == np.inf, 0.0, given), "...")
     return given
 
 

@@ -26,13 +26,16 @@ from .arguments import (
     BoolArray,
     FloatArray,
     IndexArray,
+    KeepsReadOnly,
     array,
     boolean,
+    check_shape,
     coordinates,
     flags,
     frozen,
     indices,
     instance,
+    sizes,
 )
 from .backend.compiled import Kernel
 from .backend.partition import LARGE, Regions, cut
@@ -61,7 +64,7 @@ class SystemArrays(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class MassSpring:
+class MassSpring(KeepsReadOnly):
     """Particles and the springs between them; positions and velocities are in a `State`.
 
     Attributes:
@@ -105,9 +108,9 @@ class MassSpring:
         """Check and copy the system; a property of springs may be one value for all of them.
 
         Raises:
-            ValueError: if a shape is wrong, a number is negative, not finite or beyond 1e75, an
-                index is out of range, a spring joins a particle to itself, or a free particle has
-                no mass.
+            ValueError: if a shape is wrong, a number is negative, not finite, beyond 1e75 or below
+                1e-75 but not 0, an index is out of range, a spring joins a particle to itself, or
+                a free particle has no mass.
         """
         mass = _masses(masses)
         ends = _springs(springs, len(mass))
@@ -207,7 +210,7 @@ class MassSpring:
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class State:
+class State(KeepsReadOnly):
     """Positions and velocities of the particles at one instant.
 
     Attributes:
@@ -465,10 +468,10 @@ def _positions(system: MassSpring, positions: ArrayLike) -> FloatArray:
 
 
 def _masses(masses: ArrayLike) -> FloatArray:
-    mass = array("masses", masses, "particle").copy()
+    mass = sizes("masses", masses, "particle").copy()
     if len(mass) == 0:
         raise ValueError("masses: expected at least one particle, got none")
-    return _not_negative("masses", mass)
+    return mass
 
 
 def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:
@@ -485,15 +488,7 @@ def _springs(springs: ArrayLike, particle_count: int) -> IndexArray:
 
 
 def _per_spring(name: str, value: ArrayLike, count: int) -> FloatArray:
-    values = array(name, value, "...")
-    if values.ndim == 0:
-        return _not_negative(name, np.full(count, values))
-    return _not_negative(name, array(name, values, count).copy())
-
-
-def _not_negative(name: str, values: FloatArray) -> FloatArray:
-    negative = np.flatnonzero(values < 0)
-    if len(negative):
-        first = negative[0]
-        raise ValueError(f"{name}: expected none below 0, got {values[first]} at index {first}")
-    return values
+    values = sizes(name, value, "...")
+    if values.ndim > 0:
+        check_shape(name, values, count)
+    return np.array(np.broadcast_to(values, count))

@@ -19,9 +19,9 @@ def identity(*shape: int) -> FloatArray:
     """Return identity quaternions, (*shape, 4).
 
     Raises:
-        ValueError: if a length is not an integer of at least 0.
+        ValueError: if a length is not an integer of at least 0, or they fit into no memory.
     """
-    result = np.zeros((*_lengths(shape), 4))
+    result = np.zeros((*arguments.lengths("shape", shape, 4), 4))
     result[..., 0] = 1.0
     return result
 
@@ -30,9 +30,11 @@ def random(rng: np.random.Generator, *shape: int) -> FloatArray:
     """Return uniformly random rotations, (*shape, 4): normalised Gaussian 4-vectors.
 
     Raises:
-        ValueError: if rng is no generator, or a length not an integer of at least 0.
+        ValueError: if rng is no generator, a length is not an integer of at least 0, or they fit
+            into no memory.
     """
-    q = arguments.generator("rng", rng).standard_normal((*_lengths(shape), 4))
+    rng = arguments.generator("rng", rng)
+    q = rng.standard_normal((*arguments.lengths("shape", shape, 4), 4))
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
@@ -48,17 +50,19 @@ def unit(name: str, q: ArrayLike) -> FloatArray:
     return values / lengths
 
 
-def normalise(quaternions: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def normalise(quaternions: ArrayLike, name: str = "quaternions") -> tuple[FloatArray, FloatArray]:
     """Return quaternions made unit, (..., 4), and how far their lengths were from one, (...).
+
+    `name` is the argument's, for the error.
 
     Raises:
         ValueError: if they are not finite, or one has no length.
     """
-    given = arguments.array("quaternions", quaternions, "...", 4)
+    given = arguments.array(name, quaternions, "...", 4)
     largest = np.abs(given).max(axis=-1, keepdims=True)
     if not largest.all():
         where = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
-        raise ValueError(f"quaternions: expected lengths above 0, got 0 at index {where}")
+        raise ValueError(f"{name}: expected lengths above 0, got 0 at index {where}")
     scaled = given / largest  # no square overflows or vanishes
     lengths = np.linalg.norm(scaled, axis=-1, keepdims=True)
     return scaled / lengths, np.abs(lengths * largest - 1.0)[..., 0]
@@ -200,10 +204,6 @@ def _quaternion_form(R: FloatArray) -> FloatArray:
     K[..., 1:, 0] = K[..., 0, 1:]
     K[..., 1:, 1:] = R + np.swapaxes(R, -1, -2) - K[..., :1, :1] * np.eye(3)
     return K
-
-
-def _lengths(shape: tuple[int, ...]) -> tuple[int, ...]:
-    return tuple(arguments.integer("shape", length, least=0) for length in shape)
 
 
 def _scaled(v: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import arguments
-from .arguments import FloatArray, IndexArray, frozen
+from .arguments import FloatArray, IndexArray, KeepsReadOnly, frozen
 
 
 class SkeletonArrays(NamedTuple):
@@ -20,7 +20,7 @@ class SkeletonArrays(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class Skeleton:
+class Skeleton(KeepsReadOnly):
     """A tree of ball joints without limits; parents precede children.
 
     Attributes:
@@ -142,6 +142,9 @@ def _checked_tree(parents: ArrayLike, offsets: ArrayLike) -> tuple[IndexArray, F
     count = len(offsets)
     if count == 0:
         raise ValueError("offsets: expected at least one joint, got none")
+    links = np.linalg.norm(offsets, axis=-1)
+    links[0] = 0.0
+    arguments.sizes("offsets", links, "joint")
     parents = arguments.indices("parents", parents, count, least=-1, below=count)
     roots = np.flatnonzero(parents == -1)
     if len(roots) != 1:

@@ -1,5 +1,6 @@
 """Following a curve: frame by frame, or by a smooth trajectory over all frames."""
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import arguments, rotation, trajectory
-from .arguments import FloatArray, IndexArray
+from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray
 from .articulation import Articulation
 from .inverse_kinematics.mechanism import Mechanism, gather
 from .inverse_kinematics.problem import (
@@ -88,6 +89,8 @@ def track(
     Raises:
         ValueError: as `solve_ik` does, and if the curve is not of that shape or has no points, or a
             motion is to be closed but not coherent.
+        FloatingPointError: if a coordinate of the motion exceeds 1e75, as where links or targets
+            are as large.
     """
     if arguments.boolean("closed", closed) and not arguments.boolean("coherent", coherent):
         raise ValueError("closed: expected False where coherent is False, got True")
@@ -168,7 +171,13 @@ def _smoothed(
     q = motion.coordinates.reshape(-1, articulation.coordinate_count).copy()
     if mechanism.freedoms:
         own, rows = np.ascontiguousarray(q[:, columns]), target_rows(targets, (len(q),))
-        q[:, columns], steps = trajectory.smooth(mechanism, rows, own, reached, closed)
+        with contextlib.suppress(np.linalg.LinAlgError), np.errstate(all="ignore"):
+            q[:, columns] = np.nan  # what stays where the linear algebra meets infinity
+            q[:, columns], steps = trajectory.smooth(mechanism, rows, own, reached, closed)
+    if not np.abs(q).max(initial=0.0) <= LARGEST_COORDINATE:
+        raise FloatingPointError(
+            f"track: the smooth trajectory left the numbers up to {LARGEST_COORDINATE:g}"
+        )
     return q.reshape(motion.coordinates.shape), reached, steps
 
 

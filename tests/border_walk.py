@@ -30,6 +30,9 @@ LARGE = (1e70, 1e76, 1e155, 1e200, 1e308)
 # What is right: an error that names the argument; that or any finite answer.
 REFUSED, ANYTHING = object(), object()
 SMALL = (1e-70, 1e-155, 1e-200, 1e-308)
+# Magnitudes at, between and beyond the bounds of the rule, for single numbers of an argument.
+EXTREMES = (0.0, 5e-324, 1e-310, 1e-155, 1e-76, 1e-75, 1e-37, 1e-10)
+EXTREMES += (1e10, 1e37, 1e75, 1e76, 1e155, 1e308)
 
 
 class Unconvertible:
@@ -241,6 +244,30 @@ def trial_arrays(call):
             yield f"{name} in single precision", {name: single}, rounded
 
 
+def trial_bounds(call):
+    """Yield the same for single numbers that the rule for magnitudes refuses.
+
+    None may be beyond 1e75. One that may not be negative, by however little, is a size, and no size
+    but 0 may be below 1e-75.
+    """
+    for name, x in call.arguments.items():
+        if not _scales(x) or name in call.passed_on.split():
+            continue
+        for i in (0, -1):
+            yield f"{name} too large at {i}", {name: _replaced(x, i, 2e75)}, REFUSED
+            if complaint(call, fresh(call.arguments) | {name: _replaced(x, i, -1e-70)})[1] is None:
+                yield f"{name} too small at {i}", {name: _replaced(x, i, 1e-76)}, REFUSED
+
+
+def _replaced(value, i, number):
+    """Return the number, or the array with one of its numbers replaced."""
+    if type(value) is float:
+        return number
+    values = value.copy()
+    values.flat[i] = number
+    return values
+
+
 def trial_magnitudes(call):
     """Yield the same for each number and array scaled, and for all of them together."""
     numbers = {k: v for k, v in call.arguments.items() if _scales(v)}
@@ -280,27 +307,43 @@ def trial_at_random(call, count, seed=0):
 
 
 def _anything(rng, call, name):
-    value, pick = call.arguments[name], rng.integers(4)
-    if isinstance(value, np.ndarray) and pick:
+    value, wrong, extreme = call.arguments[name], rng.integers(4) == 0, rng.integers(3) > 0
+    if _scales(value) and extreme and not wrong:
+        return _extreme(rng, value)
+    if isinstance(value, np.ndarray) and not wrong:
         other = [v for _, v, _ in (*misshapen(name, value, call), *mistyped(value))]
         other += [v for _, v, _ in not_numbers(name, value, call)]
         other += [v for _, v in alike(value)]
         return other[rng.integers(len(other))]
-    if _scales(value) and pick:
-        return _scaled(value, float(rng.choice(LARGE + SMALL)))
     return WRONG[rng.integers(len(WRONG))]
+
+
+def _extreme(rng, value):
+    """Return the number or array with one, some or all of its numbers extreme, or all scaled."""
+    if rng.integers(4) == 0:
+        return _scaled(value, float(rng.choice(LARGE + SMALL)))
+    extreme = rng.choice([-1.0, 1.0], p=[0.2, 0.8]) * rng.choice(EXTREMES)
+    if type(value) is float:
+        return float(extreme)
+    share = rng.choice([0.0, 0.3, 1.0])
+    chosen = rng.uniform(size=value.size) < share
+    chosen[rng.integers(value.size)] = True
+    signs = np.where(value < 0.0, -1.0, 1.0) if share else np.ones(value.shape)
+    return np.where(chosen.reshape(value.shape), signs * extreme, value)
 
 
 def _shown(value):
     if isinstance(value, Unspeakable):
         return "Unspeakable"
     if isinstance(value, np.ndarray):
-        return f"{value.dtype}{value.shape}"
+        few = f" {value.tolist()!r:.200}" if value.size < 50 else ""
+        return f"{value.dtype}{value.shape}{few}"
     return f"{type(value).__name__} {value!r:.40}"
 
 
 TRIALS = {
     "arrays": trial_arrays,
+    "bounds": trial_bounds,
     "magnitudes": trial_magnitudes,
     "objects": trial_objects,
     "random": trial_at_random,

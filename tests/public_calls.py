@@ -81,6 +81,7 @@ INTERNAL = {
     "reference.implicit_euler.StepSolver.iterates": "a protocol",
     "reference.implicit_euler.StepResult": "made only by a step",
     "reference.implicit_euler.certificate.Certificate": "made only by certify",
+    "reference.implicit_euler.certificate.Certificate.shares_minimiser_within": "unchecked twin",
     "reference.implicit_euler.certificate.kantorovich_distance": "a part of the proof",
     "reference.implicit_euler.certificate.least_curvature": "a part of the proof",
     "reference.implicit_euler.certificate.newton_length": "a part of the proof",
@@ -165,6 +166,7 @@ def calls():
     for part in (
         _rotations(), _curves(), _skeletons(), _articulations(), _derivatives(), _solves(),
         _systems(), _steps(), _scenes(), _files(), _matrices(), _settings(), _samples(),
+        _trees_of_numbers(), _systems_of_numbers(),
     ):  # fmt: skip
         assert not table.keys() & part.keys()
         table |= part
@@ -361,7 +363,7 @@ def _solves():
         t: Call(reference.track,
                 {"skeleton": balls, "curve": points, "start": local, **settings, "warm": True,
                  "coherent": True, "closed": True, "record": True},
-                free="curve", names="q effector"),
+                free="curve", names="q effector", raises=(FloatingPointError,)),
         t + ", poses": Call(follow, targets, free="position rotation",
                             names="target curve"),
     }  # fmt: skip
@@ -475,14 +477,16 @@ def _scenes():
     return {
         s + "grids.lab_cloth": Call(
             scenes.lab_cloth, {"size": 3, "side": 2.0, "height": 1.5, "mass": 1.0, **elastic},
-            names="spacing"),
+            names="spacing positions"),
         s + "grids.grid_cloth": Call(
             scenes.grid_cloth, {**grid, "shear_stiffness": 10.0, "bending_stiffness": 5.0,
-                                "tension_only": False, "pinned": np.array([0, 3])}, free="pinned"),
+                                "tension_only": False, "pinned": np.array([0, 3])},
+            free="pinned", names="positions"),
         s + "grids.grid_triangles": Call(scenes.grid_triangles, {"rows": 3, "columns": 4}),
-        s + "grids.net": Call(scenes.net, grid),
+        s + "grids.net": Call(scenes.net, grid, names="positions"),
         s + "grids.lattice": Call(
-            scenes.lattice, {"counts": (3, 2, 2), "spacing": 0.1, "mass": 0.1, **elastic}),
+            scenes.lattice, {"counts": (3, 2, 2), "spacing": 0.1, "mass": 0.1, **elastic},
+            names="positions"),
         s + "grids.hanging_rope": Call(
             scenes.hanging_rope,
             {"particles": 4, "length": 1.0, "mass": 0.1, **elastic, "tension_only": True}),
@@ -494,10 +498,202 @@ def _scenes():
             names="density"),
         s + "networks.random_network": Call(
             scenes.random_network, {"seed": 3, "particles": 6, "pinned": 1, "damping": 1.0,
-                                    "tension_only": 0.5}),
+                                    "tension_only": 0.5}, names="dampings"),
         s + "skeletons.lab_arm": Call(scenes.lab_arm, {}),
         s + "skeletons.ball_chain": Call(scenes.ball_chain, {"links": 3, "link_length": 0.1}),
     }  # fmt: skip
+
+
+def _trees_of_numbers():
+    """Return calls whose arguments are the numbers of a skeleton or a robot as well."""
+    tree_of = functools.partial(Skeleton, [-1, 0, 1, 1, 3, 4], names=list("abcdef"))
+    kinds = ["fixed", "hinge", "slide", "ball", "hinge", "free"]
+
+    def robot_of(offsets, axes, lower, upper, cones, multiplier, shift):
+        mimics = {4: Mimic(1, multiplier, shift)}
+        limits = {"lower": lower, "upper": upper, "cones": cones, "mimics": mimics}
+        return Articulation(tree_of(offsets), kinds, axes, **limits)
+
+    def of_balls(function):
+        return lambda offsets, **given: function(tree_of(offsets), **given)
+
+    def of_robot(function):
+        names = inspect.signature(robot_of).parameters
+
+        def call(**given):
+            model = robot_of(**{name: given.pop(name) for name in names})
+            return function(model, **given)
+
+        return call
+
+    def reached(model, position, rotation, weight, **settings):
+        target = Target(position, rotation, "f", weight), Target([0.1, 0.2, 0.3], None, "c")
+        return reference.solve_ik(model, model.neutral(), target, max_iterations=8, **settings)
+
+    def drawn(model):
+        return model.neutral(), model.random(RNG(), 3)
+
+    balls = {"offsets": np.array(tree().offsets)}
+    model, local = robot(), rotation.random(RNG(), 6)
+    parts = {
+        **balls,
+        "axes": np.array(model.axes),
+        "lower": np.full(6, -1.0),
+        "upper": np.full(6, 1.5),
+        "cones": np.full(6, 2.0),
+        "multiplier": 0.5,
+        "shift": 0.1,
+    }
+    q, q0 = model.random(RNG(), 2, 3)
+    points, turns = RNG().uniform(-0.5, 0.5, (4, 3)), rotation.random(RNG(), 4)
+    v = RNG().uniform(-1.0, 1.0, (3, model.freedom_count))
+    tolerances = {"tolerance": 1e-4, "tolerance_rotation": 1e-4}
+    smooth = functools.partial(
+        reference.track, effector="f", coherent=True, closed=True, max_iterations=8
+    )
+    judged = functools.partial(reference.judge_pose, effector="f")
+    posed = {"position": points[0], "rotation": turns[0], "weight": 2.0}
+    place = reference.forward_kinematics(tree(), local).positions
+    table = {
+        "kinematics.forward_kinematics": (
+            reference.forward_kinematics,
+            {"local_rotations": local},
+            {"local_rotations": q},
+        ),
+        "jacobians.jacobians": (differential.jacobians, {"q": local}, {"q": q}),
+        "jacobians.integrate": (differential.integrate, None, {"q": q, "v": v}),
+        "jacobians.difference": (differential.difference, None, {"q1": q, "q0": q0}),
+        "tracking.track": (smooth, {"curve": points, **tolerances}, {"curve": points}),
+        "judging.pose.judge_pose": (
+            judged,
+            {"pose": local, "target": points[0], "positions": place},
+            {"pose": q[0], "target": points[0], "positions": place},
+        ),
+        "formats.bvh.writer.format": (bvh.format, {"local_rotations": local[None]}, None),
+        "articulation.Articulation.random": (drawn, None, {}),
+    }
+    for solver in inverse_kinematics.IK_SOLVERS:
+        solve = functools.partial(reference.solve_ik, solver=solver, max_iterations=8, restarts=1)
+        given = {"local_rotations": local, "target": points[0], **tolerances}
+        table[f"inverse_kinematics.solve_ik, {solver}"] = solve, given, None
+        table[f"inverse_kinematics.solve_ik, {solver} poses"] = (
+            functools.partial(reached, solver=solver),
+            None,
+            posed | tolerances,
+        )
+    given = {
+        "names": "q local_rotations target mimics names effector parents",
+        "free": "local_rotations q q0 q1 v curve target position rotation",
+    }
+    limited = {"single": "axes lower upper cones", "infinite": "lower upper cones"}
+    made = {}
+    for name, (function, of_tree, of_model) in table.items():
+        key, raises = "reference." + name, (FloatingPointError,) * (function is smooth)
+        if of_tree is not None:
+            made[key + ", numbers"] = Call(
+                of_balls(function), balls | of_tree, raises=raises, **given
+            )
+        if of_model is not None:
+            made[key + ", robot of numbers"] = Call(
+                of_robot(function), parts | of_model, raises=raises, **given, **limited
+            )
+    return made
+
+
+def _systems_of_numbers():
+    """Return calls whose arguments are the numbers of a system and its state as well."""
+    model, state = system()
+    parts = {
+        "masses": np.array(model.masses),
+        "rest_lengths": np.full(7, 0.9),
+        "stiffnesses": np.full(7, 50.0),
+        "dampings": np.full(7, 0.5),
+        "gravity": np.array([0.0, -9.81, 1.0]),
+    }
+    moving = {"positions": np.array(state.positions), "velocities": np.array(state.velocities)}
+    loads = {
+        "external_forces": RNG().uniform(-1.0, 1.0, (5, 3)),
+        "pin_positions": np.array([[0.1, 0.0, 0.0]]),
+    }
+
+    def of_system(function):
+        def call(gravity, positions, velocities, **given):
+            values = {name: given.pop(name) for name in parts if name != "gravity"}
+            made = MassSpring(
+                values.pop("masses"),
+                model.springs,
+                **values,
+                pinned=[0],
+                gravity=gravity,
+                tension_only=model.tension_only,
+            )
+            return function(made, State(positions, velocities), **given)
+
+        return call
+
+    def stepped(solver):
+        def call(made, state, h, tolerance, **loads):
+            settings = {"h": h, "solver": solver, "tolerance": tolerance, "max_iterations": 8}
+            return ImplicitEuler(made, **settings).step(state, **loads)
+
+        return call
+
+    def certified(made, state, h, **loads):
+        return ImplicitEuler(made, h=h).certify(state, state.positions, **loads)
+
+    def measured(made, state):
+        x = state.positions
+        return [
+            mass_spring.potential_energy(made, x),
+            mass_spring.kinetic_energy(made, state),
+            mass_spring.damper_forces(made, state),
+            mass_spring.stiffness_matrix(made, x),
+            mass_spring.damping_matrix(made, x),
+            mass_spring.rest_vectors(made, x),
+            mass_spring.stretches(made, x),
+            mass_spring.derivation(made),
+        ]
+
+    def judged(made, state, h, result, **loads):
+        return reference.judge_step(made, state, h, result, state.velocities, **loads)
+
+    def formed(made, state, h, **loads):
+        g = ImplicitEuler(made, h=h).objective(state, **loads)
+        x = state.positions
+        residual = min(g.residual(g.evaluate(x)), 1e308)  # infinite where g overflows
+        return [
+            g.evaluate(x),
+            residual,
+            g.hessian(x),
+            g.pin_gradient(x),
+            g.quadratic_form(x, g.rest_vectors(x)),
+        ]
+
+    timed = loads | {"h": 0.01}
+    table = {
+        "mass_spring.forces": (mass_spring.forces, {"external_forces": loads["external_forces"]}),
+        "mass_spring.potential_energy": (measured, {}),
+        "explicit.symplectic_euler": (reference.symplectic_euler, timed),
+        "explicit.runge_kutta": (reference.runge_kutta, timed),
+        "implicit_euler.certificate.certify": (certified, timed),
+        "implicit_euler.objective.Objective.evaluate": (formed, timed),
+        "judging.step.judge_step": (judged, timed | {"result": moving["positions"] + 0.01}),
+    }
+    for solver in implicit_euler.STEP_SOLVERS:
+        table[f"implicit_euler.ImplicitEuler.step, {solver}"] = (
+            stepped(solver),
+            timed | {"tolerance": 1e-10},
+        )
+    return {
+        f"reference.{name}, numbers": Call(
+            of_system(function),
+            parts | moving | given,
+            single="rest_lengths stiffnesses dampings",
+            names="state springs",
+            raises=(FloatingPointError,),
+        )
+        for name, (function, given) in table.items()
+    }
 
 
 IT = "it"  # stands for a path
@@ -528,14 +724,14 @@ def _files():
 
         return Call(from_file, {"path": IT, **options}, names="text")
 
-    def posed(skeleton, local_rotations, frame_time, offsets):
-        return bvh.Motion(skeleton, local_rotations, frame_time, offsets).pose()
+    def posed(skeleton, local_rotations, offsets):
+        return bvh.Motion(skeleton, local_rotations, 0.02, offsets).pose()
 
     def written(path, **given):
         with tempfile.TemporaryDirectory() as folder:
             bvh.write(Path(folder, "it.bvh") if path is IT else path, **given)
 
-    pose = {name: moved[name] for name in ("skeleton", "local_rotations", "frame_time", "offsets")}
+    pose = {name: moved[name] for name in ("skeleton", "local_rotations", "offsets")}
     return {
         f + "bvh.motion.Motion.pose": Call(posed, pose),
         f + "bvh.reader.read": named(bvh.read, text),

@@ -1,10 +1,13 @@
 """No public function lets a wrong argument in, hands on a NaN, or fails from within."""
 
+import inspect
 import json
+import math
 import os
 import re
 import subprocess
 import sys
+import typing
 from pathlib import Path
 
 import border_walk
@@ -17,21 +20,26 @@ from reference.arguments import array, integer, shown
 
 PROGRAM = Path(border_walk.__file__)
 # What the walks have to be about, so that none of them shrinks unnoticed.
-FEWEST = {"arrays": 2_500, "magnitudes": 1_300, "objects": 15_000, "random": 300}
+FEWEST = {"arrays": 9_000, "bounds": 1_200, "magnitudes": 4_500, "objects": 40_000, "random": 600}
+# Arguments that are no number or array in any call, and why.
+WITHOUT_NUMBERS = {
+    "reference.implicit_euler.ImplicitEuler.certify: result": "of a StepResult in one call",
+}
 
 
-def walk(law, *options):
-    """Return how many functions and calls a walk tried, and what broke the law, in words.
+def walk(law, *options, fewest=0, **environment):
+    """Return what broke a law, in words, once enough functions and calls have been tried.
 
     It runs in a process of its own, so that a function that ends it fails the test and no more.
     """
     command = [sys.executable, PROGRAM, law, "", *map(str, options)]
-    ours = {**os.environ, "PYTHONPATH": str(PROGRAM.parents[1])}  # before the tests' own folders
+    folder = str(PROGRAM.parents[1])  # before the tests' own folders
+    ours = {**os.environ, "PYTHONPATH": folder, **environment}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=ours)
     assert done.returncode == 0, done.stderr[-2_000:]
     functions, tried, broken = json.loads(done.stdout)
     assert functions >= 100
-    assert tried >= FEWEST[law]
+    assert tried >= max(fewest, FEWEST[law])
     return broken
 
 
@@ -41,6 +49,32 @@ def test_every_public_function_has_a_call_that_is_right():
     assert public.keys() - called - public_calls.INTERNAL.keys() == set()
     assert (called | public_calls.INTERNAL.keys()) - public.keys() == set()
     assert called & public_calls.INTERNAL.keys() == set()
+
+
+def takes_numbers(annotation):
+    return annotation is float or bool({float, complex} & set(typing.get_args(annotation)))
+
+
+def test_every_argument_of_numbers_has_some_in_a_call():
+    """The laws about magnitudes then hold of it."""
+    given = {
+        f"{key.split(',')[0]}: {name}"
+        for key, call in public_calls.calls().items()
+        for name, value in call.arguments.items()
+        if isinstance(value, float | np.ndarray | list)
+    }
+    arguments_of_numbers = {
+        f"{path}: {one.name}"
+        for path, function in public_calls.public_names()
+        for one in inspect.signature(function).parameters.values()
+        if path not in public_calls.INTERNAL and takes_numbers(one.annotation)
+    }
+    assert len(arguments_of_numbers) >= 150
+    assert arguments_of_numbers - given == WITHOUT_NUMBERS.keys()
+
+
+def test_no_number_beyond_the_bounds_is_let_in():
+    assert walk("bounds") == []
 
 
 def test_what_is_unchecked_says_so():
@@ -68,8 +102,17 @@ def test_wrong_arguments_at_random_are_refused_by_name():
 
 
 @pytest.mark.slow
-def test_twenty_four_thousand_wrong_calls_are_refused_by_name():
-    assert walk("random", 200, 1) == []
+@pytest.mark.parametrize("checked", [False, True], ids=["as-compiled", "indices-checked"])
+def test_fifty_thousand_calls_at_random_end_well(checked, pytestconfig):
+    """Half of them with every index of a compiled kernel checked, in a cache of its own."""
+    environment = {}
+    if checked:
+        cache = pytestconfig.cache.mkdir("numba_boundscheck")
+        environment = {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(cache)}
+    count = math.ceil(
+        50_000 / len([call for call in public_calls.calls().values() if call.arguments])
+    )
+    assert walk("random", count, 1 + checked, fewest=50_000, **environment) == []
 
 
 def right(x, n=1):
@@ -117,6 +160,19 @@ def overflows(x, n=1):
     return right(x, n) ** 5
 
 
+def bounds_nothing(x, n=1):
+    values = arguments.floats("x", x, "row", 3)
+    if not np.isfinite(values).all():
+        raise ValueError("x: expected finite numbers")
+    return np.log1p(np.abs(values)) * n
+
+
+def takes_the_tiny(x, n=1):
+    if (array("x", x, "row", 3) < 0.0).any():
+        raise ValueError("x: expected none below 0")
+    return right(x, n)
+
+
 def wrong_type(x, n=1):
     return right(x, range(n)[-1] + 1)
 
@@ -136,6 +192,8 @@ FAULTS = [
     (names_nothing, "arrays"),
     (names_another, "arrays"),
     (refuses_lists, "arrays"),
+    (bounds_nothing, "bounds"),
+    (takes_the_tiny, "bounds"),
     (overflows, "magnitudes"),
     (unchecked, "objects"),
     (wrong_type, "objects"),

@@ -21,6 +21,8 @@ from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from typing import Any
 
+import numpy as np
+
 from .. import arguments
 from . import compilation
 from .digest import PythonKernel, callees, code_objects, digest, named_globals
@@ -84,9 +86,10 @@ class Kernel:
         return compile_kernel(self.plain, self.relaxed, self.label)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run the kernel on the backend in force."""
+        """Run the kernel on the backend in force; neither warns where a number overflows."""
         if _backend.get() == "python":
-            return self.plain(*arguments)
+            with np.errstate(all="ignore"):
+                return self.plain(*arguments)
         return self.compiled(*arguments)
 
 

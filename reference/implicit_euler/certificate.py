@@ -30,10 +30,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, floats, instance
-from ..mass_spring import lengths
+from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, instance, number
+from ..backend.compiled import Kernel
 from ..sparse import NotPositiveDefiniteError
 from ..sparse.linear_solver import Factor, factorize
+from ..springs import spring_lengths
 from .objective import Objective
 
 EPS = float(np.finfo(float).eps)
@@ -123,9 +124,10 @@ class Certificate:
             ValueError: if the other is no certificate, or the distance no number of at least 0.
         """
         instance("other", other, Certificate)
-        apart = float(floats("apart", apart))
-        if not apart >= 0.0:
-            raise ValueError(f"apart: expected a distance of at least 0, got {apart}")
+        return self.shares_minimiser_within(other, number("apart", apart, least=0.0))
+
+    def shares_minimiser_within(self, other: "Certificate", apart: float) -> bool | None:
+        """Do what `shares_minimiser` does, of a distance that is not checked."""
         if not (self.covered and other.covered):
             return None
         one, two = apart * SLACK + other.distance, apart * SLACK + self.distance
@@ -134,6 +136,7 @@ class Certificate:
         return False if apart > (self.distance + other.distance) * SLACK else None
 
 
+@np.errstate(all="ignore")  # bounds that overflow prove nothing, nor does NaN
 def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     """Return the certificate of positions, shape (particle, 3) [m], as the result of a step.
 
@@ -144,10 +147,9 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     """
     system = instance("objective", objective, Objective).system
     x = coordinates("positions", positions, system.particle_count, 3)
-    with np.errstate(over="ignore", invalid="ignore"):
-        here = objective.iterate_at(x)
-        if not (here.finite and objective.inertial.finite):
-            return Certificate(math.inf, Coverage.OVERFLOWN)
+    here = objective.iterate_at(x)
+    if not (here.finite and objective.inertial.finite):
+        return Certificate(math.inf, Coverage.OVERFLOWN)
     residual = objective.residual(here)
     if not np.array_equal(x[system.pinned], objective.y[system.pinned]):
         return Certificate(residual, Coverage.PINS_ASTRAY)
@@ -228,7 +230,7 @@ def hessian_change(objective: Objective, x: FloatArray, radius: float) -> tuple[
         COVERED and L, or the reason why g may not be twice differentiable there and NaN.
     """
     system, ends = objective.effective, objective.effective.springs
-    k, r, length = objective.h**2 * system.stiffnesses, system.rest_lengths, lengths(system, x)
+    k, r, length = objective.h**2 * system.stiffnesses, system.rest_lengths, _lengths(x, ends)
     free_ends = system.free[ends].sum(axis=1)
     error = GRADIENT_ROUNDING * EPS * (length + _rest_length_terms(objective))
     reach = SLACK * np.sqrt(free_ends) * radius + error
@@ -267,7 +269,7 @@ def rounding_errors(objective: Objective, x: FloatArray) -> RoundingErrors:
     rounding errors of y, of the external forces and of the effective springs.
     """
     system, h, springs = objective.system, objective.h, objective.effective.springs
-    k, length = h * h * objective.effective.stiffnesses, lengths(objective.effective, x)
+    k, length = h * h * objective.effective.stiffnesses, _lengths(x, springs)
     rest_terms, m, free = _rest_length_terms(objective), system.masses, system.free
     coordinate_norms = _norms(x) + _norms(objective.y) + _norms(objective.x_n)
     loads = _norms(objective.external) + m * np.linalg.norm(system.gravity)
@@ -327,3 +329,6 @@ def _sum_over_springs(
 
 def _norms(vectors: FloatArray) -> FloatArray:
     return np.linalg.norm(vectors, axis=1)
+
+
+_lengths = Kernel(spring_lengths)

@@ -123,8 +123,25 @@ class Iterate:
         return not (self.value <= other.value or self.value <= other.value + self.value_floor)
 
 
+def _finite_result(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a method of an Objective raise a FloatingPointError where its result overflows."""
+
+    @functools.wraps(method)
+    def checked(*given: Any, **options: Any) -> Any:
+        with np.errstate(all="ignore"):
+            result = method(*given, **options)
+        if not np.isfinite(result.data if scipy.sparse.issparse(result) else result).all():
+            raise FloatingPointError(f"{method.__name__}: a number left the finite ones")
+        return result
+
+    return checked
+
+
 class Objective:
     """g of one step, in SI units.
+
+    Its value, its derivatives and its quadratic form are a FloatingPointError where they overflow;
+    an iterate says so in `finite`.
 
     Attributes:
         system: particles and springs.
@@ -207,18 +224,21 @@ class Objective:
         return _rounding_bounds(positions, y, external, h, *springs)
 
     def residual(self, iterate: Iterate) -> float:
-        """Return |grad g(x)| / max(|grad g(y)|, floor).
+        """Return |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows at x or at y.
 
         Raises:
             ValueError: if it is no iterate, such as the positions of one.
         """
         if instance("iterate", iterate, Iterate).gradient_norm == 0.0:
             return 0.0
+        if not (iterate.finite and self.inertial.finite):
+            return math.inf
         scale = self.inertial.gradient_norm
         if scale < iterate.floor_bound:
             scale = max(scale, iterate.floor)
         return float(iterate.gradient_norm / scale)
 
+    @_finite_result
     def value(self, positions: ArrayLike) -> float:
         """Return g(x) [kg m²], up to a constant that depends on the pins.
 
@@ -227,6 +247,7 @@ class Objective:
         """
         return self.evaluate(positions).value
 
+    @_finite_result
     def gradient(self, positions: ArrayLike) -> FloatArray:
         """Return grad g(x) = M (x - y) - h² f(x) [kg m], shape (particle, 3), zero at the pins.
 
@@ -235,6 +256,7 @@ class Objective:
         """
         return self.evaluate(positions).gradient
 
+    @_finite_result
     def hessian(self, positions: ArrayLike, *, geometric: bool = True) -> Any:
         """Return M + h² K [kg], sparse (3 particle, 3 particle); an identity at the pins.
 
@@ -253,6 +275,7 @@ class Objective:
         hessian.data[springs.diagonal] += np.repeat(self.system.free_masses, 3)
         return hessian
 
+    @_finite_result
     def pin_gradient(self, positions: ArrayLike, *, geometric: bool = True) -> FloatArray:
         """Return h² K times the displacement of the pins from x_n to y, shape (particle, 3) [kg m].
 
@@ -275,6 +298,7 @@ class Objective:
         pulls = np.einsum("sab,sb->sa", K, displacement[i] - displacement[j])
         return self.system.with_separate_dampers.free_incidence @ pulls
 
+    @_finite_result
     def quadratic_form(self, positions: ArrayLike, d: ArrayLike) -> float:
         """Return g as a quadratic form in x for constant rest vectors d, shape (spring, 3).
 

@@ -14,8 +14,15 @@ from ..outcome import Outcome
 from ..skeleton import Skeleton
 
 
-class Target(NamedTuple):
-    """Where a joint is wanted.
+class _TargetFields(NamedTuple):
+    position: ArrayLike
+    rotation: ArrayLike | None = None
+    effector: int | str | None = None
+    weight: float = 1.0
+
+
+class Target(_TargetFields):
+    """Where a joint is wanted; position and rotation are copied.
 
     Attributes:
         position: global position [m], shape (3,), or (..., 3) for a batch.
@@ -24,10 +31,19 @@ class Target(NamedTuple):
         weight: how much its squared error counts beside those of other targets.
     """
 
-    position: ArrayLike
-    rotation: ArrayLike | None = None
-    effector: int | str | None = None
-    weight: float = 1.0
+    __slots__ = ()
+
+    def __new__(
+        cls,
+        position: ArrayLike,
+        rotation: ArrayLike | None = None,
+        effector: int | str | None = None,
+        weight: float = 1.0,
+    ) -> "Target":
+        """Copy the arrays; they are checked where the target is used."""
+        x = arguments.snapshot("position", position)
+        Q = arguments.snapshot("rotation", rotation)
+        return super().__new__(cls, x, Q, effector, weight)
 
 
 class IKSolution(NamedTuple):

@@ -23,15 +23,24 @@ from .solve_mechanism import on_mechanisms
 
 
 class IKSolver(NamedTuple):
-    """A solver's two kernels.
+    """A solver's two kernels; its pickle holds the name.
 
     Attributes:
+        name: in IK_SOLVERS.
         chain: for one position to reach by a chain of unlimited balls.
         mechanism: for all else.
     """
 
+    name: str
     chain: Kernel
     mechanism: Kernel
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _solver, (self.name,)
+
+
+def _solver(name: str) -> IKSolver:
+    return IK_SOLVERS[name]
 
 
 # A solver's sweep over a chain, and its update of a mechanism.
@@ -46,7 +55,9 @@ _KERNELS = {
 _WORKSPACES = {"ccd": new_ccd_workspace, "fabrik": new_fabrik_workspace}
 IK_SOLVERS = {
     name: IKSolver(
-        on_chains(name, sweep), on_mechanisms(name, update, _WORKSPACES.get(name, new_task_system))
+        name,
+        on_chains(name, sweep),
+        on_mechanisms(name, update, _WORKSPACES.get(name, new_task_system)),
     )
     for name, (sweep, update) in _KERNELS.items()
 }

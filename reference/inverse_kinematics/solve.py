@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
-from ..arguments import FloatArray, IndexArray, RecordArray, frozen
+from ..arguments import LARGEST_COORDINATE, FloatArray, IndexArray, RecordArray, frozen
 from ..articulation import Articulation, one_batch
 from ..backend.compiled import Kernel
 from ..backend.threads import in_slices
@@ -60,7 +60,7 @@ def solve_on_chain(
     model = (*skeleton.arrays, skeleton.path_array(target.joint))
     rows = _rows(starts, batch, 2), target_array, local, positions, figures, history
     if not _run(settings.solver.chain, model, settings, rows, LEAST_ON_CHAINS):
-        _raise_invalid(skeleton, start, [target])
+        _raise_invalid(skeleton, start, [target], settings)
     return _solution(Result(local, positions, figures, history, local), batch, settings)
 
 
@@ -95,7 +95,7 @@ def solve_on_mechanism(
     )
     rows = (_rows(starts, batch, 1), target_array, *result)
     if not _run(settings.solver.mechanism, prepared.flat, settings, rows, LEAST):
-        _raise_invalid(model, start, targets)
+        _raise_invalid(model, start, targets, settings)
     if isinstance(model, Skeleton):
         local = result.coordinates.reshape(result.local.shape)
         result = result._replace(local=local, coordinates=local)
@@ -131,15 +131,24 @@ def _part(rows: np.ndarray, part: slice) -> np.ndarray:
 
 
 def _raise_invalid(
-    model: Skeleton | Articulation, start: ArrayLike, targets: list[CheckedTarget]
+    model: Skeleton | Articulation,
+    start: ArrayLike,
+    targets: list[CheckedTarget],
+    settings: Settings,
 ) -> NoReturn:
-    """Raise a ValueError that names the number which a kernel has refused."""
+    """Raise a ValueError that names the number which a kernel has refused.
+
+    Raises:
+        FloatingPointError: if it is of a frame from which the next one starts.
+    """
     check_numbers(targets)
     name = coordinates_name(model)
     if isinstance(model, Articulation):
         model.checked(name, start)
     else:
         rotation.unit(name, start)
+    if settings.limits.chained:
+        raise FloatingPointError(f"track: a frame left the numbers up to {LARGEST_COORDINATE:g}")
     raise ValueError(f"{name}: expected quaternions within 1e-6 of unit length, got one just off")
 
 

@@ -140,14 +140,14 @@ def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatA
     name = coordinates_name(model)
     if isinstance(model, Skeleton):
         given = arguments.array(name, pose, model.joint_count, 4)
-        unit, deviation = rotation.normalise(given)
+        unit, deviation = rotation.normalise(given, name)
         return unit, float(deviation.max())
     unit = arguments.coordinates(name, pose, model.coordinate_count).copy()
     worst = 0.0
     for joint, kind in enumerate(model.kinds):
         if kind in ("ball", "free"):
             end = model.coordinates_of(joint).stop
-            unit[end - 4 : end], deviation = rotation.normalise(unit[end - 4 : end])
+            unit[end - 4 : end], deviation = rotation.normalise(unit[end - 4 : end], name)
             worst = max(worst, float(deviation))
     return unit, worst
 

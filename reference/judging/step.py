@@ -15,15 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, array, coordinates, frozen
+from ..arguments import SMALLEST_POSITIVE, FloatArray, array, coordinates, frozen
 from ..implicit_euler import ImplicitEuler
 from ..implicit_euler.certificate import Certificate
 from ..implicit_euler.objective import Objective
 from ..mass_spring import MassSpring, State
 from ..outcome import Outcome
 
-# Smaller than any residual but 0, so that only rounding stops Newton's method.
-TOLERANCE = 1e-300
+# The smallest: only rounding stops Newton's method.
+TOLERANCE = SMALLEST_POSITIVE
 MOST_ITERATIONS = 500
 
 
@@ -141,7 +141,7 @@ def judge_step(
         residual=integrator.certify(state, x, *loads).residual,
         certificate=certificate,
         reference_certificate=reference,
-        same_minimiser=certificate.shares_minimiser(reference, apart),
+        same_minimiser=certificate.shares_minimiser_within(reference, apart),
         minimiser=frozen(best),
         iterations=solution.iterations,
         outcome=solution.outcome,

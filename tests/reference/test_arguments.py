@@ -3,7 +3,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from reference import arguments
+from reference import arguments, rotation
 
 
 def test_lists_and_single_precision_become_contiguous_doubles():
@@ -142,3 +142,60 @@ def test_what_is_frozen_cannot_be_written_to_but_its_owner_can():
         view[0] = 1.0
     owner[0] = 1.0
     assert view[0] == 1.0
+
+
+SIZE = partial(arguments.number, least=0.0)
+
+
+@pytest.mark.parametrize("border", [SIZE, arguments.sizes])
+@pytest.mark.parametrize("given", [0.0, 0, 1e-75, 1e75, np.float32(2.0)])
+def test_a_size_is_zero_or_within_75_orders_of_one(border, given):
+    assert border("mass", given) == given
+
+
+@pytest.mark.parametrize("border", [SIZE, arguments.sizes])
+@pytest.mark.parametrize("given", [1e-76, 1e-310, 5e-324])
+def test_a_smaller_size_is_refused(border, given):
+    with pytest.raises(
+        ValueError, match=rf"^mass: expected 0 or (a num.*)?at least 1e-75, got {given}"
+    ):
+        border("mass", given)
+
+
+def test_of_several_sizes_the_wrong_one_is_named():
+    with pytest.raises(ValueError, match="masses: expected none below 0, got -1e-80 at index 1"):
+        arguments.sizes("masses", [1.0, -1e-80], "particle")
+
+
+def test_a_signed_number_may_be_tiny():
+    assert arguments.number("shift", -1e-310) == -1e-310
+    assert arguments.array("x", [1e-310], 1) == [1e-310]
+
+
+@pytest.mark.parametrize(
+    ("dtype", "kind"),
+    [
+        ("complex128", "complex numbers"),
+        ("object", "objects"),
+        ("<U1", "text"),
+        ("bool", "booleans"),
+        ("datetime64[s]", "dates"),
+        ("V8", "array.*"),
+    ],
+)
+def test_the_kind_of_an_array_that_holds_no_numbers_is_named(dtype, kind):
+    with pytest.raises(ValueError, match=rf"(?s)^x: expected an array of numbers, got {kind}$"):
+        arguments.array("x", np.zeros((100, 3), dtype), "joint", 3)
+
+
+@pytest.mark.parametrize("kind", [complex, bool, object, "<U1"])
+def test_no_indices_of_another_kind_are_refused(kind):
+    with pytest.raises(ValueError, match=r"^springs: expected integer indices, got "):
+        arguments.indices("springs", np.zeros((0, 2), kind), "spring", 2, least=0, below=3)
+
+
+@pytest.mark.parametrize("axes", [(10**12,), (2**40, 2**40), (10**9, 0), (1,) * 70])
+def test_the_axes_of_arrays_that_fit_no_memory_are_refused(axes):
+    for make in (rotation.identity, partial(rotation.random, np.random.default_rng(0))):
+        with pytest.raises(ValueError, match=r"^shape: expected at most 32 lengths, of an array"):
+            make(*axes)

@@ -575,10 +575,27 @@ class TestResidual:
 
     def test_at_the_floor_the_gradient_is_rounding(self, network, rng):
         given = outer(rng)
-        result = stepped(*network, "newton", given, tolerance=1e-300)
+        result = stepped(*network, "newton", given, tolerance=1e-75)
         norm, _, floor = self.residual(*network, result.state.positions, given)
         assert result.at_floor
         assert norm <= 2 * floor
+
+    @pytest.mark.parametrize("name", ["value", "quadratic_form"])
+    def test_an_objective_that_overflows_is_an_error(self, name, backend):
+        system = MassSpring([1e75, 1e75], [[0, 1]], 1.0, 1.0)
+        x, v = np.array([[0.0, 0, 0], [2, 0, 0]]), np.full((2, 3), 1e75)
+        objective = ImplicitEuler(system, h=1e75).objective(State(x, v))
+        given = [np.zeros((1, 3))] if name == "quadratic_form" else []
+        with pytest.raises(FloatingPointError, match=f"^{name}: a number left the finite ones"):
+            getattr(objective, name)(x, *given)
+
+    @pytest.mark.parametrize("h", [1e72, 1e74])
+    def test_beside_a_gradient_that_overflows_no_residual_is_small(self, network, h, backend):
+        system, state = network
+        objective = ImplicitEuler(system, h=h).objective(state)
+        assert not objective.inertial.finite
+        for x in (state.positions, objective.y):
+            assert objective.residual(objective.evaluate(x)) == np.inf
 
     def test_history_is_the_residual_before_and_after_each_iteration(self, network, solver):
         system, state = network
@@ -623,7 +640,7 @@ class TestOutcome:
         system, state = cloth
         displaced = State(state.positions + place, state.velocities)
         best, result = (
-            stepped(system, displaced, solver, tolerance=1e-300, max_iterations=2000)
+            stepped(system, displaced, solver, tolerance=1e-75, max_iterations=2000)
             for solver in ("newton", name)
         )
         assert best.outcome == result.outcome == Outcome.AT_ROUNDING

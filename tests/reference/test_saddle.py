@@ -61,7 +61,7 @@ def test_the_other_solvers_are_about_the_gradient_only(solver):
 
 
 @pytest.mark.parametrize("share", [1.0, 1.0625])
-@pytest.mark.parametrize("tolerance", [1e-10, 1e-300])
+@pytest.mark.parametrize("tolerance", [1e-10, 1e-75])
 def test_a_saddle_that_newton_comes_to_is_one(share, tolerance, backend):
     """A pin pushes a rod at rest, and a stretched one."""
     system, state = rod(share)

@@ -71,3 +71,12 @@ def test_the_reach_is_the_links_total_length():
 def test_an_unknown_joint_is_refused(joint):
     with pytest.raises(ValueError, match="joint: expected"):
         Skeleton(**FORK).index(joint)
+
+
+@pytest.mark.parametrize("length", [1e-76, 1e-155, 1e-160])
+def test_a_link_whose_length_cannot_be_divided_by_is_refused(length):
+    with pytest.raises(
+        ValueError, match=r"offsets: expected 0 or at least 1e-75, got .* at index 2"
+    ):
+        Skeleton([-1, 0, 1], [[length, 0, 0], [0, 1, 0], [0, 0, length]])
+    assert Skeleton([-1, 0], [[length, 0, 0], [0, 0, 1]]).reach() == 1.0

@@ -1,7 +1,17 @@
 import numpy as np
 import pytest
 
-from reference import IK_SOLVERS, Outcome, curves, rotation, scenes, solve_ik, track
+from reference import (
+    IK_SOLVERS,
+    Articulation,
+    Outcome,
+    Skeleton,
+    curves,
+    rotation,
+    scenes,
+    solve_ik,
+    track,
+)
 
 
 @pytest.fixture
@@ -76,3 +86,26 @@ def test_warm_starts_keep_neighbouring_frames_alike(arm, solver):
 def test_bad_input_is_named(arm, change, message):
     with pytest.raises(ValueError, match=message):
         track(arm, **({"curve": curves["circle"](3)} | change))
+
+
+@pytest.mark.parametrize("coherent", [False, True])
+def test_a_motion_that_leaves_the_range_of_numbers_is_an_error_of_its_own(coherent):
+    """A free joint has to go beyond 1e75 to bring the effector back to the origin."""
+    tree = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [1e75, 0, 0], [0, 1e75, 0], [1e75, 0, 0]])
+    robot = Articulation(tree, ["hinge", "slide", "ball", "free"])
+    curve = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 3))
+    with pytest.raises(FloatingPointError, match=r"track: .* left the numbers up to 1e"):
+        track(robot, curve, coherent=coherent, max_iterations=20)
+
+
+@pytest.mark.parametrize("size", [1e-70, 1e-37, 1e37, 1e74])
+def test_a_smooth_motion_is_the_same_in_any_unit(size):
+    """Powers of two scale all numbers exactly but for the tolerances, which are absolute."""
+    tree, unit = scenes.ball_chain(links=3)[0], 2.0 ** round(np.log2(size))
+    curve = 0.2 * curves["circle"](12)[:, [0, 2, 1]] + 0.1
+    solved = []
+    for scale in (1.0, unit):
+        model = Skeleton(tree.parents, scale * tree.offsets)
+        given = {"coherent": True, "closed": True, "tolerance": 1e-4 * scale}
+        solved.append(track(model, scale * curve, **given).positions / scale)
+    assert np.abs(solved[0] - solved[1]).max() < 1e-9
