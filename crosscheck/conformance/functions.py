@@ -237,9 +237,10 @@ def _array(field: Field, value: object) -> Any:
             raise ValueError
         return np.array(array, dtype=kind)
     except (TypeError, ValueError, OverflowError, RecursionError):
+        got = f"{value.dtype} values of shape " if isinstance(value, np.ndarray) else ""
         raise ValueError(
             f"{field.name}: expected {field.kind}s of shape {_shape(field.shape)}, "
-            f"got {_describe(value)}"
+            f"got {got}{_describe(value)}"
         ) from None
 
 

@@ -176,6 +176,14 @@ def test_methods_of_inverse_kinematics_are_found(inside, text, methods):
         assert contestant.answer(inverse(method)).values["positions"][0, 0] == value
 
 
+def test_an_answer_of_another_kind_names_the_kind(inside):
+    text = f"import numpy as np\n{FORWARD}return {{'positions': np.zeros((2, 3), complex)}}\n"
+    told = str(inside(text).answer(case(2)).sentence)
+    assert told.endswith(
+        "expected numbers of shape (joint, 3), got complex128 values of shape (2, 3)"
+    )
+
+
 def test_an_answer_without_outputs_is_described(inside):
     failure = inside(f"{FORWARD}return {{}}\n").answer(case(2))
     assert str(failure.sentence).endswith("got an empty dict")
