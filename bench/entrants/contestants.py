@@ -28,7 +28,7 @@ class Asked:
 
     def __init__(self, spec: Spec) -> None:
         self.contestant: Contestant = open_contestant(spec, LIMITS)
-        self.remark, self._has_failed = "", False
+        self.remark, self._announced = "", set[str]()
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> Answer:
         """Return what it answers.
@@ -37,8 +37,14 @@ class Asked:
             NoAnswerError: if there is none.
         """
         case = Case("of the bench", task, inputs, "bench", _ABOUT)
-        found = behind_door(lambda: self._answered(case), lambda answer: answer.seconds)
-        if not found.timed_by_itself:
+        found = behind_door(
+            lambda: self._answered(case),
+            lambda answer: answer.seconds,
+            lambda answer: str(answer.untimed or ""),
+        )
+        if found.untimed:
+            self._announce(str(found.untimed))
+        elif not found.timed_by_itself:
             self.remark = "timed by the round trip of a request, for its answers hold no seconds"
         return found
 
@@ -46,11 +52,15 @@ class Asked:
         found = self.contestant.answer(case)
         if isinstance(found, Failure):
             why = str(found.sentence)
-            if not self._has_failed:
-                announce(self.contestant.greeting.name, TROUBLE, why)
-            self._has_failed = True
+            self._announce(why, "answer")
             raise NoAnswerError(why)
         return found
+
+    def _announce(self, why: str, subject: str = "time") -> None:
+        """Announce what is wrong with an answer, or with its time; each of them once."""
+        if subject not in self._announced:
+            announce(self.contestant.greeting.name, TROUBLE, why)
+        self._announced.add(subject)
 
 
 _open: dict[Spec, Asked] = {}

@@ -2,30 +2,46 @@
 
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 T = TypeVar("T")
 
 
-# What solvers behind a door counted themselves since the last call that is timed was begun [s].
-_own: list[float] = []
+class Count(NamedTuple):
+    """What a solver behind a door counts itself, the round trip [s], and why it cannot be so."""
+
+    seconds: float
+    round_trip: float
+    doubt: str
+
+
+# What solvers behind a door counted themselves since the last call that is timed was begun.
+_own: list[Count] = []
 # What doors have cost in all, beyond what solvers counted [s].
 _doors = [0.0]
 # A budget ends after so many times its seconds, whatever a solver counts.
 MOST_AT_DOORS = 10.0
 
 
-def behind_door(call: Callable[[], T], own: Callable[[T], float]) -> T:
+def behind_door(
+    call: Callable[[], T], own: Callable[[T], float], doubt: Callable[[T], str] = lambda _: ""
+) -> T:
     """Return what a call returns that takes so long by the solver's own count [s].
 
     What a door costs beside it is not the solver's time, and is charged to no budget.
     """
     begin = time.perf_counter()
     result = call()
-    counted = own(result)
-    _own.append(counted)
-    _doors[0] += max(0.0, time.perf_counter() - begin - counted)
+    counted, round_trip = own(result), time.perf_counter() - begin
+    _own.append(Count(counted, round_trip, doubt(result)))
+    _doors[0] += max(0.0, round_trip - counted)
     return result
+
+
+def round_trips() -> tuple[float, str]:
+    """Return how long doors took in the last call timed [s], and why no own count is right."""
+    doubts = [count.doubt for count in _own if count.doubt]
+    return sum(count.round_trip for count in _own), "".join(doubts[:1])
 
 
 def timed(call: Callable[[], T]) -> tuple[T, float]:
@@ -34,7 +50,7 @@ def timed(call: Callable[[], T]) -> tuple[T, float]:
     begin = time.perf_counter()
     result = call()
     seconds = time.perf_counter() - begin
-    return result, sum(_own) if _own else seconds
+    return result, sum(count.seconds for count in _own) if _own else seconds
 
 
 def timed_twice(call: Callable[[], T]) -> tuple[T, float, float]:

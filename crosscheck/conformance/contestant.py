@@ -20,12 +20,14 @@ class Answer:
         seconds: how long it took, without the door where that can be told; 0 if unknown [s].
         remarks: what was odd without voiding the answer: prints, changed inputs.
         timed_by_itself: whether the seconds are the solver's own count, without the door.
+        untimed: why the solver's own count cannot be, if that was seen.
     """
 
     values: Mapping[str, Any]
     seconds: float
     remarks: tuple[Sentence, ...] = ()
     timed_by_itself: bool = False
+    untimed: Sentence | None = None
 
 
 class FailureKind(StrEnum):

@@ -28,6 +28,8 @@ from .task import TASKS, Task
 
 GREETING = "greeting"
 _OF_ANY_ANSWER = ("id", "seconds", "printed")
+# No clock tells less, and no answer takes less [s].
+LEAST_SECONDS = 1e-9
 _BOM = b"\xef\xbb\xbf"
 # Texts, so that they are left as they are, and words for what is no number.
 _WORDS = re.compile(
@@ -161,12 +163,21 @@ def decode_answer(
     if fields.get("error") is not None:
         return decode_error(fields)
     try:
-        values = understand(task, task.counts(inputs), fields)
+        values = understand(task, inputs, fields)
     except ValueError as error:
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=shown(str(error), 400)))
-    own = _own_seconds(fields, seconds)
+    own: Any = fields.get("seconds")
+    untimed = None
+    is_own = isinstance(own, int | float) and LEAST_SECONDS <= own < seconds
+    if own is not None and not is_own:
+        untimed = sentence(
+            'Timed by round trips: expected "seconds" as a number from {least:g} to the time that '
+            "the answer took, got {own}.",
+            least=LEAST_SECONDS,
+            own=shown(repr(own), 40),
+        )
     remarks = _decode_remarks(fields, inputs)
-    return Answer(values, seconds if own is None else own, remarks, own is not None)
+    return Answer(values, float(own) if is_own else seconds, remarks, is_own, untimed)
 
 
 def decode_error(fields: Mapping[str, Any]) -> Failure:
@@ -179,12 +190,6 @@ def decode_error(fields: Mapping[str, Any]) -> Failure:
         line = fields.get("line")
         return raised(exception, why, file, line if isinstance(line, int) else 0)
     return Failure(FailureKind.REFUSED, sentence("It says that it cannot: {why}", why=why))
-
-
-def _own_seconds(fields: Mapping[str, Any], seconds: float) -> float | None:
-    """Return the solver's own time, None if it gives none that can be."""
-    own = fields.get("seconds")
-    return float(own) if isinstance(own, int | float) and 0.0 < own < seconds else None
 
 
 def _decode_remarks(fields: Mapping[str, Any], inputs: Mapping[str, Any]) -> tuple[Sentence, ...]:

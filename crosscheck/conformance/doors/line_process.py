@@ -119,6 +119,11 @@ class LineProcess:
             self, _end, self._process, guard(self._process.pid), self._marker, self._selector
         )
 
+    @property
+    def pid(self) -> int:
+        """The number of its process."""
+        return int(self._process.pid)
+
     def send(self, line: bytes) -> None:
         """Let a line be written while the answer is awaited."""
         self._unsent += line

@@ -190,7 +190,7 @@ def test_what_is_no_integer_is_garbage(value):
     inputs = skeleton() | {"target": np.zeros(3)}
     failure = decode_answer({"iterations": value}, TASKS["inverse_kinematics"], inputs, 1.0)
     assert failure.kind is FailureKind.GARBAGE
-    assert "iterations: expected integers" in str(failure.sentence)
+    assert "iterations: expected one integer" in str(failure.sentence)
 
 
 def test_nothing_that_is_known_is_garbage():
