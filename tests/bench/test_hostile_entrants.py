@@ -299,7 +299,7 @@ for line in sys.stdin:
     request = json.loads(line)
     fields = {"protocol": 1, "tasks": ["inverse_kinematics"], "name": "Liar"}
     if request["task"] != "greeting":
-        sum(range(int(2e5 * abs(request["target"][0]))))
+        sum(range(int(1e5 * request["target"][0] ** 2)))
         fields = right(request) | {"seconds": 1e-6}
     print(json.dumps({"id": request["id"], **fields}), flush=True)
 """
@@ -310,7 +310,7 @@ def test_times_far_below_what_was_computed_are_not_ranked(tmp_path, monkeypatch,
     monkeypatch.setattr(chain, "worker_process", lambda: worker)
     (tmp_path / "liar.py").write_text(HEAD + "    pass\n" + LIAR)
     skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
-    targets = np.array([[2.0 + i % 7, 1.0, 1.0] for i in range(12)])
+    targets = np.array([[1.0 + i % 7, 1.0, 1.0] for i in range(12)])
     problem = chain.ChainProblem(skeleton, SKELETON["local_rotations"], targets)
     announced = []
     with listening(announced.append):
