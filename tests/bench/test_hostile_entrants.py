@@ -317,8 +317,9 @@ def test_times_far_below_what_was_computed_are_not_ranked(tmp_path, monkeypatch,
         found = chain.solve_chain(
             (sys.executable, str(tmp_path / "liar.py")), "", problem, chain.Limits(1e-4, 9), 60.0
         )
+    worker.close()
+    assert not running(tmp_path)
     (message,) = [one.message for one in announced if one.state == TROUBLE]
     assert message.startswith("Timed by round trips: it claims 1e-05 s for 10 requests over which")
     assert found.facts["trouble"] == found.notes["remark"] == message
     assert (found.arrays["seconds"] > 1e-3).all()
-    assert not running(tmp_path)
