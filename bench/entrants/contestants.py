@@ -28,7 +28,7 @@ class Asked:
 
     def __init__(self, spec: Spec) -> None:
         self.contestant: Contestant = open_contestant(spec, LIMITS)
-        self.remark, self._announced = "", set[str]()
+        self.remark, self._has_trouble = "", False
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> Answer:
         """Return what it answers.
@@ -52,15 +52,15 @@ class Asked:
         found = self.contestant.answer(case)
         if isinstance(found, Failure):
             why = str(found.sentence)
-            self._announce(why, "answer")
+            self._announce(why)
             raise NoAnswerError(why)
         return found
 
-    def _announce(self, why: str, subject: str = "time") -> None:
-        """Announce what is wrong with an answer, or with its time; each of them once."""
-        if subject not in self._announced:
+    def _announce(self, why: str) -> None:
+        """Announce what is wrong with its answers or times, the first time that something is."""
+        if not self._has_trouble:
             announce(self.contestant.greeting.name, TROUBLE, why)
-        self._announced.add(subject)
+        self._has_trouble = True
 
 
 _open: dict[Spec, Asked] = {}

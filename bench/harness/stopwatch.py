@@ -2,21 +2,14 @@
 
 import time
 from collections.abc import Callable
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 T = TypeVar("T")
 
 
-class Count(NamedTuple):
-    """What a solver behind a door counts itself, the round trip [s], and why it cannot be so."""
-
-    seconds: float
-    round_trip: float
-    doubt: str
-
-
-# What solvers behind a door counted themselves since the last call that is timed was begun.
-_own: list[Count] = []
+# Of the requests since the last call that is timed was begun: what solvers behind a door counted
+# themselves, the round trips [s], and why such a count cannot be, else "".
+_own: list[tuple[float, float, str]] = []
 # What doors have cost in all, beyond what solvers counted [s].
 _doors = [0.0]
 # A budget ends after so many times its seconds, whatever a solver counts.
@@ -33,15 +26,14 @@ def behind_door(
     begin = time.perf_counter()
     result = call()
     counted, round_trip = own(result), time.perf_counter() - begin
-    _own.append(Count(counted, round_trip, doubt(result)))
+    _own.append((counted, round_trip, doubt(result)))
     _doors[0] += max(0.0, round_trip - counted)
     return result
 
 
 def round_trips() -> tuple[float, str]:
-    """Return how long doors took in the last call timed [s], and why no own count is right."""
-    doubts = [count.doubt for count in _own if count.doubt]
-    return sum(count.round_trip for count in _own), "".join(doubts[:1])
+    """Return the round trips of the last timed call [s], and why its own count cannot be, or ""."""
+    return sum(seconds for _, seconds, _ in _own), max((why for *_, why in _own), default="")
 
 
 def timed(call: Callable[[], T]) -> tuple[T, float]:
@@ -50,7 +42,7 @@ def timed(call: Callable[[], T]) -> tuple[T, float]:
     begin = time.perf_counter()
     result = call()
     seconds = time.perf_counter() - begin
-    return result, sum(count.seconds for count in _own) if _own else seconds
+    return result, sum(counted for counted, *_ in _own) if _own else seconds
 
 
 def timed_twice(call: Callable[[], T]) -> tuple[T, float, float]:

@@ -6,7 +6,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.figures.chart import GREATER, Axis, Chart, Panel, Series, series
 from ...presentation.figures.sketch import Sketch, chart_sketch
-from ...presentation.results import Results, by_problem, listed
+from ...presentation.results import Results, by_problem
 from ...presentation.tables.columns import iterations_said
 from . import BEYOND, CHAIN
 
@@ -24,7 +24,7 @@ def iterations(results: Results) -> Sketch | None:
             "iterations",
             "Iterations of every solver",
             "How many of the targets are reached within so many iterations; the band is the 95 % "
-            f"interval (Wilson).{_claimed(results)}",
+            "interval (Wilson)." + " Entrants claim their iterations." * bool(results.entrants),
             tuple(Panel(of[0].title, tuple(map(_reached, of))) for of in panels),
             Axis("iterations, log scale", log=True),
             Axis("targets reached [%]", limits=(-3, 103)),
@@ -32,12 +32,6 @@ def iterations(results: Results) -> Sketch | None:
             entrants=results.entrants,
         )
     )
-
-
-def _claimed(results: Results) -> str:
-    """Return a sentence on the iterations that entrants count themselves, "" without any."""
-    names = listed(sorted(results.entrants))
-    return f" Iterations of {names} are claimed, not counted by the bench." if names else ""
 
 
 def _counts(record: Record) -> bool:

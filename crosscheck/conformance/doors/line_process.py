@@ -97,6 +97,9 @@ class LostError(Exception):
 class LineProcess:
     """A program that was started, with its three pipes.
 
+    Attributes:
+        pid: its process.
+
     Raises:
         LostError: if it cannot be started.
     """
@@ -105,6 +108,7 @@ class LineProcess:
         self._limits = limits
         self._marker = uuid.uuid4().hex
         self._process = _start(command, folder, self._marker)
+        self.pid: int = self._process.pid
         self._unsent = bytearray()
         self._sent = 0
         self._received = bytearray()
@@ -118,11 +122,6 @@ class LineProcess:
         self._end = weakref.finalize(
             self, _end, self._process, guard(self._process.pid), self._marker, self._selector
         )
-
-    @property
-    def pid(self) -> int:
-        """The number of its process."""
-        return int(self._process.pid)
 
     def send(self, line: bytes) -> None:
         """Let a line be written while the answer is awaited."""

@@ -38,7 +38,7 @@ class ProgramContestant:
         self._warm: set[object] = set()
         self._print: bytes | None = None
         self._times: ClaimedTimes
-        self._contradiction: Sentence | None = None
+        self._untimed: Sentence | None = None
 
     @property
     def greeting(self) -> Greeting:
@@ -100,26 +100,25 @@ class ProgramContestant:
         self._times.begin()
         fields, seconds, size = self._exchange(process, line, patience)
         answer = message.decode_answer(fields, TASKS[case.task], case.inputs, seconds)
+        if isinstance(answer, Answer) and answer.timed_by_itself:
+            answer = self._compared(answer, seconds, len(line) + size)
         if kind not in self._warm:  # it may have compiled, and started what will compute
-            self._times.forget()
-            self._warm.add(kind)
-        elif isinstance(answer, Answer) and answer.timed_by_itself:
-            self._compare(answer.seconds, len(line) + size)
-        if isinstance(answer, Answer) and answer.timed_by_itself and self._contradiction:
-            untimed = self._contradiction
-            answer = replace(answer, seconds=seconds, timed_by_itself=False, untimed=untimed)
+            self._times = ClaimedTimes(process.pid)
+        self._warm.add(kind)
         printed, self._print = self._print, None
         if isinstance(answer, Answer) and printed is not None and "printed" not in fields:
             remarks = (*answer.remarks, message.prints(printed))
             return replace(answer, remarks=remarks)
         return answer
 
-    def _compare(self, claimed: float, size: int) -> None:
-        """Compare a time that is claimed with what was seen; remark once that it cannot be."""
-        contradiction = self._times.end(claimed, size)
-        if contradiction and not self._contradiction:
-            self._contradiction = contradiction
-            self.remarks += (contradiction,)
+    def _compared(self, answer: Answer, round_trip: float, size: int) -> Answer:
+        """Return an answer, timed by its round trip once a claimed time cannot be; say so once."""
+        untimed = self._untimed or self._times.end(answer.seconds, size)
+        if untimed is None:
+            return answer
+        self.remarks += () if self._untimed else (untimed,)
+        self._untimed = untimed
+        return replace(answer, seconds=round_trip, timed_by_itself=False, untimed=untimed)
 
     def _exchange(
         self, process: LineProcess, line: bytes, patience: float

@@ -9,7 +9,7 @@ import pytest
 from crosscheck.conformance.case import Case
 from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.doors import Limits, open_contestant
-from crosscheck.conformance.doors.claimed_time import Call, contradicts
+from crosscheck.conformance.doors.claimed_time import contradicts
 from crosscheck.conformance.doors.processes import main_thread_seconds
 from crosscheck.conformance.sentence import sentence
 
@@ -22,7 +22,7 @@ SIZES = np.arange(1, 41) ** 4
 
 
 def calls(claimed, computed, size=2000):
-    return [Call(*call) for call in np.broadcast(claimed, computed, size + 0 * computed)]
+    return [tuple(call) for call in np.broadcast(claimed, computed, size + 0 * computed)]
 
 
 @pytest.mark.parametrize("claimed", [1e-12, 1e-7, SOLVES / 100.0], ids=["1e-12", "1e-7", "1 %"])
