@@ -171,9 +171,8 @@ def decode_answer(
     is_own = isinstance(own, int | float) and LEAST_SECONDS <= own < seconds
     if own is not None and not is_own:
         untimed = sentence(
-            'Timed by round trips: expected "seconds" as a number from {least:g} to the time that '
+            'Timed by round trips: expected "seconds" as a number from 1e-9 to the time that '
             "the answer took, got {own}.",
-            least=LEAST_SECONDS,
             own=shown(repr(own), 40),
         )
     remarks = _decode_remarks(fields, inputs)

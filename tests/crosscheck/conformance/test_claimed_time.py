@@ -159,6 +159,6 @@ def test_impossible_seconds_are_refused_in_one_sentence(tmp_path, seconds):
     (answer,), _ = answers(program(tmp_path, seconds), 1)
     assert not answer.timed_by_itself
     assert answer.seconds > 1e-4
-    assert 'expected "seconds" as a number from 1e-09 to the time that the answer took' in str(
+    assert 'expected "seconds" as a number from 1e-9 to the time that the answer took' in str(
         answer.untimed
     )
