@@ -28,8 +28,8 @@ from .task import TASKS, Task
 
 GREETING = "greeting"
 _OF_ANY_ANSWER = ("id", "seconds", "printed")
-# No clock tells less, and no answer takes less [s].
-LEAST_SECONDS = 1e-9
+# No clock tells less, and no answer takes less; coarse clocks tick so seldom [s].
+LEAST_SECONDS, TICK = 1e-9, 0.02
 _BOM = b"\xef\xbb\xbf"
 # Texts, so that they are left as they are, and words for what is no number.
 _WORDS = re.compile(
@@ -168,15 +168,15 @@ def decode_answer(
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=shown(str(error), 400)))
     own: Any = fields.get("seconds")
     untimed = None
-    is_own = isinstance(own, int | float) and LEAST_SECONDS <= own < seconds
-    if own is not None and not is_own:
+    is_own = isinstance(own, int | float) and LEAST_SECONDS <= own < seconds + TICK
+    if own and not is_own:  # 0 is what a coarse clock says
         untimed = sentence(
             'Timed by round trips: expected "seconds" as a number from 1e-9 to the time that '
             "the answer took, got {own}.",
             own=shown(repr(own), 40),
         )
     remarks = _decode_remarks(fields, inputs)
-    return Answer(values, float(own) if is_own else seconds, remarks, is_own, untimed)
+    return Answer(values, float(min(own, seconds)) if is_own else seconds, remarks, is_own, untimed)
 
 
 def decode_error(fields: Mapping[str, Any]) -> Failure:

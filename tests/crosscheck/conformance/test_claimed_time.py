@@ -162,3 +162,10 @@ def test_impossible_seconds_are_refused_in_one_sentence(tmp_path, seconds):
     assert 'expected "seconds" as a number from 1e-9 to the time that the answer took' in str(
         answer.untimed
     )
+
+
+@pytest.mark.parametrize("seconds", ["0.0", "0.016"])
+def test_a_clock_that_ticks_seldom_is_no_lie(tmp_path, seconds):
+    found, remarks = answers(program(tmp_path, seconds), 11)
+    assert remarks == []
+    assert all(one.untimed is None and one.seconds > 0.0 for one in found)
