@@ -149,6 +149,8 @@ class LineProcess:
             if now - looked >= TICK or now - start >= limit:
                 looked = now
                 self._look()
+                if b"\n" in self._received[self._searched :]:  # an answer, and then its end
+                    continue
             if now - start >= limit:
                 raise self._late(patience)
             self._exchange(max(min(TICK, start + limit - now), 0.0))
