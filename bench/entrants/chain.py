@@ -64,7 +64,9 @@ def solve_chain(
     if followed and not outcome.lost:
         history = _followed(spec, method, problem, limits, budget)
         arrays |= history
-        remarks += [] if history else ["not followed, for it counts no iterations"]
+        remarks += (
+            [] if history else ["not followed, for its answers do not depend on max_iterations"]
+        )
     facts = {"trouble": raised(outcome.solved)}
     return Measured(arrays, {"remark": "; ".join(filter(None, remarks))}, facts)
 

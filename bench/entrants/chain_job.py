@@ -8,7 +8,7 @@ import numpy as np
 from reference import Skeleton, forward_kinematics
 from reference.arguments import FloatArray, IndexArray
 
-from ..harness.stopwatch import Budget
+from ..harness.stopwatch import Budget, round_trips, timed
 from ..harness.worker import Done, Message, NoAnswerError, Ready, Solved, Unfit, describe
 from .contestants import asked
 from .entrant import Spec
@@ -76,13 +76,14 @@ class ChainJob(NamedTuple):
     def _solved(self, i: int) -> Solved:
         nothing = np.full(1 + 3 * len(self.parents), np.nan)
         try:
-            answer = asked(self.spec).answer(TASK, self._inputs(i))
+            answer, seconds = timed(lambda: asked(self.spec).answer(TASK, self._inputs(i)))
             positions = joint_positions(Skeleton(self.parents, self.offsets), answer.values)
         except (NoAnswerError, ValueError) as error:
             return Solved(nothing, -1, 0.0, describe(error))
         made = answer.values.get("iterations", np.nan)
         claimed = int(answer.values.get("converged", -1))
-        return Solved(np.concatenate([[made], positions.ravel()]), claimed, answer.seconds, "")
+        q = np.concatenate([[made], positions.ravel()])
+        return Solved(q, claimed, seconds, "", *round_trips())
 
 
 def joint_positions(skeleton: Skeleton, values: Any) -> FloatArray:

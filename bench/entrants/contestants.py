@@ -6,6 +6,7 @@ from typing import Any
 from crosscheck.conformance.case import Case
 from crosscheck.conformance.contestant import Answer, Contestant, Failure
 from crosscheck.conformance.doors import Limits, open_contestant
+from crosscheck.conformance.message import NO_SECONDS
 from crosscheck.conformance.sentence import sentence
 
 from ..harness.progress import TROUBLE, announce
@@ -28,7 +29,7 @@ class Asked:
 
     def __init__(self, spec: Spec) -> None:
         self.contestant: Contestant = open_contestant(spec, LIMITS)
-        self.remark, self._has_failed = "", False
+        self.remark, self._has_trouble = "", False
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> Answer:
         """Return what it answers.
@@ -37,8 +38,10 @@ class Asked:
             NoAnswerError: if there is none.
         """
         case = Case("of the bench", task, inputs, "bench", _ABOUT)
-        found = behind_door(lambda: self._answered(case), lambda answer: answer.seconds)
-        if found.untimed or not found.seconds:
+        found = behind_door(lambda: self._answered(case), lambda answer: answer.seconds, _doubt)
+        if doubt := _doubt(found):
+            self._announce(doubt)
+        elif found.untimed or not found.seconds:
             self.remark = 'timed by the round trip of a request, for want of valid "seconds"'
         return found
 
@@ -46,11 +49,20 @@ class Asked:
         found = self.contestant.answer(case)
         if isinstance(found, Failure):
             why = str(found.sentence)
-            if not self._has_failed:
-                announce(self.contestant.greeting.name, TROUBLE, why)
-            self._has_failed = True
+            self._announce(why)
             raise NoAnswerError(why)
         return found
+
+    def _announce(self, why: str) -> None:
+        """Announce what is wrong with its answers or times, the first time that something is."""
+        if not self._has_trouble:
+            announce(self.contestant.greeting.name, TROUBLE, why)
+        self._has_trouble = True
+
+
+def _doubt(answer: Answer) -> str:
+    """Return why the time that an answer claims is not taken, "" if it is, or claims none."""
+    return "" if answer.untimed in (None, NO_SECONDS) else str(answer.untimed)
 
 
 _open: dict[Spec, Asked] = {}

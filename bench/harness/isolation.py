@@ -80,7 +80,7 @@ class WorkerProcess:
                         outcome = outcome._replace(trouble=why, lost=ready, silent=silent)
                     case Done():
                         outcome = outcome._replace(trouble=raised(outcome.solved))
-        return outcome
+        return _timed_from_outside(outcome)
 
     def find(self, job: Work) -> Mapping[str, Any]:
         """Return what a job measures.
@@ -159,10 +159,20 @@ def in_a_fresh_process(
         return worker.find(Calculation(function, arguments))
 
 
+def _timed_from_outside(outcome: Outcome) -> Outcome:
+    """Return an outcome with the times of round trips if those of the solver cannot be right."""
+    if not any(target.doubt for target in outcome.solved):
+        return outcome
+    solved = [t._replace(seconds=max(t.seconds, t.round_trip)) for t in outcome.solved]
+    return outcome._replace(solved=solved)
+
+
 def raised(solved: list[Solved]) -> str:
-    """Return what a solver raised most often, and how often; "" if it raised nothing."""
-    counts = Counter(one.trouble for one in solved if one.trouble)
-    if not counts:
-        return ""
-    what, times = counts.most_common(1)[0]
-    return f"{what}, on {times} of {len(solved)} targets"
+    """Return what a solver raised most often and how often, and why its times are not taken.
+
+    It is "" if there is neither.
+    """
+    counts = Counter(target.trouble for target in solved if target.trouble)
+    sentences = [f"{what}, on {n} of {len(solved)} targets" for what, n in counts.most_common(1)]
+    sentences += [target.doubt for target in solved if target.doubt][:1]
+    return "; ".join(sentences)

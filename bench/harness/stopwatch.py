@@ -7,25 +7,34 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-# What solvers behind a door counted themselves since the last call that is timed was begun [s].
-_own: list[float] = []
+# Of the requests since the last call that is timed was begun: what solvers behind a door counted
+# themselves, the round trips [s], and why such a count cannot be, else "".
+_own: list[tuple[float, float, str]] = []
 # What doors have cost in all, beyond what solvers counted [s].
 _doors = [0.0]
 # A budget ends after so many times its seconds, whatever a solver counts.
 MOST_AT_DOORS = 10.0
 
 
-def behind_door(call: Callable[[], T], own: Callable[[T], float]) -> T:
+def behind_door(
+    call: Callable[[], T], own: Callable[[T], float], doubt: Callable[[T], str] = lambda _: ""
+) -> T:
     """Return what a call returns that takes so long by the solver's own count, 0 for none [s].
 
     What a door costs beside it is not the solver's time, and is charged to no budget.
     """
     begin = time.perf_counter()
     result = call()
-    counted = own(result) or time.perf_counter() - begin
-    _own.append(counted)
-    _doors[0] += max(0.0, time.perf_counter() - begin - counted)
+    round_trip = time.perf_counter() - begin
+    counted = own(result) or round_trip
+    _own.append((counted, round_trip, doubt(result)))
+    _doors[0] += max(0.0, round_trip - counted)
     return result
+
+
+def round_trips() -> tuple[float, str]:
+    """Return the round trips of the last timed call [s], and why its own count cannot be, or ""."""
+    return sum(seconds for _, seconds, _ in _own), max((why for *_, why in _own), default="")
 
 
 def timed(call: Callable[[], T]) -> tuple[T, float]:
@@ -34,7 +43,7 @@ def timed(call: Callable[[], T]) -> tuple[T, float]:
     begin = time.perf_counter()
     result = call()
     seconds = time.perf_counter() - begin
-    return result, sum(_own) if _own else seconds
+    return result, sum(counted for counted, *_ in _own) if _own else seconds
 
 
 def timed_twice(call: Callable[[], T]) -> tuple[T, float, float]:

@@ -39,12 +39,16 @@ class Solved(NamedTuple):
         claimed: 1 if the solver says that it is solved, 0 if not, -1 if it does not say.
         seconds: how long it took.
         trouble: what the solver raised, else "".
+        round_trip: how long its door took, 0 without one [s].
+        doubt: why the seconds, where it counts them itself, cannot be right, else "".
     """
 
     q: np.ndarray
     claimed: int
     seconds: float
     trouble: str
+    round_trip: float = 0.0
+    doubt: str = ""
 
 
 class Unfit(NamedTuple):

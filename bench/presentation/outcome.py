@@ -89,7 +89,7 @@ def three(headlines: Sequence[Headline]) -> list[Headline]:
 def _headline(headline: Headline) -> str:
     asked = headline.asked[:1].lower() + headline.asked[1:]
     if not headline.chapter:
-        return f"{headline.asked}: {headline.answer}; {headline.detail}."
+        return f"{headline.asked}: {headline.answer}; {headline.detail.rstrip('.')}."
     return f"{headline.chapter}, {asked}: {headline.answer}, {headline.detail}."
 
 

@@ -2,10 +2,10 @@
 
 import inspect
 import reprlib
-import time
 import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from time import perf_counter  # before a solver is loaded, which may replace `time.perf_counter`
 from typing import Any
 
 import numpy as np
@@ -61,14 +61,14 @@ def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) ->
         for name, value in inputs.items()
         if takes(function, name)
     }
-    start = time.perf_counter()
+    start = perf_counter()
     try:
         returned = function(**given)
     except (Exception, SystemExit) as error:
         return describe_exception(error, _file(function))
-    seconds = time.perf_counter() - start
+    seconds = perf_counter() - start
     try:
-        values = understand(task, task.counts(inputs), returned)
+        values = understand(task, inputs, returned)
     except ValueError as error:
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=str(error)))
     return Answer(values, seconds, _changed(inputs, given))
@@ -155,7 +155,7 @@ def _changed(inputs: Mapping[str, Any], given: Mapping[str, Any]) -> tuple[Sente
     )
 
 
-def understand(task: Task, counts: Mapping[str, int], returned: object) -> dict[str, Any]:
+def understand(task: Task, inputs: Mapping[str, Any], returned: object) -> dict[str, Any]:
     """Return the outputs by name.
 
     A dict is read by its keys, and those that are no outputs are left aside; a tuple by the order
@@ -163,8 +163,10 @@ def understand(task: Task, counts: Mapping[str, int], returned: object) -> dict[
     of one. Extents that the request does not fix may be up to `MOST_POINTS`.
 
     Raises:
-        ValueError: if nothing is understood, or an output has another shape or is no number.
+        ValueError: if nothing is understood, an output has another shape or is no number, or there
+            are more iterations than the request allows.
     """
+    counts = task.counts(inputs)
     if isinstance(returned, Mapping):
         known = [field for field in task.outputs if returned.get(field.name) is not None]
         values = {one.name: checked(one, counts, returned[one.name]) for one in known}
@@ -176,13 +178,19 @@ def understand(task: Task, counts: Mapping[str, int], returned: object) -> dict[
     if not values:
         names = ", ".join(f"{one.name} {_shape(one.shape)}" for one in task.outputs)
         raise ValueError(f"{task.name}: expected some of {names}, got {found}")
-    for field in task.outputs:
-        is_open = {count for count in field.shape if isinstance(count, str)} - counts.keys()
-        if is_open and field.name in values and len(values[field.name]) > MOST_POINTS:
-            raise ValueError(
-                f"{field.name}: expected at most {MOST_POINTS} rows, got {len(values[field.name])}"
-            )
+    _check_bounds(task, inputs, values)
     return values
+
+
+def _check_bounds(task: Task, inputs: Mapping[str, Any], values: Mapping[str, Any]) -> None:
+    counts = task.counts(inputs)
+    for field in task.outputs:
+        is_open = any(isinstance(n, str) and n not in counts for n in field.shape)
+        if is_open and field.name in values and (size := len(values[field.name])) > MOST_POINTS:
+            raise ValueError(f"{field.name}: expected at most {MOST_POINTS} rows, got {size}")
+    count, limit = values.get("iterations", 0), inputs.get("max_iterations", np.inf)
+    if not 0 <= count <= limit:
+        raise ValueError(f"iterations: expected 0 to {limit}, the max_iterations sent, got {count}")
 
 
 def _by_shape(task: Task, counts: Mapping[str, int], parts: list[object]) -> dict[str, Any]:
@@ -237,10 +245,11 @@ def _array(field: Field, value: object) -> Any:
             raise ValueError
         return np.array(array, dtype=kind)
     except (TypeError, ValueError, OverflowError, RecursionError):
+        shape = f"{field.kind}s of shape {_shape(field.shape)}"
+        expected = shape if field.shape else f"one {field.kind}"
         got = f"{value.dtype} values of shape " if isinstance(value, np.ndarray) else ""
         raise ValueError(
-            f"{field.name}: expected {field.kind}s of shape {_shape(field.shape)}, "
-            f"got {got}{_describe(value)}"
+            f"{field.name}: expected {expected}, got {got}{_describe(value)}"
         ) from None
 
 

@@ -28,6 +28,12 @@ from .task import TASKS, Task
 
 GREETING = "greeting"
 _OF_ANY_ANSWER = ("id", "seconds", "printed")
+# No clock tells less, and no answer takes less; coarse clocks tick so seldom [s].
+LEAST_SECONDS, TICK = 1e-9, 0.02
+NO_SECONDS = sentence(
+    "Not timed: only the round trips of requests are known, and these are mostly the time of the "
+    'pipe. Send the time of your function alone as "seconds" (docs/protocol.md).'
+)
 _BOM = b"\xef\xbb\xbf"
 # Texts, so that they are left as they are, and words for what is no number. A text without an end
 # is matched as well: looking for the end of each text within it would take quadratic time.
@@ -163,11 +169,11 @@ def decode_answer(
     if fields.get("error") is not None:
         return decode_error(fields)
     try:
-        values = understand(task, task.counts(inputs), fields)
+        values = understand(task, inputs, fields)
     except ValueError as error:
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=shown(str(error), 400)))
     untimed = _why_untimed(fields.get("seconds"), seconds)
-    own = seconds if untimed else float(fields["seconds"])
+    own = seconds if untimed else min(float(fields["seconds"]), seconds)
     return Answer(values, own, _decode_remarks(fields, inputs), untimed)
 
 
@@ -186,15 +192,16 @@ def decode_error(fields: Mapping[str, Any]) -> Failure:
 def _why_untimed(own: object, seconds: float) -> Sentence | None:
     """Return why "seconds" of an answer is not the solver's own time, None if it may be."""
     if own is None:
-        return sentence(
-            "Not timed: only the round trips of requests are known, and these are mostly the time "
-            'of the pipe. Send the time of your function alone as "seconds" (docs/protocol.md).'
-        )
-    if isinstance(own, int | float) and not isinstance(own, bool) and 0.0 <= own < seconds:
+        return NO_SECONDS
+    if (
+        isinstance(own, int | float)
+        and not isinstance(own, bool)
+        and (own == 0.0 or LEAST_SECONDS <= own < seconds + TICK)
+    ):
         return None
     return sentence(
-        'Not timed: expected "seconds" as a number from 0 to the time that the answer took, got '
-        "{own}.",
+        'Not timed: expected "seconds" as 0, or a number from 1e-9 to the time that the answer '
+        "took, got {own}.",
         own=shown(repr(own), 40),
     )
 

@@ -28,7 +28,9 @@ def timed(function: Callable[[], Returned]) -> tuple[Returned, float]:
 
 def with_lesser_time(first: Answer | Failure, again: Answer | Failure) -> Answer | Failure:
     """Return the first answer with the lesser time of both, 0 only if the clock sees neither."""
-    if isinstance(first, Failure) or isinstance(again, Failure) or first.untimed or again.untimed:
+    if isinstance(first, Failure) or isinstance(again, Failure) or first.untimed:
         return first
+    if again.untimed:
+        return replace(first, seconds=again.seconds, untimed=again.untimed)
     lesser, greater = sorted((first.seconds, again.seconds))
     return replace(first, seconds=lesser or greater)

@@ -93,8 +93,15 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
     made = {table.name: table for table in tables(Results(records()), ["ik"])}
     for name in ("accuracy", "q1_beyond_reach", "published_fabrik", "entered_ik"):
         assert "My FABRIK" in cells(made[name]), name
+    for name in ("accuracy", "q1_beyond_reach", "published_fabrik"):  # nobody else counted them
+        for row in made[name].rows:
+            claims = [cell for cell in row if str(cell).endswith("claimed")]
+            assert bool(claims) == ("My FABRIK" in row), (name, row)
+    assert re.search(r"My FABRIK: .* iterations? claimed", str(made["q1_beyond_reach"].summary))
     for draw in (chain_figures.ik_residuals, chain_figures.iterations):
         assert "My FABRIK" in drawn(draw(Results(records()))).svg
+    shows = chain_figures.iterations(Results(records())).shows
+    assert shows.endswith("Entrants claim their iterations.")
     printed = capsys.readouterr().out
     assert re.search(r"^My FABRIK, chain of balls: rank \d of 3 solvers", printed, re.MULTILINE)
 

@@ -155,7 +155,7 @@ def test_a_time_beside_the_reference_is_the_programs_own(capsys, folder, seconds
 UNTIMED = {
     "None": "Not timed: only the round trips of requests are known",
     "None if number == 3 else 1e-6": "Not timed: only the round trips of requests are known",
-    "100": 'expected "seconds" as a number from 0 to the time that the answer took, got 100.',
+    "100": "as 0, or a number from 1e-9 to the time that the answer took, got 100.",
     "-1e-6": "got -1e-06.",
     "0": 'Not timed: "seconds" is 0 in all answers.',
 }

@@ -24,7 +24,7 @@ def iterations(results: Results) -> Sketch | None:
             "iterations",
             "Iterations of every solver",
             "How many of the targets are reached within so many iterations; the band is the 95 % "
-            "interval (Wilson).",
+            "interval (Wilson)." + " Entrants claim their iterations." * bool(results.entrants),
             tuple(Panel(of[0].title, tuple(map(_reached, of))) for of in panels),
             Axis("iterations, log scale", log=True),
             Axis("targets reached [%]", limits=(-3, 103)),

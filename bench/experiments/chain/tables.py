@@ -63,12 +63,13 @@ def _straightness(records: Sequence[Record]) -> str:
     if not answered.any():
         return f"{straight}{unanswered}"
     iterations = np.concatenate([columns.iterations_said(record) for record in records])
+    most = columns.claimed(counted(int(iterations.max(initial=0)), "iteration"), records[0])
     excess = np.concatenate([record.arrays["excess"] for record in records])[answered]
     return (
         f"{straight}; at worst "
         f"{words_in(metrics.spread(bends[answered]).largest, '%')} of the reach off the line, "
         f"{words(metrics.spread(excess).largest)} m above distance − reach, "
-        + (counted(int(iterations.max()), "iteration") if iterations.size else "iterations unsaid")
+        + (words(most) if iterations.size else "iterations unsaid")
         + unanswered * (not answered.all())
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 from reference import MassSpring, State, scenes
 from reference.mass_spring import SystemArrays
 
-from ...harness.stopwatch import Budget, timed
+from ...harness.stopwatch import Budget, round_trips, timed
 from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
 from ...peers.cloth.protocol import Mover
 from ...peers.ik.protocol import remark_of
@@ -79,7 +79,7 @@ class ClothJob(NamedTuple):
             for _ in range(self.shape.frames):
                 stays_finite, seconds = timed(lambda: advanced(mover))
                 where = mover.positions() if stays_finite else nowhere
-                yield Solved(where, UNKNOWN, seconds, "")
+                yield Solved(where, UNKNOWN, seconds, "", *round_trips())
                 if budget.is_spent or not np.isfinite(where).all():
                     yield Done()
                     return

@@ -10,6 +10,7 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import Results, label, settings
 from ...presentation.tables.columns import (
+    claimed,
     effort,
     iterations_said,
     places,
@@ -18,7 +19,7 @@ from ...presentation.tables.columns import (
     words_in,
 )
 from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import INTERVAL, Column, Summary, in_unit, listing, words
+from ...presentation.tables.table import INTERVAL, Cell, Column, Summary, in_unit, listing, words
 from ..robots.readings import RULE, cut, solved, total
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
@@ -168,13 +169,13 @@ class Counted(NamedTuple):
         counts = published.FABRIK.get(self.solver, (None, None))
         return counts[list(published.FABRIK_DISTANCES).index(stratum)]
 
-    def mean(self, stratum: str) -> float | None:
+    def mean(self, stratum: str) -> Cell:
         """Return the mean here."""
         here = self.here.get(stratum)
         said = np.zeros(0) if here is None else iterations_said(here)
-        return metrics.mean(said) if said.size else None
+        return claimed(metrics.mean(said), here) if here is not None and said.size else None
 
-    def largest(self, stratum: str) -> float | None:
+    def largest(self, stratum: str) -> Cell:
         """Return the largest number here."""
         here = self.here.get(stratum)
         return None if here is None else spread_of_iterations(here)[2]
@@ -215,7 +216,8 @@ def _mean_in_words(counted: Counted) -> str:
         return "iterations unsaid"
     mean, low, high = metrics.mean_interval(counts)
     interval = "" if np.isnan(low) else f"{words(low)}–{words(high)}, "
-    return f"{words(mean)} ({interval}n = {words(counts.size)})"
+    written = claimed(words(mean), counted.here[NEAR])
+    return f"{written} ({interval}n = {words(counts.size)})"
 
 
 fabrik = Layout(

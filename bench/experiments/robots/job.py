@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...harness.stopwatch import Budget, timed
+from ...harness.stopwatch import Budget, round_trips, timed
 from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
 from ...peers.ik.protocol import Ask, Solve, UnableError, attempt, remark_of
 from ...peers.ik.restarts import restarted
@@ -105,4 +105,5 @@ def _solve(solve: Solve, job: Job) -> Solved:
     if q.shape != nothing.shape:
         q, trouble = nothing, f"returned {q.shape} numbers, not {nothing.shape}"
     claimed = -1 if output.claimed is None else int(output.claimed)
-    return Solved(q, claimed, seconds if output.seconds is None else output.seconds, trouble)
+    seconds = seconds if output.seconds is None else output.seconds
+    return Solved(q, claimed, seconds, trouble, *round_trips())

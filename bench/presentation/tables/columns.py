@@ -79,10 +79,15 @@ def iterations_said(record: Record) -> metrics.Floats:
     return values[~np.isnan(values)]
 
 
-def spread_of_iterations(record: Record) -> Sequence[int | float | None]:
+def spread_of_iterations(record: Record) -> Sequence[Cell]:
     """Return median, 95th percentile and maximum of the iterations, None where all are unsaid."""
     said = iterations_said(record)
-    return metrics.whole(said) if said.size else (None, None, None)
+    return [claimed(n, record) for n in metrics.whole(said)] if said.size else (None, None, None)
+
+
+def claimed(count: Cell, record: Record) -> Cell:
+    """Return a count with "claimed" behind it if it is an entrant's own: nobody else counts it."""
+    return f"{words(count)} claimed" if record.facts.get("entrant") else count
 
 
 def allowed() -> Column:

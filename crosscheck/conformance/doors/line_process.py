@@ -97,6 +97,9 @@ class LostError(Exception):
 class LineProcess:
     """A program that was started, with its three pipes.
 
+    Attributes:
+        pid: its process.
+
     Raises:
         LostError: if it cannot be started.
     """
@@ -105,6 +108,7 @@ class LineProcess:
         self._limits = limits
         self._marker = new_marker()
         self._process = _start(command, folder, self._marker)
+        self.pid: int = self._process.pid
         self._unsent = bytearray()
         self._sent = 0
         self._received = bytearray()
@@ -150,6 +154,8 @@ class LineProcess:
             if now - looked >= TICK or now - start >= limit:
                 looked = now
                 self._look()
+                if b"\n" in self._received[self._searched :]:  # an answer, and then its end
+                    continue
             if now - start >= limit:
                 raise self._late(patience)
             self._exchange(max(min(TICK, start + limit - now), 0.0))

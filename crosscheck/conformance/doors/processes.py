@@ -90,6 +90,16 @@ def family(leader: int, marker: int = 0) -> list[Process]:
     return [running[pid] for pid in sorted(found - {os.getpid()})]
 
 
+def main_thread_seconds(process: int) -> float:
+    """Return how long the first thread of a process has computed, to the nanosecond [s].
+
+    It is 0 where the process has ended, or the system does not tell.
+    """
+    with contextlib.suppress(OSError):
+        return 1e-9 * int((_PROC / str(process) / "schedstat").read_bytes().split()[0])
+    return 0.0
+
+
 def end_group(leader: int, marker: int = 0) -> None:
     """Kill a program and all that it has started.
 

@@ -12,6 +12,7 @@ from ..contestant import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
 from ..sentence import Sentence, sentence
 from ..task import TASKS
+from .claimed_time import ClaimedTimes
 from .line_process import LIMITS, Limits, LineProcess, LostError
 
 
@@ -36,6 +37,8 @@ class ProgramContestant:
         self._number = 0
         self._warm: set[object] = set()
         self._print: bytes | None = None
+        self._times: ClaimedTimes
+        self._untimed: Sentence | None = None
 
     @property
     def greeting(self) -> Greeting:
@@ -74,10 +77,11 @@ class ProgramContestant:
             self._number, self._warm, self._print = 0, set(), None
             self._process = LineProcess(self._command, self._folder, self._limits)
             self._greet(self._process)
+            self._times = ClaimedTimes(self._process.pid)
         return self._process
 
     def _greet(self, process: LineProcess) -> None:
-        fields, _ = self._exchange(process, message.encode_greeting(), self._limits.first)
+        fields, *_ = self._exchange(process, message.encode_greeting(), self._limits.first)
         if fields.get("error") is not None:
             raise LostError.of(message.decode_error(fields))
         try:
@@ -93,20 +97,33 @@ class ProgramContestant:
         patience = self._limits.request if kind in self._warm else self._limits.first
         self._number += 1
         line = message.encode_case(self._number, case)
-        fields, seconds = self._exchange(process, line, patience)
-        self._warm.add(kind)
+        self._times.begin()
+        fields, seconds, size = self._exchange(process, line, patience)
         answer = message.decode_answer(fields, TASKS[case.task], case.inputs, seconds)
+        if isinstance(answer, Answer) and answer.untimed is None and answer.seconds:
+            answer = self._compared(answer, seconds, len(line) + size)
+        if kind not in self._warm:  # it may have compiled, and started what will compute
+            self._times = ClaimedTimes(process.pid)
+        self._warm.add(kind)
         printed, self._print = self._print, None
         if isinstance(answer, Answer) and printed is not None and "printed" not in fields:
             remarks = (*answer.remarks, message.prints(printed))
             return replace(answer, remarks=remarks)
         return answer
 
+    def _compared(self, answer: Answer, round_trip: float, size: int) -> Answer:
+        """Return an answer, timed by its round trip once a claimed time cannot be."""
+        untimed = self._untimed or self._times.end(answer.seconds, size)
+        if untimed is None:
+            return answer
+        self._untimed = untimed
+        return replace(answer, seconds=round_trip, untimed=untimed)
+
     def _exchange(
         self, process: LineProcess, line: bytes, patience: float
-    ) -> tuple[Mapping[str, Any], float]:
-        """Send a request; return the answer with its number, and how long it took."""
-        start = time.monotonic()
+    ) -> tuple[Mapping[str, Any], float, int]:
+        """Send a request; return its answer, how long it took, and how many bytes came back."""
+        start, size = time.monotonic(), 0
         process.send(line)
         for _ in range(self._limits.prints + 1):
             try:
@@ -114,9 +131,10 @@ class ProgramContestant:
             except LostError as lost:
                 raise self._with_prints(lost) from None
             seconds = time.monotonic() - start
+            size += len(answer)
             fields = self._decode(answer)
             if fields is not None:
-                return fields, seconds
+                return fields, seconds, size
         raise LostError(
             FailureKind.GARBAGE,
             sentence(

@@ -11,6 +11,8 @@ import pytest
 from hostile_programs import LIMITS, LOOP, case, program, running
 
 from crosscheck.conformance.contestant import Answer, Failure, FailureKind, NoGreetingError
+from crosscheck.conformance.doors import line_process
+from crosscheck.conformance.doors.line_process import LineProcess
 from crosscheck.conformance.doors.program import ProgramContestant
 from crosscheck.conformance.judgement import Diagnosis, TaskReport
 from crosscheck.conformance.verify import DISCIPLINES, verify
@@ -393,6 +395,30 @@ def test_a_program_that_dies_kills_nobody_by_a_broken_pipe(tmp_path):
         assert contestant.answer(case(3)).kind is FailureKind.CRASHED
     finally:
         signal.signal(signal.SIGPIPE, default)
+
+
+def test_an_answer_counts_though_the_program_ends_right_after_it(tmp_path, monkeypatch):
+    """It is read by the look that finds the program ended, before the end of its output is."""
+    contestant = program(tmp_path, "right(request); os._exit(0)")
+    assert contestant.greeting
+    ended = LineProcess._has_ended
+
+    def wait(process):
+        deadline = time.monotonic() + 5.0
+        while not ended(process) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        return ended(process)
+
+    exchange = LineProcess._exchange
+    monkeypatch.setattr(line_process, "TICK", 0.0)
+    monkeypatch.setattr(LineProcess, "_has_ended", wait)
+    process = contestant._ready()
+    send = process.send
+    monkeypatch.setattr(process, "send", lambda line: (send(line), exchange(process, 1.0)))
+    answer = contestant.answer(case(3))
+    assert isinstance(answer, Answer), str(answer.sentence)
+    monkeypatch.undo()
+    contestant.close()
 
 
 def test_an_answer_too_many_is_told_at_the_next_case(tmp_path):

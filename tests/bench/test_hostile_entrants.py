@@ -1,0 +1,329 @@
+"""What a hostile solver gets, whatever it does and whichever way it comes in; nothing stays.
+
+Ways in: a Python file, a program, files of answers, and the bench, which takes the Python file.
+Elsewhere: what programs do to pipes and how they leave (`test_hostile_programs`), lines that take
+long to read (`test_message`), processes that leave their session (`test_processes`).
+"""
+
+import json
+import re
+import sys
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hostile_programs import LIMITS, running
+
+from bench.entrants import chain
+from bench.harness.isolation import WorkerProcess
+from bench.harness.progress import TROUBLE, listening
+from bench.harness.worker import NoAnswerError
+from crosscheck.conformance.case import Case
+from crosscheck.conformance.contestant import Answer
+from crosscheck.conformance.doors import export, open_contestant
+from crosscheck.conformance.greeting import Greeting
+from crosscheck.conformance.message import NO_SECONDS
+from crosscheck.conformance.sentence import sentence
+from reference import Skeleton
+
+NOT_TIMED = sentence('Not timed: the answers hold no valid "seconds".')
+TASK = "inverse_kinematics"
+TARGETS = np.array([[0.0, 2.0, 1.0], [0.0, 1.0, 2.0]])
+POSE = [[1.0, 0.0, 0.0, 0.0]] * 3
+SKELETON = {"parents": np.arange(-1, 2), "offsets": np.eye(3), "local_rotations": np.array(POSE)}
+# It misbehaves if so many iterations are allowed, and answers rightly else.
+HOSTILE, RIGHT = 9, 1
+
+HEAD = """\
+import json, os, signal, subprocess, sys, time
+kept = []
+def right(request):
+    return {"local_rotations": request["local_rotations"]}
+def misbehave(request):
+"""
+PYTHON = """
+import numpy as np
+def inverse_kinematics(**request):
+    return misbehave(request) if request["max_iterations"] == 9 else right(request)
+"""
+PROGRAM = """
+for line in sys.stdin:
+    request = json.loads(line)
+    if request["task"] == "greeting":
+        fields = {"protocol": 1, "tasks": ["inverse_kinematics"]}
+    else:
+        fields = misbehave(request) if request["max_iterations"] == 9 else right(request)
+    print(json.dumps({"id": request["id"], **fields}), flush=True)
+"""
+
+
+class Row(NamedTuple):
+    """What a solver does, or answers, and what it gets by each way; None where it is not tried.
+
+    In the bench it gets the sentence of the Python file if there is no other.
+    """
+
+    does: str | dict
+    python: str
+    program: str | None = None
+    files: str | None = None
+    bench: str | None = ""
+    waits: bool = False
+
+
+def seconds(value, shown):
+    """A row of a solver that claims a time: a Python file is timed by us, files are not timed."""
+    refused = f'^answer; Not timed: expected "seconds" .*, got {shown}.$'
+    return Row({"local_rotations": POSE, "seconds": value}, "^answer$", refused, "^answer$")
+
+
+def alike(does, words, **other):
+    """A row that gets the same by every way that takes data."""
+    return Row(does, words, words, words if isinstance(does, dict) else None, **other)
+
+
+def count(value, words):
+    """A row of a solver that answers a number of iterations."""
+    answer = {"local_rotations": POSE, "iterations": value}
+    return alike(answer, f"^garbage: iterations: expected {words}")
+
+
+NOT_FINITE = "local_rotations: expected finite numbers, got"
+SILENT = "ended after 1 s of silence"
+ALLOWED = f"0 to {HOSTILE}, the max_iterations sent, got"
+BEHAVIOURS = {
+    "replaces the clock": Row("time.perf_counter = lambda: 0.0\nreturn right(request)", "^answer$"),
+    "claims 1e-12 s": seconds(1e-12, "1e-12"),
+    "claims 5e-324 s": seconds(5e-324, "5e-324"),
+    "claims no number of seconds": seconds(float("nan"), "nan"),
+    "claims negative seconds": seconds(-1.0, "-1.0"),
+    "claims infinite seconds": seconds(float("inf"), "inf"),
+    "claims -5 iterations": count(-5, f"{ALLOWED} -5$"),
+    "claims 1e9 iterations": count(10**9, f"{ALLOWED} 1000000000$"),
+    "claims one iteration too many": count(HOSTILE + 1, f"{ALLOWED} 10$"),
+    "claims 1.5 iterations": count(1.5, "one integer, got 1.5$"),
+    "claims many iterations": count("many", "one integer, got 'many'$"),
+    "answers NaN": alike(
+        {"local_rotations": [[float("nan")] * 4] * 3}, "^answer$", bench=NOT_FINITE
+    ),
+    "answers infinities": alike(
+        {"local_rotations": [[float("inf")] * 4] * 3}, "^answer$", bench=NOT_FINITE
+    ),
+    "answers the wrong shape": alike(
+        {"local_rotations": [[1.0]]},
+        r"^garbage: local_rotations: expected shape \(3, 4\), got \(1, 1\)$",
+    ),
+    "answers texts": alike(
+        {"local_rotations": [["1"] * 4] * 3},
+        r"^garbage: local_rotations: expected numbers of shape \(joint, 4\), got \[\['1', ",
+    ),
+    "answers lists in lists": alike(
+        {"local_rotations": json.loads("[" * 500 + "]" * 500)},
+        r"^garbage: local_rotations: expected ",
+    ),
+    "answers nothing known": alike(
+        {"colour": "red"}, "^garbage: inverse_kinematics: expected some"
+    ),
+    "raises": Row(
+        "raise ValueError('no arms')",
+        "^raised: It raised ValueError in line 6 of solver.py: no arms$",
+        "^crashed: It ended instead of answering: exit code 1. .* ValueError: no arms$",
+    ),
+    "exits": Row(
+        "sys.exit(3)", "^raised: It raised SystemExit", "^crashed: .* answering: exit code 3.$"
+    ),
+    "leaves at once": alike(
+        "os._exit(3)", "^crashed: It ended instead of answering: exit code 3.$"
+    ),
+    "aborts": alike("os.abort()", "^crashed: It ended instead of answering: it aborted"),
+    "hangs": alike("while True: pass", "^hung: It computed for", waits=True, bench=SILENT),
+    "ignores signals and hangs": alike(
+        "for one in (1, 2, 3, 13, 15): signal.signal(one, signal.SIG_IGN)\nwhile True: pass",
+        "^hung: It computed for",
+        waits=True,
+        bench=SILENT,
+    ),
+    "writes standard error without end": alike(
+        "while True: os.write(2, b'e' * 65536)", "^hung", waits=True, bench=SILENT
+    ),
+    "floods its output": Row(
+        "for _ in range(1000): print('garbage')\nreturn right(request)",
+        "^answer; It prints to its standard output, for example: garbage",
+        "^garbage: It printed more than 100 lines that are no answers, for example: garbage$",
+    ),
+    "eats memory": alike(
+        "while True: kept.append(bytearray(os.urandom(1) * (8 << 20))); time.sleep(0.01)",
+        "^memory: It took more than 0.262 GB of memory.$",
+        waits=True,
+        bench=None,
+    ),
+    "changes its inputs": Row(
+        "request['offsets'] += 1.0\nreturn right(request)",
+        "^answer; It changed its argument offsets.$",
+    ),
+    "changes its folder": alike("os.chdir('/')\nreturn right(request)", "^answer$"),
+    "closes its input": Row("sys.stdin.close()\nreturn right(request)", "^answer$"),
+    "leaves a child running": alike(
+        "subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)', __file__])\n"
+        "return right(request)",
+        "^answer$",
+    ),
+    "replaces parts of NumPy and of json": Row(
+        "np.asarray = np.array = json.dumps = None\nreturn right(request)",
+        "^crashed: It ended instead of answering: exit code 1. .* TypeError: 'NoneType' object",
+    ),
+    "replaces the reference": Row(
+        "import reference\nreference.forward_kinematics = reference.Skeleton = None\n"
+        "return right(request)",
+        "^answer$",
+    ),
+}
+
+
+def source(does, loop):
+    """Return a solver; what it answers is written as JSON, which has room for deep lists."""
+    does = does if isinstance(does, str) else f"return json.loads({json.dumps(does)!r})"
+    return HEAD + "".join(f"    {line}\n" for line in does.splitlines()) + loop
+
+
+def case(iterations):
+    inputs = SKELETON | {"target": np.array([1.0, 1.0, 0.0]), "effector": 2, "tolerance": 1e-4}
+    inputs |= {"max_iterations": iterations, "method": ""}
+    return Case(f"{iterations}", TASK, inputs, "hostile", sentence("one"))
+
+
+def outcome(answer):
+    """Return what came of a request in words: remarks, and why it is timed by round trips."""
+    if not isinstance(answer, Answer):
+        return f"{answer.kind}: {answer.sentence}"
+    is_usual = answer.untimed in (None, NO_SECONDS, NOT_TIMED)
+    untimed = None if is_usual else answer.untimed
+    return "; ".join(map(str, filter(None, ["answer", *answer.remarks, untimed])))
+
+
+def rows(way, *quick):
+    """The rows of a way in; those that wait, and those that are not quick, are slow."""
+    return [
+        pytest.param(
+            name, marks=[pytest.mark.slow] * (row.waits or bool(quick and name not in quick))
+        )
+        for name, row in BEHAVIOURS.items()
+        if getattr(row, way) is not None
+    ]
+
+
+def opened(folder, way, row):
+    limits = LIMITS._replace(request=0.5 if row.python.startswith("^hung") else 20.0)
+    file = folder / "solver.py"
+    file.write_text(source(row.does, PYTHON if way == "python" else PROGRAM))
+    spec = str(file) if way == "python" else (sys.executable, "-I", "-S", str(file))
+    return open_contestant(spec, limits)
+
+
+def misbehaved(folder, way, name):
+    """What a hostile solver gets; the next request is answered, and nothing stays."""
+    solver = opened(folder, way, BEHAVIOURS[name])
+    try:
+        answers = [solver.answer(case(n)) for n in (RIGHT, HOSTILE, RIGHT)]
+    finally:
+        solver.close()
+    assert [outcome(answer) for answer in answers[::2]] == ["answer", "answer"]
+    assert not running(folder)
+    return answers[1], [str(remark) for remark in solver.remarks]
+
+
+PYTHON_QUICK = ("replaces the clock", "exits", "changes its inputs", "floods its output")
+
+
+@pytest.mark.parametrize("name", rows("python", *PYTHON_QUICK))
+def test_a_hostile_python_file_gets_its_sentence(tmp_path, name):
+    answer, remarks = misbehaved(tmp_path, "python", name)
+    assert re.search(BEHAVIOURS[name].python, outcome(answer)), outcome(answer)
+    assert any("left processes running" in one for one in remarks) == ("child" in name)
+    assert not isinstance(answer, Answer) or answer.seconds > 0.0
+
+
+@pytest.mark.parametrize("name", rows("program"))
+def test_a_hostile_program_gets_its_sentence(tmp_path, name):
+    answer, remarks = misbehaved(tmp_path, "program", name)
+    assert re.search(BEHAVIOURS[name].program, outcome(answer)), outcome(answer)
+    assert any("left processes running" in one for one in remarks) == ("child" in name)
+
+
+@pytest.mark.parametrize("name", rows("files"))
+def test_hostile_files_get_their_sentence(tmp_path, name):
+    row, asked = BEHAVIOURS[name], case(HOSTILE)
+    export.write_cases(tmp_path, [asked], Greeting(1, (TASK,)))
+    (request,) = tmp_path.rglob("request.json")
+    request.with_name("answer.json").write_text(json.dumps(row.does))
+    found = open_contestant(tmp_path).answer(asked)
+    assert re.search(row.files, outcome(found)), outcome(found)
+    assert not isinstance(found, Answer) or found.seconds == 0.0
+
+
+@pytest.fixture(scope="module")
+def worker():
+    impatient = WorkerProcess(60.0, 1.0)
+    yield impatient
+    impatient.close()
+
+
+@pytest.mark.parametrize("name", rows("bench", "claims -5 iterations"))
+def test_a_hostile_entrant_of_the_bench_reaches_nothing_by_it(tmp_path, monkeypatch, worker, name):
+    """What is wrong with an answer costs the target; its time is never what it claims."""
+    row = BEHAVIOURS[name]
+    monkeypatch.setattr(chain, "worker_process", lambda: worker)
+    (tmp_path / "solver.py").write_text(source(row.does, PYTHON))
+    skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
+    problem = chain.ChainProblem(skeleton, SKELETON["local_rotations"], TARGETS)
+    spec, limits = str(tmp_path / "solver.py"), chain.Limits(1e-4, HOSTILE)
+    measure = partial(chain.solve_chain, spec, "", problem, limits, budget=60.0)
+    if row.bench == SILENT:
+        with pytest.raises(NoAnswerError, match=SILENT):
+            measure()
+    else:
+        words = row.bench or re.sub(r"^\^(answer|\w+: )|\$$", "", row.python)
+        _check(measure(), is_right=row.python.startswith("^answer") and not row.bench, words=words)
+    worker.close()
+    assert not running(tmp_path)
+
+
+def _check(found, is_right, words):
+    """Right answers are kept and timed, others are neither; what is wrong stands in the record."""
+    assert not found.arrays["solved"].any()
+    assert (np.isfinite(found.arrays["residual"]) == is_right).all()
+    assert ((found.arrays["seconds"] > 0.0) == is_right).all()
+    told = f"{found.notes['remark']}; {found.facts['trouble']}"
+    assert re.search("^; $" if is_right else words, told), told
+
+
+LIAR = """
+for line in sys.stdin:
+    request = json.loads(line)
+    fields = {"protocol": 1, "tasks": ["inverse_kinematics"], "name": "Liar"}
+    if request["task"] != "greeting":
+        sum(range(int(1e5 * request["target"][0] ** 2)))
+        fields = right(request) | {"seconds": 1e-6}
+    print(json.dumps({"id": request["id"], **fields}), flush=True)
+"""
+
+
+def test_times_far_below_what_was_computed_are_not_ranked(tmp_path, monkeypatch, worker):
+    """Those of the first targets neither, which were claimed before it was seen."""
+    monkeypatch.setattr(chain, "worker_process", lambda: worker)
+    (tmp_path / "liar.py").write_text(HEAD + "    pass\n" + LIAR)
+    skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
+    targets = np.array([[1.0 + i % 7, 1.0, 1.0] for i in range(12)])
+    problem = chain.ChainProblem(skeleton, SKELETON["local_rotations"], targets)
+    announced = []
+    with listening(announced.append):
+        found = chain.solve_chain(
+            (sys.executable, str(tmp_path / "liar.py")), "", problem, chain.Limits(1e-4, 9), 60.0
+        )
+    worker.close()
+    assert not running(tmp_path)
+    (message,) = [one.message for one in announced if one.state == TROUBLE]
+    assert message.startswith("Timed by round trips: it claims 1e-05 s for 10 requests over which")
+    assert found.facts["trouble"] == found.notes["remark"] == message
+    assert (found.arrays["seconds"] > 1e-3).all()
