@@ -1,6 +1,6 @@
 """Write docs/sample and the README's headlines from records: `python docs/write_sample.py FOLDER`.
 
-The records are those of `plumbob bench` at full length, with every peer (`make sample` does all).
+The records are those of `plumbob bench --quick` with every peer (`make sample` does all).
 """
 
 import re
