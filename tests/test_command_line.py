@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from dataclasses import replace
@@ -532,3 +533,9 @@ def test_variables_of_numba_cost_no_traceback(empty_folder, arguments, variable,
     assert (done.returncode, done.stderr) == (code, err)
     assert ("1 of 1 claims held" in done.stdout) == (code == 0)
     assert not list(empty_folder.rglob("records.jsonl"))
+
+
+def test_an_example_in_the_help_of_bench_finds_what_it_names(capsys, empty_folder):
+    line = next(line for line in bench.EXAMPLES.splitlines() if "--robot" in line)
+    code, out, _ = plumbob(capsys, *shlex.split(line)[1:], "--dry-run")
+    assert (code, "Plumbob LM" in out) == (0, True)

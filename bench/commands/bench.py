@@ -48,7 +48,7 @@ EXAMPLES = (
     + block(
         "Your problems, and parts of the work",
         "plumbob bench ik --problem my_problems.py --problem robots/",
-        "plumbob bench ik --with my_ik.py --solver my_ik.py --robot panda --targets 50",
+        "plumbob bench ik --solver 'Plumbob LM' --robot panda --targets 50",
         "plumbob bench ik --list                what there is to choose from",
         "plumbob bench --dry-run                what would be measured, and how long it takes",
     )

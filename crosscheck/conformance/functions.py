@@ -173,7 +173,7 @@ def understand(task: Task, inputs: Mapping[str, Any], returned: object) -> dict[
         found = f"the keys {', '.join(map(str, returned))}" if returned else "an empty dict"
     else:
         parts = list(returned) if isinstance(returned, tuple) else [returned]
-        values = _by_shape(task, counts, parts)
+        values = {} if returned is None else _by_shape(task, counts, parts)
         found = "; ".join(_describe(part) for part in parts)
     if not values:
         names = ", ".join(f"{one.name} {_shape(one.shape)}" for one in task.outputs)

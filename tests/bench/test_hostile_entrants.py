@@ -314,7 +314,7 @@ def test_times_far_below_what_was_computed_are_not_ranked(tmp_path, monkeypatch,
     monkeypatch.setattr(chain, "worker_process", lambda: worker)
     (tmp_path / "liar.py").write_text(HEAD + "    pass\n" + LIAR)
     skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
-    targets = np.array([[1.0 + i % 7, 1.0, 1.0] for i in range(12)])
+    targets = np.array([[6.0 + i % 3, 1.0, 1.0] for i in range(12)])
     problem = chain.ChainProblem(skeleton, SKELETON["local_rotations"], targets)
     announced = []
     with listening(announced.append):

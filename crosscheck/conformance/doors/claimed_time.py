@@ -1,8 +1,9 @@
 """Whether the times that a program claims agree with what its processes are seen to compute.
 
 A request costs time beside the solver's: JSON, pipes, garbage collection. A larger message costs no
-less, so that the cheapest of all as large bounds this cost; far more is allowed. Main threads only
-are looked at: others may compute beside them, or wait by spinning.
+less, so that the cheapest of all as large bounds this cost, its solution included; far more is
+allowed. The claim is not taken off it: on a busy machine it holds time in which the process waited.
+Main threads only are looked at: others may compute beside them, or wait by spinning.
 """
 
 from collections import deque
@@ -59,7 +60,6 @@ class ClaimedTimes:
 def contradicts(requests: Sequence[Request]) -> bool:
     """Return whether most requests compute far longer than is claimed for them."""
     claimed, computed, size = np.array(sorted(requests, key=lambda request: -request[2])).T
-    beside = computed - claimed
-    messages = np.minimum(np.minimum.accumulate(beside), MESSAGE + BYTE * size)
-    excess = beside - ALLOWED * np.maximum(messages, 0.0) - NOISE
+    messages = np.minimum(np.minimum.accumulate(computed), MESSAGE + BYTE * size)
+    excess = computed - claimed - ALLOWED * messages - NOISE
     return bool(np.mean(excess > (FACTOR - 1.0) * claimed) > 0.5)

@@ -160,18 +160,28 @@ def _judged(one: Asked, greeting: Greeting) -> CaseJudgement:
     if not isinstance(answer, Answer):
         return CaseJudgement(case, answer, (), expected, None, seconds)
     findings = laws.Findings(greeting)
-    digits = None
+    digits = []
     joints, size = len(x), case.facts["size"]
     if "positions" in answer.values:
         tolerance = rounding.positions(greeting.epsilon, joints, size)
         error, finding = positions(answer.values["positions"], x, tolerance)
         findings.add(finding)
-        digits = laws.digits(error, size)
+        digits.append(laws.digits(error, size))
     if "rotations" in answer.values:
+        digits.append(laws.digits(_quaternion_error(answer.values["rotations"], R), 1.0))
         findings.extend(rotations(answer.values["rotations"], R, greeting))
     findings.extend(laws.repeated(one, size, greeting))
     findings.extend(laws.remarks(answer))
-    return CaseJudgement(case, answer, findings.all, expected, digits, seconds)
+    return CaseJudgement(case, answer, findings.all, expected, min(digits, default=None), seconds)
+
+
+def _quaternion_error(rotations: Any, expected: Any) -> float:
+    """Return the largest difference of a component; any multiple of q is the same rotation."""
+    with np.errstate(all="ignore"):  # infinite components give NaN
+        lengths = np.linalg.norm(rotations, axis=-1, keepdims=True)
+        unit = rotations / np.where(lengths > 0.0, lengths, 1.0)
+    differences = (np.abs(unit - expected).max(-1), np.abs(unit + expected).max(-1))
+    return float(np.minimum(*differences).max())
 
 
 def positions(theirs: Any, ours: Any, tolerance: float) -> tuple[float, Finding]:

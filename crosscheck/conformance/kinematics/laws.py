@@ -84,7 +84,7 @@ def angles(a: FloatArray, b: FloatArray) -> FloatArray:
     return 4.0 * np.arcsin(np.minimum(0.5 * apart, 1.0))
 
 
-def digits(error: float, size: float) -> float | None:
+def digits(error: float, size: float) -> float:
     """Return how many digits are correct, at most 16."""
     if not np.isfinite(error):
         return 0.0
@@ -115,7 +115,7 @@ def _apart(one: object, other: object) -> float:
     a, b = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
     if a.shape != b.shape or (np.isnan(a) != np.isnan(b)).any():
         return np.inf
-    return float(np.nanmax(np.abs(a - b), initial=0.0)) if a.size else 0.0
+    return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
 
 
 def remarks(answer: Answer) -> list[Finding]:

@@ -42,6 +42,7 @@ HONEST = {
         1e-5, 1e-3 + 2e-7 * np.arange(1, 41) ** 4, np.arange(1, 41) ** 4
     ),
     "the least of eight tries": calls(SOLVES, 8.0 * SOLVES + MESSAGES),
+    "waits on a busy machine": calls(np.where(np.arange(40) % 9, 3e-4, 5e-3), 5e-3 + MESSAGES),
     "garbage collections": calls(1e-5, np.where(np.arange(40) % 4, MESSAGES, 0.2)),
     "a start in an interpreter": calls(1e-5, MESSAGES * np.repeat([20.0, 1.0], [15, 25])),
     "a solver that waits": calls(SOLVES, MESSAGES),

@@ -185,6 +185,8 @@ def test_an_answer_of_another_kind_names_the_kind(inside):
 
 
 def test_an_answer_without_outputs_is_described(inside):
+    none = inside("def inverse_kinematics(target): return None\n").answer(inverse(""))
+    assert str(none.sentence).endswith("got None")
     failure = inside(f"{FORWARD}return {{}}\n").answer(case(2))
     assert str(failure.sentence).endswith("got an empty dict")
     failure = inside(f"{FORWARD}return {{'x': 1, 'y': 2}}\n").answer(case(2))

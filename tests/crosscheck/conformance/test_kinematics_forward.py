@@ -71,6 +71,20 @@ def test_fault_is_caught_and_named(fault):
     assert report.smallest_failure is not None
 
 
+def test_digits_are_those_of_the_rotations_too():
+    def turned_at_the_end(**inputs):
+        positions, rotations = map(np.copy, by_reference(**inputs))
+        rotations[-1] = rotation.multiply(rotations[-1], rotation.exponential([0.2, 0.0, 0.0]))
+        return positions, rotations
+
+    def scaled(**inputs):
+        positions, rotations = by_reference(**inputs)
+        return positions, -2.0 * rotations
+
+    assert judged(turned_at_the_end).digits == pytest.approx(1.0, abs=0.5)
+    assert judged(scaled).digits > 14.0
+
+
 def pairs():
     return [faults for faults in combinations("forward") if len(faults) == 2]
 
