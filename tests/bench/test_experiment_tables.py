@@ -57,6 +57,11 @@ def test_every_letter_of_ours_can_be_typeset(records):
         assert not [text for text in texts if r"\textbackslash" in escaped(text)], table.name
 
 
+def test_no_sentence_of_an_empty_table_lacks_a_number():
+    for table in tables(Results([])):
+        assert not re.search(r"[a-z] [–.,;]|every th|  ", table.measured), table.measured
+
+
 def test_the_error_that_is_asked_about_is_the_one_that_the_answer_counts_to(records):
     layout, results = cloth_peers.iterations, Results(records)
     sentence = layout(results).summary.sentence

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from ..figures.sketch import Sketch
 
 Figure = Callable[[Results], "Sketch | None"]
+# How the numbers of a table came about that has none.
+NOT_MEASURED = "Nothing of this is on record yet."
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,13 +53,16 @@ class Layout:
         """Return the table with a row for each subject."""
         subjects = list(self.subjects(results))
         columns = tuple(self.columns(subjects) if callable(self.columns) else self.columns)
+        measured = self.measured
+        if callable(measured):
+            measured = measured(subjects) if subjects else NOT_MEASURED
         return Table(
             self.name,
             self.title,
             columns,
             cells(columns, subjects),
             self.shows if isinstance(self.shows, str) else self.shows(subjects),
-            self.measured if isinstance(self.measured, str) else self.measured(subjects),
+            measured,
             self.summary(subjects) if subjects else NO_SUMMARY,
             self.compared,
             frozenset(i for i, subject in enumerate(subjects) if not self.ranked(subject)),
