@@ -31,6 +31,7 @@ from bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from bench.presentation.figures.sketch import drawn
 from bench.presentation.report import all_figures
 from bench.presentation.results import Results
+from bench.presentation.tables.table import best_cells
 from reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
 from reference.mass_spring import stiffness_matrix
 
@@ -611,6 +612,7 @@ def test_the_table_of_motions_says_what_diverged_and_what_was_cut_short(make):
     assert "diverged: MuJoCo Euler" in table.summary.sentence
     assert table.summary.points == ("20 × 20, 1,000 N/m: MuJoCo Euler by 4 steps, 0.0200 m",)
     assert "order of 3.50" in table.measured
+    assert {row for row, _ in best_cells(table)} == {1}  # one that got to its end
 
 
 def test_a_missing_engine_has_a_row_in_both_tables(make):

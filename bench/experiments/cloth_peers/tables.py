@@ -297,6 +297,7 @@ motion = WithMissing(
         text("remark", _fate),
     ),
     subjects=lambda results: points(results, MOTION),
+    ranked=lambda point: point.is_whole,
     shows="Distances are root mean squares over the particles after the last frame. Diverged "
     "means that a particle was farther from its true place than the cloth is wide.",
     measured=lambda found: f"{_CLOTH}{_FAIR}{_TRUTH}: {_certainty(found)}.",
