@@ -193,48 +193,77 @@ def run_suites(
     executor: "Executor | None" = None,
 ) -> int:
     """Run suites with a progress bar; return 1 if a claim is missed or a block failed."""
-    from reference.backend.compilation import numba_settings
-
     from ..harness import run
-    from ..harness.executor import HERE
     from ..harness.record import RecordFile
 
     RecordFile(output).read()  # before anything is measured that could not be kept
-    if numba_settings().DISABLE_JIT:
-        raise ValueError("NUMBA_DISABLE_JIT: expected it unset where times are taken, got it set")
+    _require_compiler()
     if fresh:
         run.forget(suites, scale, output)
-    events: list[run.Event] = []
-    with progress() as bar, lines_in_a_pipe(bar):
-        task, done = bar.add_task("starting", total=run.count(suites, scale)), Counter[str]()
-        with listening(_listener(bar, task, events if executor in (None, HERE) else ())):
-            for event in run.run(suites, scale, output, executor or HERE):
-                events.append(event)
-                done[event.state] += 1
-                advance = event.state in (run.KEPT, run.MEASURED, run.FAILED)
-                what = visible(f"{event.suite}: {event.what}")
-                bar.update(task, description=what, advance=advance, kept=done[run.KEPT])
-    kept = visible(f"{done[run.KEPT]} kept as on record, in {output}")
-    print(f"{done[run.MEASURED]} measured, {kept}")
-    again = Counter(e.message for e in events if e.state == run.MEASURING and e.message)
-    sentences = [f"measured again: {count}, for {why}" for why, count in again.items()]
-    sentences += [f"{e.suite}: {e.message}" for e in events if e.state == run.NOT_RUN]
-    for sentence in sentences:
-        print(visible(sentence))
-    if warning := RecordFile(output).read().warning:
-        print(f"plumbob: {visible(warning)}", file=sys.stderr)
-    failed: dict[str, list[str]] = {}
-    for event in events:
-        if event.state == run.FAILED:
-            failed.setdefault(event.message, []).append(f"{event.suite}: {event.what}")
-    failures = [
-        f"{first}{f' and {len(more)} more' if more else ''}: {why}"
-        for why, (first, *more) in failed.items()
-    ]
-    failures += run.missed_claims(suites, output)
+    events = _run_with_progress(suites, scale, output, executor)
+    _print_counts(events, output)
+    failures = [*_failures(events), *run.missed_claims(suites, output)]
     for failure in failures:
         print(f"plumbob: {visible(failure)}", file=sys.stderr)
     return MISSED if failures else SUCCESS
+
+
+def _require_compiler() -> None:
+    from reference.backend.compilation import numba_settings
+
+    if numba_settings().DISABLE_JIT:
+        raise ValueError("NUMBA_DISABLE_JIT: expected it unset where times are taken, got it set")
+
+
+def _run_with_progress(
+    suites: Sequence[str], scale: "str | Choice", output: Path, executor: "Executor | None"
+) -> "list[Event]":
+    from ..harness import run
+    from ..harness.executor import HERE
+
+    events: list[Event] = []
+    with progress() as bar, lines_in_a_pipe(bar):
+        task, counts = bar.add_task("starting", total=run.count(suites, scale)), Counter[str]()
+        with listening(_listener(bar, task, events if executor in (None, HERE) else ())):
+            for event in run.run(suites, scale, output, executor or HERE):
+                events.append(event)
+                counts[event.state] += 1
+                advance = event.state in (run.KEPT, run.MEASURED, run.FAILED)
+                description = visible(f"{event.suite}: {event.what}")
+                bar.update(task, description=description, advance=advance, kept=counts[run.KEPT])
+    return events
+
+
+def _print_counts(events: "Sequence[Event]", output: Path) -> None:
+    """Print how much was measured and kept, and what was measured again or not at all."""
+    from ..harness import run
+    from ..harness.record import RecordFile
+
+    counts = Counter(event.state for event in events)
+    kept = visible(f"{counts[run.KEPT]} kept as on record, in {output}")
+    print(f"{counts[run.MEASURED]} measured, {kept}")
+    again = Counter(e.message for e in events if e.state == run.MEASURING and e.message)
+    for reason, count in again.items():
+        print(visible(f"measured again: {count}, for {reason}"))
+    for event in events:
+        if event.state == run.NOT_RUN:
+            print(visible(f"{event.suite}: {event.message}"))
+    if warning := RecordFile(output).read().warning:
+        print(f"plumbob: {visible(warning)}", file=sys.stderr)
+
+
+def _failures(events: "Sequence[Event]") -> list[str]:
+    """Return a sentence for each reason why blocks failed."""
+    from ..harness import run
+
+    blocks: dict[str, list[str]] = {}
+    for event in events:
+        if event.state == run.FAILED:
+            blocks.setdefault(event.message, []).append(f"{event.suite}: {event.what}")
+    return [
+        f"{first}{f' and {len(more)} more' if more else ''}: {reason}"
+        for reason, (first, *more) in blocks.items()
+    ]
 
 
 def _listener(bar: Any, task: Any, events: "Sequence[Event]") -> Callable[[Progress], None]:
