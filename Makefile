@@ -19,8 +19,8 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
-# Each core begins with its share of the files, so that their fixtures are made once, and takes
-# tests from the slowest at the end: 402 s where whole files (loadfile) take 508 s.
+# Each core begins with its share of the files, so that most fixtures are made once, and takes tests
+# from the others at the end, so that none waits for a long file (as it does by loadfile).
 PARALLEL = -n auto --dist worksteal
 # The pins are made and checked by uv, in an environment of its own; no Python is downloaded.
 UV ?= build/uv/bin/uv

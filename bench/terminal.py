@@ -173,9 +173,12 @@ def lines_in_a_pipe(bar: Any) -> Iterator[None]:
 def time_left(
     elapsed: float | None, completed: float, total: float | None, fields: Mapping[str, Any]
 ) -> str:
-    """Return how long the rest takes if it goes on as it went: "1:05 left", "?" before it can."""
+    """Return how long the rest takes if it goes on as it went: "1:05 left".
+
+    "?" before a hundredth is done, for the first calls compile.
+    """
     done = completed - fields.get("kept", 0)
-    if not elapsed or done <= 0 or total is None:
+    if not elapsed or total is None or done <= 0.01 * total:
         return "? left"
     minutes, seconds = divmod(round(elapsed / done * (total - completed)), 60)
     hours, minutes = divmod(minutes, 60)

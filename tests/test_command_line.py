@@ -539,3 +539,9 @@ def test_an_example_in_the_help_of_bench_finds_what_it_names(capsys, empty_folde
     line = next(line for line in bench.EXAMPLES.splitlines() if "--robot" in line)
     code, out, _ = plumbob(capsys, *shlex.split(line)[1:], "--dry-run")
     assert (code, "Plumbob LM" in out) == (0, True)
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder that refuses everyone")
+def test_a_folder_that_cannot_be_made_cannot_be_written(capsys):
+    code, _, err = plumbob(capsys, "bench", "arm", "--quick", "-o", "/proc/plumbob")
+    assert (code, err) == (2, "plumbob: /proc/plumbob: cannot write here\n")

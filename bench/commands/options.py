@@ -30,8 +30,8 @@ def writable(folder: Path) -> None:
     from ..harness.record import check_folder
 
     check_folder(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:

@@ -226,3 +226,12 @@ def test_help_is_no_wider_than_the_terminal(capsys, monkeypatch, command):
         assert max(map(len, out.splitlines())) <= width, width
         full = full or re.sub(r"\s", "", out)
         assert re.sub(r"\s", "", out) == full
+
+
+@pytest.mark.parametrize(
+    ("completed", "kept", "left"),
+    [(8, 0, "? left"), (18, 10, "? left"), (9, 0, "16:11 left"), (450, 0, "0:10 left")],
+)
+def test_no_time_is_told_before_a_hundredth_is_done(completed, kept, left):
+    """The first of 883 rows compile: they told hours where minutes were left."""
+    assert terminal.time_left(10.0, completed, 883, {"kept": kept}) == left
