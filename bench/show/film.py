@@ -1,5 +1,6 @@
 """A scene as an animated GIF, or as a strip of moments in SVG."""
 
+import tempfile
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -41,7 +42,10 @@ def animate(scene: Scene, path: Path, progress: Told) -> None:
         update = partial(_frame, axes, scene)
         frames = len(scene.motions[0].positions)
         animation = FuncAnimation(figure, update, frames=frames, init_func=lambda: ())
-        animation.save(path, writer=PillowWriter(fps=RATE), progress_callback=progress)
+        with tempfile.TemporaryDirectory() as folder:  # interrupted, Pillow writes what it has
+            whole = Path(folder, "film.gif")
+            animation.save(whole, writer=PillowWriter(fps=RATE), progress_callback=progress)
+            path.write_bytes(whole.read_bytes())
 
 
 def picture(scene: Scene, path: Path, progress: Told) -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 
 from bench import cli
 from bench.presentation.motion import motion
-from bench.show import ours
+from bench.show import film, ours
 from bench.show.yours import Yours
 from reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
 
@@ -188,6 +188,16 @@ def test_a_still_shows_the_whole_curve_by_each_solver_and_what_its_colours_mean(
     assert re.search(r">\d+ (nm|µm|mm)<", svg)
     poses = re.findall(r"stroke: #0b62a8; stroke-opacity: ([\d.]+)", svg)
     assert 0 < max(map(float, poses)) < 0.3
+
+
+def test_an_animation_that_is_interrupted_leaves_no_file(capsys, tmp_path, monkeypatch):
+    def interrupted(axes, scene, frame):
+        if frame == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(film, "_frame", interrupted)
+    assert show(capsys, "circle", "-o", "c.gif")[0] == 130
+    assert not (tmp_path / "c.gif").exists()
 
 
 def test_without_a_scene_a_solver_is_shown_with_what_it_can(capsys, tmp_path):
