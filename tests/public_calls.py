@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-import reference
-from crosscheck import samples, verdict
-from crosscheck.tolerances import POSITION
-from reference import (
+from plumbob import reference
+from plumbob.crosscheck import samples, verdict
+from plumbob.crosscheck.tolerances import POSITION
+from plumbob.reference import (
     Articulation,
     ImplicitEuler,
     MassSpring,
@@ -37,13 +37,13 @@ from reference import (
     tracking,
     wind,
 )
-from reference import jacobians as differential
-from reference import sparse as cholesky
-from reference.backend import compiled
-from reference.backend import threads as parallel
-from reference.formats import bvh, mjcf, obj, urdf
-from reference.implicit_euler import certificate, objective
-from reference.sparse import linear_solver
+from plumbob.reference import jacobians as differential
+from plumbob.reference import sparse as cholesky
+from plumbob.reference.backend import compiled
+from plumbob.reference.backend import threads as parallel
+from plumbob.reference.formats import bvh, mjcf, obj, urdf
+from plumbob.reference.implicit_euler import certificate, objective
+from plumbob.reference.sparse import linear_solver
 
 # The modules that a user meets, the package itself first.
 MODULES = [
@@ -136,10 +136,10 @@ def public_names(modules=None):
     for module in modules or MODULES:
         for name in getattr(module, "__all__", [n for n in vars(module) if n[0] != "_"]):
             thing = getattr(module, name)
-            home = getattr(thing, "__module__", None)
-            if home is None or not home.startswith(("reference", "crosscheck")):
+            home = (getattr(thing, "__module__", None) or "").removeprefix("plumbob.")
+            if not home.startswith(("reference", "crosscheck")):
                 continue
-            if not hasattr(module, "__all__") and home != module.__name__:
+            if not hasattr(module, "__all__") and f"plumbob.{home}" != module.__name__:
                 continue
             for path, part in _parts(f"{home}.{name}", thing):
                 if path not in seen:
@@ -430,7 +430,10 @@ def _steps():
     g = euler.objective(state)
     result = euler.step(state)
     proof = euler.certify(state, result)
-    o, e = "reference.implicit_euler.objective.Objective", "reference.implicit_euler.ImplicitEuler"
+    o, e = (
+        "reference.implicit_euler.objective.Objective",
+        "reference.implicit_euler.ImplicitEuler",
+    )
 
     def iterates(state, external_forces, pin_positions):
         return list(itertools.islice(euler.iterates(state, external_forces, pin_positions), 2))
@@ -755,7 +758,10 @@ def _matrices():
     A = scipy.sparse.csc_array(np.diag([4.0, 5.0, 6.0, 7.0]) + np.ones((4, 4)))
     b = np.arange(4.0)
     factor = cholesky.CholeskyFactor(A)
-    c, library = "reference.sparse.factor.CholeskyFactor", "reference.sparse.linear_solver."
+    c, library = (
+        "reference.sparse.factor.CholeskyFactor",
+        "reference.sparse.linear_solver.",
+    )
     lu = linear_solver.SuperLUFactor(A)
     table = {
         library + "factorize": Call(

@@ -15,8 +15,8 @@ import numpy as np
 import public_calls
 import pytest
 
-from reference import arguments, curves, scenes, solve_ik
-from reference.arguments import array, integer, shown
+from plumbob.reference import arguments, curves, scenes, solve_ik
+from plumbob.reference.arguments import array, integer, shown
 
 PROGRAM = Path(border_walk.__file__)
 # What the walks have to be about, so that none of them shrinks unnoticed.

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import cli
-from bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
-from bench.comparison.rows import Verdict
-from bench.harness import machine
+from plumbob import cli
+from plumbob.bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
+from plumbob.bench.comparison.rows import Verdict
+from plumbob.bench.harness import machine
 
 LOOPS = 20_000
 # A bench of two rows, as far as a rerun asks for one and in lines that start at once: work of a
@@ -322,7 +322,7 @@ def test_the_command_measures_the_clone_in_which_it_is_run(capsys, repository, m
 @pytest.mark.slow
 def test_this_revision_beside_itself_differs_in_nothing():
     """The real bench, its working copy beside its last commit, on two rows of timing."""
-    root = Path(machine.__file__).parents[2]
+    root = Path(machine.__file__).resolve().parents[2]
     made = rerun(Plan("HEAD", ("timing",), ("10 balls/one pose",)), root)
     assert len(made.rows) >= 4
     assert called(made) == {}

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench import cli
-from bench.presentation.motion import motion
-from bench.show import film, ours
-from bench.show.yours import Yours
-from reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
+from plumbob import cli
+from plumbob.bench.motion import motion
+from plumbob.bench.show import film, ours
+from plumbob.bench.show.yours import Yours
+from plumbob.reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
 
 IK = """
     import numpy as np
-    from reference import Skeleton, solve_ik
+    from plumbob import Skeleton, solve_ik
 
     def inverse_kinematics(parents, offsets, local_rotations, target, effector):
         found = solve_ik(Skeleton(parents, offsets), local_rotations, target, solver="ccd"{})
         return {{"local_rotations": found.local_rotations}}
 """
 STEP = """
-    from reference import ImplicitEuler, MassSpring, State
+    from plumbob import ImplicitEuler, MassSpring, State
 
     def mass_spring_step(masses, springs, rest_lengths, stiffnesses, dampings, pinned, gravity,
                          positions, velocities, h):
