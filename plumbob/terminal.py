@@ -77,16 +77,13 @@ def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe")
 def print_lines(table: "Table") -> list[str]:
     """Print the lines of a table; return the headings of the columns that had no place."""
     from rich.console import Console
-    from rich.text import Text
 
     from plumbob.bench.tables.aligned import aligned
 
     made = aligned(table, width())
     console = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
     for line in made.lines:
-        text = Text.assemble(*((span.text, span.style) for span in line))
-        text.rstrip()
-        console.print(text)
+        console.print(line)
     return made.left_out
 
 

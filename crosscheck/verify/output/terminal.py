@@ -76,7 +76,7 @@ def _table(tasks: Sequence[TaskReport], say: Say) -> list[str]:
         text(say(sentence("beside the reference")), lambda t: (pace := speed(t)) and say(pace)),
     )
     made = aligned(Table("tasks", "", columns, cells(columns, tasks)), WIDTH)
-    return ["".join(span.text for span in line).rstrip() for line in made.lines]
+    return [line.plain for line in made.lines]
 
 
 def _reservations(task: TaskReport) -> list[Sentence]:
