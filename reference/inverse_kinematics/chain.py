@@ -43,6 +43,7 @@ class Chain(NamedTuple):
         deltas: where a sweep notes the rotation of each joint, (n, 4).
         reach: total length [m].
         longest: the longest link [m].
+        row: positions and rotations, one number after the other.
     """
 
     offsets: FloatArray
@@ -52,6 +53,7 @@ class Chain(NamedTuple):
     deltas: FloatArray
     reach: float
     longest: float
+    row: FloatArray
 
 
 def new_chain(offsets, path):
@@ -67,8 +69,9 @@ def new_chain(offsets, path):
         lengths[k] = norm(link)
         reach += lengths[k]
         longest = max(longest, lengths[k])
-    positions, rotations, deltas = np.empty((n + 1, 3)), np.empty((n + 1, 4)), np.empty((n, 4))
-    return Chain(along, lengths, positions, rotations, deltas, reach, longest)
+    row, deltas, split = np.empty(7 * (n + 1)), np.empty((n, 4)), 3 * (n + 1)
+    positions, rotations = row[:split].reshape(n + 1, 3), row[split:].reshape(n + 1, 4)
+    return Chain(along, lengths, positions, rotations, deltas, reach, longest, row)
 
 
 def pose_chain(chain, path, local):

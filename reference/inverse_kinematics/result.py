@@ -12,7 +12,7 @@ RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME, MERIT, EXCESS = FIGURES = rang
 
 
 class Result(NamedTuple):
-    """Poses found and how good they are.
+    """Poses and how good they are.
 
     Attributes:
         local: local rotations, (target, joint, 4).
@@ -30,6 +30,13 @@ class Result(NamedTuple):
     coordinates: FloatArray
 
 
+def fill_figures(figures, distance, angle, iterations, merit, least):
+    """Fill all figures but the outcome, where no pose is nearer than `least` [m]."""
+    figures[RESIDUAL], figures[RESIDUAL_ROTATION] = distance, angle
+    figures[ITERATIONS], figures[MERIT] = iterations, merit
+    figures[EXCESS] = max(0.0, distance - least)
+
+
 def outcome_of(reached, unreachable, settled):
     """Return how a solve ended; `unreachable` is whether geometry proves the target to be so."""
     if reached:
@@ -37,9 +44,3 @@ def outcome_of(reached, unreachable, settled):
     if unreachable:
         return Outcome.UNREACHABLE if settled else Outcome.UNREACHABLE_UNSETTLED
     return Outcome.STALLED if settled else Outcome.ITERATION_LIMIT
-
-
-def store_if_inside(row, i, value):
-    """Write entry i of a row that has one."""
-    if i < len(row):
-        row[i] = value

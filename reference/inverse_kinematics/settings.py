@@ -10,16 +10,10 @@ from .. import arguments
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from ..skeleton import Skeleton
-from .box_step import new_task_system
-from .ccd import ccd_sweep, ccd_update, new_ccd_workspace
-from .damped_least_squares import damped_least_squares_sweep, damped_least_squares_update
-from .fabrik import fabrik_sweep, fabrik_update, new_fabrik_workspace
-from .jacobian_transpose import jacobian_transpose_sweep, jacobian_transpose_update
-from .levenberg_marquardt import levenberg_marquardt_sweep, levenberg_marquardt_update
 from .problem import Target, are_targets
 from .restarts import Limits
-from .solve_chain import on_chains
-from .solve_mechanism import on_mechanisms
+from .solve_chain import ON_CHAINS
+from .solve_mechanism import ON_MECHANISMS
 
 
 class IKSolver(NamedTuple):
@@ -43,24 +37,7 @@ def _solver(name: str) -> IKSolver:
     return IK_SOLVERS[name]
 
 
-# A solver's sweep over a chain, and its update of a mechanism.
-_KERNELS = {
-    "ccd": (ccd_sweep, ccd_update),
-    "fabrik": (fabrik_sweep, fabrik_update),
-    "levenberg_marquardt": (levenberg_marquardt_sweep, levenberg_marquardt_update),
-    "damped_least_squares": (damped_least_squares_sweep, damped_least_squares_update),
-    "jacobian_transpose": (jacobian_transpose_sweep, jacobian_transpose_update),
-}
-# What makes the arrays that an update writes to, where it is no Jacobian method.
-_WORKSPACES = {"ccd": new_ccd_workspace, "fabrik": new_fabrik_workspace}
-IK_SOLVERS = {
-    name: IKSolver(
-        name,
-        on_chains(name, sweep),
-        on_mechanisms(name, update, _WORKSPACES.get(name, new_task_system)),
-    )
-    for name, (sweep, update) in _KERNELS.items()
-}
+IK_SOLVERS = {name: IKSolver(name, ON_CHAINS[name], ON_MECHANISMS[name]) for name in ON_CHAINS}
 
 # The defaults of `solve_ik`: iterations of an attempt, the same towards a target out of reach, and
 # restarts where the solver is left to us and is not FABRIK.

@@ -29,7 +29,6 @@ from reference.inverse_kinematics.restarts import (
     WAIT,
     Limits,
     most_promising,
-    new_progress,
 )
 from reference.inverse_kinematics.solve_mechanism import mechanism_criteria
 from reference.judging import judge_pose
@@ -58,7 +57,7 @@ def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_ci
 
 
 def test_of_attempts_given_up_the_least_patient_goes_on_and_then_the_nearest():
-    progress = new_progress(5)
+    progress = np.empty((6, WAIT + 1))
     progress[:, STATE] = GIVEN_UP, GIVEN_UP, GIVEN_UP, SETTLED, GIVEN_UP, GIVEN_UP
     progress[:, WAIT] = 12.0, 3.0, 3.0, 3.0, 3.0, 0.0
     progress[:, COST] = 0.1, 0.5, 0.3, 0.2, 0.4, 0.0
