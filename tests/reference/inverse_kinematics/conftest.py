@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     IK_SOLVERS,
     Articulation,
     Skeleton,
@@ -13,14 +13,14 @@ from reference import (
     forward_kinematics,
     rotation,
 )
-from reference.inverse_kinematics.mechanism import (
+from plumbob.reference.inverse_kinematics.mechanism import (
     TARGET,
     gather,
     new_data,
     update_forward_kinematics,
 )
-from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.solve_mechanism import new_workspace
+from plumbob.reference.inverse_kinematics.reduce import prepare
+from plumbob.reference.inverse_kinematics.solve_mechanism import new_workspace
 
 
 @pytest.fixture(params=IK_SOLVERS)
