@@ -32,10 +32,9 @@ def random(rng: np.random.Generator, *shape: int) -> FloatArray:
 
 
 def unit(name: str, q: ArrayLike) -> FloatArray:
-    """Return quaternions, (..., 4), normalised once; `name` is the argument's, for the error.
+    """Return quaternions within 1e-6 of unit length, (..., 4), normalised once.
 
-    Raises:
-        ValueError: if a quaternion is further than 1e-6 from unit length.
+    `name` is the argument's, for the error.
     """
     values = arguments.array(name, q, "...", 4)
     lengths = np.linalg.norm(values, axis=-1, keepdims=True)
@@ -137,13 +136,10 @@ def to_matrix(q: ArrayLike) -> FloatArray:
 
 
 def from_matrix(matrix: ArrayLike) -> FloatArray:
-    """Return the unit quaternions, (..., 4), of rotation matrices (..., 3, 3), w >= 0.
+    """Return the unit quaternions, (..., 4), of matrices (..., 3, 3), rotations to 1e-6; w >= 0.
 
     The quaternion spans the top eigenspace of a symmetric 4 x 4 matrix linear in R
     (Bar-Itzhack 2000), which has no case of its own for any angle.
-
-    Raises:
-        ValueError: if a matrix is not a rotation to 1e-6.
     """
     R = arguments.array("matrix", matrix, "...", 3, 3)
     defect = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(initial=0.0)

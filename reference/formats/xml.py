@@ -26,19 +26,12 @@ Numbers = TypeVar("Numbers", bound=tuple[float, ...])
 
 
 class Element(NamedTuple):
-    """An element of a file; its methods raise a ValueError that says where it is.
+    """An element of a file; its methods raise a ValueError that says where it is."""
 
-    Attributes:
-        tag: its name.
-        attributes: their values, by name.
-        children: the elements in it, in the order of the file.
-        location: the file and the line where it begins.
-    """
-
-    tag: str
-    attributes: dict[str, str]
-    children: list["Element"]
-    location: str
+    tag: str  # its name
+    attributes: dict[str, str]  # their values, by name
+    children: list["Element"]  # the elements in it, in the order of the file
+    location: str  # the file and the line where it begins
 
     def walk(self) -> Iterator["Element"]:
         """Yield the element and all its descendants in the order of the file."""

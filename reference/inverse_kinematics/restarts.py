@@ -26,75 +26,49 @@ INFINITY = math.inf
 
 
 class Operations(NamedTuple):
-    """What the loops do to a state, a kernel each.
+    """What the loops do to a state, a kernel each."""
 
-    Attributes:
-        update: (state, target): make one iteration of a solver.
-        error: (state, target): return the largest distance [m] and angle [rad] from effector to
-            target, the sum of all distances and levered angles [m], which shows progress, and the
-            distance that has to be small.
-        merit: (state, target): return what says which attempt is better, the less the better [m].
-        perturb: (state, target, criteria, first): move the first attempt, whose row of progress is
-            `first`, if it is stuck, and return whether it was.
-        place: (state): bring the state to what has been copied to its row.
-        draw: (state, target, n): take the configuration of random restart n = 1, 2, ...
-    """
-
-    update: PythonKernel
+    update: PythonKernel  # (state, target): make one iteration of a solver
+    # (state, target): return the largest distance [m] and angle [rad] from effector to target, the
+    # sum of all distances and levered angles [m], which shows progress, and the distance that has
+    # to be small
     error: PythonKernel
+    # (state, target): return what says which attempt is better, the less the better [m]
     merit: PythonKernel
+    # (state, target, criteria, first): move the first attempt, whose row of progress is `first`, if
+    # it is stuck, and return whether it was
     perturb: PythonKernel
-    place: PythonKernel
-    draw: PythonKernel
+    place: PythonKernel  # (state): bring the state to what has been copied to its row
+    draw: PythonKernel  # (state, target, n): take the configuration of random restart n = 1, 2 ...
 
 
 class Limits(NamedTuple):
-    """What a solve may leave and take.
+    """What a solve may leave and take."""
 
-    Attributes:
-        tolerance: distance that counts as reached [m].
-        tolerance_rotation: angle that does [rad].
-        max_iterations: of each attempt.
-        far_iterations: the same where geometry proves a target out of reach.
-        restarts: further attempts.
-        chained: whether each target but the first starts from the solution before it.
-    """
-
-    tolerance: float
-    tolerance_rotation: float
-    max_iterations: int
-    far_iterations: int
-    restarts: int
-    chained: bool
+    tolerance: float  # distance that counts as reached [m]
+    tolerance_rotation: float  # angle that does [rad]
+    max_iterations: int  # of each attempt
+    far_iterations: int  # the same where geometry proves a target out of reach
+    restarts: int  # further attempts
+    chained: bool  # whether each target but the first starts from the solution before it
 
 
 class Criteria(NamedTuple):
-    """When an attempt at one target ends.
+    """When an attempt at one target ends."""
 
-    Attributes:
-        distance: at most this far from the target counts as reached [m], some of it left for the
-            rounding of the final pose.
-        angle: the same for rotations [rad].
-        margin: an error that changes by no more has settled [m].
-        max_iterations: of each attempt.
-    """
-
+    # at most this far from the target counts as reached [m], some of it left for the rounding of
+    # the final pose
     distance: float
-    angle: float
-    margin: float
-    max_iterations: int
+    angle: float  # the same for rotations [rad]
+    margin: float  # an error that changes by no more has settled [m]
+    max_iterations: int  # of each attempt
 
 
 class Attempts(NamedTuple):
-    """How far the attempts at one target have come.
+    """How far the attempts at one target have come."""
 
-    Attributes:
-        saved: rows of the state, one an attempt and in the last row the best end of one.
-        progress: see the columns above, (attempt + 1, 4); the last row is not used.
-    """
-
-    saved: FloatArray
-    progress: FloatArray
+    saved: FloatArray  # rows of the state, one an attempt and in the last row the best end of one
+    progress: FloatArray  # see the columns above, (attempt + 1, 4); the last row is not used
 
 
 def limits_of(numbers):

@@ -12,21 +12,15 @@ RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME, MERIT, EXCESS = FIGURES = rang
 
 
 class Result(NamedTuple):
-    """Poses and how good they are.
+    """Poses and how good they are."""
 
-    Attributes:
-        local: local rotations, (target, joint, 4).
-        positions: global positions [m], (target, joint, 3).
-        figures: (target, 6), see above.
-        history: distances before and after each iteration [m], (target, iteration); (1, 1) if they
-            are not to be recorded. Entries after the last iteration are not filled.
-        coordinates: of an articulation, (target, coordinate); of a skeleton its local rotations.
-    """
-
-    local: FloatArray
-    positions: FloatArray
-    figures: FloatArray
+    local: FloatArray  # local rotations, (target, joint, 4)
+    positions: FloatArray  # global positions [m], (target, joint, 3)
+    figures: FloatArray  # (target, 6), see above
+    # distances before and after each iteration [m], (target, iteration); (1, 1) if they are not to
+    # be recorded. Entries after the last iteration are not filled
     history: FloatArray
+    # of an articulation, (target, coordinate); of a skeleton its local rotations
     coordinates: FloatArray
 
 

@@ -17,17 +17,11 @@ from .solve_mechanism import ON_MECHANISMS
 
 
 class IKSolver(NamedTuple):
-    """A solver's two kernels; its pickle holds the name.
+    """A solver's two kernels; its pickle holds the name."""
 
-    Attributes:
-        name: in IK_SOLVERS.
-        chain: for one position to reach by a chain of unlimited balls.
-        mechanism: for all else.
-    """
-
-    name: str
-    chain: Kernel
-    mechanism: Kernel
+    name: str  # in IK_SOLVERS
+    chain: Kernel  # for one position to reach by a chain of unlimited balls
+    mechanism: Kernel  # for all else
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _solver, (self.name,)
@@ -48,19 +42,12 @@ LARGEST_COUNT = 2**53
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a solve, checked.
+    """Settings of a solve, checked."""
 
-    Attributes:
-        solver: its kernels.
-        limits: what the solve may leave and take.
-        seed: of the restarts.
-        record: whether to keep the residuals of all iterations.
-    """
-
-    solver: IKSolver
-    limits: Limits
-    seed: int
-    record: bool
+    solver: IKSolver  # its kernels
+    limits: Limits  # what the solve may leave and take
+    seed: int  # of the restarts
+    record: bool  # whether to keep the residuals of all iterations
 
     @functools.cached_property
     def numbers(self) -> FloatArray:

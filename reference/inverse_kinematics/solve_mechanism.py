@@ -75,40 +75,24 @@ PERTURBATION_AXIS = (0.48, 0.6, 0.64)
 
 
 class Workspace(NamedTuple):
-    """Arrays that the solvers write to.
+    """Arrays that the solvers write to."""
 
-    Attributes:
-        system: of the Jacobian methods, and of CCD for joints that others follow.
-        backward: of FABRIK, records BACKWARD, (joint,).
-        eigen: of CCD and FABRIK, Davenport's matrix and its eigenvectors, (2, 4, 4).
-    """
-
-    system: TaskSystem
-    backward: RecordArray
-    eigen: FloatArray
+    system: TaskSystem  # of the Jacobian methods, and of CCD for joints that others follow
+    backward: RecordArray  # of FABRIK, records BACKWARD, (joint,)
+    eigen: FloatArray  # of CCD and FABRIK, Davenport's matrix and its eigenvectors, (2, 4, 4)
 
 
 class MechanismState(NamedTuple):
-    """A mechanism, where it is, and where it may be restarted.
+    """A mechanism, where it is, and where it may be restarted."""
 
-    Attributes:
-        mechanism: what moves.
-        data: its configuration.
-        row: what an attempt continues from, `data.state`.
-        workspace: of the solver.
-        restarts: coordinates of the mechanism for further attempts, (restart, coordinate).
-        effector_frames: where they put the effectors, positions [m] and rotations, (restart,
-            effector, 7).
-        ranks: how far the restarts not yet taken are from the target [m], (restart,).
-    """
-
-    mechanism: Mechanism
-    data: ConfigurationData
-    row: FloatArray
-    workspace: Workspace
-    restarts: FloatArray
+    mechanism: Mechanism  # what moves
+    data: ConfigurationData  # its configuration
+    row: FloatArray  # what an attempt continues from, `data.state`
+    workspace: Workspace  # of the solver
+    restarts: FloatArray  # coordinates of the mechanism for further attempts, (restart, coordinate)
+    # where they put the effectors, positions [m] and rotations, (restart, effector, 7)
     effector_frames: FloatArray
-    ranks: FloatArray
+    ranks: FloatArray  # how far the restarts not yet taken are from the target [m], (restart,)
 
 
 def solve_mechanisms(
