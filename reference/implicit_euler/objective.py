@@ -140,8 +140,8 @@ def _finite_result(method: Callable[..., Any]) -> Callable[..., Any]:
 class Objective:
     """g of one step, in SI units.
 
-    Its value, its derivatives and its quadratic form are a FloatingPointError where they overflow;
-    an iterate says so in `finite`.
+    Its value, its derivatives and its quadratic form are a FloatingPointError where they overflow,
+    and a ValueError at positions of another shape or not finite; an iterate says so in `finite`.
 
     Attributes:
         system: particles and springs.
@@ -200,11 +200,7 @@ class Objective:
         return self.iterate_at(np.where(self.system.free[:, None], self.x_n, self.y))
 
     def evaluate(self, positions: ArrayLike) -> Iterate:
-        """Return g and its gradient at positions of shape (particle, 3) [m].
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
-        """
+        """Return g and its gradient at positions of shape (particle, 3) [m]."""
         return self.iterate_at(self._positions(positions))
 
     def iterate_at(self, positions: FloatArray) -> Iterate:
@@ -224,11 +220,7 @@ class Objective:
         return _rounding_bounds(positions, y, external, h, *springs)
 
     def residual(self, iterate: Iterate) -> float:
-        """Return |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows at x or at y.
-
-        Raises:
-            ValueError: if it is no iterate, such as the positions of one.
-        """
+        """Return |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows at x or at y."""
         if instance("iterate", iterate, Iterate).gradient_norm == 0.0:
             return 0.0
         if not (iterate.finite and self.inertial.finite):
@@ -240,20 +232,12 @@ class Objective:
 
     @_finite_result
     def value(self, positions: ArrayLike) -> float:
-        """Return g(x) [kg m²], up to a constant that depends on the pins.
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
-        """
+        """Return g(x) [kg m²], up to a constant that depends on the pins."""
         return self.evaluate(positions).value
 
     @_finite_result
     def gradient(self, positions: ArrayLike) -> FloatArray:
-        """Return grad g(x) = M (x - y) - h² f(x) [kg m], shape (particle, 3), zero at the pins.
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
-        """
+        """Return grad g(x) = M (x - y) - h² f(x) [kg m], shape (particle, 3), zero at the pins."""
         return self.evaluate(positions).gradient
 
     @_finite_result
@@ -261,9 +245,6 @@ class Objective:
         """Return M + h² K [kg], sparse (3 particle, 3 particle); an identity at the pins.
 
         K is the stiffness matrix at x, exact, or without its geometric terms (Gauss-Newton).
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
         """
         geometric = boolean("geometric", geometric)
         return self.hessian_at(self._positions(positions), geometric=geometric)
@@ -281,9 +262,6 @@ class Objective:
 
         It is the contribution of the pins to the gradient at the free particles when the springs
         are linearised at x; zero at the pins. K is as for `hessian`.
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
         """
         geometric = boolean("geometric", geometric)
         return self.pin_gradient_at(self._positions(positions), geometric=geometric)
@@ -305,9 +283,6 @@ class Objective:
         1/2 x' (M + h² L) x - h² x' J d - x' (M y + h² f_ext) + constant (Liu et al. 2013), with
         L and J of the effective springs. It equals g(x) for d = rest_vectors(x) and is larger for
         any other d of the effective rest lengths, or of shorter ones in tension-only springs.
-
-        Raises:
-            ValueError: if the positions or d have a wrong shape or are not finite.
         """
         x, y, hh = self._positions(positions), self.y, self.h * self.h
         d = coordinates("d", d, len(self.effective.springs), 3)
@@ -319,11 +294,7 @@ class Objective:
         return float(0.5 * np.sum(x * ((M + hh * L) @ x)) - np.sum(x * linear) + constant)
 
     def rest_vectors(self, positions: ArrayLike) -> FloatArray:
-        """Return the optimal d of the effective springs at x, shape (spring, 3) [m].
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
-        """
+        """Return the optimal d of the effective springs at x, shape (spring, 3) [m]."""
         return rest_vectors(self.effective, positions)
 
     def _positions(self, positions: ArrayLike) -> FloatArray:

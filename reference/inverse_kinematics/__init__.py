@@ -1,9 +1,8 @@
 """Inverse kinematics: local rotations or coordinates that bring effectors to targets.
 
-The route of a call: `solve_ik` checks settings, model and targets; `solve.py`, or `single_solve.py`
-for one plain target, hands arrays to the kernel of a solver; that begins from each start
-(`solve_chain.py`, `solve_mechanism.py`) and runs the two loops of `restarts.py`, which call the
-solver's update in the file that bears its name.
+The route of a call: `solve_ik` checks settings, model and targets; `solve.py` hands arrays to the
+kernel of a solver; that begins from each start (`solve_chain.py`, `solve_mechanism.py`) and runs
+the two loops of `restarts.py`, which call the solver's update in the file that bears its name.
 """
 
 from collections.abc import Sequence
@@ -14,8 +13,7 @@ from ..model import Model, checked_model
 from ..outcome import Outcome
 from .problem import IKSolution, Target, checked_targets
 from .settings import IK_SOLVERS, RESTARTS, checked_settings, default_solver
-from .single_solve import solve_single
-from .solve import solve_checked
+from .solve import solve_checked, solve_plain
 
 __all__ = [
     "IK_SOLVERS",
@@ -90,7 +88,7 @@ def solve_ik(
         solver, tolerance, tolerance_rotation, max_iterations,
         0 if restarts is None else restarts, seed, record,
     )  # fmt: skip
-    plain = solve_single(skeleton, local_rotations, target, effector, settings)
+    plain = solve_plain(skeleton, local_rotations, target, effector, settings)
     if plain is not None:
         return plain
     model = checked_model(skeleton)

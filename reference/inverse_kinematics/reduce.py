@@ -25,20 +25,14 @@ BLOCK = 16
 
 
 class Prepared(NamedTuple):
-    """What is made once for some effectors and restarts.
+    """What is made once for some effectors and restarts."""
 
-    Attributes:
-        mechanism: what moves the effectors.
-        restarts: the mechanism's coordinates in random poses, (restart, coordinate).
-        effector_frames: where these put the effectors, positions [m] and rotations, (restart,
-            effector, 7).
-        flat: joints of the articulation and mechanism, one array or number after the other, and
-            the two above.
-    """
-
-    mechanism: Mechanism
-    restarts: FloatArray
+    mechanism: Mechanism  # what moves the effectors
+    restarts: FloatArray  # the mechanism's coordinates in random poses, (restart, coordinate)
+    # where these put the effectors, positions [m] and rotations, (restart, effector, 7)
     effector_frames: FloatArray
+    # joints of the articulation and mechanism, one array or number after the other, and the two
+    # above
     flat: tuple[Any, ...]
 
 

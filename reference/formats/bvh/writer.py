@@ -62,11 +62,7 @@ def format(
     *,
     order: str = "ZXY",
 ) -> str:
-    """Return the text of a motion; see `write`.
-
-    Raises:
-        ValueError: as for `write`.
-    """
+    """Return the text of a motion; see `write`."""
     arguments.choice("order", order, ORDERS)
     frame_time = arguments.number("frame_time", frame_time, above=0.0)
     if isinstance(skeleton, Articulation):

@@ -19,11 +19,7 @@ from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.inverse_kinematics.problem import checked_targets
 from plumbob.reference.inverse_kinematics.reduce import prepare
 from plumbob.reference.inverse_kinematics.settings import checked_settings
-from plumbob.reference.inverse_kinematics.solve import (
-    solve_checked,
-    solve_on_chain,
-    solve_on_mechanism,
-)
+from plumbob.reference.inverse_kinematics.solve import solve_checked
 
 COUNTS = range(13)
 # Merits come from positions recomputed: some roundings of a few metres.
@@ -236,8 +232,9 @@ def test_a_chain_s_answer_is_the_better_of_one_start_s_and_its_restarts_with_bot
     goals = forward_kinematics(chain, rotation.random(rng, 40, 5)).positions[:, -1]
     settings = checked_settings("ccd", 1e-12, 1e-12, 2, 1, 3, True, False)
     targets, start = checked_targets(chain, goals, None), rotation.random(rng, 5)
-    one = solve_on_chain(chain, start, targets[0], settings)
-    more = solve_on_mechanism(chain, start, targets, settings)
+    one = solve_ik(chain, start, goals, "ccd", tolerance=1e-12, max_iterations=4, record=True)
+    balls = Articulation(chain, "ball")
+    more = solve_checked(balls, start.ravel(), targets, settings)
     best = solve_checked(chain, start, targets, settings)
     np.testing.assert_array_equal(best.merit, np.minimum(one.merit, more.merit))
     assert 5 < np.count_nonzero(one.merit < more.merit) < 35

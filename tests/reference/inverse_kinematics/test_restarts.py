@@ -8,7 +8,6 @@ import pytest
 from plumbob.reference import Outcome, Target, forward_kinematics, rotation, solve_ik
 from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.inverse_kinematics.reduce import prepare
-from plumbob.reference.inverse_kinematics.restarts import RANK, new_progress
 from plumbob.reference.inverse_kinematics.solve_mechanism import rank_restarts, take_nearest
 
 
@@ -78,7 +77,7 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
         mechanism=prepared.mechanism,
         restarts=prepared.restarts,
         effector_frames=prepared.effector_frames,
-        progress=new_progress(10),
+        ranks=np.empty(9),
     )
     rank_restarts(state, target)
     full = np.hstack([prepared.restarts, np.zeros((9, arm.coordinate_count))])[:, :8]
@@ -88,7 +87,7 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
     angles = rotation.angle(pose.rotations[:, 7], targets[0].rotation)
     lever = LEVER * prepared.mechanism.reach
     expected = np.max(distances, axis=0) + lever * 4.0 * np.sin(angles / 4.0)
-    np.testing.assert_allclose(state.progress[1:10, RANK], expected, rtol=1e-12, atol=0)
+    np.testing.assert_allclose(state.ranks, expected, rtol=1e-12, atol=0)
     taken = np.empty((9, prepared.mechanism.coordinates))
     for q in taken:
         take_nearest(state, q)
