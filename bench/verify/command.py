@@ -153,21 +153,39 @@ def _judge(
     from crosscheck.conformance.contestant import NoGreetingError
     from crosscheck.conformance.sentence import sentence
 
+    from ..terminal import progress
     from .question import ask, suited
     from .solver import opened
     from .words import Presentation, speaker
 
     say = speaker(language)
-    files.check()
+    _check(files)
     contestant = opened(words, limits, say)
     question = suited(question, contestant)
     try:
-        report = ask(contestant, question)
+        with progress() as bar:
+            shown = bar.add_task("", total=None)
+            report = ask(contestant, question, lambda task, done, of: bar.update(
+                shown, description=task, completed=done, total=of))  # fmt: skip
     except NoGreetingError as error:
         raise ValueError(say(sentence(
             "solver: expected one that can be started: {why}", why=error.failure.sentence
         ))) from None  # fmt: skip
     return files.write(report, question, Presentation(say, language, words))
+
+
+def _check(files: "Files") -> None:
+    """Find out before anything is asked whether the files can be written.
+
+    Raises:
+        ValueError, OSError: naming the file or folder that cannot.
+    """
+    from ..commands.options import writable
+    from ..harness.record import check_regular
+
+    for path in filter(None, files.paths()):
+        check_regular(path)
+        writable(path.parent)
 
 
 def _print(lines: Iterable[str]) -> int:

@@ -10,7 +10,7 @@ from crosscheck.conformance.doors.export import export_cases
 from crosscheck.conformance.doors.files import FileContestant
 from crosscheck.conformance.sentence import sentence
 
-from .terminal import WIDTH, wrapped
+from .terminal import paragraphs
 from .words import Say
 
 # What stands before a program, and before a folder of answers.
@@ -81,4 +81,4 @@ def exported(folder: Path, tasks: Sequence[str], seed: int, thorough: bool, say:
                  count=count, folder=place),
         sentence("Then: {command}", command=f"plumbob verify --answers {place}"),
     )  # fmt: skip
-    return [line for one in told for line in wrapped(say(one), WIDTH)]
+    return paragraphs(told, say)
