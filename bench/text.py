@@ -4,7 +4,7 @@ import functools
 import re
 from collections.abc import Sequence
 
-from crosscheck.conformance.sentence import all_visible, visible
+from plumbob.crosscheck.verify.sentence import all_visible, visible
 
 __all__ = ["all_visible", "chunks", "shortened", "visible"]
 
