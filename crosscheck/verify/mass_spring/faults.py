@@ -3,8 +3,9 @@
 Those that were counted in public programs come first within their aspect.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -361,3 +362,11 @@ def apply(options: tuple[Option, ...], p: Problem, model: Model) -> tuple[Proble
         if option.fields:
             model = model._replace(**option.fields)
     return p, model
+
+
+def combined(options: Sequence[Option], most: int = 3) -> Iterator[tuple[Option, ...]]:
+    """Yield each option, then each pair and so on, of different aspects."""
+    for count in range(1, most + 1):
+        for chosen in combinations(options, count):
+            if len({one.aspect for one in chosen}) == count:
+                yield chosen
