@@ -154,17 +154,37 @@ def _judge(
     from plumbob.crosscheck.verify.output.words import Presentation, speaker
     from plumbob.crosscheck.verify.sentence import sentence
 
+    from ..terminal import progress
+
     say = speaker(language)
-    files.check()
+    _check(files)
     contestant = opened(words, limits, say)
     question = suited(question, contestant)
     try:
-        report = ask(contestant, question)
+        with progress() as bar:
+            shown = bar.add_task("", total=None)
+            report = ask(contestant, question, lambda task, done, of: bar.update(
+                shown, description=task, completed=done, total=of))  # fmt: skip
     except NoGreetingError as error:
         raise ValueError(say(sentence(
             "solver: expected one that can be started: {why}", why=error.failure.sentence
         ))) from None  # fmt: skip
     return files.write(report, question, Presentation(say, language, words))
+
+
+def _check(files: "Files") -> None:
+    """Find out before anything is asked whether the files can be written.
+
+    Raises:
+        ValueError, OSError: naming the file or folder that cannot.
+    """
+    from plumbob.bench.harness.record import check_regular
+
+    from .options import writable
+
+    for path in filter(None, files.paths()):
+        check_regular(path)
+        writable(path.parent)
 
 
 def _print(lines: Iterable[str]) -> int:

@@ -79,3 +79,8 @@ def difference(p: Problem, name: str, one: Any, other: Any) -> float:
     if name == "velocities":
         gap[..., p.pinned, :] = 0.0
     return float(gap.max(initial=0.0))
+
+
+def correct_digits(gap: float, size: float) -> float:
+    """Return how many digits of a number of this size are right, at most 16."""
+    return float(min(16.0, max(0.0, -np.log10(max(gap / size, 1e-16)))))

@@ -4,13 +4,12 @@ from typing import Literal
 
 import msgspec
 
-from plumbob.bench.text import all_visible
-
 from ..contestant import Answer
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, Report, TaskReport
 from ..message import plain
-from .words import GOOD, Say, advice, passed, remarks
+from ..sentence import Sentence, all_visible
+from .words import GOOD, Say, advice, remarks
 
 FORMAT: Literal["plumbob verify"] = "plumbob verify"
 VERSION: Literal[1] = 1
@@ -116,15 +115,17 @@ def _task(task: TaskReport, say: Say) -> TaskRecord:
         ExplanationRecord([*map(str, one.faults)], say(one.sentence), one.share, one.distance)
         for one in found.explanations
     ]
+    passed = sum(one.verdict in GOOD for one in task.judgements)
     return TaskRecord(
-        task.task, task.method, _name(task), task.digits, task.slowdown, passed(task),
-        explained,
-        say(found.behaviour) if found.behaviour else None,
-        say(found.first_broken) if found.first_broken else None,
-        [say(hint) for hint in found.hints], found.tried,
-        task.smallest_failure.case.name if task.smallest_failure else None,
+        task.task, task.method, _name(task), task.digits, task.slowdown, passed, explained,
+        _said(found.behaviour, say), _said(found.first_broken, say), list(map(say, found.hints)),
+        found.tried, task.smallest_failure.case.name if task.smallest_failure else None,
         [_case(one, say) for one in task.judgements],
     )  # fmt: skip
+
+
+def _said(words: Sentence | None, say: Say) -> str | None:
+    return None if words is None else say(words)
 
 
 def _case(one: CaseJudgement, say: Say) -> CaseRecord:
@@ -135,12 +136,9 @@ def _case(one: CaseJudgement, say: Say) -> CaseRecord:
         one.reference_seconds,
         None if isinstance(answer, Answer) else answer.kind.value,
         None if isinstance(answer, Answer) else say(answer.sentence),
-        [_finding(finding, say) for finding in one.findings],
-        [say(remark) for remark in answer.remarks] if isinstance(answer, Answer) else [],
+        [
+            FindingRecord(f.law, _name(f), f.error, f.tolerance, f.unit, say(f.sentence), f.where)
+            for f in one.findings
+        ],
+        list(map(say, answer.remarks)) if isinstance(answer, Answer) else [],
     )  # fmt: skip
-
-
-def _finding(one: Finding, say: Say) -> FindingRecord:
-    return FindingRecord(
-        one.law, _name(one), one.error, one.tolerance, one.unit, say(one.sentence), one.where
-    )

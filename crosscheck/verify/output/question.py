@@ -1,4 +1,4 @@
-"""Ask a solver what the command line says, with a bar that shows how far it is."""
+"""Ask a solver what the command line says."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,6 +10,9 @@ from ..judgement import Report
 from ..solvers.files import FileContestant
 from ..verify import DISCIPLINES, judge_cases, verify
 from . import saved
+
+# Told the task, the number of cases done, and of all, before each case.
+Notify = Callable[[str, int, int], None]
 
 
 class Question(NamedTuple):
@@ -34,28 +37,16 @@ def suited(question: Question, contestant: Contestant) -> Question:
     return question
 
 
-def ask(contestant: Contestant, question: Question) -> Report:
+def ask(contestant: Contestant, question: Question, notify: Notify) -> Report:
     """Return what was found; the solver is ended then, whatever happens."""
-    from plumbob.terminal import progress
-
     try:
-        with progress() as bar:
-            shown = bar.add_task("", total=None)
-            report = _report(
-                contestant,
-                question,
-                lambda task, done, of: bar.update(
-                    shown, description=task, completed=done, total=of
-                ),
-            )
+        report = _report(contestant, question, notify)
     finally:
         contestant.close()  # its remarks are complete then
     return replace(report, remarks=(*report.remarks, *contestant.remarks))
 
 
-def _report(
-    contestant: Contestant, question: Question, notify: Callable[[str, int, int], None]
-) -> Report:
+def _report(contestant: Contestant, question: Question, notify: Notify) -> Report:
     if question.rerun is None:
         return verify(contestant, question.tasks or None, question.seed, question.thorough, notify)
     one = saved.load(question.rerun)

@@ -9,7 +9,7 @@ from ..sentence import sentence
 from ..solvers import LIMITS, Limits, open_contestant
 from ..solvers.export import export_cases
 from ..solvers.files import FileContestant
-from .terminal import WIDTH, wrapped
+from .terminal import paragraphs
 from .words import Say
 
 # What stands before a program, and before a folder of answers.
@@ -80,4 +80,4 @@ def exported(folder: Path, tasks: Sequence[str], seed: int, thorough: bool, say:
                  count=count, folder=place),
         sentence("Then: {command}", command=f"plumbob verify --answers {place}"),
     )  # fmt: skip
-    return [line for one in told for line in wrapped(say(one), WIDTH)]
+    return paragraphs(told, say)

@@ -1,15 +1,14 @@
 """What `plumbob verify --template` does: write a starter into a folder, and say what comes next."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from ..sentence import sentence
-from .terminal import WIDTH, wrapped
+from .terminal import paragraphs
 from .words import Say
 
 
-def written(language: str, folder: Path, say: Say) -> Iterator[str]:
-    """Write the files of a starter and yield what to do next; nothing is overwritten.
+def written(language: str, folder: Path, say: Say) -> list[str]:
+    """Write the files of a starter and return what to do next; nothing is overwritten.
 
     Raises:
         ValueError: if there is none in this language, or one of its files is there already.
@@ -34,5 +33,4 @@ def written(language: str, folder: Path, say: Say) -> Iterator[str]:
         steps.append(sentence("Build: {command}", command=known.build))
     run = known.files[0] if language == "python" else f"-- {known.run}"
     steps.append(sentence("Then: {command}", command=f"plumbob verify {run}"))
-    for step in steps:
-        yield from wrapped(say(step), WIDTH)
+    return paragraphs(steps, say)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from ..sentence import Sentence, sentence
 from ..task import TASKS, Field, Task
-from .terminal import WIDTH, wrapped
+from .terminal import paragraphs, wrapped
 from .words import Say
 
 
@@ -23,16 +23,16 @@ def described(names: Sequence[str], say: Say) -> Iterator[str]:
         elif task.name in names:
             yield from _long(task, say)
     if not names:
-        yield from wrapped(say(sentence(
+        yield from paragraphs([sentence(
             "plumbob verify --list --task NAME describes every argument of a task."
-        )), WIDTH)  # fmt: skip
+        )], say)  # fmt: skip
 
 
 def _short(task: Task, say: Say) -> Iterator[str]:
     yield f"{task.name}({', '.join(_name(one) for one in task.inputs)})"
-    yield from wrapped(say(Sentence(task.about, {})), WIDTH, "  ")
+    yield from wrapped(say(Sentence(task.about, {})), "  ")
     returned = ", ".join(one.name for one in task.outputs)
-    yield from wrapped(say(sentence("Returns some of: {names}", names=returned)), WIDTH, "  ")
+    yield from wrapped(say(sentence("Returns some of: {names}", names=returned)), "  ")
     yield ""
 
 
@@ -41,15 +41,15 @@ def _name(field: Field) -> str:
 
 
 def _long(task: Task, say: Say) -> Iterator[str]:
-    yield from (task.name, *wrapped(say(Sentence(task.about, {})), WIDTH, "  "))
+    yield from (task.name, *wrapped(say(Sentence(task.about, {})), "  "))
     for heading, fields in (
         (sentence("Takes (all by keyword, those in brackets only where it asks for them):"),
          task.inputs),
         (sentence("Returns some of these, as a dict, or as a tuple in this order:"), task.outputs),
     ):  # fmt: skip
-        yield from ("", *wrapped(say(heading), WIDTH, "  "))
+        yield from ("", *wrapped(say(heading), "  "))
         for field in fields:
             shape = ", ".join(map(str, field.shape))
             about = say(Sentence(field.about, {}))
-            yield from wrapped(f"{_name(field)} ({shape}): {about}", WIDTH, "    ")
+            yield from wrapped(f"{_name(field)} ({shape}): {about}", "    ")
     yield ""
