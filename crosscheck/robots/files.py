@@ -19,11 +19,10 @@ from ..engines import ROBOT_ENGINES
 from ..engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind, xml_root
 from ..engines.robot_engine import UnreadableError
 from ..tolerances import POSITION
-from .comparisons import differences
+from .comparisons import differences, sweep_in_parts
 from .deviations import known_deviations
 from .independent_bvh import global_poses
 from .models import Model
-from .sweep import sweep_in_parts
 
 SECOND_READER = "second reader"
 # Elements of an MJCF file whose attributes are some obsolete: MuJoCo refuses files for them.

@@ -12,6 +12,7 @@ import pytest
 from crosscheck.child_process import ChildProcess, LostError
 from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
 from crosscheck.robots import comparisons, files, independent_bvh
+from crosscheck.robots.comparisons import sweep_in_parts
 from crosscheck.robots.deviations import FRAME, INCLUDE
 from crosscheck.robots.files import (
     AGREES,
@@ -27,7 +28,6 @@ from crosscheck.robots.files import (
     compare,
     find,
 )
-from crosscheck.robots.sweep import sweep_in_parts
 from crosscheck.tolerances import POSITION
 from reference import Skeleton, rotation
 from reference.formats import bvh, mjcf

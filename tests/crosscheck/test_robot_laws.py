@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from crosscheck.kinematics import full_reach
-from crosscheck.robots.comparisons import Differences, differences
-from crosscheck.robots.sweep import LinkKinematics, Sweep, reference_kinematics
+from crosscheck.robots.comparisons import (
+    Differences,
+    LinkKinematics,
+    Sweep,
+    differences,
+    reference_kinematics,
+)
 from reference import Skeleton
 from reference.formats import urdf
 

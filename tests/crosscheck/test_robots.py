@@ -15,7 +15,7 @@ from crosscheck.engines import ROBOT_ENGINES, mujoco_robot, pinocchio_robot
 from crosscheck.engines.robot_engine import UnreadableError
 from crosscheck.robots import comparisons, models
 from crosscheck.robots.claims import ROBOT_CLAIMS, robot_claims
-from crosscheck.robots.comparisons import differences
+from crosscheck.robots.comparisons import differences, reference_kinematics, sweep
 from crosscheck.robots.deviations import (
     CLASS_ANCHOR,
     DEVIATIONS,
@@ -28,7 +28,6 @@ from crosscheck.robots.deviations import (
     known_deviations,
 )
 from crosscheck.robots.models import CAUSES, CHARACTERS, IMMOBILE, ROBOTS, UNREAD, Model
-from crosscheck.robots.sweep import reference_kinematics, sweep
 from crosscheck.verdict import check_claim
 from reference import Articulation
 from reference.formats import FormatWarning, mjcf, urdf

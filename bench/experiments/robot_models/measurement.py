@@ -5,9 +5,8 @@ from functools import partial
 
 from crosscheck.engines import ROBOT_ENGINES
 from crosscheck.engines.robot_engine import UnreadableError
-from crosscheck.robots.comparisons import differences
+from crosscheck.robots.comparisons import CONFIGURATIONS, differences, sweep
 from crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
-from crosscheck.robots.sweep import CONFIGURATIONS, sweep
 
 from ...harness.block import Block, Measured, Scale
 from . import peers
