@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 
 class UnreadableError(Exception):

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import jacobians as jacobians_of
-from reference import rotation
-from reference.arguments import FloatArray
-from reference.formats.robot import Robot
-from reference.kinematics import forward_kinematics
+from plumbob.reference import jacobians as jacobians_of
+from plumbob.reference import rotation
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.formats.robot import Robot
+from plumbob.reference.kinematics import forward_kinematics
 
 from .. import samples
 from ..engines import ROBOT_ENGINES

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from crosscheck.kinematics import full_reach
-from crosscheck.robots.comparisons import (
+from plumbob.crosscheck.kinematics import full_reach
+from plumbob.crosscheck.robots.comparisons import (
     Differences,
     LinkKinematics,
     Sweep,
     differences,
     reference_kinematics,
 )
-from reference import Skeleton
-from reference.formats import urdf
+from plumbob.reference import Skeleton
+from plumbob.reference.formats import urdf
 
 ARM = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/>
 <joint name="h" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>

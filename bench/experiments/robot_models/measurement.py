@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from functools import partial
 
-from crosscheck.engines import ROBOT_ENGINES
-from crosscheck.engines.robot_engine import UnreadableError
-from crosscheck.robots.comparisons import CONFIGURATIONS, differences, sweep
-from crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
+from plumbob.crosscheck.engines import ROBOT_ENGINES
+from plumbob.crosscheck.engines.robot_engine import UnreadableError
+from plumbob.crosscheck.robots.comparisons import CONFIGURATIONS, differences, sweep
+from plumbob.crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
 
 from ...harness.block import Block, Measured, Scale
 from . import peers

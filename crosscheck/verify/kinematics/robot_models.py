@@ -1,0 +1,194 @@
+"""Robots of joints with limits: as the reference's articulations, as URDF, and as cases."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from plumbob.reference import (
+    Articulation,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    judge_pose,
+    rotation,
+)
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.judging import PoseJudgement
+from plumbob.reference.skeleton import Pose
+
+from ..case import Case
+from ..greeting import Greeting
+from ..sentence import sentence
+from .skeletons import suits
+
+TASK = "robot_inverse_kinematics"
+ITERATIONS = 200
+TOLERANCES = {"double": 1e-5, "single": 1e-3}
+# Where a start is so near to an answer, joint by joint, no minimum but the target's is nearer.
+NEAR = 0.1
+# Starts at the answer, near it, anywhere; targets that nothing reaches.
+AT, CLOSE, ANYWHERE, BEYOND = "start at the target", "near start", "any start", "beyond reach"
+# Coordinates beyond this count as there: the reference takes none beyond 1e75.
+FARTHEST = 1e74
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+_SEED = 1955
+
+
+def mechanism(inputs: Mapping[str, Any]) -> Articulation:
+    """Return the robot of a request: a fixed base, its joints in their order, the tool."""
+    Z = [0.0, 0.0, 1.0]
+    parents = [-1, *(inputs["parents"] + 1), inputs["effector"] + 1]
+    offsets = [np.zeros(3), *inputs["origins"], inputs["tool_position"]]
+    return Articulation(
+        Skeleton(parents, offsets),
+        ["fixed", *("slide" if slides else "hinge" for slides in inputs["slides"]), "fixed"],
+        [Z, *inputs["axes"], Z],
+        frames=[IDENTITY, *inputs["orientations"], inputs["tool_rotation"]],
+        lower=[-np.inf, *inputs["lower"], -np.inf],
+        upper=[np.inf, *inputs["upper"], np.inf],
+    )
+
+
+def tool_pose(inputs: Mapping[str, Any], q: FloatArray) -> Pose:
+    """Return the tool's position [m], (3,), and rotation, (4,), at coordinates q."""
+    pose = forward_kinematics(mechanism(inputs), q)
+    return Pose(pose.positions[-1], pose.rotations[-1])
+
+
+def target_of(inputs: Mapping[str, Any]) -> Target:
+    """Return the target of a request's tool."""
+    return Target(inputs["target_position"], inputs["target_rotation"], -1)
+
+
+def judgement_of(inputs: Mapping[str, Any], q: FloatArray) -> PoseJudgement:
+    """Return how far the tool is from its target at coordinates q, and these from their limits."""
+    q = np.clip(q, -FARTHEST, FARTHEST)
+    tolerances = {name: inputs[name] for name in ("tolerance", "tolerance_rotation")}
+    return judge_pose(mechanism(inputs), q, target_of(inputs), **tolerances)
+
+
+def urdf(inputs: Mapping[str, Any]) -> str:
+    """Return a robot as URDF: links base, link_0 and so on, and the tool."""
+    links = ["base", *(f"link_{j}" for j in range(len(inputs["parents"]))), "tool"]
+    joints = [_urdf_joint(inputs, j) for j in range(len(inputs["parents"]))]
+    placed = _urdf_origin(inputs["tool_position"], inputs["tool_rotation"])
+    ends = f'<parent link="link_{inputs["effector"]}"/><child link="tool"/>'
+    joints.append(f'<joint name="to_tool" type="fixed">{placed}{ends}</joint>')
+    named = "".join(f'<link name="{link}"/>' for link in links)
+    return f'<robot name="robot">{named}{"".join(joints)}</robot>'
+
+
+def _urdf_joint(inputs: Mapping[str, Any], j: int) -> str:
+    parent = int(inputs["parents"][j])
+    kind = "prismatic" if inputs["slides"][j] else "revolute"
+    lower, upper = (float(inputs[name][j]) for name in ("lower", "upper"))
+    return (
+        f'<joint name="joint_{j}" type="{kind}">'
+        + _urdf_origin(inputs["origins"][j], inputs["orientations"][j])
+        + f'<parent link="{f"link_{parent}" if parent >= 0 else "base"}"/>'
+        + f'<child link="link_{j}"/><axis xyz="{_numbers(inputs["axes"][j])}"/>'
+        + f'<limit lower="{lower!r}" upper="{upper!r}" effort="100" velocity="10"/></joint>'
+    )
+
+
+def _urdf_origin(position: FloatArray, quaternion: FloatArray) -> str:
+    """Return an origin; roll, pitch and yaw rotate about x, then y, then z, all fixed axes."""
+    R = rotation.to_matrix(quaternion)
+    pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
+    angles = (math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0]))
+    return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(np.array(angles))}"/>'
+
+
+def _numbers(values: FloatArray) -> str:
+    return " ".join(repr(float(x)) for x in values)
+
+
+def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
+    """Return robots of one joint to seven, each from starts at, near and far from the target."""
+    rng = np.random.default_rng([_SEED, seed])
+    return [
+        case
+        for name, robot in _robots(rng).items()
+        if suits(robot["parents"], greeting)
+        for number in range(3 if thorough else 1)
+        for case in _of_robot(f"{name}, pose {number + 1}", robot, rng, greeting)
+    ]
+
+
+def _of_robot(
+    name: str, robot: dict[str, Any], rng: np.random.Generator, greeting: Greeting
+) -> Iterator[Case]:
+    lower, upper = robot["lower"], robot["upper"]
+    answer = lower + (upper - lower) * rng.uniform(0.2, 0.8, len(lower))
+    close = np.clip(answer + rng.uniform(-NEAR, NEAR, len(lower)), lower, upper)
+    anywhere = rng.uniform(lower, upper)
+    reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
+    size = reach + float(np.abs(np.where(robot["slides"], upper - lower, 0.0)).sum())
+    near = tool_pose(robot, answer)
+    far = near._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * size)
+    tolerance = TOLERANCES[greeting.precision]
+    starts = ((AT, answer, near), (CLOSE, close, near), (ANYWHERE, anywhere, near),
+              (BEYOND, anywhere, far))  # fmt: skip
+    for family, start, target in starts:
+        inputs = {
+            **robot,
+            "start": start,
+            "target_position": target.positions,
+            "target_rotation": target.rotations,
+            "tolerance": tolerance * max(size, 1.0),
+            "tolerance_rotation": tolerance,
+            "max_iterations": ITERATIONS,
+            "urdf": urdf(robot),
+        }
+        about = sentence("A robot of {joints} joints.", joints=len(start))
+        yield Case(f"{name}, {family}", TASK, inputs, family, about, facts={"size": size})
+
+
+def _robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
+    z, y = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
+    arm = [[0, 0, 0.3], [0, 0.1, 0], [0, 0, 0.4], [0, 0, 0.4], [0, 0.1, 0], [0, 0, 0.1]]
+    taller = [[0, 0, height] for height in (0.34, 0.2, 0.2, 0.2, 0.2, 0.2, 0.1)]
+    scara = [[0, 0, 0.4], [0.4, 0, 0], [0.3, 0, 0], [0, 0, -0.1]]
+    slide = np.array([False, False, True, False])
+    return {
+        "one hinge": _robot([z], [[0, 0, 0.2]], tool=[0.5, 0, 0]),
+        "two hinges": _robot([z, z], [[0, 0, 0.1], [0.6, 0, 0]], tool=[0.4, 0, 0]),
+        "a slide": _robot([z, z, z, z], scara, slide),
+        "a branch": _robot([z, y, y, y], [[0, 0, 0.2], [0, 0, 0.3], [0, 0.2, 0], [0.4, 0, 0]],
+                           parents=[-1, 0, 0, 1], tool=[0.2, 0, 0.1]),
+        "six hinges": _robot([z, y, y, y, z, y], arm, tool=[0, 0.05, 0.1]),
+        "seven hinges": _robot([z, y, z, y, z, y, z], taller, tool=[0, 0, 0.1]),
+        **{f"seven hinges in rotated frames {i}": _anyhow(rng) for i in range(1, 4)},
+    }  # fmt: skip
+
+
+def _anyhow(rng: np.random.Generator) -> dict[str, Any]:
+    """Return a robot whose frames and axes point anywhere."""
+    axes = rng.standard_normal((7, 3))
+    return _robot(
+        axes / np.linalg.norm(axes, axis=1, keepdims=True), 0.3 * rng.standard_normal((7, 3)),
+        orientations=rotation.random(rng, 7), tool=[0.1, -0.1, 0.2],
+        tool_rotation=rotation.random(rng),
+    )  # fmt: skip
+
+
+def _robot(
+    axes: Any, origins: Any, slides: Any = None, *, parents: Any = None, orientations: Any = None,
+    tool: Any = (0.0, 0.0, 0.1), tool_rotation: Any = (1.0, 0.0, 0.0, 0.0),
+) -> dict[str, Any]:  # fmt: skip
+    count = len(axes)
+    slides = np.zeros(count, dtype=bool) if slides is None else slides
+    return {
+        "parents": np.array(np.arange(count) - 1 if parents is None else parents),
+        "origins": np.array(origins, dtype=float),
+        "orientations": rotation.identity(count) if orientations is None else orientations,
+        "axes": np.array(axes, dtype=float),
+        "slides": slides,
+        "lower": np.where(slides, -0.2, -2.2),
+        "upper": np.where(slides, 0.3, 2.4),
+        "effector": count - 1,
+        "tool_position": np.array(tool, dtype=float),
+        "tool_rotation": np.array(tool_rotation, dtype=float),
+    }
