@@ -26,35 +26,21 @@ PART = 2**22
 
 
 class LinkKinematics(NamedTuple):
-    """Poses and Jacobians of links in each configuration.
+    """Poses and Jacobians of links in each configuration."""
 
-    Attributes:
-        positions: of the links' origins [m], (configuration, link, 3).
-        matrices: their rotations, (configuration, link, 3, 3).
-        jacobians: (configuration, link, 6, freedom).
-    """
-
-    positions: FloatArray
-    matrices: FloatArray
-    jacobians: FloatArray
+    positions: FloatArray  # of the links' origins [m], (configuration, link, 3)
+    matrices: FloatArray  # their rotations, (configuration, link, 3, 3)
+    jacobians: FloatArray  # (configuration, link, 6, freedom)
 
 
 class Sweep(NamedTuple):
-    """A model in random configurations with the engine's kinematics of its links.
+    """A model in random configurations with the engine's kinematics of its links."""
 
-    Attributes:
-        robot: the model as the reference reads it.
-        q: the configurations, (configuration, coordinate).
-        links: indices of our joints whose links the engine knows.
-        theirs: the engine's kinematics of those links.
-        free_mimics: why mimic joints move independently here; empty if they follow their leaders.
-    """
-
-    robot: Robot
-    q: FloatArray
-    links: np.ndarray
-    theirs: LinkKinematics
-    free_mimics: str
+    robot: Robot  # as the reference reads it
+    q: FloatArray  # the configurations, (configuration, coordinate)
+    links: np.ndarray  # indices of our joints whose links the engine knows
+    theirs: LinkKinematics  # of those links
+    free_mimics: str  # why mimic joints move independently; empty if they follow their leaders
 
 
 def sweep_in_parts(engine: str, model: Model, part: float = PART) -> Iterator[Sweep]:
@@ -145,17 +131,11 @@ def compare(quantity: Quantity, family: str, engine: str, cases: int) -> Iterato
 
 
 class Differences(NamedTuple):
-    """The largest differences in one model.
+    """The largest differences in one model."""
 
-    Attributes:
-        positions: relative to the extent of the links.
-        rotations: of matrices.
-        jacobians: of linear velocities relative to the extent, of angular ones to one radian.
-    """
-
-    positions: float
-    rotations: float
-    jacobians: float
+    positions: float  # relative to the extent of the links
+    rotations: float  # of matrices
+    jacobians: float  # of linear velocities relative to the extent, of angular ones to a radian
 
 
 def differences(parts: Iterable[Sweep]) -> Differences:

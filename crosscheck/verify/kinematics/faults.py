@@ -17,23 +17,14 @@ __all__ = ["FAULTS", "Fault", "Switches", "by_key", "combinations", "describe", 
 
 
 class Fault(NamedTuple):
-    """A number of a switch.
+    """A number of a switch."""
 
-    Attributes:
-        part: the table that it is in: "forward", "ccd", "fabrik", "stop" or "follow".
-        key: its short name.
-        switch: the field of Switches.
-        number: what the switch is set to.
-        sentence: what is wrong and what it should be.
-        honest: whether a solver may be so on purpose: its answers still obey every law.
-    """
-
-    part: str
-    key: str
-    switch: str
-    number: int
-    sentence: Sentence
-    honest: bool = False
+    part: str  # the table that it is in: "forward", "ccd", "fabrik", "stop" or "follow"
+    key: str  # its short name
+    switch: str  # the field of Switches
+    number: int  # what the switch is set to
+    sentence: Sentence  # what is wrong and what it should be
+    honest: bool = False  # a solver may be so on purpose: its answers still obey every law
 
 
 def _table(part: str, rows: Sequence[tuple[Any, ...]]) -> tuple[Fault, ...]:

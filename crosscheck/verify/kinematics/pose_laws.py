@@ -28,23 +28,14 @@ NEITHER = sentence("The answer has neither rotations nor positions.")
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """An answer as the laws see it.
+    """An answer as the laws see it."""
 
-    Attributes:
-        path: joints from the root to the effector.
-        raw: their local rotations as they came, or None.
-        local: the same normalised, the effector's own as at the start if it moves nothing; or None.
-        given: their positions, or None [m].
-        positions: where the joints are: by the rotations if there are any [m].
-        judgement: by the reference, None if numbers are missing.
-    """
-
-    path: IndexArray
-    raw: FloatArray | None
-    local: FloatArray | None
-    given: FloatArray | None
-    positions: FloatArray
-    judgement: PoseJudgement | None
+    path: IndexArray  # joints from the root to the effector
+    raw: FloatArray | None  # local rotations as they came
+    local: FloatArray | None  # the same, normalised, with `with_effector_of`
+    given: FloatArray | None  # positions as they came [m]
+    positions: FloatArray  # where the joints are: by the rotations if there are any [m]
+    judgement: PoseJudgement | None  # None if numbers are missing
 
     @property
     def finite(self) -> bool:

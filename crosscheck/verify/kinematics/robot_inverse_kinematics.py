@@ -31,19 +31,12 @@ Request = Mapping[str, Any]
 
 
 class Fault(NamedTuple):
-    """A wrong reading of a request.
+    """A wrong reading of a request."""
 
-    Attributes:
-        sentence: what is wrong, and what it should be.
-        misread: returns those inputs that are understood otherwise.
-        scale: of hinges' coordinates, in radians.
-        relative: whether coordinates count from the start.
-    """
-
-    sentence: Sentence
-    misread: Callable[[Request], Request] = lambda request: {}
-    scale: float = 1.0
-    relative: bool = False
+    sentence: Sentence  # what is wrong, and what it should be
+    misread: Callable[[Request], Request] = lambda request: {}  # the inputs understood otherwise
+    scale: float = 1.0  # of hinges' coordinates, in radians
+    relative: bool = False  # whether coordinates count from the start
 
     def read(self, request: Request) -> Request:
         """Return the request as the solver understands it."""

@@ -1,7 +1,7 @@
 """Robots of joints with limits: as the reference's articulations, as URDF, and as cases."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -71,24 +71,27 @@ def judgement_of(inputs: Mapping[str, Any], q: FloatArray) -> PoseJudgement:
 
 def urdf(inputs: Mapping[str, Any]) -> str:
     """Return a robot as URDF: links base, link_0 and so on, and the tool."""
-    links = ["base", *(f"link_{j}" for j in range(len(inputs["parents"]))), "tool"]
-    joints = [_urdf_joint(inputs, j) for j in range(len(inputs["parents"]))]
+    count = len(inputs["parents"])
+    named = [f'<link name="{link}"/>' for link in ("base", *map(_link, range(count)), "tool")]
+    joints = [_urdf_joint(inputs, j) for j in range(count)]
     placed = _urdf_origin(inputs["tool_position"], inputs["tool_rotation"])
-    ends = f'<parent link="link_{inputs["effector"]}"/><child link="tool"/>'
+    ends = f'<parent link="{_link(inputs["effector"])}"/><child link="tool"/>'
     joints.append(f'<joint name="to_tool" type="fixed">{placed}{ends}</joint>')
-    named = "".join(f'<link name="{link}"/>' for link in links)
-    return f'<robot name="robot">{named}{"".join(joints)}</robot>'
+    return f'<robot name="robot">{"".join(named + joints)}</robot>'
+
+
+def _link(j: int) -> str:
+    return f"link_{j}" if j >= 0 else "base"
 
 
 def _urdf_joint(inputs: Mapping[str, Any], j: int) -> str:
-    parent = int(inputs["parents"][j])
     kind = "prismatic" if inputs["slides"][j] else "revolute"
     lower, upper = (float(inputs[name][j]) for name in ("lower", "upper"))
     return (
         f'<joint name="joint_{j}" type="{kind}">'
         + _urdf_origin(inputs["origins"][j], inputs["orientations"][j])
-        + f'<parent link="{f"link_{parent}" if parent >= 0 else "base"}"/>'
-        + f'<child link="link_{j}"/><axis xyz="{_numbers(inputs["axes"][j])}"/>'
+        + f'<parent link="{_link(int(inputs["parents"][j]))}"/><child link="{_link(j)}"/>'
+        + f'<axis xyz="{_numbers(inputs["axes"][j])}"/>'
         + f'<limit lower="{lower!r}" upper="{upper!r}" effort="100" velocity="10"/></joint>'
     )
 
@@ -98,10 +101,10 @@ def _urdf_origin(position: FloatArray, quaternion: FloatArray) -> str:
     R = rotation.to_matrix(quaternion)
     pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
     angles = (math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0]))
-    return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(np.array(angles))}"/>'
+    return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(angles)}"/>'
 
 
-def _numbers(values: FloatArray) -> str:
+def _numbers(values: Iterable[float]) -> str:
     return " ".join(repr(float(x)) for x in values)
 
 

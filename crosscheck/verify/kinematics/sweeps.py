@@ -47,25 +47,14 @@ class Swept(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What the sweeps say.
+    """What the sweeps say."""
 
-    Attributes:
-        method: "ccd", "fabrik" or "", as declared or inferred.
-        declared: as declared.
-        behaviour: what was inferred, in words.
-        off: names of the cases whose sweeps are not the textbook's.
-        findings: by the names of cases.
-        honest: whether they are another honest solver's, which may be slower.
-        damped: how its rotations are made smaller on purpose, if they are.
-    """
-
-    method: str
-    declared: str
-    behaviour: Sentence | None
-    off: Sequence[str]
-    findings: Mapping[str, Sequence[Finding]]
-    honest: bool = False
-    damped: Sentence | None = None
+    method: str  # "ccd", "fabrik" or "", as declared or inferred
+    behaviour: Sentence | None = None  # what was inferred, in words
+    off: Sequence[str] = ()  # names of the cases whose sweeps are not the textbook's
+    findings: Mapping[str, Sequence[Finding]] = {}  # by the names of cases
+    honest: bool = False  # whether they are another honest solver's, which may be slower
+    damped: Sentence | None = None  # how its rotations are made smaller on purpose, if they are
 
 
 def likeness(greeting: Greeting, case: Case) -> float:
@@ -81,7 +70,7 @@ def compare(
 ) -> Comparison:
     """Return the findings of the sweeps of a method that is declared, or seen."""
     if not method:
-        return Comparison("", "", None, (), {})
+        return Comparison("")
     errors = {one.case.name: _error(one, method, greeting) for one in swept}
     off = [name for name, (error, bound) in errors.items() if not error <= bound]
     behaviour = None
@@ -104,9 +93,8 @@ def compare(
     for name, (error, bound) in errors.items():
         outcome, words = (verdict, told) if name in off else holds
         findings[name] = [Finding(LAW, outcome, error, bound, "m", words)]
-    return Comparison(
-        method, declared, behaviour, off, findings, verdict is Verdict.RIGHT_BUT, damped
-    )
+    honest = verdict is Verdict.RIGHT_BUT
+    return Comparison(method, behaviour, off, findings, honest, damped)
 
 
 def seen(swept: Sequence[Swept], greeting: Greeting) -> str:
