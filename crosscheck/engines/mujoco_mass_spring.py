@@ -55,14 +55,9 @@ class MujocoMassSpring:
         integrator: str = "Euler",
         iterations: int = 5000,
     ) -> None:
-        """Build the model.
+        """Build the model, with h [s], an integrator of `INTEGRATORS`, and conjugate gradients.
 
-        Args:
-            system: the particles and springs.
-            h: time step [s].
-            integrator: one of `INTEGRATORS`.
-            iterations: most conjugate gradient iterations of "discrete"; MuJoCo's default of 100
-                does not suffice for larger systems.
+        MuJoCo's default of 100 iterations of "discrete" does not suffice for larger systems.
 
         Raises:
             ValueError: if the integrator is unknown.

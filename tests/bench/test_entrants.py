@@ -449,7 +449,7 @@ def test_a_request_calls_the_tool_as_the_protocol_says(name):
         np.testing.assert_allclose(
             pose.positions[model.names.index("tool")], positions[0], atol=1e-12
         )
-        np.testing.assert_allclose(tool_pose(inputs, q).position, positions[0], atol=1e-12)
+        np.testing.assert_allclose(tool_pose(inputs, q).positions, positions[0], atol=1e-12)
 
 
 @pytest.mark.slow

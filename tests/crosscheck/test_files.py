@@ -12,6 +12,7 @@ import pytest
 from plumbob.crosscheck.child_process import ChildProcess, LostError
 from plumbob.crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
 from plumbob.crosscheck.robots import comparisons, files, independent_bvh
+from plumbob.crosscheck.robots.comparisons import sweep_in_parts
 from plumbob.crosscheck.robots.deviations import FRAME, INCLUDE
 from plumbob.crosscheck.robots.files import (
     AGREES,
@@ -27,7 +28,6 @@ from plumbob.crosscheck.robots.files import (
     compare,
     find,
 )
-from plumbob.crosscheck.robots.sweep import sweep_in_parts
 from plumbob.crosscheck.tolerances import POSITION
 from plumbob.reference import Skeleton, rotation
 from plumbob.reference.formats import bvh, mjcf

@@ -15,7 +15,7 @@ from plumbob.crosscheck.engines import ROBOT_ENGINES, mujoco_robot, pinocchio_ro
 from plumbob.crosscheck.engines.robot_engine import UnreadableError
 from plumbob.crosscheck.robots import comparisons, models
 from plumbob.crosscheck.robots.claims import ROBOT_CLAIMS, robot_claims
-from plumbob.crosscheck.robots.comparisons import differences
+from plumbob.crosscheck.robots.comparisons import differences, reference_kinematics, sweep
 from plumbob.crosscheck.robots.deviations import (
     CLASS_ANCHOR,
     DEVIATIONS,
@@ -28,7 +28,6 @@ from plumbob.crosscheck.robots.deviations import (
     known_deviations,
 )
 from plumbob.crosscheck.robots.models import CAUSES, CHARACTERS, IMMOBILE, ROBOTS, UNREAD, Model
-from plumbob.crosscheck.robots.sweep import reference_kinematics, sweep
 from plumbob.crosscheck.verdict import check_claim
 from plumbob.reference import Articulation
 from plumbob.reference.formats import FormatWarning, mjcf, urdf

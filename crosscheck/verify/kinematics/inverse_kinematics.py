@@ -1,7 +1,8 @@
 """Inverse kinematics: whether targets are reached by honest poses, and by which sweeps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,6 @@ from ..contestant import Answer, Asked
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
-from ..timing import timed
 from . import laws, pose_laws, problems, rounding, sweeps
 from .pose_laws import Posed
 from .predictions import solve
@@ -38,6 +38,19 @@ class Told(NamedTuple):
     posed: Posed | None
     judgement: CaseJudgement
 
+    @property
+    def case(self) -> Case:
+        """The case."""
+        return self.asked.case
+
+    def with_findings(self, findings: Sequence[Finding]) -> "Told":
+        """Return the same with other findings."""
+        return self._replace(judgement=replace(self.judgement, findings=tuple(findings)))
+
+    def corrected(self, correct: Callable[[Finding], Finding]) -> "Told":
+        """Return the same with each finding as a function returns it."""
+        return self.with_findings(list(map(correct, self.judgement.findings)))
+
 
 def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
     """Hold poses against the laws and sweeps against the textbook's; name the faults."""
@@ -48,80 +61,74 @@ def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport
         for one, posed in zip(asked, poses, strict=True)
         if "sweeps" in one.case.facts and posed is not None and posed.finite
     ]
-    known = declared
-    if not method and not declared:
-        known = sweeps.seen(swept, greeting)
+    known = declared if method else sweeps.seen(swept, greeting)
     told = [_judged(one, posed, known, greeting) for one, posed in zip(asked, poses, strict=True)]
-    found = sweeps.compare(swept, known, declared, _others_hold(told), greeting)
-    told = [_extended(one, found.findings.get(one.asked.case.name, ())) for one in told]
+    others_hold = all(one.judgement.verdict < Verdict.WRONG for one in told)
+    found = sweeps.compare(swept, known, declared, others_hold, greeting)
+    told = [
+        one.with_findings([*one.judgement.findings, *found.findings.get(one.case.name, ())])
+        for one in told
+    ]
     if found.honest:
         told = [_slower(one) for one in told]
-    judgements = _in_other_worlds(told, "" if found.honest else found.method, greeting)
-    diagnosis = _diagnosis(told, judgements, found, greeting)
+    told = _in_other_worlds(told, "" if found.honest else found.method, greeting)
+    diagnosis = _diagnosis(told, found, greeting)
     if found.honest and sweeps.is_grave(found.method, diagnosis):
-        judgements = [_graver(one) for one in judgements]
-    return report(TASK, method, asked, judgements, diagnosis, greeting)
+        told = [one.corrected(_graver) for one in told]
+    return report(TASK, method, [one.judgement for one in told], diagnosis)
 
 
 def _slower(one: Told) -> Told:
     """Return a judgement in which a target that an honest, slower solver misses is forgiven."""
-    case, known = one.asked.case, one.judgement
-    gained = case.facts["before"] - case.facts["least"]
-    findings = [
-        replace(
-            finding,
-            verdict=Verdict.RIGHT_BUT,
-            sentence=sentence(
-                "It is slow: {error:.2g} m are left after the iterations allowed.",
-                error=finding.error,
-            ),
-        )
-        if finding.law in ("target reached", "nearest point")
-        and finding.verdict is Verdict.WRONG and finding.error < gained
-        else finding
-        for finding in known.findings
-    ]  # fmt: skip
-    return one._replace(judgement=replace(known, findings=tuple(findings)))
+    gained = one.case.facts["before"] - one.case.facts["least"]
+
+    def forgiven(finding: Finding) -> Finding:
+        is_missed = finding.law in ("target reached", "nearest point")
+        if not is_missed or finding.verdict is not Verdict.WRONG or finding.error >= gained:
+            return finding
+        return replace(finding, verdict=Verdict.RIGHT_BUT, sentence=_slow(finding.error))
+
+    return one.corrected(forgiven)
 
 
-def _graver(one: CaseJudgement) -> CaseJudgement:
-    """Return a judgement in which a sweep known to be a fault's is wrong."""
-    findings = [
-        replace(finding, verdict=Verdict.WRONG)
-        if finding.law == sweeps.LAW and finding.verdict is Verdict.RIGHT_BUT
-        else finding
-        for finding in one.findings
-    ]
-    return replace(one, findings=tuple(findings))
+def _slow(error: float) -> Sentence:
+    return sentence("It is slow: {error:.2g} m are left after the iterations allowed.", error=error)
+
+
+def _graver(finding: Finding) -> Finding:
+    """Return the finding of a sweep that is known to be a fault's as a wrong one."""
+    is_forgiven = finding.law == sweeps.LAW and finding.verdict is Verdict.RIGHT_BUT
+    return replace(finding, verdict=Verdict.WRONG) if is_forgiven else finding
 
 
 def understood(one: Asked) -> Posed | None:
     """Return an answer as the laws see it, or None if there is none."""
     if not isinstance(one.answer, Answer):
         return None
-    if not {"local_rotations", "positions"} & one.answer.values.keys():
-        return None
     return pose_laws.understood(one.answer.values, one.case.inputs, one.case.facts)
 
 
 def _judged(one: Asked, posed: Posed | None, method: str, greeting: Greeting) -> Told:
-    case, answer = one.case, one.answer
-    skeleton = Skeleton(case.inputs["parents"], case.inputs["offsets"])
-    _, seconds = timed(lambda: _reference(skeleton, case.inputs, method or "fabrik"))
-    if not isinstance(answer, Answer):
-        return Told(one, None, CaseJudgement(case, answer, (), {}, None, seconds))
-    findings = laws.Findings(greeting)
-    if posed is None:
-        told = sentence("The answer has neither rotations nor positions.")
-        findings.add(Finding("numbers", Verdict.BROKEN, np.inf, 0.0, "", told))
-    else:
-        findings.extend(pose_laws.all_of(posed, case, greeting))
-        if not findings.broken:
-            findings.extend(target_laws(posed, answer.values, case, method, greeting))
-    findings.extend(laws.repeated(one, case.facts["size"], greeting))
-    findings.extend(laws.remarks(answer))
-    expected, digits = _expected(posed, case, method)
-    return Told(one, posed, CaseJudgement(case, answer, findings.all, expected, digits, seconds))
+    case = one.case
+
+    def findings(values: Mapping[str, Any]) -> list[Finding]:
+        if posed is None:
+            return [laws.missing(pose_laws.NEITHER)]
+        kept = pose_laws.all_of(posed, case, greeting)
+        if any(finding.verdict is Verdict.BROKEN for finding in kept):
+            return kept
+        return kept + target_laws(posed, values, case, method, greeting)
+
+    skeleton, inputs = Skeleton(case.inputs["parents"], case.inputs["offsets"]), case.inputs
+    names = ("effector", "tolerance", "max_iterations")
+    options = {name: inputs[name] for name in names}
+    judgement = laws.judged(
+        one, greeting, findings,
+        lambda: solve_ik(skeleton, inputs["local_rotations"], inputs["target"], method or "fabrik",
+                         **options),
+        *(_expected(posed, case, method) if isinstance(one.answer, Answer) else ()),
+    )  # fmt: skip
+    return Told(one, posed, judgement)
 
 
 def _expected(
@@ -131,71 +138,55 @@ def _expected(
     if not method or "sweeps" not in case.facts:
         return {}, None
     local, x, _ = solve(method, case.inputs)
-    path, digits = case.facts["path"], None
+    digits = None
     if posed is not None and posed.finite:
-        error = float(np.abs(posed.positions[path] - x[path]).max())
-        digits = laws.digits(error, case.facts["size"])
+        digits = laws.digits(_error(posed, x), case.facts["size"])
     return {"local_rotations": local, "positions": x}, digits
 
 
-def _reference(skeleton: Skeleton, inputs: Mapping[str, Any], method: str) -> Any:
-    return solve_ik(
-        skeleton,
-        inputs["local_rotations"],
-        inputs["target"],
-        method,
-        effector=inputs["effector"],
-        tolerance=inputs["tolerance"],
-        max_iterations=inputs["max_iterations"],
-    )
+def _error(posed: Posed, x: Any) -> float:
+    """Return how far the joints of the path are from other positions [m]."""
+    return float(np.abs(posed.positions[posed.path] - x[posed.path]).max())
 
 
 def target_laws(
     posed: Posed, values: Mapping[str, Any], case: Case, method: str, greeting: Greeting
 ) -> list[Finding]:
     """Return whether the target is reached, or the nearest point, and whether claims are true."""
-    distance = posed.distance(case)
-    slack = rounding.positions(greeting.epsilon, len(posed.start), case.facts["size"], posed.drift)
-    found = []
+    distance, size = posed.distance, case.facts["size"]
+    slack = rounding.positions(greeting.epsilon, len(posed.positions), size, posed.drift)
+    findings = []
     if "sweeps" not in case.facts:
-        found.append(reached(distance, slack, case, method, greeting))
+        findings.append(reached(distance, slack, case, method, greeting))
         if method and case.inputs["tolerance"] == problems.LOOSE:
-            found += in_time(posed, case, method, greeting)
+            findings += in_time(posed, case, method, greeting)
     elif method:
-        found.append(not_farther(distance, slack, case))
-    return found + claims(distance, slack, values, case)
+        findings.append(not_farther(distance, slack, case))
+    return findings + claims(distance, slack, values, case)
 
 
 def reached(distance: float, slack: float, case: Case, method: str, greeting: Greeting) -> Finding:
     """Return how the effector's distance stands to the least one, the tolerance allowed."""
-    least, reach, before = case.facts["least"], case.facts["reach"], case.facts["before"]
+    least = case.facts["least"]
     tolerance = case.inputs["tolerance"] + slack
     excess = distance - least
     if method and least > 0.0:
-        tolerance += AS_SLOW * max(0.0, _textbook_distance(method, case) - least)
+        _, x, _ = solve(method, case.inputs)
+        closest = float(np.linalg.norm(x[case.inputs["effector"]] - case.inputs["target"]))
+        tolerance += AS_SLOW * max(0.0, closest - least)
     law = "target reached" if least == 0.0 else "nearest point"
     if excess <= tolerance:
         return laws.bounded(law, excess, tolerance, "m", laws.HOLDS)
-    verdict, told = _missed(excess, least, reach, before, case, method, greeting)
+    verdict, told = _missed(excess, case, method, greeting)
     return Finding(law, verdict, excess, tolerance, "m", told)
 
 
-def _textbook_distance(method: str, case: Case) -> float:
-    _, x, _ = solve(method, case.inputs)
-    return float(np.linalg.norm(x[case.inputs["effector"]] - case.inputs["target"]))
-
-
-def _missed(
-    excess: float,
-    least: float,
-    reach: float,
-    before: float,
-    case: Case,
-    method: str,
-    greeting: Greeting,
-) -> tuple[Verdict, Sentence]:
+def _missed(excess: float, case: Case, method: str, greeting: Greeting) -> tuple[Verdict, Sentence]:
     """Return what follows from a target that is missed by an excess [m]."""
-    if case.family in problems.DEGENERATE and excess + least <= before + 1e-6 * reach:
+    least, reach, before = (case.facts[name] for name in ("least", "reach", "before"))
+    is_degenerate, is_beyond = case.family in problems.DEGENERATE, least > 0.0
+    is_nearer = excess < 0.5 * (before - least)
+    if is_degenerate and excess + least <= before + 1e-6 * reach:
         return Verdict.RIGHT_BUT, sentence(
             "It is stuck {error:.2g} m off: nothing here says which direction to bend in. Bend "
             "the chain a little before the first sweep.",
@@ -207,36 +198,30 @@ def _missed(
             "one direction into another return the identity for small angles?",
             error=excess,
         )
-    slow = excess < 0.5 * (before - least)
-    if least > 0.0 and slow:
+    if is_beyond and is_nearer:
         return Verdict.RIGHT_BUT, sentence(
             "The target cannot be reached; it comes within {error:.2g} m of the nearest point.",
             error=excess,
         )
-    if slow and (not method or case.family in problems.DEGENERATE):
-        return Verdict.RIGHT_BUT, sentence(
-            "It is slow: {error:.2g} m are left after the iterations allowed.", error=excess
-        )
-    if least > 0.0:
-        return Verdict.WRONG, sentence(
-            "It stays {error:.2g} m farther from its target than it could be.", error=excess
-        )
+    if is_nearer and (not method or is_degenerate):
+        return Verdict.RIGHT_BUT, _slow(excess)
     return Verdict.WRONG, sentence(
-        "It stays {error:.2g} m off a target that it can reach.", error=excess
+        "It stays {error:.2g} m farther from its target than it could be."
+        if is_beyond
+        else "It stays {error:.2g} m off a target that it can reach.",
+        error=excess,
     )
 
 
 def in_time(posed: Posed, case: Case, method: str, greeting: Greeting) -> list[Finding]:
     """Return whether a solve made more sweeps than its tolerance asks for, where that shows."""
-    path, size = case.facts["path"], case.facts["size"]
-    bound = size * (1e-7 if greeting.precision == "double" else 1e-3)
+    bound = case.facts["size"] * (1e-7 if greeting.precision == "double" else 1e-3)
     _, x, made = solve(method, case.inputs)
-    if np.abs(posed.positions[path] - x[path]).max() <= bound:
+    if _error(posed, x) <= bound:
         return [Finding(STOPS, Verdict.RIGHT, 0.0, 0.0, "", laws.HOLDS)]
     for count in range(made + 1, case.inputs["max_iterations"] + 1):
         inputs = {**case.inputs, "tolerance": 0.0, "max_iterations": count}
-        _, x, _ = solve(method, inputs)
-        if np.abs(posed.positions[path] - x[path]).max() <= bound:
+        if _error(posed, solve(method, inputs)[1]) <= bound:
             told = sentence(
                 "It makes {more} sweeps more than its tolerance asks for.", more=count - made
             )
@@ -279,45 +264,26 @@ def claims(distance: float, slack: float, values: Mapping[str, Any], case: Case)
     return found
 
 
-def _others_hold(told: Sequence[Told]) -> bool:
-    """Return whether all laws but those of sweeps hold."""
-    return all(one.judgement.verdict < Verdict.WRONG for one in told)
-
-
-def _extended(one: Told, findings: Sequence[Finding]) -> Told:
-    if not findings:
-        return one
-    known = one.judgement
-    more = replace(known, findings=(*known.findings, *findings))
-    return one._replace(judgement=more)
-
-
-def _in_other_worlds(told: Sequence[Told], method: str, greeting: Greeting) -> list[CaseJudgement]:
+def _in_other_worlds(told: Sequence[Told], method: str, greeting: Greeting) -> list[Told]:
     """Return the judgements, each case of another world compared with what it is like."""
-    by_name = {one.asked.case.name: one for one in told}
-    found = []
+    by_name = {one.case.name: one for one in told}
+    compared = []
     for one in told:
-        case = one.asked.case
-        base = by_name.get(case.facts.get("like", ""))
+        base = by_name.get(one.case.facts.get("like", ""))
         if base is not None and one.posed is not None and base.posed is not None:
-            one = _extended(one, _alike(one, base, method, greeting))
-        found.append(one.judgement)
-    return found
+            alike = _alike(one.posed, base.posed, one.case, method, greeting)
+            one = one.with_findings([*one.judgement.findings, *alike])
+        compared.append(one)
+    return compared
 
 
-def _alike(one: Told, base: Told, method: str, greeting: Greeting) -> list[Finding]:
-    case = one.asked.case
-    assert one.posed is not None
-    assert base.posed is not None
-    error = pose_laws.apart_in_worlds(one.posed, base.posed, case.facts["world"])
+def _alike(posed: Posed, base: Posed, case: Case, method: str, greeting: Greeting) -> list[Finding]:
+    error = pose_laws.distance_between(posed, base, case.facts["world"])
     if not np.isfinite(error):
         return []
-    tolerance = 2.0 * rounding.sweep(
-        greeting.epsilon,
-        len(one.posed.start),
-        case.facts["size"],
-        case.facts["amplification"],
-    )
+    size, amplification = case.facts["size"], case.facts["amplification"]
+    joints = len(posed.positions)
+    tolerance = 2.0 * rounding.sweep(greeting.epsilon, joints, size, amplification)
     told = sentence(
         "In another world, rotated, shifted or in other units, the same request has an answer "
         "{error:.2g} m away: something depends on the origin or on an axis.",
@@ -327,49 +293,37 @@ def _alike(one: Told, base: Told, method: str, greeting: Greeting) -> list[Findi
     return [laws.bounded("equal worlds", error, tolerance, "m", told, verdict=verdict)]
 
 
-def _diagnosis(
-    told: Sequence[Told],
-    judgements: Sequence[CaseJudgement],
-    found: sweeps.Comparison,
-    greeting: Greeting,
-) -> Diagnosis:
+def _diagnosis(told: Sequence[Told], found: sweeps.Comparison, greeting: Greeting) -> Diagnosis:
     """Return the faults that reproduce the answers, of the method declared or inferred."""
-    pairs = list(zip(told, judgements, strict=True))
-    all_sweeps = [_seen(one) for one in told if one.posed is not None and _is_sweep(one)]
-    off = [
-        _seen(one)
-        for one, judgement in pairs
-        if _is_sweep(one) and one.posed is not None
-        and (judgement.verdict >= Verdict.WRONG or one.asked.case.name in found.off)
-    ]  # fmt: skip
-    whole = [
-        _seen(one)
-        for one, judgement in pairs
-        if (judgement.verdict >= Verdict.WRONG or _is_late(judgement))
-        and one.posed is not None and not _is_sweep(one)
-        and one.asked.case.family not in problems.DEGENERATE
-    ]  # fmt: skip
-    if off:
-        return sweeps.explained(found, all_sweeps, off, greeting)
-    if whole and found.method:
-        return diagnosed(
-            found.method, whole, whole, lambda case: sweeps.likeness(case, greeting),
-            found.behaviour,
-        )  # fmt: skip
+    posed = [one for one in told if one.posed is not None]
+    all_sweeps = [one for one in posed if "sweeps" in one.case.facts]
+    wrong_sweeps = [one for one in all_sweeps if _is_wrong(one) or one.case.name in found.off]
+    wrong_solves = [
+        one
+        for one in posed
+        if "sweeps" not in one.case.facts
+        and one.case.family not in problems.DEGENERATE
+        and (_is_wrong(one) or _is_late(one))
+    ]
+    if wrong_sweeps:
+        seen = list(map(_seen, all_sweeps)), list(map(_seen, wrong_sweeps))
+        return sweeps.explained(found, *seen, greeting)
+    if wrong_solves and found.method:
+        whole = list(map(_seen, wrong_solves))
+        likeness = partial(sweeps.likeness, greeting)
+        return diagnosed(found.method, whole, whole, likeness, found.behaviour)
     return Diagnosis(behaviour=found.behaviour)
 
 
-def _is_late(one: CaseJudgement) -> bool:
-    return any(finding.law == STOPS and finding.verdict for finding in one.findings)
+def _is_wrong(one: Told) -> bool:
+    return one.judgement.verdict >= Verdict.WRONG
 
 
-def _is_sweep(one: Told) -> bool:
-    return "sweeps" in one.asked.case.facts
+def _is_late(one: Told) -> bool:
+    return any(finding.law == STOPS and finding.verdict for finding in one.judgement.findings)
 
 
 def _seen(one: Told) -> Asked:
     """Return the answer as variants predict it."""
     assert one.posed is not None
-    assert isinstance(one.asked.answer, Answer)
-    seen = replace(one.asked.answer, values=one.posed.comparable)
-    return Asked(one.asked.case, seen, seen)
+    return sweeps.Swept(one.case, one.posed).asked

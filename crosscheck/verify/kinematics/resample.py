@@ -1,6 +1,7 @@
 """Resampling a polyline: laws only, since every program has a rule of its own."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,9 +12,8 @@ from plumbob.reference.arguments import FloatArray, distinct_texts
 from ..case import Case
 from ..contestant import Answer, Asked
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
+from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
-from ..timing import timed
 from . import laws, rounding
 from .polylines import Line, even_by_count, even_by_spacing
 from .report import report
@@ -40,72 +40,55 @@ class Scene(NamedTuple):
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return polylines to be resampled by count and by spacing, the smallest first."""
-    found = []
-    for i in range(5 if thorough else 1):
-        for scene in _scenes(generator(seed, f"resample {i}"), i):
-            line = Line(scene.curve, scene.strokes, scene.closed)
-            count = max(5, len(scene.curve) // 3)
-            spacing = line.length / (2.5 * count)
-            for kind, value in (("count", count), ("spacing", spacing)):
-                found.append(_case(scene, line, kind, value))
+    found = [
+        case
+        for i in range(5 if thorough else 1)
+        for scene in _scenes(generator(seed, f"resample {i}"))
+        for case in _cases_of(scene, i + 1)
+    ]
     return sorted(found, key=lambda case: len(case.inputs["curve"]))
 
 
-def _case(scene: Scene, line: Line, kind: str, value: float) -> Case:
-    inputs = {
-        "curve": scene.curve,
-        "strokes": np.array(scene.strokes),
-        "closed": scene.closed,
-        kind: value,
-    }
+def _cases_of(scene: Scene, number: int) -> Iterator[Case]:
+    line = Line(scene.curve, scene.strokes, scene.closed)
+    count = max(5, len(scene.curve) // 3)
     facts = {"line": line, "size": float(np.abs(scene.curve).max())}
-    return Case(f"{scene.name}, by {kind}", TASK, inputs, scene.name, scene.about, facts=facts)
+    family = f"{scene.name} {number}"
+    for kind, value in (("count", count), ("spacing", line.length / (2.5 * count))):
+        inputs = {
+            "curve": scene.curve,
+            "strokes": np.array(scene.strokes),
+            "closed": scene.closed,
+            kind: value,
+        }
+        yield Case(f"{family}, by {kind}", TASK, inputs, family, scene.about, facts=facts)
 
 
-def _scenes(rng: np.random.Generator, i: int) -> list[Scene]:
-    number = f" {i + 1}"
+def _scenes(rng: np.random.Generator) -> list[Scene]:
     corner = np.array([[0.1, 0.0, 0.2], [0.9, 0.0, 0.2], [0.9, 0.0, 0.6]])
     walk = np.cumsum(rng.standard_normal((12, 3)) * rng.uniform(0.05, 0.5, (12, 1)), axis=0)
-    bob = curves["plumb_bob"](100)
     return [
-        Scene("segment" + number, sentence("A single segment."), rng.uniform(-1.0, 1.0, (2, 3))),
-        Scene("corner" + number, sentence("Two segments at a right angle."), corner),
-        Scene("uneven walk" + number, sentence("A random walk in space with uneven steps."), walk),
-        Scene(
-            "closed square" + number,
-            sentence("A square whose end joins its start."),
-            curves["square"](4),
-            closed=True,
-        ),
-        Scene(
-            "repeated points" + number,
-            sentence("A polyline in which a point comes twice."),
-            np.repeat(walk[:5], [1, 2, 1, 3, 1], axis=0),
-        ),
-        Scene(
-            "two strokes" + number,
-            sentence("Two strokes apart: bridged or kept, both are right."),
-            np.concatenate([walk[:6], walk[6:] + 1.5]),
-            (0, 6),
-        ),
-        Scene(
-            "plumb bob" + number,
-            sentence("A drawing in five strokes with uneven samples."),
-            bob,
-            tuple(range(0, 100, 20)),
-        ),
-        Scene("heart" + number, sentence("The lab's heart."), curves["heart"](90), closed=True),
-    ]
+        Scene("segment", sentence("A single segment."), rng.uniform(-1.0, 1.0, (2, 3))),
+        Scene("corner", sentence("Two segments at a right angle."), corner),
+        Scene("uneven walk", sentence("A random walk in space with uneven steps."), walk),
+        Scene("closed square", sentence("A square whose end joins its start."),
+              curves["square"](4), closed=True),
+        Scene("repeated points", sentence("A polyline in which a point comes twice."),
+              np.repeat(walk[:5], [1, 2, 1, 3, 1], axis=0)),
+        Scene("two strokes", sentence("Two strokes apart: bridged or kept, both are right."),
+              np.concatenate([walk[:6], walk[6:] + 1.5]), (0, 6)),
+        Scene("plumb bob", sentence("A drawing in five strokes with uneven samples."),
+              curves["plumb_bob"](100), tuple(range(0, 100, 20))),
+        Scene("heart", sentence("The lab's heart."), curves["heart"](90), closed=True),
+    ]  # fmt: skip
 
 
 def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
     """Hold points against the laws of resampling; strokes may be bridged or kept."""
     judgements = [_judged(one, greeting) for one in asked]
     wrong = [one for one, told in zip(asked, judgements, strict=True) if told.verdict]
-    found = diagnosis(asked, wrong, greeting)
-    behaviour = _strokes(asked, greeting)
-    told = Diagnosis(found.explanations, behaviour, tried=found.tried)
-    return report(TASK, method, asked, judgements, told, greeting)
+    found = diagnosis(asked, wrong, greeting, _strokes(asked, greeting))
+    return report(TASK, method, judgements, found)
 
 
 def _strokes(asked: Sequence[Asked], greeting: Greeting) -> Sentence | None:
@@ -123,12 +106,8 @@ def _strokes(asked: Sequence[Asked], greeting: Greeting) -> Sentence | None:
 
 def _bound(case: Case, greeting: Greeting) -> float:
     """Return what rounding allows: arc lengths add up over all points [m]."""
-    line = case.facts["line"]
-    return (
-        rounding.ROUNDINGS_A_JOINT
-        * greeting.epsilon
-        * (len(case.inputs["curve"]) * case.facts["size"] + line.length)
-    )
+    size = len(case.inputs["curve"]) * case.facts["size"] + case.facts["line"].length
+    return float(rounding.ROUNDINGS_A_JOINT * greeting.epsilon * size)
 
 
 def _off(points: FloatArray, line: Line, bridged: bool) -> FloatArray:
@@ -136,41 +115,31 @@ def _off(points: FloatArray, line: Line, bridged: bool) -> FloatArray:
 
 
 def _judged(one: Asked, greeting: Greeting) -> CaseJudgement:
-    case, answer = one.case, one.answer
-    (_, seconds) = timed(lambda: _even(case.inputs, case.facts["line"]))
-    if not isinstance(answer, Answer):
-        return CaseJudgement(case, answer, (), {}, None, seconds)
-    findings = laws.Findings(greeting)
-    points = answer.values.get("points")
-    if points is None or not len(points):
-        told = sentence("The answer has no points.")
-        findings.add(Finding("numbers", Verdict.BROKEN, np.inf, 0.0, "", told))
-    elif not np.isfinite(points).all():
-        told = sentence("A point is not a number.")
-        findings.add(Finding("numbers", Verdict.BROKEN, np.inf, 0.0, "", told))
-    else:
-        findings.extend(point_laws(points, case, greeting))
-    findings.extend(laws.repeated(one, case.facts["size"], greeting))
-    findings.extend(laws.remarks(answer))
-    return CaseJudgement(case, answer, findings.all, {}, None, seconds)
-
-
-def _even(inputs: Mapping[str, Any], line: Line) -> FloatArray:
+    inputs, line = one.case.inputs, one.case.facts["line"]
     if "count" in inputs:
-        return even_by_count(line, inputs["count"], True)
-    return even_by_spacing(line, inputs["spacing"], True)
+        reference = partial(even_by_count, line, inputs["count"], True)
+    else:
+        reference = partial(even_by_spacing, line, inputs["spacing"], True)
+    return laws.judged(one, greeting, partial(_findings, one.case, greeting), reference)
+
+
+def _findings(case: Case, greeting: Greeting, values: Mapping[str, Any]) -> list[Finding]:
+    points = values.get("points")
+    if points is None or not len(points):
+        return [laws.missing(sentence("The answer has no points."))]
+    if not np.isfinite(points).all():
+        return [laws.missing(sentence("A point is not a number."))]
+    return point_laws(points, case, greeting)
 
 
 def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Finding]:
     """Return whether points are on the line, in order, evenly spaced and as many as asked for."""
     line, bound = case.facts["line"], _bound(case, greeting)
     off = _off(points, line, True)
-    worst = int(np.argmax(off))
-    found = [_on_line(points, off, line, bound)]
-    found.append(_ends(points, case, bound))
+    found = [_on_line(points, off, line, bound), _ends(points, case, bound)]
     if "count" in case.inputs:
         found.append(_count(points, case))
-    if off[worst] <= bound:
+    if off.max() <= bound:
         at = line.parameters(points, bound)
         found += [_order(at, line, bound), _gaps(points, at, case, bound)]
         if case.inputs["closed"] and len(points) > 1:
@@ -180,8 +149,7 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
 
 def _on_line(points: FloatArray, off: FloatArray, line: Line, bound: float) -> Finding:
     """Return whether points are on the line, or between two of its points."""
-    worst = int(np.argmax(off))
-    verdict = Verdict.WRONG
+    worst, verdict = int(np.argmax(off)), Verdict.WRONG
     told = sentence(
         "Point {index} is {error:.2g} m off the polyline.", index=worst, error=off[worst]
     )
@@ -264,19 +232,19 @@ def _widest(kinds: Sequence[FloatArray], case: Case, bound: float) -> Finding:
     spacing, line = case.inputs["spacing"], case.facts["line"]
     bridges = len(line.strokes) - 1
     wide = min(float(np.sort(gaps)[: len(gaps) - bridges].max(initial=0.0)) for gaps in kinds)
-    gap, limit = distinct_texts(wide, spacing, 3)
-    told = sentence(
-        "Neighbouring points are {gap} m apart, more than the {spacing} m asked for.",
-        gap=gap,
-        spacing=limit,
-    )
     if wide > spacing * (1.0 + 1e-6) + 2.0 * bound:
+        gap, limit = distinct_texts(wide, spacing, 3)
+        told = sentence(
+            "Neighbouring points are {gap} m apart, more than the {spacing} m asked for.",
+            gap=gap,
+            spacing=limit,
+        )
         return Finding("spacing", Verdict.WRONG, wide, spacing, "m", told)
-    narrow = int((kinds[2] < LEAST_GAP * spacing - 2.0 * bound).sum())
-    told = sentence(
-        "{narrow} gaps are narrower than half the spacing: the points are uneven.", narrow=narrow
-    )
-    allowed = 1.0 + bridges + len(case.inputs["curve"])
-    if len(kinds[2]) > 4.0 * line.length / spacing + allowed:
+    if len(kinds[2]) > 4.0 * line.length / spacing + 1.0 + bridges + len(case.inputs["curve"]):
+        narrow = int((kinds[2] < LEAST_GAP * spacing - 2.0 * bound).sum())
+        told = sentence(
+            "{narrow} gaps are narrower than half the spacing: the points are uneven.",
+            narrow=narrow,
+        )
         return Finding("spacing", Verdict.RIGHT_BUT, narrow, 0.0, "", told)
     return Finding("spacing", Verdict.RIGHT, wide, spacing, "m", laws.HOLDS)

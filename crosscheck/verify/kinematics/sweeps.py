@@ -17,9 +17,9 @@ from ..greeting import Greeting
 from ..judgement import Diagnosis, Finding, Verdict
 from ..sentence import Sentence, sentence
 from . import laws, pose_laws, rounding
-from .faults import FAULTS, Fault, Switches, by_key, describe, switches
+from .faults import FAULTS, Switches, by_key, describe, switches
 from .pose_laws import Posed
-from .predictions import predict_inverse, solve
+from .predictions import UNDAMPED, predict_inverse, solve
 from .report import diagnosed
 from .textbook import Damping
 
@@ -47,33 +47,22 @@ class Swept(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What the sweeps say.
+    """What the sweeps say."""
 
-    Attributes:
-        method: "ccd", "fabrik" or "", as declared or inferred.
-        declared: as declared.
-        behaviour: what was inferred, in words.
-        off: names of the cases whose sweeps are not the textbook's.
-        findings: by the names of cases.
-        honest: whether they are another honest solver's, which may be slower.
-        damped: how its rotations are made smaller on purpose, if they are.
-    """
-
-    method: str
-    declared: str
-    behaviour: Sentence | None
-    off: Sequence[str]
-    findings: Mapping[str, Sequence[Finding]]
-    honest: bool = False
-    damped: Sentence | None = None
+    method: str  # "ccd", "fabrik" or "", as declared or inferred
+    behaviour: Sentence | None = None  # what was inferred, in words
+    off: Sequence[str] = ()  # names of the cases whose sweeps are not the textbook's
+    findings: Mapping[str, Sequence[Finding]] = {}  # by the names of cases
+    honest: bool = False  # whether they are another honest solver's, which may be slower
+    damped: Sentence | None = None  # how its rotations are made smaller on purpose, if they are
 
 
-def likeness(case: Case, greeting: Greeting) -> float:
+def likeness(greeting: Greeting, case: Case) -> float:
     """Return the relative difference that still counts as a variant's answer."""
-    joints, known = len(case.inputs["parents"]), case.facts
-    amplification = known.get("amplification", 10.0)
-    bound = rounding.sweep(greeting.epsilon, joints, known["size"], amplification)
-    return max(1e-9, 4.0 * bound / known["size"])
+    joints, size = len(case.inputs["parents"]), case.facts["size"]
+    amplification = case.facts.get("amplification", 10.0)
+    bound = rounding.sweep(greeting.epsilon, joints, size, amplification)
+    return max(1e-9, 4.0 * bound / size)
 
 
 def compare(
@@ -81,7 +70,7 @@ def compare(
 ) -> Comparison:
     """Return the findings of the sweeps of a method that is declared, or seen."""
     if not method:
-        return Comparison("", "", None, (), {})
+        return Comparison("")
     errors = {one.case.name: _error(one, method, greeting) for one in swept}
     off = [name for name, (error, bound) in errors.items() if not error <= bound]
     behaviour = None
@@ -99,13 +88,13 @@ def compare(
             damped = damping_of(swept, greeting)
         if damped is not None:
             verdict, told = Verdict.RIGHT_BUT, damped
-    findings = {
-        name: [Finding(LAW, verdict if name in off else Verdict.RIGHT, error, bound, "m",
-                       told if name in off else laws.HOLDS)]
-        for name, (error, bound) in errors.items()
-    }  # fmt: skip
+    holds = Verdict.RIGHT, laws.HOLDS
+    findings = {}
+    for name, (error, bound) in errors.items():
+        outcome, words = (verdict, told) if name in off else holds
+        findings[name] = [Finding(LAW, outcome, error, bound, "m", words)]
     honest = verdict is Verdict.RIGHT_BUT
-    return Comparison(method, declared, behaviour, off, findings, honest, damped)
+    return Comparison(method, behaviour, off, findings, honest, damped)
 
 
 def seen(swept: Sequence[Swept], greeting: Greeting) -> str:
@@ -134,12 +123,9 @@ def _is_another_solver(greeting: Greeting, one: Swept) -> bool:
 def _best_fit(swept: Sequence[Swept], method: str, greeting: Greeting) -> tuple[float, int]:
     """Return what share of the sweeps a faulty textbook reproduces, and minus its faults."""
     asked = [one.asked for one in swept]
-    found = diagnosed(
-        method, asked, asked, lambda case: likeness(case, greeting), most_faults=SEEN_FAULTS
-    ).explanations
-    if not found:
-        return 0.0, 0
-    return found[0].share, -len(found[0].faults[0].split(" + "))
+    alike = partial(likeness, greeting)
+    found = diagnosed(method, asked, asked, alike, most_faults=SEEN_FAULTS).explanations
+    return (found[0].share, -len(found[0].faults[0].split(" + "))) if found else (0.0, 0)
 
 
 def _error(one: Swept, method: str, greeting: Greeting) -> tuple[float, float]:
@@ -147,7 +133,7 @@ def _error(one: Swept, method: str, greeting: Greeting) -> tuple[float, float]:
     _, x, _ = solve(method, one.case.inputs)
     path, known = one.posed.path, one.case.facts
     error = float(np.abs(one.posed.positions[path] - x[path]).max())
-    joints, size = len(one.posed.start), known["size"]
+    joints, size = len(one.posed.positions), known["size"]
     return error, rounding.sweep(greeting.epsilon, joints, size, known["amplification"])
 
 
@@ -179,9 +165,9 @@ def _verdict(
 
 
 def _goes_on(one: Swept, greeting: Greeting) -> bool:
-    return one.posed.distance(one.case) <= rounding.STALL[greeting.precision] * max(
-        one.case.facts["reach"], 1e-300
-    )
+    """Return whether the effector has arrived, or as near as helpers let it."""
+    stall = rounding.STALL[greeting.precision] * max(one.case.facts["reach"], 1e-300)
+    return one.posed.distance <= stall
 
 
 def _ends_well(one: Swept) -> bool:
@@ -200,21 +186,21 @@ def _angle(a: np.ndarray, b: np.ndarray) -> float:
 def honest_variant(swept: Sequence[Swept], method: str, greeting: Greeting) -> Sentence | None:
     """Return what an honest solver does otherwise than the textbook, if it explains all sweeps."""
     for fault in (one for one in FAULTS[method] if one.honest and one.key != "tolerance squared"):
-        if _explains(swept, method, greeting, (fault,), Damping()):
+        if _explains(swept, method, greeting, switches([fault])):
             return describe(method, [fault.key])
     return None
 
 
 def damping_of(swept: Sequence[Swept], greeting: Greeting) -> Sentence | None:
     """Return by how much a CCD scales or caps its rotations, if that explains all sweeps."""
-    for faults in ((), *(((one,)) for one in FAULTS["ccd"] if one.key == "root to tip")):
-        gain, most = _damping(swept, switches(faults))
+    for switched in (Switches(), switches([by_key("ccd")["root to tip"]])):
+        gain, most = _damping(swept, switched)
         scaled, capped = Damping(gain=gain), Damping(most=most)
-        if SMALLEST < gain < 0.999 and _explains(swept, "ccd", greeting, faults, scaled):
+        if SMALLEST < gain < 0.999 and _explains(swept, "ccd", greeting, switched, scaled):
             return sentence(
                 "It is CCD with each rotation scaled by {gain:.4g}, which is slower.", gain=gain
             )
-        if most > SMALLEST and _explains(swept, "ccd", greeting, faults, capped):
+        if most > SMALLEST and _explains(swept, "ccd", greeting, switched, capped):
             return sentence(
                 "It is CCD with each rotation capped at {angle:.4g} rad, which is slower.",
                 angle=most,
@@ -231,48 +217,41 @@ def _damping(swept: Sequence[Swept], switched: Switches) -> tuple[float, float]:
         start = one.case.inputs["local_rotations"]
         local, _, _ = solve("ccd", one.case.inputs, switched)
         path = one.posed.path
-        first = path[0] if switched.ccd.order == 1 else path[-2]
+        first = path[0] if switched.order == 1 else path[-2]
         theirs = laws.angles(one.posed.local, start)
-        ours = laws.angles(local, start)
-        gain = float(theirs[first] / ours[first])
+        gain = float(theirs[first] / laws.angles(local, start)[first])
         most = max(most, float(theirs[path].max()))
     return gain, most
 
 
 def _explains(
-    swept: Sequence[Swept],
-    method: str,
-    greeting: Greeting,
-    faults: Sequence[Fault],
-    damping: Damping,
-) -> bool:
+    swept: Sequence[Swept], method: str, greeting: Greeting, switched: Switches,
+    damping: Damping = UNDAMPED,
+) -> bool:  # fmt: skip
     return all(
-        difference(
-            predict_inverse(method, switches(faults), one.case, damping), one.posed.comparable
-        )
-        <= likeness(one.case, greeting)
+        difference(predict_inverse(method, switched, one.case, damping), one.posed.comparable)
+        <= likeness(greeting, one.case)
         for one in swept
     )
 
 
 def explained(
-    found: Comparison, all_sweeps: Sequence[Asked], off: Sequence[Asked], greeting: Greeting
+    found: Comparison, all_sweeps: Sequence[Asked], wrong: Sequence[Asked], greeting: Greeting
 ) -> Diagnosis:
     """Return the faults that reproduce the sweeps."""
     if not found.method:
         return Diagnosis()
     if found.damped is not None:
         return Diagnosis(behaviour=found.damped)
-    return diagnosed(
-        found.method, all_sweeps, off, lambda case: likeness(case, greeting), found.behaviour
-    )
+    alike = partial(likeness, greeting)
+    return diagnosed(found.method, all_sweeps, wrong, alike, found.behaviour)
 
 
 def is_grave(method: str, diagnosis: Diagnosis) -> bool:
     """Return whether a fault that nobody makes on purpose reproduces every sweep."""
-    by_keys = by_key(method)
+    faults = by_key(method)
     return any(
         one.share == 1.0
-        and not any(by_keys[key].honest for name in one.faults for key in name.split(" + "))
+        and not any(faults[key].honest for name in one.faults for key in name.split(" + "))
         for one in diagnosis.explanations
     )

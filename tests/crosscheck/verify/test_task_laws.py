@@ -226,7 +226,7 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
     """Sixteen epsilons of the largest limit, 2.4 rad."""
     q = robot.inputs["start"].copy()
     q[3] = robot.inputs[side][3] + sign * share * 16 * EPSILON * 2.4
-    found = robot_inverse_kinematics._limits(q, robot, ROBOTS)
+    (found, *_) = robot_inverse_kinematics._findings(robot, ROBOTS, {"q": q})
     assert (found.law, found.verdict, found.where) == ("limits kept", verdict, 3)
 
 
@@ -247,12 +247,11 @@ def test_a_claim_is_about_the_position_and_the_rotation(distance, angle, claim, 
 
 
 def test_a_target_s_quaternion_may_have_either_sign(robot):
-    pose = robot_models.tool_pose(robot.inputs, robot.inputs["start"])
     for sign in (1.0, -1.0):
         inputs = {**robot.inputs, "target_rotation": sign * robot.inputs["target_rotation"]}
-        distance, angle = robot_models.apart(pose, inputs)
-        assert distance <= 1e-12
-        assert angle <= 1e-12
+        found = robot_models.judgement_of(inputs, robot.inputs["start"])
+        assert found.distance <= 1e-12
+        assert found.angle <= 1e-12
 
 
 # ---- what is said of a task
@@ -315,8 +314,5 @@ def test_a_fault_is_told_only_if_it_explains_more_than_no_fault_does():
     assert _telling([right, as_good, better]) == [better]
     whole = match(1.0, "c")
     assert _telling([right, as_good, better, whole]) == [whole]
-    assert _telling([replace_share(right, 1.0), whole]) == [replace_share(right, 1.0), whole]
-
-
-def replace_share(match, share):
-    return match._replace(share=share)
+    perfect = right._replace(share=1.0)
+    assert _telling([perfect, whole]) == [perfect, whole]
