@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from crosscheck.conformance.case import Case
-from crosscheck.conformance.doors.line_process import Limits
+from crosscheck.conformance.doors import Limits
 from crosscheck.conformance.doors.program import ProgramContestant
 from crosscheck.conformance.sentence import sentence
 

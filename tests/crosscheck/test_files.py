@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from crosscheck.child_process import ChildProcess, LostError
+from crosscheck.child_process import CallProcess, LostError
 from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
 from crosscheck.robots import comparisons, files, independent_bvh
 from crosscheck.robots.deviations import FRAME, INCLUDE
@@ -84,7 +84,7 @@ class Here:
 @pytest.fixture
 def here(monkeypatch):
     """Let files be read in this process."""
-    monkeypatch.setattr(files, "ChildProcess", Here)
+    monkeypatch.setattr(files, "CallProcess", Here)
 
 
 def outcomes(folder, **options):
@@ -428,7 +428,7 @@ def loud():
 
 
 def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
-    with ChildProcess(nothing, patience=0.5) as child:
+    with CallProcess(nothing, patience=0.5) as child:
         first = child.call(loud)
         assert child.call(loud) == first != os.getpid()
         with pytest.raises(LostError, match="ends by SIGSEGV"):
@@ -440,14 +440,14 @@ def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
         with pytest.raises(LostError, match="gives no answer within 5 s"):
             child.call(time.sleep, 60)
         assert child.call(loud) not in (first, os.getpid())
-        process = child._child.process
+        process = child._child._process
     assert process.returncode is not None
     assert capfd.readouterr() == ("", "")
 
 
 def test_a_call_that_waits_for_the_processor_is_not_lost():
     """Only its own processor time counts: no waiting, no start, nothing between two calls."""
-    with ChildProcess(partial(spin, 1.0), patience=0.5) as child:
+    with CallProcess(partial(spin, 1.0), patience=0.5) as child:
         process = child.call(os.getpid)
         for _ in range(3):
             child.call(time.sleep, 1.0)

@@ -10,8 +10,8 @@ from crosscheck.conformance.case import Case
 from crosscheck.conformance.contestant import Answer
 from crosscheck.conformance.doors import Limits, open_contestant
 from crosscheck.conformance.doors.claimed_time import contradicts
-from crosscheck.conformance.doors.processes import main_thread_seconds
 from crosscheck.conformance.sentence import sentence
+from crosscheck.process_tree import main_thread_seconds
 
 LIMITS = Limits(first=60.0, request=60.0)
 # Seconds of 40 requests: what is computed for the messages, and what solves take; some are long.
