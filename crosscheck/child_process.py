@@ -493,7 +493,7 @@ class CallProcess:
         try:
             if self._child is None:
                 self._child = python_process(
-                    "import crosscheck.child_process as c; c.perform_calls()"
+                    "import plumbob.crosscheck.child_process as c; c.perform_calls()"
                 )
                 _perform(self._child, self.start_patience, self.prepare)
             result: Result = _perform(self._child, self.patience, function, *arguments)

@@ -4,10 +4,10 @@ import sys
 
 import pytest
 
-from crosscheck.child_process import ChildProcess, Loss, LostError, python_process
+from plumbob.crosscheck.child_process import ChildProcess, Loss, LostError, python_process
 
 ECHO = (
-    "import crosscheck.child_process as c\nrequests, answers = c.connect()\n"
+    "import plumbob.crosscheck.child_process as c\nrequests, answers = c.connect()\n"
     "print('noise'); answers.send((requests.recv(), None)); requests.recv()"
 )
 

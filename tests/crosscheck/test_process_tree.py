@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from hostile_programs import case, program, running
 
-from crosscheck import process_tree
-from crosscheck.process_tree import carry, end_group, family
+from plumbob.crosscheck import process_tree
+from plumbob.crosscheck.process_tree import carry, end_group, family
 
 ROOT = str(Path(__file__).parents[2])
 MARKER = (1 << 61) - 1234567
@@ -125,7 +125,7 @@ def test_a_judge_that_is_killed_takes_the_program_with_it(tmp_path, end):
     judge = (
         "import os, sys; sys.path[:0] = sys.argv[1:3]\n"
         "from hostile_programs import LIMITS, case, program\n"
-        "from crosscheck.conformance.doors.program import ProgramContestant\n"
+        "from plumbob.crosscheck.verify.solvers.program import ProgramContestant\n"
         "contestant = ProgramContestant([sys.executable, '-I', '-S', sys.argv[3]], limits=LIMITS)\n"
         "contestant.answer(case(2))\n"
         'contestant._ready().send(b\'{"id": 2, "parents": [1, 2, 3]}\\n\')\n'

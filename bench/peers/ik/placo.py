@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.child_process import ChildProcess, LostError
-from reference.arguments import FloatArray
+from plumbob.crosscheck.child_process import ChildProcess, LostError
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot
