@@ -25,7 +25,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from .process_tree import carry, dismiss, end_group, family, guard, new_marker
+from .process_tree import carry, end_group, family, guard, new_marker
 
 Result = TypeVar("Result")
 
@@ -33,8 +33,6 @@ Result = TypeVar("Result")
 TICK = 0.05
 # How much of standard error is kept [B].
 STDERR_KEPT = 4096
-# How often it is read once a program ended: more than a pipe holds.
-STDERR_ROUNDS = 8
 # Below this share of a processor a program waits rather than computes.
 IDLE = 0.1
 # How long what closed one of its pipes may still take to answer, or to end [s].
@@ -67,7 +65,7 @@ class Loss(Enum):
 
 
 # No message came in time.
-SILENT = {Loss.DEAF, Loss.UNFINISHED, Loss.UNREAD, Loss.COMPUTING, Loss.WAITING}
+SILENT = (Loss.DEAF, Loss.UNFINISHED, Loss.UNREAD, Loss.COMPUTING, Loss.WAITING)
 
 
 class LostError(Exception):
@@ -78,47 +76,37 @@ class LostError(Exception):
         self.loss = loss
 
 
-class Lines:
-    """Messages are lines of bytes, with their ends where they are sent, without when received."""
-
-    def __init__(self) -> None:
-        self._searched = 0
-
-    def encode(self, message: bytes) -> bytes:
-        """Return a line."""
-        return message
-
-    def decode(self, received: bytearray) -> tuple[bytes, ...]:
-        """Take the first line."""
-        end = received.find(b"\n", self._searched)
-        self._searched = len(received) if end < 0 else 0
-        if end < 0:
-            return ()
-        line = bytes(received[:end])
-        del received[: end + 1]
-        return (line,)
+# Codecs take the first message from what was received, and return it, or () if there is none yet.
 
 
-class Pickles:
-    """Messages are pickled objects, framed as by `multiprocessing.connection.Connection`."""
+def take_line(received: bytearray) -> tuple[bytes, ...]:
+    """Take the first line of bytes, without its end, which can only be in the last chunk."""
+    end = received.find(b"\n", max(0, len(received) - _CHUNK))
+    if end < 0:
+        return ()
+    line = bytes(received[:end])
+    del received[: end + 1]
+    return (line,)
 
-    def encode(self, message: object) -> bytes:
-        """Return the length and the pickled object."""
-        data = pickle.dumps(message)
-        return struct.pack("!i", len(data)) + data
 
-    def decode(self, received: bytearray) -> tuple[Any, ...]:
-        """Take the first object."""
-        if len(received) < 4:
-            return ()
-        (size,) = struct.unpack_from("!i", received)
-        if size < 0:
-            raise ValueError(f"expected a length, got {size}")
-        if len(received) < 4 + size:
-            return ()
-        data = bytes(received[4 : 4 + size])
-        del received[: 4 + size]
-        return (pickle.loads(data),)
+def take_pickle(received: bytearray) -> tuple[Any, ...]:
+    """Take the first object, as `multiprocessing.connection.Connection` sends it."""
+    if len(received) < 4:
+        return ()
+    size: int = struct.unpack_from("!i", received)[0]
+    if size < 0:
+        raise ValueError(f"expected a length, got {size}")
+    if len(received) < 4 + size:
+        return ()
+    data = bytes(received[4 : 4 + size])
+    del received[: 4 + size]
+    return (pickle.loads(data),)
+
+
+def pickled(message: object) -> bytes:
+    """Return an object as `take_pickle` and a Connection read it."""
+    data = pickle.dumps(message)
+    return struct.pack("!i", len(data)) + data
 
 
 class _Look(NamedTuple):
@@ -144,34 +132,42 @@ class ChildProcess:
     def __init__(
         self,
         command: Sequence[str | Path],
-        codec: Lines | Pickles | None = None,
+        take: Callable[[bytearray], tuple[Any, ...]] = take_line,
         folder: Path | None = None,
         environment: Mapping[str, str] | None = None,
         memory: float = math.inf,
         longest: float = math.inf,
-        hears_errors: bool = True,
     ) -> None:
         """Start a program.
 
         Args:
             command: the program and its arguments.
-            codec: lines if None.
+            take: the codec; with pickled objects, what the program prints goes nowhere.
             folder: where it works.
             environment: ours if None.
             memory: what it may take, with all that it starts [B]. Where there is a limit nothing
                 of the program is trusted: what leaves its group and session is ended with it.
             longest: the longest message that it may send [B].
-            hears_errors: whether the end of its standard error is kept.
 
         Raises:
             OSError: if it cannot be started.
             ValueError: if the command holds what no command can.
         """
-        self._codec: Any = codec or Lines()
-        self._memory, self._longest = memory, longest
+        self._take, self._memory, self._longest = take, memory, longest
         self._marker = new_marker() if memory < math.inf else 0
-        errors = subprocess.PIPE if hears_errors else subprocess.DEVNULL
-        self._process = _start(command, folder, environment, self._marker, errors)
+        self._process: Any = subprocess.Popen(
+            command,
+            bufsize=0,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL if take is take_pickle else subprocess.PIPE,
+            cwd=folder,
+            env=environment,
+            start_new_session=True,
+            pipesize=_CHUNK,  # fewer changes of context for large messages
+            # A limit that is set later would miss what the program starts at once.
+            preexec_fn=partial(carry, self._marker) if self._marker else None,
+        )
         self.pid: int = self._process.pid
         self.partial, self.last_words = bytearray(), bytearray()
         self._unsent, self.sent = bytearray(), 0
@@ -193,15 +189,15 @@ class ChildProcess:
     @property
     def ending(self) -> str:
         """How it ended: "with code 3" or "by SIGSEGV"."""
-        names = {int(known): known.name for known in signal.Signals}
-        code = self.code
-        return f"with code {code}" if code >= 0 else f"by {names.get(-code, f'signal {-code}')}"
+        names = {-known: known.name for known in signal.Signals}
+        return (
+            f"with code {self.code}" if self.code >= 0 else f"by {names.get(self.code, -self.code)}"
+        )
 
-    def send(self, message: Any) -> None:
+    def send(self, message: bytes) -> None:
         """Let a message be written while the answer is awaited."""
-        data = self._codec.encode(message)
-        self._unsent += data
-        self.sent = len(data)
+        self._unsent += message
+        self.sent = len(message)
         if not self._is_deaf:
             self._forget(self._process.stdin)
             self._selector.register(self._process.stdin, selectors.EVENT_WRITE)
@@ -216,21 +212,20 @@ class ChildProcess:
         Raises:
             LostError: if none comes in time, the program ended, or takes too much.
         """
-        start = looked = time.monotonic()
+        start = time.monotonic()
+        looked = -math.inf if processor < math.inf else start
         self._looks.clear()
-        if processor < math.inf:
-            self._look(processor)
         while not (message := self._next_message()):
             now = time.monotonic()
-            limit = min(seconds, SHUT) if self._is_deaf else seconds
-            if now - looked >= TICK or now - start >= limit:
+            limit = start + (min(seconds, SHUT) if self._is_deaf else seconds)
+            if now - looked >= TICK or now >= limit:
                 looked = now
                 self._look(processor)
                 if message := self._next_message():  # an answer, and then its end
                     break
-            if now - start >= limit:
+            if now >= limit:
                 raise LostError(self._silence())
-            self._exchange(max(min(TICK, start + limit - now), 0.0))
+            self._exchange(max(min(TICK, limit - now), 0.0))
         return message[0]
 
     def leave(self, seconds: float) -> tuple[bool, int]:
@@ -240,7 +235,7 @@ class ChildProcess:
             Whether it ended in time, and how many processes it then left running.
         """
         self._forget(self._process.stdin)
-        with _no_signal_of_pipes(), contextlib.suppress(OSError):
+        with contextlib.suppress(OSError):
             self._process.stdin.close()
         has_left = self._ends_within(seconds)
         strays = len(family(self.pid, self._marker)) if has_left else 0
@@ -253,26 +248,34 @@ class ChildProcess:
 
     def _next_message(self) -> tuple[Any, ...]:
         try:
-            return self._codec.decode(self.partial)
+            return self._take(self.partial)
         except Exception:
             raise LostError(Loss.GARBLED) from None
 
     def _exchange(self, seconds: float) -> None:
         """Write and read what the pipes allow; return after so many seconds if they allow none."""
-        has_ended = False
-        for key, _ in self._selector.select(seconds):
-            if key.fileobj is self._process.stdin:
-                self._write()
-            elif key.fileobj is self._process.stderr:
-                self._read_errors()
-            else:
-                chunk = _read(self._process.stdout)
-                has_ended = chunk == b""
-                self.partial += chunk or b""
-        if has_ended:
+        if not self._pump(seconds):
             raise self._ended()
         if len(self.partial) > self._longest:
             raise LostError(Loss.TOO_LONG)
+
+    def _pump(self, seconds: float) -> bool:
+        """Write and read what the pipes allow; return whether standard output is still open."""
+        is_open = True
+        for key, _ in self._selector.select(seconds):
+            if key.fileobj is self._process.stdin:
+                self._write()
+                continue
+            chunk = _read(key.fileobj)
+            if chunk == b"":
+                self._forget(key.fileobj)
+                is_open &= key.fileobj is not self._process.stdout
+            elif key.fileobj is self._process.stdout:
+                self.partial += chunk or b""
+            else:
+                self.last_words += chunk or b""
+                del self.last_words[:-STDERR_KEPT]
+        return is_open
 
     def _write(self) -> None:
         try:
@@ -287,29 +290,24 @@ class ChildProcess:
         if not self._unsent:
             self._forget(self._process.stdin)
 
-    def _read_errors(self) -> None:
-        chunk = _read(self._process.stderr)
-        self.last_words += chunk or b""
-        del self.last_words[:-STDERR_KEPT]
-        if chunk == b"":
-            self._forget(self._process.stderr)
-
-    def _ends_within(self, seconds: float) -> bool:
-        """Return whether it ends in time; throw away what it prints until then."""
-        deadline = time.monotonic() + seconds
-        while not (has_ended := self._has_ended()) and time.monotonic() < deadline:
-            for key, _ in self._selector.select(TICK / 10):
-                if key.fileobj is self._process.stderr:
-                    self._read_errors()
-                elif key.fileobj is self._process.stdin or _read(key.fileobj) == b"":
-                    self._forget(key.fileobj)
-            if not self._selector.get_map():
-                time.sleep(TICK / 10)
-        return has_ended
-
     def _forget(self, pipe: Any) -> None:
         with contextlib.suppress(KeyError):
             self._selector.unregister(pipe)
+
+    def _ends_within(self, seconds: float) -> bool:
+        """Return whether it ends in time; throw away what it prints until then."""
+        deadline, length = time.monotonic() + seconds, len(self.partial)
+        while not (has_ended := self._has_ended()) and time.monotonic() < deadline:
+            self._pump(TICK / 10)
+            del self.partial[length:]
+        return has_ended
+
+    def _has_ended(self) -> bool:
+        """Return whether the program ended, leaving its number its own where that can be had."""
+        if not hasattr(os, "waitid") or self._process.returncode is not None:
+            return self._process.poll() is not None
+        options = os.WEXITED | os.WNOWAIT | os.WNOHANG
+        return os.waitid(os.P_PID, self.pid, options) is not None
 
     def _look(self, processor: float) -> None:
         """Raise if it ended or takes too much; note what it does."""
@@ -328,25 +326,11 @@ class ChildProcess:
         if used - self._looks[0].used > processor:
             raise LostError(Loss.PROCESSOR)
 
-    def _computes(self) -> bool:
-        """Return whether it computed rather than waited, most times when it was looked at."""
-        first, last = self._looks[0], self._looks[-1]
-        if last.used - first.used > IDLE * (last.time - first.time):
-            return True
-        return 2 * sum(look.runs for look in self._looks) > len(self._looks)
-
-    def _has_ended(self) -> bool:
-        """Return whether the program ended, leaving its number its own where that can be had."""
-        if not hasattr(os, "waitid") or self._process.returncode is not None:
-            return self._process.poll() is not None
-        options = os.WEXITED | os.WNOWAIT | os.WNOHANG
-        return os.waitid(os.P_PID, self.pid, options) is not None
-
     def _ended(self) -> LostError:
         """Return why nothing more will come."""
         has_ended = self._ends_within(SHUT)
-        for _ in range(STDERR_ROUNDS if self._process.stderr else 0):
-            self._read_errors()
+        for _ in range(8):  # more than the pipe of its last words holds
+            self._pump(0.0)
         self.end()
         if not has_ended:
             return LostError(Loss.CLOSED)
@@ -360,33 +344,16 @@ class ChildProcess:
             return Loss.UNFINISHED
         if self._unsent:
             return Loss.UNREAD
-        return Loss.COMPUTING if self._looks and self._computes() else Loss.WAITING
+        return Loss.COMPUTING if self._computes() else Loss.WAITING
 
-
-def _start(
-    command: Sequence[str | Path],
-    folder: Path | None,
-    environment: Mapping[str, str] | None,
-    marker: int,
-    errors: int,
-) -> Any:
-    process = subprocess.Popen(
-        command,
-        bufsize=0,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=errors,
-        cwd=folder,
-        env=environment,
-        start_new_session=True,
-        pipesize=_CHUNK,  # fewer changes of context for large messages
-        # A limit that is set later would miss what the program starts at once.
-        preexec_fn=partial(carry, marker) if marker else None,
-    )
-    if hasattr(resource, "prlimit"):
-        with contextlib.suppress(OSError):  # it has ended already
-            resource.prlimit(process.pid, resource.RLIMIT_CORE, (0, 0))
-    return process
+    def _computes(self) -> bool:
+        """Return whether it computed rather than waited, most times when it was looked at."""
+        if not self._looks:
+            return False
+        first, last = self._looks[0], self._looks[-1]
+        if last.used - first.used > IDLE * (last.time - first.time):
+            return True
+        return 2 * sum(look.runs for look in self._looks) > len(self._looks)
 
 
 def _pipes(process: Any) -> list[Any]:
@@ -407,11 +374,11 @@ def _end(
     end_group(process.pid, marker)
     with contextlib.suppress(subprocess.TimeoutExpired):  # what the system does not let go
         process.wait(SHUT)
-    dismiss(watch)
+    watch.kill()
+    watch.communicate()
     selector.close()
     for pipe in _pipes(process):
-        with contextlib.suppress(OSError):
-            pipe.close()
+        pipe.close()
 
 
 @contextlib.contextmanager
@@ -428,12 +395,9 @@ def _no_signal_of_pipes() -> Iterator[None]:
 
 
 def python_process(statement: str) -> ChildProcess:
-    """Start a Python that finds our packages, on one thread; it gets and sends pickled objects.
-
-    What it prints goes nowhere.
-    """
+    """Start a Python that finds our packages, on one thread; it gets and sends pickled objects."""
     command = [sys.executable, "-P", "-c", _PATH + statement, str(_ROOT)]
-    return ChildProcess(command, Pickles(), environment=one_thread(), hears_errors=False)
+    return ChildProcess(command, take_pickle, environment=one_thread())
 
 
 def one_thread() -> dict[str, str]:
@@ -443,7 +407,7 @@ def one_thread() -> dict[str, str]:
 
 
 def take_streams() -> tuple[int, int]:
-    """Return the descriptors of requests and answers, away from what solvers read and print.
+    """Return the descriptors of requests and answers, and keep solvers away from them.
 
     These read nothing, and print to standard error.
     """
@@ -457,6 +421,7 @@ def take_streams() -> tuple[int, int]:
 
 def connect() -> tuple[Connection, Connection]:
     """Return the connections of pickled requests and answers with the parent of this process."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     requests, answers = take_streams()
     return Connection(requests, writable=False), Connection(answers, readable=False)
 
@@ -478,12 +443,6 @@ class CallProcess:
         self.start_patience = start_patience
         self._child: ChildProcess | None = None
 
-    def __enter__(self) -> "CallProcess":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def call(self, function: Callable[..., Result], *arguments: object) -> Result:
         """Return what a function of a module returns, which must not raise.
 
@@ -492,9 +451,8 @@ class CallProcess:
         """
         try:
             if self._child is None:
-                self._child = python_process(
-                    "import plumbob.crosscheck.child_process as c; c.perform_calls()"
-                )
+                start = f"import {__name__} as c; c.perform_calls()"
+                self._child = python_process(start)
                 _perform(self._child, self.start_patience, self.prepare)
             result: Result = _perform(self._child, self.patience, function, *arguments)
             return result
@@ -510,7 +468,7 @@ class CallProcess:
 
 
 def _perform(child: ChildProcess, patience: float, *call: object) -> Any:
-    child.send(call)
+    child.send(pickled(call))
     try:
         return child.receive(_WALL * patience, patience)
     except LostError as error:

@@ -13,6 +13,7 @@ import secrets
 import signal
 import subprocess
 import time
+from collections.abc import Callable
 from typing import NamedTuple
 
 import psutil
@@ -50,13 +51,14 @@ def new_marker() -> int:
 
 
 def carry(marker: int) -> None:
-    """Let this process and all that it starts carry a marker, where the system allows it.
+    """Let this process and all that it starts carry a marker, and leave no core where they crash.
 
     A child calls this between fork and exec, where other threads' locks stay locked: so it does
     nothing else.
     """
-    if LIMIT is not None:
-        with contextlib.suppress(OSError, ValueError):
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        if LIMIT is not None:
             resource.setrlimit(LIMIT, (marker, marker))
 
 
@@ -92,14 +94,14 @@ def _descendants(pid: int) -> list[int]:
 
 
 def _measured(pid: int) -> Process | None:
+    """Return a process, None if it has ended."""
     with contextlib.suppress(psutil.Error):
         process = psutil.Process(pid)
         with process.oneshot():
-            status, times = process.status(), process.cpu_times()
+            status, used = process.status(), process.cpu_times()
             if status not in (psutil.STATUS_ZOMBIE, psutil.STATUS_DEAD):
-                runs = status == psutil.STATUS_RUNNING
-                memory = process.memory_info().rss
-                return Process(pid, memory, times.user + times.system, runs)
+                memory, runs = process.memory_info().rss, status == psutil.STATUS_RUNNING
+                return Process(pid, memory, used.user + used.system, runs)
     return None
 
 
@@ -118,20 +120,23 @@ def end_group(leader: int, marker: int = 0) -> None:
 
     The leader must not have been waited for, so that its number is still its own.
     """
-    for again in range(ROUNDS):
-        members = family(leader, marker) if marker else []
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(leader, signal.SIGKILL)  # at once, for those that fork while they are listed
-        if not (members or (marker and not again)):
+    for again in range(ROUNDS if marker else 1):
+        pids = [process.pid for process in family(leader, marker)] if marker else []
+        _kill(os.killpg, leader)  # at once, for those that fork while they are listed
+        for pid in pids:
+            _kill(os.kill, pid)
+        if again and not pids:
             break
-        for process in members:
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.kill(process.pid, signal.SIGKILL)
-        time.sleep(PAUSE)
+        time.sleep(PAUSE if marker else 0.0)
+
+
+def _kill(kill: Callable[[int, int], None], target: int) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        kill(target, signal.SIGKILL)
 
 
 def guard(leader: int, marker: int) -> subprocess.Popen[bytes]:
-    """Start a process that kills a program's family should this one die, by whatever means."""
+    """Start a process that ends the same, should this process die by whatever means."""
     return subprocess.Popen(
         ["/bin/sh", "-c", _GUARD, "sh", str(leader), str(marker)],
         stdin=subprocess.PIPE,
@@ -139,9 +144,3 @@ def guard(leader: int, marker: int) -> subprocess.Popen[bytes]:
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-
-
-def dismiss(guard: subprocess.Popen[bytes]) -> None:
-    """End a guard."""
-    guard.kill()
-    guard.communicate()

@@ -5,7 +5,14 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from plumbob.crosscheck.child_process import SILENT, ChildProcess, Loss, LostError, python_process
+from plumbob.crosscheck.child_process import (
+    SILENT,
+    ChildProcess,
+    Loss,
+    LostError,
+    pickled,
+    python_process,
+)
 
 from .progress import Progress, announce
 from .worker import LAST, Begun, Calculation, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
@@ -110,7 +117,7 @@ class WorkerProcess:
         ready = False
         try:
             worker = self._worker = self._worker or python_process(_START)
-            worker.send(job)
+            worker.send(pickled(job))
             message: Message | None = None
             while not isinstance(message, LAST):
                 message = _received(worker, self._patience[ready])

@@ -1,5 +1,6 @@
 """Compare the reference with other readers on all files in folders."""
 
+import contextlib
 import os
 import tempfile
 import warnings
@@ -108,7 +109,7 @@ def check(files: Iterable[File], patience: float = 60.0) -> Iterator[Checked]:
     """
     files = tuple(files)
     included = {path for file in files for path in _includes(file)}
-    with CallProcess(prepare, patience) as child:
+    with contextlib.closing(CallProcess(prepare, patience)) as child:
         for file in files:
             readings = [_read(child, engine, file) for engine in ENGINES.get(file.kind, ())]
             if file.path.resolve() in included and all(r.outcome == NEITHER for r in readings):

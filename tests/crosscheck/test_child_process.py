@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from plumbob.crosscheck.child_process import ChildProcess, Loss, LostError, python_process
+from plumbob.crosscheck.child_process import ChildProcess, Loss, LostError, pickled, python_process
 
 ECHO = (
     "import plumbob.crosscheck.child_process as c\nrequests, answers = c.connect()\n"
@@ -30,7 +30,7 @@ def start():
 
 def test_a_message_comes_back_and_silence_is_none(start):
     child = start(ECHO)
-    child.send(bytes(2**20))
+    child.send(pickled(bytes(2**20)))
     assert child.receive(60.0) == (bytes(2**20), None)
     with pytest.raises(LostError) as caught:
         child.receive(0.05)
@@ -51,7 +51,7 @@ def test_a_process_that_sends_nothing_any_more_has_a_loss_and_an_ending(
     start, statement, loss, ending
 ):
     child = start(statement)
-    child.send("anything")
+    child.send(b"anything")
     with pytest.raises(LostError) as caught:
         child.receive(60.0)
     assert caught.value.loss is loss

@@ -4,6 +4,7 @@ import os
 import signal
 import time
 import tracemalloc
+from contextlib import closing
 from functools import partial
 
 import numpy as np
@@ -71,10 +72,7 @@ class Here:
     def __init__(self, prepare, patience):
         pass
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
+    def close(self):
         pass
 
     def call(self, function, *arguments):
@@ -428,7 +426,7 @@ def loud():
 
 
 def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
-    with CallProcess(nothing, patience=0.5) as child:
+    with closing(CallProcess(nothing, patience=0.5)) as child:
         first = child.call(loud)
         assert child.call(loud) == first != os.getpid()
         with pytest.raises(LostError, match="ends by SIGSEGV"):
@@ -447,7 +445,7 @@ def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
 
 def test_a_call_that_waits_for_the_processor_is_not_lost():
     """Only its own processor time counts: no waiting, no start, nothing between two calls."""
-    with CallProcess(partial(spin, 1.0), patience=0.5) as child:
+    with closing(CallProcess(partial(spin, 1.0), patience=0.5)) as child:
         process = child.call(os.getpid)
         for _ in range(3):
             child.call(time.sleep, 1.0)

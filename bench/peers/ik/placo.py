@@ -29,7 +29,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
         UnableError: if the robot is no chain, or the program does not take it.
     """
     needs_a_chain(robot)
-    program = ChildProcess([environments.python(NAME), "-I", PROGRAM], hears_errors=False)
+    program = ChildProcess([environments.python(NAME), "-I", PROGRAM])
     task = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
     try:
         _answer(program, {**task, "iterations": iterations, "limits": tolerance})

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from ...child_process import SILENT, ChildProcess, Loss, LostError
+from ...child_process import SILENT, ChildProcess, Loss
 from ..contestant import Failure, FailureKind
 from ..message import shown
 from ..sentence import Sentence, sentence
@@ -58,70 +58,49 @@ class FailureError(Exception):
         self.failure = Failure(kind, words)
 
 
-def failure_of(
-    lost: LostError, process: ChildProcess, limits: Limits, patience: float
-) -> FailureError:
+_KINDS = {
+    Loss.MEMORY: FailureKind.MEMORY,
+    Loss.TOO_LONG: FailureKind.GARBAGE,
+    **dict.fromkeys(SILENT, FailureKind.HUNG),
+}
+_WORDS = {
+    Loss.MEMORY: sentence("It took more than {limit:.3g} GB of memory."),
+    Loss.TOO_LONG: sentence(
+        "It printed more than {most} bytes without an end of line, beginning with: {line}"
+    ),
+    Loss.ENDED: sentence("It ended instead of answering: {how}."),
+    Loss.CUT: sentence("It ended in the middle of a line ({line}): {how}."),
+    Loss.CLOSED: sentence("It closed its standard output, but runs on."),
+    Loss.DEAF: sentence("It closed its standard input before it had read the request."),
+    Loss.UNFINISHED: sentence(
+        "It printed {count} bytes, but no end of line within {seconds:g} s: {line}"
+    ),
+    Loss.UNREAD: sentence(
+        "It did not read the whole request of {count} bytes within {seconds:g} s."
+    ),
+    Loss.COMPUTING: sentence("It computed for {seconds:g} s without an answer."),
+    Loss.WAITING: sentence(
+        "It gave no answer within {seconds:g} s and was not computing: does it end each answer "
+        "with an end of line, and flush its output?"
+    ),
+}
+
+
+def failure_of(loss: Loss, process: ChildProcess, limits: Limits, patience: float) -> FailureError:
     """Return why a process was lost, after so much patience [s]."""
-    match lost.loss:
-        case Loss.MEMORY:
-            return FailureError(
-                FailureKind.MEMORY,
-                sentence("It took more than {limit:.3g} GB of memory.", limit=limits.memory / 1e9),
-            )
-        case Loss.TOO_LONG:
-            return FailureError(
-                FailureKind.GARBAGE,
-                sentence(
-                    "It printed more than {most} bytes without an end of line, beginning with: "
-                    "{line}",
-                    most=limits.line,
-                    line=shown(bytes(process.partial[:200]), 60),
-                ),
-            )
-        case loss if loss in SILENT:
-            what = _silence(loss, process, patience)
-            return FailureError(FailureKind.HUNG, _with_stderr(what, process))
-        case loss:
-            return FailureError(FailureKind.CRASHED, _with_stderr(_end(loss, process), process))
-
-
-def _end(loss: Loss, process: ChildProcess) -> Sentence:
-    if loss is Loss.CLOSED:
-        return sentence("It closed its standard output, but runs on.")
-    if loss is Loss.CUT:
-        line = shown(bytes(process.partial[-400:]), 60)
-        return sentence(
-            "It ended in the middle of a line ({line}): {how}.", line=line, how=ending(process.code)
-        )
-    return sentence("It ended instead of answering: {how}.", how=ending(process.code))
-
-
-def _silence(loss: Loss, process: ChildProcess, patience: float) -> Sentence:
-    """Return why nothing came in time."""
-    match loss:
-        case Loss.DEAF:
-            return sentence("It closed its standard input before it had read the request.")
-        case Loss.UNFINISHED:
-            return sentence(
-                "It printed {count} bytes, but no end of line within {seconds:g} s: {line}",
-                count=len(process.partial),
-                seconds=patience,
-                line=shown(bytes(process.partial[:400]), 60),
-            )
-        case Loss.UNREAD:
-            return sentence(
-                "It did not read the whole request of {count} bytes within {seconds:g} s.",
-                count=process.sent,
-                seconds=patience,
-            )
-        case Loss.COMPUTING:
-            return sentence("It computed for {seconds:g} s without an answer.", seconds=patience)
-        case _:
-            return sentence(
-                "It gave no answer within {seconds:g} s and was not computing: does it end each "
-                "answer with an end of line, and flush its output?",
-                seconds=patience,
-            )
+    part = process.partial[-400:] if loss is Loss.CUT else process.partial[:400]
+    values = {
+        "limit": limits.memory / 1e9,
+        "most": limits.line,
+        "line": shown(bytes(part), 60),
+        "count": process.sent if loss is Loss.UNREAD else len(process.partial),
+        "seconds": patience,
+        "how": ending(process.code) if loss in (Loss.ENDED, Loss.CUT) else "",
+    }
+    words = _WORDS[loss]._replace(values=values)
+    if loss in (Loss.MEMORY, Loss.TOO_LONG):
+        return FailureError(_KINDS[loss], words)
+    return FailureError(_KINDS.get(loss, FailureKind.CRASHED), _with_stderr(words, process))
 
 
 def ending(code: int) -> Sentence:
@@ -146,27 +125,21 @@ def _with_stderr(what: Sentence, process: ChildProcess) -> Sentence:
 
 def not_started(program: str, error: Exception) -> FailureError:
     """Return why a program could not be started."""
-    return FailureError(FailureKind.CRASHED, _obstacle(program, error))
-
-
-def _obstacle(program: str, error: Exception) -> Sentence:
+    why = str(getattr(error, "strerror", None) or error)
     match error:
         case FileNotFoundError() if Path(program).is_file() and os.sep not in program:
-            return sentence(
-                "There is no command {program}; for the file here write ./{program}.",
-                program=program,
-            )
+            words = sentence("There is no command {program}; for the file here write ./{program}.")
         case FileNotFoundError() if not Path(program).exists():
-            return sentence("There is no command {program}.", program=program)
+            words = sentence("There is no command {program}.")
         case PermissionError():
-            return sentence("{program} cannot be executed: chmod +x {program}", program=program)
+            words = sentence("{program} cannot be executed: chmod +x {program}")
         case _:
-            return sentence(
+            words = sentence(
                 "{program} cannot be started ({why}): is it built for this machine, and does a "
-                "script begin with #!?",
-                program=program,
-                why=str(getattr(error, "strerror", None) or error),
+                "script begin with #!?"
             )
+    words = words._replace(values={"program": program, "why": why})
+    return FailureError(FailureKind.CRASHED, words)
 
 
 def departure(process: ChildProcess, patience: float) -> tuple[Sentence, ...]:

@@ -140,7 +140,7 @@ class ProgramContestant:
             try:
                 answer = process.receive(start + patience - time.monotonic())
             except LostError as lost:
-                failure = failure_of(lost, process, self._limits, patience)
+                failure = failure_of(lost.loss, process, self._limits, patience)
                 raise self._with_prints(failure) from None
             seconds = time.monotonic() - start
             size += len(answer)
