@@ -359,7 +359,7 @@ def robots(empty_folder, monkeypatch):
     from plumbob.crosscheck.robots import files
 
     monkeypatch.setattr(
-        child_process.ChildProcess, "call", lambda self, function, *given: function(*given)
+        child_process.CallProcess, "call", lambda self, function, *given: function(*given)
     )
     monkeypatch.setattr(files, "known_deviations", lambda path: [])
     folder = empty_folder / "robots"

@@ -326,7 +326,7 @@ def test_restarts_that_all_fail_claim_nothing():
 def test_a_worker_serves_job_after_job(targets):
     ours, theirs = Pipe()
     with ours, theirs:
-        serving = threading.Thread(target=serve, args=(theirs,))
+        serving = threading.Thread(target=serve, args=(theirs, theirs))
         serving.start()
         kinds = []
         for manner in ("perfect", "unable"):

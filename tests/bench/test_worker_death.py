@@ -13,7 +13,7 @@ import pytest
 from plumbob.bench.harness import isolation
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.worker import Ready
-from plumbob.crosscheck.child_process import PipedProcess
+from plumbob.crosscheck.child_process import ChildProcess
 
 ROOT = Path(isolation.__file__).resolve().parents[2]
 PATIENCE = 3.0
@@ -27,7 +27,7 @@ import numpy as np
 from plumbob.bench.harness.worker import Done, Ready, Solved
 
 def descriptor():
-    (own,) = [o for o in gc.get_objects() if isinstance(o, Connection)]
+    (own,) = [o for o in gc.get_objects() if isinstance(o, Connection) and o.writable]
     return own.fileno()
 
 def leave():
@@ -137,7 +137,7 @@ def worker(jobs):
 
 
 def pid(worker):
-    return worker._worker.process.pid
+    return worker._worker.pid
 
 
 def is_gone(process):
@@ -175,8 +175,8 @@ def test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job(worker, jobs
         assert_works(worker, jobs)
         before = pid(worker)
         seen = []
-        end = PipedProcess.end
-        patch.setattr(PipedProcess, "end", lambda w: (seen.append(w.process.pid), end(w)))
+        end = ChildProcess.end
+        patch.setattr(ChildProcess, "end", lambda w: (seen.append(w.pid), end(w)))
         outcome = worker.perform(jobs.Dying(manner, moment))
     assert re.fullmatch(SAYS[manner], outcome.trouble)
     assert len(outcome.solved) == MOMENTS[moment]
@@ -196,7 +196,7 @@ def test_a_death_after_the_last_message_costs_nothing(worker, jobs, manner):
 STARTS = {
     "raise SystemExit(3)": SAYS["leave"],
     "import os, signal; os.kill(os.getpid(), signal.SIGKILL)": SAYS["kill"],
-    "import os, time; os.closerange(3, 99); time.sleep(600)": SAYS["close"],
+    "import os, time; os.closerange(0, 99); time.sleep(600)": SAYS["close"],
     "import an_engine_that_nobody_has": SAYS["raises"],
     "import time; time.sleep(600)": SAYS["hang"],
 }

@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 from hostile_programs import case, program, running
 
+from plumbob.crosscheck import process_tree
 from plumbob.crosscheck.verify.contestant import Answer
-from plumbob.crosscheck.verify.solvers import processes, python_file
+from plumbob.crosscheck.verify.solvers import python_file
 
 ROOT = Path(__file__).parents[3]
-LINUX_ONLY = pytest.mark.skipif(processes._LIMIT is None, reason="Linux has this limit only")
+LINUX_ONLY = pytest.mark.skipif(process_tree.LIMIT is None, reason="Linux has this limit only")
 # Forks twice, leaves the session, and runs something else without an environment.
 DAEMON = """
 import os

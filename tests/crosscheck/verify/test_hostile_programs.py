@@ -10,10 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from hostile_programs import LIMITS, LOOP, case, program, running
 
+from plumbob.crosscheck import child_process
+from plumbob.crosscheck.child_process import ChildProcess
 from plumbob.crosscheck.verify.contestant import Answer, Failure, FailureKind, NoGreetingError
 from plumbob.crosscheck.verify.judgement import Diagnosis, TaskReport
-from plumbob.crosscheck.verify.solvers import line_process
-from plumbob.crosscheck.verify.solvers.line_process import LineProcess
 from plumbob.crosscheck.verify.solvers.program import ProgramContestant
 from plumbob.crosscheck.verify.verify import DISCIPLINES, verify
 
@@ -401,7 +401,7 @@ def test_an_answer_counts_though_the_program_ends_right_after_it(tmp_path, monke
     """It is read by the look that finds the program ended, before the end of its output is."""
     contestant = program(tmp_path, "right(request); os._exit(0)")
     assert contestant.greeting
-    ended = LineProcess._has_ended
+    ended = ChildProcess._has_ended
 
     def wait(process):
         deadline = time.monotonic() + 5.0
@@ -409,9 +409,9 @@ def test_an_answer_counts_though_the_program_ends_right_after_it(tmp_path, monke
             time.sleep(0.01)
         return ended(process)
 
-    exchange = LineProcess._exchange
-    monkeypatch.setattr(line_process, "TICK", 0.0)
-    monkeypatch.setattr(LineProcess, "_has_ended", wait)
+    exchange = ChildProcess._exchange
+    monkeypatch.setattr(child_process, "TICK", 0.0)
+    monkeypatch.setattr(ChildProcess, "_has_ended", wait)
     process = contestant._ready()
     send = process.send
     monkeypatch.setattr(process, "send", lambda line: (send(line), exchange(process, 1.0)))
