@@ -195,7 +195,7 @@ class TestObjective:
         with pytest.raises(ValueError, match=r"^d: expected shape"):
             problem[0].quadratic_form(problem[1], np.zeros((2, 3)))
 
-    METHODS = ("evaluate", "value", "gradient", "hessian", "pin_gradient", "rest_vectors")
+    METHODS = ("evaluate", "value", "gradient", "hessian", "rest_vectors")
 
     @pytest.mark.parametrize("method", METHODS)
     @pytest.mark.parametrize("shape", [(6, 3), (8, 3), (7, 2), (3, 7), (21,), (7, 3, 1), (0, 3)])
@@ -911,11 +911,7 @@ class TestInputs:
             ("h", np.nan, "finite"),
             ("h", 1e200, "expected a number of at most 1e.75"),
             ("h", "fast", "a number, got 'fast'"),
-            (
-                "solver",
-                "simplex",
-                f"one of {', '.join(STEP_SOLVERS)}, got 'simplex'",
-            ),
+            ("solver", "simplex", f"one of {', '.join(STEP_SOLVERS)}, got 'simplex'"),
             ("tolerance", -1e-3, "at least 0"),
             ("tolerance", np.inf, "finite"),
             ("max_iterations", -1, "at least 0"),

@@ -8,13 +8,7 @@ import pytest
 from plumbob.reference import scenes
 from plumbob.reference.mass_spring import forces, lengths, stretches
 
-SCENES = [
-    scenes.lab_cloth,
-    scenes.hanging_rope,
-    scenes.grid_cloth,
-    scenes.net,
-    scenes.lattice,
-]
+SCENES = [scenes.lab_cloth, scenes.hanging_rope, scenes.grid_cloth, scenes.net, scenes.lattice]
 
 # Two triangles that share an edge of 1 m, and a vertex that belongs to neither.
 KITE = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0, 0.6], [0.5, 0, -0.8], [9, 9, 9]], dtype=float)
