@@ -16,15 +16,7 @@ from numpy.typing import ArrayLike
 
 from . import arguments
 from .arguments import FloatArray
-from .articulation import (
-    BALL,
-    FIXED,
-    FREE,
-    FREEDOMS,
-    Articulation,
-    articulated_pose,
-    one_batch,
-)
+from .articulation import BALL, FIXED, FREE, FREEDOMS, Articulation, articulated_pose, one_batch
 from .backend.compiled import Kernel
 from .model import Model, checked_model, effector_of
 from .motion_subspace import accumulate, motion, velocity_at

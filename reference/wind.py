@@ -93,8 +93,7 @@ def plate_force(normal, w, drag, lift):
     pressure = 0.5 * twice_area * speed * speed
     perpendicular = subtract(n, scale(cosine, e))
     return add(
-        scale(drag * pressure * abs(cosine), e),
-        scale(lift * pressure * cosine, perpendicular),
+        scale(drag * pressure * abs(cosine), e), scale(lift * pressure * cosine, perpendicular)
     )
 
 

@@ -460,7 +460,6 @@ def _steps():
         ),
         o + ".residual": Call(g.residual, {"iterate": g.start}),
         o + ".hessian": Call(g.hessian, {"positions": x, "geometric": True}),
-        o + ".pin_gradient": Call(g.pin_gradient, {"positions": x, "geometric": False}),
         o + ".quadratic_form": Call(g.quadratic_form, {"positions": x, "d": g.rest_vectors(x)}),
         "reference.implicit_euler.certificate.certify": Call(
             certificate.certify, {"objective": g, "positions": x}),
@@ -667,7 +666,6 @@ def _systems_of_numbers():
             g.evaluate(x),
             residual,
             g.hessian(x),
-            g.pin_gradient(x),
             g.quadratic_form(x, g.rest_vectors(x)),
         ]
 

@@ -19,6 +19,7 @@ of the gradient are zero.
 import functools
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -53,39 +54,21 @@ from .terms import (
 STARTS = ("y", "x_n")
 
 
+@dataclass(eq=False)
 class Iterate:
-    """Positions with g and its gradient there.
+    """Positions with g and its gradient there."""
 
-    Attributes:
-        positions: x, shape (particle, 3) [m].
-        gradient: grad g(x), shape (particle, 3) [kg m], zero at the pins.
-        value: g(x) [kg m²].
-        gradient_norm: |grad g(x)|.
-        floor_bound: an upper bound of `floor` that is cheaper to compute.
-        is_convex: whether Newton's method found the Hessian positive definite on its way here.
-    """
-
-    def __init__(
-        self,
-        positions: FloatArray,
-        gradient: FloatArray,
-        value: float,
-        gradient_norm: float,
-        floor_bound: float,
-        rounding: Callable[[FloatArray], tuple[float, float]],
-    ) -> None:
-        """Store them, with the function that returns `floor` and `value_floor`."""
-        self.positions = positions
-        self.gradient = gradient
-        self.value = value
-        self.gradient_norm = gradient_norm
-        self.floor_bound = floor_bound
-        self.is_convex = False
-        self._compute_rounding = rounding
+    positions: FloatArray  # x, shape (particle, 3) [m]
+    gradient: FloatArray  # grad g(x), shape (particle, 3) [kg m], zero at the pins
+    value: float  # g(x) [kg m²]
+    gradient_norm: float  # |grad g(x)|
+    floor_bound: float  # an upper bound of `floor` that is cheaper to compute
+    rounding_of: Callable[[FloatArray], tuple[float, float]]  # of the norm and of g at x
+    is_convex: bool = False  # whether Newton found the Hessian positive definite on its way here
 
     @functools.cached_property
     def _rounding(self) -> tuple[float, float]:
-        return self._compute_rounding(self.positions)
+        return self.rounding_of(self.positions)
 
     @property
     def floor(self) -> float:
@@ -256,18 +239,12 @@ class Objective:
         hessian.data[springs.diagonal] += np.repeat(self.system.free_masses, 3)
         return hessian
 
-    @_finite_result
-    def pin_gradient(self, positions: ArrayLike, *, geometric: bool = True) -> FloatArray:
+    def pin_gradient_at(self, x: FloatArray, *, geometric: bool) -> FloatArray:
         """Return h² K times the displacement of the pins from x_n to y, shape (particle, 3) [kg m].
 
         It is the contribution of the pins to the gradient at the free particles when the springs
-        are linearised at x; zero at the pins. K is as for `hessian`.
+        are linearised at x, which is not checked; zero at the pins. K is as for `hessian`.
         """
-        geometric = boolean("geometric", geometric)
-        return self.pin_gradient_at(self._positions(positions), geometric=geometric)
-
-    def pin_gradient_at(self, x: FloatArray, *, geometric: bool) -> FloatArray:
-        """Return `pin_gradient` at positions that are not checked."""
         displacement = np.where(self.system.free[:, None], 0.0, self.y - self.x_n)
         if not displacement.any():
             return displacement

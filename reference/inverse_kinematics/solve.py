@@ -175,14 +175,9 @@ def run(
 ) -> tuple[FloatArray, ...]:
     """Return the fields of Result as a kernel fills them; none if some number is not valid.
 
-    Args:
-        kernel: of a solver.
-        arrays: what it reads of the model.
-        starts: (target, ...), or (1, ...) for all targets.
-        targets: positions [m], (target, 3), or of a mechanism records TARGET, (target, effector).
-        joints: how many the model has.
-        coordinates: how many a solution on a mechanism has; None on a chain.
-        settings: of the solve.
+    `arrays` are what the kernel reads of the model. The starts are rows, (target, ...), or one for
+    all targets; the targets are positions [m], (target, 3), or of a mechanism records TARGET,
+    (target, effector). `coordinates` is how many a solution on a mechanism has, None on a chain.
     """
     n, history = len(targets), UNRECORDED
     local, positions = np.empty((n, joints, 4)), np.empty((n, joints, 3))

@@ -130,8 +130,7 @@ SWEEPS = {
 # The kernel that solves chains by the sweep of each solver.
 ON_CHAINS = {
     name: Kernel(
-        bind(solve_chains, operations=operations._replace(update=sweep)),
-        label=f"{name} for chains",
+        bind(solve_chains, operations=operations._replace(update=sweep)), label=f"{name} for chains"
     )
     for name, sweep in SWEEPS.items()
 }

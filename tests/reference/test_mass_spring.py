@@ -348,13 +348,6 @@ class TestInputs:
             array[...] = 7
             np.testing.assert_array_equal(getattr(system, name), kept)
 
-    def test_the_state_owns_its_arrays(self):
-        x, v = PAIR.copy(), PAIR.copy()
-        state = State(x, v)
-        x[:], v[:] = 7.0, 7.0
-        np.testing.assert_array_equal(state.positions, PAIR)
-        np.testing.assert_array_equal(state.velocities, PAIR)
-
     @pytest.mark.parametrize("name", [f.name for f in dataclasses.fields(MassSpring)])
     def test_the_model_cannot_be_changed(self, network, name):
         system, _ = network

@@ -94,19 +94,6 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
     assert (taken == prepared.restarts[np.argsort(expected)]).all()
 
 
-def test_the_best_of_all_attempts_is_returned(arm, poses, rng, solver, backend):
-    """With no iterations the attempts are the start and the random poses as they are."""
-    q, wanted = arm.random(rng), Target(poses.position[0])
-    random = prepare(arm, (7,), (False,), 6, 5).restarts
-    starts = np.vstack([q[:7], random])
-    full = np.hstack([starts, np.full((7, 1), q[7])])
-    errors = forward_kinematics(arm, full).positions[:, -1] - wanted.position
-    best = np.linalg.norm(errors, axis=1)
-    solution = solve_ik(arm, q, wanted, solver, restarts=6, seed=5, max_iterations=0)
-    assert solution.residual == pytest.approx(best.min(), abs=1e-14)
-    np.testing.assert_allclose(solution.coordinates, full[best.argmin()], rtol=0, atol=1e-15)
-
-
 def test_restarts_follow_from_the_seed(arm, poses, rng):
     q = arm.random(rng)
     first = solve_ik(arm, q, poses, "levenberg_marquardt", restarts=5, seed=1)
@@ -149,10 +136,3 @@ def test_the_iterations_of_all_attempts_are_counted_and_recorded(arm, rng, solve
     assert solution.history.shape == (solution.iterations + 1,)
     assert np.isfinite(solution.history).all()
     assert (solution.history >= 90.0).all()
-
-
-def test_a_skeleton_may_be_restarted_too(skeleton, local, rng, solver, backend):
-    target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
-    solution = solve_ik(skeleton, local, target, solver, restarts=2, max_iterations=300)
-    assert solution.outcome is Outcome.CONVERGED
-    assert solution.local_rotations.shape == (6, 4)
