@@ -2,8 +2,6 @@
 
 import importlib
 import sys
-import threading
-from multiprocessing import Pipe
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,7 +17,7 @@ from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess, raised
 from plumbob.bench.harness.measure import record_of
 from plumbob.bench.harness.results import Results
-from plumbob.bench.harness.worker import Begun, Done, Ready, Solved, Unfit, serve
+from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
 from plumbob.bench.peers.ik.restarts import restarted
@@ -111,9 +109,7 @@ def targets(rng):
 
 def job(targets, manner, restarts=0, budget=60.0, **settings):
     settings = {"manner": manner, **settings}
-    return Job(
-        "fake_solvers", robot("iiwa14"), targets, TOLERANCE, settings, restarts, budget
-    )  # fmt: skip
+    return Job("fake_solvers", robot("iiwa14"), targets, TOLERANCE, settings, restarts, budget)
 
 
 def verdict(targets, solved):
@@ -278,65 +274,37 @@ class Attempts:
         return solve
 
 
-@pytest.mark.parametrize("end", [SolverOutput(np.zeros(7), True), SolverOutput(np.zeros(7), None)])
-def test_restarts_end_with_the_first_claim_within_the_limits(end):
-    """Neither an answer that is not claimed nor one that is beyond the limits ends them."""
-    beyond, nothing = SolverOutput(np.full(7, 9.0), True), SolverOutput(None, False)
-    attempts = Attempts(beyond, nothing, end, SolverOutput(np.ones(7), True))
-    answer = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))()
-    assert (answer.q == (0.0 if end.claimed else 1.0)).all()
-    assert len(attempts.starts) == (3 if end.claimed else 4)
-    assert (attempts.starts[0] == 0.5).all()
-    assert len({tuple(start) for start in attempts.starts}) == len(attempts.starts)
+GOOD, SILENT = SolverOutput(np.zeros(7), True), SolverOutput(np.zeros(7), None)
+BEYOND, MISSED = SolverOutput(np.full(7, 9.0), True), SolverOutput(np.ones(7), False)
+NOTHING, LATER = SolverOutput(None, False), SolverOutput(np.ones(7), True)
 
 
-def test_an_attempt_that_raises_is_followed_by_the_next_restart():
-    """An exception once ended the target: a solver that solves all of them had 84 %."""
-    good = SolverOutput(np.zeros(7), True)
-    attempts = Attempts(ArithmeticError("once"), ArithmeticError("twice"), good)
-    answer = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))()
-    assert answer.claimed
-    assert (answer.q == 0.0).all()
-    assert answer.error == "ArithmeticError: once"
-    assert len(attempts.starts) == 3
-
-
-def test_an_exception_in_the_last_attempt_does_not_hide_the_answers_before():
-    missed = SolverOutput(np.ones(7), False)
-    attempts = Attempts(SolverOutput(None, False), missed, ArithmeticError("in the end"))
-    answer = restarted(attempts, robot("iiwa14"), 2)(None, None, np.full(7, 0.5))()
-    assert (answer.q == 1.0).all()
-    assert answer.claimed is False
-
-
-def test_targets_are_converted_for_every_restart_before_the_clock_runs():
-    attempts = Attempts(*[SolverOutput(None, False)] * 4)
+@pytest.mark.parametrize(
+    ("answers", "count", "q", "claimed", "error"),
+    [
+        ([BEYOND, NOTHING, GOOD, LATER], 3, 0.0, True, ""),
+        ([BEYOND, NOTHING, SILENT, LATER], 4, 1.0, True, ""),
+        # An exception once ended the target: a solver that solves all of them had 84 %.
+        ([ArithmeticError("once"), ArithmeticError("twice"), GOOD], 3, 0.0, True, "once"),
+        ([NOTHING, MISSED, NOTHING, ArithmeticError("in the end")], 4, 1.0, False, "in the end"),
+        ([BEYOND] * 4, 4, None, False, ""),
+    ],
+    ids=["claimed", "silent", "raises", "raises in the end", "beyond"],
+)
+def test_restarts_end_with_the_first_claim_within_the_limits(answers, count, q, claimed, error):
+    """Targets are converted for every restart before the clock runs, each from its own start."""
+    attempts = Attempts(*answers)
     solve = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))
     assert len(attempts.asked) == 4
     assert not attempts.starts
-    solve()
+    answer = solve()
+    assert (q is None) or (answer.q == q).all()
+    assert answer.claimed is claimed
+    assert answer.error == (f"ArithmeticError: {error}" if error else "")
     assert len(attempts.asked) == 4
-
-
-def test_restarts_that_all_fail_claim_nothing():
-    attempts = Attempts(*[SolverOutput(np.full(7, 9.0), True)] * 3)
-    assert restarted(attempts, robot("iiwa14"), 2)(None, None, np.zeros(7))().claimed is False
-
-
-def test_a_worker_serves_job_after_job(targets):
-    ours, theirs = Pipe()
-    with ours, theirs:
-        serving = threading.Thread(target=serve, args=(theirs, theirs))
-        serving.start()
-        kinds = []
-        for manner in ("perfect", "unable"):
-            ours.send(job(targets, manner))
-            kinds.append(type(ours.recv()))
-            while kinds[-1] not in (Done, Unfit):
-                kinds.append(type(ours.recv()))
-        ours.close()
-        serving.join()
-    assert kinds == [Begun, Ready, *[Solved] * COUNT, Done, Begun, Unfit]
+    assert len(attempts.starts) == count
+    assert (attempts.starts[0] == 0.5).all()
+    assert len({tuple(start) for start in attempts.starts}) == count
 
 
 @pytest.fixture
