@@ -12,7 +12,7 @@ from plumbob.crosscheck.engines import (
     forward_kinematics_by,
     mujoco_mass_spring,
 )
-from plumbob.crosscheck.engines.mujoco_bodies import add_point_mass
+from plumbob.crosscheck.engines.mujoco_mass_spring import add_point_mass
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.crosscheck.tolerances import STEP
 from plumbob.reference import rotation
