@@ -200,9 +200,11 @@ def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -
                     "{why}"
                     if at_joints and finding.where is not None
                     else "The first law to break is '{law}', in the case '{case}': {why}",
-                    law=finding.law, joint=finding.where, case=judgement.case.name,
+                    law=finding.law,
+                    joint=finding.where,
+                    case=judgement.case.name,
                     why=finding.sentence,
-                )  # fmt: skip
+                )
     return None
 
 
@@ -212,15 +214,19 @@ def hints_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
     broken = {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
     hints = []
     if broken & {"equal answers", "equal requests"}:
-        hints.append(sentence(
-            "Equal requests get different answers. Look for state that is left over from the "
-            "request before, and for memory that is read before it is written or dangles (in "
-            "Eigen, a product kept with auto); a sanitizer (-fsanitize=address,undefined, or "
-            "valgrind) finds the latter."
-        ))  # fmt: skip
+        hints.append(
+            sentence(
+                "Equal requests get different answers. Look for state that is left over from the "
+                "request before, and for memory that is read before it is written or dangles (in "
+                "Eigen, a product kept with auto); a sanitizer (-fsanitize=address,undefined, or "
+                "valgrind) finds the latter."
+            )
+        )
     if "untouched inputs" in broken:
-        hints.append(sentence(
-            "The solver writes into the skeleton that it is given, so that every later answer "
-            "is about another skeleton. Copy what you change."
-        ))  # fmt: skip
+        hints.append(
+            sentence(
+                "The solver writes into the skeleton that it is given, so that every later answer "
+                "is about another skeleton. Copy what you change."
+            )
+        )
     return tuple(hints)

@@ -184,7 +184,9 @@ def _absent(place: Path, task: Task) -> Sentence:
     names = [ANSWER, *(f"{PREFIX}{field.name}.csv" for field in task.outputs)]
     for file in sorted({path.name for path in place.iterdir()} - _exported(task)):
         if near := did_you_mean(file, names):
-            return sentence("There is no answer in {place}, but {file}{near}",
-                            place=place, file=file, near=near)  # fmt: skip
-    return sentence("There is no answer in {place}: expected {names}",
-                    place=place, names=" or ".join(names))  # fmt: skip
+            return sentence(
+                "There is no answer in {place}, but {file}{near}", place=place, file=file, near=near
+            )
+    return sentence(
+        "There is no answer in {place}: expected {names}", place=place, names=" or ".join(names)
+    )
