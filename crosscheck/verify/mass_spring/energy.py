@@ -139,8 +139,9 @@ def _sum_laws(given: Mapping[str, Any], allowed: float) -> list[Finding]:
     ):
         if all(name in given for name in (whole, *parts)):
             gap = abs(given[whole] - sum(given[name] for name in parts))
-            said = sentence("The {whole} energy is {gap:.2g} J off the sum of its parts.",
-                            whole=whole, gap=gap)  # fmt: skip
+            said = sentence(
+                "The {whole} energy is {gap:.2g} J off the sum of its parts.", whole=whole, gap=gap
+            )
             found.append(laws.bounded("sum of energies", gap, 4.0 * allowed, "J", said))
     return found
 
@@ -157,8 +158,9 @@ def _work(
         said = sentence(
             "From one place to another the {name} energy changes by {gap:.2g} J other than by the "
             "work of the forces.",
-            name=name, gap=gap,
-        )  # fmt: skip
+            name=name,
+            gap=gap,
+        )
         found.append(laws.bounded("energy and work", gap, 4.0 * allowed, "J", said))
     return found
 

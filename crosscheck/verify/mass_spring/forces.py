@@ -91,8 +91,10 @@ def _formula(p: Problem, given: Any, expected: Any, allowed: float) -> Finding:
     where, worst = int(gap.argmax()), float(gap.max())
     said = sentence(
         "The force on particle {where} is {gap:.2g} N off {term}.",
-        where=where, gap=worst, term=_term(p, given - expected),
-    )  # fmt: skip
+        where=where,
+        gap=worst,
+        term=_term(p, given - expected),
+    )
     return laws.bounded("force formula", worst, allowed, "N", said, where)
 
 

@@ -124,8 +124,9 @@ def declared_step(one: Context) -> Finding | None:
     if "positions" not in one.answered:
         return None
     if not one.known:
-        return unsure(law, np.inf, sentence(
-            "The step is none of those that are known; none was declared."))  # fmt: skip
+        return unsure(
+            law, np.inf, sentence("The step is none of those that are known; none was declared.")
+        )
     if not one.expected or not np.isfinite(one.expected["positions"]).all():
         return unsure(law, np.inf, sentence("The declared step has no finite result here."))
     answered = {"positions": one.answered["positions"]}
@@ -134,8 +135,10 @@ def declared_step(one: Context) -> Finding | None:
     where = int(gap.reshape(-1, one.problem.count).max(axis=0).argmax())
     said = sentence(
         "Positions are up to {gap:.2g} m from those of {model}, at particle {where}.",
-        gap=float(gap.max()), model=one.says, where=where,
-    )  # fmt: skip
+        gap=float(gap.max()),
+        model=one.says,
+        where=where,
+    )
     verdict = _graded(error, one.displacement(), one.allowed.positions)
     if verdict is Verdict.WRONG and not one.problem.steps:
         verdict = _excused(one)
@@ -246,8 +249,9 @@ def consistency(one: Context) -> Finding | None:
     scale = float(np.abs(wanted[free]).max())
     said = sentence(
         "In a small step the acceleration is {gap:.2g} m/s² off f / m, of {scale:.2g} m/s².",
-        gap=gap, scale=scale,
-    )  # fmt: skip
+        gap=gap,
+        scale=scale,
+    )
     tolerance = CONSISTENT * scale + 2.0 * one.allowed.velocities / p.h
     return bounded("consistency", gap, tolerance, "m/s²", said)
 

@@ -178,15 +178,8 @@ def _with_pins(p: Problem, model: Model) -> Problem:
         return p.changed(masses=masses, weighing=p.weighed if kind == "heavy" else masses)
     if kind == "unattached":
         kept = ~np.isin(p.springs, pinned).any(axis=1)
-        return p.changed(
-            stiffnesses=np.where(kept, p.stiffnesses, 0.0),
-            dampings=np.where(kept, p.dampings, 0.0),
-        )
-    if kind == "first":
-        return p.changed(pinned=pinned[:1])
-    if kind == "free":
-        return p.changed(pinned=pinned[:0])
-    return p
+        return p.changed(stiffnesses=kept * p.stiffnesses, dampings=kept * p.dampings)
+    return p.changed(pinned=pinned[: {"first": 1, "free": 0}.get(kind)])
 
 
 def _step(p: Problem, model: Model, x: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -203,16 +196,15 @@ def _step(p: Problem, model: Model, x: FloatArray, v: FloatArray) -> tuple[Float
 
 def substep(start: Start) -> tuple[FloatArray, FloatArray]:
     """Return positions and velocities a time h later."""
-    p, model, x_n, v_n, h = start
+    p, model, x_n, natural, h = start
     if model.integrator.explicit:
         x, natural = EXPLICIT[model.integrator.method](start)
     else:
         equation = Equation(start)
         x = _implicit(equation)
-        natural = v_n
         if model.velocity == "separate":
-            rest = equation.gradient(x) / p.masses[:, None]
-            natural = v_n + (x - equation.y - rest) / h
+            force = x - equation.y - equation.gradient(x) / p.masses[:, None]
+            natural = natural + force / h
     v = VELOCITIES[model.velocity](start, x, natural) * model.scaling
     if model.pins == "overwritten" or not start.free.all():
         x, v = x.copy(), v.copy()

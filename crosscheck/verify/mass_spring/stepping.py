@@ -222,8 +222,10 @@ def _nearest(asked: Sequence[Asked], problems: Problems, greeting: Greeting) -> 
     return sentence(
         "The nearest step that is known is {model}; it differs by {median:.2g} of a displacement "
         "in the median small case, by {worst:.2g} in the worst.",
-        model=describe_model(options), median=median, worst=worst,
-    )  # fmt: skip
+        model=describe_model(options),
+        median=median,
+        worst=worst,
+    )
 
 
 def _what_holds(judgements: Sequence[CaseJudgement]) -> Sentence:

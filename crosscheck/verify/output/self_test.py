@@ -30,8 +30,9 @@ def lines(trials: Iterable[Trial], say: Say) -> Iterator[str]:
 def _told(family: str, members: list[Trial]) -> Sentence:
     if family == HONEST:
         accused = sum(not one.passed for one in members)
-        return sentence("{n} honest solvers tried, {accused} accused.", n=len(members),
-                        accused=accused)  # fmt: skip
+        return sentence(
+            "{n} honest solvers tried, {accused} accused.", n=len(members), accused=accused
+        )
     return sentence(
         "{family}: {n} faults planted, {caught} caught by a law, {named} named.",
         family=family,

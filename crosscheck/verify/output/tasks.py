@@ -23,9 +23,9 @@ def described(names: Sequence[str], say: Say) -> Iterator[str]:
         elif task.name in names:
             yield from _long(task, say)
     if not names:
-        yield from paragraphs([sentence(
-            "plumbob verify --list --task NAME describes every argument of a task."
-        )], say)  # fmt: skip
+        yield from paragraphs(
+            [sentence("plumbob verify --list --task NAME describes every argument of a task.")], say
+        )
 
 
 def _short(task: Task, say: Say) -> Iterator[str]:

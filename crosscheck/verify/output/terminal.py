@@ -119,8 +119,9 @@ def _failing(task: TaskReport, failure: CaseJudgement, say: Say) -> list[str]:
     if law is not None and say(law).endswith(what) and failure.case.name in say(law):
         return []
     name = f'"{failure.case.name}"'
-    return wrapped(say(sentence("Smallest failing case, {name}: {what}", name=name, what=what)),
-                   "  ")  # fmt: skip
+    return wrapped(
+        say(sentence("Smallest failing case, {name}: {what}", name=name, what=what)), "  "
+    )
 
 
 def _again(task: TaskReport, context: Presentation) -> list[str]:

@@ -161,5 +161,6 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
             "Next: correct {task} first, since the others may rest on it; then run this again.",
             task=title(first),
         )
-    return sentence("Next: correct {task}, rerun the saved case, then run all again.",
-                    task=title(first))  # fmt: skip
+    return sentence(
+        "Next: correct {task}, rerun the saved case, then run all again.", task=title(first)
+    )
