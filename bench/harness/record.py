@@ -19,6 +19,9 @@ from typing import Annotated, Any, Literal, NamedTuple, TypedDict
 import msgspec
 import numpy as np
 
+from ..experiments import kind_of
+from . import values
+
 FORMAT = 3
 # Those that are read: what lines of the two formats before lack is empty. Format 1 has no facts,
 # formats 1 and 2 have no conditions.
@@ -116,6 +119,28 @@ class Record:
     facts: Mapping[str, Any] = field(default_factory=dict)
     conditions: Mapping[str, Any] = field(default_factory=dict)
 
+    @functools.cached_property
+    def values(self) -> Any:
+        """The arrays as the type that the experiment declares; None if there are none."""
+        kind = kind_of(self.suite, str(self.facts.get("task", "")))
+        return values.read(kind.values, self.arrays) if kind and self.arrays else None
+
+    @functools.cached_property
+    def details(self) -> Any:
+        """Settings, notes and facts as the type that the experiment declares; None without one."""
+        kind = kind_of(self.suite, str(self.facts.get("task", "")))
+        every = {**self.settings, **self.notes, **self.facts}
+        return values.read(kind.details, every) if kind else None
+
+    def check(self) -> None:
+        """Make sure that the record is of its type, unless nothing shows it any more.
+
+        Raises:
+            ValueError: naming a field that is missing, or of another type.
+        """
+        if not self.superseded:
+            self.values, self.details  # noqa: B018
+
     @property
     def trouble(self) -> str:
         """What its solver raised, and how often; "" if nothing."""
@@ -177,7 +202,7 @@ class RecordFile:
         lines, unfinished = self._lines()
         records = {line.record.key: line.record for line in lines if line.record}
         sentences = [_cut_off(self.path)] if unfinished else []
-        if damaged := [line for line in lines if not line.record]:
+        if damaged := [line for line in lines if not line.record and line.key not in records]:
             sentences.append(_no_records(self.path, damaged))
         return Reading(list(records.values()), " ".join(sentences))
 
@@ -299,12 +324,13 @@ def _naming(path: Path) -> Iterator[None]:
 
 
 class _Decoded(NamedTuple):
-    """A line of a result file: its record, or why it is none."""
+    """A line of a result file: its record, or why it is none; a key if its fields are at fault."""
 
     number: int
     text: bytes
     record: Record | None
-    why: str
+    why: str = ""
+    key: Key | None = None
 
 
 def check_regular(path: Path) -> None:
@@ -353,12 +379,15 @@ def _decoded(text: bytes, number: int) -> _Decoded:
 
 # A run reads its file again and again: so many lines are decoded once.
 @functools.lru_cache(maxsize=4096)
-def _record_of(text: bytes) -> tuple[Record | None, str]:
+def _record_of(text: bytes) -> tuple[Record | None, str, Key | None]:
     """Return the record of a line, or None and why it is none."""
+    record = None
     try:
-        return decode(text), ""
+        record = _untyped(text)
+        record.check()
     except ValueError as error:
-        return None, str(error)[:100]
+        return None, str(error)[:100], record.key if record else None
+    return record, "", record.key
 
 
 def _cut_off(path: Path) -> str:
@@ -392,6 +421,13 @@ def decode(line: bytes | str) -> Record:
         ValueError: if the line is not JSON, of another format, lacks a field, or has one of
             another kind.
     """
+    record = _untyped(line)
+    record.check()
+    return record
+
+
+def _untyped(line: bytes | str) -> Record:
+    """Return the record of a line, whatever the type of its suite and task."""
     try:
         content = _DECODER.decode(line)
     except RecursionError:
