@@ -5,11 +5,11 @@ import sys
 
 import pytest
 
-from bench.experiments import SCALES, blocks
-from bench.experiments.first_call import measurement as suite
-from bench.experiments.first_call import tables as first_call
-from bench.presentation.results import Results
-from reference import IK_SOLVERS, STEP_SOLVERS
+from plumbob.bench.experiments import SCALES, blocks
+from plumbob.bench.experiments.first_call import measurement as suite
+from plumbob.bench.experiments.first_call import tables as first_call
+from plumbob.bench.harness.results import Results
+from plumbob.reference import IK_SOLVERS, STEP_SOLVERS
 
 
 def test_the_first_process_compiles_and_the_next_one_does_not():
@@ -55,7 +55,7 @@ def test_a_call_that_fails_says_why(tmp_path):
 
 def test_importing_the_suite_does_not_import_the_compiler():
     """Its import is part of what a first call costs."""
-    code = "import sys, bench.experiments.first_call.measurement; sys.exit('numba' in sys.modules)"
+    code = "import sys, plumbob.bench.experiments.first_call.measurement; sys.exit('numba' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

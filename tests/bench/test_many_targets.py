@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bench.experiments import Scale, blocks
-from bench.experiments.many_targets import measurement, tables
-from bench.presentation.results import Results
+from plumbob.bench.experiments import Scale, blocks
+from plumbob.bench.experiments.many_targets import measurement, tables
+from plumbob.bench.harness.results import Results
 
 
 def parts(targets):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from bench.experiments import SCALES, Scale, blocks
-from bench.experiments.newton import measurement as suite
-from bench.experiments.newton import tables as newton
-from bench.presentation.results import Results
-from reference import STEP_SOLVERS
+from plumbob.bench.experiments import SCALES, Scale, blocks
+from plumbob.bench.experiments.newton import measurement as suite
+from plumbob.bench.experiments.newton import tables as newton
+from plumbob.bench.harness.results import Results
+from plumbob.reference import STEP_SOLVERS
 
 SIZE = 6
 

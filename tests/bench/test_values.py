@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from bench.experiments.energy.values import Swing, SwingDetails
-from bench.harness.block import Block, Measured
-from bench.harness.measure import record_of
-from bench.harness.record import Record, RecordFile, decode, encode
+from plumbob.bench.experiments.energy.values import Swing, SwingDetails
+from plumbob.bench.harness.block import Block, Measured
+from plumbob.bench.harness.measure import record_of
+from plumbob.bench.harness.record import Record, RecordFile, decode, encode
 
 SETTINGS = {"h": 0.1, "steps": 2, "every": 1, "tolerance": 1e-10}
 FACTS = {"title": "undamped", "damping": 0.0}

@@ -1,11 +1,11 @@
 """The largest rotation of a joint between frames, on every curve."""
 
+from ...figures.chart import SPAN, Axis, Chart, Panel, series
+from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.figures.chart import SPAN, Axis, Chart, Panel, series
-from ...presentation.figures.sketch import Sketch, chart_sketch
-from ...presentation.results import Results, by_problem
-from ...presentation.tables.table import in_unit
+from ...harness.results import Results, by_problem
+from ...tables.table import in_unit
 from . import CURVE
 
 

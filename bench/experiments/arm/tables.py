@@ -8,8 +8,8 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, by_problem, label, leaders, settings
-from ...presentation.tables.columns import (
+from ...harness.results import Results, by_problem, label, leaders, settings
+from ...tables.columns import (
     LARGEST,
     MEDIAN,
     P95,
@@ -23,8 +23,8 @@ from ...presentation.tables.columns import (
     text,
     titled,
 )
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from ..chain import BEYOND, CHAIN
 from ..chain import figures as chain
 from . import CURVE

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from ...figures.chart import GREATER, Axis, Chart, Panel, Series, series
+from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.figures.chart import GREATER, Axis, Chart, Panel, Series, series
-from ...presentation.figures.sketch import Sketch, chart_sketch
-from ...presentation.results import Results, by_problem
-from ...presentation.tables.columns import iterations_said
+from ...harness.results import Results, by_problem
+from ...tables.columns import iterations_said
 from . import BEYOND, CHAIN
 
 # Iterations at which targets are counted.

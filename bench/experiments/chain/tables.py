@@ -7,10 +7,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.entered import entered
-from ...presentation.results import Results, by_problem, counted, label, settings, solvers
-from ...presentation.tables import columns
-from ...presentation.tables.columns import (
+from ...harness.results import Results, by_problem, counted, label, settings, solvers
+from ...report.entered import entered
+from ...tables import columns
+from ...tables.columns import (
     LARGEST,
     MEDIAN,
     P95,
@@ -22,8 +22,8 @@ from ...presentation.tables.columns import (
     titled,
     words_in,
 )
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from .. import arm
 from . import BEYOND, CHAIN, figures
 

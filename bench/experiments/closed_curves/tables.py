@@ -5,10 +5,10 @@ from typing import Any
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, label, settings
-from ...presentation.tables.columns import folded, greatest, largest, least, text, words_in
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...harness.results import Results, label, settings
+from ...tables.columns import folded, greatest, largest, least, text, words_in
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from ..arm import figures as arm
 from . import COHERENT, COLD, CURVE, DRIFT, WARM
 

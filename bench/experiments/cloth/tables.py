@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import Outcome
+from plumbob.reference import Outcome
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...harness.results import Results, by_problem, counted, label, settings
 from ...peers import registry
-from ...presentation.results import Results, by_problem, counted, label, settings
-from ...presentation.tables.columns import (
+from ...tables.columns import (
     LARGEST,
     MEDIAN,
     folded,
@@ -25,8 +25,8 @@ from ...presentation.tables.columns import (
     titled,
     words_in,
 )
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from ..pictures import figures as pictures
 from . import DAMPERS, FEW, ONE_STEP, SWING, figures
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from ...harness.record import Record
-from ...presentation.results import Results
-from ...presentation.tables.table import words
+from ...harness.results import Results
+from ...tables.table import words
 
 
 class Point(NamedTuple):

@@ -9,12 +9,12 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...harness.results import Results, label, listed
 from ...peers import registry
-from ...presentation.entered import entered
-from ...presentation.results import Results, label, listed
-from ...presentation.tables.columns import SOLVER, folded, least, number, text, words_in
-from ...presentation.tables.layout import Layout, source
-from ...presentation.tables.table import Column, Summary, Table, listing, words
+from ...report.entered import entered
+from ...tables.columns import SOLVER, folded, least, number, text, words_in
+from ...tables.layout import Layout, source
+from ...tables.table import Column, Summary, Table, listing, words
 from ..published import problem as published
 from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, SOLVED, STABILITY, TARGETS, figures
 from .measurement import AMPLITUDE, BISECTION, GROWTH, REPEATS, STABILITY_SIZE, STABILITY_STEPS

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...harness.results import settings
 from ...peers import registry
-from ...presentation.results import settings
-from ...presentation.tables.columns import folded, least, number, setting, text
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, listing, words
+from ...tables.columns import folded, least, number, setting, text
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, listing, words
 
 OURS = registry.SUPERNODAL.name
 PEERS = {library.name: library.label for library in registry.FACTORS}

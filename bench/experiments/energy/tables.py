@@ -5,10 +5,10 @@ from functools import partial
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import label, settings
-from ...presentation.tables.columns import lengths_of_steps, text, titled
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, in_unit, words
+from ...harness.results import label, settings
+from ...tables.columns import lengths_of_steps, text, titled
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, in_unit, words
 from . import figures
 from .problem import DAMPINGS, SIZE
 from .values import Swing

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-import reference
-from reference import IK_SOLVERS, STEP_SOLVERS, Articulation, Target, scenes
-from reference.backend.compilation import on_compile
-from reference.jacobians import jacobian
+from plumbob import reference
+from plumbob.reference import IK_SOLVERS, STEP_SOLVERS, Articulation, Target, scenes
+from plumbob.reference.backend.compilation import on_compile
+from plumbob.reference.jacobians import jacobian
 
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import in_a_fresh_process

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ...harness.record import Record
-from ...presentation.results import label
-from ...presentation.tables.columns import number, text, titled
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...harness.results import label
+from ...tables.columns import number, text, titled
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 
 
 def _summary(records: Sequence[Record]) -> Summary:

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, label, settings
-from ...presentation.tables.columns import text
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import INTERVAL, Column, Summary, words
+from ...harness.results import Results, label, settings
+from ...tables.columns import text
+from ...tables.layout import Layout
+from ...tables.table import INTERVAL, Column, Summary, words
 
 Group = list[Record]
 

@@ -3,7 +3,7 @@
 import functools
 from dataclasses import dataclass
 
-from reference import ImplicitEuler, MassSpring, State, scenes
+from plumbob.reference import ImplicitEuler, MassSpring, State, scenes
 
 STIFFNESSES = (1e3, 1e4, 1e5)
 H = 1 / 30

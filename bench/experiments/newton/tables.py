@@ -6,10 +6,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import counted, settings
-from ...presentation.tables.columns import SOLVER, folded, least, number, text
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...harness.results import counted, settings
+from ...tables.columns import SOLVER, folded, least, number, text
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from .problem import FRAMES, GRAVITY, H
 
 
