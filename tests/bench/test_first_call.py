@@ -55,7 +55,8 @@ def test_a_call_that_fails_says_why(tmp_path):
 
 def test_importing_the_suite_does_not_import_the_compiler():
     """Its import is part of what a first call costs."""
-    code = "import sys, plumbob.bench.experiments.first_call.measurement; sys.exit('numba' in sys.modules)"
+    module = "plumbob.bench.experiments.first_call.measurement"
+    code = f"import sys, {module}; sys.exit('numba' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
