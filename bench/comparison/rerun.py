@@ -23,11 +23,19 @@ from plumbob.crosscheck.child_process import kill_group, one_thread
 from ..harness.metrics import adjusted
 from ..harness.record import Record, untyped
 from . import revision_process
+from .answers import is_clocked
 from .compare import Comparison, decide
-from .intervals import ERROR_RATE, Deviation, Ratio, pairs_needed, ratio_of_pairs
-from .quantities import is_clocked
-from .rows import Pair, RowKey, by_row, come_and_gone, is_meant, pairs, row_key, worst_first
-from .times import FLOOR, UNKNOWN, Drift, known_drift
+from .rows import Pair, Ratio, RowKey, by_row, come_and_gone, is_meant, pairs, row_key, worst_first
+from .times import (
+    ERROR_RATE,
+    FLOOR,
+    UNKNOWN,
+    Deviation,
+    Drift,
+    known_drift,
+    pairs_needed,
+    ratio_of_pairs,
+)
 
 # Pairs of median times, old and new, of each time of each row.
 Taken = dict[tuple[RowKey, str], list[tuple[float, float]]]
