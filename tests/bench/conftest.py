@@ -283,7 +283,7 @@ def republished():
         record("ik", "published/trac_ik/ur5", "TRAC-IK, 5 ms", {}, arrays,
                facts={"task": "TRAC-IK’s table", "robot": "ur5"}),
         record("ik", "published/toolbox/ur5", "ik_LM, NR", {"method": "NR"}, arrays,
-               facts={"task": "the toolbox’s table", "infeasible": 11.0}),
+               facts={"task": "the toolbox’s table", "title": "ur5", "infeasible": 11.0}),
         *(record("ik", f"published/fabrik/{s}", "fabrik", {"tolerance": 1e-6}, counts,
                  facts={"task": "FABRIK’s table", "stratum": s})
           for s in ("reachable", "unreachable")),
