@@ -432,7 +432,8 @@ def test_without_its_script_every_table_can_be_read(browser, address):
         browser.open(address, *DESK)
         tree = browser.send("Accessibility.getFullAXTree")["nodes"]
         named = {node.get("name", {}).get("value", "") for node in tree}
-        assert "time, geometric mean, 95 % from [µs]" in named  # a column that is folded where there is a script
+        # a column that is folded where there is a script
+        assert "time, geometric mean, 95 % from [µs]" in named
     finally:
         browser.send("Emulation.setScriptExecutionDisabled", value=False)
 
