@@ -23,12 +23,12 @@ import numpy as np
 from plumbob.crosscheck.child_process import kill_group, one_thread
 
 from ..harness.metrics import adjusted
-from ..harness.record import Record, decode
+from ..harness.record import Record, untyped
 from . import revision_process
 from .compare import Comparison, decide
 from .intervals import ERROR_RATE, Deviation, Ratio, pairs_needed, ratio_of_pairs
 from .quantities import is_clocked
-from .rows import Pair, RowKey, by_row, come_and_gone, pairs, row_key, worst_first
+from .rows import Pair, RowKey, by_row, come_and_gone, is_meant, pairs, row_key, worst_first
 from .times import FLOOR, UNKNOWN, Drift, known_drift
 
 # Pairs of median times, old and new, of each time of each row.
@@ -159,7 +159,7 @@ class Revision:
         assert self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError):  # what ended it is said by the answer
             print(json.dumps(key), file=self._process.stdin, flush=True)
-        return decode(self._answer())
+        return untyped(self._answer())
 
     def _answer(self) -> str:
         assert self._process.stdout is not None
@@ -199,7 +199,7 @@ def _order(new_first: bool) -> tuple[int, int]:
 def _measured(folders: tuple[Path, Path], plan: Plan, tell: Callable[[str], None]) -> Comparison:
     """Measure once for the answers, which also compiles, and then pair by pair for the times."""
     with _both(folders, plan) as both:
-        keys = [_chosen(one.blocks(), plan.words) for one in both]
+        keys = [[key for key in one.blocks() if is_meant(key, plan.words)] for one in both]
         if not any(keys):
             raise ValueError(
                 "--rerun: expected something to measure in both revisions, got nothing"
@@ -209,7 +209,7 @@ def _measured(folders: tuple[Path, Path], plan: Plan, tell: Callable[[str], None
             tell(f"answers of {len(blocks)} rows")
             found.append([one.measure(key) for key in blocks])
     old, new = by_row(found[0]), by_row(found[1])
-    rows = dict(pairs(old, new))
+    rows = pairs(old, new)
     taken = _take_pairs(folders, plan, rows, tell)
     ratios = _ratios(taken)
     if called := _called(ratios):
@@ -263,11 +263,6 @@ def _drift(taken: Taken, count: int) -> Drift:
     spread = math.sqrt(2 * np.mean([np.var(values, ddof=1) for values in logs]))
     freedom = len(logs) * (count - 1)
     return Drift(Deviation(spread, freedom), f"the old revision beside itself, {count} times")
-
-
-def _chosen(keys: Sequence[Sequence[str]], words: Sequence[str]) -> list[Sequence[str]]:
-    """Return the keys whose problem or solver contains one of the words."""
-    return [key for key in keys if not words or any(w in part for w in words for part in key[1:3])]
 
 
 def _take_pairs(

@@ -18,9 +18,6 @@ FLOOR, UNKNOWN = 0.01, 0.1
 MARGIN = 0.1
 # Of fewer rounds nothing is said.
 ROUNDS = 5
-# As many standard deviations leave out 5 % of a normal distribution.
-_NORMAL = 1.959963984540054
-_SURE = 1e6
 
 
 class Drift(NamedTuple):
@@ -42,7 +39,8 @@ class Drift(NamedTuple):
 
 def known_drift(half_width: float, source: str) -> Drift:
     """Return a drift that is taken for granted."""
-    return Drift(Deviation(half_width / _NORMAL, _SURE), source)
+    sure = 1e6
+    return Drift(Deviation(half_width / Deviation(1.0, sure).half_width, sure), source)
 
 
 def drift(rows: Mapping[RowKey, Pair]) -> Drift:
@@ -81,8 +79,19 @@ def time_ratios(
     """Return the ratio of each time of each row, or why there is none."""
     return {
         (key, name): _why_not(pair, name) or _ratio(pair, name, machine)
-        for key, pair in rows.items() for name in _clocked(pair)
+        for key, pair in rows.items() for name in clocked(pair) if has_rounds(pair, name)
     }  # fmt: skip
+
+
+def clocked(pair: Pair) -> list[str]:
+    """Return the names of the times that both runs have."""
+    both = pair.old.arrays.keys() & pair.new.arrays.keys()
+    return [n for n in pair.old.arrays if n in both and is_clocked(pair.old.suite, n)]
+
+
+def has_rounds(pair: Pair, name: str) -> bool:
+    """Return whether both runs have enough rounds of a time."""
+    return all(record.arrays[name].size >= ROUNDS for record in pair)
 
 
 def judged(key: RowKey, name: str, ratio: Ratio, chance: float) -> Row:
@@ -98,14 +107,6 @@ def _verdict(ratio: Ratio, chance: float) -> Verdict:
     return Verdict.SAME if within else Verdict.UNDECIDED
 
 
-def _clocked(pair: Pair) -> Iterator[str]:
-    """Yield the names of times that both runs have enough of."""
-    for name, old in pair.old.arrays.items():
-        new = pair.new.arrays.get(name, np.empty(0))
-        if is_clocked(pair.old.suite, name) and min(old.size, new.size) >= ROUNDS:
-            yield name
-
-
 def _why_not(pair: Pair, name: str) -> str:
     old, new = pair.old.arrays[name], pair.new.arrays[name]
     if pair.old.stamp.get("machine") != pair.new.stamp.get("machine"):
@@ -117,32 +118,23 @@ def _why_not(pair: Pair, name: str) -> str:
 
 def _ratio(pair: Pair, name: str, machine: Drift) -> Ratio:
     old, new = (record.arrays[name].ravel() for record in pair)
-    paired = _is_by_target(pair)
+    if np.array_equal(old, new):
+        return Ratio(1.0, 1.0, 1.0, 1.0)
+    paired = all(SOLVED in record.arrays for record in pair)  # by targets, the same in both runs
     if paired:
         count = min(len(old), len(new))
         old, new = old[:count], new[:count]
-    lot = np.random.default_rng(len(old))
-    return ratio_of_medians(old, new, machine.deviation, paired, lot)
-
-
-def _is_by_target(pair: Pair) -> bool:
-    """Return whether times belong to targets, which are the same in both runs."""
-    return all(SOLVED in record.arrays for record in pair)
+    return ratio_of_medians(old, new, machine.deviation, paired, np.random.default_rng(len(old)))
 
 
 def _is_control(pair: Pair) -> bool:
     """Return whether a row times code that no revision of ours changes."""
-    if pair.old.suite != "timing" or pair.old.stamp.get("versions") != pair.new.stamp.get(
-        "versions"
-    ):
+    versions = [record.stamp.get("versions") for record in pair]
+    if pair.old.suite != "timing" or versions[0] != versions[1]:
         return False
-    return _is_foreign(pair.old.solver) and not _why_not(pair, "seconds")
-
-
-def _is_foreign(solver: str) -> bool:
-    if solver == registry.LIMIT.name:
-        return True
-    return registry.find(solver).engine not in ("", registry.PLUMBOB)
+    engine = registry.find(pair.old.solver).engine
+    is_foreign = pair.old.solver == registry.LIMIT.name or engine not in ("", registry.PLUMBOB)
+    return is_foreign and not _why_not(pair, "seconds")
 
 
 def _apart(pair: Pair) -> float:

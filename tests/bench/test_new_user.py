@@ -16,7 +16,7 @@ from plumbob.bench.experiments.chain.tables import beyond_reach
 from plumbob.bench.experiments.robots.participants import participants
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.harness.results import Results, printable
 from plumbob.bench.peers import registry
 from plumbob.bench.report.headlines import absent, not_asked
 from plumbob.bench.report.sections import tables
@@ -58,7 +58,7 @@ def printed(folder):
 
 @pytest.fixture(scope="module")
 def records(printed):
-    return [plain(one) for one in RecordFile("out").read().records]
+    return [printable(one) for one in RecordFile("out").read().records]
 
 
 @pytest.fixture(scope="module")

@@ -11,22 +11,23 @@ from ...tables.layout import Layout
 from ...tables.table import Column, Summary, in_unit, words
 from . import figures
 from .problem import DAMPINGS, SIZE
+from .values import Swing
 
 LISTED = (100, 1_000, 10_000)
 
 
 def _extent(record: Record) -> tuple[float, float]:
-    return metrics.extent(record.arrays["left"])
+    return metrics.extent(record.values.left)
 
 
 def _left(record: Record, steps: int) -> float | None:
-    k = steps // record.settings["every"]
-    left = record.arrays["left"]
-    return float(left[k]) if k < left.size else None
+    swing: Swing = record.values
+    k = steps // record.details.every
+    return float(swing.left[k]) if k < swing.left.size else None
 
 
 def _summary(records: Sequence[Record]) -> Summary:
-    undamped = [record for record in records if record.facts["damping"] == 0.0]
+    undamped = [record for record in records if record.details.damping == 0.0]
     if not undamped:
         return Summary()
     return Summary(
@@ -37,7 +38,7 @@ def _summary(records: Sequence[Record]) -> Summary:
 
 
 def _range(record: Record) -> str:
-    shares = (float(record.arrays["left"][-1]), *_extent(record))
+    shares = (float(record.values.left[-1]), *_extent(record))
     last, low, high = (words(in_unit(share, "%")) for share in shares)
     return f"{last}, never less than {low} nor more than {high}"
 
