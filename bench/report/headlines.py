@@ -72,16 +72,16 @@ def answers(results: Results) -> Answers:
 
 def verdict(results: Results) -> Verdict | None:
     """Return what the cross-check says, None if it was not run."""
-    claims = [record for record in results.all("check") if "held" in record.arrays]
+    claims = [record for record in results.all("check") if record.values]
     if not claims:
         return None
-    held = sum(bool(record.arrays["held"]) for record in claims)
+    held = sum(record.values.held for record in claims)
     narrowest = max(claims, key=_used)
     return Verdict(held, len(claims), narrowest.title, _used(narrowest))
 
 
 def _used(claim: Record) -> float:
-    return metrics.ratio(float(claim.arrays["difference"]), float(claim.arrays["tolerance"]))
+    return metrics.ratio(claim.values.difference, claim.values.tolerance)
 
 
 def headlines(results: Results) -> list[Headline]:
@@ -96,7 +96,7 @@ def scale(results: Results) -> str:
     scales = dict.fromkeys(r.notes.get("scale", "") for r in results.all(FINISHED))
     name = listed([name for name in scales if name])
     records = results.all("ik", task=REACHABLE)
-    counts = {int(r.size) // max(1, len(r.facts.get("strata", ()))) for r in records} - {0}
+    counts = {int(r.size) // max(1, len(r.details.strata)) for r in records} - {0}
     targets = listed([words(count) for count in sorted(counts)], "or")
     run = f"{name} run".strip().capitalize()
     return f"{run}: {targets} targets a stratum" if targets else run if name else ""

@@ -9,7 +9,6 @@ from ...harness import metrics
 from ...harness.metrics import Interval, Share
 from ...harness.record import Record
 from ...harness.results import Results, label
-from ...tables.columns import iterations_said
 from ..robots.readings import Score
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
@@ -67,7 +66,7 @@ def _trac_ik(results: Results) -> Iterator[Comparison]:
     measured = [r for r in results.all("ik", task=TRAC_IK) if "solved" in r.arrays]
     for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK):
         rates = {rate.solver: rate for rate in published.TRAC_IK if rate.robot == robot}
-        here = {r.solver.partition(", ")[0]: r for r in measured if r.facts["robot"] == robot}
+        here = {r.solver.partition(", ")[0]: r for r in measured if r.details.robot == robot}
         for solver in dict.fromkeys([*rates, *here]) if here else ():
             yield from _rates(robot, solver, rates.get(solver), here.get(solver))
 
@@ -91,7 +90,7 @@ def _toolbox(results: Results) -> Iterator[Comparison]:
     for record in results.all("ik", task=TOOLBOX):
         if "solved" in record.arrays:
             score = Score(record.title, "", record.solver, (record,))
-            before = record.facts.get("infeasible")
+            before = record.details.infeasible
             source = "" if before is None else published.TOOLBOX_SOURCE
             row = Comparison("Robotics Toolbox", score.robots, score.solver, source=source)
             numbers: Numbers = {
@@ -107,7 +106,7 @@ def _fabrik(results: Results) -> Iterator[Comparison]:
     for i, stratum in enumerate(published.FABRIK_DISTANCES):
         for record in results.all("ik", task=FABRIK, stratum=stratum):
             before = published.FABRIK.get(record.solver, (None, None))[i]
-            counts = iterations_said(record)
+            counts = record.values.iterations[~np.isnan(record.values.iterations)]
             claimed = "claimed" if record.facts.get("entrant") else ""
             row = Comparison(
                 "FABRIK",

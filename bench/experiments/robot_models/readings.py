@@ -8,6 +8,7 @@ from ...harness.results import Results, by_problem, listed
 from ...peers import registry
 from ...tables.table import words
 from . import PEERS
+from .values import FileDetails
 
 QUANTITIES = ("positions", "rotations", "jacobians")
 
@@ -53,28 +54,25 @@ def files_of(records: Iterable[Record]) -> list[Record]:
 
 def agreeing(records: Iterable[Record]) -> list[Record]:
     """Return the records on files with numbers that no fault of the engine has a part in."""
-    return [r for r in files_of(records) if "links" in r.arrays and not r.notes["cause"]]
+    return [r for r in files_of(records) if r.values and not r.details.cause]
 
 
 def largest(records: Sequence[Record], quantity: str) -> float | None:
     """Return the largest difference in records, None if they have none."""
-    values = (float(r.arrays[quantity]) for r in records if quantity in r.arrays)
+    values = (getattr(record.values, quantity) for record in records if record.values)
     return max(values, default=None)
 
 
 def _file(records: Sequence[Record]) -> Comparison:
     valid = agreeing(records)
-    fewest = min(valid, key=lambda record: (record.arrays["freedoms"], record.solver), default=None)
+    fewest = min(valid, key=lambda record: (record.values.freedoms, record.solver), default=None)
     positions, rotations, jacobians = (largest(valid, quantity) for quantity in QUANTITIES)
-    links, joints, freedoms = (
-        int(fewest.arrays[name]) if fewest else None for name in ("links", "joints", "freedoms")
-    )
     return Comparison(
         records[0].title,
         listed([record.solver for record in valid]) or "none",
-        links,
-        joints,
-        freedoms,
+        _size(fewest, "links"),
+        _size(fewest, "joints"),
+        _size(fewest, "freedoms"),
         positions,
         None,
         rotations,
@@ -84,21 +82,25 @@ def _file(records: Sequence[Record]) -> Comparison:
     )
 
 
+def _size(record: Record | None, name: str) -> int | None:
+    return getattr(record.values, name) if record else None
+
+
 def _remark(record: Record) -> str:
     """Return what is to be said of an engine and a file, "" if nothing."""
-    if "links" not in record.arrays:
-        return record.notes["unread"]
-    if record.notes["cause"]:
-        difference = max(float(record.arrays[quantity]) for quantity in QUANTITIES)
-        return f"{record.solver} is off by {words(difference)}: {record.notes['cause']}"
-    if record.notes["free mimics"]:
-        return f"{record.solver} with mimic joints left free: {record.notes['free mimics']}"
-    return ""
+    details: FileDetails = record.details
+    if not record.values:
+        return details.unread
+    if details.cause:
+        difference = max(getattr(record.values, quantity) for quantity in QUANTITIES)
+        return f"{record.solver} is off by {words(difference)}: {details.cause}"
+    mimics = f"{record.solver} with mimic joints left free: {details.free_mimics}"
+    return mimics if details.free_mimics else ""
 
 
 def _robot(record: Record) -> Comparison:
     positions, rotations = (largest([record], name) for name in ("positions", "rotations"))
-    engine = f"{record.solver} {record.settings['version']}"
-    remark = record.notes["remark"] or registry.SINGLE_PRECISION.get(record.solver, "")
+    engine = f"{record.solver} {record.details.version}"
+    remark = record.details.remark or registry.SINGLE_PRECISION.get(record.solver, "")
     unknown = (None, None, None, None)
     return Comparison(record.title, engine, *unknown, positions, rotations, None, remark, [record])

@@ -29,7 +29,7 @@ def _measured(comparisons: Sequence[Comparison]) -> str:
 def _summary(comparisons: Sequence[Comparison]) -> Summary:
     records = _records(comparisons)
     valid = agreeing(records)
-    peers = [r for r in records if r.facts.get("task") == PEERS and "positions" in r.arrays]
+    peers = [r for r in records if r.facts.get("task") == PEERS and r.values]
     points = [
         *(_reads(records, engine) for engine in _engines(files_of(records)) if valid),
         *(_farthest([r for r in peers if r.solver == engine]) for engine in _engines(peers)),
@@ -50,8 +50,8 @@ def _engines(records: Sequence[Record]) -> list[str]:
 
 def _reads(records: Sequence[Record], engine: str) -> str:
     mine = [record for record in files_of(records) if record.solver == engine]
-    read = [record for record in mine if "links" in record.arrays]
-    different = sum(bool(record.notes["cause"]) for record in read)
+    read = [record for record in mine if record.values]
+    different = sum(bool(record.details.cause) for record in read)
     otherwise = f", {words(different)} of them otherwise than MuJoCo's documentation says"
     count = f"{words(len(read))} of {counted(len(mine), 'file')} read"
     return f"{engine}: {count}{otherwise * bool(different)}"

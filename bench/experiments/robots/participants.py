@@ -12,6 +12,7 @@ from ...tables.layout import Layout
 from ...tables.table import Summary
 from . import REACHABLE
 from .readings import STARTS, title_of
+from .values import RobotDetails
 
 
 class Participant(NamedTuple):
@@ -24,7 +25,7 @@ class Participant(NamedTuple):
     @property
     def version(self) -> str:
         """Its version, "" if it is not installed."""
-        return str(self.records[0].settings.get("version", ""))
+        return str(self.records[0].details.version)
 
     @property
     def entries(self) -> str:
@@ -43,8 +44,8 @@ class Participant(NamedTuple):
         """Why it was not measured on a robot, "" where it is not installed."""
         reasons: dict[str, dict[str, None]] = {}
         for record in self.records if self.version else ():
-            if remark := str(record.notes.get("remark", "")):
-                reasons.setdefault(remark, {})[record.title] = None
+            if record.details.remark:
+                reasons.setdefault(record.details.remark, {})[record.title] = None
         return "; ".join(f"{listed(list(titles))}: {why}" for why, titles in reasons.items())
 
 
@@ -65,8 +66,8 @@ def _records_of(peer: Peer, records: Sequence[Record]) -> tuple[Record, ...]:
 
 def _as_peer(record: Record) -> Peer:
     """Return what a record of a solver that was entered says of it."""
-    kind = str(record.settings["kind"])
-    return Peer(record.solver, "", str(record.facts.get("door", "")), "", "", (Entry(kind),))
+    entry = Entry(record.details.kind)
+    return Peer(record.solver, "", str(record.facts.get("door", "")), "", "", (entry,))
 
 
 def _summary(participants: Sequence[Participant]) -> Summary:
@@ -84,10 +85,11 @@ def _summary(participants: Sequence[Participant]) -> Summary:
 
 
 def _robot(record: Record) -> str:
-    facts = record.facts
-    freedoms = "" if facts["freedom"] == facts["joints"] else f", {facts['freedom']} freedoms"
-    effectors = listed(facts["tips"])
-    return f"{record.title}: {facts['joints']} joints{freedoms}, {facts['wanted']} of {effectors}"
+    """Return what a robot is, and what is asked of it."""
+    robot: RobotDetails = record.details
+    effectors = listed(robot.tips)
+    freedoms = "" if robot.freedom == robot.joints else f", {robot.freedom} freedoms"
+    return f"{record.title}: {robot.joints} joints{freedoms}, {robot.wanted} of {effectors}"
 
 
 participants = Layout(

@@ -71,7 +71,7 @@ class Score(NamedTuple):
     @property
     def strata(self) -> Sequence[str]:
         """The names of the strata."""
-        names: Sequence[str] = self.records[0].facts.get("strata", ())
+        names: Sequence[str] = self.records[0].details.strata
         return names
 
     def solved_in_stratum(self, stratum: int) -> np.ndarray:
@@ -162,7 +162,7 @@ class Score(NamedTuple):
     @property
     def setup(self) -> float:
         """How long the solver took before the first target [s], the sum over robots."""
-        return float(sum(record.arrays["setup"] for record in self.records))
+        return float(sum(record.values.setup for record in self.records))
 
     @property
     def distances(self) -> Floats:
@@ -243,18 +243,18 @@ def _padded(record: Record, name: str, value: float) -> np.ndarray:
 def _strata(record: Record) -> np.ndarray:
     """Return the stratum of every target: they alternate, begun or not."""
     begun = record.arrays["stratum"]
-    others = np.arange(begun.size, total(record)) % max(len(record.facts["strata"]), 1)
+    others = np.arange(begun.size, total(record)) % max(len(record.details.strata), 1)
     return np.concatenate([begun, others])
 
 
 def _outcomes(record: Record) -> Counter[str]:
-    arrays, settings = record.arrays, record.settings
-    answered = np.isfinite(arrays["position"])
-    reached = answered & (arrays["position"] <= settings["tolerance"])
-    reached &= arrays["rotation"] <= settings["tolerance_rotation"]
-    raised = arrays.get("exception", np.zeros(answered.size, dtype=bool))
-    claimed = answered & (arrays["claimed"] == 1)
-    holds = (arrays["solved"], reached, claimed, answered, raised, np.ones_like(answered))
+    solves, details = record.values, record.details
+    answered = np.isfinite(solves.position)
+    reached = answered & (solves.position <= details.tolerance)
+    reached &= solves.rotation <= details.tolerance_rotation
+    raised = np.zeros_like(answered) if solves.exception is None else solves.exception
+    claimed = answered & (solves.claimed == 1)
+    holds = (solves.solved, reached, claimed, answered, raised, np.ones_like(answered))
     first = np.argmax(holds, axis=0)
     counts = Counter({name: int(np.sum(first == i)) for i, name in enumerate(OUTCOMES[:-1])})
     counts[OUTCOMES[-1]] = total(record) - answered.size

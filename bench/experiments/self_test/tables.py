@@ -6,30 +6,32 @@ from ...harness.record import Record
 from ...harness.results import listed
 from ...tables.columns import text, titled
 from ...tables.layout import Layout
-from ...tables.table import Column, Summary
+from ...tables.table import Cell, Column, Summary
 
 
-def _of_fault(name: str, record: Record) -> bool | None:
+def _of_fault(name: str, record: Record) -> Cell:
     """Return whether a fault is caught, or named; None of an honest solver."""
-    return bool(record.arrays[name]) if record.facts["faulty"] else None
+    return getattr(record.values, name) if record.details.faulty else None
 
 
 def _is_accused(record: Record) -> bool | None:
     """Return whether an honest solver is accused, None of a faulty one."""
-    return None if record.facts["faulty"] else not record.arrays["passed"]
+    return None if record.details.faulty else not record.values.passed
 
 
 def _summary(records: Sequence[Record]) -> Summary:
-    families = dict.fromkeys(str(record.facts["family"]) for record in records)
-    failures = [f"{r.facts['family']}: {r.title}" for r in records if not r.arrays["passed"]]
-    points = (f"{f}: {_count([r for r in records if r.facts['family'] == f])}" for f in families)
+    families = dict.fromkeys(record.details.family for record in records)
+    failures = [f"{r.details.family}: {r.title}" for r in records if not r.values.passed]
+    points = (f"{f}: {_count([r for r in records if r.details.family == f])}" for f in families)
     return Summary(f"{_count(records)}:", (*failures, *points))
 
 
 def _count(records: Sequence[Record]) -> str:
     """Say how many faults are caught and named, and how many honest solvers are accused."""
-    faulty = [record for record in records if record.facts["faulty"]]
-    caught, named = (sum(bool(r.arrays[name]) for r in faulty) for name in ("caught", "named"))
+    faulty = [record for record in records if record.details.faulty]
+    caught, named = (
+        sum(bool(getattr(r.values, name)) for r in faulty) for name in ("caught", "named")
+    )
     accused = sum(bool(_is_accused(record)) for record in records)
     faults = f"{caught} of {len(faulty)} planted faults caught, {named} named"
     honest = f"{accused} of {len(records) - len(faulty)} honest solvers accused"
@@ -42,12 +44,12 @@ self_test = Layout(
     "Planted faults and honest solvers, judged by plumbob verify",
     subjects=lambda results: results.all("self_test"),
     columns=(
-        text("solvers", lambda record: str(record.facts["family"])),
+        text("solvers", lambda record: record.details.family),
         titled("fault or honest solver"),
         Column("caught", read=lambda record: _of_fault("caught", record)),
         Column("named", read=lambda record: _of_fault("named", record)),
         Column("accused", read=_is_accused),
-        text("broken laws", lambda record: listed(record.facts["laws"])),
+        text("broken laws", lambda record: listed(record.details.laws)),
     ),
     shows="Caught: a law is broken that knows nothing of faults. Named: the fault, or a class "
     "with it that no answer tells apart, is the first explanation. Accused: an honest solver is "
