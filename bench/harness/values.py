@@ -4,6 +4,9 @@ An experiment declares its types in `values.py`, in `KINDS`. What stands in the 
 read into them, so that a record that lacks a field, or has one of another type, is refused.
 """
 
+import functools
+import importlib
+import importlib.util
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar, get_args
 
@@ -40,6 +43,19 @@ class Kind(NamedTuple):
 
     values: type[Values]
     details: type[Details] = Details
+
+
+@functools.cache
+def kind_of(suite: str, task: str) -> Kind | None:
+    """Return the types of the records of a task ("" if they name none); None if none is known.
+
+    No engine is imported.
+    """
+    from ..experiments import EXPERIMENTS
+
+    modules = [f"{made.package}.values" for made in EXPERIMENTS if made.suite == suite]
+    declared = [importlib.import_module(m).KINDS for m in modules if importlib.util.find_spec(m)]
+    return next((kinds[task] for kinds in declared if task in kinds), None)
 
 
 Typed = TypeVar("Typed", bound=msgspec.Struct)

@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import numpy as np
 import pytest
 
 from plumbob import cli
-from plumbob.bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
+from plumbob.bench.comparison.rerun import Plan, rerun
 from plumbob.bench.comparison.rows import Verdict
 from plumbob.bench.harness import machine
 
@@ -228,7 +227,7 @@ def test_a_process_that_ends_is_said_to_and_nothing_is_left(repository):
 def test_a_signal_leaves_no_worktree_no_file_and_no_process(
     number, code, repository, temporary, start
 ):
-    """Ctrl-C goes to the terminal's whole group; what SIGKILL leaves, the next start removes."""
+    """Ctrl-C goes to the terminal's whole group; SIGKILL leaves the files, and no process."""
     measure_endlessly(repository)
     process = start()
     pids = temporary.with_name("pids")
@@ -244,19 +243,8 @@ def test_a_signal_leaves_no_worktree_no_file_and_no_process(
     assert process.wait(timeout=60) == code
     assert eventually(lambda: not any(map(is_running, started)))
     assert worktrees(repository) == 1
-    if number == signal.SIGKILL:
-        assert list(temporary.iterdir())
-        assert start("--only", "no such solver").wait(timeout=60) == 2
-    assert list(temporary.iterdir()) == []
-
-
-def test_a_rerun_beside_another_one_leaves_its_files(repository, temporary, start):
-    measure_endlessly(repository)
-    start()
-    assert eventually(temporary.with_name("pids").exists)
-    [folder] = temporary.iterdir()
-    assert start("--only", "no such solver").wait(timeout=60) == 2
-    assert (folder / "old" / "bench").is_dir()
+    if number != signal.SIGKILL:
+        assert list(temporary.iterdir()) == []
 
 
 @pytest.mark.parametrize("content", [bytes(20_000), os.urandom(20_000)], ids=["files", "archive"])
@@ -327,16 +315,3 @@ def test_this_revision_beside_itself_differs_in_nothing():
     made = rerun(Plan("HEAD", ("timing",), ("10 balls/one pose",)), root)
     assert len(made.rows) >= 4
     assert called(made) == {}
-
-
-@pytest.mark.parametrize("own", [True, False])
-def test_only_own_folders_of_runs_that_were_killed_are_removed(tmp_path, monkeypatch, own):
-    """Everyone may write to the folder of temporary files."""
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    folder = tmp_path / f"{PREFIX}killed"
-    (folder / "old").mkdir(parents=True)
-    (folder / "lock").touch()
-    user = os.getuid()
-    monkeypatch.setattr(os, "getuid", lambda: user if own else user + 1)
-    with _temporary_folder():
-        assert folder.exists() != own
