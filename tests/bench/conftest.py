@@ -300,7 +300,7 @@ def pictured():
     cloth = {"positions": [np.eye(4, 3), 2 * np.eye(4, 3)], "time": [0.0, 1.0], "pinned": [0, 1]}
     return [
         *(record("pictures", "arm/x", "ccd", {"evened": e, **spacing}, arrays,
-                 facts={"task": "arm"}) for e in (0, 1)),
+                 facts={"task": "arm"}) for e in (False, True)),
         record("pictures", "cloth/x1", "newton", {}, cloth, facts={"task": "cloth"}),
     ]  # fmt: skip
 

@@ -369,30 +369,30 @@ def test_a_missing_peer_costs_one_block_that_says_so(suite):
 
 
 def test_every_manner_becomes_one_record(suite):
-    arrays, notes, _ = suite.blocks["liar", "robots/iiwa14"].measure()
-    assert arrays["claimed"].tolist() == [1] * 6
-    assert not arrays["solved"].any()
+    solves, notes, _ = suite.blocks["liar", "robots/iiwa14"].measure()
+    assert solves.claimed.tolist() == [1] * 6
+    assert not solves.solved.any()
     assert notes["remark"] == ""
-    arrays, notes, _ = suite.blocks["unable", "robots/iiwa14"].measure()
-    assert "solved" not in arrays
+    solves, notes, _ = suite.blocks["unable", "robots/iiwa14"].measure()
+    assert solves.solved is None
     assert notes["remark"] == "takes no iiwas"
 
 
 def test_the_target_that_a_solver_hangs_on_counts_as_failed_with_the_time_it_took(suite):
     """The next targets are given to a new process, in which it hangs on its second again."""
-    arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
-    assert arrays["exception"].tolist() == [False, True] * 3
-    assert not arrays["solved"][1]
-    assert arrays["seconds"][1] == 0.5
-    assert np.isnan(arrays["position"][1])
+    solves, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
+    assert solves.exception.tolist() == [False, True] * 3
+    assert not solves.solved[1]
+    assert solves.seconds[1] == 0.5
+    assert np.isnan(solves.position[1])
     assert notes["remark"] == "ended after 0.5 s of silence, on 3 of 6 targets"
 
 
 def test_a_process_lost_at_the_end_of_the_budget_is_not_started_again(suite, monkeypatch):
     """Else a solver that hangs on every target would take hours."""
     monkeypatch.setattr(robots, "Budget", lambda seconds: SimpleNamespace(is_spent=True))
-    arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
-    assert arrays["exception"].tolist() == [False, True]
+    solves, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
+    assert solves.exception.tolist() == [False, True]
     assert notes["remark"] == "ended after 0.5 s of silence"
 
 

@@ -41,7 +41,7 @@ def of_full_length(make):
         for peer in PRESENT:
             for entry in peer.entries:
                 chance = generator.uniform(0.2, 0.9)
-                changed = {"solved": generator.random(120) < chance, "claimed": np.ones(120)}
+                changed = {"solved": generator.random(120) < chance, "claimed": np.ones(120, int)}
                 changed |= {"seconds": generator.uniform(1, 9, 120) * 1e-5 / chance}
                 changed |= {name: generator.random(120) for name in ("position", "rotation")}
                 changed |= {"stratum": np.arange(120) % 2, "beyond": np.zeros(120)}

@@ -25,7 +25,7 @@ N = 200
 
 def solving(make, solver, hits, seconds=1e-3, begun=N, kind="one start", mine=False, **facts):
     """A record of N targets of a robot, the first so many solved, each in these seconds."""
-    arrays = {"solved": np.arange(begun) < hits, "claimed": np.ones(begun)}
+    arrays = {"solved": np.arange(begun) < hits, "claimed": np.ones(begun, int)}
     arrays |= {"seconds": np.full(begun, seconds), "stratum": np.zeros(begun, int)}
     arrays |= dict.fromkeys(("position", "rotation", "beyond"), np.zeros(begun))
     made = replace(make.raced(solver, kind, **arrays), size=float(N))

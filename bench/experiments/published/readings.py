@@ -9,6 +9,7 @@ from ...harness import metrics
 from ...harness.metrics import Interval, Share
 from ...harness.record import Record
 from ...harness.results import Results, label
+from ...peers import registry
 from ..robots.readings import Score
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
@@ -64,9 +65,10 @@ def _rows(row: Comparison, numbers: Numbers) -> Iterator[Comparison]:
 def _trac_ik(results: Results) -> Iterator[Comparison]:
     """Yield success rates and mean times, robot by robot, the published solvers first."""
     measured = [r for r in results.all("ik", task=TRAC_IK) if "solved" in r.arrays]
+    titles = {peer.called(entry): peer.title for peer in registry.PEERS for entry in peer.entries}
     for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK):
         rates = {rate.solver: rate for rate in published.TRAC_IK if rate.robot == robot}
-        here = {r.solver.partition(", ")[0]: r for r in measured if r.details.robot == robot}
+        here = {titles.get(r.solver, r.solver): r for r in measured if r.details.robot == robot}
         for solver in dict.fromkeys([*rates, *here]) if here else ():
             yield from _rates(robot, solver, rates.get(solver), here.get(solver))
 

@@ -13,11 +13,16 @@ class Searches(Values, frozen=True, kw_only=True):
     setup: float
 
 
-class SearchDetails(Details, frozen=True):
-    """The robot, and which share of targets was published as infeasible [%]."""
+class RobotDetails(Details, frozen=True):
+    """The robot of TRAC-IK's table."""
 
-    robot: str = ""
-    infeasible: float | None = None
+    robot: str
+
+
+class SearchDetails(Details, frozen=True):
+    """Which share of targets was published as infeasible [%], None if none was."""
+
+    infeasible: float | None
 
 
 class Iterations(Values, frozen=True):
@@ -34,7 +39,7 @@ class IterationDetails(Details, frozen=True):
 
 
 KINDS = {
-    TRAC_IK: Kind(Searches, SearchDetails),
+    TRAC_IK: Kind(Searches, RobotDetails),
     TOOLBOX: Kind(Searches, SearchDetails),
     FABRIK: Kind(Iterations, IterationDetails),
 }
