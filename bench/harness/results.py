@@ -14,6 +14,8 @@ from .record import Record, on_record
 
 # So much may a time that is shown be off, in relative terms, by the drift of its machine.
 PRECISION = 0.05
+# Of more solvers that tie with the first a sentence gives only the number.
+NAMED_TIES = 3
 
 
 class Results:
@@ -111,7 +113,8 @@ def counted(count: int, name: str) -> str:
 def leaders(ranking: Ranking) -> str:
     """Return who is first, and who is not told from that one: "a, in a tie with b and c"."""
     first, *tied = ranking.first
-    return f"{first}, in a tie with {listed(tied)}" if tied else first
+    others = listed(tied) if len(tied) <= NAMED_TIES else f"{len(tied)} others"
+    return f"{first}, in a tie with {others}" if tied else first
 
 
 def steadiness(noise: float) -> str:

@@ -64,7 +64,7 @@ SECTIONS = (
         "Real arms and a character with two hands to place: the same targets, starts and "
         "evaluation for every solver. The lab’s arm of five joints draws curves, and a chain of "
         "ten ball joints reaches for targets near, far, at the edge of its reach and beyond it.",
-        "robots_overall_one_start",
+        "robots_overall",
         "budget_one_start",
     ),
     Section(

@@ -283,7 +283,7 @@ def republished():
         record("ik", "published/trac_ik/ur5", "TRAC-IK, 5 ms", {}, arrays,
                facts={"task": "TRAC-IK’s table", "robot": "ur5"}),
         record("ik", "published/toolbox/ur5", "ik_LM, NR", {"method": "NR"}, arrays,
-               facts={"task": "the toolbox’s table", "infeasible": 11.0}),
+               facts={"task": "the toolbox’s table", "title": "ur5", "infeasible": 11.0}),
         *(record("ik", f"published/fabrik/{s}", "fabrik", {"tolerance": 1e-6}, counts,
                  facts={"task": "FABRIK’s table", "stratum": s})
           for s in ("reachable", "unreachable")),
@@ -300,7 +300,7 @@ def pictured():
     cloth = {"positions": [np.eye(4, 3), 2 * np.eye(4, 3)], "time": [0.0, 1.0], "pinned": [0, 1]}
     return [
         *(record("pictures", "arm/x", "ccd", {"evened": e, **spacing}, arrays,
-                 facts={"task": "arm"}) for e in (0, 1)),
+                 facts={"task": "arm"}) for e in (False, True)),
         record("pictures", "cloth/x1", "newton", {}, cloth, facts={"task": "cloth"}),
     ]  # fmt: skip
 

@@ -91,9 +91,9 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
         assert record.arrays["seconds"].shape == record.arrays["solved"].shape == (2,), solver
         assert (record.arrays["seconds"] > 0.0).all()
     made = {table.name: table for table in tables(Results(records()), ["ik"])}
-    for name in ("accuracy", "q1_beyond_reach", "published_fabrik", "entered_ik"):
+    for name in ("accuracy", "q1_beyond_reach", "published_ik", "entered"):
         assert "My FABRIK" in cells(made[name]), name
-    for name in ("accuracy", "q1_beyond_reach", "published_fabrik"):  # nobody else counted them
+    for name in ("accuracy", "q1_beyond_reach", "published_ik"):  # nobody else counted them
         for row in made[name].rows:
             claims = [cell for cell in row if str(cell).endswith("claimed")]
             assert bool(claims) == ("My FABRIK" in row), (name, row)
@@ -109,8 +109,8 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
 def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
     one_step = ("--problem", "peers/one step/k1000")
     assert bench("cloth", "--quick", *one_step, "--with", "my_cloth.py", *EXPLICIT) == 0
-    made = {table.name: table for table in tables(Results(records()), ["cloth"])}
-    for name in ("cloth_peers_step", "entered_cloth"):
+    made = {table.name: table for table in tables(Results(records()))}
+    for name in ("cloth_peers_step", "entered"):
         assert "My symplectic Euler" in cells(made[name]), name
     assert "My symplectic Euler" in drawn(cloth_figures.one_step(Results(records()))).svg
     # The same method is the same to rounding, in every number but the times.
@@ -126,7 +126,7 @@ def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
 def test_a_cloth_solver_moves_on_beside_others(folder):
     asked = ("--problem", "peers/motion/k1000", "--with", "my_cloth.py")
     assert bench("cloth", "--quick", *asked, *EXPLICIT) == 0
-    made = {table.name: table for table in tables(Results(records()), ["cloth"])}
+    made = {table.name: table for table in tables(Results(records()))}
     assert "My symplectic Euler" in cells(made["cloth_peers_motion"])
 
 
@@ -136,7 +136,7 @@ def test_the_limit_of_stability_of_the_same_method_is_the_same(folder):
     assert bench("cloth", "--quick", *asked) == 0
     limits = [one.arrays["limit"] for one in records()]
     np.testing.assert_allclose(*limits, rtol=1e-3)
-    made = {table.name: table for table in tables(Results(records()), ["cloth"])}
+    made = {table.name: table for table in tables(Results(records()))}
     assert "My symplectic Euler" in cells(made["cloth_stability"])
 
 
@@ -538,7 +538,7 @@ def test_a_cloth_of_a_python_file_stands_in_the_same_tables(folder):
     assert (
         bench("cloth", "--quick", *words, "My symplectic Euler", "--solver", "Plumbob Newton") == 0
     )
-    made = {table.name: table for table in tables(Results(records()), ["cloth"])}
+    made = {table.name: table for table in tables(Results(records()))}
     rows = [row[:2] for row in made["cloth_peers_step"].rows]
     assert set(rows) == {("hammock", "My symplectic Euler"), ("hammock", "Plumbob Newton")}
     assert "hammock" in drawn(cloth_figures.one_step(Results(records()))).svg

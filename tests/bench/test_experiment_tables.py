@@ -19,12 +19,10 @@ from plumbob.bench.experiments.check import tables as check
 from plumbob.bench.experiments.closed_curves import tables as tracking
 from plumbob.bench.experiments.cloth import tables as cloth
 from plumbob.bench.experiments.cloth_peers import tables as cloth_peers
-from plumbob.bench.experiments.published import tables as published
-from plumbob.bench.experiments.robots import tables as robots
 from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.harness.results import Results, label
 from plumbob.bench.report.sections import SECTIONS, tables
-from plumbob.bench.tables.table import Share, comma_separated, markdown, words
+from plumbob.bench.tables.table import comma_separated, markdown, words
 from plumbob.bench.tables.tex_text import escaped
 
 
@@ -76,7 +74,7 @@ def test_the_error_that_is_asked_about_is_the_one_that_the_answer_counts_to(reco
 FACTS = re.compile(
     r"Q[123]\.|UR5|PR2|RK4|\((?:[^()]* )?20\d\d\)|(?:Lasenby|Corke) 20\d\d|2(?:\.828)? / ω|y = 0"
     r"|both are 1 at the start|each of 6 components|1e-15|0/|\b95 %|less than 5 %|\b[19]0th\b"
-    r"|^Published: (?:10,000|6,561)|table 1, 20 runs|at most 5 ms for TRAC-IK"
+    r"|^Published: 6,561|published with (?:10,000|20 runs)|table 1$|at most 5 ms for TRAC-IK"
     r"|float64|25 digits|; 1 is no nearer"
 )
 SOURCES = sorted(
@@ -134,14 +132,9 @@ def test_targets_without_an_answer_are_said_to_have_none(make):
         unanswered(make.beyond(solver, 0.004), "residual", "bend", "excess", count=count)
         for solver, count in (("ccd", 1), ("mine", 2))
     ]
-    none = [math.nan] * 4
     others = [
         unanswered(make.reached("near", "mine"), "residual"),
         make.worked("Plumbob Newton", error=(math.inf, math.inf)),
-        *(
-            make.raced(solver, "one start", solved=[False] * 4, position=none, rotation=none)
-            for solver in ("Plumbob LM", "mine")
-        ),
     ]
     made = {table.name: table for table in tables(Results([*beyond, *others]))}
     q1 = made["q1_beyond_reach"]
@@ -153,9 +146,6 @@ def test_targets_without_an_answer_are_said_to_have_none(make):
     assert list(map(words, column(q1, "off the line, largest [m]"))) == ["no answer"] * 2
     assert list(map(words, column(made["accuracy"], "residual, largest [m]"))) == ["no answer"]
     assert column(made["cloth_peers_step"], "least error") == ["diverged"]
-    profiles = made["robots_profile_one_start"]
-    assert {cell for row in profiles.rows for cell in row[2:]} == {None}
-    assert len(profiles.rows) == 2
     for table in made.values():
         text = markdown(table)
         assert not re.search(r"\binf(inite)?\b|no answer [m%µ]|not a number", text), table.name
@@ -197,17 +187,6 @@ def test_who_meets_most_targets_ties_within_chance(make):
     assert said.sentence.endswith("first: CCD, in a tie with FABRIK:")
     assert said.points[0] == "CCD: 39/40 = 97.5 % (87.1–99.6)"
     assert accuracy({"ccd": 20, "fabrik": 3}).sentence.endswith("first: FABRIK:")
-
-
-def test_a_published_table_counts_what_was_never_begun(make):
-    trac, toolbox, *_ = (replace(r, size=4) for r in make.republished())
-    table = published.trac_ik(Results([trac]))
-    assert column(table, "solved [%]")[-1] == 25.0
-    assert column(table, "mark")[-1] == "cut at 2 of 4"
-    assert table.summary.points[0].endswith("cut at 2 of 4")
-    table = published.toolbox(Results([toolbox]))
-    assert column(table, "here, by its own word [%]") == [75.0]
-    assert column(table, "mark") == ["cut at 2 of 4"]
 
 
 def test_jitter_is_the_largest_angle_in_degrees_and_the_closing_one_stands_apart(make):
@@ -310,17 +289,6 @@ def test_a_machine_too_noisy_for_the_precision_aimed_at_is_said_to_be_so(make, n
     assert table.summary.sentence.startswith("The machine was too noisy") == bool(mark)
 
 
-def test_the_paces_beside_the_records_tell_whether_robots_were_timed_in_peace(make):
-    def how(paces):
-        made = [make.raced(s, "one start") for s in "abc"]
-        noted = [replace(r, conditions={"pace": p}) for r, p in zip(made, paces, strict=True)]
-        return ONE.success(Results(noted)).measured
-
-    assert "steady within the 5 %" in how([1e-4, 1.01e-4, 1e-4])
-    assert "too noisy for the 5 %" in how([1e-4, 1.5e-4, 1e-4])
-    assert "noisy" not in ONE.success(Results([make.raced("a", "one start")])).measured
-
-
 def test_a_plain_copy_stands_in_a_column_and_is_called_no_limit(make):
     """Work that caches serve better takes half of its time: that is below no bound."""
     copy = make.timed("limit: copying as many bytes", 1e-6)
@@ -341,120 +309,8 @@ def test_every_suite_has_a_chapter_and_its_tables_are_some_of_all():
     every = [table.name for table in tables(Results([]))]
     some = [table.name for table in tables(Results([]), ["check"])]
     assert "check" in some
-    assert "robots_solvers" not in some
+    assert "participants" not in some
     assert [table.name for table in tables(Results([]), SUITES)] == every
-
-
-ONE, AGAIN = robots.OF_KIND["one start"], robots.OF_KIND["restarts"]
-
-
-def test_success_counts_the_evaluation_says_and_times_count_failures(make):
-    table = ONE.success(Results([make.raced("a", "one start")]))
-    (row,) = table.rows
-    assert row[:2] == ("the arm", "a")
-    shares = [cell for cell in row if isinstance(cell, Share)]
-    assert [(share.hits, share.total) for share in shares] == [(2, 4), (1, 2)]
-    assert column(table, "time, median [µs]") == pytest.approx([100.0])
-    assert column(table, "time, mean [µs]") == pytest.approx([302.5])
-    assert column(table, "position residual, largest [m]") == [1e-7]
-    assert column(table, "rotation residual, median [rad]") == pytest.approx([5.05e-7])
-    assert column(table, "claimed but not so") == [1]
-    assert column(table, "set-up [ms]") == [250.0]
-
-
-def test_one_start_and_restarts_are_never_in_one_table(make):
-    results = Results([make.raced("a", "one start"), make.raced("b", "restarts")])
-    for name in robots.Tables._fields:
-        for kind, mine, other in (("one start", "a", "b"), ("restarts", "b", "a")):
-            table = getattr(robots.OF_KIND[kind], name)(results)
-            cells = [cell for row in table.rows for cell in row]
-            assert other not in cells
-            assert (mine in cells) == (name != "unreachable")
-
-
-def test_a_solver_that_says_nothing_is_not_said_to_lie(make):
-    silent = make.raced("a", "one start", claimed=[-1] * 4)
-    assert column(ONE.success(Results([silent])), "claimed but not so") == [None]
-
-
-def test_who_is_missing_or_cannot_has_a_row_that_says_why(make):
-    results = Results([
-        make.raced("a", "one start"),
-        make.lacking("b", "one start", "b is not installed"),
-        make.lacking("all solvers", "any", "the data is not installed", "panda"),
-    ])  # fmt: skip
-    table = ONE.success(results)
-    remarks = column(table, "remark")
-    assert remarks == ["", "b is not installed", "the data is not installed"]
-    assert set(table.rows[1][2:-1]) == {None, "b is not installed"}
-    assert [row[1] for row in AGAIN.success(results).rows] == ["all solvers"]
-    assert len(ONE.strata(results).rows) == len(ONE.budgets(results).rows) == 1
-
-
-def test_solvers_that_are_not_installed_are_listed_as_such(make):
-    missing = make.lacking("pink", "one start", "pink is not installed")
-    table = robots.who(Results([make.raced("Plumbob LM", "one start"), missing]))
-    versions = dict(zip(column(table, "solver"), column(table, "version"), strict=True))
-    assert versions["Plumbob LM"] == "1.2"
-    assert versions["pink"] == "not installed"
-    assert robots.who(Results([])).rows == ()
-
-
-def test_strata_are_counted_apart_and_the_hardest_is_named(make):
-    hard = make.raced("a", "one start", solved=[True, False, True, True])
-    table = ONE.strata(Results([hard]))
-    assert [(share.hits, share.total) for share in table.rows[0][2:4]] == [(2, 2), (1, 2)]
-    assert table.summary.sentence.endswith("the hardest first:")
-    assert table.summary.points == (
-        "space: 1/2 = 50 % (9.5–90.5)",
-        "joint space: 2/2 = 100 % (34.2–100)",
-    )
-
-
-def test_claims_out_of_reach_are_named(make):
-    far = {"solved": [False] * 4, "position": [0.5, 0.7, np.nan, 0.6]}
-    liar = make.raced("a", "one start", "unreachable", **far)
-    table = ONE.unreachable(Results([liar]))
-    assert column(table, "claimed as solved") == [3]
-    assert column(table, "distance left, largest [m]") == [0.7]
-    assert column(table, "answers within limits") == [3]
-    assert table.summary.points == ("the arm, a: 3/4 = 75 % (30.1–95.4)",)
-    honest = make.raced("a", "one start", "unreachable", claimed=[0] * 4, **far)
-    mute = make.raced("b", "one start", "unreachable", claimed=[-1] * 4, **far)
-    assert ONE.unreachable(Results([honest, mute])).summary.sentence == (
-        "No solver that makes claims claims a target that is out of reach (n = 4). "
-        "These make no claims: b."
-    )
-
-
-def test_budgets_and_profiles_show_who_is_ahead(make):
-    slow = make.raced("slow", "restarts", seconds=[1.0] * 4, solved=[True] * 4)
-    results = Results([make.raced("fast", "restarts"), slow])
-    budgets = AGAIN.budgets(results)
-    assert column(budgets, "within 10.0 µs [%]") == [25.0, 0.0]
-    assert column(budgets, "within 100 ms [%]") == [50.0, 0.0]
-    profile = AGAIN.profiles(results)
-    assert column(profile, "within 1.00 times the fastest [%]") == [50.0, 50.0]
-    assert column(profile, "within 1,000 times the fastest [%]") == [50.0, 50.0]
-
-
-def test_the_robots_are_listed_once(make):
-    both = [make.raced(s, "restarts", robot=r) for s in "ab" for r in ("arm", "leg")]
-    table = robots.models(Results(both))
-    assert column(table, "robot") == ["the arm", "the leg"]
-    assert column(table, "joints") == [7, 7]
-
-
-def test_published_numbers_stand_beside_those_measured_here(make):
-    results = Results(make.republished())
-    table = published.trac_ik(results)
-    assert column(table, "from") == ["TRAC-IK README, v1.1.0"] * 3 + ["here"]
-    assert column(table, "solved [%]") == [35.89, 88.71, 99.62, 50.0]
-    assert column(published.toolbox(results), "published, infeasible [%]") == [11.0]
-    assert "jhavl/dkt at 1155dcb" in markdown(published.toolbox(results))
-    assert column(published.toolbox(results), "here, by its own word [%]") == [50.0]
-    (row,) = published.fabrik(results).rows
-    assert row == ("FABRIK", 15.5, 5.0, 6, 67.6, 5.0, 6)
 
 
 def test_the_two_laws_of_dampers_are_listed_with_their_order(make):

@@ -12,7 +12,7 @@ from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
 from plumbob.bench.experiments.robots.job import AGAIN, Job
 from plumbob.bench.experiments.robots.problem import robot
-from plumbob.bench.experiments.robots.tables import OF_KIND
+from plumbob.bench.experiments.robots.tables import outcomes
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess, raised
 from plumbob.bench.harness.measure import record_of
@@ -337,41 +337,41 @@ def test_a_missing_peer_costs_one_block_that_says_so(suite):
 
 
 def test_every_manner_becomes_one_record(suite):
-    arrays, notes, _ = suite.blocks["liar", "robots/iiwa14"].measure()
-    assert arrays["claimed"].tolist() == [1] * 6
-    assert not arrays["solved"].any()
+    solves, notes, _ = suite.blocks["liar", "robots/iiwa14"].measure()
+    assert solves.claimed.tolist() == [1] * 6
+    assert not solves.solved.any()
     assert notes["remark"] == ""
-    arrays, notes, _ = suite.blocks["unable", "robots/iiwa14"].measure()
-    assert "solved" not in arrays
+    solves, notes, _ = suite.blocks["unable", "robots/iiwa14"].measure()
+    assert solves.solved is None
     assert notes["remark"] == "takes no iiwas"
 
 
 def test_the_target_that_a_solver_hangs_on_counts_as_failed_with_the_time_it_took(suite):
     """The next targets are given to a new process, in which it hangs on its second again."""
-    arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
-    assert arrays["exception"].tolist() == [False, True] * 3
-    assert not arrays["solved"][1]
-    assert arrays["seconds"][1] == 0.5
-    assert np.isnan(arrays["position"][1])
+    solves, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
+    assert solves.exception.tolist() == [False, True] * 3
+    assert not solves.solved[1]
+    assert solves.seconds[1] == 0.5
+    assert np.isnan(solves.position[1])
     assert notes["remark"] == "ended after 0.5 s of silence, on 3 of 6 targets"
 
 
 def test_a_process_lost_at_the_end_of_the_budget_is_not_started_again(suite, monkeypatch):
     """Else a solver that hangs on every target would take hours."""
     monkeypatch.setattr(robots, "Budget", lambda seconds: SimpleNamespace(is_spent=True))
-    arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
-    assert arrays["exception"].tolist() == [False, True]
+    solves, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
+    assert solves.exception.tolist() == [False, True]
     assert notes["remark"] == "ended after 0.5 s of silence"
 
 
 @pytest.mark.parametrize(("solver", "count"), [("hangs", 3), ("raises", 1)])
 def test_what_a_solver_raises_is_printed_as_such_and_not_as_no_answer(suite, solver, count):
     block = suite.blocks[solver, "robots/iiwa14"]
-    table = OF_KIND[ONE_START].outcomes(Results([record_of(block, block.measure(), 0.0)]))
+    table = outcomes(Results([record_of(block, block.measure(), 0.0)]))
     heading, _, row = (line.split(" | ") for line in markdown(table).splitlines() if "|" in line)
     printed = {name.strip("| "): cell.strip("| ") for name, cell in zip(heading, row, strict=True)}
     assert printed["wrong claim"] == str(6 - count)
     assert printed["exception or crash"] == str(count)
     assert printed["no answer"] == printed["not begun"] == "0"
     expected = f"{solver}: {6 - count} wrong claim and {count} exception or crash, of 6"
-    assert table.summary.points == (expected,)
+    assert table.summary.points[0] == expected

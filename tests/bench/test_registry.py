@@ -107,9 +107,9 @@ def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, 
     monkeypatch.delitem(sys.modules, "stays_put")
     assert not record.failed
     results = Results([record])
-    (row,) = robot_tables.OF_KIND[ONE_START].success(results).rows
-    assert row[:2] == ("character", "Stays put")
-    assert "Stays put" in [row[0] for row in robot_tables.who(results).rows]
+    (row,) = robot_tables.robot_by_robot(results).rows
+    assert row[:3] == ("character", ONE_START, "Stays put")
+    assert "Stays put" in [row[0] for row in robot_tables.participants(results).rows]
 
 
 counted = Layout(

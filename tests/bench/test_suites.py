@@ -45,7 +45,8 @@ def test_no_two_blocks_have_the_same_key(suite):
 @pytest.mark.parametrize("suite", SUITES)
 def test_the_settings_of_every_block_can_be_read_again(suite):
     for b in blocks(suite, TINY):
-        made = Record(b.suite, b.problem, b.solver, b.settings, b.size, stamp=stamp(), when=now())
+        about = {"stamp": stamp(), "when": now(), "facts": b.facts}
+        made = Record(b.suite, b.problem, b.solver, b.settings, b.size, **about)
         back = decode(encode(made))
         assert back.key == made.key
         assert back.stamp == made.stamp
@@ -97,9 +98,9 @@ def test_the_history_begins_at_the_start_and_ends_at_the_residual():
 
 def test_a_claim_is_judged_as_by_the_cross_check():
     (block,) = [b for b in blocks("check", TINY) if b.problem == "damper forces"]
-    arrays, notes, _ = block.measure()
-    assert arrays["held"]
-    assert 0 < arrays["difference"] <= arrays["tolerance"]
+    values, notes, _ = block.measure()
+    assert values.held
+    assert 0 < values.difference <= values.tolerance
     assert notes["missed"] == ""
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...harness.results import Results, by_problem, counted, label, settings, solvers
-from ...report.entered import entered
 from ...tables import columns
 from ...tables.columns import (
     LARGEST,
@@ -180,4 +179,4 @@ iterations = Layout(
 )
 
 
-LAYOUTS = (beyond_reach, iterations, entered("ik", "inverse kinematics"))
+LAYOUTS = (beyond_reach, iterations)

@@ -11,7 +11,6 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...harness.results import Results, label, listed
 from ...peers import registry
-from ...report.entered import entered
 from ...tables.columns import SOLVER, folded, least, number, text, words_in
 from ...tables.layout import Layout, source
 from ...tables.table import Column, Summary, Table, listing, words
@@ -414,4 +413,4 @@ liu_2013 = Layout(
 )
 
 
-LAYOUTS = (iterations, one_step, motion, stability, liu_2013, entered("cloth", "the cloth"))
+LAYOUTS = (iterations, one_step, motion, stability, liu_2013)

@@ -19,6 +19,7 @@ from ..robots.problem import is_installed
 from ..robots.targets import uniform_targets
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
+from .values import Iterations, Searches
 
 # Random targets, and seconds that a solver has for them, for those of a scale.
 _TARGETS = 5
@@ -75,10 +76,9 @@ def _block(problem: str, run: Run, count: int, facts: dict[str, Any]) -> Block:
 
 
 def _solve(run: Run, count: int, middle: bool) -> Measured:
-    measured = solve(run, uniform_targets(run.robot, count, middle))
-    kept = ("solved", "claimed", "seconds", "setup")
-    arrays = {name: measured.arrays[name] for name in kept if name in measured.arrays}
-    return Measured(arrays, measured.notes, measured.facts)
+    solves, notes, facts = solve(run, uniform_targets(run.robot, count, middle))
+    names = Searches.__struct_fields__
+    return Measured(Searches(**{name: getattr(solves, name) for name in names}), notes, facts)
 
 
 def iterations(solver: str, distance: float) -> Measured:
@@ -89,4 +89,4 @@ def iterations(solver: str, distance: float) -> Measured:
     rng = np.random.default_rng(_SEED)
     targets = distance * unit(rng.standard_normal((published.FABRIK_RUNS, 3)))
     solution = solve_ik(skeleton, rest, targets, solver, **_LIMITS)
-    return Measured({"iterations": solution.iterations, "residual": solution.residual})
+    return Measured(Iterations(np.asarray(solution.iterations), np.asarray(solution.residual)))

@@ -95,7 +95,7 @@ def shown_table(
     classes = _column_classes(table, most, solver)
     rows = _rows(table, classes, best)
     heads = [
-        Head(column, of, column.best, j in (0, solver))
+        Head(column, of, column.best, j < table.compared or j in (0, solver))
         for j, (column, of) in enumerate(zip(table.columns, classes, strict=True))
     ]
     return ShownTable(
