@@ -18,15 +18,15 @@ from ..experiments.chain.measurement import (
     Limits,
     blocks_of,
 )
-from ..experiments.chain.problem import STRATA, chain_targets, unit
 from ..experiments.cloth_peers import measurement as cloth_peers
-from ..experiments.cloth_peers.problem import FallingCloth, own_cloth
 from ..experiments.published import problem as of_paper
 from ..experiments.robots import REACHABLE
 from ..experiments.robots import measurement as robots
-from ..experiments.robots.problem import ROBOTS, enter, is_installed
 from ..harness.block import Block, Measured, Scale
 from ..peers import registry
+from ..peers.entrant import SUITE_TASKS, Entrant, Method
+from ..peers.ik import entrant as robot
+from ..peers.ik.entrant_chain import TASK as CHAIN_TASK
 from ..peers.registry import (
     AGAIN,
     EXPLICIT,
@@ -38,11 +38,11 @@ from ..peers.registry import (
     Entry,
     Peer,
 )
-from . import robot
+from ..problems.chains import STRATA, chain_targets, unit
+from ..problems.falling_cloth import FallingCloth, own_cloth
+from ..problems.own import OwnProblem
+from ..problems.robots import ROBOTS, enter, is_installed
 from .chain import ChainProblem, solve_chain
-from .chain_job import TASK as CHAIN_TASK
-from .entrant import SUITE_TASKS, Entrant, Method
-from .problems import OwnProblem
 
 # Seconds that an entrant has for a stratum of the chain, for those of a scale: enough for as many
 # iterations as ours may make, in the interpreter.
@@ -246,7 +246,7 @@ def as_cloth_peer(entrant: Entrant) -> EnteredCloth:
     return EnteredCloth(
         title=entrant.name,
         engine=entrant.name,
-        module="plumbob.bench.entrants.cloth",
+        module="plumbob.bench.peers.cloth.entrant",
         package=version,
         kind=kind if entrant.step else UNDECLARED,
         settings={"spec": entrant.spec},

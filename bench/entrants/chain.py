@@ -13,8 +13,8 @@ from ..harness import metrics
 from ..harness.block import Measured
 from ..harness.isolation import Outcome, WorkerProcess, raised
 from ..harness.worker import NoAnswerError
-from .chain_job import ChainJob
-from .entrant import Spec
+from ..peers.entrant import Spec
+from ..peers.ik.entrant_chain import ChainJob
 
 # Residuals after each iteration are kept for so many targets and iterations: each is a solve from
 # the start with that many at most.

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from ..entrants.entrant import Entrant
-    from ..entrants.problems import OwnProblem
+    from ..peers.entrant import Entrant
+    from ..problems.own import OwnProblem
 
 
 class Measured(NamedTuple):

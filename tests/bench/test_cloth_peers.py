@@ -10,7 +10,16 @@ from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.cloth_peers import measurement as peers_cloth
 from plumbob.bench.experiments.cloth_peers import tables
 from plumbob.bench.experiments.cloth_peers.job import ClothJob, Shape
-from plumbob.bench.experiments.cloth_peers.problem import (
+from plumbob.bench.experiments.cloth_peers.ladder import Rung, motion_rungs, step_rungs
+from plumbob.bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, true_motion
+from plumbob.bench.figures.sketch import drawn
+from plumbob.bench.harness import metrics
+from plumbob.bench.harness.isolation import Outcome, WorkerProcess
+from plumbob.bench.harness.results import Results
+from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
+from plumbob.bench.peers import registry
+from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
+from plumbob.bench.problems.falling_cloth import (
     FRAME,
     MASS,
     FallingCloth,
@@ -21,15 +30,6 @@ from plumbob.bench.experiments.cloth_peers.problem import (
     highest_mode,
     level_cloth,
 )
-from plumbob.bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, true_motion
-from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness import metrics
-from plumbob.bench.harness.isolation import Outcome, WorkerProcess
-from plumbob.bench.harness.results import Results
-from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
-from plumbob.bench.peers import registry
-from plumbob.bench.peers.cloth.ladder import Rung, motion_rungs, step_rungs
-from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from plumbob.bench.report.report import all_figures
 from plumbob.bench.tables.table import best_cells
 from plumbob.reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plumbob.bench.entrants import opening
 from plumbob.bench.experiments.chain import figures as chain_figures
 from plumbob.bench.experiments.cloth_peers import figures as cloth_figures
-from plumbob.bench.experiments.robots.problem import ROBOTS, robot
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.peers import opening
+from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.report.sections import tables
 from plumbob.cli import run_command
 from plumbob.crosscheck.verify.solvers import open_contestant
@@ -172,7 +172,7 @@ def test_a_changed_file_is_measured_again_and_a_part_forgets_nothing(folder, cap
 
 
 def test_a_file_that_the_solver_imports_belongs_to_it(folder):
-    from plumbob.bench.entrants.sources import digest_of
+    from plumbob.bench.peers.sources import digest_of
 
     (folder / "my_ik.py").write_text("import mine.one\n" + IK, encoding="utf-8")
     (folder / "mine").mkdir()
@@ -185,7 +185,7 @@ def test_a_file_that_the_solver_imports_belongs_to_it(folder):
 def test_the_commit_of_the_solver_is_on_record(folder):
     import subprocess
 
-    from plumbob.bench.entrants.sources import commit_of
+    from plumbob.bench.peers.sources import commit_of
 
     git = ["git", "-C", str(folder), "-c", "user.name=n", "-c", "user.email=e"]
     for words in (["init", "-q"], ["add", "my_ik.py"], ["commit", "-qm", "one"]):
@@ -224,7 +224,7 @@ def test_a_program_enters_by_lines_and_is_timed_by_itself_or_says_so(folder, ext
 )
 def test_a_budget_goes_by_the_seconds_that_a_solver_behind_a_slow_door_counts(folder, extra, done):
     from plumbob.bench.entrants import chain
-    from plumbob.bench.experiments.chain.problem import chain_targets
+    from plumbob.bench.problems.chains import chain_targets
 
     slow = PROGRAM.replace("EXTRA", extra).replace("print(json", "time.sleep(0.15); print(json")
     (folder / "slow.py").write_text(slow.replace("import json", "import json, time"))
@@ -432,8 +432,8 @@ def test_one_start_of_robots_and_restarts_through_the_door_are_those_of_the_solv
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
 def test_a_request_calls_the_tool_as_the_protocol_says(name):
     """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
-    from plumbob.bench.entrants.robot import robot_inputs
-    from plumbob.bench.experiments.robots.evaluate import evaluator_of
+    from plumbob.bench.peers.ik.entrant import robot_inputs
+    from plumbob.bench.problems.evaluate import evaluator_of
     from plumbob.crosscheck.verify.kinematics.robot_models import tool_pose
     from plumbob.crosscheck.verify.task import TASKS
     from plumbob.reference import forward_kinematics
@@ -522,7 +522,7 @@ def test_problems_of_a_python_file_stand_in_the_same_tables(folder):
 
 
 def dry(folder, *words):
-    from plumbob.bench.entrants import outlook
+    from plumbob.commands import outlook
     from plumbob.commands.bench import Asked, _choice
 
     given = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--problem"]
@@ -552,7 +552,7 @@ OBJ += "".join(f"f {i} {i + 1} {i + 4} {i + 3}\n" for i in (1, 2, 4, 5))
     ("rule", "pinned"), [(None, [0, 8]), ("0,2", [0, 2]), ("top", [*range(9)])]
 )
 def test_an_obj_becomes_a_cloth_with_pins_by_a_rule(folder, rule, pinned):
-    from plumbob.bench.entrants import models
+    from plumbob.bench.problems import models
 
     (folder / "mesh.obj").write_text(OBJ)
     system, state = models.cloth(folder / "mesh.obj", rule)
@@ -573,8 +573,8 @@ URDF = """<robot name="r"><link name="b"/><link name="l1"/><link name="l2"/><lin
 
 
 def test_a_urdf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
-    from plumbob.bench.entrants import models
-    from plumbob.bench.experiments.robots.evaluate import Evaluator
+    from plumbob.bench.problems import models
+    from plumbob.bench.problems.evaluate import Evaluator
     from plumbob.reference import forward_kinematics
     from plumbob.reference.formats import urdf
 
@@ -598,8 +598,8 @@ MJCF = """<mujoco><compiler angle="radian"/><worldbody><body name="a" pos="0 0 .
 
 
 def test_an_mjcf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
-    from plumbob.bench.entrants import models
-    from plumbob.bench.experiments.robots.evaluate import Evaluator
+    from plumbob.bench.problems import models
+    from plumbob.bench.problems.evaluate import Evaluator
     from plumbob.reference import forward_kinematics
     from plumbob.reference.formats import mjcf
 
@@ -615,7 +615,7 @@ def test_an_mjcf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
 
 
 def test_a_slide_is_refused_by_its_name(folder):
-    from plumbob.bench.entrants import models
+    from plumbob.bench.problems import models
 
     path = folder / "slides.urdf"
     axis, limit = '<axis xyz="0 1 0"/>', '<limit lower="0" upper="1" effort="1" velocity="1"/>'
@@ -653,7 +653,7 @@ Frame Time: 0.01
 
 
 def test_a_bvh_becomes_targets_that_its_joints_can_reach(folder):
-    from plumbob.bench.entrants import models
+    from plumbob.bench.problems import models
 
     path = folder / "walk.bvh"
     path.write_text(BVH)

@@ -11,9 +11,7 @@ import pytest
 
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.robots import measurement as robots
-from plumbob.bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
 from plumbob.bench.experiments.robots.job import AGAIN, Job
-from plumbob.bench.experiments.robots.problem import robot
 from plumbob.bench.experiments.robots.tables import OF_KIND
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess, raised
@@ -24,6 +22,8 @@ from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.registry import ONE_START, Entry, Peer
+from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.problems.robots import robot
 from plumbob.bench.tables.table import markdown
 
 TOLERANCE = Tolerance(1e-3, 1e-3)

@@ -6,20 +6,15 @@ import sys
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.robots import LIMIT_TOLERANCE
-from plumbob.bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
 from plumbob.bench.experiments.robots.job import Job
-from plumbob.bench.experiments.robots.problem import CHARACTER, is_installed, robot
-from plumbob.bench.experiments.robots.targets import (
-    robot_targets,
-    uniform_targets,
-    unreachable_targets,
-)
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.worker import Solved
 from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.registry import ONE_START, OURS, PEERS, PLACO, RESTARTS
+from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
+from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, is_installed, robot
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several effectors.

@@ -7,9 +7,9 @@ from plumbob.reference import IK_SOLVERS, scenes, track
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
+from ...problems.curves import FollowedCurve, arm_beyond, arm_curves
 from ..chain.measurement import BEYOND_TOLERANCE, Limits, residuals, solve_targets
 from . import BEYOND, CURVE
-from .problem import FollowedCurve, arm_beyond, arm_curves
 
 LIMITS = Limits(tolerance=1e-4, max_iterations=100)
 BEYOND_LIMITS = Limits(BEYOND_TOLERANCE, max_iterations=1000)

@@ -16,8 +16,8 @@ from ...harness.block import Block, Measured, Scale
 from ...harness.stopwatch import timed
 from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
-from . import BEYOND, CHAIN
-from .problem import STRATA, TargetsForSkeleton, chain_targets
+from ...problems.chains import BEYOND, STRATA, TargetsForSkeleton, chain_targets
+from . import CHAIN
 
 TOLERANCE = 1e-4
 # Beyond reach it is the distance from the best answer there is; small, to see how straight it is.

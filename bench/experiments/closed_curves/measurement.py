@@ -11,7 +11,7 @@ from plumbob.reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinemati
 from plumbob.reference.arguments import FloatArray
 
 from ...harness.block import Block, Measured, Scale
-from ..arm.problem import FollowedCurve
+from ...problems.curves import FollowedCurve
 from . import COHERENT, COLD, CURVE, DRIFT, WARM
 from .problem import (
     DRIFT_FRAMES,

@@ -8,7 +8,7 @@ import numpy as np
 from plumbob.reference import curves, resample, scenes
 from plumbob.reference.formats import urdf
 
-from ..arm.problem import (
+from ...problems.curves import (
     CUSTOM,
     FRAMES,
     MAX_SPACING,
@@ -17,7 +17,7 @@ from ..arm.problem import (
     custom_curve,
     spaced,
 )
-from ..robots.problem import robot
+from ...problems.robots import robot
 
 ARM_CURVES = ("circle", "heart", "triangle", "star")
 ROBOT, ROBOT_CURVES = "iiwa14", ("circle", "heart")

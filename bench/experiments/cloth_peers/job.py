@@ -13,7 +13,7 @@ from ...harness.stopwatch import Budget, round_trips, timed
 from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
 from ...peers.cloth.protocol import Mover
 from ...peers.ik.protocol import remark_of
-from .problem import FRAME
+from ...problems.falling_cloth import FRAME
 
 # Moved once before anything is timed, in so short a frame [s] that any solver is stable: what has
 # to be compiled is compiled then.

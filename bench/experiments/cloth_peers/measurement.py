@@ -18,12 +18,8 @@ from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, WorkerProcess
 from ...harness.measure import not_installed
 from ...peers import registry
-from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
 from ...peers.registry import EXPLICIT, UNDECLARED, ClothPeer
-from ..published import problem as published
-from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
-from .job import ClothJob, Shape
-from .problem import (
+from ...problems.falling_cloth import (
     FRAME,
     SIDE,
     STIFFNESSES,
@@ -32,10 +28,14 @@ from .problem import (
     hanging_cloth,
     highest_mode,
 )
+from ..published import problem as published
+from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
+from .job import ClothJob, Shape
+from .ladder import Rung, motion_rungs, step_rungs
 from .truth import ClothTruth, cloth_truth, implicit_motion, truth_of
 
 if TYPE_CHECKING:
-    from ...entrants.problems import OwnProblem
+    from ...problems.own import OwnProblem
 
 SUITE = "cloth"
 # One step is timed so often, but for no more than a twentieth of its ladder's time.

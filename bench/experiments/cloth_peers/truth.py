@@ -16,7 +16,7 @@ from plumbob.reference import ImplicitEuler, State, runge_kutta
 from plumbob.reference.arguments import FloatArray
 
 from ...harness import metrics
-from .problem import FRAME, FallingCloth, explicit_substeps, falling_cloth
+from ...problems.falling_cloth import FRAME, FallingCloth, explicit_substeps, falling_cloth
 
 # Newton goes on to the rounding floor, which is above this, so that errors of 1e-8 can be measured.
 TOLERANCE = 1e-14

@@ -12,11 +12,11 @@ from plumbob.reference import scenes, solve_ik
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS, Entry, Peer
-from ..chain.problem import unit
-from ..robots.evaluate import Tolerance
+from ...problems.chains import unit
+from ...problems.evaluate import Tolerance
+from ...problems.robot_targets import uniform_targets
+from ...problems.robots import is_installed
 from ..robots.measurement import SUITE, Run, settings_of, solve
-from ..robots.problem import is_installed
-from ..robots.targets import uniform_targets
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
 

@@ -13,8 +13,8 @@ from plumbob.reference.formats import mjcf, urdf
 from ...harness.block import Block, Measured
 from ...harness.worker import Calculation
 from ...peers.registry import KINEMATICS, Peer
+from ...problems.robots import ALL, is_installed, robot, title
 from ..robots.measurement import worker_process
-from ..robots.problem import ALL, is_installed, robot, title
 from . import PEERS
 
 CONFIGURATIONS = 100

@@ -13,8 +13,8 @@ from ...harness.stopwatch import Budget, round_trips, timed
 from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
 from ...peers.ik.protocol import Ask, Solve, UnableError, attempt, remark_of
 from ...peers.ik.restarts import restarted
-from .evaluate import Targets, Tolerance
-from .problem import Robot
+from ...problems.evaluate import Targets, Tolerance
+from ...problems.robots import Robot
 
 # A solve that took less [s] is made again so often, uncounted, right before the next.
 QUICK, AGAIN = 1e-3, 4

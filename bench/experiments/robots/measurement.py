@@ -18,11 +18,11 @@ from ...harness.stopwatch import Budget
 from ...harness.worker import Solved
 from ...peers import registry
 from ...peers.registry import Entry, Peer
+from ...problems.evaluate import Targets, Tolerance, evaluator_of
+from ...problems.robot_targets import STRATA, least_distances, robot_targets, unreachable_targets
+from ...problems.robots import PACKAGE, ROBOTS, is_installed, title
 from . import REACHABLE, UNREACHABLE
-from .evaluate import Targets, Tolerance, evaluator_of
 from .job import Job
-from .problem import PACKAGE, ROBOTS, is_installed, title
-from .targets import STRATA, least_distances, robot_targets, unreachable_targets
 
 SUITE = "ik"
 TOLERANCE = Tolerance(1e-3, 1e-3)

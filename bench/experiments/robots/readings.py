@@ -18,9 +18,10 @@ from ...harness.record import Record
 from ...harness.results import Results, settings, steadiness
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
+from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.columns import words_in
 from ...tables.table import words
-from . import LIMIT_TOLERANCE, REACHABLE
+from . import REACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}
 # What a target that is not solved counts for in a mean of times [s], if it did not take longer.

@@ -17,9 +17,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...entrants.entrant import Entrant
-from ...entrants.sources import digest_of
 from ...experiments import Block, Scale, blocks
+from ...peers.entrant import Entrant
+from ...peers.sources import digest_of
 from ..folder_lock import open_lock
 from ..isolation import WorkerProcess
 from ..machine import difference, stamp

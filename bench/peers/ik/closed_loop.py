@@ -11,8 +11,8 @@ import pinocchio
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
+from ...problems.evaluate import Tolerance
+from ...problems.robots import Robot
 from .pinocchio_model import from_pinocchio, pinocchio_model, to_pinocchio
 from .protocol import Ask, Solve, SolverOutput
 

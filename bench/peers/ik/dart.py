@@ -9,8 +9,8 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
+from ...problems.evaluate import Tolerance
+from ...problems.robots import Robot
 from .protocol import Ask, Forward, Solve, SolverOutput, needs_a_chain
 
 

@@ -21,8 +21,8 @@ from pydrake.solvers import IpoptSolver, SnoptSolver, SolverOptions
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
+from ...problems.evaluate import Tolerance
+from ...problems.robots import Robot
 from .protocol import Ask, Forward, Solve, SolverOutput
 
 # The part of the tolerance that is asked for.

@@ -10,10 +10,9 @@ from eaik.pybindings import EAIK
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots import LIMIT_TOLERANCE
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot, links
 from ...harness.stopwatch import timed
+from ...problems.evaluate import Tolerance
+from ...problems.robots import LIMIT_TOLERANCE, Robot, links
 from .protocol import Ask, Solve, SolverOutput, UnableError, needs_a_chain
 
 REVOLUTION = 2.0 * np.pi

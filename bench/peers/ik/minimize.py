@@ -10,8 +10,8 @@ from mujoco import minimize
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance, mujoco_model
-from ...experiments.robots.problem import Robot
+from ...problems.evaluate import Tolerance, mujoco_model
+from ...problems.robots import Robot
 from .protocol import Ask, Solve, SolverOutput, needs_a_chain
 
 SILENT = minimize.Verbosity.SILENT

@@ -9,8 +9,8 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance, mujoco_model
-from ...experiments.robots.problem import Robot
+from ...problems.evaluate import Tolerance, mujoco_model
+from ...problems.robots import Robot
 from .protocol import Ask, Solve, SolverOutput
 
 

@@ -7,7 +7,7 @@ import pinocchio
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.problem import Robot
+from ...problems.robots import Robot
 
 
 def pinocchio_model(robot: Robot) -> pinocchio.Model:

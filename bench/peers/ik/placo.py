@@ -11,8 +11,8 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
+from ...problems.evaluate import Tolerance
+from ...problems.robots import Robot
 from .. import environments
 from .protocol import Ask, Solve, SolverOutput, UnableError, needs_a_chain
 

@@ -6,8 +6,8 @@ from plumbob.reference import Outcome, Target, rotation, solve_ik
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.formats import mjcf, urdf
 
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
+from ...problems.evaluate import Tolerance
+from ...problems.robots import Robot
 from .protocol import Ask, Solve, SolverOutput
 
 

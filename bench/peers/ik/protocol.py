@@ -15,8 +15,8 @@ from typing import Any, NamedTuple, Protocol
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.problem import Robot
 from ...harness.worker import describe
+from ...problems.robots import Robot
 
 
 class SolverOutput(NamedTuple):

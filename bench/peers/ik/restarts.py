@@ -6,7 +6,7 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.problem import Robot
+from ...problems.robots import Robot
 from .protocol import Ask, Solve, SolverOutput, attempt
 
 _SEED = 1986

@@ -11,8 +11,8 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot, links
+from ...problems.evaluate import Tolerance
+from ...problems.robots import Robot, links
 from .protocol import Ask, Solve, SolverOutput, needs_a_chain
 
 with warnings.catch_warnings():

@@ -12,8 +12,8 @@ import pytracik
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
+from ...problems.evaluate import Tolerance
+from ...problems.robots import Robot
 from .protocol import Ask, Solve, SolverOutput, needs_a_chain
 
 

@@ -13,8 +13,7 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from . import LIMIT_TOLERANCE
-from .problem import Robot, robot
+from .robots import LIMIT_TOLERANCE, Robot, robot
 
 
 class Tolerance(NamedTuple):

@@ -6,16 +6,16 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-from ..experiments import blocks, chain, cloth_peers, published
-from ..experiments.cloth_peers import measurement as cloths
-from ..experiments.robots import REACHABLE, UNREACHABLE
-from ..harness import run
-from ..harness.block import Block, Scale
-from ..harness.choice import Choice
-from ..harness.executor import HERE
-from ..harness.measure import block_key
-from ..harness.record import Key, Record, RecordFile
-from .blocks import CHAIN_BUDGET
+from plumbob.bench.entrants.blocks import CHAIN_BUDGET
+from plumbob.bench.experiments import blocks, chain, cloth_peers, published
+from plumbob.bench.experiments.cloth_peers import measurement as cloths
+from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
+from plumbob.bench.harness import run
+from plumbob.bench.harness.block import Block, Scale
+from plumbob.bench.harness.choice import Choice
+from plumbob.bench.harness.executor import HERE
+from plumbob.bench.harness.measure import block_key
+from plumbob.bench.harness.record import Key, Record, RecordFile
 
 RECORDED, ALIKE, BUDGET, UNKNOWN = "its own record", "records of others", "budgets", "unknown"
 # Budgets of a block in seconds, for those of a benchmark at its scale, by its task; an entrant's on

@@ -5,16 +5,15 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from plumbob.bench.experiments import SCALES, blocks
+from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
+from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
+from plumbob.bench.harness.block import Block, Scale
+from plumbob.bench.harness.choice import Choice
+from plumbob.bench.peers import registry
+from plumbob.bench.peers.entrant import Entrant
+from plumbob.bench.problems.own import OwnProblem
 from plumbob.reference.arguments import name_list
-
-from ..experiments import SCALES, blocks
-from ..experiments.published import TOOLBOX, TRAC_IK
-from ..experiments.robots import REACHABLE, UNREACHABLE
-from ..harness.block import Block, Scale
-from ..harness.choice import Choice
-from ..peers import registry
-from .entrant import Entrant
-from .problems import OwnProblem
 
 # The tasks whose problems are robots.
 OF_ROBOTS = (REACHABLE, UNREACHABLE, TRAC_IK, TOOLBOX)

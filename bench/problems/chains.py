@@ -7,9 +7,8 @@ import numpy as np
 from plumbob.reference import Skeleton, scenes
 from plumbob.reference.arguments import FloatArray, choice
 
-from . import BEYOND
-
 BALLS = 10
+BEYOND = "beyond"
 
 # How far targets lie from the root, as shares of the reach; uniform within the shell.
 STRATA = {"near": (0.05, 0.4), "far": (0.6, 0.95), "edge": (0.99, 0.9999), BEYOND: (1.01, 2.0)}

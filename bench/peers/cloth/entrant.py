@@ -8,9 +8,9 @@ from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
 
-from ..peers.cloth.protocol import Mover
-from .contestants import Asked, asked, remark
-from .entrant import Spec
+from ..contestant import Asked, asked, remark
+from ..entrant import Spec
+from .protocol import Mover
 
 __all__ = ["prepare", "remark"]
 

@@ -7,7 +7,7 @@ import numpy as np
 from plumbob.reference import Articulation, Skeleton, curves, resample, scenes
 from plumbob.reference.arguments import FloatArray
 
-from ..chain.problem import TargetsForSkeleton, unit
+from .chains import TargetsForSkeleton, unit
 
 # Samples of each curve, as the lab takes them; the custom curve is resampled from a raw drawing.
 FRAMES = {"circle": 150, "square": 150, "heart": 150, "triangle": 150, "star": 400}

@@ -13,11 +13,11 @@ import numpy as np
 from plumbob.reference import MassSpring, Skeleton, State
 from plumbob.reference.formats.source import read_bytes, read_text
 
-from ..experiments.chain.problem import TargetsForSkeleton
-from ..experiments.robots.problem import ALL
+from ..peers.opening import clean
 from . import models
-from .opening import clean
-from .problems import OwnProblem
+from .chains import TargetsForSkeleton
+from .own import OwnProblem
+from .robots import ALL
 
 SUFFIXES = (".py", ".urdf", ".xml", ".mjcf", ".bvh", ".obj")
 LIST = "PROBLEMS"

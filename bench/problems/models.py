@@ -16,8 +16,8 @@ from plumbob.reference import (
 from plumbob.reference.arguments import FloatArray, IndexArray, name_list
 from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
 
-from ..experiments.chain.problem import TargetsForSkeleton, random_rotations
-from ..experiments.robots.problem import TWO_REVOLUTIONS, Robot, chain_from
+from .chains import TargetsForSkeleton, random_rotations
+from .robots import TWO_REVOLUTIONS, Robot, chain_from
 
 # Of cloths from meshes.
 STIFFNESS, MASS = 1000.0, 1.0

@@ -10,8 +10,8 @@ from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.message import shown
 from plumbob.crosscheck.verify.solvers import LIMITS, open_contestant
 
-from ..peers import registry
 from ..text import visible
+from . import registry
 from .entrant import SUITE_TASKS, Entrant, Spec
 from .sources import commit_of, digest_of
 

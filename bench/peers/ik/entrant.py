@@ -8,12 +8,12 @@ from plumbob.crosscheck.verify.kinematics import robot_models
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
 
-from ..experiments.robots.evaluate import Tolerance
-from ..experiments.robots.problem import Robot, links
-from ..harness.worker import NoAnswerError
-from ..peers.ik.protocol import Solve, SolverOutput, UnableError
-from .contestants import asked, remark
-from .entrant import Spec
+from ...harness.worker import NoAnswerError
+from ...problems.evaluate import Tolerance
+from ...problems.robots import Robot, links
+from ..contestant import asked, remark
+from ..entrant import Spec
+from .protocol import Solve, SolverOutput, UnableError
 
 __all__ = ["TASK", "prepare", "remark", "robot_inputs"]
 

@@ -8,10 +8,10 @@ import numpy as np
 from plumbob.reference import Skeleton, forward_kinematics
 from plumbob.reference.arguments import FloatArray, IndexArray
 
-from ..harness.stopwatch import Budget, round_trips, timed
-from ..harness.worker import Done, Message, NoAnswerError, Ready, Solved, Unfit, describe
-from .contestants import asked
-from .entrant import Spec
+from ...harness.stopwatch import Budget, round_trips, timed
+from ...harness.worker import Done, Message, NoAnswerError, Ready, Solved, Unfit, describe
+from ..contestant import asked
+from ..entrant import Spec
 
 TASK = "inverse_kinematics"
 # Positions without rotations count if they keep every link to this share of its length.

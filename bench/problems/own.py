@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from plumbob.reference import MassSpring, State
 
-from ..experiments.chain.problem import TargetsForSkeleton
-from ..experiments.robots.problem import Robot
+from .chains import TargetsForSkeleton
+from .robots import Robot
 
 
 @dataclass(frozen=True, eq=False)
