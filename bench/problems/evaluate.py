@@ -38,6 +38,19 @@ class Targets(NamedTuple):
     starts: FloatArray
     strata: np.ndarray
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The number of targets, and of coordinates."""
+        return len(self.starts), self.starts.shape[-1]
+
+    def request(self, i: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return what a solver is asked for."""
+        return self.positions[i], self.rotations[i], self.starts[i].copy()
+
+    def after(self, count: int) -> "Targets":
+        """Return the targets after the first ones."""
+        return Targets(*(part[count:] for part in self))
+
 
 class Evaluation(NamedTuple):
     """What the answers come to, one entry a target.

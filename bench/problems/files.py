@@ -62,8 +62,8 @@ def _in(path: Path, effector: str | None, pins: str | None) -> list[OwnProblem]:
         return [_of_dict(*made) for made in _in_python(path)]
     if suffix == ".bvh":
         return [
-            OwnProblem(clean(f"{name}, {made.title.rpartition(', ')[2]}"), digest, "ik", made)
-            for made in models.skeletons(path, effector)
+            OwnProblem(made.title, digest, "ik", made)
+            for made in models.skeletons(path, name, effector)
         ]
     if suffix == ".obj":
         cloth = models.cloth(path, pins)

@@ -95,7 +95,9 @@ def _numbers(values: FloatArray) -> str:
     return " ".join(repr(float(x)) for x in values)
 
 
-def skeletons(path: Path, effector: str | None, count: int = 100) -> list[TargetsForSkeleton]:
+def skeletons(
+    path: Path, title: str, effector: str | None, count: int = 100
+) -> list[TargetsForSkeleton]:
     """Return targets for the balls of a BVH file, from random poses: anywhere, far out, near.
 
     Raises:
@@ -116,7 +118,9 @@ def skeletons(path: Path, effector: str | None, count: int = 100) -> list[Target
     }
     starts = random_rotations(rng, count, chain.joint_count)
     return [
-        TargetsForSkeleton(path.stem, f"{path.stem}, {name}", chain, starts, reached[which])
+        TargetsForSkeleton(
+            f"chain/{title}, {name}", f"{title}, {name}", chain, starts, reached[which]
+        )
         for name, which in chosen.items()
     ]
 

@@ -37,4 +37,4 @@ class OwnProblem:
             return [f"robots/{self.name}", f"unreachable/{self.name}"]
         if self.cloth is not None:
             return [f"peers/one step/{self.name}", f"peers/motion/{self.name}"]
-        return [f"chain/{self.name}"]
+        return [self.targets.name] if self.targets is not None else []

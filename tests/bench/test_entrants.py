@@ -3,20 +3,27 @@
 import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from plumbob.bench.experiments.chain import figures as chain_figures
+from plumbob.bench.experiments.chain import measurement as chain
 from plumbob.bench.experiments.cloth_peers import figures as cloth_figures
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import stopwatch
+from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.harness.results import Results, plain
-from plumbob.bench.peers import opening
+from plumbob.bench.peers import contestant, opening, registry
+from plumbob.bench.peers.entrant import CHAIN_TASK, Entrant
+from plumbob.bench.peers.protocol import OwnTime
+from plumbob.bench.problems.chains import chain_targets
 from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.report.sections import tables
 from plumbob.cli import run_command
+from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.solvers import open_contestant
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
@@ -223,24 +230,22 @@ def test_a_program_enters_by_lines_and_is_timed_by_itself_or_says_so(folder, ext
     ("extra", "done"), [('"seconds": 1e-7', 6), pytest.param("", 2, marks=pytest.mark.slow)]
 )
 def test_a_budget_goes_by_the_seconds_that_a_solver_behind_a_slow_door_counts(folder, extra, done):
-    from plumbob.bench.entrants import chain
-    from plumbob.bench.problems.chains import chain_targets
-
     slow = PROGRAM.replace("EXTRA", extra).replace("print(json", "time.sleep(0.15); print(json")
     (folder / "slow.py").write_text(slow.replace("import json", "import json, time"))
-    made = chain_targets("near", 6)
-    problem = chain.ChainProblem(made.skeleton, made.starts, made.targets)
-    spec = (sys.executable, str(folder / "slow.py"))
-    found = chain.solve_chain(spec, "", problem, chain.Limits(1e-4, 5), budget=0.2)
+    entrant = Entrant("slow", "", (sys.executable, str(folder / "slow.py")), tasks=(CHAIN_TASK,))
+    (peer,) = registry.chain_peers([entrant])
+    limits = chain.Limits(1e-4, 5)
+    found = chain.solve_one_by_one(chain_targets("near", 6), peer, limits, budget=0.2)
     assert np.isfinite(found.arrays["residual"]).sum() == done
     assert ("cut by its time budget" in found.notes["remark"]) == (done < 6)
 
 
 @pytest.fixture
 def pass_by(monkeypatch):
-    """Let seconds pass on the stopwatch's clock, which stands still otherwise."""
+    """Let seconds pass on the clocks, which stand still otherwise."""
     now = [0.0]
     monkeypatch.setattr(stopwatch.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(contestant, "perf_counter", lambda: now[0])
 
     def advance(seconds):
         now[0] += seconds
@@ -248,23 +253,26 @@ def pass_by(monkeypatch):
     return advance
 
 
-def test_a_call_that_a_solver_counts_no_time_of_takes_its_round_trip(pass_by):
-    def call():
-        return stopwatch.behind_door(lambda: pass_by(1.5), lambda _: 0.0)
-
-    assert stopwatch.timed(call) == (None, 1.5)
+@pytest.mark.parametrize(("claimed", "counted"), [(0.0, 1.5), (1e-12, 1e-12)])
+def test_a_request_that_a_solver_counts_no_time_of_takes_its_round_trip(
+    pass_by, monkeypatch, claimed, counted
+):
+    door = SimpleNamespace(answer=lambda case: pass_by(1.5) or Answer({}, claimed))
+    monkeypatch.setattr(contestant, "open_contestant", lambda *_: door)
+    solver = contestant.Contestant("mine")
+    assert solver.answer(CHAIN_TASK, {}) == ({}, OwnTime(counted, 1.5))
+    assert bool(solver.remark) == (not claimed)
 
 
 def test_a_budget_ends_though_a_solver_counts_almost_nothing(pass_by):
     budget = stopwatch.Budget(1.0)
-    for _ in range(int(stopwatch.MOST_AT_DOORS) - 1):
+    for _ in range(int(stopwatch.MOST_AT_DOORS)):
         assert not budget.is_spent
-        stopwatch.behind_door(lambda: pass_by(1.0), lambda _: 1e-12)
-    assert not budget.is_spent
-    stopwatch.behind_door(lambda: pass_by(1.0), lambda _: 1e-12)
+        pass_by(1.0)
+        budget.excuse(1.0 - 1e-12)
     assert budget.is_spent
     budget = stopwatch.Budget(1.0)
-    stopwatch.behind_door(lambda: pass_by(1.5), lambda _: 1.5)
+    pass_by(1.5)
     assert budget.is_spent
 
 
@@ -300,9 +308,6 @@ def test_a_broken_solver_loses_its_own_rows_only_and_says_why(folder, name, caps
 
 @pytest.mark.slow
 def test_a_solver_that_hangs_is_ended(folder, monkeypatch):
-    from plumbob.bench.entrants import chain
-    from plumbob.bench.harness.isolation import WorkerProcess
-
     impatient = WorkerProcess(30.0, 0.5)
     monkeypatch.setattr(chain, "worker_process", lambda: impatient)
     (folder / "hangs.py").write_text(
@@ -393,7 +398,7 @@ def test_each_method_has_rows_of_its_own(folder):
         methods.replace('"version"', '"methods": ["ccd", "fabrik"], "version"')
     )
     (one,) = entrants("two.py")
-    assert [method.solver for method in one.called()] == ["My FABRIK, ccd", "My FABRIK, fabrik"]
+    assert one.titles == {"ccd": "My FABRIK, ccd", "fabrik": "My FABRIK, fabrik"}
 
 
 class Installed:
@@ -657,7 +662,7 @@ def test_a_bvh_becomes_targets_that_its_joints_can_reach(folder):
 
     path = folder / "walk.bvh"
     path.write_text(BVH)
-    problems = models.skeletons(path, "head", count=5)
+    problems = models.skeletons(path, "walk", "head", count=5)
     assert [one.title for one in problems] == [
         "walk, joint space", "walk, outer shell", "walk, near the root"
     ]  # fmt: skip
@@ -669,7 +674,7 @@ def test_a_bvh_becomes_targets_that_its_joints_can_reach(folder):
         assert (distances >= 1.0 - 1e-9).all()
     assert away[1].min() > away[2].max()
     with pytest.raises(ValueError, match="effector: expected one of hip"):
-        models.skeletons(path, "tail")
+        models.skeletons(path, "walk", "tail")
 
 
 @pytest.mark.slow

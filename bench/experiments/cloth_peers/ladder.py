@@ -56,7 +56,7 @@ def _rungs(
 
 
 def _rung(peer: ClothPeer, label: str, **settings: float) -> Rung:
-    return Rung(label, {**peer.settings, **settings})
+    return Rung(label, {**peer.settings, **peer.spec, **settings})
 
 
 def _counted(count: int, name: str) -> str:

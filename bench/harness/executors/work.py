@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from ...experiments import Block, Scale, blocks
 from ...peers.entrant import Entrant
+from ...peers.protocol import describe
 from ...peers.sources import digest_of
 from ..folder_lock import open_lock
 from ..isolation import WorkerProcess
@@ -26,7 +27,7 @@ from ..machine import difference, stamp
 from ..measure import block_key, measure
 from ..progress import Progress, listening
 from ..record import Key, encode
-from ..worker import Calculation, describe
+from ..worker import Calculation
 
 # A block that says nothing for so long [s] is given up.
 PATIENCE = 24 * 3600.0

@@ -1,92 +1,56 @@
-"""Position targets of a skeleton of balls, put to an entrant one by one in a worker's process."""
+"""A user's solver for chains of balls: its answers are the joints' positions."""
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
 from plumbob.reference import Skeleton, forward_kinematics
-from plumbob.reference.arguments import FloatArray, IndexArray
+from plumbob.reference.arguments import FloatArray
 
-from ...harness.stopwatch import Budget, round_trips, timed
-from ...harness.worker import Done, Message, NoAnswerError, Ready, Solved, Unfit, describe
-from ..contestant import asked
-from ..entrant import Spec
+from ..contestant import opened, remark
+from ..entrant import CHAIN_TASK, Spec
+from .protocol import Solve, SolverOutput
 
-TASK = "inverse_kinematics"
+__all__ = ["joint_positions", "prepare", "remark"]
+
 # Positions without rotations count if they keep every link to this share of its length.
 STRETCH = 1e-6
+Ask = Callable[[FloatArray, FloatArray, int], Solve]
 
 
-class ChainJob(NamedTuple):
-    """What an entrant is asked for.
+def prepare(skeleton: Skeleton, tolerance: float, spec: Spec = "", method: str = "") -> Ask:
+    """Return a user's solver, set up for a skeleton whose last joint is the effector.
 
-    Attributes:
-        spec: what opens it.
-        method: its method.
-        parents, offsets: of the skeleton.
-        starts: local rotations, (target, joint, 4).
-        targets: global positions [m], (target, 3).
-        effector: the joint that is to reach them.
-        tolerance: the distance that counts as reached [m].
-        iterations: the most for each target, (target,).
-        budget: no further target is begun after so long [s].
+    An output holds the iterations, NaN if unsaid, and the joints' positions in a row.
+
+    Raises:
+        NoAnswerError: if it gives no answer when one iteration is allowed.
     """
+    solver = opened(spec)
+    known = {"parents": skeleton.parents, "offsets": skeleton.offsets, "tolerance": tolerance}
+    known |= {"effector": skeleton.joint_count - 1, "method": method}
 
-    spec: Spec
-    method: str
-    parents: IndexArray
-    offsets: FloatArray
-    starts: FloatArray
-    targets: FloatArray
-    effector: int
-    tolerance: float
-    iterations: IndexArray
-    budget: float
+    def inputs(target: FloatArray, start: FloatArray, iterations: int) -> dict[str, Any]:
+        asked = {"local_rotations": start, "target": target, "max_iterations": iterations}
+        return {**known, **asked}
 
-    def perform(self) -> Iterator[Message]:
-        """Yield for each target the iterations, NaN if unsaid, and the joints' positions."""
-        solver = asked(self.spec)
-        try:
-            solver.answer(TASK, self._inputs(0) | {"max_iterations": 1})  # may compile
-            forward_kinematics(Skeleton(self.parents, self.offsets), self.starts[0])  # likewise
-        except NoAnswerError as error:
-            yield Unfit(describe(error))
-            return
-        yield Ready(0.0, solver.remark)
-        budget = Budget(self.budget)
-        for i in range(len(self.targets)):
-            if budget.is_spent:
-                break
-            yield self._solved(i)
-        yield Done()
+    def ask(target: FloatArray, start: FloatArray, iterations: int) -> Solve:
+        def solve() -> SolverOutput:
+            values, time = solver.answer(CHAIN_TASK, inputs(target, start, iterations))
+            positions = joint_positions(skeleton, values)
+            q = np.append(values.get("iterations", np.nan), positions)
+            return SolverOutput(q, values.get("converged"), time)
 
-    def _inputs(self, i: int) -> dict[str, Any]:
-        return {
-            "parents": self.parents,
-            "offsets": self.offsets,
-            "local_rotations": self.starts[i],
-            "target": self.targets[i],
-            "effector": self.effector,
-            "tolerance": self.tolerance,
-            "max_iterations": int(self.iterations[i]),
-            "method": self.method,
-        }
+        return solve
 
-    def _solved(self, i: int) -> Solved:
-        nothing = np.full(1 + 3 * len(self.parents), np.nan)
-        try:
-            answer, seconds = timed(lambda: asked(self.spec).answer(TASK, self._inputs(i)))
-            positions = joint_positions(Skeleton(self.parents, self.offsets), answer.values)
-        except (NoAnswerError, ValueError) as error:
-            return Solved(nothing, -1, 0.0, describe(error))
-        made = answer.values.get("iterations", np.nan)
-        claimed = int(answer.values.get("converged", -1))
-        q = np.concatenate([[made], positions.ravel()])
-        return Solved(q, claimed, seconds, "", *round_trips())
+    rest = np.tile([1.0, 0.0, 0.0, 0.0], (skeleton.joint_count, 1))
+    effector = forward_kinematics(skeleton, rest).positions[-1]
+    solver.answer(CHAIN_TASK, inputs(0.5 * (skeleton.offsets[0] + effector), rest, 1))
+    return ask
 
 
-def joint_positions(skeleton: Skeleton, values: Any) -> FloatArray:
+def joint_positions(skeleton: Skeleton, values: Mapping[str, Any]) -> FloatArray:
     """Return where an answer puts the joints [m], (joint, 3): by its rotations if it has any.
 
     Raises:

@@ -9,12 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from plumbob.reference.arguments import FloatArray
-
-from ...problems.evaluate import Tolerance
-from ...problems.robots import Robot
 from .. import environments
-from .protocol import Ask, Solve, SolverOutput, UnableError, needs_a_chain
+from ..protocol import OwnTime
+from .protocol import (
+    Ask,
+    FloatArray,
+    Robot,
+    Solve,
+    SolverOutput,
+    Tolerance,
+    UnableError,
+    needs_a_chain,
+)
 
 NAME = "placo"
 PROGRAM = Path(__file__).with_name("placo_program.py")
@@ -34,7 +40,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
 
         def solve() -> SolverOutput:
             answer = program.answer(question)
-            return SolverOutput(answer[2:], bool(answer[0]), float(answer[1]))
+            return SolverOutput(answer[2:], bool(answer[0]), OwnTime(float(answer[1])))
 
         return solve
 
