@@ -116,7 +116,7 @@ def unfit(error: Exception, entrant: str) -> Iterator[Message]:
     """Yield that a job cannot be done; that a user's solver does not answer is announced."""
     if entrant and isinstance(error, NoAnswerError):
         yield Progress(entrant, TROUBLE, describe(error))
-    yield Unfit(describe(error))
+    yield Unfit(str(error) if isinstance(error, UnableError) else describe(error))
 
 
 def announced(targets: Iterator[Solved], entrant: str) -> Iterator[Message]:

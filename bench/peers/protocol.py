@@ -41,9 +41,8 @@ class UnableError(ValueError):
 
 
 def describe(error: Exception) -> str:
-    """Return what an exception says, on one line; its type too unless it is one of these two."""
-    is_sentence = isinstance(error, NoAnswerError | UnableError)
-    kind = "" if is_sentence else f"{type(error).__name__}: "
+    """Return what an exception says, on one line; its type too unless it is a `NoAnswerError`."""
+    kind = "" if isinstance(error, NoAnswerError) else f"{type(error).__name__}: "
     return " ".join(f"{kind}{error}".split())[:300]
 
 

@@ -369,44 +369,52 @@ class ClothPeer(Adapter):
     converges: bool = False
 
 
-def _cloth_peer(
-    title: str, adapter: str, package: str, engine: str, kind: str, *, ladder: tuple[int, ...] = (),
-    **settings: Any,
-) -> ClothPeer:  # fmt: skip
-    """Return a solver of an engine; those with a ladder make `SOME` iterations in a motion."""
-    module, motion = f"{__package__}.cloth.{adapter}", SOME if ladder else ()
-    return ClothPeer(title, module, package, engine, kind, settings, ladder, motion)
+_CLOTH = f"{__package__}.cloth"
 
 
 def _of_ours(solver: StepSolver) -> ClothPeer:
     """Return a solver of the reference as a peer."""
-    known = (f"Plumbob {solver.label}", f"{__package__}.cloth.step_solvers", "plumbob", PLUMBOB)
+    known = (f"Plumbob {solver.label}", f"{_CLOTH}.plumbob", "plumbob", PLUMBOB)
     if solver.is_linear:
         return ClothPeer(*known, LINEARISED, {"solver": solver.name, "iterations": 1})
     iterated = (solver.ladder, solver.motion, solver.converges)
     return ClothPeer(*known, ITERATED, {"solver": solver.name}, *iterated)
 
 
-_EXPLICIT = ("explicit", "plumbob", PLUMBOB, EXPLICIT)
-_TENDONS = ("mujoco_tendons", "mujoco", MUJOCO)
-_VBD, _XPBD = ("newton_vbd", "newton", NEWTON), ("newton_xpbd", "newton", NEWTON)
-_TO_THE_END: dict[str, Any] = {"iterations": 5000, "tolerance": 1e-15}
+def _explicit(title: str, solver: str) -> ClothPeer:
+    known = (f"Plumbob {title}", f"{_CLOTH}.plumbob", "plumbob", PLUMBOB)
+    return ClothPeer(*known, EXPLICIT, {"solver": solver})
+
+
+def _mujoco(title: str, kind: str, **settings: Any) -> ClothPeer:
+    known = (f"MuJoCo {title}", f"{_CLOTH}.mujoco", "mujoco", MUJOCO)
+    return ClothPeer(*known, kind, settings)
+
+
+def _newton(title: str, kind: str, ladder: tuple[int, ...] = (), **settings: Any) -> ClothPeer:
+    known = (f"Newton engine, {title}", f"{_CLOTH}.newton", "newton", NEWTON)
+    return ClothPeer(*known, kind, settings, ladder, SOME if ladder else ())
+
+
 CLOTH_ENGINES = (
-    _cloth_peer("Plumbob symplectic Euler", *_EXPLICIT, integrator="symplectic_euler"),
-    _cloth_peer("Plumbob Runge-Kutta", *_EXPLICIT, integrator="runge_kutta"),
-    _cloth_peer("MuJoCo Euler", *_TENDONS, EXPLICIT, integrator="Euler"),
-    _cloth_peer("MuJoCo implicitfast", *_TENDONS, EXPLICIT, integrator="implicitfast"),
-    _cloth_peer("MuJoCo flex, Euler", "mujoco_flex", "mujoco", MUJOCO, EXPLICIT),
-    _cloth_peer("MuJoCo discrete", *_TENDONS, LINEARISED, integrator="discrete"),
-    _cloth_peer(
-        "MuJoCo discrete, to the end", *_TENDONS, LINEARISED, integrator="discrete", **_TO_THE_END
+    _explicit("symplectic Euler", "symplectic_euler"),
+    _explicit("Runge-Kutta", "runge_kutta"),
+    _mujoco("Euler", EXPLICIT),
+    _mujoco("implicitfast", EXPLICIT, integrator="implicitfast"),
+    _mujoco("flex, Euler", EXPLICIT, flex=True),
+    _mujoco("discrete", LINEARISED, integrator="discrete"),
+    _mujoco(
+        "discrete, to the end", LINEARISED, integrator="discrete", iterations=5000, tolerance=1e-15
     ),
-    _cloth_peer("Newton engine, semi-implicit", "newton_semi_implicit", "newton", NEWTON, EXPLICIT),
-    _cloth_peer("Newton engine, VBD", *_VBD, ITERATED, ladder=MANY),
-    _cloth_peer("Newton engine, VBD, its own colours", *_VBD, ITERATED, ladder=SOME, own=1),
-    _cloth_peer("Newton engine, XPBD", *_XPBD, ITERATED, ladder=SOME),
-    _cloth_peer("Newton engine, XPBD, substeps", *_XPBD, EXPLICIT, iterations=1),
-    _cloth_peer("PyBullet deformable, Euler", "pybullet_deformable", "pybullet", BULLET, EXPLICIT),
+    _newton("semi-implicit", EXPLICIT, solver="semi-implicit"),
+    _newton("VBD", ITERATED, MANY, solver="VBD"),
+    _newton("VBD, its own colours", ITERATED, SOME, solver="VBD", own=1),
+    _newton("XPBD", ITERATED, SOME, solver="XPBD"),
+    _newton("XPBD, substeps", EXPLICIT, solver="XPBD", iterations=1),
+    ClothPeer(
+        *("PyBullet deformable, Euler", f"{_CLOTH}.pybullet_deformable", "pybullet", BULLET),
+        EXPLICIT,
+    ),
 )
 
 
@@ -419,8 +427,8 @@ def cloth_peers(entrants: Iterable[Entrant] = ()) -> tuple[ClothPeer, ...]:
 def _entered_cloth(entrant: Entrant) -> ClothPeer:
     """Return a user's solver as a peer for cloths, tried as its declared step asks for."""
     kind = EXPLICIT if entrant.step in _EXPLICIT_METHODS else LINEARISED
-    module, kind = f"{__package__}.cloth.entrant", kind if entrant.step else UNDECLARED
-    return ClothPeer(entrant.name, module, "", entrant.name, kind, entrant=entrant)
+    known = (entrant.name, f"{_CLOTH}.entrant", "", entrant.name)
+    return ClothPeer(*known, kind if entrant.step else UNDECLARED, entrant=entrant)
 
 
 def ik_solvers() -> dict[str, Solver]:

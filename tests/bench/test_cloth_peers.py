@@ -259,10 +259,8 @@ def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
 
 
 def test_colours_are_proper_and_few(cloth):
-    newton_model = pytest.importorskip(
-        "plumbob.bench.peers.cloth.newton_model", exc_type=ImportError
-    )
-    groups = newton_model.colours(cloth.system.springs, cloth.system.particle_count)
+    newton_adapter = pytest.importorskip("plumbob.bench.peers.cloth.newton", exc_type=ImportError)
+    groups = newton_adapter.colours(cloth.system.springs, cloth.system.particle_count)
     colour = np.full(cloth.system.particle_count, -1)
     for number, group in enumerate(groups):
         colour[group] = number
@@ -273,10 +271,8 @@ def test_colours_are_proper_and_few(cloth):
 
 
 def test_by_itself_newton_gives_springs_one_colour(cloth):
-    newton_model = pytest.importorskip(
-        "plumbob.bench.peers.cloth.newton_model", exc_type=ImportError
-    )
-    model = newton_model.model(cloth.system, own_colours=True)
+    newton_adapter = pytest.importorskip("plumbob.bench.peers.cloth.newton", exc_type=ImportError)
+    model = newton_adapter.model(cloth.system, own_colours=True)
     assert len(model.particle_color_groups) == 1
 
 

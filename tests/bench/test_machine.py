@@ -49,7 +49,7 @@ def test_an_edit_of_any_file_changes_the_digest_unless_it_only_shows_numbers(cop
 @pytest.mark.parametrize(
     "name",
     [
-        "bench/peers/cloth/explicit.py",
+        "bench/peers/cloth/plumbob.py",
         "bench/experiments/cloth_peers/job.py",
         "bench/experiments/cloth_peers/truth.py",
     ],

@@ -17,10 +17,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...experiments import Block, Scale, blocks
 from ...peers.entrant import Entrant
 from ...peers.protocol import describe
 from ...peers.sources import digest_of
+from ..block import Block, Scale
+from ..experiment import blocks
 from ..folder_lock import open_lock
 from ..isolation import WorkerProcess
 from ..machine import difference, stamp

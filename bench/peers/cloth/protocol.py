@@ -6,7 +6,6 @@ is timed, so conversions cost no solver anything, and set-up is timed apart. For
 cannot move `prepare` raises a `ValueError`.
 """
 
-from collections.abc import Callable
 from typing import Protocol
 
 from plumbob.reference import State
@@ -30,24 +29,3 @@ class Mover(Protocol):
 
     def positions(self) -> FloatArray:
         """Return where the particles are now [m], (particle, 3), not finite if they blew up."""
-
-
-class Steps:
-    """So many steps a frame of what maps a state to the next."""
-
-    def __init__(self, step: Callable[[State], State], substeps: int) -> None:
-        self._step, self._substeps = step, substeps
-
-    def begin(self, state: State) -> None:
-        """Start from a state."""
-        self._state = state
-
-    def advance(self) -> OwnTime | None:
-        """Take the steps of one frame."""
-        for _ in range(self._substeps):
-            self._state = self._step(self._state)
-        return None
-
-    def positions(self) -> FloatArray:
-        """Return where the particles are [m], (particle, 3)."""
-        return self._state.positions
