@@ -19,8 +19,6 @@ from pathlib import Path
 import pytest
 
 from plumbob import cli
-from plumbob.bench.entrants.entrant import Entrant
-from plumbob.bench.entrants.sources import digest_of
 from plumbob.bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
 from plumbob.bench.harness import run
 from plumbob.bench.harness.choice import Choice
@@ -30,6 +28,8 @@ from plumbob.bench.harness.measure import block_key, measure
 from plumbob.bench.harness.progress import Progress, listening
 from plumbob.bench.harness.record import RecordFile, encode
 from plumbob.bench.harness.results import Results
+from plumbob.bench.peers.entrant import Entrant
+from plumbob.bench.peers.sources import digest_of
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.table import markdown
 

@@ -3,20 +3,27 @@
 import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from plumbob.bench.entrants import opening
 from plumbob.bench.experiments.chain import figures as chain_figures
+from plumbob.bench.experiments.chain import measurement as chain
 from plumbob.bench.experiments.cloth_peers import figures as cloth_figures
-from plumbob.bench.experiments.robots.problem import ROBOTS, robot
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import stopwatch
+from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.harness.results import Results, printable
+from plumbob.bench.peers import contestant, opening, registry
+from plumbob.bench.peers.entrant import CHAIN_TASK, Entrant
+from plumbob.bench.peers.protocol import OwnTime
+from plumbob.bench.problems.chains import chain_targets
+from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.report.sections import tables
 from plumbob.cli import run_command
+from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.solvers import open_contestant
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
@@ -172,7 +179,7 @@ def test_a_changed_file_is_measured_again_and_a_part_forgets_nothing(folder, cap
 
 
 def test_a_file_that_the_solver_imports_belongs_to_it(folder):
-    from plumbob.bench.entrants.sources import digest_of
+    from plumbob.bench.peers.sources import digest_of
 
     (folder / "my_ik.py").write_text("import mine.one\n" + IK, encoding="utf-8")
     (folder / "mine").mkdir()
@@ -185,7 +192,7 @@ def test_a_file_that_the_solver_imports_belongs_to_it(folder):
 def test_the_commit_of_the_solver_is_on_record(folder):
     import subprocess
 
-    from plumbob.bench.entrants.sources import commit_of
+    from plumbob.bench.peers.sources import commit_of
 
     git = ["git", "-C", str(folder), "-c", "user.name=n", "-c", "user.email=e"]
     for words in (["init", "-q"], ["add", "my_ik.py"], ["commit", "-qm", "one"]):
@@ -223,24 +230,22 @@ def test_a_program_enters_by_lines_and_is_timed_by_itself_or_says_so(folder, ext
     ("extra", "done"), [('"seconds": 1e-7', 6), pytest.param("", 2, marks=pytest.mark.slow)]
 )
 def test_a_budget_goes_by_the_seconds_that_a_solver_behind_a_slow_door_counts(folder, extra, done):
-    from plumbob.bench.entrants import chain
-    from plumbob.bench.experiments.chain.problem import chain_targets
-
     slow = PROGRAM.replace("EXTRA", extra).replace("print(json", "time.sleep(0.15); print(json")
     (folder / "slow.py").write_text(slow.replace("import json", "import json, time"))
-    made = chain_targets("near", 6)
-    problem = chain.ChainProblem(made.skeleton, made.starts, made.targets)
-    spec = (sys.executable, str(folder / "slow.py"))
-    found = chain.solve_chain(spec, "", problem, chain.Limits(1e-4, 5), budget=0.2)
+    entrant = Entrant("slow", "", (sys.executable, str(folder / "slow.py")), tasks=(CHAIN_TASK,))
+    (peer,) = registry.chain_peers([entrant])
+    limits = chain.Limits(1e-4, 5)
+    found = chain.solve_one_by_one(chain_targets("near", 6), peer, limits, budget=0.2)
     assert np.isfinite(found.arrays["residual"]).sum() == done
     assert ("cut by its time budget" in found.notes["remark"]) == (done < 6)
 
 
 @pytest.fixture
 def pass_by(monkeypatch):
-    """Let seconds pass on the stopwatch's clock, which stands still otherwise."""
+    """Let seconds pass on the clocks, which stand still otherwise."""
     now = [0.0]
     monkeypatch.setattr(stopwatch.time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(contestant, "perf_counter", lambda: now[0])
 
     def advance(seconds):
         now[0] += seconds
@@ -248,23 +253,26 @@ def pass_by(monkeypatch):
     return advance
 
 
-def test_a_call_that_a_solver_counts_no_time_of_takes_its_round_trip(pass_by):
-    def call():
-        return stopwatch.behind_door(lambda: pass_by(1.5), lambda _: 0.0)
-
-    assert stopwatch.timed(call) == (None, 1.5)
+@pytest.mark.parametrize(("claimed", "counted"), [(0.0, 1.5), (1e-12, 1e-12)])
+def test_a_request_that_a_solver_counts_no_time_of_takes_its_round_trip(
+    pass_by, monkeypatch, claimed, counted
+):
+    door = SimpleNamespace(answer=lambda case: pass_by(1.5) or Answer({}, claimed))
+    monkeypatch.setattr(contestant, "open_contestant", lambda *_: door)
+    solver = contestant.Contestant("mine")
+    assert solver.answer(CHAIN_TASK, {}) == ({}, OwnTime(counted, 1.5))
+    assert bool(solver.remark) == (not claimed)
 
 
 def test_a_budget_ends_though_a_solver_counts_almost_nothing(pass_by):
     budget = stopwatch.Budget(1.0)
-    for _ in range(int(stopwatch.MOST_AT_DOORS) - 1):
+    for _ in range(int(stopwatch.MOST_AT_DOORS)):
         assert not budget.is_spent
-        stopwatch.behind_door(lambda: pass_by(1.0), lambda _: 1e-12)
-    assert not budget.is_spent
-    stopwatch.behind_door(lambda: pass_by(1.0), lambda _: 1e-12)
+        pass_by(1.0)
+        budget.excuse(1.0 - 1e-12)
     assert budget.is_spent
     budget = stopwatch.Budget(1.0)
-    stopwatch.behind_door(lambda: pass_by(1.5), lambda _: 1.5)
+    pass_by(1.5)
     assert budget.is_spent
 
 
@@ -300,9 +308,6 @@ def test_a_broken_solver_loses_its_own_rows_only_and_says_why(folder, name, caps
 
 @pytest.mark.slow
 def test_a_solver_that_hangs_is_ended(folder, monkeypatch):
-    from plumbob.bench.entrants import chain
-    from plumbob.bench.harness.isolation import WorkerProcess
-
     impatient = WorkerProcess(30.0, 0.5)
     monkeypatch.setattr(chain, "worker_process", lambda: impatient)
     (folder / "hangs.py").write_text(
@@ -393,7 +398,7 @@ def test_each_method_has_rows_of_its_own(folder):
         methods.replace('"version"', '"methods": ["ccd", "fabrik"], "version"')
     )
     (one,) = entrants("two.py")
-    assert [method.solver for method in one.called()] == ["My FABRIK, ccd", "My FABRIK, fabrik"]
+    assert one.titles == {"ccd": "My FABRIK, ccd", "fabrik": "My FABRIK, fabrik"}
 
 
 class Installed:
@@ -432,8 +437,8 @@ def test_one_start_of_robots_and_restarts_through_the_door_are_those_of_the_solv
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
 def test_a_request_calls_the_tool_as_the_protocol_says(name):
     """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
-    from plumbob.bench.entrants.robot import robot_inputs
-    from plumbob.bench.experiments.robots.evaluate import evaluator_of
+    from plumbob.bench.peers.ik.entrant import robot_inputs
+    from plumbob.bench.problems.evaluate import evaluator_of
     from plumbob.crosscheck.verify.kinematics.robot_models import tool_pose
     from plumbob.crosscheck.verify.task import TASKS
     from plumbob.reference import forward_kinematics
@@ -522,7 +527,7 @@ def test_problems_of_a_python_file_stand_in_the_same_tables(folder):
 
 
 def dry(folder, *words):
-    from plumbob.bench.entrants import outlook
+    from plumbob.commands import outlook
     from plumbob.commands.bench import Asked, _choice
 
     given = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--problem"]
@@ -552,7 +557,7 @@ OBJ += "".join(f"f {i} {i + 1} {i + 4} {i + 3}\n" for i in (1, 2, 4, 5))
     ("rule", "pinned"), [(None, [0, 8]), ("0,2", [0, 2]), ("top", [*range(9)])]
 )
 def test_an_obj_becomes_a_cloth_with_pins_by_a_rule(folder, rule, pinned):
-    from plumbob.bench.entrants import models
+    from plumbob.bench.problems import models
 
     (folder / "mesh.obj").write_text(OBJ)
     system, state = models.cloth(folder / "mesh.obj", rule)
@@ -573,8 +578,8 @@ URDF = """<robot name="r"><link name="b"/><link name="l1"/><link name="l2"/><lin
 
 
 def test_a_urdf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
-    from plumbob.bench.entrants import models
-    from plumbob.bench.experiments.robots.evaluate import Evaluator
+    from plumbob.bench.problems import models
+    from plumbob.bench.problems.evaluate import Evaluator
     from plumbob.reference import forward_kinematics
     from plumbob.reference.formats import urdf
 
@@ -598,8 +603,8 @@ MJCF = """<mujoco><compiler angle="radian"/><worldbody><body name="a" pos="0 0 .
 
 
 def test_an_mjcf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
-    from plumbob.bench.entrants import models
-    from plumbob.bench.experiments.robots.evaluate import Evaluator
+    from plumbob.bench.problems import models
+    from plumbob.bench.problems.evaluate import Evaluator
     from plumbob.reference import forward_kinematics
     from plumbob.reference.formats import mjcf
 
@@ -615,7 +620,7 @@ def test_an_mjcf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
 
 
 def test_a_slide_is_refused_by_its_name(folder):
-    from plumbob.bench.entrants import models
+    from plumbob.bench.problems import models
 
     path = folder / "slides.urdf"
     axis, limit = '<axis xyz="0 1 0"/>', '<limit lower="0" upper="1" effort="1" velocity="1"/>'
@@ -653,11 +658,11 @@ Frame Time: 0.01
 
 
 def test_a_bvh_becomes_targets_that_its_joints_can_reach(folder):
-    from plumbob.bench.entrants import models
+    from plumbob.bench.problems import models
 
     path = folder / "walk.bvh"
     path.write_text(BVH)
-    problems = models.skeletons(path, "head", count=5)
+    problems = models.skeletons(path, "walk", "head", count=5)
     assert [one.title for one in problems] == [
         "walk, joint space", "walk, outer shell", "walk, near the root"
     ]  # fmt: skip
@@ -669,7 +674,7 @@ def test_a_bvh_becomes_targets_that_its_joints_can_reach(folder):
         assert (distances >= 1.0 - 1e-9).all()
     assert away[1].min() > away[2].max()
     with pytest.raises(ValueError, match="effector: expected one of hip"):
-        models.skeletons(path, "tail")
+        models.skeletons(path, "walk", "tail")
 
 
 @pytest.mark.slow

@@ -15,10 +15,13 @@ import numpy as np
 import pytest
 from hostile_programs import LIMITS, running
 
-from plumbob.bench.entrants import chain
+from plumbob.bench.experiments.chain import measurement as chain
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.progress import TROUBLE, listening
-from plumbob.bench.harness.worker import NoAnswerError
+from plumbob.bench.peers import registry
+from plumbob.bench.peers.entrant import Entrant
+from plumbob.bench.peers.protocol import NoAnswerError
+from plumbob.bench.problems.chains import TargetsForSkeleton
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.greeting import Greeting
@@ -269,16 +272,21 @@ def worker():
     impatient.close()
 
 
+def solved(spec, targets):
+    """What the bench measures of an entrant that is asked for targets."""
+    (peer,) = registry.chain_peers([Entrant("hostile", "", spec, tasks=(TASK,))])
+    skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
+    problem = TargetsForSkeleton("", "", skeleton, SKELETON["local_rotations"], targets)
+    return chain.solve_one_by_one(problem, peer, chain.Limits(1e-4, HOSTILE), budget=60.0)
+
+
 @pytest.mark.parametrize("name", rows("bench", "claims -5 iterations"))
 def test_a_hostile_entrant_of_the_bench_reaches_nothing_by_it(tmp_path, monkeypatch, worker, name):
     """What is wrong with an answer costs the target; its time is never what it claims."""
     row = BEHAVIOURS[name]
     monkeypatch.setattr(chain, "worker_process", lambda: worker)
     (tmp_path / "solver.py").write_text(source(row.does, PYTHON))
-    skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
-    problem = chain.ChainProblem(skeleton, SKELETON["local_rotations"], TARGETS)
-    spec, limits = str(tmp_path / "solver.py"), chain.Limits(1e-4, HOSTILE)
-    measure = partial(chain.solve_chain, spec, "", problem, limits, budget=60.0)
+    measure = partial(solved, str(tmp_path / "solver.py"), TARGETS)
     if row.bench == SILENT:
         with pytest.raises(NoAnswerError, match=SILENT):
             measure()
@@ -313,14 +321,10 @@ def test_times_far_below_what_was_computed_are_not_ranked(tmp_path, monkeypatch,
     """Those of the first targets neither, which were claimed before it was seen."""
     monkeypatch.setattr(chain, "worker_process", lambda: worker)
     (tmp_path / "liar.py").write_text(HEAD + "    pass\n" + LIAR)
-    skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
     targets = np.array([[6.0 + i % 3, 1.0, 1.0] for i in range(12)])
-    problem = chain.ChainProblem(skeleton, SKELETON["local_rotations"], targets)
     announced = []
     with listening(announced.append):
-        found = chain.solve_chain(
-            (sys.executable, str(tmp_path / "liar.py")), "", problem, chain.Limits(1e-4, 9), 60.0
-        )
+        found = solved((sys.executable, str(tmp_path / "liar.py")), targets)
     worker.close()
     assert not running(tmp_path)
     (message,) = [one.message for one in announced if one.state == TROUBLE]

@@ -6,20 +6,16 @@ import sys
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.robots import LIMIT_TOLERANCE
-from plumbob.bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
-from plumbob.bench.experiments.robots.job import Job
-from plumbob.bench.experiments.robots.problem import CHARACTER, is_installed, robot
-from plumbob.bench.experiments.robots.targets import (
-    robot_targets,
-    uniform_targets,
-    unreachable_targets,
-)
 from plumbob.bench.harness import stopwatch
+from plumbob.bench.harness.job import Job
 from plumbob.bench.harness.worker import Solved
 from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
 from plumbob.bench.peers.ik.restarts import restarted
+from plumbob.bench.peers.protocol import OwnTime
 from plumbob.bench.peers.registry import ONE_START, OURS, PEERS, PLACO, RESTARTS
+from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
+from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, is_installed, robot
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several effectors.
@@ -174,7 +170,7 @@ def measuring(seconds):
     def ask(positions, rotations, start):
         def solve():
             attempts.append(start)
-            return SolverOutput(start, len(attempts) == 3, seconds)
+            return SolverOutput(start, len(attempts) == 3, seconds and OwnTime(seconds))
 
         return solve
 
@@ -187,7 +183,7 @@ def test_times_that_a_solver_measures_are_added_over_its_restarts(each, together
     nowhere = np.zeros((1, 3)), np.eye(3)[None], arm.draw(np.random.default_rng(0), 1)[0]
     answer = restarted(measuring(each), arm, 5)(*nowhere)()
     assert answer.claimed
-    assert answer.seconds == together
+    assert answer.time == (together and OwnTime(together))
 
 
 def test_every_entry_has_a_name_of_its_own_within_its_kind():
@@ -205,4 +201,4 @@ def test_the_choice_among_its_solutions_is_not_charged_to_eaik():
     ask = eaik.prepare(robot("ur5"), TOLERANCE)
     for x, R, start in zip(targets.positions, targets.rotations, targets.starts, strict=True):
         answer, whole = stopwatch.timed(ask(x, R, start))
-        assert 0 < answer.seconds < whole
+        assert 0 < answer.time.seconds < whole

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.arm.problem import MAX_SPACING, MIN_SPACING, arm_beyond, arm_curves
-from plumbob.bench.experiments.chain.problem import STRATA, chain_targets
 from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.problems.chains import STRATA, chain_targets
+from plumbob.bench.problems.curves import MAX_SPACING, MIN_SPACING, arm_beyond, arm_curves
 
 
 @pytest.mark.parametrize("stratum", STRATA)

@@ -11,10 +11,10 @@ import pytest
 from browser import CHROMIUM, Browser
 
 from plumbob import terminal
-from plumbob.bench.entrants import opening
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.harness.results import Results
+from plumbob.bench.peers import opening
 from plumbob.bench.report import outcome, report
 from plumbob.bench.report.sections import tables
 from plumbob.bench.report.standings import CLOTHS, standings

@@ -11,13 +11,13 @@ from ...harness import metrics
 from ...harness.record import Record
 from ...harness.results import Results, label, listed
 from ...peers import registry
+from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.columns import SOLVER, folded, least, number, text, words_in
 from ...tables.layout import Layout, source
 from ...tables.table import Column, Summary, Table, listing, words
 from ..published import problem as published
 from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, SOLVED, STABILITY, TARGETS, figures
 from .measurement import AMPLITUDE, BISECTION, GROWTH, REPEATS, STABILITY_SIZE, STABILITY_STEPS
-from .problem import FALLING, FRAME, GRAVITY, MASS, SIDE
 from .readings import Point, points
 
 # So near to the truth [m] a motion is hard to tell from it by eye.

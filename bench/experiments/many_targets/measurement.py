@@ -15,9 +15,9 @@ from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from ...peers.ik import plumbob
 from ...peers.registry import RESTARTS, Entry
-from ..robots.evaluate import Targets, Tolerance, evaluator_of
+from ...problems.evaluate import Targets, Tolerance, evaluator_of
+from ...problems.robots import title
 from ..robots.measurement import TOLERANCE, settings_of
-from ..robots.problem import title
 
 SUITE = "many_targets"
 ROBOT = "iiwa14"

@@ -13,7 +13,8 @@ import pytest
 
 from ...harness.progress import announce
 from ...harness.record import Key
-from ...harness.worker import Done, Found, Message, Unfit, describe
+from ...harness.worker import Done, Found, Message, Unfit
+from ...peers.protocol import describe
 from .case import Case
 from .cases import cases
 

@@ -3,6 +3,7 @@
 import functools
 import secrets
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -30,7 +31,8 @@ def blocks(scale: Scale) -> Iterator[Block]:
     for case in cases():
         measure = partial(timed, run, case, scale.seconds)
         name, settings = case.work.problem, case.settings
-        yield Block(TIMING, name, case.solver, measure, settings, scale.seconds, case.facts)
+        block = Block(TIMING, name, case.solver, measure, settings, scale.seconds, case.facts)
+        yield replace(block, budget=block.size)
 
 
 # What was found for cases that were measured together with another, by the run and the case; it is

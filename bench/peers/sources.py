@@ -1,13 +1,13 @@
-"""The files that an entrant is made of: their digest and their commit."""
+"""The files that a user's solver is made of: their digest and their commit."""
 
 import ast
 import hashlib
 import importlib.machinery
+import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ..harness.machine import git_commit
 from .entrant import Spec
 
 # Files of a program larger than this [B] are interpreters rather than somebody's solver.
@@ -16,8 +16,7 @@ _LARGEST = 1 << 26
 
 def digest_of(spec: Spec) -> str:
     """Return twelve hex digits over all files of a solver, "" if none is known."""
-    files = source_files(spec)
-    digest = hashlib.sha256()
+    files, digest = source_files(spec), hashlib.sha256()
     for path in files:
         digest.update(path.name.encode(errors="replace") + b"\0" + path.read_bytes())
     return digest.hexdigest()[:12] if files else ""
@@ -29,24 +28,32 @@ def commit_of(spec: Spec) -> str:
     return git_commit(files[0].parent, [str(path) for path in files]) if files else ""
 
 
+def git_commit(folder: Path, paths: Sequence[str]) -> str:
+    """Return the commit of a folder, and whether these paths differ from it; "" outside of git."""
+    git = ["git", "-C", str(folder)]
+    try:
+        head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, check=True)
+        status = [*git, "status", "--porcelain", "--", *paths]
+        changed = subprocess.run(status, capture_output=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError):  # no git, or no commit yet
+        return ""
+    return head.stdout.decode().strip() + (" with changes" if changed else "")
+
+
 def source_files(spec: Spec) -> list[Path]:
     """Return the files of a Python file, of a module, or of a command, the main one first.
 
     Of a Python file those of its own folder that it imports belong to it, of a module its package.
     """
     if not isinstance(spec, str):
-        return _files_of_command(spec)
+        paths = [Path(word).resolve() for word in spec if "/" in word or "." in word]
+        return list(filter(_is_source, paths))
     place = spec.partition(":")[0]
     if place.endswith(".py"):
         return list(dict.fromkeys(_with_imports(Path(place).resolve(), set())))
     if Path(place).is_file():
-        return _files_of_command([place])
+        return list(filter(_is_source, [Path(place).resolve()]))
     return _files_of_module(place)
-
-
-def _files_of_command(words: Sequence[str]) -> list[Path]:
-    paths = [Path(word).resolve() for word in words if "/" in word or "." in word]
-    return [path for path in paths if _is_source(path)]
 
 
 def _is_source(path: Path) -> bool:
@@ -80,11 +87,10 @@ def _imported(path: Path) -> Iterator[str]:
 
 
 def _files_of_module(name: str) -> list[Path]:
-    found = importlib.machinery.PathFinder.find_spec(
-        name.split(".")[0], [str(Path.cwd()), *sys.path]
-    )
-    if found is None or not found.origin:
+    path = [str(Path.cwd()), *sys.path]
+    package = importlib.machinery.PathFinder.find_spec(name.split(".")[0], path)
+    if package is None or not package.origin:
         return []
-    folders = [Path(folder) for folder in found.submodule_search_locations or ()]
+    folders = [Path(folder) for folder in package.submodule_search_locations or ()]
     inside = sorted(path for folder in folders for path in folder.rglob("*.py"))
-    return list(dict.fromkeys([Path(found.origin), *inside]))
+    return list(dict.fromkeys([Path(package.origin), *inside]))

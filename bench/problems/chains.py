@@ -1,15 +1,15 @@
 """Position targets for a chain of ten ball joints, from seeded random poses."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from plumbob.reference import Skeleton, scenes
-from plumbob.reference.arguments import FloatArray, choice
-
-from . import BEYOND
+from plumbob.reference.arguments import FloatArray, IndexArray, choice
 
 BALLS = 10
+BEYOND = "beyond"
 
 # How far targets lie from the root, as shares of the reach; uniform within the shell.
 STRATA = {"near": (0.05, 0.4), "far": (0.6, 0.95), "edge": (0.99, 0.9999), BEYOND: (1.01, 2.0)}
@@ -33,6 +33,33 @@ class TargetsForSkeleton:
     skeleton: Skeleton
     starts: FloatArray
     targets: FloatArray
+
+    @property
+    def every_start(self) -> FloatArray:
+        """The start for each target, (target, joint, 4)."""
+        shape = (len(self.targets), self.skeleton.joint_count, 4)
+        return np.broadcast_to(self.starts, shape)
+
+
+class ChainRequests(NamedTuple):
+    """Targets as a user's solver is asked for them, one by one.
+
+    Attributes:
+        problem: the targets.
+        iterations: how many are allowed for each of them, (target,).
+    """
+
+    problem: TargetsForSkeleton
+    iterations: IndexArray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The number of targets, and of numbers of an answer: iterations, then positions."""
+        return len(self.iterations), 1 + 3 * self.problem.skeleton.joint_count
+
+    def request(self, i: int) -> tuple[FloatArray, FloatArray, int]:
+        """Return a target, the start and the iterations that are allowed."""
+        return self.problem.targets[i], self.problem.every_start[i], int(self.iterations[i])
 
 
 def chain_targets(stratum: str, count: int) -> TargetsForSkeleton:

@@ -23,6 +23,8 @@ from plumbob.reference.arguments import FloatArray, choice
 PACKAGE = "example-robot-data"
 _FOLDER = "cmeel.prefix/share/example-robot-data/robots"
 TWO_REVOLUTIONS = 4.0 * math.pi
+# A limit counts as kept to this [rad]; some peers keep limits in single precision.
+LIMIT_TOLERANCE = 1e-6
 
 
 class AbsentError(Exception):

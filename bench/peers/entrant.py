@@ -1,24 +1,15 @@
 """A solver that a user entered: what it is called, where it comes from, what it offers."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 # What `open_contestant` takes: a Python file or object, or a command.
 Spec = str | tuple[str, ...]
 
+CHAIN_TASK, ROBOT_TASK = "inverse_kinematics", "robot_inverse_kinematics"
+STEP_TASK, MOTION_TASK = "mass_spring_step", "mass_spring_motion"
 # The tasks that each suite asks of an entrant.
-SUITE_TASKS = {
-    "ik": ("inverse_kinematics", "robot_inverse_kinematics"),
-    "cloth": ("mass_spring_step", "mass_spring_motion"),
-}
-
-
-class Method(NamedTuple):
-    """A method of an entrant: what it is asked for by, and how its rows are called."""
-
-    name: str
-    solver: str
+SUITE_TASKS = {"ik": (CHAIN_TASK, ROBOT_TASK), "cloth": (STEP_TASK, MOTION_TASK)}
 
 
 @dataclass(frozen=True)
@@ -47,11 +38,11 @@ class Entrant:
     methods: tuple[str, ...] = ("",)
     step: str | None = None
 
-    def called(self) -> Iterator[Method]:
-        """Yield its methods of inverse kinematics, each with the name of its rows."""
-        for method in self.methods:
-            several = method and len(self.methods) > 1
-            yield Method(method, f"{self.name}, {method}" if several else self.name)
+    @property
+    def titles(self) -> dict[str, str]:
+        """The names of its rows, by its methods of inverse kinematics."""
+        several = len(self.methods) > 1
+        return {m: f"{self.name}, {m}" if m and several else self.name for m in self.methods}
 
     @property
     def facts(self) -> dict[str, Any]:

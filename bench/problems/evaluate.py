@@ -13,8 +13,7 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from . import LIMIT_TOLERANCE
-from .problem import Robot, robot
+from .robots import LIMIT_TOLERANCE, Robot, robot
 
 
 class Tolerance(NamedTuple):
@@ -38,6 +37,19 @@ class Targets(NamedTuple):
     rotations: FloatArray
     starts: FloatArray
     strata: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The number of targets, and of coordinates."""
+        return len(self.starts), self.starts.shape[-1]
+
+    def request(self, i: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return what a solver is asked for."""
+        return self.positions[i], self.rotations[i], self.starts[i].copy()
+
+    def after(self, count: int) -> "Targets":
+        """Return the targets after the first ones."""
+        return Targets(*(part[count:] for part in self))
 
 
 class Evaluation(NamedTuple):

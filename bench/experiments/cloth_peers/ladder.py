@@ -7,8 +7,8 @@ Each is a point in a work-precision diagram.
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from ...experiments.cloth_peers.problem import explicit_substeps
-from ..registry import EXPLICIT, LINEARISED, UNDECLARED, ClothPeer
+from ...peers.registry import EXPLICIT, LINEARISED, UNDECLARED, ClothPeer
+from ...problems.falling_cloth import explicit_substeps
 
 # Explicit steps, for those at symplectic Euler's limit of stability.
 MARGINS = (1.1, 2.0, 4.0)
@@ -56,7 +56,7 @@ def _rungs(
 
 
 def _rung(peer: ClothPeer, label: str, **settings: float) -> Rung:
-    return Rung(label, {**peer.settings, **settings})
+    return Rung(label, {**peer.settings, **peer.spec, **settings})
 
 
 def _counted(count: int, name: str) -> str:

@@ -2,15 +2,25 @@
 
 from dataclasses import dataclass
 
+from plumbob.crosscheck.verify.message import shown
 from plumbob.reference import MassSpring, State
 
-from ..experiments.chain.problem import TargetsForSkeleton
-from ..experiments.robots.problem import Robot
+from ..text import visible
+from .chains import TargetsForSkeleton
+from .robots import Robot
+
+# Letters of a name that a user gives to a problem or a solver.
+_LONGEST = 60
+
+
+def clean(name: str) -> str:
+    """Return a name on one line, without what cannot be shown."""
+    return shown(visible(name.encode(errors="replace").decode()), _LONGEST)
 
 
 @dataclass(frozen=True, eq=False)
 class OwnProblem:
-    """A problem that a user entered.
+    """A problem that a user entered: one of targets of balls, a chain of hinges, or a cloth.
 
     Attributes:
         name: as it stands in tables.
@@ -33,8 +43,7 @@ class OwnProblem:
     @property
     def recorded(self) -> list[str]:
         """The names of its problems in records."""
-        if self.robot is not None:
-            return [f"robots/{self.name}", f"unreachable/{self.name}"]
-        if self.cloth is not None:
-            return [f"peers/one step/{self.name}", f"peers/motion/{self.name}"]
-        return [f"chain/{self.name}"]
+        if self.targets is not None:
+            return [self.targets.name]
+        kinds = ("robots", "unreachable") if self.robot else ("peers/one step", "peers/motion")
+        return [f"{kind}/{self.name}" for kind in kinds]

@@ -10,14 +10,12 @@ from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.message import shown
 from plumbob.crosscheck.verify.solvers import LIMITS, open_contestant
 
-from ..peers import registry
-from ..text import visible
+from ..problems.own import clean
+from . import registry
 from .entrant import SUITE_TASKS, Entrant, Spec
 from .sources import commit_of, digest_of
 
 GROUP = "plumbob.solvers"
-# Letters of a name.
-_LONGEST = 60
 
 
 class Entry(NamedTuple):
@@ -37,9 +35,7 @@ def named(words: Sequence[str], program: Sequence[str] = ()) -> list[Entry]:
         program: a command and its arguments.
     """
     entries = [_entry(word) for word in words]
-    if program:
-        entries.append(Entry(" ".join(program), tuple(program)))
-    return entries
+    return [*entries, Entry(" ".join(program), tuple(program))] if program else entries
 
 
 def _entry(word: str) -> Entry:
@@ -49,21 +45,20 @@ def _entry(word: str) -> Entry:
     if not door:
         raise ValueError(f"with: expected NAME=FILE, got {word!r}")
     place, colon, attribute = door.partition(":")
-    if Path(place).exists():
-        return Entry(door, f"{Path(place).resolve()}{colon}{attribute}", called)
-    return Entry(door, door, called)
+    is_file = Path(place).exists()
+    return Entry(door, f"{Path(place).resolve()}{colon}{attribute}" if is_file else door, called)
 
 
 def installed() -> list[Entry]:
     """Return the solvers that installed packages offer as entry points."""
-    found = importlib.metadata.entry_points(group=GROUP)
+    points = importlib.metadata.entry_points(group=GROUP)
     return [
         Entry(
             f"{point.name} of {point.dist.name}" if point.dist else point.name,
             point.value.replace(" ", "") + ("" if ":" in point.value else ":"),
             version=point.dist.version if point.dist else "",
         )
-        for point in sorted(found, key=lambda point: (point.name, point.value))
+        for point in sorted(points, key=lambda point: (point.name, point.value))
     ]
 
 
@@ -75,9 +70,22 @@ def opened(entries: Sequence[Entry], suites: Sequence[str]) -> list[Entrant]:
             of another.
     """
     entrants = [_opened(entry) for entry in entries]
+    doors: dict[str, str] = {}
     for entrant in entrants:
-        _check_tasks(entrant, suites)
-    _check_names(entrants)
+        if not any(map(entrant.offers, suites)):
+            asked = [f"{suite} ({', '.join(tasks)})" for suite, tasks in SUITE_TASKS.items()]
+            raise ValueError(
+                f"with: expected a solver for one of the suites that are run; {entrant.door} "
+                f"offers {', '.join(entrant.tasks)}, and suites that ask entrants are "
+                f"{' and '.join(asked)}"
+            )
+    for entrant in entrants:
+        before = doors.setdefault(entrant.name.casefold(), entrant.door)
+        if before is not entrant.door:
+            raise ValueError(
+                f"with: expected solvers of different names, got {entrant.name!r} twice, {before} "
+                f"and {entrant.door}; call one otherwise: --with 'another name={entrant.door}'"
+            )
     return entrants
 
 
@@ -92,16 +100,14 @@ def opened_where_possible(
     for entry in entries:
         try:
             entrant = _opened(entry)
+            if not any(map(entrant.offers, suites)):
+                continue
+            if entrant.name.casefold() in names:
+                raise ValueError(f"there is a solver called {entrant.name!r} already")
+            names.add(entrant.name.casefold())
+            yield entrant
         except ValueError as error:
             yield f"{entry.door} takes no part: {error}"
-            continue
-        if not any(entrant.offers(suite) for suite in suites):
-            continue
-        if entrant.name.casefold() in names:
-            yield f"{entry.door} takes no part: there is a solver called {entrant.name!r} already"
-            continue
-        names.add(entrant.name.casefold())
-        yield entrant
 
 
 def _opened(entry: Entry) -> Entrant:
@@ -109,9 +115,9 @@ def _opened(entry: Entry) -> Entrant:
     try:
         greeting = contestant.greeting
     except NoGreetingError as error:
+        why = shown(str(error.failure.sentence), 300)
         raise ValueError(
-            f"with: expected a solver that says what it is, got {entry.door}: "
-            f"{shown(str(error.failure.sentence), 300)}"
+            f"with: expected a solver that says what it is, got {entry.door}: {why}"
         ) from None
     finally:
         contestant.close()
@@ -123,7 +129,7 @@ def _opened(entry: Entry) -> Entrant:
         commit_of(entry.spec),
         digest_of(entry.spec),
         greeting.tasks,
-        tuple(clean(method) for method in greeting.methods),
+        tuple(map(clean, greeting.methods)),
         greeting.step.method,
     )
 
@@ -135,31 +141,5 @@ def _name(entry: Entry, greeting: Greeting) -> str:
         words = entry.spec if isinstance(entry.spec, tuple) else (entry.spec,)
         said = Path(words[0].partition(":")[0]).name
     name = clean(entry.called or said) or clean(entry.door)
-    taken = {one.casefold() for one in registry.names()}
+    taken = {taken.casefold() for taken in registry.names()}
     return f"{name} ({clean(entry.door)})" if name.casefold() in taken else name
-
-
-def clean(text: str) -> str:
-    """Return a text on one line, without what cannot be shown."""
-    return shown(visible(text.encode(errors="replace").decode()), _LONGEST)
-
-
-def _check_tasks(entrant: Entrant, suites: Sequence[str]) -> None:
-    if any(entrant.offers(suite) for suite in suites):
-        return
-    asked = [f"{suite} ({', '.join(SUITE_TASKS[suite])})" for suite in SUITE_TASKS]
-    raise ValueError(
-        f"with: expected a solver for one of the suites that are run; {entrant.door} offers "
-        f"{', '.join(entrant.tasks)}, and suites that ask entrants are {' and '.join(asked)}"
-    )
-
-
-def _check_names(entrants: Sequence[Entrant]) -> None:
-    doors: dict[str, str] = {}
-    for entrant in entrants:
-        before = doors.setdefault(entrant.name.casefold(), entrant.door)
-        if before is not entrant.door:
-            raise ValueError(
-                f"with: expected solvers of different names, got {entrant.name!r} twice, {before} "
-                f"and {entrant.door}; call one otherwise: --with 'another name={entrant.door}'"
-            )

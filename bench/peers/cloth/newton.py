@@ -1,64 +1,78 @@
-"""Particles and springs as a model of Newton, the engine, in single precision.
+"""Newton, the engine, in single precision: particles and springs, by one of its solvers.
+
+- semi-implicit: symplectic Euler.
+- VBD: vertex block descent minimises the objective of implicit Euler (Chen et al. 2024). One after
+  the other, each particle takes a Newton step of its own, those of one colour at once; so
+  neighbours must differ in colour.
+- XPBD: extended position based dynamics (Macklin, Müller, Chentanez 2016) corrects all springs at
+  once and adds what each wants of a particle, without averaging.
 
 Collisions between particles are left out, as the reference has none. A pinned particle has mass
 zero. A spring's rest length would be taken from the particles' places, and is overwritten.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import newton
 import numpy as np
 import warp as wp
+from newton.solvers import SolverSemiImplicit, SolverVBD, SolverXPBD
 
 from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray, IndexArray
 
-Solver = Callable[[Any], Any]
+from .protocol import Mover
+
+SOLVERS: dict[str, Any] = {
+    "semi-implicit": SolverSemiImplicit,
+    "VBD": SolverVBD,
+    "XPBD": SolverXPBD,
+}
 
 
-class NewtonSteps:
-    """Steps of one of Newton's solvers, so many a frame.
+def prepare(
+    system: MassSpring,
+    frame: float,
+    solver: str = "VBD",
+    substeps: int = 1,
+    own: int = 0,
+    **limits: int,
+) -> Mover:
+    """Return a solver, stepping so many times a frame, with `iterations` a step if it iterates.
 
-    Attributes:
-        model: the newton.Model.
+    With `own`, VBD goes by the colours that Newton gives, not by those of the springs.
     """
+    wp.config.log_level = wp.LOG_ERROR
+    with wp.ScopedDevice("cpu"):
+        particles = model(system, own_colours=bool(own))
+        return _Steps(particles, SOLVERS[solver](particles, **limits), frame / substeps, substeps)
 
-    def __init__(
-        self, system: MassSpring, frame: float, substeps: int, solver: Solver, *,
-        own_colours: bool = False,
-    ) -> None:  # fmt: skip
-        """Build the model; `solver` makes the solver for it.
 
-        With `own_colours` the particles are coloured by Newton, which sees no springs.
-        """
-        wp.config.log_level = wp.LOG_ERROR
-        with wp.ScopedDevice("cpu"):
-            self.model = model(system, own_colours=own_colours)
-            self._now, self._next = self.model.state(), self.model.state()
-            self._solver, self._control = solver(self.model), self.model.control()
-        self._substeps, self._h = substeps, frame / substeps
+class _Steps:
+    """Steps of one of Newton's solvers, so many a frame."""
+
+    def __init__(self, particles: Any, solver: Any, h: float, substeps: int) -> None:
+        self._now, self._next = particles.state(), particles.state()
+        self._solver, self._control = solver, particles.control()
+        self._substeps, self._h = substeps, h
 
     def begin(self, state: State) -> None:
-        """Put the particles into a state."""
         for mine in (self._now, self._next):
             mine.particle_q.assign(state.positions.astype(np.float32))
             mine.particle_qd.assign(state.velocities.astype(np.float32))
 
     def advance(self) -> None:
-        """Take the steps of one frame."""
         for _ in range(self._substeps):
             self._now.clear_forces()
             self._solver.step(self._now, self._next, self._control, None, self._h)
             self._now, self._next = self._next, self._now
 
     def positions(self) -> FloatArray:
-        """Return where the particles are [m], (particle, 3)."""
         return np.array(self._now.particle_q.numpy(), dtype=float)
 
 
 def model(system: MassSpring, *, own_colours: bool = False) -> Any:
-    """Return the model, coloured by its springs, or by Newton if `own_colours`."""
+    """Return the model, coloured by its springs, or by Newton, which sees none."""
     builder = newton.ModelBuilder(gravity=wp.vec3(*system.gravity))
     nowhere = wp.vec3(0.0, 0.0, 0.0)
     for mass, free in zip(system.masses, system.free, strict=True):
@@ -69,10 +83,10 @@ def model(system: MassSpring, *, own_colours: bool = False) -> Any:
         builder.color()
     else:
         builder.set_coloring(colours(system.springs, system.particle_count))
-    made: Any = builder.finalize(device="cpu")
-    made.spring_rest_length.assign(system.rest_lengths.astype(np.float32))
-    made.particle_grid = None
-    return made
+    particles: Any = builder.finalize(device="cpu")
+    particles.spring_rest_length.assign(system.rest_lengths.astype(np.float32))
+    particles.particle_grid = None
+    return particles
 
 
 def colours(springs: IndexArray, particle_count: int) -> list[IndexArray]:

@@ -1,13 +1,17 @@
-"""The lab's arm drawing the named curves, and reaching for what is too far away."""
+"""Curves followed by the lab's arm and a robot of seven hinges; targets that are too far away."""
 
+import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from plumbob.reference import Articulation, Skeleton, curves, resample, scenes
 from plumbob.reference.arguments import FloatArray
+from plumbob.reference.formats import urdf
 
-from ..chain.problem import TargetsForSkeleton, unit
+from .chains import TargetsForSkeleton, unit
+from .robots import robot
 
 # Samples of each curve, as the lab takes them; the custom curve is resampled from a raw drawing.
 FRAMES = {"circle": 150, "square": 150, "heart": 150, "triangle": 150, "star": 400}
@@ -17,6 +21,15 @@ MIN_SPACING = 0.01
 MAX_SPACING = 0.02
 BEYOND = (1.01, 2.0)
 _SEED = 1986
+# Closed curves, and where a robot draws them.
+ARM_CURVES = ("circle", "heart", "triangle", "star")
+ROBOT, ROBOT_CURVES = "iiwa14", ("circle", "heart")
+# A pose with the elbow bent and the wrist over the table [°], and where the curves are drawn [m]:
+# upright, in front of the robot, so small that all of it is within reach.
+_START = (0.0, 35.0, 0.0, 80.0, 0.0, 65.0, 0.0)
+_CENTRE, _SCALE = (0.5, 0.0, 0.5), 0.4
+# Frames of the heart where it is drawn several times.
+DRIFT_FRAMES = 60
 
 
 @dataclass(frozen=True)
@@ -71,3 +84,35 @@ def arm_beyond(count: int) -> TargetsForSkeleton:
     distances = skeleton.reach() * rng.uniform(*BEYOND, count)
     targets = skeleton.offsets[0] + distances[:, None] * unit(rng.standard_normal((count, 3)))
     return TargetsForSkeleton("arm/beyond", "arm, beyond", skeleton, rest, targets)
+
+
+@functools.cache
+def arm_closed_curves() -> Sequence[FollowedCurve]:
+    """Return the lab's arm on the lab's curves; the custom one evened out, its ends joined."""
+    skeleton, rest = scenes.lab_arm()
+    drawn = {name: curves[name](FRAMES[name]) for name in ARM_CURVES}
+    spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
+    drawn[CUSTOM] = resample(custom_curve(), closed=True, **spacing)
+    return [
+        FollowedCurve(f"arm/{name}", f"arm, {spaced(name)}", skeleton, rest, curve)
+        for name, curve in drawn.items()
+    ]
+
+
+def robot_closed_curves() -> list[FollowedCurve]:
+    """Return a robot arm of seven hinges with limits on two of the curves."""
+    arm = urdf.parse(robot(ROBOT).text).articulation
+    drawn = {name: _SCALE * curves[name](FRAMES[name])[:, [0, 2, 1]] for name in ROBOT_CURVES}
+    return [
+        FollowedCurve(
+            f"{ROBOT}/{name}", f"{ROBOT}, {name}", arm, np.radians(_START), curve + _CENTRE
+        )
+        for name, curve in drawn.items()
+    ]
+
+
+def heart_three_times() -> FollowedCurve:
+    """Return the lab's arm on the heart, three times over."""
+    skeleton, rest = scenes.lab_arm()
+    thrice = np.tile(curves["heart"](DRIFT_FRAMES), (3, 1))
+    return FollowedCurve("drift/heart", "drift, heart", skeleton, rest, thrice)

@@ -18,6 +18,8 @@ from plumbob.reference import MassSpring, State, scenes, symplectic_euler
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import stiffness_matrix
 
+from .own import OwnProblem
+
 SIDE, MASS, GRAVITY = 2.0, 1.0, 9.81
 STIFFNESSES = (1e2, 1e3, 1e4)
 FRAME = 1 / 60
@@ -40,7 +42,6 @@ class FallingCloth:
         frequency: the highest there [rad/s].
         frame: the length of a frame [s].
         extent: how wide it is [m].
-        name: of a user's cloth, "" for ours.
     """
 
     size: int
@@ -50,7 +51,6 @@ class FallingCloth:
     frequency: float
     frame: float = FRAME
     extent: float = SIDE
-    name: str = ""
 
     @property
     def beat(self) -> float:
@@ -58,13 +58,16 @@ class FallingCloth:
         return self.frequency * self.frame / FRAME
 
 
-def own_cloth(name: str, system: MassSpring, start: State, frame: float) -> FallingCloth:
+@functools.lru_cache(maxsize=4)
+def own_cloth(problem: OwnProblem) -> FallingCloth:
     """Return a user's cloth, which falls from the state that it is given in."""
+    assert problem.cloth is not None
+    system, start = problem.cloth
     frequency = highest_frequency(system, start.positions)
     extent = float(np.ptp(start.positions, axis=0).max())
     stiffness = float(system.stiffnesses.mean())
     known = (system.particle_count, stiffness, system, start, frequency)
-    return FallingCloth(*known, frame, extent, name)
+    return FallingCloth(*known, problem.h, extent)
 
 
 @functools.cache

@@ -5,16 +5,15 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from plumbob.bench.experiments import SCALES, blocks
+from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
+from plumbob.bench.experiments.robots import REACHABLE, UNREACHABLE
+from plumbob.bench.harness.block import Block, Scale
+from plumbob.bench.harness.choice import Choice
+from plumbob.bench.peers import registry
+from plumbob.bench.peers.entrant import Entrant
+from plumbob.bench.problems.own import OwnProblem
 from plumbob.reference.arguments import name_list
-
-from ..experiments import SCALES, blocks
-from ..experiments.published import TOOLBOX, TRAC_IK
-from ..experiments.robots import REACHABLE, UNREACHABLE
-from ..harness.block import Block, Scale
-from ..harness.choice import Choice
-from ..peers import registry
-from .entrant import Entrant
-from .problems import OwnProblem
 
 # The tasks whose problems are robots.
 OF_ROBOTS = (REACHABLE, UNREACHABLE, TRAC_IK, TOOLBOX)
@@ -44,15 +43,10 @@ def scale_of(
     Raises:
         ValueError: if the number is none.
     """
-    known = SCALES[name]
     if targets is not None and targets < 1:
         raise ValueError(f"targets: expected 1 or more, got {targets}")
-    return replace(
-        known,
-        targets=targets or known.targets,
-        entrants=tuple(entrants),
-        problems=tuple(problems),
-    )
+    scale = replace(SCALES[name], entrants=tuple(entrants), problems=tuple(problems))
+    return replace(scale, targets=targets or scale.targets)
 
 
 def choose(suites: Sequence[str], name: str, scale: Scale, wanted: Wanted) -> Choice:
@@ -63,12 +57,12 @@ def choose(suites: Sequence[str], name: str, scale: Scale, wanted: Wanted) -> Ch
     """
     if not any((wanted.solvers, wanted.problems, wanted.robots)):
         return Choice(name, scale, is_partial=wanted.targets is not None)
-    there = [block for suite in suites for block in blocks(suite, scale)]
-    solvers = _meant("solver", wanted.solvers, _names_of(there, _solver_names))
-    problems = _meant("problem", wanted.problems, _names_of(there, _problem_names))
-    problems += _meant("robot", wanted.robots, _names_of(there, _robot_names))
+    every = [block for suite in suites for block in blocks(suite, scale)]
+    solvers = _meant("solver", wanted.solvers, every, _solver_names)
+    problems = _meant("problem", wanted.problems, every, _problem_names)
+    problems += _meant("robot", wanted.robots, every, _robot_names)
     choice = Choice(name, scale, tuple(solvers), tuple(problems), is_partial=True)
-    if not any(map(choice.takes, there)):
+    if not any(map(choice.takes, every)):
         asked = " and ".join(filter(None, map(name_list, (wanted.problems, wanted.robots))))
         raise ValueError(
             f"solver: expected one that is asked {asked or 'something'} in {', '.join(suites)}, "
@@ -77,19 +71,7 @@ def choose(suites: Sequence[str], name: str, scale: Scale, wanted: Wanted) -> Ch
     return choice
 
 
-# The name in records that a name on the command line stands for, one or several.
-_Names = dict[str, list[str]]
-
-
-def _names_of(there: Iterable[Block], read: Callable[[Block], tuple[str, list[str]]]) -> _Names:
-    names: _Names = {}
-    for block in there:
-        recorded, called = read(block)
-        for name in called:
-            names.setdefault(name, []).append(recorded)
-    return {name: list(dict.fromkeys(of)) for name, of in names.items()}
-
-
+# Each returns the name in records, and the names that stand for it on the command line.
 def _solver_names(block: Block) -> tuple[str, list[str]]:
     """Return a solver's names: in records, in tables, and without what distinguishes its rows."""
     solver = block.solver
@@ -104,20 +86,28 @@ def _problem_names(block: Block) -> tuple[str, list[str]]:
 
 
 def _robot_names(block: Block) -> tuple[str, list[str]]:
-    problem = block.problem
-    robot = problem.rpartition("/")[2]
-    return problem, [robot] if block.facts.get("task") in OF_ROBOTS and robot != "all" else []
+    robot = block.problem.rpartition("/")[2]
+    is_robot = block.facts.get("task") in OF_ROBOTS and robot != "all"
+    return block.problem, [robot] if is_robot else []
 
 
-def _meant(kind: str, wanted: Sequence[str], names: _Names) -> list[str]:
+def _meant(
+    kind: str, words: Sequence[str], every: Iterable[Block],
+    read: Callable[[Block], tuple[str, list[str]]],
+) -> list[str]:  # fmt: skip
+    """Return the names in records, one or several each, that words stand for."""
+    names: dict[str, list[str]] = {}
+    for recorded, called in map(read, every):
+        for name in called:
+            names.setdefault(name, []).append(recorded)
     simple = {name.casefold(): name for name in reversed(names)}
-    found: list[str] = []
-    for word in wanted:
-        name = word if word in names else simple.get(word.casefold())
-        if name is None:
+    meant: list[str] = []
+    for word in words:
+        name = word if word in names else simple.get(word.casefold(), "")
+        if not name:
             raise ValueError(f"unknown {kind} {word!r}: {_hint(word, simple)}")
-        found += names[name]
-    return list(dict.fromkeys(found))
+        meant += names[name]
+    return list(dict.fromkeys(meant))
 
 
 def _hint(word: str, simple: dict[str, str]) -> str:

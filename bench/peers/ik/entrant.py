@@ -1,4 +1,4 @@
-"""An entrant as a solver for robots: hinges in a row, a tool, poses within limits."""
+"""A user's solver for robots: hinges in a row, a tool, poses within limits."""
 
 from typing import Any
 
@@ -6,45 +6,38 @@ import numpy as np
 
 from plumbob.crosscheck.verify.kinematics import robot_models
 from plumbob.reference import rotation
-from plumbob.reference.arguments import FloatArray
 
-from ..experiments.robots.evaluate import Tolerance
-from ..experiments.robots.problem import Robot, links
-from ..harness.worker import NoAnswerError
-from ..peers.ik.protocol import Solve, SolverOutput, UnableError
-from .contestants import asked, remark
-from .entrant import Spec
+from ...problems.robots import links
+from ..contestant import opened, remark
+from ..entrant import ROBOT_TASK, Spec
+from ..protocol import NoAnswerError
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, UnableError
 
-__all__ = ["TASK", "prepare", "remark", "robot_inputs"]
+__all__ = ["prepare", "remark", "robot_inputs"]
 
-TASK = "robot_inverse_kinematics"
 ITERATIONS = 200
 
 
-def prepare(robot: Robot, tolerance: Tolerance, spec: Spec = "") -> Any:
-    """Return an entrant, set up for a robot.
+def prepare(robot: Robot, tolerance: Tolerance, spec: Spec = "") -> Ask:
+    """Return a user's solver, set up for a robot.
 
     Raises:
         UnableError: for a robot that the protocol has no words for.
     """
     if not robot.is_chain:
         raise UnableError("not asked: the protocol has hinges and one effector, no balls")
-    solver, known = asked(spec), robot_inputs(robot)
+    solver, known = opened(spec), robot_inputs(robot)
     known |= {"tolerance": tolerance.position, "tolerance_rotation": tolerance.rotation}
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        inputs = {
-            **known,
-            "start": start,
-            "target_position": positions[0],
-            "target_rotation": rotation.from_matrix(rotations[0]),
-        }
+        target = {"target_position": positions[0]}
+        target["target_rotation"] = rotation.from_matrix(rotations[0])
 
         def solve() -> SolverOutput:
-            values = solver.answer(TASK, inputs).values
+            values, time = solver.answer(ROBOT_TASK, {**known, **target, "start": start})
             if "q" not in values:
                 raise NoAnswerError("It answered no q.")
-            return SolverOutput(values["q"], values.get("converged"))
+            return SolverOutput(values["q"], values.get("converged"), time)
 
         return solve
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ..chain.problem import random_rotations, unit
+from .chains import random_rotations, unit
 from .evaluate import Evaluator, Targets, evaluator_of
-from .problem import links, seed_of
+from .robots import links, seed_of
 
 STRATA = {
     "joint space": "uniform in joint space",

@@ -16,8 +16,8 @@ from plumbob.reference import (
 from plumbob.reference.arguments import FloatArray, IndexArray, name_list
 from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
 
-from ..experiments.chain.problem import TargetsForSkeleton, random_rotations
-from ..experiments.robots.problem import TWO_REVOLUTIONS, Robot, chain_from
+from .chains import TargetsForSkeleton, random_rotations
+from .robots import TWO_REVOLUTIONS, Robot, chain_from
 
 # Of cloths from meshes.
 STIFFNESS, MASS = 1000.0, 1.0
@@ -39,12 +39,11 @@ def robot(path: Path, name: str, effector: str | None) -> Robot:
     model = read(path).articulation
     tip = _effector(model.skeleton, model.names, effector)
     steps = [int(j) for j in model.skeleton.path(tip)]
-    for j in steps:
-        if model.kinds[j] not in ("hinge", "fixed") or j in model.mimics:
-            kind = "mimic joint" if j in model.mimics else model.kinds[j]
-            raise ValueError(f"{path}: expected hinges to {model.names[tip]!r}, got a {kind}")
-    if not any(model.kinds[j] == "hinge" for j in steps):
-        raise ValueError(f"{path}: expected hinges to {model.names[tip]!r}, got none")
+    kinds = ["mimic joint" if j in model.mimics else model.kinds[j] for j in steps]
+    others = [f"a {kind}" for kind in kinds if kind not in ("hinge", "fixed")]
+    if others or "hinge" not in kinds:
+        found = [*others, "none"][0]
+        raise ValueError(f"{path}: expected hinges to {model.names[tip]!r}, got {found}")
     text, root, last = _urdf(model, steps)
     return chain_from(name, name, text, root, last)
 
@@ -61,27 +60,22 @@ def _effector(skeleton: Skeleton, names: tuple[str, ...], effector: str | None) 
 
 def _urdf(model: Articulation, steps: list[int]) -> tuple[str, str, str]:
     """Return the path as URDF, with the names of its root and its effector."""
-    tree = ElementTree.Element("robot", name="robot")
-    names = [f"{i}_{model.names[j]}" for i, j in enumerate(steps)]
-    for link in ("base", *names):
+    tree, half = ElementTree.Element("robot", name="robot"), TWO_REVOLUTIONS / 2
+    names = ["base", *(f"{i}_{model.names[j]}" for i, j in enumerate(steps))]
+    for link in names:
         ElementTree.SubElement(tree, "link", name=link)
-    for i, j in enumerate(steps):
-        is_hinge = model.kinds[j] == "hinge"
-        kind = "revolute" if is_hinge else "fixed"
-        joint = ElementTree.SubElement(tree, "joint", name=f"joint_{names[i]}", type=kind)
-        origin = {
-            "xyz": _numbers(model.skeleton.offsets[j]),
-            "rpy": _numbers(_rpy(model.frames[j])),
-        }
-        ElementTree.SubElement(joint, "origin", origin)
-        ElementTree.SubElement(joint, "parent", link=names[i - 1] if i else "base")
-        ElementTree.SubElement(joint, "child", link=names[i])
-        if is_hinge:
+    for parent, child, j in zip(names, names[1:], steps, strict=False):
+        kind = "revolute" if model.kinds[j] == "hinge" else "fixed"
+        joint = ElementTree.SubElement(tree, "joint", name=f"joint_{child}", type=kind)
+        xyz, rpy = model.skeleton.offsets[j], _rpy(model.frames[j])
+        ElementTree.SubElement(joint, "origin", xyz=_numbers(xyz), rpy=_numbers(rpy))
+        ElementTree.SubElement(joint, "parent", link=parent)
+        ElementTree.SubElement(joint, "child", link=child)
+        if kind == "revolute":
             ElementTree.SubElement(joint, "axis", xyz=_numbers(model.axes[j]))
-            half = TWO_REVOLUTIONS / 2
             lower, upper = (float(np.clip(x[j], -half, half)) for x in (model.lower, model.upper))
             ElementTree.SubElement(joint, "limit", lower=repr(lower), upper=repr(upper))
-    return ElementTree.tostring(tree, encoding="unicode"), "base", names[-1]
+    return ElementTree.tostring(tree, encoding="unicode"), names[0], names[-1]
 
 
 def _rpy(quaternion: FloatArray) -> FloatArray:
@@ -95,7 +89,9 @@ def _numbers(values: FloatArray) -> str:
     return " ".join(repr(float(x)) for x in values)
 
 
-def skeletons(path: Path, effector: str | None, count: int = 100) -> list[TargetsForSkeleton]:
+def skeletons(
+    path: Path, title: str, effector: str | None, count: int = 100
+) -> list[TargetsForSkeleton]:
     """Return targets for the balls of a BVH file, from random poses: anywhere, far out, near.
 
     Raises:
@@ -103,7 +99,7 @@ def skeletons(path: Path, effector: str | None, count: int = 100) -> list[Target
     """
     skeleton = bvh.read(path).skeleton
     tip = _effector(skeleton, skeleton.names, effector)
-    chain = path_to(skeleton.parents, skeleton.offsets, tip)
+    chain = path_to(skeleton, tip)
     rng = np.random.default_rng(_SEED)
     pool = random_rotations(rng, _POOL * count, chain.joint_count)
     reached = forward_kinematics(chain, pool).positions[:, -1]
@@ -116,15 +112,17 @@ def skeletons(path: Path, effector: str | None, count: int = 100) -> list[Target
     }
     starts = random_rotations(rng, count, chain.joint_count)
     return [
-        TargetsForSkeleton(path.stem, f"{path.stem}, {name}", chain, starts, reached[which])
+        TargetsForSkeleton(
+            f"chain/{title}, {name}", f"{title}, {name}", chain, starts, reached[which]
+        )
         for name, which in chosen.items()
     ]
 
 
-def path_to(parents: IndexArray, offsets: FloatArray, effector: int) -> Skeleton:
+def path_to(skeleton: Skeleton, effector: int) -> Skeleton:
     """Return the joints from the root to an effector: no other moves it."""
-    path = Skeleton(parents, offsets).path(effector)
-    return Skeleton(np.arange(len(path)) - 1, np.asarray(offsets, dtype=float)[path])
+    path = skeleton.path(effector)
+    return Skeleton(np.arange(len(path)) - 1, skeleton.offsets[path])
 
 
 def cloth(path: Path, pins: str | None) -> tuple[MassSpring, State]:
@@ -137,11 +135,9 @@ def cloth(path: Path, pins: str | None) -> tuple[MassSpring, State]:
     x, sides = mesh.vertices, mesh.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     used, edges = np.unique(np.unique(np.sort(sides, axis=1), axis=0), return_inverse=True)
     x, edges = x[used], edges.reshape(-1, 2)
-    count, springs = len(x), len(edges)
     rest = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1)
-    masses, stiffnesses = np.full(count, MASS / count), np.full(springs, STIFFNESS)
-    pinned = _pins(x, pins)
-    system = MassSpring(masses, edges, rest, stiffnesses, np.zeros(springs), pinned)
+    masses = np.full(len(x), MASS / len(x))
+    system = MassSpring(masses, edges, rest, STIFFNESS, pinned=_pins(x, pins))
     return system, State(x, np.zeros_like(x))
 
 
