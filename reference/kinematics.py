@@ -66,9 +66,9 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
 
 
 def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
-    """Return local rotations, (..., joint, 4), from global ones: Q = R_parent* R, the root's Q = R.
+    """Return local rotations, (..., joint, 4), from global ones: Q = R_parent* R.
 
-    Errors are those of `forward_kinematics`.
+    The root's are R. Errors are those of `forward_kinematics`.
     """
     tree = checked_skeleton(skeleton).arrays
     poses = arguments.floats("rotations", rotations, "...", len(tree.parents), 4)

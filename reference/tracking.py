@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import arguments, rotation, trajectory
-from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray
+from .arguments import LARGEST_COORDINATE, FloatArray
 from .articulation import Articulation
-from .inverse_kinematics.mechanism import Mechanism, gather
 from .inverse_kinematics.problem import (
     CheckedTarget,
     IKSolution,
@@ -130,19 +129,17 @@ def _along(
     ]
 
 
-def _start(skeleton: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
-    if isinstance(skeleton, Articulation):
-        if start is None:
-            return skeleton.neutral()
-        given = arguments.floats("start", start, skeleton.coordinate_count)
-        skeleton.checked("start", given)
-        return given
-    count = skeleton.joint_count
-    if start is None:
-        return rotation.identity(count)
-    given = arguments.floats("start", start, count, 4)
-    rotation.unit("start", given)
-    return given
+def _start(model: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
+    """Return the start, checked but not made unit, or the pose that stands for none."""
+    if isinstance(model, Articulation):
+        q = model.neutral() if start is None else start
+        q = arguments.floats("start", q, model.coordinate_count)
+        model.checked("start", q)
+        return q
+    local = rotation.identity(model.joint_count) if start is None else start
+    local = arguments.floats("start", local, model.joint_count, 4)
+    rotation.unit("start", local)
+    return local
 
 
 def _smoothed(
@@ -155,8 +152,8 @@ def _smoothed(
     articulation = skeleton if isinstance(skeleton, Articulation) else balls(skeleton)
     effectors = tuple(one.joint for one in targets)
     oriented = tuple(one.rotation is not None for one in targets)
-    mechanism = prepare(articulation, effectors, oriented).mechanism
-    columns = _columns(mechanism, articulation.coordinate_count)
+    prepared = prepare(articulation, effectors, oriented)
+    mechanism, columns = prepared.mechanism, prepared.columns
     near = np.asarray(motion.residual) <= MET * mechanism.reach
     met = near & (np.asarray(motion.residual_rotation) <= MET)
     reached, steps = met | (np.asarray(motion.outcome) == Outcome.CONVERGED), 0
@@ -171,13 +168,6 @@ def _smoothed(
             f"track: the smooth trajectory left the numbers up to {LARGEST_COORDINATE:g}"
         )
     return q.reshape(motion.coordinates.shape), reached, steps
-
-
-def _columns(mechanism: Mechanism, count: int) -> IndexArray:
-    """Return which of the articulation's coordinates are the mechanism's own."""
-    own = np.empty(mechanism.coordinates)
-    gather(mechanism, np.arange(count, dtype=np.float64), own)
-    return own.astype(np.int64)
 
 
 def _settled(

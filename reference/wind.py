@@ -45,8 +45,7 @@ def wind_forces(
         lift: the coefficient of lift.
 
     Raises:
-        ValueError: if an argument has a wrong shape, is negative or not finite, or an index is out
-            of range.
+        ValueError: if an argument has a wrong shape, is negative or out of range.
         FloatingPointError: if a force overflows.
     """
     instance("state", state, State)
