@@ -391,7 +391,7 @@ def test_what_a_worker_does_is_heard(made_up, monkeypatch):
 @pytest.fixture(scope="module")
 def cluster():
     distributed = pytest.importorskip("distributed", reason=INSTALLED)
-    given = {"threads_per_worker": 1, "processes": True, "dashboard_address": None}
+    given = {"threads_per_worker": 1, "processes": True, "dashboard_address": ":0"}
     with distributed.LocalCluster(n_workers=2, host="127.0.0.1", **given) as cluster:
         yield cluster
 
