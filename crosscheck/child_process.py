@@ -23,9 +23,9 @@ from enum import Enum, auto
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
-from .process_tree import carry, end_group, family, guard, new_marker
+from .process_tree import Process, carry, end_group, family, guard, new_marker
 
 Result = TypeVar("Result")
 
@@ -40,6 +40,8 @@ SHUT = 1.0
 _CHUNK = 1 << 18
 # A call may last so many times its limit of processor time: others may use the processor, too.
 _WALL = 10
+# What a process may take to load and compile before its first call [s].
+_START = 300.0
 # In safe-path mode (-P) nothing is imported from the working directory; our packages come from
 # where this file is, before any other that the path may lead to.
 _ROOT = Path(__file__).parents[2]
@@ -109,14 +111,6 @@ def pickled(message: object) -> bytes:
     return struct.pack("!i", len(data)) + data
 
 
-class _Look(NamedTuple):
-    """What a program was seen to do: at a time, the processors' time used, and if it runs [s]."""
-
-    time: float
-    used: float
-    runs: bool
-
-
 class ChildProcess:
     """A program in a session of its own, which is talked with by messages on its three pipes.
 
@@ -172,7 +166,7 @@ class ChildProcess:
         self.partial, self.last_words = bytearray(), bytearray()
         self._unsent, self.sent = bytearray(), 0
         self._is_deaf = False
-        self._looks: list[_Look] = []
+        self._looks: list[tuple[float, list[Process]]] = []
         self._selector = selectors.DefaultSelector()
         for pipe in _pipes(self._process):
             os.set_blocking(pipe.fileno(), False)
@@ -319,12 +313,16 @@ class ChildProcess:
         if min(self._memory, processor) == math.inf:  # what is timed is not disturbed
             return
         members = family(self.pid, self._marker)
-        used = sum(member.seconds for member in members)
-        self._looks.append(_Look(time.monotonic(), used, any(one.runs for one in members)))
+        self._looks.append((time.monotonic(), members))
         if sum(member.memory for member in members) > self._memory:
             raise LostError(Loss.MEMORY)
-        if used - self._looks[0].used > processor:
+        if self._used() > processor:
             raise LostError(Loss.PROCESSOR)
+
+    def _used(self) -> float:
+        """Return how much time of processors it has used since it was first looked at [s]."""
+        first, last = (sum(p.seconds for p in self._looks[i][1]) for i in (0, -1))
+        return last - first
 
     def _ended(self) -> LostError:
         """Return why nothing more will come."""
@@ -350,10 +348,9 @@ class ChildProcess:
         """Return whether it computed rather than waited, most times when it was looked at."""
         if not self._looks:
             return False
-        first, last = self._looks[0], self._looks[-1]
-        if last.used - first.used > IDLE * (last.time - first.time):
-            return True
-        return 2 * sum(look.runs for look in self._looks) > len(self._looks)
+        runs = [any(process.runs for process in members) for _, members in self._looks]
+        seconds = self._looks[-1][0] - self._looks[0][0]
+        return self._used() > IDLE * seconds or 2 * sum(runs) > len(runs)
 
 
 def _pipes(process: Any) -> list[Any]:
@@ -427,20 +424,11 @@ def connect() -> tuple[Connection, Connection]:
 
 
 class CallProcess:
-    """A process that performs calls one by one, started when one comes, and anew after a loss.
+    """A process that performs calls one by one, started when one comes, and anew after a loss."""
 
-    Attributes:
-        prepare: called first in every process, to load and compile.
-        patience: how much processor time a call may take [s].
-        start_patience: how much `prepare` may take [s].
-    """
-
-    def __init__(
-        self, prepare: Callable[[], object], patience: float = 60.0, start_patience: float = 300.0
-    ) -> None:
-        self.prepare = prepare
-        self.patience = patience
-        self.start_patience = start_patience
+    def __init__(self, prepare: Callable[[], object], patience: float) -> None:
+        """Let each process begin with `prepare`, and a call take so much processor time [s]."""
+        self._prepare, self._patience = prepare, patience
         self._child: ChildProcess | None = None
 
     def call(self, function: Callable[..., Result], *arguments: object) -> Result:
@@ -451,10 +439,9 @@ class CallProcess:
         """
         try:
             if self._child is None:
-                start = f"import {__name__} as c; c.perform_calls()"
-                self._child = python_process(start)
-                _perform(self._child, self.start_patience, self.prepare)
-            result: Result = _perform(self._child, self.patience, function, *arguments)
+                self._child = python_process(f"import {__name__} as c; c.perform_calls()")
+                _perform(self._child, _START, self._prepare)
+            result: Result = _perform(self._child, self._patience, function, *arguments)
             return result
         except BaseException:
             self.close()

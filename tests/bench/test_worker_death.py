@@ -30,43 +30,13 @@ def descriptor():
     (own,) = [o for o in gc.get_objects() if isinstance(o, Connection) and o.writable]
     return own.fileno()
 
-def leave():
-    os._exit(3)
-
-def go():
-    sys.exit(4)
-
-def kill():
-    os.kill(os.getpid(), signal.SIGKILL)
-
-def crash():
-    ctypes.string_at(0)
-
-def close():
-    os.close(descriptor())
+def write(data, size):
+    os.write(descriptor(), struct.pack("!i", size) + data)
     time.sleep(600)
-
-def hang():
-    time.sleep(600)
-
-def stop():
-    os.kill(os.getpid(), signal.SIGSTOP)
-
-def rubbish():
-    os.write(descriptor(), struct.pack("!i", 5) + b"hello")
-    time.sleep(600)
-
-def stranger():
-    data = pickle.dumps(42)
-    os.write(descriptor(), struct.pack("!i", len(data)) + data)
-    time.sleep(600)
-
-def raises():
-    raise SystemError("from within")
 
 class Dying:
-    def __init__(self, manner, moment, load=0):
-        self.manner, self.moment, self.load = manner, moment, bytes(load)
+    def __init__(self, death, moment, load=0):
+        self.death, self.moment, self.load = death, moment, bytes(load)
 
     def __setstate__(self, state):
         self.__dict__ = state
@@ -74,7 +44,7 @@ class Dying:
 
     def die(self, moment):
         if moment == self.moment:
-            globals()[self.manner]()
+            exec(self.death, globals())
 
     def perform(self):
         self.die("preparing")
@@ -101,17 +71,20 @@ class WithChild:
 """
 MOMENTS = {"reading": 0, "preparing": 0, "solving": 1, "in a message": 1}
 WITHIN = {("rubbish", "in a message"), ("stranger", "in a message")}  # then it is a part of that
-SAYS = {
-    "leave": "its process ended with code 3",
-    "go": "its process ended with code 4",
-    "kill": "its process was ended by SIGKILL",
-    "crash": "its process was ended by SIGSEGV",
-    "close": "its process broke off the connection, or sent what is no message",
-    "hang": "ended after .* s of silence",
-    "stop": "ended after .* s of silence",
-    "raises": "its process ended with code 1",
-    "rubbish": "its process broke off the connection, or sent what is no message",
-    "stranger": "its process broke off the connection, or sent what is no message",
+BREAKS_OFF = "its process broke off the connection, or sent what is no message"
+SILENT = "ended after .* s of silence"
+# What a worker does, and the sentence for it.
+MANNERS = {
+    "leave": ("os._exit(3)", "its process ended with code 3"),
+    "go": ("sys.exit(4)", "its process ended with code 4"),
+    "kill": ("os.kill(os.getpid(), signal.SIGKILL)", "its process was ended by SIGKILL"),
+    "crash": ("ctypes.string_at(0)", "its process was ended by SIGSEGV"),
+    "close": ("os.close(descriptor()); time.sleep(600)", BREAKS_OFF),
+    "hang": ("time.sleep(600)", SILENT),
+    "stop": ("os.kill(os.getpid(), signal.SIGSTOP)", SILENT),
+    "raises": ("raise SystemError('from within')", "its process ended with code 1"),
+    "rubbish": ("write(b'hello', 5)", BREAKS_OFF),
+    "stranger": ("write(pickle.dumps(42), len(pickle.dumps(42)))", BREAKS_OFF),
 }
 
 
@@ -149,7 +122,7 @@ def is_gone(process):
 
 
 def assert_works(worker, jobs):
-    outcome = worker.perform(jobs.Dying("leave", "never"))
+    outcome = worker.perform(jobs.Dying("", "never"))
     assert (outcome.trouble, len(outcome.solved), outcome.setup) == ("", 2, 0.5)
 
 
@@ -163,13 +136,16 @@ FEW |= {("stranger", "preparing"), ("close", "preparing")}
     ("manner", "moment"),
     [
         pytest.param(*both, marks=[] if both in FEW else [pytest.mark.slow])
-        for both in ((manner, moment) for manner in SAYS for moment in MOMENTS)
+        for both in ((manner, moment) for manner in MANNERS for moment in MOMENTS)
         if both not in WITHIN
     ],
 )
 def test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job(worker, jobs, manner, moment):
     if (manner, moment) == ("raises", "reading"):  # that is an answer
-        assert worker.perform(jobs.Dying(manner, moment)).trouble == "SystemError: from within"
+        assert (
+            worker.perform(jobs.Dying(MANNERS[manner][0], moment)).trouble
+            == "SystemError: from within"
+        )
         return
     with pytest.MonkeyPatch.context() as patch:
         assert_works(worker, jobs)
@@ -177,8 +153,8 @@ def test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job(worker, jobs
         seen = []
         end = ChildProcess.end
         patch.setattr(ChildProcess, "end", lambda w: (seen.append(w.pid), end(w)))
-        outcome = worker.perform(jobs.Dying(manner, moment))
-    assert re.fullmatch(SAYS[manner], outcome.trouble)
+        outcome = worker.perform(jobs.Dying(MANNERS[manner][0], moment))
+    assert re.fullmatch(MANNERS[manner][1], outcome.trouble)
     assert len(outcome.solved) == MOMENTS[moment]
     assert outcome.lost == (MOMENTS[moment] > 0)
     assert before in seen
@@ -188,17 +164,17 @@ def test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job(worker, jobs
 
 @pytest.mark.parametrize("manner", ["leave", "kill", "close", "stop", "rubbish"])
 def test_a_death_after_the_last_message_costs_nothing(worker, jobs, manner):
-    outcome = worker.perform(jobs.Dying(manner, "after the last"))
+    outcome = worker.perform(jobs.Dying(MANNERS[manner][0], "after the last"))
     assert (outcome.trouble, len(outcome.solved)) == ("", 2)
     assert_works(worker, jobs)
 
 
 STARTS = {
-    "raise SystemExit(3)": SAYS["leave"],
-    "import os, signal; os.kill(os.getpid(), signal.SIGKILL)": SAYS["kill"],
-    "import os, time; os.closerange(0, 99); time.sleep(600)": SAYS["close"],
-    "import an_engine_that_nobody_has": SAYS["raises"],
-    "import time; time.sleep(600)": SAYS["hang"],
+    "raise SystemExit(3)": MANNERS["leave"][1],
+    "import os, signal; os.kill(os.getpid(), signal.SIGKILL)": MANNERS["kill"][1],
+    "import os, time; os.closerange(0, 99); time.sleep(600)": MANNERS["close"][1],
+    "import an_engine_that_nobody_has": MANNERS["raises"][1],
+    "import time; time.sleep(600)": MANNERS["hang"][1],
 }
 
 
@@ -207,7 +183,7 @@ STARTS = {
 def test_a_death_before_the_job_is_read_is_a_sentence(worker, jobs, monkeypatch, start, load):
     """A large job does not fit into what the system keeps for a reader."""
     monkeypatch.setattr(isolation, "_START", start)
-    outcome = worker.perform(jobs.Dying("leave", "never", load))
+    outcome = worker.perform(jobs.Dying("", "never", load))
     assert re.fullmatch(STARTS[start], outcome.trouble)
     assert (outcome.solved, outcome.lost) == ([], False)
     monkeypatch.undo()
