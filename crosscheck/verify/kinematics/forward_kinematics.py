@@ -148,10 +148,8 @@ def _positions(theirs: Any, ours: Any, tolerance: float) -> Finding:
     errors = np.linalg.norm(theirs - ours, axis=-1)
     if not np.isfinite(errors).all():
         return laws.no_numbers("positions", errors, tolerance)
-    worst = int(np.argmax(errors))
-    error, where = errors[worst], laws.first_beyond(errors, tolerance)
-    told = sentence("Joint {joint} is {error:.2g} m off its position.", joint=worst, error=error)
-    return laws.bounded("positions", error, tolerance, "m", told, where=where)
+    told = sentence("Joint {joint} is {error:.2g} m off its position.")
+    return laws.of_joints("positions", errors, tolerance, "m", told)
 
 
 def _rotations(theirs: Any, ours: Any, bound: float) -> list[Finding]:
@@ -163,10 +161,5 @@ def _rotations(theirs: Any, ours: Any, bound: float) -> list[Finding]:
         told = sentence("The rotation of joint {joint} is not a number or zero.", joint=bad)
         return [Finding("rotations", Verdict.WRONG, np.inf, bound, "rad", told, bad)]
     angles = laws.angles(theirs / lengths[:, None], ours)
-    worst = int(np.argmax(angles))
-    error, where = angles[worst], laws.first_beyond(angles, bound)
-    told = sentence("Joint {joint} is rotated {error:.2g} rad off.", joint=worst, error=error)
-    return [
-        laws.unit(lengths, bound),
-        laws.bounded("rotations", error, bound, "rad", told, where=where),
-    ]
+    told = sentence("Joint {joint} is rotated {error:.2g} rad off.")
+    return [laws.unit(lengths, bound), laws.of_joints("rotations", angles, bound, "rad", told)]

@@ -53,10 +53,29 @@ def bounded(
     verdict: Verdict = Verdict.WRONG,
     where: int | None = None,
 ) -> Finding:
-    """Return the finding that an error is within its tolerance, or the verdict if it is not."""
+    """Return the finding that an error is within its tolerance, or the verdict if it is not.
+
+    The sentence is given the error and the joint where it is, unless it has them.
+    """
     if error <= tolerance:
         return Finding(law, Verdict.RIGHT, float(error), tolerance, unit, HOLDS, where)
-    return Finding(law, verdict, float(error), tolerance, unit, told, where)
+    words = Sentence(told.template, {"error": error, "joint": where, **told.values})
+    return Finding(law, verdict, float(error), tolerance, unit, words, where)
+
+
+def of_joints(
+    law: str,
+    errors: FloatArray,
+    tolerance: float,
+    unit: str,
+    told: Sentence,
+    verdict: Verdict = Verdict.WRONG,
+) -> Finding:
+    """Return the finding of the worst joint, at the first that is off: there the fault begins."""
+    worst, wrong = int(np.argmax(errors)), errors > tolerance
+    words = Sentence(told.template, {"joint": worst, **told.values})
+    where = int(np.argmax(wrong)) if wrong.any() else worst
+    return bounded(law, errors[worst], tolerance, unit, words, verdict=verdict, where=where)
 
 
 def missing(told: Sentence) -> Finding:
@@ -78,18 +97,10 @@ def unit(lengths: FloatArray, tolerance: float) -> Finding:
     told = sentence(
         "The quaternion of joint {joint} has the length {length}, not 1; normalise after each "
         "product.",
-        joint=joint,
         length=distinct_texts(lengths[joint], 1.0)[0],
     )
-    verdict = Verdict.RIGHT_BUT
-    return bounded("unit quaternions", errors[joint], tolerance, "", told, verdict=verdict,
-                   where=joint)  # fmt: skip
-
-
-def first_beyond(errors: FloatArray, tolerance: float) -> int:
-    """Return the first joint that is off, where the fault begins, or the worst."""
-    wrong = errors > tolerance
-    return int(np.argmax(wrong if wrong.any() else errors))
+    law, verdict = "unit quaternions", Verdict.RIGHT_BUT
+    return bounded(law, errors[joint], tolerance, "", told, verdict=verdict, where=joint)
 
 
 def angles(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -117,8 +128,7 @@ def _repeated(answer: Answer, again: object, size: float, greeting: Greeting) ->
     tolerance = 16.0 * greeting.epsilon * max(size, 1.0)  # threads may add up in another order
     told = sentence(
         "Asked the same again, it answers something else, {error:.2g} away: state left over, or "
-        "memory that nobody has filled.",
-        error=error,
+        "memory that nobody has filled."
     )
     return bounded("equal answers", error, tolerance, "", told)
 

@@ -149,17 +149,15 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
 
 def _on_line(points: FloatArray, off: FloatArray, line: Line, bound: float) -> Finding:
     """Return whether points are on the line, or between two of its points."""
-    worst, verdict = int(np.argmax(off)), Verdict.WRONG
+    is_cut = all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(off > bound))
     told = sentence(
-        "Point {index} is {error:.2g} m off the polyline.", index=worst, error=off[worst]
+        "Points between given ones are left out, so that corners are cut by {error:.2g} m."
+        if is_cut
+        else "Point {index} is {error:.2g} m off the polyline.",
+        index=int(np.argmax(off)),
     )
-    if all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(off > bound)):
-        verdict = Verdict.RIGHT_BUT
-        told = sentence(
-            "Points between given ones are left out, so that corners are cut by {error:.2g} m.",
-            error=off[worst],
-        )
-    return laws.bounded("on the line", off[worst], bound, "m", told, verdict=verdict)
+    verdict = Verdict.RIGHT_BUT if is_cut else Verdict.WRONG
+    return laws.bounded("on the line", off.max(), bound, "m", told, verdict=verdict)
 
 
 def _ends(points: FloatArray, case: Case, bound: float) -> Finding:
@@ -168,8 +166,7 @@ def _ends(points: FloatArray, case: Case, bound: float) -> Finding:
     if not case.inputs["closed"]:
         error = max(error, float(np.linalg.norm(points[-1] - curve[-1])))
     told = sentence(
-        "The curve's ends are not kept: the answer starts or ends {error:.2g} m from them.",
-        error=error,
+        "The curve's ends are not kept: the answer starts or ends {error:.2g} m from them."
     )
     return laws.bounded("ends", error, bound, "m", told)
 
@@ -184,7 +181,7 @@ def _count(points: FloatArray, case: Case) -> Finding:
 
 def _order(at: FloatArray, line: Line, bound: float) -> Finding:
     back = float(np.max(-np.diff(at), initial=0.0))
-    told = sentence("The points go back along the curve, by {error:.2g} m.", error=back)
+    told = sentence("The points go back along the curve, by {error:.2g} m.")
     return laws.bounded("order", back, 2.0 * bound, "m", told)
 
 
@@ -198,8 +195,7 @@ def _gaps(points: FloatArray, at: FloatArray, case: Case, bound: float) -> Findi
     if "count" in case.inputs:
         error = min(_spread(gaps) for gaps in kinds)
         told = sentence(
-            "The points are not evenly spaced: a gap differs from the mean by {error:.0%}.",
-            error=error,
+            "The points are not evenly spaced: a gap differs from the mean by {error:.0%}."
         )
         verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else Verdict.WRONG
         tolerance = UNEVEN + 4.0 * bound / max(float(kinds[2].mean()), bound)

@@ -118,9 +118,8 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
     largest = float(np.abs([case.inputs["lower"], case.inputs["upper"]]).max())
     allowed = rounding.ROUNDINGS_A_JOINT * greeting.epsilon * largest
     told = sentence(
-        "Joint {joint} is at {value:.6g}, {error:.2g} beyond its limit.",
-        joint=joint, value=float(q[joint]), error=float(excess[joint]),
-    )  # fmt: skip
+        "Joint {joint} is at {value:.6g}, {error:.2g} beyond its limit.", value=float(q[joint])
+    )
     return laws.bounded("limits kept", excess[joint], allowed, "rad", told, where=joint)
 
 
@@ -141,16 +140,12 @@ def _reached(
     distance: float, angle: float, near: float, straight: float, family: str
 ) -> list[Finding]:
     """Return whether the target is reached; from any start a solver may end in another minimum."""
-    stuck = family == ANYWHERE
-    verdict = Verdict.RIGHT_BUT if stuck else Verdict.WRONG
-    off = (
-        sentence("It stays {error:.2g} m off a target that it can reach.", error=distance),
-        sentence("Its tool is rotated by {error:.2g} rad from a target that it can reach.",
-                 error=angle),
-    )  # fmt: skip
+    verdict = Verdict.RIGHT_BUT if family == ANYWHERE else Verdict.WRONG
+    missed = sentence("It stays {error:.2g} m off a target that it can reach.")
+    rotated = sentence("Its tool is rotated by {error:.2g} rad from a target that it can reach.")
     return [
-        laws.bounded("target reached", distance, near, "m", off[0], verdict=verdict),
-        laws.bounded("rotation reached", angle, straight, "rad", off[1], verdict=verdict),
+        laws.bounded("target reached", distance, near, "m", missed, verdict=verdict),
+        laws.bounded("rotation reached", angle, straight, "rad", rotated, verdict=verdict),
     ]
 
 

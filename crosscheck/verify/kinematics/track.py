@@ -1,6 +1,6 @@
 """Following a curve: each frame an honest pose, on its target, near the frame before."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -148,18 +148,13 @@ def _likeness(greeting: Greeting, case: Case) -> float:
 
 def frames_of(one: Asked) -> list[tuple[Case, Posed]]:
     """Return each frame as a case of inverse kinematics, and its pose; none if there are none."""
-    return list(_frames(one)) if isinstance(one.answer, Answer) else []
-
-
-def _frames(one: Asked) -> Iterator[tuple[Case, Posed]]:
-    assert isinstance(one.answer, Answer)
-    case, values = one.case, one.answer.values
-    for i, facts in enumerate(case.facts["frames"]):
-        inputs = {**case.inputs, "target": case.inputs["curve"][i]}
-        names = {"local_rotations", "positions"} & values.keys()
+    values = one.answer.values if isinstance(one.answer, Answer) else {}
+    names, frames = {"local_rotations", "positions"} & values.keys(), []
+    for i, facts in enumerate(one.case.facts["frames"] if names else ()):
+        inputs = {**one.case.inputs, "target": one.case.inputs["curve"][i]}
         posed = pose_laws.understood({name: values[name][i] for name in names}, inputs, facts)
-        if posed is not None:
-            yield replace(case, inputs=inputs, facts=facts), posed
+        frames.append((replace(one.case, inputs=inputs, facts=facts), posed))
+    return frames
 
 
 def _seen(one: Asked) -> Asked:
@@ -226,7 +221,7 @@ def _on_target(posed: Posed, case: Case, greeting: Greeting) -> Finding:
     joints, size, error = len(posed.positions), case.facts["size"], posed.distance
     slack = rounding.positions(greeting.epsilon, joints, size, posed.drift)
     share = rounding.STALL[greeting.precision] if case.inputs["method"] in KNOWN else SLOW
-    told = sentence("It is {error:.2g} m off a target that it can reach.", error=error)
+    told = sentence("It is {error:.2g} m off a target that it can reach.")
     verdict = Verdict.RIGHT_BUT if error <= share * case.facts["reach"] else Verdict.WRONG
     bound = case.inputs["tolerance"] + slack
     return laws.bounded("target reached", error, bound, "m", told, verdict=verdict)
@@ -243,8 +238,7 @@ def _continuity(poses: Sequence[Posed]) -> list[Finding]:
     told = sentence(
         "Joint {joint} jumps by {error:.2g} m from frame {frame} to the next: start each frame "
         "from the one before.",
-        joint=joint, error=error, frame=int(frame),
-    )  # fmt: skip
-    return [
-        laws.bounded("continuity", error, JUMP, "m", told, verdict=Verdict.RIGHT_BUT, where=joint)
-    ]
+        frame=int(frame),
+    )
+    verdict = Verdict.RIGHT_BUT
+    return [laws.bounded("continuity", error, JUMP, "m", told, verdict=verdict, where=joint)]
