@@ -18,7 +18,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..sentence import Sentence, sentence
 from . import laws, pose_laws, problems, rounding, sweeps
-from .pose_laws import Posed
+from .pose_laws import AnsweredPose
 from .predictions import solve
 from .report import diagnosed, report
 from .sweeps import Comparison, Trial
@@ -42,16 +42,16 @@ def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport
     for trial in trials:
         trial.judgement = _judged(trial, known, greeting)
     others_hold = all(trial.judgement.verdict < Verdict.WRONG for trial in trials)
-    found = sweeps.compare(swept, known, declared, others_hold, greeting)
+    comparison = sweeps.compare(swept, known, declared, others_hold, greeting)
     by_name = {trial.case.name: trial for trial in trials}
     for trial in trials:
-        trial.add(found.findings.get(trial.case.name, ()))
-        if found.honest:
+        trial.add(comparison.findings.get(trial.case.name, ()))
+        if comparison.honest:
             trial.correct(partial(_forgiven, trial.case))
         if base := by_name.get(trial.case.facts.get("like", "")):
-            trial.add(_alike(trial, base, "" if found.honest else found.method, greeting))
-    diagnosis = _diagnosis(trials, found, greeting)
-    if found.honest and sweeps.is_grave(found.method, diagnosis):
+            trial.add(_alike(trial, base, "" if comparison.honest else comparison.method, greeting))
+    diagnosis = _diagnosis(trials, comparison, greeting)
+    if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
         for trial in trials:
             trial.correct(_graver)
     return report(TASK, method, [trial.judgement for trial in trials], diagnosis)
@@ -80,10 +80,10 @@ def _judged(trial: Trial, method: str, greeting: Greeting) -> CaseJudgement:
     case, posed, inputs = trial.case, trial.posed, trial.case.inputs
 
     def findings(values: Mapping[str, Any]) -> list[Finding]:
-        kept = pose_laws.all_of(posed, case, greeting)
-        if any(finding.verdict is Verdict.BROKEN for finding in kept):
-            return kept
-        return kept + target_laws(posed, values, case, method, greeting)
+        findings = pose_laws.all_of(posed, case, greeting)
+        if any(finding.verdict is Verdict.BROKEN for finding in findings):
+            return findings
+        return findings + target_laws(posed, values, case, method, greeting)
 
     reference = partial(
         solve_ik, Skeleton(inputs["parents"], inputs["offsets"]), inputs["local_rotations"],
@@ -106,7 +106,7 @@ def _expected(trial: Trial, method: str) -> tuple[Mapping[str, Any], float | Non
 
 
 def target_laws(
-    posed: Posed, values: Mapping[str, Any], case: Case, method: str, greeting: Greeting
+    posed: AnsweredPose, values: Mapping[str, Any], case: Case, method: str, greeting: Greeting
 ) -> list[Finding]:
     """Return whether the target is reached, or the nearest point, and whether claims are true."""
     distance, size = posed.distance, case.facts["size"]
@@ -133,8 +133,8 @@ def reached(distance: float, slack: float, case: Case, method: str, greeting: Gr
     law = "target reached" if least == 0.0 else "nearest point"
     if excess <= tolerance:
         return laws.bounded(law, excess, tolerance, "m", laws.HOLDS)
-    verdict, told = _missed(excess, case, method, greeting)
-    return Finding(law, verdict, excess, tolerance, "m", told)
+    verdict, message = _missed(excess, case, method, greeting)
+    return Finding(law, verdict, excess, tolerance, "m", message)
 
 
 def _missed(excess: float, case: Case, method: str, greeting: Greeting) -> tuple[Verdict, Sentence]:
@@ -169,52 +169,52 @@ def _missed(excess: float, case: Case, method: str, greeting: Greeting) -> tuple
     )
 
 
-def in_time(posed: Posed, case: Case, method: str, greeting: Greeting) -> list[Finding]:
+def in_time(posed: AnsweredPose, case: Case, method: str, greeting: Greeting) -> list[Finding]:
     """Return whether a solve made more sweeps than its tolerance asks for, where that shows."""
     bound = case.facts["size"] * (1e-7 if greeting.precision == "double" else 1e-3)
-    _, x, made = solve(method, case.inputs)
+    _, x, sweeps_made = solve(method, case.inputs)
     if posed.distance_to(x) <= bound:
         return [Finding(STOPS, Verdict.RIGHT, 0.0, 0.0, "", laws.HOLDS)]
-    for count in range(made + 1, case.inputs["max_iterations"] + 1):
+    for count in range(sweeps_made + 1, case.inputs["max_iterations"] + 1):
         inputs = {**case.inputs, "tolerance": 0.0, "max_iterations": count}
         if posed.distance_to(solve(method, inputs)[1]) <= bound:
-            told = sentence(
-                "It makes {more} sweeps more than its tolerance asks for.", more=count - made
+            message = sentence(
+                "It makes {more} sweeps more than its tolerance asks for.", more=count - sweeps_made
             )
-            return [Finding(STOPS, Verdict.RIGHT_BUT, count - made, 0.0, "", told)]
+            return [Finding(STOPS, Verdict.RIGHT_BUT, count - sweeps_made, 0.0, "", message)]
     return []
 
 
 def not_farther(distance: float, slack: float, case: Case) -> Finding:
     """Return whether sweeps have not taken the effector farther away, which none ever does."""
     growth = distance - case.facts["before"]
-    told = sentence(
+    message = sentence(
         "A sweep takes the effector {error:.2g} m farther from its target. Every rotation of CCD "
         "and every pass of FABRIK brings it nearer, or leaves it."
     )
-    return laws.bounded("distance does not grow", growth, slack, "m", told)
+    return laws.bounded("distance does not grow", growth, slack, "m", message)
 
 
 def claims(distance: float, slack: float, values: Mapping[str, Any], case: Case) -> list[Finding]:
     """Return whether what the solver says of its answer is true."""
-    found = []
+    findings = []
     tolerance = case.inputs["tolerance"] + slack
     if values.get("converged"):
-        told = sentence("It claims to have arrived, but the effector is {error:.2g} m off.")
-        found.append(laws.bounded("claims", distance, tolerance, "m", told))
+        message = sentence("It claims to have arrived, but the effector is {error:.2g} m off.")
+        findings.append(laws.bounded("claims", distance, tolerance, "m", message))
     elif "converged" in values and distance <= case.inputs["tolerance"] - slack:
-        told = sentence("It has arrived, {error:.2g} m off, and denies it.", error=distance)
-        found.append(Finding("claims", Verdict.RIGHT_BUT, distance, tolerance, "m", told))
+        message = sentence("It has arrived, {error:.2g} m off, and denies it.", error=distance)
+        findings.append(Finding("claims", Verdict.RIGHT_BUT, distance, tolerance, "m", message))
     if "residual" in values and np.isfinite(values["residual"]):
         error = abs(values["residual"] - distance)
         claimed, actual = distinct_texts(values["residual"], distance, 3)
-        told = sentence(
+        message = sentence(
             "It reports a residual of {claimed} m; the effector is {distance} m off.",
             claimed=claimed,
             distance=actual,
         )
-        found.append(laws.bounded("claims", error, slack + 1e-3 * distance, "m", told))
-    return found
+        findings.append(laws.bounded("claims", error, slack + 1e-3 * distance, "m", message))
+    return findings
 
 
 def _alike(trial: Trial, base: Trial, method: str, greeting: Greeting) -> list[Finding]:
@@ -227,19 +227,19 @@ def _alike(trial: Trial, base: Trial, method: str, greeting: Greeting) -> list[F
     error = trial.posed.distance_to(moved)
     size, amplification = trial.case.facts["size"], trial.case.facts["amplification"]
     tolerance = 2.0 * rounding.sweep(greeting.epsilon, len(moved), size, amplification)
-    told = sentence(
+    message = sentence(
         "In another world, rotated, shifted or in other units, the same request has an answer "
         "{error:.2g} m away: something depends on the origin or on an axis."
     )
     verdict = Verdict.WRONG if method else Verdict.RIGHT_BUT
-    return [laws.bounded("equal worlds", error, tolerance, "m", told, verdict=verdict)]
+    return [laws.bounded("equal worlds", error, tolerance, "m", message, verdict=verdict)]
 
 
-def _diagnosis(trials: Sequence[Trial], found: Comparison, greeting: Greeting) -> Diagnosis:
+def _diagnosis(trials: Sequence[Trial], comparison: Comparison, greeting: Greeting) -> Diagnosis:
     """Return the faults that reproduce the answers, of the method declared or inferred."""
     posed = [one for one in trials if one.posed.comparable]
     all_sweeps = [one for one in posed if one.is_sweep]
-    wrong_sweeps = [one for one in all_sweeps if one.is_wrong or one.case.name in found.off]
+    wrong_sweeps = [one for one in all_sweeps if one.is_wrong or one.case.name in comparison.wrong]
     solves = [
         one.seen
         for one in posed
@@ -248,11 +248,11 @@ def _diagnosis(trials: Sequence[Trial], found: Comparison, greeting: Greeting) -
         and (one.is_wrong or _is_late(one))
     ]
     if wrong_sweeps:
-        return sweeps.explained(found, all_sweeps, wrong_sweeps, greeting)
-    if solves and found.method:
+        return sweeps.explained(comparison, all_sweeps, wrong_sweeps, greeting)
+    if solves and comparison.method:
         likeness = partial(sweeps.likeness, greeting)
-        return diagnosed(found.method, solves, solves, likeness, found.behaviour)
-    return Diagnosis(behaviour=found.behaviour)
+        return diagnosed(comparison.method, solves, solves, likeness, comparison.behaviour)
+    return Diagnosis(behaviour=comparison.behaviour)
 
 
 def _is_late(one: Trial) -> bool:

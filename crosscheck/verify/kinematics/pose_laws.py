@@ -27,7 +27,7 @@ NEITHER = sentence("The answer has neither rotations nor positions.")
 
 
 @dataclass(frozen=True, eq=False)
-class Posed:
+class AnsweredPose:
     """An answer as the laws see it."""
 
     path: IndexArray  # joints from the root to the effector
@@ -72,7 +72,7 @@ class Posed:
 
 def understood(
     values: Mapping[str, Any], inputs: Mapping[str, Any], facts: Mapping[str, Any]
-) -> Posed:
+) -> AnsweredPose:
     """Return an answer as the laws see it."""
     raw: FloatArray | None = values.get("local_rotations")
     given: FloatArray | None = values.get("positions")
@@ -90,7 +90,7 @@ def understood(
         positions = given
     elif pose is not None and judgement is not None:
         positions = judgement.positions
-    return Posed(path, raw, local, given, positions, judgement)
+    return AnsweredPose(path, raw, local, given, positions, judgement)
 
 
 def _normalised(local: FloatArray) -> FloatArray:
@@ -104,7 +104,7 @@ def _placeable(local: FloatArray, path: IndexArray, start: FloatArray) -> FloatA
     return np.where(usable[:, None], local, start) if usable[path[:-1]].all() else None
 
 
-def all_of(posed: Posed, case: Case, greeting: Greeting) -> list[Finding]:
+def all_of(posed: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
     """Return the findings that hold for every pose, whatever its target."""
     if not posed.comparable:
         return [laws.missing(NEITHER)]
@@ -114,7 +114,7 @@ def all_of(posed: Posed, case: Case, greeting: Greeting) -> list[Finding]:
     return findings
 
 
-def rotation_laws(posed: Posed, case: Case, greeting: Greeting) -> list[Finding]:
+def rotation_laws(posed: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
     """Return the findings of local rotations: numbers, norms, joints that have to stay."""
     if posed.raw is None or posed.local is None:
         return []
@@ -138,24 +138,24 @@ def _unusable(usable: Any, local: FloatArray, case: Case, bound: float) -> Findi
     """Return the finding of rotations that are no numbers; the effector's own may not matter."""
     joint = int(np.argmin(usable))
     matters = joint != case.inputs["effector"] or not np.isfinite(local).all()
-    told = sentence("The local rotation of joint {joint} is not a number or zero.", joint=joint)
+    message = sentence("The local rotation of joint {joint} is not a number or zero.", joint=joint)
     verdict = Verdict.BROKEN if matters else Verdict.RIGHT_BUT
-    return Finding("numbers", verdict, np.inf, bound, "", told, joint)
+    return Finding("numbers", verdict, np.inf, bound, "", message, joint)
 
 
 def _untouched(moved: FloatArray, bound: float, effector: int) -> Finding:
     joint = int(np.argmax(moved))
     law, verdict = "joints off the path", Verdict.RIGHT_BUT if joint == effector else Verdict.WRONG
-    told = sentence(
+    message = sentence(
         "It rotates the effector itself by {error:.2g} rad, which brings the effector nowhere "
         "but moves what is below."
         if joint == effector
         else "It rotates joint {joint}, which is not on the path from the root to the effector."
     )
-    return laws.bounded(law, moved[joint], bound, "rad", told, verdict=verdict, where=joint)
+    return laws.bounded(law, moved[joint], bound, "rad", message, verdict=verdict, where=joint)
 
 
-def position_laws(posed: Posed, case: Case, greeting: Greeting) -> list[Finding]:
+def position_laws(posed: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
     """Return the findings of positions: numbers, the root's place, lengths, branches, rotations."""
     x = posed.given
     assert x is not None
@@ -169,9 +169,9 @@ def position_laws(posed: Posed, case: Case, greeting: Greeting) -> list[Finding]
     lengthened = sentence(
         "The link to joint {joint} has another length than its offset, by {error:.2g} m."
     )
-    told = sentence("The root has moved by {error:.2g} m.")
+    message = sentence("The root has moved by {error:.2g} m.")
     return [
-        laws.bounded("root in place", moved, bound, "m", told, where=0),
+        laws.bounded("root in place", moved, bound, "m", message, where=0),
         laws.of_joints("link lengths", posed.judgement.length_errors, bound, "m", lengthened),
         _branches(x, parents, offsets, 2.0 * bound),
         *_agreement(posed, case, 2.0 * bound, greeting),
@@ -186,20 +186,20 @@ def _branches(x: FloatArray, parents: IndexArray, offsets: FloatArray, bound: fl
             length = np.linalg.norm(offsets[j] - offsets[sibling])
             change = abs(float(np.linalg.norm(x[j] - x[sibling]) - length))
             error, joint = max((error, joint), (change, j), key=lambda pair: pair[0])
-    told = sentence(
+    message = sentence(
         "Joint {joint} does not keep its distance from another child of the same parent: it is "
         "{error:.2g} m off. A parent rotates all its children as one body."
     )
-    return laws.bounded("branches", error, bound, "m", told, where=joint)
+    return laws.bounded("branches", error, bound, "m", message, where=joint)
 
 
-def _agreement(posed: Posed, case: Case, bound: float, greeting: Greeting) -> list[Finding]:
+def _agreement(posed: AnsweredPose, case: Case, bound: float, greeting: Greeting) -> list[Finding]:
     """Return whether positions are where the rotations put the joints."""
     errors = None if posed.judgement is None else posed.judgement.position_errors
     carriers = case.inputs["parents"][1:]
     if errors is None or posed.local is None or not np.isfinite(posed.local[carriers]).all():
         return []
     dead = DEAD_JOINTS * rounding.DEAD_ANGLE[greeting.precision] * case.facts["reach"]
-    told = sentence("Joint {joint} is {error:.2g} m from where the answer's rotations put it.")
+    message = sentence("Joint {joint} is {error:.2g} m from where the answer's rotations put it.")
     verdict = Verdict.RIGHT_BUT if errors.max() <= dead else Verdict.WRONG
-    return [laws.of_joints("rotations agree with positions", errors, bound, "m", told, verdict)]
+    return [laws.of_joints("rotations agree with positions", errors, bound, "m", message, verdict)]

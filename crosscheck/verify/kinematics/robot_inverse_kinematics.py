@@ -117,10 +117,10 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
     joint = int(np.argmax(excess))
     largest = float(np.abs([case.inputs["lower"], case.inputs["upper"]]).max())
     allowed = rounding.ROUNDINGS_A_JOINT * greeting.epsilon * largest
-    told = sentence(
+    message = sentence(
         "Joint {joint} is at {value:.6g}, {error:.2g} beyond its limit.", value=float(q[joint])
     )
-    return laws.bounded("limits kept", excess[joint], allowed, "rad", told, where=joint)
+    return laws.bounded("limits kept", excess[joint], allowed, "rad", message, where=joint)
 
 
 def _target_laws(
@@ -154,14 +154,14 @@ def _claims(
 ) -> list[Finding]:
     reached = distance <= near and angle <= straight
     if values.get("converged") and not reached:
-        told = sentence(
+        message = sentence(
             "It claims to have arrived, but the tool is {distance:.2g} m and {angle:.2g} rad off.",
             distance=distance, angle=angle,
         )  # fmt: skip
-        return [Finding("claims", Verdict.WRONG, distance, near, "m", told)]
+        return [Finding("claims", Verdict.WRONG, distance, near, "m", message)]
     if "converged" in values and not values["converged"] and reached:
-        told = sentence("It has arrived, {error:.2g} m off, and denies it.", error=distance)
-        return [Finding("claims", Verdict.RIGHT_BUT, distance, near, "m", told)]
+        message = sentence("It has arrived, {error:.2g} m off, and denies it.", error=distance)
+        return [Finding("claims", Verdict.RIGHT_BUT, distance, near, "m", message)]
     return []
 
 

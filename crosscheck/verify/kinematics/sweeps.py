@@ -19,9 +19,8 @@ from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
 from ..sentence import Sentence, sentence
 from . import laws, pose_laws, rounding
 from .faults import FAULTS, Switches, by_key, describe, switches
-from .predictions import UNDAMPED, predict_inverse, solve
+from .predictions import predict_inverse, solve
 from .report import diagnosed
-from .textbook import Damping
 
 NAMES = {"ccd": "CCD", "fabrik": "FABRIK"}
 # A textbook's sweeps are those of a solver if so many of them are.
@@ -79,7 +78,7 @@ class Comparison(NamedTuple):
 
     method: str  # "ccd", "fabrik" or "", as declared or inferred
     behaviour: Sentence | None = None  # what was inferred, in words
-    off: Sequence[str] = ()  # names of the cases whose sweeps are not the textbook's
+    wrong: Sequence[str] = ()  # names of the cases whose sweeps are not the textbook's
     findings: Mapping[str, Sequence[Finding]] = {}  # by the names of cases
     honest: bool = False  # whether they are another honest solver's, which may be slower
     damped: Sentence | None = None  # how its rotations are made smaller on purpose, if they are
@@ -100,29 +99,32 @@ def compare(
     if not method:
         return Comparison("")
     errors = {one.case.name: _error(one, method, greeting) for one in swept}
-    off = [name for name, (error, bound) in errors.items() if not error <= bound]
+    wrong = [name for name, (error, bound) in errors.items() if not error <= bound]
     behaviour = None
     if not declared:
         behaviour = sentence(
             "Its sweeps resemble those of {method}, with which it is compared."
-            if off
+            if wrong
             else "Its sweeps are those of {method}.",
             method=NAMES[method],
         )
-    verdict, told, damped = Verdict.RIGHT, laws.HOLDS, None
-    if off:
-        verdict, told = _verdict(swept, method, others_hold, greeting)
-        if method == "ccd" and honest_variant(swept, method, greeting) is None:
-            damped = damping_of(swept, greeting)
-        if damped is not None:
-            verdict, told = Verdict.RIGHT_BUT, damped
-    holds = Verdict.RIGHT, laws.HOLDS
+    holds = verdict, message = Verdict.RIGHT, laws.HOLDS
+    damped = None
+    if wrong:
+        honest = honest_variant(swept, method, greeting)
+        damped = damping_of(swept, greeting) if method == "ccd" and honest is None else None
+        choice = honest or damped
+        verdict, message = (
+            (Verdict.RIGHT_BUT, choice)
+            if choice
+            else _verdict(swept, method, others_hold, greeting)
+        )
     findings = {}
     for name, (error, bound) in errors.items():
-        outcome, words = (verdict, told) if name in off else holds
+        outcome, words = (verdict, message) if name in wrong else holds
         findings[name] = [Finding(LAW, outcome, error, bound, "m", words)]
-    honest = verdict is Verdict.RIGHT_BUT
-    return Comparison(method, behaviour, off, findings, honest, damped)
+    is_honest = verdict is Verdict.RIGHT_BUT
+    return Comparison(method, behaviour, wrong, findings, is_honest, damped)
 
 
 def seen(swept: Sequence[Trial], greeting: Greeting) -> str:
@@ -143,8 +145,8 @@ def seen(swept: Sequence[Trial], greeting: Greeting) -> str:
 
 def _is_another_solver(greeting: Greeting, one: Trial) -> bool:
     """Return whether a pose keeps all laws and has arrived, whatever was asked for."""
-    found = pose_laws.all_of(one.posed, one.case, greeting)
-    keeps = all(finding.verdict < Verdict.WRONG for finding in found)
+    findings = pose_laws.all_of(one.posed, one.case, greeting)
+    keeps = all(finding.verdict < Verdict.WRONG for finding in findings)
     return keeps and _goes_on(one, greeting)
 
 
@@ -152,8 +154,12 @@ def _best_fit(swept: Sequence[Trial], method: str, greeting: Greeting) -> tuple[
     """Return what share of the sweeps a faulty textbook reproduces, and minus its faults."""
     asked = [one.seen for one in swept]
     alike = partial(likeness, greeting)
-    found = diagnosed(method, asked, asked, alike, most_faults=SEEN_FAULTS).explanations
-    return (found[0].share, -len(found[0].faults[0].split(" + "))) if found else (0.0, 0)
+    explanations = diagnosed(method, asked, asked, alike, most_faults=SEEN_FAULTS).explanations
+    return (
+        (explanations[0].share, -len(explanations[0].faults[0].split(" + ")))
+        if explanations
+        else (0.0, 0)
+    )
 
 
 def _error(one: Trial, method: str, greeting: Greeting) -> tuple[float, float]:
@@ -167,9 +173,6 @@ def _verdict(
     swept: Sequence[Trial], method: str, others_hold: bool, greeting: Greeting
 ) -> tuple[Verdict, Sentence]:
     """Return what follows from sweeps that are not the textbook's."""
-    honest = honest_variant(swept, method, greeting)
-    if honest is not None:
-        return Verdict.RIGHT_BUT, honest
     if others_hold and all(_goes_on(one, greeting) for one in swept):
         return Verdict.RIGHT_BUT, sentence(
             "It goes on to the target although one sweep was asked for (max_iterations 1, "
@@ -221,12 +224,12 @@ def damping_of(swept: Sequence[Trial], greeting: Greeting) -> Sentence | None:
     """Return by how much a CCD scales or caps its rotations, if that explains all sweeps."""
     for switched in (Switches(), switches([by_key("ccd")["root to tip"]])):
         gain, most = _damping(swept, switched)
-        scaled, capped = Damping(gain=gain), Damping(most=most)
-        if SMALLEST < gain < 0.999 and _explains(swept, "ccd", greeting, switched, scaled):
+        scaled, capped = switched._replace(gain=gain), switched._replace(most=most)
+        if SMALLEST < gain < 0.999 and _explains(swept, "ccd", greeting, scaled):
             return sentence(
                 "It is CCD with each rotation scaled by {gain:.4g}, which is slower.", gain=gain
             )
-        if most > SMALLEST and _explains(swept, "ccd", greeting, switched, capped):
+        if most > SMALLEST and _explains(swept, "ccd", greeting, capped):
             return sentence(
                 "It is CCD with each rotation capped at {angle:.4g} rad, which is slower.",
                 angle=most,
@@ -250,29 +253,28 @@ def _damping(swept: Sequence[Trial], switched: Switches) -> tuple[float, float]:
     return gain, most
 
 
-def _explains(
-    swept: Sequence[Trial], method: str, greeting: Greeting, switched: Switches,
-    damping: Damping = UNDAMPED,
-) -> bool:  # fmt: skip
+def _explains(swept: Sequence[Trial], method: str, greeting: Greeting, switched: Switches) -> bool:
     return all(
-        difference(predict_inverse(method, switched, one.case, damping), one.posed.comparable)
+        difference(predict_inverse(method, switched, one.case), one.posed.comparable)
         <= likeness(greeting, one.case)
         for one in swept
     )
 
 
 def explained(
-    found: Comparison, all_sweeps: Sequence[Trial], wrong: Sequence[Trial], greeting: Greeting
+    comparison: Comparison, all_sweeps: Sequence[Trial], wrong: Sequence[Trial], greeting: Greeting
 ) -> Diagnosis:
     """Return the faults that reproduce the sweeps."""
-    if not found.method:
+    if not comparison.method:
         return Diagnosis()
-    if found.damped is not None:
-        return Diagnosis(behaviour=found.damped)
+    if comparison.damped is not None:
+        return Diagnosis(behaviour=comparison.damped)
     alike = partial(likeness, greeting)
     seen = {one.case.name: one.seen for one in all_sweeps}
-    told = [seen[one.case.name] for one in wrong]
-    return diagnosed(found.method, list(seen.values()), told, alike, found.behaviour)
+    trials_seen = [seen[one.case.name] for one in wrong]
+    return diagnosed(
+        comparison.method, list(seen.values()), trials_seen, alike, comparison.behaviour
+    )
 
 
 def is_grave(method: str, diagnosis: Diagnosis) -> bool:
