@@ -16,7 +16,7 @@ from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..sentence import sentence
 from . import laws, rounding, skeletons
 from .report import diagnosed, report
-from .skeletons import Family, Posed, chain, tree
+from .skeletons import Family, Posed, chain, chains, tree, trees
 
 TASK = "forward_kinematics"
 
@@ -51,16 +51,15 @@ def _branches(rng: np.random.Generator) -> Posed:
 
 
 FAMILIES = (
-    Family("root only", sentence("A single joint, away from the origin and rotated."),
-           lambda rng: chain(rng, 1)),
+    Family("root only", sentence("A single joint, away from the origin and rotated."), chains(1)),
     Family("two joints, a quarter",
            sentence("Two joints along the axes, rotated by quarters: the answer is seen at a "
                     "glance."),
            lambda rng: skeletons.quarter_turns(rng, 2), 3),
-    Family("two joints", sentence("Two joints in a moved pose."), lambda rng: chain(rng, 2), 2),
+    Family("two joints", sentence("Two joints in a moved pose."), chains(2), 2),
     Family("three joints",
            sentence("Three joints in a moved pose: the order of products begins to matter."),
-           lambda rng: chain(rng, 3), 3),
+           chains(3), 3),
     Family("quarters", sentence("A chain along the axes, rotated by quarters."),
            lambda rng: skeletons.quarter_turns(rng, 4), 2),
     Family("half turns", sentence("Rotations by half a turn, of which w is 0."), _half_turns),
@@ -72,14 +71,12 @@ FAMILIES = (
     Family("arm at rest", sentence("The lab's arm, straight down."), lambda rng: skeletons.arm()),
     Family("arm", sentence("The lab's arm in a moved pose."), skeletons.moved_arm, 2),
     Family("branches", sentence("A root with three children."), _branches, 2),
-    Family("chain", sentence("A chain in a moved pose."), lambda rng: chain(rng, 6), 2),
-    Family("far away", sentence("A chain whose root is a hundred metres away."),
-           lambda rng: chain(rng, 6, 100.0)),
-    Family("tree", sentence("A tree in a moved pose."), lambda rng: tree(rng, 9), 3),
-    Family("long chain", sentence("A chain of thirty joints: rounding adds up."),
-           lambda rng: chain(rng, 30)),
+    Family("chain", sentence("A chain in a moved pose."), chains(6), 2),
+    Family("far away", sentence("A chain whose root is a hundred metres away."), chains(6, 100.0)),
+    Family("tree", sentence("A tree in a moved pose."), trees(9), 3),
+    Family("long chain", sentence("A chain of thirty joints: rounding adds up."), chains(30)),
     Family("large tree", sentence("A tree of thirty joints, as many as a character has."),
-           lambda rng: tree(rng, 30)),
+           trees(30)),
 )  # fmt: skip
 
 
@@ -95,7 +92,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
 def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
     """Hold positions and rotations separately against the reference; name the faults."""
     judgements = [_judged(one, greeting) for one in asked]
-    wrong = [one for one, told in zip(asked, judgements, strict=True) if told.verdict > 1]
+    wrong = [one for one, judgement in zip(asked, judgements, strict=True) if judgement.verdict > 1]
     diagnosis = diagnosed("forward", asked, wrong, partial(_likeness, greeting))
     return report(TASK, method, judgements, diagnosis)
 
@@ -148,10 +145,8 @@ def _positions(theirs: Any, ours: Any, tolerance: float) -> Finding:
     errors = np.linalg.norm(theirs - ours, axis=-1)
     if not np.isfinite(errors).all():
         return laws.no_numbers("positions", errors, tolerance)
-    worst = int(np.argmax(errors))
-    error, where = errors[worst], laws.first_beyond(errors, tolerance)
-    told = sentence("Joint {joint} is {error:.2g} m off its position.", joint=worst, error=error)
-    return laws.bounded("positions", error, tolerance, "m", told, where=where)
+    message = sentence("Joint {joint} is {error:.2g} m off its position.")
+    return laws.of_joints("positions", errors, tolerance, "m", message)
 
 
 def _rotations(theirs: Any, ours: Any, bound: float) -> list[Finding]:
@@ -160,13 +155,8 @@ def _rotations(theirs: Any, ours: Any, bound: float) -> list[Finding]:
     usable = np.isfinite(lengths) & (lengths > 0.0)
     if not usable.all():
         bad = int(np.argmin(usable))
-        told = sentence("The rotation of joint {joint} is not a number or zero.", joint=bad)
-        return [Finding("rotations", Verdict.WRONG, np.inf, bound, "rad", told, bad)]
+        message = sentence("The rotation of joint {joint} is not a number or zero.", joint=bad)
+        return [Finding("rotations", Verdict.WRONG, np.inf, bound, "rad", message, bad)]
     angles = laws.angles(theirs / lengths[:, None], ours)
-    worst = int(np.argmax(angles))
-    error, where = angles[worst], laws.first_beyond(angles, bound)
-    told = sentence("Joint {joint} is rotated {error:.2g} rad off.", joint=worst, error=error)
-    return [
-        laws.unit(lengths, bound),
-        laws.bounded("rotations", error, bound, "rad", told, where=where),
-    ]
+    message = sentence("Joint {joint} is rotated {error:.2g} rad off.")
+    return [laws.unit(lengths, bound), laws.of_joints("rotations", angles, bound, "rad", message)]

@@ -48,48 +48,59 @@ def bounded(
     error: float,
     tolerance: float,
     unit: str,
-    told: Sentence,
+    message: Sentence,
     *,
     verdict: Verdict = Verdict.WRONG,
     where: int | None = None,
 ) -> Finding:
-    """Return the finding that an error is within its tolerance, or the verdict if it is not."""
+    """Return the finding that an error is within its tolerance, or the verdict if it is not.
+
+    The sentence is given the error and the joint where it is, unless it has them.
+    """
     if error <= tolerance:
         return Finding(law, Verdict.RIGHT, float(error), tolerance, unit, HOLDS, where)
-    return Finding(law, verdict, float(error), tolerance, unit, told, where)
+    words = Sentence(message.template, {"error": error, "joint": where, **message.values})
+    return Finding(law, verdict, float(error), tolerance, unit, words, where)
 
 
-def missing(told: Sentence) -> Finding:
+def of_joints(
+    law: str,
+    errors: FloatArray,
+    tolerance: float,
+    unit: str,
+    message: Sentence,
+    verdict: Verdict = Verdict.WRONG,
+) -> Finding:
+    """Return the finding of the worst joint, at the first that is off: there the fault begins."""
+    worst, wrong = int(np.argmax(errors)), errors > tolerance
+    words = Sentence(message.template, {"joint": worst, **message.values})
+    where = int(np.argmax(wrong)) if wrong.any() else worst
+    return bounded(law, errors[worst], tolerance, unit, words, verdict=verdict, where=where)
+
+
+def missing(message: Sentence) -> Finding:
     """Return the finding that an answer lacks what is to be judged."""
-    return Finding("numbers", Verdict.BROKEN, np.inf, 0.0, "", told)
+    return Finding("numbers", Verdict.BROKEN, np.inf, 0.0, "", message)
 
 
 def no_numbers(law: str, values: FloatArray, tolerance: float) -> Finding:
     """Return the finding that some values of joints are NaN or infinite."""
     joint = int(np.argmin(np.isfinite(values)))
-    told = sentence("The answer of joint {joint} is not a number.", joint=joint)
-    return Finding(law, Verdict.BROKEN, np.inf, tolerance, "", told, joint)
+    message = sentence("The answer of joint {joint} is not a number.", joint=joint)
+    return Finding(law, Verdict.BROKEN, np.inf, tolerance, "", message, joint)
 
 
 def unit(lengths: FloatArray, tolerance: float) -> Finding:
     """Return how far quaternions are off unit length; they are normalised after that."""
     errors = np.abs(lengths - 1.0)
     joint = int(np.argmax(errors))
-    told = sentence(
+    message = sentence(
         "The quaternion of joint {joint} has the length {length}, not 1; normalise after each "
         "product.",
-        joint=joint,
         length=distinct_texts(lengths[joint], 1.0)[0],
     )
-    verdict = Verdict.RIGHT_BUT
-    return bounded("unit quaternions", errors[joint], tolerance, "", told, verdict=verdict,
-                   where=joint)  # fmt: skip
-
-
-def first_beyond(errors: FloatArray, tolerance: float) -> int:
-    """Return the first joint that is off, where the fault begins, or the worst."""
-    wrong = errors > tolerance
-    return int(np.argmax(wrong if wrong.any() else errors))
+    law, verdict = "unit quaternions", Verdict.RIGHT_BUT
+    return bounded(law, errors[joint], tolerance, "", message, verdict=verdict, where=joint)
 
 
 def angles(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -108,19 +119,18 @@ def digits(error: float, size: float) -> float:
 def _repeated(answer: Answer, again: object, size: float, greeting: Greeting) -> Finding:
     """Return whether the same request got the same answer again."""
     if not isinstance(again, Answer):
-        told = sentence("Asked again, it gave no answer.")
-        return Finding("equal answers", Verdict.BROKEN, np.inf, 0.0, "", told)
+        message = sentence("Asked again, it gave no answer.")
+        return Finding("equal answers", Verdict.BROKEN, np.inf, 0.0, "", message)
     error = max(
         (_difference(value, again.values.get(name)) for name, value in answer.values.items()),
         default=0.0,
     )
     tolerance = 16.0 * greeting.epsilon * max(size, 1.0)  # threads may add up in another order
-    told = sentence(
+    message = sentence(
         "Asked the same again, it answers something else, {error:.2g} away: state left over, or "
-        "memory that nobody has filled.",
-        error=error,
+        "memory that nobody has filled."
     )
-    return bounded("equal answers", error, tolerance, "", told)
+    return bounded("equal answers", error, tolerance, "", message)
 
 
 def _difference(value: object, other: object) -> float:

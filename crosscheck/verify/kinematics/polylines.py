@@ -50,14 +50,14 @@ class Line:
         Where a line crosses itself a point is in several places. The last point of a closed line
         may be its first one again.
         """
-        found, before = np.empty(len(points)), 0.0
+        parameters, before = np.empty(len(points)), 0.0
         for i, point in enumerate(points):
             distance, along = self._to_segments(point)
             places = along[distance <= 2.0 * bound]
             later = places[places >= before - 4.0 * bound]
-            found[i] = later.min() if len(later) else places.max(initial=0.0)
-            before = found[i]
-        return found
+            parameters[i] = later.min() if len(later) else places.max(initial=0.0)
+            before = parameters[i]
+        return parameters
 
     def without_bridges(self, at: FloatArray) -> FloatArray:
         """Return lengths along the line that do not count its bridges [m]."""

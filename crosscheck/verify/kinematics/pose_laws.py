@@ -1,13 +1,13 @@
 """Laws of a pose that a solver answers: local rotations, positions, or both."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Skeleton, judge_pose, rotation
+from plumbob.reference import Skeleton, judge_pose
 from plumbob.reference.arguments import FloatArray, IndexArray
 from plumbob.reference.judging import PoseJudgement
 
@@ -27,7 +27,7 @@ NEITHER = sentence("The answer has neither rotations nor positions.")
 
 
 @dataclass(frozen=True, eq=False)
-class Posed:
+class AnsweredPose:
     """An answer as the laws see it."""
 
     path: IndexArray  # joints from the root to the effector
@@ -65,16 +65,18 @@ class Posed:
         """How far the effector is from its target [m]."""
         return np.inf if self.judgement is None else self.judgement.distance
 
+    def distance_to(self, positions: FloatArray) -> float:
+        """Return how far a coordinate of a joint of the path is from other positions [m]."""
+        return float(np.abs(self.positions[self.path] - positions[self.path]).max())
+
 
 def understood(
     values: Mapping[str, Any], inputs: Mapping[str, Any], facts: Mapping[str, Any]
-) -> Posed | None:
-    """Return an answer as the laws see it, None if it has neither rotations nor positions."""
+) -> AnsweredPose:
+    """Return an answer as the laws see it."""
     raw: FloatArray | None = values.get("local_rotations")
     given: FloatArray | None = values.get("positions")
     path = facts["path"]
-    if raw is None and given is None:
-        return None
     local = None if raw is None else _normalised(with_effector_of(np.array(raw), inputs))
     pose = None if local is None else _placeable(local, path, inputs["local_rotations"])
     x = given if given is not None and np.isfinite(given).all() else None
@@ -83,11 +85,12 @@ def understood(
         x = None if x is None else np.clip(x, -FARTHEST, FARTHEST)
         skeleton = Skeleton(inputs["parents"], inputs["offsets"])
         judgement = judge_pose(skeleton, pose, inputs["target"], inputs["effector"], positions=x)
-    if local is not None or given is None:
-        nowhere = np.full(np.shape(inputs["offsets"]), np.nan)
-        positions = nowhere if pose is None or judgement is None else judgement.positions
-        return Posed(path, raw, local, given, positions, judgement)
-    return Posed(path, raw, local, given, given, judgement)
+    positions = np.full(np.shape(inputs["offsets"]), np.nan)
+    if local is None and given is not None:
+        positions = given
+    elif pose is not None and judgement is not None:
+        positions = judgement.positions
+    return AnsweredPose(path, raw, local, given, positions, judgement)
 
 
 def _normalised(local: FloatArray) -> FloatArray:
@@ -101,15 +104,17 @@ def _placeable(local: FloatArray, path: IndexArray, start: FloatArray) -> FloatA
     return np.where(usable[:, None], local, start) if usable[path[:-1]].all() else None
 
 
-def all_of(posed: Posed, case: Case, greeting: Greeting) -> list[Finding]:
+def all_of(posed: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
     """Return the findings that hold for every pose, whatever its target."""
+    if not posed.comparable:
+        return [laws.missing(NEITHER)]
     findings = rotation_laws(posed, case, greeting)
     if posed.given is not None:
         findings += position_laws(posed, case, greeting)
     return findings
 
 
-def rotation_laws(posed: Posed, case: Case, greeting: Greeting) -> list[Finding]:
+def rotation_laws(posed: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
     """Return the findings of local rotations: numbers, norms, joints that have to stay."""
     if posed.raw is None or posed.local is None:
         return []
@@ -133,28 +138,24 @@ def _unusable(usable: Any, local: FloatArray, case: Case, bound: float) -> Findi
     """Return the finding of rotations that are no numbers; the effector's own may not matter."""
     joint = int(np.argmin(usable))
     matters = joint != case.inputs["effector"] or not np.isfinite(local).all()
-    told = sentence("The local rotation of joint {joint} is not a number or zero.", joint=joint)
+    message = sentence("The local rotation of joint {joint} is not a number or zero.", joint=joint)
     verdict = Verdict.BROKEN if matters else Verdict.RIGHT_BUT
-    return Finding("numbers", verdict, np.inf, bound, "", told, joint)
+    return Finding("numbers", verdict, np.inf, bound, "", message, joint)
 
 
 def _untouched(moved: FloatArray, bound: float, effector: int) -> Finding:
     joint = int(np.argmax(moved))
-    verdict, told = Verdict.WRONG, sentence(
-        "It rotates joint {joint}, which is not on the path from the root to the effector.",
-        joint=joint,
-    )  # fmt: skip
-    if joint == effector:
-        verdict, told = Verdict.RIGHT_BUT, sentence(
-            "It rotates the effector itself by {error:.2g} rad, which brings the effector nowhere "
-            "but moves what is below.",
-            error=moved[joint],
-        )  # fmt: skip
-    law = "joints off the path"
-    return laws.bounded(law, moved[joint], bound, "rad", told, verdict=verdict, where=joint)
+    law, verdict = "joints off the path", Verdict.RIGHT_BUT if joint == effector else Verdict.WRONG
+    message = sentence(
+        "It rotates the effector itself by {error:.2g} rad, which brings the effector nowhere "
+        "but moves what is below."
+        if joint == effector
+        else "It rotates joint {joint}, which is not on the path from the root to the effector."
+    )
+    return laws.bounded(law, moved[joint], bound, "rad", message, verdict=verdict, where=joint)
 
 
-def position_laws(posed: Posed, case: Case, greeting: Greeting) -> list[Finding]:
+def position_laws(posed: AnsweredPose, case: Case, greeting: Greeting) -> list[Finding]:
     """Return the findings of positions: numbers, the root's place, lengths, branches, rotations."""
     x = posed.given
     assert x is not None
@@ -164,26 +165,17 @@ def position_laws(posed: Posed, case: Case, greeting: Greeting) -> list[Finding]
     assert posed.judgement is not None
     parents, offsets = case.inputs["parents"], case.inputs["offsets"]
     moved = float(np.linalg.norm(x[0] - offsets[0]))
-    told = sentence("The root has moved by {error:.2g} m.", error=moved)
+    assert posed.judgement.length_errors is not None
+    lengthened = sentence(
+        "The link to joint {joint} has another length than its offset, by {error:.2g} m."
+    )
+    message = sentence("The root has moved by {error:.2g} m.")
     return [
-        laws.bounded("root in place", moved, bound, "m", told, where=0),
-        _lengths(posed.judgement, bound),
+        laws.bounded("root in place", moved, bound, "m", message, where=0),
+        laws.of_joints("link lengths", posed.judgement.length_errors, bound, "m", lengthened),
         _branches(x, parents, offsets, 2.0 * bound),
         *_agreement(posed, case, 2.0 * bound, greeting),
     ]
-
-
-def _lengths(judgement: PoseJudgement, bound: float) -> Finding:
-    errors = judgement.length_errors
-    assert errors is not None
-    worst = int(np.argmax(errors))
-    told = sentence(
-        "The link to joint {joint} has another length than its offset, by {error:.2g} m.",
-        joint=worst,
-        error=errors[worst],
-    )
-    where = laws.first_beyond(errors, bound)
-    return laws.bounded("link lengths", errors[worst], bound, "m", told, where=where)
 
 
 def _branches(x: FloatArray, parents: IndexArray, offsets: FloatArray, bound: float) -> Finding:
@@ -194,36 +186,20 @@ def _branches(x: FloatArray, parents: IndexArray, offsets: FloatArray, bound: fl
             length = np.linalg.norm(offsets[j] - offsets[sibling])
             change = abs(float(np.linalg.norm(x[j] - x[sibling]) - length))
             error, joint = max((error, joint), (change, j), key=lambda pair: pair[0])
-    told = sentence(
+    message = sentence(
         "Joint {joint} does not keep its distance from another child of the same parent: it is "
-        "{error:.2g} m off. A parent rotates all its children as one body.",
-        joint=joint,
-        error=error,
+        "{error:.2g} m off. A parent rotates all its children as one body."
     )
-    return laws.bounded("branches", error, bound, "m", told, where=joint)
+    return laws.bounded("branches", error, bound, "m", message, where=joint)
 
 
-def _agreement(posed: Posed, case: Case, bound: float, greeting: Greeting) -> list[Finding]:
+def _agreement(posed: AnsweredPose, case: Case, bound: float, greeting: Greeting) -> list[Finding]:
     """Return whether positions are where the rotations put the joints."""
     errors = None if posed.judgement is None else posed.judgement.position_errors
-    if errors is None or posed.local is None or not np.isfinite(posed.local).all():
+    carriers = case.inputs["parents"][1:]
+    if errors is None or posed.local is None or not np.isfinite(posed.local[carriers]).all():
         return []
-    worst = int(np.argmax(errors))
     dead = DEAD_JOINTS * rounding.DEAD_ANGLE[greeting.precision] * case.facts["reach"]
-    told = sentence(
-        "Joint {joint} is {error:.2g} m from where the answer's rotations put it.",
-        joint=worst,
-        error=errors[worst],
-    )
-    verdict = Verdict.RIGHT_BUT if errors[worst] <= dead else Verdict.WRONG
-    law, where = "rotations agree with positions", laws.first_beyond(errors, bound)
-    return [laws.bounded(law, errors[worst], bound, "m", told, verdict=verdict, where=where)]
-
-
-def distance_between(posed: Posed, base: Posed, world: Sequence[Any]) -> float:
-    """Return how far an answer is from another one brought into its world [m]."""
-    Q, scale, shift = world
-    if not (posed.finite and base.finite):
-        return np.nan
-    moved = scale * rotation.rotate(Q, base.positions[base.path]) + shift
-    return float(np.abs(posed.positions[posed.path] - moved).max())
+    message = sentence("Joint {joint} is {error:.2g} m from where the answer's rotations put it.")
+    verdict = Verdict.RIGHT_BUT if errors.max() <= dead else Verdict.WRONG
+    return [laws.of_joints("rotations agree with positions", errors, bound, "m", message, verdict)]

@@ -12,9 +12,8 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 from ..case import Case
 from ..explain import Variant
 from .faults import combinations, switches
-from .textbook import SOLVERS, Chain, Damping, Ending, Pose, Switches, place_all
+from .textbook import SOLVERS, Chain, Ending, Pose, Switches, place_all
 
-UNDAMPED = Damping()
 RIGHT = Switches()
 
 
@@ -39,10 +38,7 @@ def _unplaced(local: FloatArray) -> Pose:
 
 
 def solve(
-    method: str,
-    inputs: Mapping[str, Any],
-    switched: Switches = RIGHT,
-    damping: Damping = UNDAMPED,
+    method: str, inputs: Mapping[str, Any], switched: Switches = RIGHT
 ) -> tuple[FloatArray, FloatArray, int]:
     """Return local rotations, positions as the solver has them, and the number of sweeps."""
     parents = inputs["parents"]
@@ -51,7 +47,7 @@ def solve(
     chain = Chain(parents, inputs["offsets"], path_to(parents, effector))
     target = tuple(inputs["target"].tolist())
     ending = Ending(float(inputs["tolerance"]), int(inputs["max_iterations"]))
-    made = SOLVERS[method](chain, target, ending, switched, damping, pose)
+    made = SOLVERS[method](chain, target, ending, switched, pose)
     return _written(pose.local, switched), pose.positions, made
 
 
@@ -66,13 +62,10 @@ def _written(local: FloatArray, switched: Switches) -> FloatArray:
 
 def variants(method: str, most_faults: int = 3) -> Iterator[Variant]:
     """Yield the textbook's method with all combinations of its faults, the fewest first."""
-    predict: Callable[[Switches, Case], Mapping[str, Any]]
-    if method == "forward":
-        predict = predict_forward
-    elif method.startswith("track "):
-        predict = partial(predict_track, method.removeprefix("track "))
-    else:
-        predict = partial(predict_inverse, method)
+    task, _, solver = method.rpartition(" ")
+    predict: Callable[[Switches, Case], Mapping[str, Any]] = predict_forward
+    if method != "forward":
+        predict = partial(predict_track if task else predict_inverse, solver)
     for faults in combinations(method):
         if len(faults) > most_faults:
             return
@@ -86,21 +79,19 @@ def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
     return {"positions": positions, "rotations": _written(rotations, switched)}
 
 
-def predict_inverse(
-    method: str, switched: Switches, case: Case, damping: Damping = UNDAMPED
-) -> Mapping[str, Any]:
+def predict_inverse(method: str, switched: Switches, case: Case) -> Mapping[str, Any]:
     """Return what a solver answers, with `placed`: where its local rotations put the joints.
 
     The rotations that FABRIK's positions stand for are not unique: each link may twist.
     """
-    return _predicted(method, switched, case.inputs, damping)[0]
+    return _predicted(method, switched, case.inputs)[0]
 
 
 def _predicted(
-    method: str, switched: Switches, inputs: Mapping[str, Any], damping: Damping = UNDAMPED
+    method: str, switched: Switches, inputs: Mapping[str, Any]
 ) -> tuple[dict[str, Any], FloatArray]:
     """Return what a solver answers, and its local rotations."""
-    local, positions, _ = solve(method, inputs, switched, damping)
+    local, positions, _ = solve(method, inputs, switched)
     local = with_effector_of(local, inputs)
     if method == "ccd":
         return {"positions": positions, "local_rotations": local}, local

@@ -20,7 +20,7 @@ from ..greeting import Greeting
 from ..sentence import sentence
 from . import skeletons
 from .predictions import forward, path_to, solve
-from .skeletons import Family, Posed
+from .skeletons import Family, Make, Posed, chains, trees
 from .textbook import SOLVERS, Switches
 
 TASK = "inverse_kinematics"
@@ -45,7 +45,6 @@ class Problem(NamedTuple):
 
 
 Draw = Callable[[np.random.Generator], Any]
-Make = Callable[[np.random.Generator], Posed]
 
 
 def request(problem: Problem, tolerance: float, sweeps: int, method: str) -> dict[str, Any]:
@@ -215,59 +214,49 @@ def _links(*lengths: float) -> Make:
     return posed
 
 
-def _trees(joints: int) -> Make:
-    return lambda rng: skeletons.tree(rng, joints)
-
-
-def _chains(joints: int) -> Make:
-    return lambda rng: skeletons.chain(rng, joints)
-
-
 _ONE = sentence("A single sweep: one iteration, tolerance 0.")
 _TWO = sentence("Two sweeps, tolerance 0.")
 _REACHABLE = sentence("A target within reach.")
 _FOLDING = _links(0.7, 0.5, 0.6, 0.8)  # can fold back to its root
 # How many copies, the tolerance [m] and the sweeps allowed follow what is drawn.
 FAMILIES = (
-    Family("one sweep, two links", _ONE, _sweep_of(_chains(3)), 2, 0.0, 1),
-    Family("one sweep, three links", _ONE, _sweep_of(_chains(4)), 2, 0.0, 1),
-    Family("one sweep, four links", _ONE, _sweep_of(_chains(5)), 2, 0.0, 1),
+    Family("one sweep, two links", _ONE, _sweep_of(chains(3)), 2, 0.0, 1),
+    Family("one sweep, three links", _ONE, _sweep_of(chains(4)), 2, 0.0, 1),
+    Family("one sweep, four links", _ONE, _sweep_of(chains(5)), 2, 0.0, 1),
     Family("one sweep, arm", _ONE, _sweep_of(skeletons.moved_arm), 1, 0.0, 1),
     Family("one sweep, joint in the middle",
            sentence("A single sweep that moves a joint with others below it."),
-           _sweep_of(_chains(5), 3), 2, 0.0, 1),
-    Family("one sweep, tree", _ONE, _sweep_of(_trees(6)), 2, 0.0, 1),
-    Family("two sweeps, two links", _TWO, _sweep_of(_chains(3), -1, 2), 1, 0.0, 2),
-    Family("two sweeps, four links", _TWO, _sweep_of(_chains(5), -1, 2), 1, 0.0, 2),
+           _sweep_of(chains(5), 3), 2, 0.0, 1),
+    Family("one sweep, tree", _ONE, _sweep_of(trees(6)), 2, 0.0, 1),
+    Family("two sweeps, two links", _TWO, _sweep_of(chains(3), -1, 2), 1, 0.0, 2),
+    Family("two sweeps, four links", _TWO, _sweep_of(chains(5), -1, 2), 1, 0.0, 2),
     Family("one link", sentence("One link, its target on the sphere that it can reach."),
-           _at_distance(_chains(2), 1.0)),
+           _at_distance(chains(2), 1.0)),
     Family("two links", sentence("Links of 3 and 4, a target at 5: a right angle."), _two_links),
     Family("arm", sentence("The lab's arm, a target on its circle."),
            accepted(_on_circle, partial(is_easy, 1e-4)), 2),
     Family("arm from rest", sentence("The lab's arm, straight down, a target aside."),
            _of_arm([0.6, 0.0, 0.3])),
-    Family("chain of 4", _REACHABLE, _easy(_chains(4)), 2),
-    Family("chain of 7", _REACHABLE, _easy(_chains(7)), 2),
-    Family("tree", sentence("A target within reach of a branch."), _easy(_trees(8))),
+    Family("chain of 4", _REACHABLE, _easy(chains(4)), 2),
+    Family("chain of 7", _REACHABLE, _easy(chains(7)), 2),
+    Family("tree", sentence("A target within reach of a branch."), _easy(trees(8))),
     Family("joint in the middle", sentence("A target for a joint with others below it."),
-           _easy(_chains(6), 4)),
-    Family("loose",
-           sentence("A loose tolerance, which a solver keeps without arriving exactly."),
-           _loose(_chains(5), 2), 2, LOOSE),
+           _easy(chains(6), 4)),
+    Family("loose", sentence("A loose tolerance, which a solver keeps without arriving exactly."),
+           _loose(chains(5), 2), 2, LOOSE),
     Family("slow approach",
            sentence("A target that is approached slowly: small steps are not arrival."),
-           _loose(_chains(5), 3), 1, LOOSE),
-    Family("tight", sentence("A tight tolerance."), _easy(_chains(5), tolerance=1e-6), 1, 1e-6),
-    Family("arrived", sentence("The effector is on its target already."),
-           _at_joint(3, _chains(4))),
-    Family("beyond reach", sentence("A target beyond reach."), _at_distance(_chains(4), 1.5),
-           2, 1e-4, FEW),
+           _loose(chains(5), 3), 1, LOOSE),
+    Family("tight", sentence("A tight tolerance."), _easy(chains(5), tolerance=1e-6), 1, 1e-6),
+    Family("arrived", sentence("The effector is on its target already."), _at_joint(3, chains(4))),
+    Family("beyond reach", sentence("A target beyond reach."), _at_distance(chains(4), 1.5), 2,
+           1e-4, FEW),
     Family("arm beyond reach", sentence("A target beyond the arm's reach."),
            _of_arm([3.0, 0.5, 2.0], skeletons.moved_arm), 1, 1e-4, FEW),
     Family("inner radius", sentence("A target nearer to the root than the longest link allows."),
            _at_distance(_links(1.5, 0.4, 0.3), 0.3 / 2.2), 1, 1e-4, FEW),
-    Family("at the root", sentence("A target at the root itself."), _at_joint(0, _FOLDING),
-           1, 1e-3, FEW),
+    Family("at the root", sentence("A target at the root itself."), _at_joint(0, _FOLDING), 1, 1e-3,
+           FEW),
     Family("at a joint", sentence("A target where a joint is."), _at_joint(2, _FOLDING), 1, 1e-3),
     Family("collinear",
            sentence("A straight arm, its target on the same line: there is no plane to bend in."),
@@ -275,8 +264,7 @@ FAMILIES = (
     Family("opposite",
            sentence("A straight arm, its target on the same line on the root's other side."),
            _of_arm([0.0, 3.1, 0.0]), 1, 1e-4, FEW),
-    Family("straight beyond",
-           sentence("A straight arm, its target farther out on the same line."),
+    Family("straight beyond", sentence("A straight arm, its target farther out on the same line."),
            _of_arm([0.0, -2.0, 0.0]), 1, 1e-4, FEW),
 )  # fmt: skip
 # Families in which a start or a target leaves a direction undefined.
@@ -286,12 +274,12 @@ DEGENERATE = ("collinear", "opposite", "straight beyond", "at the root", "at a j
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return single sweeps, then closed forms, whole solves and hostile targets."""
     drawn = skeletons.drawn(FAMILIES, seed, 5 if thorough else 1)
-    found = [
+    problems = [
         _case(name, family, problem, greeting, method)
         for name, family, problem in drawn
         if skeletons.suits(problem.posed.parents, greeting)
     ]
-    return [*found, *_elsewhere(found)]
+    return [*problems, *_elsewhere(problems)]
 
 
 def _case(name: str, family: Family, problem: Problem, greeting: Greeting, method: str) -> Case:
@@ -299,26 +287,26 @@ def _case(name: str, family: Family, problem: Problem, greeting: Greeting, metho
     if greeting.precision == "single" and family.name == "tight":
         tolerance = 3e-5
     inputs = request(problem, tolerance, family.sweeps, method)
-    known = facts(inputs, problem.posed)
+    facts_of_case = facts(inputs, problem.posed)
     if tolerance == 0.0:
-        known |= {"amplification": amplification(inputs), "sweeps": family.sweeps}
-    return Case(name, TASK, inputs, family.name, family.about, facts=known)
+        facts_of_case |= {"amplification": amplification(inputs), "sweeps": family.sweeps}
+    return Case(name, TASK, inputs, family.name, family.about, facts=facts_of_case)
 
 
-def _elsewhere(found: list[Case]) -> Iterator[Case]:
+def _elsewhere(cases: list[Case]) -> Iterator[Case]:
     """Yield the first sweeps but two again in a rotated, scaled and shifted world."""
     worlds = (
         ("rotated", rotation.exponential([0.5, -0.8, 1.1]), 1.0, np.zeros(3)),
         ("in other units", rotation.identity(), 1000.0, np.zeros(3)),
         ("shifted", rotation.identity(), 1.0, np.array([2.0, -1.0, 0.5])),
     )
-    swept = [case for case in islice(found, 2, 2 + len(worlds)) if "sweeps" in case.facts]
+    swept = [case for case in islice(cases, 2, 2 + len(worlds)) if "sweeps" in case.facts]
     for case, (name, Q, scale, shift) in zip(swept, worlds, strict=False):
         posed = Posed(*(case.inputs[key] for key in Posed._fields))
         moved = skeletons.in_world(posed, Q, scale, shift)
         target = scale * rotation.rotate(Q, case.inputs["target"]) + shift
         inputs = {**case.inputs, **moved._asdict(), "target": target}
-        known = {
+        facts_of_case = {
             **case.facts,
             **facts(inputs, moved),
             "like": case.name,
@@ -329,4 +317,6 @@ def _elsewhere(found: list[Case]) -> Iterator[Case]:
             case=case.name,
             how=name,
         )
-        yield Case(f"{case.name}, {name}", TASK, inputs, "another world", about, facts=known)
+        yield Case(
+            f"{case.name}, {name}", TASK, inputs, "another world", about, facts=facts_of_case
+        )

@@ -33,8 +33,8 @@ def diagnosed(
     tried = 0
     if answered:
         words = partial(describe, method)
-        found, tried = explain(variants(method, most_faults), compared, tolerance, words)
-        named = tuple(one for one in found if one.faults != ("",))
+        explanations, tried = explain(variants(method, most_faults), compared, tolerance, words)
+        named = tuple(one for one in explanations if one.faults != ("",))
     return Diagnosis(named, behaviour, tried=tried)
 
 

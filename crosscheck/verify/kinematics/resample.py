@@ -40,13 +40,13 @@ class Scene(NamedTuple):
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return polylines to be resampled by count and by spacing, the smallest first."""
-    found = [
+    cases_of_scenes = [
         case
         for i in range(5 if thorough else 1)
         for scene in _scenes(generator(seed, f"resample {i}"))
         for case in _cases_of(scene, i + 1)
     ]
-    return sorted(found, key=lambda case: len(case.inputs["curve"]))
+    return sorted(cases_of_scenes, key=lambda case: len(case.inputs["curve"]))
 
 
 def _cases_of(scene: Scene, number: int) -> Iterator[Case]:
@@ -86,9 +86,9 @@ def _scenes(rng: np.random.Generator) -> list[Scene]:
 def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
     """Hold points against the laws of resampling; strokes may be bridged or kept."""
     judgements = [_judged(one, greeting) for one in asked]
-    wrong = [one for one, told in zip(asked, judgements, strict=True) if told.verdict]
-    found = diagnosis(asked, wrong, greeting, _strokes(asked, greeting))
-    return report(TASK, method, judgements, found)
+    wrong = [one for one, message in zip(asked, judgements, strict=True) if message.verdict]
+    report_of_faults = diagnosis(asked, wrong, greeting, _strokes(asked, greeting))
+    return report(TASK, method, judgements, report_of_faults)
 
 
 def _strokes(asked: Sequence[Asked], greeting: Greeting) -> Sentence | None:
@@ -98,7 +98,7 @@ def _strokes(asked: Sequence[Asked], greeting: Greeting) -> Sentence | None:
             points, line = one.answer.values.get("points"), one.case.facts["line"]
             if points is None or not len(points) or not np.isfinite(points).all():
                 continue
-            if _off(points, line, False).max() > _bound(one.case, greeting):
+            if _distances(points, line, False).max() > _bound(one.case, greeting):
                 return sentence("It bridges strokes: points lie between them as well.")
             return sentence("It keeps strokes apart: no points lie between them.")
     return None
@@ -110,7 +110,7 @@ def _bound(case: Case, greeting: Greeting) -> float:
     return float(rounding.ROUNDINGS_A_JOINT * greeting.epsilon * size)
 
 
-def _off(points: FloatArray, line: Line, bridged: bool) -> FloatArray:
+def _distances(points: FloatArray, line: Line, bridged: bool) -> FloatArray:
     return np.array([line.nearest(point, bridged)[0] for point in points])
 
 
@@ -135,31 +135,29 @@ def _findings(case: Case, greeting: Greeting, values: Mapping[str, Any]) -> list
 def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Finding]:
     """Return whether points are on the line, in order, evenly spaced and as many as asked for."""
     line, bound = case.facts["line"], _bound(case, greeting)
-    off = _off(points, line, True)
-    found = [_on_line(points, off, line, bound), _ends(points, case, bound)]
+    distances = _distances(points, line, True)
+    findings = [_on_line(points, distances, line, bound), _ends(points, case, bound)]
     if "count" in case.inputs:
-        found.append(_count(points, case))
-    if off.max() <= bound:
+        findings.append(_count(points, case))
+    if distances.max() <= bound:
         at = line.parameters(points, bound)
-        found += [_order(at, line, bound), _gaps(points, at, case, bound)]
+        findings += [_order(at, line, bound), _gaps(points, at, case, bound)]
         if case.inputs["closed"] and len(points) > 1:
-            found.append(_closing(points, at, line, bound))
-    return found
+            findings.append(_closing(points, at, line, bound))
+    return findings
 
 
-def _on_line(points: FloatArray, off: FloatArray, line: Line, bound: float) -> Finding:
+def _on_line(points: FloatArray, distances: FloatArray, line: Line, bound: float) -> Finding:
     """Return whether points are on the line, or between two of its points."""
-    worst, verdict = int(np.argmax(off)), Verdict.WRONG
-    told = sentence(
-        "Point {index} is {error:.2g} m off the polyline.", index=worst, error=off[worst]
+    is_cut = all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(distances > bound))
+    message = sentence(
+        "Points between given ones are left out, so that corners are cut by {error:.2g} m."
+        if is_cut
+        else "Point {index} is {error:.2g} m off the polyline.",
+        index=int(np.argmax(distances)),
     )
-    if all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(off > bound)):
-        verdict = Verdict.RIGHT_BUT
-        told = sentence(
-            "Points between given ones are left out, so that corners are cut by {error:.2g} m.",
-            error=off[worst],
-        )
-    return laws.bounded("on the line", off[worst], bound, "m", told, verdict=verdict)
+    verdict = Verdict.RIGHT_BUT if is_cut else Verdict.WRONG
+    return laws.bounded("on the line", distances.max(), bound, "m", message, verdict=verdict)
 
 
 def _ends(points: FloatArray, case: Case, bound: float) -> Finding:
@@ -167,25 +165,24 @@ def _ends(points: FloatArray, case: Case, bound: float) -> Finding:
     error = float(np.linalg.norm(points[0] - curve[0]))
     if not case.inputs["closed"]:
         error = max(error, float(np.linalg.norm(points[-1] - curve[-1])))
-    told = sentence(
-        "The curve's ends are not kept: the answer starts or ends {error:.2g} m from them.",
-        error=error,
+    message = sentence(
+        "The curve's ends are not kept: the answer starts or ends {error:.2g} m from them."
     )
-    return laws.bounded("ends", error, bound, "m", told)
+    return laws.bounded("ends", error, bound, "m", message)
 
 
 def _count(points: FloatArray, case: Case) -> Finding:
     asked, came = case.inputs["count"], len(points)
-    told = sentence("It was asked for {asked} points and gives {came}.", asked=asked, came=came)
+    message = sentence("It was asked for {asked} points and gives {came}.", asked=asked, came=came)
     repeated = case.inputs["closed"] and came == asked + 1
     verdict = Verdict.RIGHT_BUT if repeated else Verdict.WRONG
-    return laws.bounded("count", abs(came - asked), 0.0, "", told, verdict=verdict)
+    return laws.bounded("count", abs(came - asked), 0.0, "", message, verdict=verdict)
 
 
 def _order(at: FloatArray, line: Line, bound: float) -> Finding:
     back = float(np.max(-np.diff(at), initial=0.0))
-    told = sentence("The points go back along the curve, by {error:.2g} m.", error=back)
-    return laws.bounded("order", back, 2.0 * bound, "m", told)
+    message = sentence("The points go back along the curve, by {error:.2g} m.")
+    return laws.bounded("order", back, 2.0 * bound, "m", message)
 
 
 def _gaps(points: FloatArray, at: FloatArray, case: Case, bound: float) -> Finding:
@@ -197,13 +194,12 @@ def _gaps(points: FloatArray, at: FloatArray, case: Case, bound: float) -> Findi
     ]  # fmt: skip
     if "count" in case.inputs:
         error = min(_spread(gaps) for gaps in kinds)
-        told = sentence(
-            "The points are not evenly spaced: a gap differs from the mean by {error:.0%}.",
-            error=error,
+        message = sentence(
+            "The points are not evenly spaced: a gap differs from the mean by {error:.0%}."
         )
         verdict = Verdict.RIGHT_BUT if len(case.inputs["strokes"]) > 1 else Verdict.WRONG
         tolerance = UNEVEN + 4.0 * bound / max(float(kinds[2].mean()), bound)
-        return laws.bounded("spacing", error, tolerance, "", told, verdict=verdict)
+        return laws.bounded("spacing", error, tolerance, "", message, verdict=verdict)
     return _widest(kinds, case, bound)
 
 
@@ -213,13 +209,13 @@ def _closing(points: FloatArray, at: FloatArray, line: Line, bound: float) -> Fi
     gap = line.length - float(at[-1]) if back else 0.0
     widest = float(np.diff(at).max()) * (1.0 + UNEVEN)
     side, others = distinct_texts(gap, widest, 3)
-    told = sentence(
+    message = sentence(
         "The side that closes the curve is left out: from the last point to the start it is "
         "{gap} m, between others at most {widest} m.",
         gap=side,
         widest=others,
     )
-    return laws.bounded("closing side", gap, widest + 2.0 * bound, "m", told)
+    return laws.bounded("closing side", gap, widest + 2.0 * bound, "m", message)
 
 
 def _spread(gaps: FloatArray) -> float:
@@ -234,17 +230,17 @@ def _widest(kinds: Sequence[FloatArray], case: Case, bound: float) -> Finding:
     wide = min(float(np.sort(gaps)[: len(gaps) - bridges].max(initial=0.0)) for gaps in kinds)
     if wide > spacing * (1.0 + 1e-6) + 2.0 * bound:
         gap, limit = distinct_texts(wide, spacing, 3)
-        told = sentence(
+        message = sentence(
             "Neighbouring points are {gap} m apart, more than the {spacing} m asked for.",
             gap=gap,
             spacing=limit,
         )
-        return Finding("spacing", Verdict.WRONG, wide, spacing, "m", told)
+        return Finding("spacing", Verdict.WRONG, wide, spacing, "m", message)
     if len(kinds[2]) > 4.0 * line.length / spacing + 1.0 + bridges + len(case.inputs["curve"]):
         narrow = int((kinds[2] < LEAST_GAP * spacing - 2.0 * bound).sum())
-        told = sentence(
+        message = sentence(
             "{narrow} gaps are narrower than half the spacing: the points are uneven.",
             narrow=narrow,
         )
-        return Finding("spacing", Verdict.RIGHT_BUT, narrow, 0.0, "", told)
+        return Finding("spacing", Verdict.RIGHT_BUT, narrow, 0.0, "", message)
     return Finding("spacing", Verdict.RIGHT, wide, spacing, "m", laws.HOLDS)

@@ -91,8 +91,8 @@ def diagnosis(
     variants = [Variant((), partial(_predict, _even))]
     variants += [Variant((key,), partial(_predict, make)) for key, (make, _) in FAULTS.items()]
     compared = [*wrong, *(one for one in asked if one not in wrong)]
-    found, tried = explain(variants, compared, partial(_likeness, greeting), _describe)
-    named = tuple(one for one in found if one.faults != ("",))
+    explanations, tried = explain(variants, compared, partial(_likeness, greeting), _describe)
+    named = tuple(one for one in explanations if one.faults != ("",))
     return Diagnosis(named, behaviour, tried=tried)
 
 

@@ -117,11 +117,10 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
     joint = int(np.argmax(excess))
     largest = float(np.abs([case.inputs["lower"], case.inputs["upper"]]).max())
     allowed = rounding.ROUNDINGS_A_JOINT * greeting.epsilon * largest
-    told = sentence(
-        "Joint {joint} is at {value:.6g}, {error:.2g} beyond its limit.",
-        joint=joint, value=float(q[joint]), error=float(excess[joint]),
-    )  # fmt: skip
-    return laws.bounded("limits kept", excess[joint], allowed, "rad", told, where=joint)
+    message = sentence(
+        "Joint {joint} is at {value:.6g}, {error:.2g} beyond its limit.", value=float(q[joint])
+    )
+    return laws.bounded("limits kept", excess[joint], allowed, "rad", message, where=joint)
 
 
 def _target_laws(
@@ -141,16 +140,12 @@ def _reached(
     distance: float, angle: float, near: float, straight: float, family: str
 ) -> list[Finding]:
     """Return whether the target is reached; from any start a solver may end in another minimum."""
-    stuck = family == ANYWHERE
-    verdict = Verdict.RIGHT_BUT if stuck else Verdict.WRONG
-    off = (
-        sentence("It stays {error:.2g} m off a target that it can reach.", error=distance),
-        sentence("Its tool is rotated by {error:.2g} rad from a target that it can reach.",
-                 error=angle),
-    )  # fmt: skip
+    verdict = Verdict.RIGHT_BUT if family == ANYWHERE else Verdict.WRONG
+    missed = sentence("It stays {error:.2g} m off a target that it can reach.")
+    rotated = sentence("Its tool is rotated by {error:.2g} rad from a target that it can reach.")
     return [
-        laws.bounded("target reached", distance, near, "m", off[0], verdict=verdict),
-        laws.bounded("rotation reached", angle, straight, "rad", off[1], verdict=verdict),
+        laws.bounded("target reached", distance, near, "m", missed, verdict=verdict),
+        laws.bounded("rotation reached", angle, straight, "rad", rotated, verdict=verdict),
     ]
 
 
@@ -159,14 +154,14 @@ def _claims(
 ) -> list[Finding]:
     reached = distance <= near and angle <= straight
     if values.get("converged") and not reached:
-        told = sentence(
+        message = sentence(
             "It claims to have arrived, but the tool is {distance:.2g} m and {angle:.2g} rad off.",
             distance=distance, angle=angle,
         )  # fmt: skip
-        return [Finding("claims", Verdict.WRONG, distance, near, "m", told)]
+        return [Finding("claims", Verdict.WRONG, distance, near, "m", message)]
     if "converged" in values and not values["converged"] and reached:
-        told = sentence("It has arrived, {error:.2g} m off, and denies it.", error=distance)
-        return [Finding("claims", Verdict.RIGHT_BUT, distance, near, "m", told)]
+        message = sentence("It has arrived, {error:.2g} m off, and denies it.", error=distance)
+        return [Finding("claims", Verdict.RIGHT_BUT, distance, near, "m", message)]
     return []
 
 

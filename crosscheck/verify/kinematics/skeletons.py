@@ -49,6 +49,9 @@ class Posed(NamedTuple):
         return float(np.abs(self.offsets[0]).max() + lengths[1:].sum())
 
 
+Make = Callable[[np.random.Generator], Posed]
+
+
 def generator(seed: int, name: str) -> np.random.Generator:
     """Return the random numbers of a case, independent of those of all others."""
     return np.random.default_rng([seed, *name.encode()])
@@ -67,6 +70,16 @@ def tree(rng: np.random.Generator, joints: int) -> Posed:
         if rng.uniform() < 0.5 or j == joints - 1:
             parents[j] = rng.integers(max(0, j - 4), j - 1)
     return Posed(parents, _offsets(rng, joints, 1.0), rotation.random(rng, joints))
+
+
+def chains(joints: int, place: float = 1.0) -> Make:
+    """Return how to draw chains of so many joints."""
+    return lambda rng: chain(rng, joints, place)
+
+
+def trees(joints: int) -> Make:
+    """Return how to draw trees of so many joints."""
+    return lambda rng: tree(rng, joints)
 
 
 def arm() -> Posed:

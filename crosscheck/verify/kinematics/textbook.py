@@ -38,6 +38,9 @@ ORIGIN = (0.0, 0.0, 0.0)
 GIVEN_TO_CHILD = 10
 
 
+UNCAPPED = 10.0  # an angle that no rotation has [rad]
+
+
 class Switches(NamedTuple):
     """The number of the fault in each rule of a solver; 0 is right."""
 
@@ -63,13 +66,9 @@ class Switches(NamedTuple):
     budget: int = 0  # how many sweeps are allowed
     frame_start: int = 0  # following a curve: where a frame starts
     frame_target: int = 0  # which target a frame has
-
-
-class Damping(NamedTuple):
-    """What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad]."""
-
+    # What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad].
     gain: float = 1.0
-    most: float = 10.0
+    most: float = UNCAPPED
 
 
 class Chain(NamedTuple):
@@ -146,9 +145,7 @@ def base_of(chain: Chain, pose: Pose, p: int, fault: int) -> Any:
     return load_vector(pose.positions, 0 if fault == 2 else p)
 
 
-def solve(
-    chain: Chain, target: Any, ending: Ending, faults: Switches, damping: Damping, pose: Pose
-) -> int:
+def solve(chain: Chain, target: Any, ending: Ending, faults: Switches, pose: Pose) -> int:
     """Sweep until the end of the solve; `pose.local` is the start and becomes the result.
 
     Returns the number of sweeps made.
@@ -164,7 +161,7 @@ def solve(
         if is_reached(distance, before, ending.tolerance, i, faults.test):
             break
         before = distance
-        method.sweep(chain, target, i, faults, damping, pose)
+        method.sweep(chain, target, i, faults, pose)
         i += 1
     method.finish(chain, i, faults, pose)
     return i
@@ -183,25 +180,21 @@ def is_reached(distance: float, before: float, tolerance: float, made: int, faul
     return error <= bound
 
 
-def sweep_ccd(
-    chain: Chain, target: Any, i: int, faults: Switches, damping: Damping, pose: Pose
-) -> None:
+def sweep_ccd(chain: Chain, target: Any, i: int, faults: Switches, pose: Pose) -> None:
     """Rotate each joint from the effector's parent to the root; or only one of them, the i-th."""
     links = len(chain.path) - 1
     if faults.budget == 3:
-        rotate_joint(chain, links - 1 - i % links, target, faults, damping, pose)
+        rotate_joint(chain, links - 1 - i % links, target, faults, pose)
         return
     for link in range(links):
         k = link if faults.order == 1 else links - 1 - link
         left_out = (-1, 0, links - 1)
         if k != left_out[faults.joints]:
-            rotate_joint(chain, k, target, faults, damping, pose)
+            rotate_joint(chain, k, target, faults, pose)
     place(chain, faults, pose)
 
 
-def rotate_joint(
-    chain: Chain, k: int, target: Any, faults: Switches, damping: Damping, pose: Pose
-) -> None:
+def rotate_joint(chain: Chain, k: int, target: Any, faults: Switches, pose: Pose) -> None:
     """Rotate joint k of the path so that the effector comes nearest to the target."""
     joint = load_vector(pose.positions, chain.path[k])
     effector = load_vector(pose.positions, chain.path[-1])
@@ -214,25 +207,25 @@ def rotate_joint(
         (arm, subtract(target, effector)),
     )
     a, b = directions[faults.aim]
-    apply_rotation(chain, k, damped(between(a, b), faults.angle, damping), faults.applied, pose)
+    apply_rotation(chain, k, damped(between(a, b), faults), faults.applied, pose)
     if faults.update == 0:
         place(chain, faults, pose)
 
 
-def damped(d: Any, fault: int, damping: Damping) -> Any:
+def damped(d: Any, faults: Switches) -> Any:
     """Return the rotation with another angle: negative (1), doubled (2), halved (3), damped."""
-    if fault == 1:
+    if faults.angle == 1:
         return conjugate(d)
-    if fault == 2:
+    if faults.angle == 2:
         return multiply(d, d)
-    factor = 0.5 * damping.gain if fault == 3 else damping.gain
-    if factor == 1.0 and damping.most >= 10.0:
+    factor = 0.5 * faults.gain if faults.angle == 3 else faults.gain
+    if factor == 1.0 and faults.most >= UNCAPPED:
         return d
     v = logarithm(d)
     angle = norm(v)
     if angle == 0.0:
         return d
-    return rotation_about(scale(1.0 / angle, v), min(factor * angle, damping.most))
+    return rotation_about(scale(1.0 / angle, v), min(factor * angle, faults.most))
 
 
 def apply_rotation(chain: Chain, k: int, d: Any, fault: int, pose: Pose) -> None:
@@ -268,9 +261,7 @@ def keep(chain: Chain, made: int, faults: Switches, pose: Pose) -> None:
     """Leave a pose of CCD as it is: its sweeps keep rotations and positions together."""
 
 
-def sweep_fabrik(
-    chain: Chain, target: Any, i: int, faults: Switches, damping: Damping, pose: Pose
-) -> None:
+def sweep_fabrik(chain: Chain, target: Any, i: int, faults: Switches, pose: Pose) -> None:
     """Pull the joints to the target, then back to the root."""
     last, positions = len(chain.path) - 1, pose.positions
     if faults.passes == 0:

@@ -1,6 +1,6 @@
 """Following a curve: each frame an honest pose, on its target, near the frame before."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,11 +21,11 @@ from ..sentence import sentence
 from . import laws, pose_laws, problems, rounding, skeletons, sweeps
 from .faults import Switches
 from .inverse_kinematics import KNOWN
-from .pose_laws import Posed
+from .pose_laws import AnsweredPose
 from .predictions import forward, path_to, predict_track
 from .problems import Problem
 from .report import diagnosed, report
-from .skeletons import Family
+from .skeletons import Family, Make, chains, trees
 
 TASK = "track"
 # Another method that is within this share of the reach is slow, not wrong.
@@ -71,7 +71,7 @@ def _is_smooth(scene: Scene) -> bool:
     return True
 
 
-def _circle(make: problems.Make, effector: int) -> problems.Draw:
+def _circle(make: Make, effector: int) -> problems.Draw:
     """Return how to draw a small circle in space about where the effector is."""
 
     def scene(rng: np.random.Generator) -> Scene:
@@ -98,16 +98,12 @@ def _arm(curve: str, step: int) -> problems.Draw:
 
 
 FAMILIES = (
-    Family("small circle", sentence("A chain draws a small circle."),
-           _circle(lambda rng: skeletons.chain(rng, 4), 3)),
-    Family("arm, circle", sentence("The lab's arm draws a part of its circle."),
-           _arm("circle", 2)),
-    Family("arm, square", sentence("The lab's arm draws a part of its square."),
-           _arm("square", 4)),
-    Family("tree", sentence("A branch of a tree draws a small circle."),
-           _circle(lambda rng: skeletons.tree(rng, 6), 5)),
+    Family("small circle", sentence("A chain draws a small circle."), _circle(chains(4), 3)),
+    Family("arm, circle", sentence("The lab's arm draws a part of its circle."), _arm("circle", 2)),
+    Family("arm, square", sentence("The lab's arm draws a part of its square."), _arm("square", 4)),
+    Family("tree", sentence("A branch of a tree draws a small circle."), _circle(trees(6), 5)),
     Family("joint in the middle", sentence("A joint with others below it draws a circle."),
-           _circle(lambda rng: skeletons.chain(rng, 6), 4)),
+           _circle(chains(6), 4)),
 )  # fmt: skip
 
 
@@ -116,17 +112,19 @@ def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport
     judgements = [_judged(one, method.lower(), greeting) for one in asked]
     seen = {one.case.name: _seen(one) for one in asked if frames_of(one)}
     wrong = [
-        seen[told.case.name] for told in judgements if told.case.name in seen and _is_wrong(told)
+        seen[judgement.case.name]
+        for judgement in judgements
+        if judgement.case.name in seen and _is_wrong(judgement)
     ]
     diagnosis = _diagnosis(list(seen.values()), wrong, method.lower(), greeting)
     return report(TASK, method, judgements, diagnosis)
 
 
-def _is_wrong(told: CaseJudgement) -> bool:
+def _is_wrong(judgement: CaseJudgement) -> bool:
     """Return whether frames break a law, or jump."""
     laws_of_frames = ("continuity", CONTINUES)
-    jumps = any(one.law in laws_of_frames and one.verdict for one in told.findings)
-    return jumps or told.verdict >= Verdict.WRONG
+    jumps = any(one.law in laws_of_frames and one.verdict for one in judgement.findings)
+    return jumps or judgement.verdict >= Verdict.WRONG
 
 
 def _diagnosis(
@@ -146,20 +144,15 @@ def _likeness(greeting: Greeting, case: Case) -> float:
     return max(1e-8, 16.0 * sweeps.likeness(greeting, case))
 
 
-def frames_of(one: Asked) -> list[tuple[Case, Posed]]:
+def frames_of(one: Asked) -> list[tuple[Case, AnsweredPose]]:
     """Return each frame as a case of inverse kinematics, and its pose; none if there are none."""
-    return list(_frames(one)) if isinstance(one.answer, Answer) else []
-
-
-def _frames(one: Asked) -> Iterator[tuple[Case, Posed]]:
-    assert isinstance(one.answer, Answer)
-    case, values = one.case, one.answer.values
-    for i, facts in enumerate(case.facts["frames"]):
-        inputs = {**case.inputs, "target": case.inputs["curve"][i]}
-        names = {"local_rotations", "positions"} & values.keys()
+    values = one.answer.values if isinstance(one.answer, Answer) else {}
+    names, frames = {"local_rotations", "positions"} & values.keys(), []
+    for i, facts in enumerate(one.case.facts["frames"] if names else ()):
+        inputs = {**one.case.inputs, "target": one.case.inputs["curve"][i]}
         posed = pose_laws.understood({name: values[name][i] for name in names}, inputs, facts)
-        if posed is not None:
-            yield replace(case, inputs=inputs, facts=facts), posed
+        frames.append((replace(one.case, inputs=inputs, facts=facts), posed))
+    return frames
 
 
 def _seen(one: Asked) -> Asked:
@@ -182,8 +175,8 @@ def _judged(one: Asked, method: str, greeting: Greeting) -> CaseJudgement:
         frames = frames_of(one)
         if not frames:
             return [laws.missing(pose_laws.NEITHER)]
-        kept = [*_frame_laws(frames, greeting), *_continuity([posed for _, posed in frames])]
-        return [*kept, _goes_on(one, method, greeting)] if method in KNOWN else kept
+        findings = [*_frame_laws(frames, greeting), *_continuity([posed for _, posed in frames])]
+        return [*findings, _goes_on(one, method, greeting)] if method in KNOWN else findings
 
     return laws.judged(one, greeting, findings, reference)
 
@@ -198,14 +191,14 @@ def _goes_on(one: Asked, method: str, greeting: Greeting) -> Finding:
     )
     if not warm > bound >= cold:
         return Finding(CONTINUES, Verdict.RIGHT, 0.0, 0.0, "", laws.HOLDS)
-    told = sentence(
+    message = sentence(
         "Every frame starts from the first pose, so that joints may jump. Start each frame from "
         "the one before."
     )
-    return Finding(CONTINUES, Verdict.RIGHT_BUT, 1.0, 0.0, "", told)
+    return Finding(CONTINUES, Verdict.RIGHT_BUT, 1.0, 0.0, "", message)
 
 
-def _frame_laws(frames: Sequence[tuple[Case, Posed]], greeting: Greeting) -> list[Finding]:
+def _frame_laws(frames: Sequence[tuple[Case, AnsweredPose]], greeting: Greeting) -> list[Finding]:
     """Return the worst finding of each law over all frames."""
     worst: dict[str, Finding] = {}
     for i, (case, posed) in enumerate(frames):
@@ -215,24 +208,24 @@ def _frame_laws(frames: Sequence[tuple[Case, Posed]], greeting: Greeting) -> lis
         for finding in findings:
             known = worst.get(finding.law)
             if known is None or (finding.verdict, finding.error) > (known.verdict, known.error):
-                told = finding.sentence
+                message = finding.sentence
                 if finding.verdict:
-                    told = sentence("Frame {frame}: {what}", frame=i, what=finding.sentence)
-                worst[finding.law] = replace(finding, sentence=told)
+                    message = sentence("Frame {frame}: {what}", frame=i, what=finding.sentence)
+                worst[finding.law] = replace(finding, sentence=message)
     return list(worst.values())
 
 
-def _on_target(posed: Posed, case: Case, greeting: Greeting) -> Finding:
+def _on_target(posed: AnsweredPose, case: Case, greeting: Greeting) -> Finding:
     joints, size, error = len(posed.positions), case.facts["size"], posed.distance
     slack = rounding.positions(greeting.epsilon, joints, size, posed.drift)
     share = rounding.STALL[greeting.precision] if case.inputs["method"] in KNOWN else SLOW
-    told = sentence("It is {error:.2g} m off a target that it can reach.", error=error)
+    message = sentence("It is {error:.2g} m off a target that it can reach.")
     verdict = Verdict.RIGHT_BUT if error <= share * case.facts["reach"] else Verdict.WRONG
     bound = case.inputs["tolerance"] + slack
-    return laws.bounded("target reached", error, bound, "m", told, verdict=verdict)
+    return laws.bounded("target reached", error, bound, "m", message, verdict=verdict)
 
 
-def _continuity(poses: Sequence[Posed]) -> list[Finding]:
+def _continuity(poses: Sequence[AnsweredPose]) -> list[Finding]:
     """Return whether no joint jumps from a frame to the next."""
     x = np.array([posed.positions[posed.path] for posed in poses])
     if not np.isfinite(x).all():
@@ -240,11 +233,10 @@ def _continuity(poses: Sequence[Posed]) -> list[Finding]:
     moves = np.linalg.norm(np.diff(x, axis=0), axis=-1)
     frame, k = np.unravel_index(int(np.argmax(moves)), moves.shape)
     joint, error = int(poses[0].path[k]), float(moves[frame, k])
-    told = sentence(
+    message = sentence(
         "Joint {joint} jumps by {error:.2g} m from frame {frame} to the next: start each frame "
         "from the one before.",
-        joint=joint, error=error, frame=int(frame),
-    )  # fmt: skip
-    return [
-        laws.bounded("continuity", error, JUMP, "m", told, verdict=Verdict.RIGHT_BUT, where=joint)
-    ]
+        frame=int(frame),
+    )
+    verdict = Verdict.RIGHT_BUT
+    return [laws.bounded("continuity", error, JUMP, "m", message, verdict=verdict, where=joint)]

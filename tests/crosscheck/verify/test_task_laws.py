@@ -62,30 +62,25 @@ def spring():
     )
 
 
-def test_rounding_of_a_force_is_that_of_its_terms(spring):
-    """Eight epsilons of k (|x| + r) + c |v| + m g: 300, 6 and 10 N."""
+def test_rounding_of_a_force_and_of_an_energy_is_that_of_their_terms(spring):
+    """Eight epsilons of k (|x| + r) + c |v| + m g: 300, 6 and 10 N; and sixteen of
+    k (|x| + r) (|l| + r), m v² and m |x| g of each: 900, 9 and 20 J.
+    """
     assert forces.tolerance(spring, EPSILON) == pytest.approx(8 * EPSILON * 316.0)
-
-
-def test_rounding_of_an_energy_is_that_of_its_terms(spring):
-    """Sixteen epsilons of k (|x| + r) (|l| + r), m v² and m |x| g of each: 900, 9 and 20 J."""
     assert energy.tolerance(spring, EPSILON) == pytest.approx(16 * EPSILON * 929.0)
 
 
 @pytest.mark.parametrize(("share", "verdict"), EDGES)
-def test_a_force_is_that_of_the_formula_to_rounding(spring, share, verdict):
+def test_forces_are_those_of_the_formula_and_add_up_to_the_weight_to_rounding(
+    spring, share, verdict
+):
+    """The sum to twice the rounding of one, times the root of the number of particles."""
     expected, allowed = all_forces(spring), forces.tolerance(spring, EPSILON)
     given = expected.copy()
     given[1, 2] += share * allowed
     found = forces._formula(spring, given, expected, allowed)
     assert (found.verdict, found.where) == (verdict, 1)
-
-
-@pytest.mark.parametrize(("share", "verdict"), EDGES)
-def test_forces_add_up_to_the_weight_to_rounding(spring, share, verdict):
-    """Twice the rounding of one, times the root of the number of particles."""
-    allowed = forces.tolerance(spring, EPSILON)
-    given = all_forces(spring)
+    given = expected.copy()
     given[:, 1] += share * allowed * np.sqrt(2.0)
     assert forces._balance(spring, given, allowed).verdict is verdict
 
@@ -126,22 +121,17 @@ ON_LINE = 16 * EPSILON * (3 * 3.0 + 5.0)
 
 
 @pytest.mark.parametrize(("share", "verdict"), EDGES)
-@pytest.mark.parametrize(("end", "back"), [(0, [1.0, 0, 0]), (-1, [0, -1.0, 0])])
-def test_both_ends_are_kept_to_rounding(segments, end, back, share, verdict):
+@pytest.mark.parametrize(
+    ("law", "point", "direction"),
+    [("ends", 0, [1, 0, 0]), ("ends", -1, [0, -1, 0])]
+    + [("on the line", point, [0, 0, 1]) for point in (2, 8)],
+)
+def test_points_and_ends_are_kept_to_rounding(segments, law, point, direction, share, verdict):
     case, points = segments
-    points[end] += share * ON_LINE * np.array(back)
+    points[point] += share * ON_LINE * np.array(direction)
     found = by_law(resample.point_laws(points, case, GREETING))
-    assert found["ends"].verdict is verdict
-    assert found["on the line"].verdict is RIGHT
-
-
-@pytest.mark.parametrize(("share", "verdict"), EDGES)
-@pytest.mark.parametrize("point", [2, 8])
-def test_points_are_on_the_line_to_rounding(segments, point, share, verdict):
-    case, points = segments
-    points[point, 2] += share * ON_LINE
-    found = by_law(resample.point_laws(points, case, GREETING))
-    assert found["on the line"].verdict is verdict
+    assert found[law].verdict is verdict
+    assert {found[other].verdict for other in {"ends", "on the line"} - {law}} == {RIGHT}
 
 
 @pytest.mark.parametrize(("share", "verdict"), [(0.015, RIGHT), (0.025, WRONG)])
