@@ -101,7 +101,7 @@ def exported(folder: Path, tasks: Sequence[str], seed: int, thorough: bool, say:
 
 def self_test(trials: Iterable["Trial"], say: Say) -> Iterator[str]:
     """Yield a line a family of solvers, then what did not pass, then the sum."""
-    families: dict[str, list["Trial"]] = {}
+    families: dict[str, list[Trial]] = {}
     for trial in trials:
         families.setdefault(trial.subject.family, []).append(trial)
     for family, members in families.items():
