@@ -48,37 +48,24 @@ EVERYTHING = System(external_forces=True, tension_only=True)
 
 
 class Subject(NamedTuple):
-    """A solver of which is known what is wrong with it.
+    """A solver of which is known what is wrong with it."""
 
-    Attributes:
-        name: what it is.
-        family: what it is one of: "CCD", "steps", "honest solvers".
-        task: what it solves.
-        function: the solver.
-        greeting: what it says of itself.
-        fault: the key of what is wrong; "" if nothing is.
-    """
-
-    name: str
-    family: str
-    task: str
-    function: Callable[..., Any]
-    greeting: Greeting
-    fault: str = ""
+    name: str  # what it is
+    family: str  # what it is one of: "CCD", "steps", "honest solvers"
+    task: str  # what it solves
+    function: Callable[..., Any]  # the solver
+    greeting: Greeting  # what it says of itself
+    fault: str = ""  # the key of what is wrong; "" if nothing is
 
 
 class Trial(NamedTuple):
-    """What the judge said of a subject.
-
-    Attributes:
-        laws: those that were broken.
-        named: whether the first explanation names the fault, or a class of faults that it is in
-            and that no answer tells apart; for an honest one, whether nothing is named.
-    """
+    """What the judge said of a subject."""
 
     subject: Subject
     verdict: Verdict
-    laws: frozenset[str]
+    laws: frozenset[str]  # those that were broken
+    # whether the first explanation names the fault, or a class of faults that it is in and that no
+    # answer tells apart; for an honest one, whether nothing is named
     named: bool
 
     @property

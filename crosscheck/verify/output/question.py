@@ -72,17 +72,11 @@ def opened(words: Sequence[str], chosen: Limits, say: Say) -> Contestant:
 
 
 class Question(NamedTuple):
-    """Which cases to ask.
+    """Which cases to ask."""
 
-    Attributes:
-        tasks: only these, () for all that the solver offers.
-        rerun: a saved failing case, which is then all that is asked.
-        thorough, seed: as of `plumbob.crosscheck.verify.verify`.
-    """
-
-    tasks: tuple[str, ...] = ()
-    rerun: Path | None = None
-    thorough: bool = False
+    tasks: tuple[str, ...] = ()  # only these, () for all that the solver offers
+    rerun: Path | None = None  # a saved failing case, which is then all that is asked
+    thorough: bool = False  # thorough, seed: as of `plumbob.crosscheck.verify.verify`
     seed: int = 0
 
 

@@ -22,18 +22,12 @@ VERDICTS = {
 
 
 class Presentation(NamedTuple):
-    """What is shown besides a report.
+    """What is shown besides a report."""
 
-    Attributes:
-        say: puts sentences into words of the language.
-        language: a key of LANGUAGES.
-        solver: as it stands on the command line.
-        files: where the smallest failing case of a task and method is saved.
-    """
-
-    say: Say
-    language: str
-    solver: Sequence[str]
+    say: Say  # puts sentences into words of the language
+    language: str  # a key of LANGUAGES
+    solver: Sequence[str]  # as it stands on the command line
+    # where the smallest failing case of a task and method is saved
     files: Mapping[tuple[str, str], Path] = {}
 
     def command(self, task: TaskReport) -> Sentence | None:
