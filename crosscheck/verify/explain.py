@@ -22,15 +22,11 @@ MOST_TOLD = 3
 
 
 class Variant(NamedTuple):
-    """The reference with some faults.
+    """The reference with some faults."""
 
-    Attributes:
-        faults: their keys, in the order of the computation; () for an honest model.
-        predict: returns outputs by name for a case; those that are also answered are compared. An
-            exception of NumPy or a ValueError means that it has no answer.
-    """
-
-    faults: tuple[str, ...]
+    faults: tuple[str, ...]  # their keys, in the order of the computation; () for an honest model
+    # returns outputs by name for a case; those that are also answered are compared. An exception of
+    # NumPy or a ValueError means that it has no answer.
     predict: Callable[[Case], Mapping[str, Any]]
 
 

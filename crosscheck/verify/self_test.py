@@ -42,43 +42,30 @@ PINS: dict[str, Literal["overwritten", "penalty", "heavy"]] = {
     "heavy 1e8": "heavy",
 }
 PRECISIONS: dict[Precision, type] = {"double": np.float64, "single": np.float32}
-IK = "inverse_kinematics"
+FK, IK, STEP = "forward_kinematics", "inverse_kinematics", "mass_spring_step"
 FAMILIES = {"forward": "forward kinematics", "ccd": "CCD", "fabrik": "FABRIK"}
 EVERYTHING = System(external_forces=True, tension_only=True)
 
 
 class Subject(NamedTuple):
-    """A solver of which is known what is wrong with it.
+    """A solver of which is known what is wrong with it."""
 
-    Attributes:
-        name: what it is.
-        family: what it is one of: "CCD", "steps", "honest solvers".
-        task: what it solves.
-        function: the solver.
-        greeting: what it says of itself.
-        fault: the key of what is wrong; "" if nothing is.
-    """
-
-    name: str
-    family: str
-    task: str
-    function: Callable[..., Any]
-    greeting: Greeting
-    fault: str = ""
+    name: str  # what it is
+    family: str  # what it is one of: "CCD", "steps", "honest solvers"
+    task: str  # what it solves
+    function: Callable[..., Any]  # the solver
+    greeting: Greeting  # what it says of itself
+    fault: str = ""  # the key of what is wrong; "" if nothing is
 
 
 class Trial(NamedTuple):
-    """What the judge said of a subject.
-
-    Attributes:
-        laws: those that were broken.
-        named: whether the first explanation names the fault, or a class of faults that it is in
-            and that no answer tells apart; for an honest one, whether nothing is named.
-    """
+    """What the judge said of a subject."""
 
     subject: Subject
     verdict: Verdict
-    laws: frozenset[str]
+    laws: frozenset[str]  # those that were broken
+    # whether the first explanation names the fault, or a class of faults that it is in and that no
+    # answer tells apart; for an honest one, whether nothing is named
     named: bool
 
     @property
@@ -117,23 +104,30 @@ def subjects() -> Iterator[Subject]:
         yield from make()
 
 
+def _subjects(
+    family: str, task: str, functions: Mapping[str, Callable[..., Any]], **said: Any
+) -> Iterator[Subject]:
+    """Yield a subject for each function by its name, which is its fault if it is not honest."""
+    greeting = Greeting(PROTOCOL, (task,), **said)
+    for name, function in functions.items():
+        yield Subject(name, family, task, function, greeting, "" if family == HONEST else name)
+
+
 def _kinematic_faults() -> Iterator[Subject]:
     for kind, family in FAMILIES.items():
-        task, method = ("forward_kinematics", "") if kind == "forward" else (IK, kind)
-        greeting = Greeting(PROTOCOL, (task,), methods=(method,))
-        for fault in FAULTS[kind]:
-            if not fault.honest:
-                function = partial(_textbook, method, switches([fault]))
-                yield Subject(fault.key, family, task, function, greeting, fault.key)
+        task, method = (FK, "") if kind == "forward" else (IK, kind)
+        faults = {fault.key: switches([fault]) for fault in FAULTS[kind] if not fault.honest}
+        functions = {key: partial(_textbook, method, one) for key, one in faults.items()}
+        yield from _subjects(family, task, functions, methods=(method,))
 
 
 def _robots() -> Iterator[Subject]:
-    greeting = Greeting(PROTOCOL, (ROBOTS,))
-    for key, fault in ROBOT_FAULTS.items():
-        yield Subject(key, "robots", ROBOTS, partial(solve_wrongly, fault), greeting, key)
-    right = partial(solve_wrongly, None)
-    yield Subject("damped least squares, robots", HONEST, ROBOTS, right, greeting)
-    yield Subject("reference, robots", HONEST, ROBOTS, solve_by_reference, greeting)
+    faults = {key: partial(solve_wrongly, fault) for key, fault in ROBOT_FAULTS.items()}
+    yield from _subjects("robots", ROBOTS, faults)
+    yield from _subjects(HONEST, ROBOTS, {
+        "damped least squares, robots": partial(solve_wrongly, None),
+        "reference, robots": solve_by_reference,
+    })  # fmt: skip
 
 
 def _textbook(method: str, switched: Switches, /, **inputs: Any) -> Mapping[str, Any]:
@@ -208,16 +202,13 @@ class Stepper:
 
 
 def _mass_spring_faults() -> Iterator[Subject]:
-    task = "mass_spring_forces"
-    greeting = Greeting(PROTOCOL, (task,), system=EVERYTHING)
-    for key, option in _by_key(FORCE_FAULTS).items():
-        if key not in NO_FORCES:
-            yield Subject(key, "forces", task, partial(_evaluated, option), greeting, key)
-    task = "mass_spring_step"
+    options = _by_key([one for one in FORCE_FAULTS if one.key not in NO_FORCES])
+    functions = {key: partial(_evaluated, option) for key, option in options.items()}
+    yield from _subjects("forces", "mass_spring_forces", functions, system=EVERYTHING)
     for key, option in _by_key(STEP_FAULTS).items():
         model, step = DECLARED[_BASES.get(key, "linearised")]
-        greeting = Greeting(PROTOCOL, (task,), system=EVERYTHING, step=step)
-        yield Subject(key, "steps", task, Stepper(model, [option]), greeting, key)
+        stepper = {key: Stepper(model, [option])}
+        yield from _subjects("steps", STEP, stepper, system=EVERYTHING, step=step)
 
 
 def _by_key(options: Sequence[Option]) -> dict[str, Option]:
@@ -234,20 +225,17 @@ def _evaluated(option: Option, /, **inputs: Any) -> Mapping[str, Any]:
 
 
 def _right_kinematics() -> Iterator[Subject]:
-    task = "forward_kinematics"
     for precision, kind in PRECISIONS.items():
-        greeting = Greeting(PROTOCOL, (task,), precision=precision)
-        function = partial(_placed, kind)
-        yield Subject(f"reference, {precision}", HONEST, task, function, greeting)
-    for engine in SKELETON_ENGINES:
-        function, greeting = partial(_placed_by, engine), Greeting(PROTOCOL, (task,))
-        yield Subject(engine, HONEST, task, function, greeting)
+        function = {f"reference, {precision}": partial(_placed, kind)}
+        yield from _subjects(HONEST, FK, function, precision=precision)
+    engines = {engine: partial(_placed_by, engine) for engine in SKELETON_ENGINES}
+    yield from _subjects(HONEST, FK, engines)
     for solver in ("ccd", "fabrik", "levenberg_marquardt"):
-        greeting = Greeting(PROTOCOL, (IK,), methods=(solver,))
-        yield Subject(f"reference, {solver}", HONEST, IK, partial(_solved, solver), greeting)
+        function = {f"reference, {solver}": partial(_solved, solver)}
+        yield from _subjects(HONEST, IK, function, methods=(solver,))
     for method in ("ccd", "fabrik"):
-        greeting = Greeting(PROTOCOL, ("track",), methods=(method,))
-        yield Subject(f"textbook, {method}", HONEST, "track", partial(_followed, method), greeting)
+        function = {f"textbook, {method}": partial(_followed, method)}
+        yield from _subjects(HONEST, "track", function, methods=(method,))
 
 
 def _placed(kind: type, /, parents: Any, offsets: Any, local_rotations: Any) -> Any:
@@ -287,20 +275,16 @@ _REFERENCE: dict[str, tuple[Callable[..., Any], Step]] = {
 
 
 def _right_steps() -> Iterator[Subject]:
-    task = "mass_spring_step"
-    silent = Greeting(PROTOCOL, (task,))
     for name, (model, step) in DECLARED.items():
         for precision, kind in PRECISIONS.items():
-            declared = Greeting(PROTOCOL, (task,), step=step, precision=precision)
-            yield Subject(f"{name}, {precision}", HONEST, task, Stepper(model, (), kind), declared)
-        yield Subject(f"{name}, undeclared", HONEST, task, Stepper(model), silent)
+            stepper = {f"{name}, {precision}": Stepper(model, (), kind)}
+            yield from _subjects(HONEST, STEP, stepper, step=step, precision=precision)
+        yield from _subjects(HONEST, STEP, {f"{name}, undeclared": Stepper(model)})
     for pins, said in PINS.items():
-        greeting = Greeting(PROTOCOL, (task,), step=Step(pins=said))
-        stepper = Stepper(LINEARISED._replace(pins=pins))
-        yield Subject(f"linearised, pins {pins}", HONEST, task, stepper, greeting)
+        stepper = {f"linearised, pins {pins}": Stepper(LINEARISED._replace(pins=pins))}
+        yield from _subjects(HONEST, STEP, stepper, step=Step(pins=said))
     for name, (function, step) in _REFERENCE.items():
-        greeting = Greeting(PROTOCOL, (task,), step=step)
-        yield Subject(name, HONEST, task, partial(_stepped, function), greeting)
+        yield from _subjects(HONEST, STEP, {name: partial(_stepped, function)}, step=step)
 
 
 def _stepped(function: Callable[..., Any], /, **inputs: Any) -> dict[str, Any]:

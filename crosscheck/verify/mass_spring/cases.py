@@ -25,15 +25,7 @@ MOTION_STEPS = 6
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A system, its state and a step.
-
-    Attributes:
-        needs: attributes of `System` without which it makes no sense: "pinned" and so on.
-        tasks: those that it suits; () for all.
-        follows: the name of the scene that is asked just before it.
-        probe: whether faults are sought in it.
-        facts: passed on to the laws.
-    """
+    """A system, its state and a step."""
 
     name: str
     family: str
@@ -51,11 +43,12 @@ class Scene:
     rest_lengths: FloatArray | None = None
     external_forces: FloatArray | float = 0.0
     tension_only: bool = False
+    # attributes of `System` without which it makes no sense: "pinned" and so on
     needs: tuple[str, ...] = ()
-    tasks: tuple[str, ...] = ()
-    follows: str = ""
-    probe: bool = False
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    tasks: tuple[str, ...] = ()  # those that it suits; () for all
+    follows: str = ""  # the name of the scene that is asked just before it
+    probe: bool = False  # whether faults are sought in it
+    facts: Mapping[str, Any] = field(default_factory=dict)  # passed on to the laws
 
 
 def task_cases(task: str, greeting: Greeting, seed: int, thorough: bool) -> list[Case]:

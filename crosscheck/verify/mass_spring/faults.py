@@ -18,21 +18,13 @@ Change = Callable[[Problem], Problem]
 
 
 class Option(NamedTuple):
-    """One choice of how a solver does a thing, right or wrong.
+    """One choice of how a solver does a thing, right or wrong."""
 
-    Attributes:
-        key: its name in reports.
-        aspect: what it is a choice of; a solver makes one choice an aspect.
-        sentence: what it does, and for a fault what to do instead.
-        change: what it makes of the problem, or None.
-        fields: what it makes of the model.
-    """
-
-    key: str
-    aspect: str
-    sentence: Sentence
-    change: Change | None = None
-    fields: Mapping[str, Any] = {}
+    key: str  # its name in reports
+    aspect: str  # what it is a choice of; a solver makes one choice an aspect
+    sentence: Sentence  # what it does, and for a fault what to do instead
+    change: Change | None = None  # what it makes of the problem, or None
+    fields: Mapping[str, Any] = {}  # what it makes of the model
 
 
 # In the order of the computation.

@@ -27,25 +27,16 @@ CONSISTENT = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """What the laws of one answer need.
-
-    Attributes:
-        answered: by the names of the outputs.
-        model: the step that is declared, completed by what was inferred.
-        known: whether that model is declared or was recognised.
-        says: the model in words.
-        expected: its prediction, or {} if it has none.
-        pins_declared: whether the greeting says how pins are held.
-    """
+    """What the laws of one answer need."""
 
     problem: Problem
-    answered: Mapping[str, Any]
+    answered: Mapping[str, Any]  # by the names of the outputs
     allowed: Rounding
-    model: Model
-    known: bool
-    says: Sentence
-    expected: Mapping[str, Any]
-    pins_declared: bool
+    model: Model  # the step that is declared, completed by what was inferred
+    known: bool  # whether that model is declared or was recognised
+    says: Sentence  # the model in words
+    expected: Mapping[str, Any]  # its prediction, or {} if it has none
+    pins_declared: bool  # whether the greeting says how pins are held
 
     @cached_property
     def judgement(self) -> StepJudgement | None:

@@ -38,24 +38,17 @@ PIN_STRENGTHS: Mapping[str, float] = {
 
 
 class Integrator(NamedTuple):
-    """How positions follow from the state at the start of a step.
+    """How positions follow from the state at the start of a step."""
 
-    Attributes:
-        method: explicit, symplectic, taylor (x + h v + h²/2 a), runge_kutta; newton, local_global,
-            descent (along the gradient), converged.
-        start: of the iterations, "x_n" or "y".
-        iterations: how many.
-        hessian: of Newton's method: exact; gauss: without geometric term; projected: that term
-            only where it pulls; flipped: its sign turned; transverse: nothing but that term;
-            frozen: exact at x_n.
-        rate: by what the step of Newton's method or the gradient is multiplied.
-    """
-
+    # explicit, symplectic, taylor (x + h v + h²/2 a), runge_kutta; newton, local_global, descent
+    # (along the gradient), converged
     method: str
-    start: str = "x_n"
-    iterations: int = 1
+    start: str = "x_n"  # of the iterations, "x_n" or "y"
+    iterations: int = 1  # how many
+    # of Newton's method: exact; gauss: without geometric term; projected: that term only where it
+    # pulls; flipped: its sign turned; transverse: nothing but that term; frozen: exact at x_n
     hessian: str = "exact"
-    rate: float = 1.0
+    rate: float = 1.0  # by what the step of Newton's method or the gradient is multiplied
 
     @property
     def explicit(self) -> bool:
@@ -64,50 +57,35 @@ class Integrator(NamedTuple):
 
 
 class Model(NamedTuple):
-    """A complete description of a step, honest or not.
+    """A complete description of a step, honest or not."""
 
-    Attributes:
-        integrator: of the positions.
-        substeps: equal steps that make up h.
-        damper: none, explicit, length_rate, end_velocity; implicit in diag(C), in C's 3 x 3 blocks,
-            or in C, beside explicit springs: diagonal, blocks, matrix.
-        scaling: of every velocity after each substep.
-        pins: eliminated, overwritten, a key of PIN_STRENGTHS; at_the_end: free through the
-            substeps; free; unattached: no springs to them; first: only one is held; origin: their
-            columns dropped, so that springs end at the origin.
-        velocity: displacement, separate; or a key of VELOCITIES.
-        matrix: of an implicit step: a key of MATRICES.
-        inertia: what stands for y: y; x_n: no velocity; doubled: x_n + 2 h v; squared: x_n + h² v.
-        time: divided among substeps; undivided; before: of the last request, in the matrix only;
-            or a number of seconds instead of h.
-    """
-
-    integrator: Integrator = Integrator("converged", "y")
-    substeps: int = 1
+    integrator: Integrator = Integrator("converged", "y")  # of the positions
+    substeps: int = 1  # equal steps that make up h
+    # none, explicit, length_rate, end_velocity; implicit in diag(C), in C's 3 x 3 blocks, or in C,
+    # beside explicit springs: diagonal, blocks, matrix
     damper: str = "length_rate"
-    scaling: float = 1.0
+    scaling: float = 1.0  # of every velocity after each substep
+    # eliminated, overwritten, a key of PIN_STRENGTHS; at_the_end: free through the substeps; free;
+    # unattached: no springs to them; first: only one is held; origin: their columns dropped, so
+    # that springs end at the origin
     pins: str = "eliminated"
-    velocity: str = "displacement"
-    matrix: str = "M+h²L"
+    velocity: str = "displacement"  # displacement, separate; or a key of VELOCITIES
+    matrix: str = "M+h²L"  # of an implicit step: a key of MATRICES
+    # what stands for y: y; x_n: no velocity; doubled: x_n + 2 h v; squared: x_n + h² v
     inertia: str = "y"
+    # divided among substeps; undivided; before: of the last request, in the matrix only; or a
+    # number of seconds instead of h
     time: str | float = "divided"
 
 
 class Matrix(NamedTuple):
-    """How the system matrix is put together from masses and springs.
+    """How the system matrix is put together from masses and springs."""
 
-    Attributes:
-        masses: how many times M is added.
-        power: of h before the springs' part, with its sign.
-        stiffness: whether the springs' part has its factor k.
-        beside: by what the entries off the diagonal are multiplied.
-    """
-
-    masses: float = 1.0
-    power: int = 2
+    masses: float = 1.0  # how many times M is added
+    power: int = 2  # of h before the springs' part, with its sign
     sign: float = 1.0
-    stiffness: bool = True
-    beside: float = 1.0
+    stiffness: bool = True  # whether the springs' part has its factor k
+    beside: float = 1.0  # by what the entries off the diagonal are multiplied
 
 
 MATRICES: Mapping[str, Matrix] = {

@@ -22,44 +22,36 @@ COINCIDENT = 1e-150
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What a request of a force, an energy or a step says, and how a faulty solver reads it.
-
-    Attributes:
-        gravity: acceleration [m/s^2], shape (3,).
-        external: forces besides gravity [N], shape (particle, 3).
-        pinned: indices of pinned particles.
-        h: time step [s]; h_before: that of the request before; both 0 for forces and energies.
-        steps: number of steps, or None for a task of one step.
-        weights: the force of gravity if it is not m gravity [N], shape (particle, 3).
-        weighing: the masses m in m gravity, if they are others than those of inertia.
-        ends: what share of its force a spring exerts on its first and on its second end.
-        accumulated: whether forces of springs at one particle add up; else the last one stays, of
-            those whose first end it is and of those whose second.
-        damping: what the dampers see: the velocity along the spring, all of the relative velocity,
-            the particle's own velocity, or the particle's own along the spring.
-        normalised: whether a spring's direction is of length one.
-    """
+    """What a request of a force, an energy or a step says, and how a faulty solver reads it."""
 
     masses: FloatArray
     springs: IndexArray
     rest_lengths: FloatArray
     stiffnesses: FloatArray
     dampings: FloatArray
-    gravity: FloatArray
+    gravity: FloatArray  # acceleration [m/s^2], shape (3,)
     positions: FloatArray
     velocities: FloatArray
-    pinned: IndexArray
+    pinned: IndexArray  # indices of pinned particles
     tension_only: Any
-    external: FloatArray
+    external: FloatArray  # forces besides gravity [N], shape (particle, 3)
+    # time step [s]; h_before: that of the request before; both 0 for forces and energies
     h: float = 0.0
     h_before: float = 0.0
-    steps: int | None = None
+    steps: int | None = None  # number of steps, or None for a task of one step
+    # the force of gravity if it is not m gravity [N], shape (particle, 3)
     weights: FloatArray | None = None
+    # the masses m in m gravity, if they are others than those of inertia
     weighing: FloatArray | None = None
+    # what share of its force a spring exerts on its first and on its second end
     ends: tuple[float, float] = (1.0, 1.0)
+    # whether forces of springs at one particle add up; else the last one stays, of those whose
+    # first end it is and of those whose second
     accumulated: bool = True
+    # what the dampers see: the velocity along the spring, all of the relative velocity, the
+    # particle's own velocity, or the particle's own along the spring
     damping: str = "along"
-    normalised: bool = True
+    normalised: bool = True  # whether a spring's direction is of length one
 
     @property
     def count(self) -> int:

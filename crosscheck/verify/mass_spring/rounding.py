@@ -17,15 +17,10 @@ SOLVED = 1e-6
 
 
 class Rounding(NamedTuple):
-    """What rounding may change.
+    """What rounding may change."""
 
-    Attributes:
-        positions: [m].
-        velocities: [m/s].
-    """
-
-    positions: float
-    velocities: float
+    positions: float  # [m]
+    velocities: float  # [m/s]
 
 
 def rounding(p: Problem, model: Model, epsilon: float) -> Rounding:

@@ -45,15 +45,11 @@ Chosen = dict[str, Option]
 
 
 class Found(NamedTuple):
-    """Choices that reproduce the answers to all probes.
+    """Choices that reproduce the answers to all probes."""
 
-    Attributes:
-        options: one for each aspect that matters in a probe, in the order of the computation.
-        faults: those of them that the greeting denies, or that nobody should make.
-    """
-
+    # one for each aspect that matters in a probe, in the order of the computation
     options: tuple[Option, ...]
-    faults: tuple[Option, ...]
+    faults: tuple[Option, ...]  # those of them that the greeting denies, or that nobody should make
 
 
 class Probe(NamedTuple):

@@ -24,18 +24,12 @@ class Shape(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """A failing case to be drawn.
+    """A failing case to be drawn."""
 
-    Attributes:
-        given: what was asked: a curve, the system that forces act on; or None.
-        theirs, ours: what was answered; None where it makes no picture.
-        marks: points that are wanted or held: a target, pins.
-    """
-
-    given: Shape | None
-    theirs: Shape | None
+    given: Shape | None  # what was asked: a curve, the system that forces act on; or None
+    theirs: Shape | None  # theirs, ours: what was answered; None where it makes no picture
     ours: Shape | None
-    marks: FloatArray
+    marks: FloatArray  # points that are wanted or held: a target, pins
 
 
 def scene(judgement: CaseJudgement) -> Scene | None:

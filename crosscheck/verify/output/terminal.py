@@ -45,7 +45,7 @@ def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[s
     say = context.say
     bad = [task for task in report.tasks if task.verdict not in GOOD]
     shown = [*wrapped(say(introduction(report))), *_table(report.tasks, say)]
-    shown += [line for remark in remarks(report) for line in wrapped(say(remark))]
+    shown += paragraphs(remarks(report), say)
     end = wrapped(say(advice(report.tasks)))
     good = [task for task in report.tasks if task.verdict in GOOD and _reservations(task)]
     free = 0 if bad and height < ENDLESS else height - len(shown) - len(end) - 1
@@ -103,7 +103,7 @@ def _trouble(task: TaskReport, context: Presentation, room: int) -> list[str]:
     say = context.say
     failure = task.smallest_failure
     words = explanations(task) if failure else _reservations(task)
-    why = [line for one in words for line in wrapped(say(one), "  ")]
+    why = paragraphs(words, say, "  ")
     if failure is None:
         return [f"{title(task)}:", *_cut(why, max(_WHY, room // 3))]
     case = _cut(_failing(task, failure, say), max(_COMPLAINT, room // 8))
@@ -154,9 +154,9 @@ def wrapped(text: str, indent: str = "", size: int = WIDTH) -> list[str]:
     return [f"{indent}{line.plain.rstrip()}" for line in found if line.plain.strip()]
 
 
-def paragraphs(sentences: Iterable[Sentence], say: Say) -> list[str]:
+def paragraphs(sentences: Iterable[Sentence], say: Say, indent: str = "") -> list[str]:
     """Return each sentence in lines of its own."""
-    return [line for one in sentences for line in wrapped(say(one))]
+    return [line for one in sentences for line in wrapped(say(one), indent)]
 
 
 def _cut(shown: list[str], most: int) -> list[str]:

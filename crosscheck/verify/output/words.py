@@ -22,18 +22,12 @@ VERDICTS = {
 
 
 class Presentation(NamedTuple):
-    """What is shown besides a report.
+    """What is shown besides a report."""
 
-    Attributes:
-        say: puts sentences into words of the language.
-        language: a key of LANGUAGES.
-        solver: as it stands on the command line.
-        files: where the smallest failing case of a task and method is saved.
-    """
-
-    say: Say
-    language: str
-    solver: Sequence[str]
+    say: Say  # puts sentences into words of the language
+    language: str  # a key of LANGUAGES
+    solver: Sequence[str]  # as it stands on the command line
+    # where the smallest failing case of a task and method is saved
     files: Mapping[tuple[str, str], Path] = {}
 
     def command(self, task: TaskReport) -> Sentence | None:
@@ -65,26 +59,17 @@ def digits(judged: TaskReport | CaseJudgement) -> str:
 
 def speed(report: TaskReport, say: Say) -> str:
     """Return the time of a solver beside the reference's, a dash if that is not measured."""
-    times = report.slowdown
     if report.untimed:
         return say(sentence("not timed"))
-    if times is None:
+    if report.slowdown is None:
         return "–"
-    if times >= 1.05:
-        words = (
-            sentence("{times:,.0f} x slower", times=times)
-            if times >= 9.95
-            else sentence("{times:.1f} x slower", times=times)
-        )
-    elif times > 1 / 1.05:
-        words = sentence("as fast")
-    else:
-        words = (
-            sentence("{times:.1f} x faster", times=1 / times)
-            if times > 1 / 9.95
-            else sentence("{times:,.0f} x faster", times=1 / times)
-        )
-    return say(words)
+    rate = max(report.slowdown, 1.0 / report.slowdown)
+    times = f"{rate:,.0f}" if rate >= 9.95 else f"{rate:.1f}"
+    if rate < 1.05:
+        return say(sentence("as fast"))
+    if report.slowdown > 1.0:
+        return say(sentence("{times} x slower", times=times))
+    return say(sentence("{times} x faster", times=times))
 
 
 def introduction(report: Report) -> Sentence:
@@ -145,22 +130,20 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
             "more cases."
         )
     first = bad[0]
-    if first.verdict is Verdict.UNDECIDED and first.diagnosis.hints:
-        return sentence(
-            'Next: declare the step that you make, by "step" in the greeting (docs/protocol.md).'
-        )
     if first.verdict is Verdict.UNDECIDED:
-        return sentence("Next: ask the long list of cases with --thorough.")
+        return (
+            sentence('Next: declare the step that you make, by "step" in the greeting '
+                     "(docs/protocol.md).")
+            if first.diagnosis.hints
+            else sentence("Next: ask the long list of cases with --thorough.")
+        )  # fmt: skip
+    template = sentence("Next: correct {task}, rerun the saved case, then run all again.")
     if first.verdict is Verdict.BROKEN and not first.diagnosis.explained:
-        return sentence(
-            "Next: let {task} answer every case first; what it breaks on is saved above.",
-            task=title(first),
+        template = sentence(
+            "Next: let {task} answer every case first; what it breaks on is saved above."
         )
-    if len(bad) > 1:
-        return sentence(
-            "Next: correct {task} first, since the others may rest on it; then run this again.",
-            task=title(first),
+    elif len(bad) > 1:
+        template = sentence(
+            "Next: correct {task} first, since the others may rest on it; then run this again."
         )
-    return sentence(
-        "Next: correct {task}, rerun the saved case, then run all again.", task=title(first)
-    )
+    return Sentence(template.template, {"task": title(first)})

@@ -50,11 +50,7 @@ def read_greeting(folder: Path) -> Greeting:
 
 
 def _object(path: Path) -> dict[str, Any]:
-    """Return the JSON object of a file.
-
-    Raises:
-        ValueError: if it holds something else.
-    """
+    """Return the JSON object of a file; raise ValueError if it holds something else."""
     data = _content(path)
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         data = data.decode("utf-16", errors="replace").encode()
