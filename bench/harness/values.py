@@ -98,8 +98,10 @@ def _array(kind: Any, value: Any) -> np.ndarray:
     shape, dtype = get_args(kind)
     axes, wanted = len(get_args(shape)), np.dtype(get_args(dtype)[0])
     array = np.asarray(value)
+    if not array.size:
+        return np.empty((0,) * axes, wanted)
     if array.ndim != axes:
         raise ValueError(f"expected {axes} dimensions, got {array.ndim}")
-    if array.size and array.dtype.kind not in _TAKES[wanted.kind]:
+    if array.dtype.kind not in _TAKES[wanted.kind]:
         raise ValueError(f"expected {wanted.name}, got {array.dtype.name}")
     return array.astype(wanted, copy=False)
