@@ -96,7 +96,7 @@ def _toolbox(results: Results) -> Iterator[Comparison]:
             source = "" if before is None else published.TOOLBOX_SOURCE
             row = Comparison("Robotics Toolbox", score.robots, score.solver, source=source)
             numbers: Numbers = {
-                INFEASIBLE: (before, _percent(score.unclaimed)),
+                INFEASIBLE: (before, _percent(metrics.share(score.all("claimed", 0) != 1))),
                 UNSOLVED: (None, _percent(metrics.share(~score.solved))),
                 MEDIAN_TIME: (None, Interval(*(1e6 * x for x in score.median_time))),
             }

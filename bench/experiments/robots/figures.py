@@ -13,7 +13,7 @@ from ...harness import metrics
 from ...harness.metrics import Floats
 from ...harness.results import Results
 from ...tables.layout import Figure
-from .readings import STARTS, Score, budget_curve, fields_of, profiles
+from .readings import STARTS, Score, fields_of, profiles, within_budgets
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +29,7 @@ MOST_BESIDE = 5
 def budgets(start: str, results: Results) -> Sketch | None:
     """Return the targets solved within a time, by solvers of one start; None if there are none."""
     panels = {
-        robot: [_share(score, BUDGETS, budget_curve(score, BUDGETS)) for score in field]
+        robot: [_share(score, BUDGETS, within_budgets(score, BUDGETS)) for score in field]
         for robot, field in fields_of(results, start).items()
     }
     return _chart(
