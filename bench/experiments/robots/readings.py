@@ -359,9 +359,9 @@ def spread_of_paces(records: Iterable[Record]) -> float:
     return metrics.relative_spread(np.array(paces)) if len(paces) > 1 else np.nan
 
 
-def within_budgets(score: Score, budgets: Floats) -> Floats:
-    """Return the share of all targets that are solved within each budget [s]."""
-    return metrics.within_budget(score.seconds, score.solved, budgets)
+def within_budgets(field: Sequence[Score], budgets: Floats) -> list[tuple[Score, Floats]]:
+    """Return the share of all targets that each solver solves within each budget [s]."""
+    return [(score, metrics.within_budget(score.seconds, score.solved, budgets)) for score in field]
 
 
 def profiles(field: Sequence[Score], ratios: Floats) -> list[tuple[Score, Floats]]:
