@@ -16,7 +16,7 @@ from ..experiments.robots import REACHABLE
 from ..experiments.robots.readings import STARTS, Score, fields_of, over_sets, ratio_of_times
 from ..experiments.timing.tables import median_time, ranked_by_time
 from ..harness import metrics
-from ..harness.record import FINISHED, Record
+from ..harness.record import FINISHED
 from ..harness.results import Results, by_problem, counted, listed
 from ..peers import registry
 from ..tables.table import words
@@ -31,14 +31,7 @@ _NOT_RIVALS = {registry.PLAIN.name, registry.OUR_KINEMATICS.name, registry.LIMIT
 
 
 class Verdict(NamedTuple):
-    """How many claims of the cross-check hold, and which uses most of its tolerance.
-
-    Attributes:
-        held: claims that hold.
-        total: claims.
-        narrowest: the claim that uses most of its tolerance.
-        used: how much of it, as a share.
-    """
+    """How many claims hold of all, which uses most of its tolerance, and what share of it."""
 
     held: int
     total: int
@@ -47,15 +40,7 @@ class Verdict(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """What the first screen says.
-
-    Attributes:
-        verdict: of the cross-check, None if it was not run.
-        headlines: who is most accurate and who is fastest.
-        scale: at which scale was measured, "" if that is not known.
-        absent: peers that took no part.
-        standings: where solvers of the user's stand.
-    """
+    """What the first screen says; the verdict is None if the cross-check was not run."""
 
     verdict: Verdict | None
     headlines: list[Headline]
@@ -75,13 +60,9 @@ def verdict(results: Results) -> Verdict | None:
     claims = [record for record in results.all("check") if record.values]
     if not claims:
         return None
-    held = sum(record.values.held for record in claims)
-    narrowest = max(claims, key=_used)
-    return Verdict(held, len(claims), narrowest.title, _used(narrowest))
-
-
-def _used(claim: Record) -> float:
-    return metrics.ratio(claim.values.difference, claim.values.tolerance)
+    used = {r.title: metrics.ratio(r.values.difference, r.values.tolerance) for r in claims}
+    narrowest = max(used, key=lambda name: used[name])
+    return Verdict(sum(r.values.held for r in claims), len(claims), narrowest, used[narrowest])
 
 
 def headlines(results: Results) -> list[Headline]:

@@ -28,14 +28,9 @@ CLOTHS = 3
 
 
 class Headline(NamedTuple):
-    """An answer in a line.
+    """An answer in a line, by how much it is so, and the table in which it can be read.
 
-    Attributes:
-        chapter: the section of the report that it belongs to; "" of a solver of the user's.
-        asked: what is asked, or the name and task of a solver of the user's.
-        answer: who, or the rank of a solver of the user's.
-        detail: by how much, over how many.
-        table: the name of the table that it can be read in.
+    A solver of the user's has no chapter; its name and task are asked, and its rank is the answer.
     """
 
     chapter: str

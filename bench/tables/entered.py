@@ -1,7 +1,7 @@
 """The table of the solvers that users entered."""
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from dataclasses import replace
 
 from ..harness.record import Record
 from ..harness.results import Results, listed
@@ -10,63 +10,48 @@ from .layout import Layout
 from .table import Column, Summary
 
 NOT_ASKED = "not asked"
-
-
-class Entered(NamedTuple):
-    """A solver that was entered, with what is on record of it in a suite."""
-
-    records: list[Record]
-
-    @property
-    def last(self) -> Record:
-        """Its last record."""
-        return self.records[-1]
-
-    @property
-    def version(self) -> str:
-        """What it says of its version."""
-        return str(self.last.settings.get("version") or "–")
-
-    @property
-    def commit(self) -> str:
-        """The commit of its own sources, with a plus where they were changed."""
-        commit, _, changes = str(self.last.conditions.get("solver_commit", "")).partition(" ")
-        return commit[:7] + ("+" if changes else "") or "–"
-
-    @property
-    def remarks(self) -> list[str]:
-        """Why it was not asked for all, and what it raised."""
-        remarks = [_why_not_asked(record) or record.trouble for record in self.records]
-        return list(dict.fromkeys(filter(None, remarks)))
-
-    def fact(self, name: str) -> str:
-        """Return what its last record says of it."""
-        return str(self.last.facts.get(name) or "–")
+# What is on record of a solver in a suite.
+Entered = Sequence[Record]
 
 
 def _why_not_asked(record: Record) -> str:
-    """Return why a solver was not asked, "" if it was."""
     why = "" if record.arrays else str(record.notes.get("remark", ""))
     return why if why.startswith(NOT_ASKED) else ""
 
 
 def remarks_of_entrants(results: Results, suites: Iterable[str]) -> list[str]:
     """Return sentences on solvers that were entered into suites and not asked for all."""
-    known = [record for suite in suites for record in results.all(suite, entrant=True)]
-    remarks = [f"{r.solver} was {why}." for r in known if (why := _why_not_asked(r))]
+    records = [record for suite in suites for record in results.all(suite, entrant=True)]
+    remarks = (f"{r.solver} was {why}." for r in records if (why := _why_not_asked(r)))
     return list(dict.fromkeys(remarks))
 
 
 def _entered(results: Results) -> list[Entered]:
     solvers: dict[tuple[str, str], list[Record]] = {}
-    for suite in ("ik", "cloth"):
-        for record in results.all(suite, entrant=True):
-            solvers.setdefault((suite, record.solver), []).append(record)
-    return [Entered(records) for records in solvers.values()]
+    for record in [*results.all("ik", entrant=True), *results.all("cloth", entrant=True)]:
+        solvers.setdefault((record.suite, record.solver), []).append(record)
+    return list(solvers.values())
+
+
+def _version(records: Entered) -> str:
+    return str(records[-1].settings.get("version") or "–")
+
+
+def _commit(records: Entered) -> str:
+    """Return the commit of the solver's own sources, with a plus where they were changed."""
+    of_solver = {"commit": records[-1].conditions.get("solver_commit", "")}
+    return replace(records[-1], conditions=of_solver).commit or "–"
+
+
+def _remark(records: Entered) -> str:
+    """Return why a solver was not asked for all, and what it raised."""
+    remarks = (_why_not_asked(record) or record.trouble for record in records)
+    return "; ".join(dict.fromkeys(filter(None, remarks)))
 
 
 def _summary(entered: Sequence[Entered]) -> Summary:
-    return Summary(f"{listed([f'{one.last.solver} ({one.version})' for one in entered])}.")
+    names = [f"{records[-1].solver} ({_version(records)})" for records in entered]
+    return Summary(f"{listed(names)}.")
 
 
 entered = Layout(
@@ -75,14 +60,14 @@ entered = Layout(
     "Solvers that were entered",
     subjects=_entered,
     columns=(
-        text("solver", lambda entered: entered.last.solver),
-        text("suite", lambda entered: entered.last.suite),
-        text("version", lambda entered: entered.version),
-        text("commit", lambda entered: entered.commit),
-        text("sources", lambda entered: entered.fact("digest")),
-        text("door", lambda entered: entered.fact("door")),
-        Column("records", read=lambda entered: len(entered.records)),
-        text("remark", lambda entered: "; ".join(entered.remarks)),
+        text("solver", lambda records: records[-1].solver),
+        text("suite", lambda records: records[-1].suite),
+        text("version", _version),
+        text("commit", _commit),
+        text("sources", lambda records: str(records[-1].facts.get("digest") or "–")),
+        text("door", lambda records: str(records[-1].facts.get("door") or "–")),
+        Column("records", read=len),
+        text("remark", _remark),
     ),
     shows="A commit with a plus has changes beside it; sources are a digest of its files, "
     "and a change of them is measured anew.",

@@ -4,15 +4,7 @@ from ...harness.values import Details, Kind, Values
 
 
 class ClaimValues(Values, frozen=True):
-    """What became of a claim.
-
-    Attributes:
-        cases: in how many random systems it was looked at.
-        difference: the largest of them, relative.
-        tolerance: how large it may be.
-        moved: by how much the quantity changed, at least.
-        held: whether the claim holds.
-    """
+    """The largest relative difference over cases, what it may be, and what moved in each case."""
 
     cases: int
     difference: float

@@ -5,16 +5,7 @@ from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
 
 
 class ArmDrawing(Values, frozen=True):
-    """The arm on a curve.
-
-    Attributes:
-        curve: its points [m], (point, 3).
-        residual: how far the effector is from each [m], (point,).
-        iterations: of each solve, (point,).
-        largest_angle, mean_angle: of the rotations of joints between frames [rad], (point - 1,).
-        spacing: between neighbouring points [m], (point - 1,).
-        ghosts: the joints in a few frames [m], (frame, joint, 3).
-    """
+    """The arm on a curve, point by point [m], [rad], with the joints in a few frames."""
 
     curve: Floats2
     residual: Floats1
@@ -57,13 +48,7 @@ class ArmMotionDetails(Details, frozen=True):
 
 
 class ClothMotion(Values, frozen=True):
-    """A cloth in motion.
-
-    Attributes:
-        positions: of its particles [m], (frame, particle, 3).
-        distance: of each to where converged steps bring it [m], (frame, particle).
-        pinned: which particles are.
-    """
+    """A cloth's particles [m], (frame, particle, 3), how far each is off [m], the pins."""
 
     positions: Floats3
     distance: Floats2

@@ -1,7 +1,7 @@
 """Numbers of published tables, and what the same set-up gives here."""
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,23 +17,14 @@ from . import problem as published
 SOLVED, MEAN_TIME = "solved [%]", "time, mean [ms]"
 INFEASIBLE, UNSOLVED = "infeasible by its own word [%]", "not solved within the limits [%]"
 MEAN_ITERATIONS, MOST_ITERATIONS = "iterations, mean", "iterations, largest"
-MEDIAN_TIME = "time, median [µs]"
+MEDIAN_TIME, UNSAID = "time, median [µs]", "iterations unsaid"
 
 
 class Comparison(NamedTuple):
     """A number of a published table, and what it comes to here.
 
-    Attributes:
-        table: whose table it is.
-        problem: a robot, or a stratum of targets.
-        solver: how it is written.
-        quantity: what the number is, with its unit.
-        published: the number there, None if there is none.
-        here: the number here with its 95 % interval, NaN where that is unknown; likewise.
-        targets: how many targets are behind the number here.
-        mark: what to know of the number here.
-        source: where the number was published.
-        record: what was measured.
+    It is of a solver on a robot, or in a stratum of targets; here it has its 95 % interval, NaN
+    where that is unknown, and there are so many targets behind it.
     """
 
     table: str
@@ -48,91 +39,71 @@ class Comparison(NamedTuple):
     record: Record | None = None
 
 
-# Numbers by quantity: as published, and here.
-Numbers = dict[str, tuple[float | None, Interval | None]]
-
-
 def comparisons(results: Results) -> list[Comparison]:
     """Return all numbers of the published tables of which something was measured."""
-    return [*_trac_ik(results), *_toolbox(results), *_fabrik(results)]
+    toolbox, fabrik = (results.all("ik", task=task) for task in (TOOLBOX, FABRIK))
+    return [
+        *_trac_ik([r for r in results.all("ik", task=TRAC_IK) if "solved" in r.arrays]),
+        *(row for r in toolbox if "solved" in r.arrays for row in _search(r)),
+        *(row for r in sorted(fabrik, key=_stratum) for row in _iterations(r)),
+    ]
 
 
-def _rows(row: Comparison, numbers: Numbers) -> Iterator[Comparison]:
-    for quantity, (before, here) in numbers.items():
-        yield row._replace(quantity=quantity, published=before, here=here)
-
-
-def _trac_ik(results: Results) -> Iterator[Comparison]:
+def _trac_ik(records: Sequence[Record]) -> Iterator[Comparison]:
     """Yield success rates and mean times, robot by robot, the published solvers first."""
-    measured = [r for r in results.all("ik", task=TRAC_IK) if "solved" in r.arrays]
     titles = {peer.called(entry): peer.title for peer in registry.PEERS for entry in peer.entries}
     for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK):
         rates = {rate.solver: rate for rate in published.TRAC_IK if rate.robot == robot}
-        here = {titles.get(r.solver, r.solver): r for r in measured if r.details.robot == robot}
+        here = {titles.get(r.solver, r.solver): r for r in records if r.details.robot == robot}
         for solver in dict.fromkeys([*rates, *here]) if here else ():
-            yield from _rates(robot, solver, rates.get(solver), here.get(solver))
+            rate, record = rates.get(solver), here.get(solver)
+            row = Comparison("TRAC-IK", robot, solver, source=rate.source if rate else "")
+            row, share, time = _measured(row, record) if record else (row, None, None)
+            yield row._replace(quantity=SOLVED, published=rate and rate.percent, here=share)
+            yield row._replace(quantity=MEAN_TIME, published=rate and rate.milliseconds, here=time)
 
 
-def _rates(
-    robot: str, solver: str, rate: published.PublishedRate | None, record: Record | None
-) -> Iterator[Comparison]:
-    """Yield the success rate and the mean time of a solver on a robot."""
-    row = Comparison("TRAC-IK", robot, solver, source=rate.source if rate else "")
-    share = time = None
-    if record:
-        score = Score(robot, "", record.solver, (record,))
-        row = row._replace(solver=record.solver, **_sample(score))
-        share, time = _percent(score.share), Interval(1e3 * score.effort.mean, *_UNKNOWN)
-    percent, milliseconds = (rate.percent, rate.milliseconds) if rate else (None, None)
-    yield from _rows(row, {SOLVED: (percent, share), MEAN_TIME: (milliseconds, time)})
+def _measured(row: Comparison, record: Record) -> tuple[Comparison, Interval, Interval]:
+    """Return a row of what is measured here, the share of targets solved and the mean time."""
+    score = Score(row.problem, "", record.solver, (record,))
+    row = row._replace(solver=record.solver, targets=score.total, mark=score.limits, record=record)
+    return row, _percent(score.share), Interval(1e3 * score.effort.mean, np.nan, np.nan)
 
 
-def _toolbox(results: Results) -> Iterator[Comparison]:
+def _search(record: Record) -> Iterator[Comparison]:
     """Yield which share of targets one search does not solve, and how long it takes."""
-    for record in results.all("ik", task=TOOLBOX):
-        if "solved" in record.arrays:
-            score = Score(record.title, "", record.solver, (record,))
-            before = record.details.infeasible
-            source = "" if before is None else published.TOOLBOX_SOURCE
-            row = Comparison("Robotics Toolbox", score.robots, score.solver, source=source)
-            numbers: Numbers = {
-                INFEASIBLE: (before, _percent(score.unclaimed)),
-                UNSOLVED: (None, _percent(metrics.share(~score.solved))),
-                MEDIAN_TIME: (None, Interval(*(1e6 * x for x in score.median_time))),
-            }
-            yield from _rows(row._replace(**_sample(score)), numbers)
+    score = Score(record.title, "", record.solver, (record,))
+    before = record.details.infeasible
+    source = "" if before is None else published.TOOLBOX_SOURCE
+    row, *_ = _measured(Comparison("Robotics Toolbox", record.title, "", source=source), record)
+    unclaimed = _percent(metrics.share(score.all("claimed", 0) != 1))
+    unsolved = _percent(metrics.share(~score.solved))
+    median = Interval(*(1e6 * x for x in score.median_time))
+    yield row._replace(quantity=INFEASIBLE, published=before, here=unclaimed)
+    yield row._replace(quantity=UNSOLVED, here=unsolved)
+    yield row._replace(quantity=MEDIAN_TIME, here=median)
 
 
-def _fabrik(results: Results) -> Iterator[Comparison]:
-    """Yield the iterations of each solver, stratum by stratum."""
-    for i, stratum in enumerate(published.FABRIK_DISTANCES):
-        for record in results.all("ik", task=FABRIK, stratum=stratum):
-            before = published.FABRIK.get(record.solver, (None, None))[i]
-            counts = record.values.iterations[~np.isnan(record.values.iterations)]
-            claimed = "claimed" if record.facts.get("entrant") else ""
-            row = Comparison(
-                "FABRIK",
-                stratum,
-                label(record.solver),
-                targets=counts.size or None,
-                mark=claimed if counts.size else "iterations unsaid",
-                source="" if before is None else published.FABRIK_SOURCE,
-                record=record,
-            )
-            largest = Interval(float(counts.max()), *_UNKNOWN) if counts.size else None
-            mean = metrics.mean_interval(counts) if counts.size else None
-            numbers: Numbers = {MEAN_ITERATIONS: (before, mean), MOST_ITERATIONS: (None, largest)}
-            yield from _rows(row, numbers)
+def _stratum(record: Record) -> int:
+    return list(published.FABRIK_DISTANCES).index(record.details.stratum)
 
 
-_UNKNOWN = (np.nan, np.nan)
+def _iterations(record: Record) -> Iterator[Comparison]:
+    """Yield the mean and the largest number of iterations of a solver in a stratum."""
+    before = published.FABRIK.get(record.solver, (None, None))[_stratum(record)]
+    counts = record.values.iterations[~np.isnan(record.values.iterations)]
+    row = Comparison("FABRIK", record.details.stratum, label(record.solver), record=record)
+    row = row._replace(
+        targets=counts.size or None,
+        mark="claimed" * (record.facts.get("entrant") is True) if counts.size else UNSAID,
+        source="" if before is None else published.FABRIK_SOURCE,
+    )
+    mean = metrics.mean_interval(counts) if counts.size else None
+    largest = Interval(float(counts.max()), np.nan, np.nan) if counts.size else None
+    yield row._replace(quantity=MEAN_ITERATIONS, published=before, here=mean)
+    yield row._replace(quantity=MOST_ITERATIONS, here=largest)
 
 
 def _percent(share: Share) -> Interval:
     rate = metrics.ratio(share.hits, share.total)
-    return Interval(*(100.0 * x for x in (rate, share.low, share.high)))
-
-
-def _sample(score: Score) -> dict[str, Any]:
-    """Return what is behind the numbers of a score."""
-    return {"targets": score.share.total, "mark": score.limits, "record": score.records[0]}
+    return Interval(100.0 * rate, 100.0 * share.low, 100.0 * share.high)

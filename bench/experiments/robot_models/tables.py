@@ -1,68 +1,60 @@
 """Robots and characters: how closely engines that read the same files agree with the reference."""
 
-from collections.abc import Sequence
-from operator import attrgetter
+from collections.abc import Iterator, Sequence
+from functools import partial
+from operator import methodcaller
 
-from ...harness.record import Record
-from ...harness.results import counted, problems, settings
+from ...harness.results import counted, settings
 from ...tables.columns import folded, text
 from ...tables.layout import Layout
 from ...tables.table import Column, Summary, words
-from . import PEERS
-from .readings import QUANTITIES, Comparison, agreeing, comparisons, files_of, largest
-
-
-def _records(comparisons: Sequence[Comparison]) -> list[Record]:
-    return [record for comparison in comparisons for record in comparison.records]
+from .readings import QUANTITIES, Comparison, comparisons, largest
 
 
 def _measured(comparisons: Sequence[Comparison]) -> str:
-    records = _records(comparisons)
-    configurations = settings(files_of(records), "configurations") or "No"
-    of_robots = settings([r for r in records if r.facts.get("task") == PEERS], "configurations")
+    files, robots = (
+        settings((r for c in comparisons if c.is_file == of for r in c.records), "configurations")
+        for of in (True, False)
+    )
     return (
-        f"{configurations} random configurations of each file and {of_robots or 'none'} of each "
-        "robot, within the limits; links and joints are matched by name."
+        f"{files or 'No'} random configurations of each file and {robots or 'none'} of each robot, "
+        "within the limits; links and joints are matched by name."
     )
 
 
 def _summary(comparisons: Sequence[Comparison]) -> Summary:
-    records = _records(comparisons)
-    valid = agreeing(records)
-    peers = [r for r in records if r.facts.get("task") == PEERS and r.values]
-    points = [
-        *(_reads(records, engine) for engine in _engines(files_of(records)) if valid),
-        *(_farthest([r for r in peers if r.solver == engine]) for engine in _engines(peers)),
-    ]
-    if not valid:
-        return Summary("Largest differences from the reference:" * bool(points), tuple(points))
+    files = [comparison for comparison in comparisons if comparison.is_file]
+    valid = [record for file in files for record in file.valid]
     worst = [words(largest(valid, quantity)) for quantity in QUANTITIES]
-    return Summary(
-        f"Over {counted(len(problems(valid)), 'file')} positions differ by at most {worst[0]} "
-        f"of the extent, rotations by {worst[1]}, Jacobians by {worst[2]}:",
-        tuple(points),
+    sentence = (
+        f"Over {counted(sum(bool(f.valid) for f in files), 'file')} positions differ by at most "
+        f"{worst[0]} of the extent, rotations by {worst[1]}, Jacobians by {worst[2]}:"
     )
+    return Summary(sentence * bool(valid), tuple(_points(comparisons)))
 
 
-def _engines(records: Sequence[Record]) -> list[str]:
-    return list(dict.fromkeys(record.solver for record in records))
+def _points(comparisons: Sequence[Comparison]) -> Iterator[str]:
+    """Yield how many files each engine reads, and how far engines of peers place robots."""
+    files = [record for c in comparisons if c.is_file for record in c.records]
+    for engine in dict.fromkeys(record.solver for record in files):
+        mine = [record for record in files if record.solver == engine]
+        read = [record for record in mine if record.values]
+        different = sum(bool(record.details.cause) for record in read)
+        otherwise = f", {words(different)} of them otherwise than MuJoCo's documentation says"
+        count = f"{words(len(read))} of {counted(len(mine), 'file')} read"
+        yield f"{engine}: {count}{otherwise * bool(different)}"
+    robots = [r for c in comparisons if not c.is_file for r in c.records if r.values]
+    for engine in dict.fromkeys(record.solver for record in robots):
+        mine = [record for record in robots if record.solver == engine]
+        positions, rotations = (words(largest(mine, name)) for name in QUANTITIES[:2])
+        yield (
+            f"{engine} on the bench’s robots: effectors within {positions} m and {rotations} in a "
+            "rotation matrix"
+        )
 
 
-def _reads(records: Sequence[Record], engine: str) -> str:
-    mine = [record for record in files_of(records) if record.solver == engine]
-    read = [record for record in mine if record.values]
-    different = sum(bool(record.details.cause) for record in read)
-    otherwise = f", {words(different)} of them otherwise than MuJoCo's documentation says"
-    count = f"{words(len(read))} of {counted(len(mine), 'file')} read"
-    return f"{engine}: {count}{otherwise * bool(different)}"
-
-
-def _farthest(records: Sequence[Record]) -> str:
-    positions, rotations = (words(largest(records, name)) for name in QUANTITIES[:2])
-    return (
-        f"{records[0].solver} on the bench’s robots: effectors within {positions} m and "
-        f"{rotations} in a rotation matrix"
-    )
+def _positions(of_files: bool, comparison: Comparison) -> float | None:
+    return comparison.largest("positions") if comparison.is_file == of_files else None
 
 
 readers = Layout(
@@ -70,23 +62,23 @@ readers = Layout(
     "readers",
     "Robots and characters, as engines read them",
     columns=(
-        text("robot", attrgetter("title")),
-        text("engines", attrgetter("engines")),
-        Column("freedoms", read=attrgetter("freedoms")),
+        text("robot", lambda comparison: comparison.records[0].title),
+        text("engines", lambda comparison: comparison.engines),
+        Column("freedoms", read=lambda comparison: comparison.size("freedoms")),
         *(
-            Column(title, unit, read=attrgetter(name), group="largest difference")
-            for title, unit, name in (
-                ("positions, of the extent", "", "relative_positions"),
-                ("positions", "m", "positions"),
-                ("rotations", "", "rotations"),
-                ("Jacobians", "", "jacobians"),
+            Column(title, unit, group="largest difference", read=read)
+            for title, unit, read in (
+                ("positions, of the extent", "", partial(_positions, True)),
+                ("positions", "m", partial(_positions, False)),
+                ("rotations", "", methodcaller("largest", "rotations")),
+                ("Jacobians", "", methodcaller("largest", "jacobians")),
             )
         ),
-        text("remark", attrgetter("remark")),
+        text("remark", lambda comparison: comparison.remark),
         *folded(
             [
-                Column("links", read=attrgetter("links")),
-                Column("moving joints", read=attrgetter("joints")),
+                Column("links", read=lambda comparison: comparison.size("links")),
+                Column("moving joints", read=lambda comparison: comparison.size("joints")),
             ]
         ),
     ),

@@ -9,11 +9,8 @@ from . import PEERS
 class FileValues(Values, frozen=True):
     """The size of a file in an engine, and its largest differences from the reference.
 
-    Attributes:
-        links, joints, freedoms: how many there are, links without and with joints that move.
-        positions: of the extent of the links.
-        rotations: between entries of rotation matrices.
-        jacobians: between entries of Jacobians, of the extent and of one radian.
+    Positions are over the extent of the links, rotations between entries of matrices, Jacobians
+    over the extent and one radian.
     """
 
     links: int
@@ -25,7 +22,7 @@ class FileValues(Values, frozen=True):
 
 
 class FileDetails(Details, frozen=True):
-    """Why an engine reads a file otherwise, which mimics it leaves free, or why it reads it not."""
+    """Why an engine reads a file otherwise or not at all, and which mimics it leaves free."""
 
     configurations: int
     cause: str = ""

@@ -13,51 +13,48 @@ from ...harness import metrics
 from ...harness.metrics import Floats
 from ...harness.results import Results
 from ...tables.layout import Figure
-from .readings import STARTS, Score, budget_curve, fields_of, profiles
+from .readings import STARTS, Score, fields_of, profiles, within_budgets
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
-BUDGETS, RATIOS = np.logspace(-6, 0, 121), np.logspace(0, 4, 121)
 # So many times the least time is drawn as the palest, and the least time as the fullest.
 SLOWEST = 1000.0
 # Maps of more robots than this stand below each other.
 MOST_BESIDE = 5
 
 
-def budgets(start: str, results: Results) -> Sketch | None:
-    """Return the targets solved within a time, by solvers of one start; None if there are none."""
-    panels = {
-        robot: [_share(score, BUDGETS, budget_curve(score, BUDGETS)) for score in field]
-        for robot, field in fields_of(results, start).items()
-    }
-    return _chart(
-        f"budget_{_stem(start)}",
-        f"Robots, {start}: targets solved within a time",
-        "Share of the targets within reach that are solved within so much time for each; the "
-        "band is the 95 % interval (Wilson).",
-        panels,
-        "time for each target [s]",
-        results.entrants,
-    )
+# Shares of targets by solver, at places along an axis.
+Curves = Callable[[Sequence[Score], Floats], list[tuple[Score, Floats]]]
 
 
-def performance_profiles(start: str, results: Results) -> Sketch | None:
-    """Return performance profiles of solvers of one start; None if there are none."""
-    panels = {
-        robot: [_share(score, RATIOS, curve) for score, curve in profiles(field, RATIOS)]
+def _curves(
+    name: str,
+    title: str,
+    shows: str,
+    axis: str,
+    read: Curves,
+    along: Floats,
+    start: str,
+    results: Results,
+) -> Sketch | None:
+    """Return a panel of curves for each robot; None if there are no solvers with this start."""
+    panels = tuple(
+        Panel(robot, tuple(_share(score, along, rates) for score, rates in read(field, along)))
         for robot, field in fields_of(results, start).items()
-    }
-    return _chart(
-        f"profile_{_stem(start)}",
-        f"Robots, {start}: performance profiles",
-        "Share of the targets that a solver solves within so many times the time of the "
-        "fastest on that target (Dolan and Moré 2002); where a line ends is what it solves at all.",
-        panels,
-        "times the fastest on a target",
-        results.entrants,
     )
+    chart = Chart(
+        f"{name}_{_stem(start)}",
+        f"Robots, {start}: {title}",
+        shows,
+        panels,
+        Axis(axis, log=True),
+        Axis("targets [%]", limits=(-3, 103)),
+        better=GREATER,
+        entrants=results.entrants,
+    )
+    return chart_sketch(chart) if panels else None
 
 
 def _stem(start: str) -> str:
@@ -66,33 +63,30 @@ def _stem(start: str) -> str:
 
 def _share(score: Score, along: Floats, rates: Floats) -> Series:
     """Return a share with the interval that holds the true one in 95 % of samples [%]."""
-    low, high = metrics.wilson(rates, max(1, score.share.total))
+    low, high = metrics.wilson(rates, max(1, score.total))
     return series(score.solver, along, 100 * rates, (100 * low, 100 * high))
 
 
-def _chart(
-    name: str,
-    title: str,
-    shows: str,
-    panels: dict[str, list[Series]],
-    axis: str,
-    entrants: frozenset[str],
-) -> Sketch | None:
-    """Return a panel for each robot."""
-    if not panels:
-        return None
-    return chart_sketch(
-        Chart(
-            name,
-            title,
-            shows,
-            tuple(Panel(robot, tuple(curves)) for robot, curves in panels.items()),
-            Axis(axis, log=True),
-            Axis("targets [%]", limits=(-3, 103)),
-            better=GREATER,
-            entrants=entrants,
-        )
-    )
+budgets = partial(
+    _curves,
+    "budget",
+    "targets solved within a time",
+    "Share of the targets within reach that are solved within so much time for each; the "
+    "band is the 95 % interval (Wilson).",
+    "time for each target [s]",
+    within_budgets,
+    np.logspace(-6, 0, 121),
+)
+performance_profiles = partial(
+    _curves,
+    "profile",
+    "performance profiles",
+    "Share of the targets that a solver solves within so many times the time of the "
+    "fastest on that target (Dolan and Moré 2002); where a line ends is what it solves at all.",
+    "times the fastest on a target",
+    profiles,
+    np.logspace(0, 4, 121),
+)
 
 
 # What a cell of a map is: how full it is drawn, from 0 to 1, and what is written on it.

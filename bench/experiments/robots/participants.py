@@ -1,6 +1,7 @@
 """The solvers that were asked, and the robots that they solve targets of."""
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 from ...harness.record import Record
@@ -16,7 +17,7 @@ from .values import RobotDetails
 
 
 class Participant(NamedTuple):
-    """A solver that was asked, with its records on robots."""
+    """A solver that was asked, its records on robots, and one record of each robot of all."""
 
     peer: Peer
     records: tuple[Record, ...]
@@ -33,7 +34,7 @@ class Participant(NamedTuple):
         return listed([f"{e.kind} ({e.note})" if e.note else e.kind for e in self.peer.entries])
 
     @property
-    def solved_robots(self) -> str:
+    def measured_robots(self) -> str:
         """Which of all robots it was measured on, "" for none."""
         names = {record.title for record in self.records if "solved" in record.arrays}
         others = [robot for robot in self.robots if robot not in names]
@@ -42,32 +43,29 @@ class Participant(NamedTuple):
     @property
     def remark(self) -> str:
         """Why it was not measured on a robot, "" where it is not installed."""
-        reasons: dict[str, dict[str, None]] = {}
-        for record in self.records if self.version else ():
-            if record.details.remark:
-                reasons.setdefault(record.details.remark, {})[record.title] = None
-        return "; ".join(f"{listed(list(titles))}: {why}" for why, titles in reasons.items())
+        remarks = {r.title: r.details.remark for r in self.records if r.details.remark}
+        reasons = dict.fromkeys(remarks.values() if self.version else ())
+        robots = {why: [robot for robot in remarks if remarks[robot] == why] for why in reasons}
+        return "; ".join(f"{listed(names)}: {why}" for why, names in robots.items())
 
 
 def _participants(results: Results) -> list[Participant]:
     """Return the peers that have records, and the solvers that users entered."""
     asked = [r for start in STARTS for r in results.all("ik", task=REACHABLE, kind=start)]
     robots = {record.title: record for record in asked if "solved" in record.arrays}
-    entered = [r for r in asked if r.facts.get("entrant") is True]
-    peers = [*registry.PEERS, *{r.solver: _as_peer(r) for r in entered}.values()]
-    participants = (Participant(peer, _records_of(peer, asked), robots) for peer in peers)
+    entered = {r.solver: _as_peer(r) for r in asked if r.facts.get("entrant") is True}
+    participants = [
+        Participant(peer, tuple(r for r in asked if r.solver in names), robots)
+        for peer in (*registry.PEERS, *entered.values())
+        for names in [set(map(peer.called, peer.entries))]
+    ]
     return [participant for participant in participants if participant.records]
-
-
-def _records_of(peer: Peer, records: Sequence[Record]) -> tuple[Record, ...]:
-    names = set(map(peer.called, peer.entries))
-    return tuple(record for record in records if record.solver in names)
 
 
 def _as_peer(record: Record) -> Peer:
     """Return what a record of a solver that was entered says of it."""
-    entry = Entry(record.details.kind)
-    return Peer(record.solver, "", str(record.facts.get("door", "")), "", "", (entry,))
+    door = str(record.facts.get("door", ""))
+    return Peer(record.solver, "", door, "", "", (Entry(record.details.kind),))
 
 
 def _summary(participants: Sequence[Participant]) -> Summary:
@@ -98,14 +96,14 @@ participants = Layout(
     "Solvers and robots",
     subjects=_participants,
     columns=(
-        text("solver", lambda participant: participant.peer.title),
-        text("package", lambda participant: participant.peer.package),
+        text("solver", attrgetter("peer.title")),
+        text("package", attrgetter("peer.package")),
         text("version", lambda participant: participant.version or "not installed"),
-        text("license", lambda participant: participant.peer.license),
-        text("robots", lambda participant: participant.solved_robots),
-        text("takes", lambda participant: participant.peer.can),
-        text("takes part as", lambda participant: participant.entries),
-        text("remark", lambda participant: participant.remark),
+        text("license", attrgetter("peer.license")),
+        text("robots", attrgetter("measured_robots")),
+        text("takes", attrgetter("peer.can")),
+        text("takes part as", attrgetter("entries")),
+        text("remark", attrgetter("remark")),
     ),
     shows="A solver that makes one attempt is also started again by the bench, from seeded "
     "random poses until it claims an answer within the limits. Arms are the chains of links that "

@@ -40,11 +40,9 @@ class Score(NamedTuple):
     Attributes:
         robots: which ones, in words.
         start: one start or restarts, "" where solvers are not told apart so.
-        solver: its name.
         records: its record of each robot, in one order for all solvers.
         has_same_targets: whether it was given the targets of most solvers.
-        success: who of the solvers that are ranked solves the most of the same targets.
-        time: who of them takes the least time.
+        success, time: who of those ranked solves the most of the same targets; who is fastest.
         least_time: the least geometric mean of times of any solver [s].
         best_distances: the least distance within limits of any solver, out of reach [m], (target,).
     """
@@ -60,34 +58,36 @@ class Score(NamedTuple):
     best_distances: Floats = np.zeros(0)
 
     @property
+    def total(self) -> int:
+        """How many targets it was given, begun or not."""
+        return sum(map(_total, self.records))
+
+    def begun(self, name: str) -> np.ndarray:
+        """Return an array of the targets that were begun, (target,)."""
+        return np.concatenate([record.arrays[name] for record in self.records])
+
+    def all(self, name: str, value: float) -> np.ndarray:
+        """Return an array of all targets, with a value for those never begun, (target,)."""
+        return np.concatenate([_padded(record, name, value) for record in self.records])
+
+    @property
     def solved(self) -> np.ndarray:
         """Which of all targets are solved, (target,)."""
-        return np.concatenate([_padded(record, "solved", False) for record in self.records])
+        return self.all("solved", False)
 
     @property
     def share(self) -> Share:
         """How many of all targets are solved."""
         return metrics.share(self.solved)
 
-    @property
-    def strata(self) -> Sequence[str]:
-        """The names of the strata."""
-        names: Sequence[str] = self.records[0].details.strata
-        return names
-
     def solved_in_stratum(self, stratum: int) -> np.ndarray:
         """Return which of all targets in a stratum are solved, (target,)."""
-        strata = np.concatenate([_strata(record) for record in self.records])
-        return self.solved[strata == stratum]
-
-    def share_of_stratum(self, stratum: int) -> Share:
-        """Return how many of all targets in a stratum are solved."""
-        return metrics.share(self.solved_in_stratum(stratum))
+        return self.solved[np.concatenate(list(map(_strata, self.records))) == stratum]
 
     @property
     def seconds(self) -> Floats:
         """How long each target took, infinite where it was never begun [s], (target,)."""
-        return np.concatenate([_padded(record, "seconds", np.inf) for record in self.records])
+        return self.all("seconds", np.inf)
 
     @property
     def penalised(self) -> Floats:
@@ -102,17 +102,12 @@ class Score(NamedTuple):
     @property
     def mean_time_interval(self) -> Interval:
         """The same with its interval [s], targets drawn again within each robot."""
-        groups = [total(record) for record in self.records]
-        return metrics.shifted_geometric_mean(self.penalised, SHIFT, groups)
+        return metrics.shifted_geometric_mean(self.penalised, SHIFT, [*map(_total, self.records)])
 
     @property
     def times_the_least(self) -> float:
         """The geometric mean of times over the least of any solver."""
         return metrics.ratio(self.mean_time, self.least_time)
-
-    def begun(self, name: str) -> np.ndarray:
-        """Return an array of the targets that were begun, (target,)."""
-        return np.concatenate([record.arrays[name] for record in self.records])
 
     @property
     def effort(self) -> metrics.Effort:
@@ -124,26 +119,14 @@ class Score(NamedTuple):
         """The median time of targets begun, and its interval [s]."""
         return metrics.median_interval(self.begun("seconds"))
 
-    @property
-    def position_residual(self) -> Spread:
-        """How far effectors of solved targets are from them [m], NaN if none is solved."""
-        return metrics.spread(self.begun("position")[self.begun("solved")])
-
-    @property
-    def rotation_residual(self) -> Spread:
-        """By how much effectors of solved targets are rotated [rad], NaN if none is solved."""
-        return metrics.spread(self.begun("rotation")[self.begun("solved")])
+    def residual(self, name: str) -> Spread:
+        """Return where the residuals of targets solved lie, NaN if none is."""
+        return metrics.spread(self.begun(name)[self.begun("solved")])
 
     @property
     def claims(self) -> int:
         """Of how many targets it says whether they are solved."""
         return int(np.sum(self.begun("claimed") >= 0))
-
-    @property
-    def unclaimed(self) -> Share:
-        """How many of all targets it does not call solved, begun or not."""
-        claimed = np.concatenate([_padded(record, "claimed", 0) for record in self.records])
-        return metrics.share(claimed != 1)
 
     @property
     def false_claim_share(self) -> Share:
@@ -161,15 +144,9 @@ class Score(NamedTuple):
         return sum(map(_outcomes, self.records), Counter())
 
     @property
-    def setup(self) -> float:
-        """How long the solver took before the first target [s], the sum over robots."""
-        return float(sum(record.values.setup for record in self.records))
-
-    @property
     def distances(self) -> Floats:
         """How far each target begun was missed; NaN without an answer that keeps limits [m]."""
-        kept = self.begun("beyond") <= LIMIT_TOLERANCE
-        return np.where(kept, self.begun("position"), np.nan)
+        return np.where(self.begun("beyond") <= LIMIT_TOLERANCE, self.begun("position"), np.nan)
 
     @property
     def answers_within_limits(self) -> int:
@@ -193,22 +170,17 @@ class Score(NamedTuple):
         return _spread(self.begun("position"))
 
     @property
+    def limits(self) -> str:
+        """Why it is not ranked, "" if it is: its time ran out, or its targets are others."""
+        begun = self.begun("solved").size
+        cut = f"cut at {words(begun)} of {words(self.total)}" * (begun < self.total)
+        others = f"other targets, {words(self.total)}" * (not self.has_same_targets)
+        return "; ".join(filter(None, (cut, others)))
+
+    @property
     def is_ranked(self) -> bool:
         """Whether it began all of its targets, and they are the same as others'."""
-        return not self.cut and self.has_same_targets
-
-    @property
-    def cut(self) -> str:
-        """Where a budget of time ended its targets, "" if there was enough of it."""
-        begun, count = self.begun("solved").size, sum(map(total, self.records))
-        return f"cut at {words(begun)} of {words(count)}" if begun < count else ""
-
-    @property
-    def limits(self) -> str:
-        """Why it is not ranked, "" if it is."""
-        count = sum(map(total, self.records))
-        others = "" if self.has_same_targets else f"other targets, {words(count)}"
-        return "; ".join(filter(None, (self.cut, others)))
+        return not self.limits
 
     @property
     def trouble(self) -> str:
@@ -230,21 +202,19 @@ def _spread(values: Floats) -> Spread:
     return metrics.spread(values[np.isfinite(values)])
 
 
-def total(record: Record) -> int:
-    """Return how many targets a solver was given, begun or not."""
+def _total(record: Record) -> int:
     return max(int(record.size), record.arrays["solved"].size)
 
 
 def _padded(record: Record, name: str, value: float) -> np.ndarray:
-    """Return an array with a value for the targets that were never begun, (target,)."""
     begun = record.arrays[name]
-    return np.pad(begun, (0, total(record) - begun.size), constant_values=value)
+    return np.pad(begun, (0, _total(record) - begun.size), constant_values=value)
 
 
 def _strata(record: Record) -> np.ndarray:
     """Return the stratum of every target: they alternate, begun or not."""
     begun = record.arrays["stratum"]
-    others = np.arange(begun.size, total(record)) % max(len(record.details.strata), 1)
+    others = np.arange(begun.size, _total(record)) % max(len(record.details.strata), 1)
     return np.concatenate([begun, others])
 
 
@@ -258,7 +228,7 @@ def _outcomes(record: Record) -> Counter[str]:
     holds = (solves.solved, reached, claimed, answered, raised, np.ones_like(answered))
     first = np.argmax(holds, axis=0)
     counts = Counter({name: int(np.sum(first == i)) for i, name in enumerate(OUTCOMES[:-1])})
-    counts[OUTCOMES[-1]] = total(record) - answered.size
+    counts[OUTCOMES[-1]] = _total(record) - answered.size
     return counts
 
 
@@ -289,9 +259,9 @@ def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score
 
 def _field(robot: str, start: str, records: Sequence[Record]) -> list[Score]:
     """Return solvers on one robot; of equally many sets of targets the larger one counts."""
-    counts = Counter(map(total, records))
+    counts = Counter(map(_total, records))
     size = max(counts, key=lambda size: (counts[size], size))
-    return _ranked([Score(robot, start, r.solver, (r,), total(r) == size) for r in records])
+    return _ranked([Score(robot, start, r.solver, (r,), _total(r) == size) for r in records])
 
 
 def _ranked(field: Sequence[Score]) -> list[Score]:
@@ -374,27 +344,14 @@ def fields(scores: Iterable[Score]) -> dict[tuple[str, str], list[Score]]:
     return groups
 
 
-def total_outcomes(scores: Iterable[Score]) -> dict[str, Counter[str]]:
-    """Return how many targets of all robots came to what, by solver."""
-    outcomes: dict[str, Counter[str]] = {}
-    for score in scores:
-        outcomes.setdefault(score.solver, Counter()).update(score.outcomes)
-    return outcomes
-
-
-def pooled_strata(scores: Iterable[Score]) -> dict[str, list[tuple[str, Share]]]:
-    """Return how many targets of each stratum ranked solvers solve, by start, hardest first."""
-    shares: dict[str, list[tuple[str, Share]]] = {}
-    ranked = [score for score in scores if score.is_ranked]
-    for start in dict.fromkeys(score.start for score in ranked):
-        mine = [score for score in ranked if score.start == start]
-        hits = [
-            (name, metrics.share(np.concatenate([s.solved_in_stratum(i) for s in mine])))
-            for i, name in enumerate(mine[0].strata)
-        ]
-        hits = [(name, share) for name, share in hits if share.total]
-        shares[start] = sorted(hits, key=lambda hit: hit[1].hits / hit[1].total)
-    return shares
+def pooled_strata(scores: Sequence[Score]) -> list[tuple[str, Share]]:
+    """Return how many targets of each stratum these solvers solve, the hardest stratum first."""
+    names = scores[0].records[0].details.strata if scores else []
+    shares = [
+        (name, metrics.share(np.concatenate([score.solved_in_stratum(i) for score in scores])))
+        for i, name in enumerate(names)
+    ]
+    return sorted(shares, key=lambda share: metrics.ratio(share[1].hits, share[1].total))
 
 
 def spread_of_paces(records: Iterable[Record]) -> float:
@@ -403,9 +360,9 @@ def spread_of_paces(records: Iterable[Record]) -> float:
     return metrics.relative_spread(np.array(paces)) if len(paces) > 1 else np.nan
 
 
-def budget_curve(score: Score, budgets: Floats) -> Floats:
-    """Return the share of all targets that are solved within each budget [s]."""
-    return metrics.within_budget(score.seconds, score.solved, budgets)
+def within_budgets(field: Sequence[Score], budgets: Floats) -> list[tuple[Score, Floats]]:
+    """Return the share of all targets that each solver solves within each budget [s]."""
+    return [(score, metrics.within_budget(score.seconds, score.solved, budgets)) for score in field]
 
 
 def profiles(field: Sequence[Score], ratios: Floats) -> list[tuple[Score, Floats]]:

@@ -1,10 +1,11 @@
 """Robots: who solves how many targets, how fast, and how many claims are false."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from operator import attrgetter, methodcaller
+from operator import attrgetter
 
 from ...harness import metrics
 from ...harness.results import leaders, listed, settings, steadiness
@@ -26,7 +27,6 @@ from .readings import (
     pooled_strata,
     scores,
     spread_of_paces,
-    total_outcomes,
 )
 
 _MEASURED = (
@@ -67,7 +67,7 @@ def _how(scores: Sequence[Score]) -> str:
     ).rstrip()
 
 
-def _number(title: str, reading: str, unit: str = "", best: str = "", group: str = "") -> Column:
+def _number(title: str, reading: str, unit: str = "", best: str = "") -> Column:
     """Return the column of a reading of scores, empty where that is not a number."""
     read = attrgetter(reading)
 
@@ -75,15 +75,18 @@ def _number(title: str, reading: str, unit: str = "", best: str = "", group: str
         value: Cell = read(score)
         return None if isinstance(value, float) and math.isnan(value) else value
 
-    return Column(title, unit, read=cell, best=best, group=group)
+    return Column(title, unit, read=cell, best=best)
+
+
+def _residual(quantity: str, unit: str, place: str) -> Column:
+    def read(score: Score) -> float | None:
+        return getattr(score.residual(quantity), place) if score.share.hits else None
+
+    return Column(f"{quantity} residual, {place}", unit, read=read)
 
 
 def _mark(score: Score) -> str:
     return "; ".join(filter(None, (score.limits, score.leads, score.trouble)))
-
-
-def _trouble(score: Score) -> str:
-    return "; ".join(filter(None, (score.limits, score.trouble)))
 
 
 NAMES = (
@@ -93,16 +96,19 @@ NAMES = (
 )
 SOLVED = replace(_number("solved", "share", best="greatest"), note=INTERVAL)
 FALSE_SUCCESSES = _number("false successes", "false_claims")
-MEAN_TIME = _number("time, geometric mean", "mean_time_interval.value", "µs", best="least")
+MEAN = "time, geometric mean"
+MEAN_TIME = _number(MEAN, "mean_time", "µs", best="least")
 MEAN_TIME_INTERVAL = (
-    _number("time, geometric mean, 95 % from", "mean_time_interval.low", "µs"),
-    _number("time, geometric mean, 95 % to", "mean_time_interval.high", "µs"),
+    _number(f"{MEAN}, 95 % from", "mean_time_interval.low", "µs"),
+    _number(f"{MEAN}, 95 % to", "mean_time_interval.high", "µs"),
 )
 MEDIAN_TIME = _number("time, median", "median_time.value", "µs")
 OTHER_TIMES = (
     _number("time, 95 %", "effort.p95", "µs"),
     _number("time, mean", "effort.mean", "µs"),
 )
+# Solvers with the same robots and starts are compared.
+_of_scores = partial(Layout, measured=_how, compared=2, ranked=attrgetter("is_ranked"))
 
 
 def _count(name: str, score: Score) -> int:
@@ -133,7 +139,7 @@ def _summary(scores: Sequence[Score]) -> Summary:
     return listing(sentence, _points(scores))
 
 
-over_all = Layout(
+over_all = _of_scores(
     "Who is best over all robots?",
     "robots_overall",
     "Robots: all robots and strata together",
@@ -149,13 +155,10 @@ over_all = Layout(
     shows="Every robot and every stratum counts alike, and solvers are compared over robots that "
     f"all of them take. {_STARTS} {RULE} {_CLAIMS} {_MEAN} Its interval is by the bootstrap: "
     f"targets drawn again {metrics.RESAMPLES} times within each robot, by seeded lots. {_TIES}",
-    measured=_how,
     summary=_summary,
-    compared=2,
-    ranked=attrgetter("is_ranked"),
 )
 
-robot_by_robot = Layout(
+robot_by_robot = _of_scores(
     "Who is good at which robot?",
     "robots_by_robot",
     "Robots one by one: success, time and accuracy",
@@ -174,22 +177,20 @@ robot_by_robot = Layout(
                 *OTHER_TIMES,
                 MEAN_TIME,
                 *MEAN_TIME_INTERVAL,
-                _number("position residual, median", "position_residual.median", "m"),
-                _number("position residual, largest", "position_residual.largest", "m"),
-                _number("rotation residual, median", "rotation_residual.median", "rad"),
-                _number("rotation residual, largest", "rotation_residual.largest", "rad"),
-                _number("set-up", "setup", "ms"),
+                *(
+                    _residual(quantity, unit, place)
+                    for quantity, unit in (("position", "m"), ("rotation", "rad"))
+                    for place in ("median", "largest")
+                ),
+                Column("set-up", "ms", read=lambda score: score.records[0].values.setup),
             ]
         ),
     ),
     shows=f"{_STARTS} {RULE} {_CLAIMS} Median times are of all targets begun, those that failed "
     f"included. {_MEAN} “Times the least time” is that mean over the least of any solver. "
     f"Residuals are of the targets solved, not cut off at the tolerance. {_TIES}",
-    measured=_how,
     summary=_summary,
     figures=figures.FIGURES,
-    compared=2,
-    ranked=attrgetter("is_ranked"),
 )
 
 
@@ -198,36 +199,34 @@ def _outcome_columns(scores: Sequence[Score]) -> list[Column]:
     counts = [
         replace(column, folded=not any(map(column.read, scores))) for column in _counts(OUTCOMES)
     ]
-    strata = scores[0].strata if scores else []
-    shares = [
-        Column(
-            f"solved, {name}",
-            note=INTERVAL,
-            read=methodcaller("share_of_stratum", i),
-            best="greatest",
-            folded=True,
-        )
-        for i, name in enumerate(strata)
+    strata = [
+        Column(f"solved, {name}", note=INTERVAL, read=partial(_stratum, i), best="greatest")
+        for i, name in enumerate(scores[0].records[0].details.strata if scores else ())
     ]
-    return [*NAMES, *counts, _number("targets", "share.total"), *shares]
+    return [*NAMES, *counts, _number("targets", "total"), *folded(strata)]
+
+
+def _stratum(stratum: int, score: Score) -> metrics.Share:
+    return metrics.share(score.solved_in_stratum(stratum))
 
 
 def _outcome_summary(scores: Sequence[Score]) -> Summary:
     """Say what became of targets that were not solved, and which strata are the hardest."""
     points = []
-    for solver, counts in total_outcomes(scores).items():
+    for solver in dict.fromkeys(score.solver for score in scores):
+        counts = sum((s.outcomes for s in scores if s.solver == solver), Counter())
         failures = [f"{words(counts[name])} {name}" for name in OUTCOMES[1:] if counts[name]]
         if failures:
             points.append(f"{solver}: {listed(failures)}, of {words(counts.total())}")
-    strata = (
-        f"{start}, strata from the hardest: "
-        + ", ".join(f"{name} {words(share)}" for name, share in shares)
-        for start, shares in pooled_strata(scores).items()
-    )
-    return listing("What was not solved, and which targets are hard:", [*points, *strata])
+    for start in dict.fromkeys(score.start for score in scores):
+        shares = pooled_strata([s for s in scores if s.start == start and s.is_ranked])
+        strata = [f"{name} {words(share)}" for name, share in shares if share.total]
+        if strata:
+            points.append(f"{start}, strata from the hardest: {', '.join(strata)}")
+    return listing("What was not solved, and which targets are hard:", points)
 
 
-outcomes = Layout(
+outcomes = _of_scores(
     "What becomes of the targets, and which are hard?",
     "robots_outcomes",
     "Robots: what became of every target, and success in each stratum",
@@ -243,10 +242,7 @@ outcomes = Layout(
     "effector is farthest from and nearest to the first joint; near singular: the twentieth "
     "with the smallest least singular value of the Jacobian; at a limit: one joint put at "
     f"one of its limits. {_STARTS} {RULE}",
-    measured=_how,
     summary=_outcome_summary,
-    compared=2,
-    ranked=attrgetter("is_ranked"),
 )
 
 
@@ -262,7 +258,7 @@ def _unreachable_summary(scores: Sequence[Score]) -> Summary:
     return Summary(f"{sentence} (n = {words(count)}).{beside}")
 
 
-unreachable = Layout(
+unreachable = _of_scores(
     "What happens out of reach?",
     "robots_unreachable",
     "Robots: targets out of reach",
@@ -272,14 +268,14 @@ unreachable = Layout(
         FALSE_SUCCESSES,
         _number("beyond the best known, median", "excess_over_best.median", "m", best="least"),
         MEDIAN_TIME,
-        text("mark", _trouble),
+        text("mark", lambda score: "; ".join(filter(None, (score.limits, score.trouble)))),
         *folded(
             [
                 _number("beyond the best known, largest", "excess_over_best.largest", "m"),
                 _number("beyond the lower bound, median", "excess_over_bound.median", "m"),
                 _number("distance left, median", "gap.median", "m"),
                 _number("distance left, largest", "gap.largest", "m"),
-                _number("targets", "share.total"),
+                _number("targets", "total"),
                 _number("answers within limits", "answers_within_limits"),
                 *_counts(OUTCOMES[4:]),
                 *OTHER_TIMES,
@@ -292,10 +288,7 @@ unreachable = Layout(
     "or more; the lower bound is how much farther a target is than all links in a row. A "
     "solver of poses may trade distance for angle. Answers beyond a limit have no distance. "
     f"{RULE}",
-    measured=_how,
     summary=_unreachable_summary,
-    compared=2,
-    ranked=attrgetter("is_ranked"),
 )
 
 LAYOUTS = (participants, over_all, robot_by_robot, outcomes, unreachable, entered)

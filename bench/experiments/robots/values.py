@@ -41,17 +41,10 @@ class RobotSolves(Values, frozen=True, kw_only=True):
 
 
 class RobotDetails(Details, frozen=True):
-    """What is said of a solver and a robot.
+    """The solver's start and version, why it does not take a robot, and what the robot is.
 
-    Attributes:
-        kind: one start or restarts.
-        version: of the solver.
-        tolerance, tolerance_rotation: within which a target is solved [m], [rad].
-        remark: why the solver does not take the robot.
-        strata: names of the strata.
-        tips: names of the effectors.
-        joints, freedom: how many the robot has, of joints and of degrees of freedom.
-        wanted: pose or position.
+    Targets are solved within the tolerances [m], [rad]; tips are the effectors, of which a pose or
+    a position is wanted.
     """
 
     kind: str

@@ -6,13 +6,7 @@ from ...harness.values import Details, Kind, Values
 
 
 class TrialValues(Values, frozen=True):
-    """Whether a solver was judged rightly.
-
-    Attributes:
-        caught: whether a law is broken.
-        named: whether the fault is named; of an honest solver, whether nothing is.
-        passed: whether the judge did all that it should.
-    """
+    """Whether a law is broken, the fault named (or none, of an honest solver), all is right."""
 
     caught: bool
     named: bool
