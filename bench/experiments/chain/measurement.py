@@ -23,13 +23,7 @@ from ...peers.entrant import CHAIN_TASK
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
 from ...peers.protocol import NoAnswerError
 from ...peers.registry import ChainPeer
-from ...problems.chains import (
-    BEYOND,
-    STRATA,
-    ChainRequests,
-    TargetsForSkeleton,
-    chain_targets,
-)
+from ...problems.chains import BEYOND, STRATA, ChainRequests, TargetsForSkeleton, chain_targets
 from . import CHAIN
 
 SUITE = "ik"
