@@ -195,10 +195,9 @@ def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
             if not outcome.solved:
                 break
     names = ("particles", "frames", "wanted", "seconds", "setup", "implicit", "true", "diverged")
-    measured = _columns(names, rows, remarks)
     truths = [fall.truth for fall in falls]
     known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
-    return measured._replace(arrays={**measured.arrays, **known})
+    return _columns(names, rows, remarks, **known)
 
 
 def _tried(
@@ -365,14 +364,19 @@ def job(
     return ClothJob(peer.module, *known, peer.entrant_name)
 
 
-def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[Remark]) -> Measured:
+def _columns(
+    names: tuple[str, ...], rows: list[Row], remarks: list[Remark], **more: list[float]
+) -> Measured:
     """Return rows, their labels last, as arrays and facts."""
     arrays = {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
     arrays["remark_particles"] = np.array([remark.particles for remark in remarks])
-    sentences = [remark.sentence for remark in remarks]
-    facts: dict[str, Any] = {"rungs": [row[-1] for row in rows], "remarks": sentences}
-    facts["trouble"] = next((remark.sentence for remark in remarks if remark.is_trouble), "")
-    return Measured(arrays, facts=facts)
+    troubles = [remark.sentence for remark in remarks if remark.is_trouble]
+    facts = {
+        "rungs": [row[-1] for row in rows],
+        "remarks": [remark.sentence for remark in remarks],
+        "trouble": troubles[0] if troubles else "",
+    }
+    return Measured({**arrays, **more}, facts=facts)
 
 
 @functools.cache
