@@ -106,9 +106,8 @@ _STEP = (
     StepSolver("gauss_newton", "Gauss-Newton", is_linear=True, **_ONE_SOLVE),
 )
 
-# One Levenberg-Marquardt loop on the kinematics of either engine.
+# One Levenberg-Marquardt loop on engines' kinematics; what is timed; libraries that factor.
 LOOPS = tuple(Solver(f"lm/{engine}", f"LM, {engine}", engine) for engine in (PINOCCHIO, MUJOCO))
-# Those that are timed.
 COMPILED = Solver("Plumbob, compiled", "Plumbob, compiled", style=Style("blue", "", "o"))
 PLAIN = Solver("Plumbob, plain Python", "Plumbob, plain Python", style=Style("orange", "", "D"))
 OUR_KINEMATICS = Solver(
@@ -124,7 +123,6 @@ TIMED = (
     Solver(MUJOCO, MUJOCO, MUJOCO, Style("purple", "", "^")),
     LIMIT,
 )
-# Libraries that factor matrices, ours first.
 SUPERNODAL = Solver("supernodal", "ours")
 CHOLMOD = Solver("cholespy", "CHOLMOD (cholespy)", "CHOLMOD")
 FACTORS = (SUPERNODAL, CHOLMOD)

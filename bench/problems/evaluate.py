@@ -88,18 +88,13 @@ class Evaluator:
 
     def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the effectors' positions [m], (..., effector, 3), and rotations, (..., 3, 3)."""
-        rows = q.reshape(-1, q.shape[-1])
-        positions = np.empty((len(rows), len(self._effectors), 3))
-        rotations = np.empty((len(rows), len(self._effectors), 9))
-        for i, row in enumerate(rows):
-            self._update_kinematics(row)
+        shape = (*q.shape[:-1], len(self._effectors))
+        positions, rotations = np.empty((*shape, 3)), np.empty((*shape, 9))
+        for i in np.ndindex(q.shape[:-1]):
+            self._update_kinematics(q[i])
             positions[i] = self._data.xpos[self._effectors]
             rotations[i] = self._data.xmat[self._effectors]
-        batch = q.shape[:-1]
-        return (
-            positions.reshape(*batch, -1, 3),
-            rotations.reshape(*batch, len(self._effectors), 3, 3),
-        )
+        return positions, rotations.reshape(*shape, 3, 3)
 
     def jacobians(self, q: FloatArray) -> FloatArray:
         """Return the Jacobians of positions and rotations, (row, 6 effector, freedom)."""
@@ -114,19 +109,16 @@ class Evaluator:
 
     def evaluate(self, targets: Targets, q: FloatArray, tolerance: Tolerance) -> Evaluation:
         """Return what answers (target, coordinate) to the first targets come to; NaN is none."""
-        given = np.asarray(np.isfinite(q).all(axis=-1))
-        positions, rotations = self.forward(np.where(given[:, None], q, targets.starts[: len(q)]))
-        distance = np.linalg.norm(positions - targets.positions[: len(q)], axis=-1).max(axis=-1)
-        angle = angle_between(rotations, targets.rotations[: len(q)]).max(axis=-1)
-        angle = angle if self.robot.posed else np.zeros_like(angle)
+        answered, count = np.asarray(np.isfinite(q).all(axis=-1)), len(q)
+        positions, rotations = self.forward(np.where(answered[:, None], q, targets.starts[:count]))
+        distance = np.linalg.norm(positions - targets.positions[:count], axis=-1).max(axis=-1)
+        angle = angle_between(rotations, targets.rotations[:count]).max(axis=-1)
         over = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
-        distance, angle, over = (np.where(given, x, np.nan) for x in (distance, angle, over))
-        solved = (
-            (distance <= tolerance.position)
-            & (angle <= tolerance.rotation)
-            & (over <= LIMIT_TOLERANCE)
-        )
-        return Evaluation(distance, angle, over, solved)
+        errors = np.stack([distance, angle * self.robot.posed, over])
+        errors[:, ~answered] = np.nan
+        limits = np.array([*tolerance, LIMIT_TOLERANCE])[:, None]
+        solved = np.asarray((errors <= limits).all(axis=0))
+        return Evaluation(errors[0], errors[1], errors[2], solved)
 
     def _update_kinematics(self, q: FloatArray) -> None:
         self._data.qpos[:] = q

@@ -33,12 +33,7 @@ _SEED = 1986
 
 @functools.lru_cache(maxsize=16)
 def robot_targets(name: str, count: int) -> Targets:
-    """Return `count` targets in each stratum, the strata alternating, and random starts.
-
-    Raises:
-        ValueError: if there is no such robot.
-        AbsentError: if its file is not installed.
-    """
+    """Return `count` targets in each stratum, the strata alternating, and random starts."""
     evaluator = evaluator_of(name)
     rng = np.random.default_rng([_SEED, seed_of(name)])
     poses = stratum_poses(evaluator, rng, count).values()
@@ -70,18 +65,10 @@ def stratum_poses(
 
 @functools.lru_cache(maxsize=16)
 def unreachable_targets(name: str, count: int) -> Targets:
-    """Return targets 1.05 to 1.5 times as far from the first joint as all links in a row reach.
-
-    Raises:
-        ValueError: if there is no such robot.
-        AbsentError: if its file is not installed.
-    """
-    evaluator = evaluator_of(name)
-    rng = np.random.default_rng([_SEED, seed_of(name), 1])
-    positions, rotations = _unreachable(rng, evaluator, count)
-    return Targets(
-        positions, rotations, evaluator.robot.draw(rng, count), np.zeros(count, dtype=int)
-    )
+    """Return targets 1.05 to 1.5 times as far from the first joint as all links in a row reach."""
+    evaluator, rng = evaluator_of(name), np.random.default_rng([_SEED, seed_of(name), 1])
+    poses = _unreachable(rng, evaluator, count)
+    return Targets(*poses, evaluator.robot.draw(rng, count), np.zeros(count, dtype=int))
 
 
 def least_distances(name: str, targets: Targets) -> FloatArray:
@@ -96,12 +83,7 @@ def least_distances(name: str, targets: Targets) -> FloatArray:
 
 @functools.lru_cache(maxsize=16)
 def uniform_targets(name: str, count: int, middle: bool) -> Targets:
-    """Return targets uniform in joint space, from random starts or from the middle of the limits.
-
-    Raises:
-        ValueError: if there is no such robot.
-        AbsentError: if its file is not installed.
-    """
+    """Return targets uniform in joint space, from random starts or the middle of the limits."""
     evaluator = evaluator_of(name)
     rng = np.random.default_rng([_SEED, seed_of(name), count])
     positions, rotations = evaluator.forward(evaluator.robot.draw(rng, count))
@@ -144,10 +126,8 @@ def _at_a_limit(rng: np.random.Generator, evaluator: Evaluator, count: int) -> F
     q = evaluator.robot.draw(rng, count)
     limited = np.flatnonzero(np.isfinite(evaluator.robot.lower))
     joint = rng.choice(limited, count)
-    ends = np.where(
-        rng.random(count) < 0.5, evaluator.robot.lower[joint], evaluator.robot.upper[joint]
-    )
-    q[np.arange(count), joint] = ends
+    robot, is_low = evaluator.robot, rng.random(count) < 0.5
+    q[np.arange(count), joint] = np.where(is_low, robot.lower[joint], robot.upper[joint])
     return q
 
 

@@ -84,24 +84,14 @@ class Link(NamedTuple):
     axis: FloatArray | None
 
 
-class _Arm(NamedTuple):
-    title: str
-    file: str
-    root: str
-    effector: str
-
-
+# Title, file, root and effector.
 _ARMS = {
-    "panda": _Arm(
-        "Franka Panda", "panda_description/urdf/panda.urdf", "panda_link0", "panda_link8"
-    ),
-    "ur5": _Arm("UR5", "ur_description/urdf/ur5_robot.urdf", "base_link", "tool0"),
-    "xarm7": _Arm("xArm7", "xarm_description/urdf/xarm7.urdf", "link_base", "link_eef"),
-    "pr2": _Arm(
-        "PR2, right arm",
-        "pr2_description/urdf/pr2.urdf",
-        "torso_lift_link",
-        "r_wrist_roll_link",
+    "panda": ("Franka Panda", "panda_description/urdf/panda.urdf", "panda_link0", "panda_link8"),
+    "ur5": ("UR5", "ur_description/urdf/ur5_robot.urdf", "base_link", "tool0"),
+    "xarm7": ("xArm7", "xarm_description/urdf/xarm7.urdf", "link_base", "link_eef"),
+    "pr2": (
+        *("PR2, right arm", "pr2_description/urdf/pr2.urdf"),
+        *("torso_lift_link", "r_wrist_roll_link"),
     ),
 }
 # Heights of the joints above each other [m], axes and limits [°] of the KUKA LBR iiwa 14 R820, by
@@ -110,12 +100,12 @@ _IIWA = (
     (0.1575, "0 0 1", 170), (0.2025, "0 1 0", 120), (0.2045, "0 0 1", 170), (0.2155, "0 -1 0", 120),
     (0.1845, "0 0 1", 170), (0.2155, "0 1 0", 120), (0.081, "0 0 1", 175), (0.045, None, 0),
 )  # fmt: skip
-CHARACTER = "character"
+IIWA, CHARACTER = "iiwa14", "character"
 # What the tables are about; the iiwa stands beside a published table only.
 ROBOTS = (*_ARMS, CHARACTER)
-ALL = (*_ARMS, "iiwa14", CHARACTER)
-
-
+ALL = (*_ARMS, IIWA, CHARACTER)
+_TITLES = {name: arm[0] for name, arm in _ARMS.items()}
+_TITLES |= {IIWA: "KUKA iiwa14", CHARACTER: "character"}
 # Robots of users, by name.
 OWN: dict[str, Robot] = {}
 
@@ -145,30 +135,24 @@ def robot(name: str) -> Robot:
     choice("robot", name, ALL)
     if name == CHARACTER:
         return _character()
-    if name == "iiwa14":
-        return _chain(name, _Arm("KUKA iiwa14", "", "link_0", "link_8"), _iiwa())
-    arm = _ARMS[name]
-    return _chain(name, arm, _folder().joinpath(arm.file).read_text(encoding="utf-8"))
-
-
-def chain_from(name: str, title: str, text: str, root: str, effector: str) -> Robot:
-    """Return the chain of hinges of a URDF from a root to an effector."""
-    return _chain(name, _Arm(title, "", root, effector), text)
+    if name == IIWA:
+        return chain_from(name, title(name), _iiwa(), "link_0", "link_8")
+    _, file, root, effector = _ARMS[name]
+    text = _folder().joinpath(file).read_text(encoding="utf-8")
+    return chain_from(name, title(name), text, root, effector)
 
 
 def is_installed(name: str) -> bool:
     """Return whether a robot's file is there."""
     try:
-        return name not in _ARMS or _folder().joinpath(_ARMS[name].file).exists()
+        return name not in _ARMS or _folder().joinpath(_ARMS[name][1]).exists()
     except AbsentError:
         return False
 
 
 def title(name: str) -> str:
     """Return how a robot is written."""
-    own = {"iiwa14": "KUKA iiwa14", CHARACTER: "character"}
-    own |= {entered.name: entered.title for entered in OWN.values()}
-    return own.get(name) or _ARMS[name].title
+    return OWN[name].title if name in OWN else _TITLES[name]
 
 
 def links(chain: Robot) -> list[Link]:
@@ -194,24 +178,21 @@ def _folder() -> Path:
         raise AbsentError(f"{PACKAGE} is not installed") from None
 
 
-def _chain(name: str, arm: _Arm, text: str) -> Robot:
-    joints = _joints_between(ElementTree.fromstring(text), arm.root, arm.effector)
+def chain_from(name: str, title: str, text: str, root: str, effector: str) -> Robot:
+    """Return the chain of hinges of a URDF from a root to an effector."""
+    above = {
+        _link(joint, "child"): joint for joint in ElementTree.fromstring(text).findall("joint")
+    }
+    joints: list[ElementTree.Element] = []
+    link = effector
+    while link != root:
+        joints.insert(0, above[link])
+        link = _link(above[link], "parent")
     moving = [joint for joint in joints if joint.get("type") != "fixed"]
     limits = np.array([_limits(joint) for joint in moving])
     names = tuple(joint.get("name", "") for joint in moving)
-    text = _urdf(name, arm.root, joints)
-    return Robot(name, arm.title, text, arm.root, (arm.effector,), names, *limits.T)
-
-
-def _joints_between(
-    tree: ElementTree.Element, root: str, effector: str
-) -> list[ElementTree.Element]:
-    above = {_link(joint, "child"): joint for joint in tree.findall("joint")}
-    joints: list[ElementTree.Element] = []
-    while effector != root:
-        joints.insert(0, above[effector])
-        effector = _link(above[effector], "parent")
-    return joints
+    text = _urdf(name, root, joints)
+    return Robot(name, title, text, root, (effector,), names, *limits.T)
 
 
 def _link(joint: ElementTree.Element, end: str) -> str:
@@ -229,23 +210,21 @@ def _limits(joint: ElementTree.Element) -> tuple[float, float]:
 def _urdf(name: str, root: str, joints: Sequence[ElementTree.Element]) -> str:
     """Return a URDF of only these joints; every link has the mass that some readers insist on."""
     tree = ElementTree.Element("robot", name=name)
-    for link in (root, *(_link(joint, "child") for joint in joints)):
-        inertial = ElementTree.SubElement(
-            ElementTree.SubElement(tree, "link", name=link), "inertial"
-        )
+    for name in (root, *(_link(joint, "child") for joint in joints)):
+        link = ElementTree.SubElement(tree, "link", name=name)
+        inertial = ElementTree.SubElement(link, "inertial")
         ElementTree.SubElement(inertial, "mass", value="1")
         moments = {f"i{a}{b}": str(int(a == b)) for a, b in ("xx", "xy", "xz", "yy", "yz", "zz")}
         ElementTree.SubElement(inertial, "inertia", moments)
     for joint in joints:
         kind = "fixed" if joint.get("type") == "fixed" else "revolute"
-        made = ElementTree.SubElement(tree, "joint", name=joint.get("name", ""), type=kind)
-        made.extend(
-            part for tag in ("origin", "parent", "child", "axis") for part in joint.findall(tag)
-        )
+        part = ElementTree.SubElement(tree, "joint", name=joint.get("name", ""), type=kind)
+        for tag in ("origin", "parent", "child", "axis"):
+            part.extend(joint.findall(tag))
         if kind != "fixed":
             lower, upper = _limits(joint)
             bounds = {"lower": repr(lower), "upper": repr(upper), "effort": "100", "velocity": "10"}
-            ElementTree.SubElement(made, "limit", bounds)
+            ElementTree.SubElement(part, "limit", bounds)
     return ElementTree.tostring(tree, encoding="unicode")
 
 

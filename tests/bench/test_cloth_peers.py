@@ -464,14 +464,11 @@ def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, los
     assert facts == {"rungs": ["as it is"], "remarks": remarks, "trouble": why}
 
 
-class InThisProcess:
-    """A worker process without a process of its own."""
+class InThisProcess(WorkerProcess):
+    """A worker process that is none."""
 
-    def perform(self, job):
-        said = list(job.perform())
-        solved = [message for message in said if isinstance(message, Solved)]
-        trouble = said[-1].why if isinstance(said[-1], Unfit) else ""
-        return Outcome(0.0, solved, trouble)
+    def stream(self, job):
+        return job.perform()
 
 
 @pytest.fixture

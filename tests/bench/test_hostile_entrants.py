@@ -224,34 +224,32 @@ def opened(folder, way, row):
     return open_contestant(spec, limits)
 
 
-def misbehaved(folder, way, name):
+PYTHON_QUICK = ("replaces the clock", "exits", "changes its inputs", "floods its output")
+
+
+def check_sentence(folder, way, name):
     """What a hostile solver gets; the next request is answered, and nothing stays."""
-    solver = opened(folder, way, BEHAVIOURS[name])
+    solver, words = opened(folder, way, BEHAVIOURS[name]), getattr(BEHAVIOURS[name], way)
     try:
-        answers = [solver.answer(case(n)) for n in (RIGHT, HOSTILE, RIGHT)]
+        before, answer, after = (solver.answer(case(n)) for n in (RIGHT, HOSTILE, RIGHT))
     finally:
         solver.close()
-    assert [outcome(answer) for answer in answers[::2]] == ["answer", "answer"]
+    assert outcome(before) == outcome(after) == "answer"
     assert not running(folder)
-    return answers[1], [str(remark) for remark in solver.remarks]
-
-
-PYTHON_QUICK = ("replaces the clock", "exits", "changes its inputs", "floods its output")
+    assert re.search(words, outcome(answer)), outcome(answer)
+    remarks = map(str, solver.remarks)
+    assert any("left processes running" in remark for remark in remarks) == ("child" in name)
+    assert way == "program" or not isinstance(answer, Answer) or answer.seconds > 0.0
 
 
 @pytest.mark.parametrize("name", rows("python", *PYTHON_QUICK))
 def test_a_hostile_python_file_gets_its_sentence(tmp_path, name):
-    answer, remarks = misbehaved(tmp_path, "python", name)
-    assert re.search(BEHAVIOURS[name].python, outcome(answer)), outcome(answer)
-    assert any("left processes running" in one for one in remarks) == ("child" in name)
-    assert not isinstance(answer, Answer) or answer.seconds > 0.0
+    check_sentence(tmp_path, "python", name)
 
 
 @pytest.mark.parametrize("name", rows("program"))
 def test_a_hostile_program_gets_its_sentence(tmp_path, name):
-    answer, remarks = misbehaved(tmp_path, "program", name)
-    assert re.search(BEHAVIOURS[name].program, outcome(answer)), outcome(answer)
-    assert any("left processes running" in one for one in remarks) == ("child" in name)
+    check_sentence(tmp_path, "program", name)
 
 
 @pytest.mark.parametrize("name", rows("files"))

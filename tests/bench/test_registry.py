@@ -17,10 +17,9 @@ from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots import tables as robot_tables
 from plumbob.bench.harness import run
 from plumbob.bench.harness.experiment import Experiment
-from plumbob.bench.harness.isolation import Outcome
+from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.harness.results import Results
-from plumbob.bench.harness.worker import Found, Solved, Unfit
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import ONE_START, Entry, Peer
 from plumbob.bench.report import report
@@ -54,10 +53,8 @@ def test_a_new_step_solver_takes_part_in_every_suite_of_steps():
 
 @pytest.mark.usefixtures("damped")
 def test_a_new_step_solver_stands_in_the_tables(make):
-    (block,) = [
-        b for b in blocks("cloth", TINY)
-        if (b.problem, b.solver) == ("cloth/x1/one step", "damped_global")
-    ]  # fmt: skip
+    name = ("cloth/x1/one step", "damped_global")
+    (block,) = [b for b in blocks("cloth", TINY) if (b.problem, b.solver) == name]
     small = partial(cloth.one_step, cloth_swing(1, size=5), "damped_global", 20)
     record = run.measure(replace(block, measure=small))
     assert not record.failed
@@ -77,22 +74,11 @@ def prepare(robot, tolerance):
 """
 
 
-class InThisProcess:
+class InThisProcess(WorkerProcess):
     """A worker process that is none."""
 
-    patience = 1.0
-
-    def perform(self, job):
-        outcome = Outcome(0.0, [], "")
-        for message in job.perform():
-            match message:
-                case Solved():
-                    outcome.solved.append(message)
-                case Unfit(why):
-                    outcome = outcome._replace(trouble=why)
-                case Found(values):
-                    outcome = outcome._replace(found=values)
-        return outcome
+    def stream(self, job):
+        return job.perform()
 
 
 def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, monkeypatch):
@@ -101,8 +87,8 @@ def test_a_new_peer_is_an_adapter_and_a_line_and_stands_in_the_tables(tmp_path, 
     line = Peer("Stays put", "stays_put", "numpy", "MIT", "anything", (Entry(ONE_START),))
     monkeypatch.setattr(registry, "PEERS", (*registry.PEERS, line))
     monkeypatch.setattr(robots, "worker_process", InThisProcess)
-    mine = [b for b in blocks("ik", TINY) if b.solver == "Stays put"]
-    (block,) = [b for b in mine if b.problem == "robots/character"]
+    name = ("robots/character", "Stays put")
+    (block,) = [b for b in blocks("ik", TINY) if (b.problem, b.solver) == name]
     record = run.measure(block)
     monkeypatch.delitem(sys.modules, "stays_put")
     assert not record.failed

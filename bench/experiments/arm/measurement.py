@@ -6,14 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import (
-    IK_SOLVERS,
-    IKSolution,
-    Skeleton,
-    forward_kinematics,
-    rotation,
-    track,
-)
+from plumbob.reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rotation, track
 from plumbob.reference.arguments import FloatArray
 
 from ...harness.block import Block, Measured, Scale

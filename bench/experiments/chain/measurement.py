@@ -23,13 +23,7 @@ from ...peers.entrant import CHAIN_TASK
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
 from ...peers.protocol import NoAnswerError
 from ...peers.registry import ChainPeer
-from ...problems.chains import (
-    BEYOND,
-    STRATA,
-    ChainRequests,
-    TargetsForSkeleton,
-    chain_targets,
-)
+from ...problems.chains import BEYOND, STRATA, ChainRequests, TargetsForSkeleton, chain_targets
 from . import CHAIN
 
 SUITE = "ik"
@@ -79,13 +73,13 @@ def _blocks_on(
 ) -> Iterator[Block]:
     """Yield targets for every solver of ours, for one loop on each engine, and for users'."""
     facts = {"task": CHAIN, "stratum": stratum, "title": problem.title}
-    followed = (limits._asdict(), len(problem.targets), facts)
+    common = (limits._asdict(), len(problem.targets), facts)
     for solver in IK_SOLVERS:
         measure = partial(solve_targets, problem, solver, limits, record=True)
-        yield Block(SUITE, problem.name, solver, measure, *followed)
+        yield Block(SUITE, problem.name, solver, measure, *common)
     for loop in registry.LOOPS:
         measure = partial(solve_with_engine, problem, loop.engine, limits)
-        yield Block(SUITE, problem.name, loop.name, measure, *followed)
+        yield Block(SUITE, problem.name, loop.name, measure, *common)
     for block in blocks_of_users(problem, limits, scale, followed=stratum != BEYOND):
         yield replace(block, size=len(problem.targets), facts={**facts, **block.facts})
 

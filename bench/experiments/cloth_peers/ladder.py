@@ -38,14 +38,10 @@ def motion_rungs(peer: ClothPeer, frequency: float) -> list[Rung]:
 def _rungs(
     peer: ClothPeer, frequency: float, iterations: tuple[int, ...], parts: tuple[int, ...]
 ) -> list[Rung]:
-    if peer.kind == EXPLICIT:
-        counts = [explicit_substeps(frequency, margin) for margin in MARGINS]
-        return [_rung(peer, _counted(n, "step"), substeps=n) for n in counts]
-    if peer.kind == UNDECLARED:
-        counts = [explicit_substeps(frequency, margin) for margin in MARGINS]
-        return [_rung(peer, _counted(n, "step"), substeps=n) for n in sorted({*parts, *counts})]
-    if peer.kind == LINEARISED:
-        return [_rung(peer, _counted(n, "step"), substeps=n) for n in parts]
+    stable = [explicit_substeps(frequency, margin) for margin in MARGINS]
+    substeps = {EXPLICIT: stable, LINEARISED: parts, UNDECLARED: sorted({*parts, *stable})}
+    if peer.kind in substeps:
+        return [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps[peer.kind]]
     rungs = [_rung(peer, _counted(n, "iteration"), iterations=n) for n in iterations]
     if peer.converges and len(parts) > 1:
         rungs += [

@@ -6,6 +6,7 @@ and against the motion itself.
 
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -29,7 +30,6 @@ from ...problems.falling_cloth import (
     highest_mode,
     own_cloth,
 )
-from ...problems.own import OwnProblem
 from ..published import problem as published
 from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
@@ -57,7 +57,6 @@ _FAR = 8.0
 
 # Numbers, and a label in the end.
 Row = tuple[Any, ...]
-Measure = Callable[..., Measured]
 # Parts of a cloth's ladder that use its whole budget.
 _LADDER = 2.0
 
@@ -83,63 +82,15 @@ def levels(scale: Scale) -> tuple[Level, ...]:
 
 
 class Fall(NamedTuple):
-    """A cloth that falls for so many frames: how far, and what makes it."""
+    """A cloth that falls: how far, and what makes it."""
 
     level: Level
     make: Callable[[], FallingCloth]
 
     @property
-    def cloth(self) -> FallingCloth:
-        """The cloth."""
-        return self.make()
-
-    @property
     def truth(self) -> ClothTruth:
         """Its answers."""
         return truth_of(self.make(), self.level.frames)
-
-
-class Cloth(NamedTuple):
-    """A cloth at several sizes, or a user's.
-
-    Attributes:
-        name: in those of its problems.
-        stiffness: of its springs [N/m].
-        frame: the length of a frame [s].
-        falls: the sizes.
-        problem: the user's, if it is one.
-    """
-
-    name: str
-    stiffness: float
-    frame: float
-    falls: list[Fall]
-    problem: OwnProblem | None = None
-
-    def block(self, peer: ClothPeer, words: str, task: str, measure: Measure) -> Block:
-        """Return the block of a solver for this cloth."""
-        settings = {"stiffness": self.stiffness, "frame": self.frame, "version": peer.version}
-        levels, call = [fall.level for fall in self.falls], partial(measure, peer, self.falls)
-        size, budget = sum(level.size for level in levels), sum(level.budget for level in levels)
-        name, facts = f"peers/{words}/{self.name}", {"task": task}
-        if self.problem:
-            facts |= {"cloth": self.name, "problem_digest": self.problem.digest}
-        block = Block(SUITE, name, peer.title, call, settings, size, facts, budget=_LADDER * budget)
-        return block.of(peer.entrant)
-
-
-def cloths(scale: Scale) -> Iterator[Cloth]:
-    """Yield our cloth at three stiffnesses, then those of users."""
-    for k in STIFFNESSES:
-        falls = [Fall(level, partial(falling_cloth, level.size, k)) for level in levels(scale)]
-        yield Cloth(f"k{k:g}", k, FRAME, falls)
-    for problem in scale.problems:
-        if problem.cloth is not None:
-            system, _ = problem.cloth
-            level = levels(scale)[0]._replace(size=system.particle_count)
-            falls = [Fall(level, partial(own_cloth, problem))]
-            stiffness = float(system.stiffnesses.mean())
-            yield Cloth(problem.name, stiffness, problem.h, falls, problem)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -167,14 +118,35 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 def blocks_of(peer: ClothPeer, scale: Scale) -> Iterator[Block]:
     """Yield one step, a motion and, if it is explicit, the limit of a solver."""
-    for cloth in cloths(scale):
-        yield cloth.block(peer, "one step", ONE_STEP, one_step)
-        yield cloth.block(peer, "motion", MOTION, motion)
+    sizes = levels(scale)
+    for k in STIFFNESSES:
+        falls = [Fall(level, partial(falling_cloth, level.size, k)) for level in sizes]
+        yield from _falling(peer, f"k{k:g}", {"stiffness": k, "frame": FRAME}, falls)
+    for own in scale.problems:
+        if own.cloth is not None:
+            system, _ = own.cloth
+            settings: dict[str, Any] = {"stiffness": float(system.stiffnesses.mean())}
+            settings |= {"frame": own.h}
+            fall = Fall(sizes[0]._replace(size=system.particle_count), partial(own_cloth, own))
+            for block in _falling(peer, own.name, settings, [fall]):
+                yield replace(block, facts={**block.facts, "cloth": own.name}).on(own)
     if peer.kind in (EXPLICIT, UNDECLARED) and not peer.settings.get("iterations"):
-        hung = STIFFNESSES if levels(scale) == FULL else QUICK_STIFFNESS
+        hung = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
         settings = {"size": STABILITY_SIZE, "version": peer.version}
         measure, facts = partial(stability, peer, hung), {"task": STABILITY}
         block = Block(SUITE, "peers/stability", peer.title, measure, settings, len(hung), facts)
+        yield block.of(peer.entrant)
+
+
+def _falling(
+    peer: ClothPeer, cloth: str, settings: dict[str, Any], falls: list[Fall]
+) -> Iterator[Block]:
+    """Yield one step and a motion of a cloth at some sizes."""
+    size, budget = (sum(fall.level[i] for fall in falls) for i in (0, 2))
+    settings = settings | {"version": peer.version}
+    for words, task, measure in (("one step", ONE_STEP, one_step), ("motion", MOTION, motion)):
+        known = (SUITE, f"peers/{words}/{cloth}", peer.title, partial(measure, peer, falls))
+        block = Block(*known, settings, size, {"task": task}, budget=_LADDER * budget)
         yield block.of(peer.entrant)
 
 
@@ -194,7 +166,7 @@ def one_step(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
     rows: list[Row] = []
     remarks: list[Remark] = []
     for fall in falls:
-        level, cloth, truth = fall.level, fall.cloth, fall.truth
+        level, cloth, truth = fall.level, fall.make(), fall.truth
         spent = 0.0
         for rung in step_rungs(peer, cloth.beat):
             shape = Shape(1, REPEATS, _REPEATING * level.budget, cloth.frame)
@@ -215,7 +187,7 @@ def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
     rows: list[Row] = []
     remarks: list[Remark] = []
     for fall in falls:
-        level, cloth, truth = fall.level, fall.cloth, fall.truth
+        level, cloth, truth = fall.level, fall.make(), fall.truth
         for rung in motion_rungs(peer, cloth.beat):
             shape = Shape(level.frames, 1, level.budget, cloth.frame)
             outcome = _tried(peer, cloth, rung, shape, remarks)
@@ -223,10 +195,9 @@ def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
             if not outcome.solved:
                 break
     names = ("particles", "frames", "wanted", "seconds", "setup", "implicit", "true", "diverged")
-    measured = _columns(names, rows, remarks)
     truths = [fall.truth for fall in falls]
     known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
-    return measured._replace(values={**measured.arrays, **known})
+    return _columns(names, rows, remarks, **known)
 
 
 def _tried(
@@ -393,14 +364,19 @@ def job(
     return ClothJob(peer.module, *known, peer.entrant_name)
 
 
-def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[Remark]) -> Measured:
+def _columns(
+    names: tuple[str, ...], rows: list[Row], remarks: list[Remark], **more: list[float]
+) -> Measured:
     """Return rows, their labels last, as arrays and facts."""
     arrays = {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
     arrays["remark_particles"] = np.array([remark.particles for remark in remarks])
-    sentences = [remark.sentence for remark in remarks]
-    facts: dict[str, Any] = {"rungs": [row[-1] for row in rows], "remarks": sentences}
-    facts["trouble"] = next((remark.sentence for remark in remarks if remark.is_trouble), "")
-    return Measured(arrays, facts=facts)
+    troubles = [remark.sentence for remark in remarks if remark.is_trouble]
+    facts = {
+        "rungs": [row[-1] for row in rows],
+        "remarks": [remark.sentence for remark in remarks],
+        "trouble": troubles[0] if troubles else "",
+    }
+    return Measured({**arrays, **more}, facts=facts)
 
 
 @functools.cache

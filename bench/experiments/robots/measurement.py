@@ -22,12 +22,7 @@ from ...peers.entrant import ROBOT_TASK
 from ...peers.registry import Entry, Peer
 from ...problems.evaluate import Targets, Tolerance, evaluator_of
 from ...problems.own import OwnProblem
-from ...problems.robot_targets import (
-    STRATA,
-    least_distances,
-    robot_targets,
-    unreachable_targets,
-)
+from ...problems.robot_targets import STRATA, least_distances, robot_targets, unreachable_targets
 from ...problems.robots import PACKAGE, ROBOTS, enter, is_installed, title
 from . import REACHABLE, UNREACHABLE
 from .values import RobotSolves

@@ -7,16 +7,7 @@ of the task must not be zero: full steps then jump about.
 import mink
 
 from ...problems.evaluate import mujoco_model
-from .protocol import (
-    Ask,
-    FloatArray,
-    Robot,
-    Solve,
-    SolverOutput,
-    Tolerance,
-    arrived,
-    iterate,
-)
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
 
 
 def prepare(

@@ -9,16 +9,7 @@ With pink's own damping of 1e-12 the quadratic program is infeasible, and pink r
 import pink
 
 from .pinocchio_model import from_pinocchio, pinocchio_model, to_pinocchio
-from .protocol import (
-    Ask,
-    FloatArray,
-    Robot,
-    Solve,
-    SolverOutput,
-    Tolerance,
-    arrived,
-    iterate,
-)
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
 
 
 def prepare(
