@@ -14,7 +14,6 @@ from ..harness.record import Record
 _USUAL = frozenset({"seconds", "setup"})
 _CLOCKED: Mapping[str, frozenset[str]] = {
     "cloth_scale": frozenset({"assembly", "factor", "refactor", "solve", "local", "step", "limit"}),
-    "first_call": frozenset({"cold wall", "cold processor", "warm wall", "warm processor"}),
 }
 # What depends on the system's state: bytes of memory.
 _INCIDENTAL: Mapping[str, frozenset[str]] = {"cloth_scale": frozenset({"before", "memory"})}

@@ -24,28 +24,6 @@ def record(suite, problem, solver, settings=None, arrays=None, **more):
     return Record(suite, problem, solver, settings or {}, arrays=made, **given)
 
 
-def first_called(name, solver, cold, warm=0.3):
-    """The first call of a function, with nothing compiled and with all of it on disk."""
-    arrays = {"cold compiled": 2, "cold processor": cold, "cold wall": 2 * cold}
-    arrays |= {"warm compiled": 0, "warm processor": warm, "warm wall": 2 * warm}
-    facts = {"title": name.replace("/", ", ")}
-    return record("first_call", name, solver, {}, arrays, facts=facts)
-
-
-def in_parts(solver="Plumbob LM, 100 restarts", missed=((), (7,))):
-    """Parts of five targets each, of which some are missed, one falsely claimed to be solved."""
-    return [
-        record(
-            "many_targets", f"many/iiwa14/{part:06d}", solver,
-            {"tolerance": 1e-3, "tolerance_rotation": 1e-3},
-            {"targets": 5, "solved": 5 - len(which), "false": len(which), "position": 1e-5,
-             "rotation": 1e-6, "missed": np.array(which, dtype=int)},
-            size=5, facts={"title": "KUKA iiwa14", "robot": "iiwa14", "part": part},
-        )
-        for part, which in enumerate(missed)
-    ]  # fmt: skip
-
-
 def drawn(solver, warm, angle):
     """The arm drawing a curve, in three frames."""
     return record(
@@ -83,13 +61,13 @@ def followed(solver, **angles):
     ]
 
 
-def drifted(solver):
+def drifted(solver, curve="circle"):
     """Three repetitions, warm and coherent."""
     modes = {"warm": [0.1, 0.2, 0.3], "coherent": [0.0, 1e-9, 0.0]}
     return [
         record(
             "tracking",
-            "drift/heart",
+            f"drift/{curve}",
             solver,
             {"mode": mode},
             {"drift": drift},
@@ -391,8 +369,6 @@ def make():
         claim=claim,
         entered=entered,
         reached=reached,
-        first_called=first_called,
-        in_parts=in_parts,
         timed=timed,
         stepped=stepped,
         swung=swung,
@@ -421,8 +397,6 @@ def records():
         claim(),
         judged("CCD", "root to tip"),
         judged("honest solvers", "", ()),
-        first_called("solve_ik/chain", "fabrik", 2.0),
-        *in_parts(),
         *arm,
         *followed("ccd", cold=1.0, warm=0.5, coherent=0.25),
         *drifted("ccd"),

@@ -137,7 +137,7 @@ def test_the_limit_of_stability_of_the_same_method_is_the_same(folder):
     limits = [one.arrays["limit"] for one in records()]
     np.testing.assert_allclose(*limits, rtol=1e-3)
     made = {table.name: table for table in tables(Results(records()), ["cloth"])}
-    assert "My symplectic Euler" in cells(made["cloth_stability"])
+    assert "My symplectic Euler" in cells(made["cloth_peers_motion"])
 
 
 def test_a_later_plain_run_keeps_what_was_entered(folder, capsys, monkeypatch):

@@ -11,9 +11,8 @@ import pytest
 from bench.cli import run_command
 from bench.entrants import opening, selection
 from bench.experiments import SUITES, blocks
-from bench.experiments.arm.tables import accuracy
 from bench.experiments.chain import figures
-from bench.experiments.chain.tables import beyond_reach
+from bench.experiments.chain.tables import accuracy, beyond_reach
 from bench.experiments.robots.tables import who
 from bench.harness.record import RecordFile
 from bench.peers import registry

@@ -1,13 +1,15 @@
-"""Iterations and residuals of inverse kinematics on the ten-ball chain."""
+"""Iterations and residuals on the ten-ball chain, and how far joints rotate on every curve."""
 
 import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.figures.chart import GREATER, Axis, Chart, Panel, Series, series
+from ...presentation.figures.chart import GREATER, SPAN, Axis, Chart, Panel, Series, series
 from ...presentation.figures.sketch import Sketch, chart_sketch
 from ...presentation.results import Results, by_problem
 from ...presentation.tables.columns import iterations_said
+from ...presentation.tables.table import in_unit
+from .. import arm
 from . import BEYOND, CHAIN
 
 # Iterations at which targets are counted.
@@ -83,3 +85,36 @@ def _ik_panels(results: Results) -> list[list[Record]]:
     records = [r for r in results.all("ik", task=CHAIN) if r.facts["stratum"] != BEYOND]
     records = [record for record in records if "history_median" in record.arrays]
     return list(by_problem(records).values())
+
+
+def jitter(results: Results) -> Sketch | None:
+    """Show the largest rotation of a joint on each curve, from rest and from the last solution."""
+    records = results.all("arm", task=arm.CURVE, warm=False)
+    if not records:
+        return None
+    rows = by_problem(records)
+    curves, spans = list(rows), []
+    for record in records:
+        warm = results.one("arm", record.problem, record.solver, warm=True)
+        ends = [_largest_angle(r) for r in (record, warm) if r is not None]
+        y = [curves.index(record.problem)] * len(ends)
+        spans.append(series(record.solver, ends, y, form=SPAN))
+    return chart_sketch(
+        Chart(
+            "jitter",
+            "Largest rotation of a joint between neighbouring frames",
+            "Hollow: every frame solved from the rest pose; filled: every frame started from the "
+            "last solution.",
+            (Panel("", tuple(spans)),),
+            Axis("largest rotation of a joint between frames [°], log scale", log=True),
+            columns=1,
+            rows=tuple(str(of[0].facts["curve"]) for of in rows.values()),
+            entrants=results.entrants,
+            hollow="from rest",
+            filled="from the last solution",
+        )
+    )
+
+
+def _largest_angle(record: Record) -> float:
+    return in_unit(metrics.spread(record.arrays["largest_angle"]).largest, "°")

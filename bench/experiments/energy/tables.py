@@ -3,26 +3,15 @@
 from collections.abc import Sequence
 from functools import partial
 
-from ...harness import metrics
 from ...harness.record import Record
 from ...presentation.results import label, settings
 from ...presentation.tables.columns import lengths_of_steps, text, titled
 from ...presentation.tables.layout import Layout
 from ...presentation.tables.table import Column, Summary, in_unit, words
-from . import figures
+from . import figures, readings
 from .problem import DAMPINGS, SIZE
 
 LISTED = (100, 1_000, 10_000)
-
-
-def _extent(record: Record) -> tuple[float, float]:
-    return metrics.extent(record.arrays["left"])
-
-
-def _left(record: Record, steps: int) -> float | None:
-    k = steps // record.settings["every"]
-    left = record.arrays["left"]
-    return float(left[k]) if k < left.size else None
 
 
 def _summary(records: Sequence[Record]) -> Summary:
@@ -37,7 +26,7 @@ def _summary(records: Sequence[Record]) -> Summary:
 
 
 def _range(record: Record) -> str:
-    shares = (float(record.arrays["left"][-1]), *_extent(record))
+    shares = float(record.arrays["left"][-1]), readings.least(record), readings.greatest(record)
     last, low, high = (words(in_unit(share, "%")) for share in shares)
     return f"{last}, never less than {low} nor more than {high}"
 
@@ -54,13 +43,13 @@ energy = Layout(
             Column(
                 f"left after {words(k)} steps",
                 "%",
-                read=partial(_left, steps=k),
+                read=partial(readings.left_after, steps=k),
                 group="left after",
             )
             for k in LISTED
         ),
-        Column("most ever", "%", read=lambda record: _extent(record)[1]),
-        Column("least ever", "%", read=lambda record: _extent(record)[0]),
+        Column("greatest", "%", read=readings.greatest),
+        Column("least", "%", read=readings.least),
     ),
     shows="Energy of motion, springs and gravity above that of the cloth at rest, in percent "
     "of the start. Without dampers all of it should stay. implicit, implicitfast, discrete "

@@ -17,7 +17,7 @@ from reference.implicit_euler.objective import Objective
 
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
-from .problem import STIFFNESSES, H, MidSwing, mid_swing
+from ..cloth.problem import FRAME, HEAVY_STIFFNESSES, ClothSwing, mid_swing
 
 SUITE = "newton"
 TOLERANCE = 1e-10
@@ -34,7 +34,7 @@ QUICK, FULL, _FULL = 10, 30, 2000
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield, for each stiffness, every solver's limit and ten local/global iterations."""
     size = FULL if scale.targets >= _FULL else QUICK
-    for stiffness in STIFFNESSES:
+    for stiffness in HEAVY_STIFFNESSES:
         for solver, known in registry.step_solvers().items():
             limit = known.certified
             yield _block(size, stiffness, solver, FROM_Y, limit)
@@ -44,7 +44,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def _block(size: int, stiffness: float, solver: str, start: str, limit: int) -> Block:
-    settings = {"h": H, "start": start, "iterations": limit, "tolerance": TOLERANCE}
+    settings = {"h": FRAME, "start": start, "iterations": limit, "tolerance": TOLERANCE}
     measure = partial(certified_step, size, stiffness, solver, start, limit)
     facts = {"stiffness": stiffness}
     return Block(SUITE, f"swing/k{stiffness:g}", solver, measure, settings, size, facts)
@@ -67,7 +67,7 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
             "iterations": iterations,
             "residual": known.residual,
             "at_floor": here.at_floor,
-            "balance": balance_residual(problem.system, problem.state, x, problem.h),
+            "balance": balance_residual(problem.system, problem.start, x, problem.h),
             "distance": known.distance,
             "curvature": known.curvature,
             "lipschitz": known.lipschitz,
@@ -93,26 +93,26 @@ class Converged(NamedTuple):
 
 
 @functools.cache
-def newtons_answer(problem: MidSwing) -> Converged:
+def newtons_answer(problem: ClothSwing) -> Converged:
     """Return what Newton's method comes to, iterated far beyond the rounding floor."""
     integrator = ImplicitEuler(problem.system, h=problem.h, tolerance=0.0, max_iterations=50)
-    x, objective = integrator.step(problem.state).state.positions, _objective(problem)
-    exact = exact_step(problem.system, problem.state, problem.h, x)
+    x, objective = integrator.step(problem.start).state.positions, _objective(problem)
+    exact = exact_step(problem.system, problem.start, problem.h, x)
     return Converged(x, exact, certify(objective, x), objective.value(x))
 
 
-def _objective(problem: MidSwing) -> Objective:
-    return Objective(problem.system, problem.state, problem.h)
+def _objective(problem: ClothSwing) -> Objective:
+    return Objective(problem.system, problem.start, problem.h)
 
 
-def _solved(problem: MidSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
+def _solved(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
     result = ImplicitEuler(
         problem.system, h=problem.h, solver=solver, tolerance=TOLERANCE, max_iterations=limit
-    ).step(problem.state)
+    ).step(problem.start)
     return result.state.positions, result.iterations
 
 
-def _solved_from_beside(problem: MidSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
+def _solved_from_beside(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
     """Return what the solver comes to, and after how many iterations, from beside the answer.
 
     Solvers start where the objective starts; the residual stays that of the step from y.

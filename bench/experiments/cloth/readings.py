@@ -1,0 +1,192 @@
+"""What the records of the lab's cloth say: how solvers converge, dampers, proofs."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from reference import Outcome
+
+from ...harness import metrics
+from ...harness.record import Record
+from ...presentation.results import Results, label
+from ...presentation.tables.columns import spread_of
+from ...presentation.tables.table import words
+from ..cloth_peers import DECADES, NEEDED
+from . import DAMPERS, FEW, ONE_STEP, SWING
+
+# Iterations after which errors are listed; consecutive steps make as many, but for the last.
+LISTED = (1, 10, 100, 1000)
+
+
+class FewIterations(NamedTuple):
+    """Consecutive steps of a few iterations each, begun at the states of the converged motion.
+
+    Attributes:
+        record: what was measured.
+        median_error: of a step.
+        largest_error: of a step.
+        drift: from the converged motion in the end, if all steps are taken so [m].
+        drift_share: the drift over the converged motion's path.
+    """
+
+    record: Record
+    median_error: float
+    largest_error: float
+    drift: float
+    drift_share: float
+
+
+class Convergence(NamedTuple):
+    """How a solver converges on a cloth: in one step, and in consecutive ones.
+
+    Attributes:
+        cloth: how the cloth is written.
+        solver: the solver's label.
+        one_step: iterations of one step of the lab's cloth.
+        counted: those of one step of the falling cloth, counted to each error.
+        few: consecutive steps of so many iterations each.
+        converged: consecutive steps that were converged.
+    """
+
+    cloth: str
+    solver: str
+    one_step: Record | None
+    counted: Record | None
+    few: Mapping[int, FewIterations]
+    converged: Record | None
+
+    def after(self, quantity: str, count: int) -> float | None:
+        """Return the error or residual of one step after so many iterations."""
+        values = self.one_step.arrays[quantity] if self.one_step else np.zeros(0)
+        return float(values[count]) if count < values.size else None
+
+    def needed(self, decade: str) -> int | None:
+        """Return the iterations of one step to an error of so much, None if none sufficed."""
+        if self.one_step:
+            return metrics.first_below(self.one_step.arrays["error"], float(decade))
+        counts = self.counted.arrays["needed"] if self.counted else np.full(len(DECADES), np.nan)
+        count = counts[DECADES.index(decade)]
+        return None if np.isnan(count) else int(count)
+
+    @property
+    def tried(self) -> int:
+        """The iterations that were made of one step."""
+        if self.one_step:
+            return int(self.one_step.arrays["error"].size) - 1
+        return int(self.counted.arrays["tried"]) if self.counted else 0
+
+    @property
+    def least(self) -> float | None:
+        """The least error of one step."""
+        if self.one_step:
+            return metrics.extent(self.one_step.arrays["error"])[0]
+        return float(self.counted.arrays["least"]) if self.counted else None
+
+    @property
+    def hits(self) -> metrics.Share | None:
+        """The share of consecutive steps that converged."""
+        if not self.converged:
+            return None
+        solved = [outcome for outcome in Outcome if outcome.solved]
+        return metrics.share(np.isin(self.converged.arrays["outcome"], solved))
+
+    @property
+    def iterations(self) -> Sequence[float | None]:
+        """Median, 95th percentile and largest of the iterations of converged steps."""
+        return spread_of(self.converged, "iterations") if self.converged else (None, None, None)
+
+    @property
+    def residuals(self) -> Sequence[float | None]:
+        """Median, 95th percentile and largest of the residuals of converged steps."""
+        return spread_of(self.converged, "residual") if self.converged else (None, None, None)
+
+    @property
+    def at_floor(self) -> int | None:
+        """Converged steps that ended at the rounding floor."""
+        return int(self.converged.arrays["at_floor"].sum()) if self.converged else None
+
+
+def convergence(results: Results) -> list[Convergence]:
+    """Return how every solver converges, cloth by cloth."""
+    rows: dict[tuple[str, str], Convergence] = {}
+    for task in (ONE_STEP, FEW, SWING, NEEDED):
+        for record in results.all("cloth", task=task):
+            place = _cloth(record), label(record.solver)
+            row = rows.get(place, Convergence(*place, None, None, {}, None))
+            rows[place] = _joined(row, task, record)
+    cloths = list(dict.fromkeys(cloth for cloth, _ in rows))
+    return sorted(rows.values(), key=lambda row: cloths.index(row.cloth))
+
+
+def _cloth(record: Record) -> str:
+    if record.facts["task"] != NEEDED:
+        return f"lab cloth, {record.title}"
+    size, stiffness = record.settings["size"], int(record.settings["stiffness"])
+    return f"falling cloth, {words(stiffness)} N/m, {size} × {size}"
+
+
+def _joined(row: Convergence, task: str, record: Record) -> Convergence:
+    if task == FEW:
+        return row._replace(few={**row.few, record.settings["iterations"]: _few(record)})
+    field = {ONE_STEP: "one_step", SWING: "converged", NEEDED: "counted"}[task]
+    changes: dict[str, Any] = {field: record}
+    return row._replace(**changes)
+
+
+def _few(record: Record) -> FewIterations:
+    errors = metrics.spread(record.arrays["error"])
+    drift, path = (float(record.arrays[name][-1]) for name in ("drift", "path"))
+    return FewIterations(record, errors.median, errors.largest, drift, metrics.ratio(drift, path))
+
+
+class DampedStep(NamedTuple):
+    """One step of a cloth with dampers.
+
+    Attributes:
+        record: what was measured.
+        h: the length of the step [s].
+        difference: of the two laws' forces at its end, relative.
+        order: observed from the step twice as long, None at the first.
+    """
+
+    record: Record
+    h: float
+    difference: float
+    order: float | None
+
+
+def damped_steps(results: Results) -> list[DampedStep]:
+    """Return the steps of every damped cloth, the longest first."""
+    steps = []
+    for record in results.all("cloth", task=DAMPERS):
+        h, apart = record.arrays["h"], record.arrays["apart"]
+        orders = [None, *np.log2(apart[:-1] / apart[1:]).tolist()]
+        steps += list(map(DampedStep, [record] * h.size, h.tolist(), apart.tolist(), orders))
+    return steps
+
+
+def minimiser_distance(record: Record) -> float | None:
+    """Return how near a minimiser is proven to be [m], None without a bound."""
+    distance = float(record.arrays["distance"])
+    return distance if np.isfinite(distance) else None
+
+
+def bound(record: Record) -> str:
+    """Return whether there is a bound, or why there is none."""
+    if record.arrays["covered"]:
+        return "yes"
+    return record.notes["coverage"].lower().replace("_", " ")
+
+
+def shares_minimiser(record: Record) -> str:
+    """Return whether the answer is proven to belong to Newton's minimiser."""
+    if record.arrays["same"]:
+        return "yes"
+    return "no" if record.arrays["different"] else "not proven"
+
+
+def is_solved(record: Record) -> bool:
+    """Return whether a step came to its tolerance or to the rounding floor."""
+    arrays = record.arrays
+    return bool(arrays["at_floor"]) or float(arrays["residual"]) <= record.settings["tolerance"]
