@@ -60,7 +60,7 @@ drawing: .venv/installed
 	$(BIN)/python docs/draw_lab.py
 
 messages: .venv/installed
-	$(BIN)/python -m crosscheck.conformance.catalogue
+	$(BIN)/python -m plumbob.crosscheck.verify.catalogue
 
 .venv/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and \

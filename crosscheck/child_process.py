@@ -26,7 +26,7 @@ _LEAVE = 1.0
 # where this file is, before any other that the path may lead to.
 _ROOT = Path(__file__).resolve().parents[1]
 _PATH = "import sys; sys.path.insert(0, sys.argv[1]); "
-_CALLS = "import crosscheck.child_process as c; c.perform_calls({})"
+_CALLS = "import plumbob.crosscheck.child_process as c; c.perform_calls({})"
 
 
 class LostError(Exception):

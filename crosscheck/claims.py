@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from reference import arguments
-from reference.inverse_kinematics import IK_SOLVERS
+from plumbob.reference import arguments
+from plumbob.reference.inverse_kinematics import IK_SOLVERS
 
 from . import kinematics
 from .engines import SKELETON_ENGINES

@@ -4,11 +4,11 @@ import functools
 
 import numpy as np
 
-from reference import rotation
-from reference.arguments import FloatArray
-from reference.inverse_kinematics import IK_SOLVERS, solve_ik
-from reference.kinematics import forward_kinematics, local_from_global
-from reference.skeleton import Pose, Skeleton
+from plumbob.reference import rotation
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.inverse_kinematics import IK_SOLVERS, solve_ik
+from plumbob.reference.kinematics import forward_kinematics, local_from_global
+from plumbob.reference.skeleton import Pose, Skeleton
 
 from . import samples
 from .engines import SKELETON_ENGINES, forward_kinematics_by

@@ -4,10 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference import arguments, rotation
-from reference.arguments import FloatArray
-from reference.mass_spring import MassSpring, State
-from reference.skeleton import Skeleton, checked_skeleton
+from plumbob.reference import arguments, rotation
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.mass_spring import MassSpring, State
+from plumbob.reference.skeleton import Skeleton, checked_skeleton
 
 MOST_JOINTS = 50
 LEAST_PARTICLES, MOST_PARTICLES = 5, 500

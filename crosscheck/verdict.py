@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import arguments
-from reference.arguments import FloatArray
+from plumbob.reference import arguments
+from plumbob.reference.arguments import FloatArray
 
 from .tolerances import Tolerance
 

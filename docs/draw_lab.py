@@ -10,11 +10,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from bench.experiments.pictures import ARM, figures, measurement
-from bench.harness.record import Record
-from bench.presentation.figures.sketch import drawn
-from bench.presentation.results import Results
-from reference import ImplicitEuler, scenes
+from plumbob.bench.experiments.pictures import ARM, figures, measurement
+from plumbob.bench.figures.sketch import drawn
+from plumbob.bench.harness.record import Record
+from plumbob.bench.harness.results import Results
+from plumbob.reference import ImplicitEuler, scenes
 
 DOCS = Path(__file__).parent
 H = 1 / 60

@@ -9,12 +9,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-from bench.harness.record import FILE_NAME, RecordFile
-from bench.presentation.headlines import Headline
-from bench.presentation.report import Written, write
-from bench.presentation.results import listed
-from bench.presentation.tables.provenance import provenance
-from bench.presentation.tables.table import words
+from plumbob.bench.harness.record import FILE_NAME, RecordFile
+from plumbob.bench.harness.results import listed
+from plumbob.bench.report.headlines import Headline
+from plumbob.bench.report.report import Written, write
+from plumbob.bench.tables.provenance import provenance
+from plumbob.bench.tables.table import words
 
 DOCS = Path(__file__).parent
 SAMPLE, README = DOCS / "sample", DOCS.parent / "README.md"

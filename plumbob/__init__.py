@@ -6,16 +6,17 @@ On a terminal a line on stderr says what is compiled, once it takes more than a 
 import sys
 from importlib.metadata import version
 
-from bench import entry_point
+from . import entry_point
 
 # `python -m plumbob` comes through here before it reaches the command line.
 if sys.argv[:1] == ["-m"] and sys.orig_argv[-len(sys.argv)] == "plumbob":
     entry_point.leave_at_interrupt()
 
-from bench import compile_notice
-from reference import *
-from reference import __all__ as _names
-from reference import formats, jacobians, mass_spring
+from plumbob.reference import *
+from plumbob.reference import __all__ as _names
+from plumbob.reference import formats, jacobians, mass_spring
+
+from . import compile_notice
 
 compile_notice.install()
 

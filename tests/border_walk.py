@@ -20,9 +20,9 @@ import numpy as np
 import scipy
 from public_calls import calls, robot, system, tree
 
-from reference import Articulation, MassSpring, Skeleton, State, StepJudgement
-from reference.implicit_euler.certificate import Certificate
-from reference.implicit_euler.objective import Iterate, Objective
+from plumbob.reference import Articulation, MassSpring, Skeleton, State, StepJudgement
+from plumbob.reference.implicit_euler.certificate import Certificate
+from plumbob.reference.implicit_euler.objective import Iterate, Objective
 
 PATIENCE = 600  # seconds until a call counts as endless; compiling is part of it
 MEMORY = 8 * 2**30  # bytes: what asks for more gets a MemoryError

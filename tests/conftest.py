@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from reference.backend import compiled
+from plumbob.reference.backend import compiled
 
 # What is printed must not depend on the terminal of whoever runs the tests.
 os.environ.pop("COLUMNS", None)

@@ -3,7 +3,7 @@
 from hypothesis import HealthCheck, example, settings
 from hypothesis import strategies as st
 
-from reference.articulation import KINDS
+from plumbob.reference.articulation import KINDS
 
 TREES = {
     "kinds": st.lists(st.sampled_from(KINDS), min_size=1, max_size=6),

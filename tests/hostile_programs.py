@@ -6,10 +6,10 @@ import time
 
 import numpy as np
 
-from crosscheck.conformance.case import Case
-from crosscheck.conformance.doors.line_process import Limits
-from crosscheck.conformance.doors.program import ProgramContestant
-from crosscheck.conformance.sentence import sentence
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.crosscheck.verify.solvers.line_process import Limits
+from plumbob.crosscheck.verify.solvers.program import ProgramContestant
 
 # The first request may wait for a busy machine; the others come when the program is warm.
 LIMITS = Limits(first=20.0, request=0.5, leave=0.4, memory=250 << 20, line=1 << 20, prints=100)

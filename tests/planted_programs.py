@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.conformance import templates
+from plumbob.crosscheck.verify import templates
 
 ROOM = Path(__file__).parent / "crosscheck" / "conformance" / "programs"
 TEMPLATES = Path(templates.__file__).parent

@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from crosscheck.conformance.case import Case
-from crosscheck.conformance.contestant import Answer, Asked
-from crosscheck.conformance.explain import Variant, difference, explain
-from crosscheck.conformance.judgement import (
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer, Asked
+from plumbob.crosscheck.verify.explain import Variant, difference, explain
+from plumbob.crosscheck.verify.judgement import (
     CaseJudgement,
     Diagnosis,
     Finding,
     TaskReport,
     Verdict,
 )
-from crosscheck.conformance.sentence import sentence
-from reference import Skeleton, forward_kinematics, rotation, scenes, solve_ik
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes, solve_ik
 
 TOLERANCE = 1e-12
 

@@ -48,8 +48,8 @@ def test_a_box_stands_above_what_it_imports(draw):
 
 
 def test_relative_imports_are_resolved(draw, tmp_path):
-    code = "from . import near\nfrom ..room import far\nimport reference.curve\n"
+    code = "from . import near\nfrom ..room import far\nimport plumbob.reference.curve\n"
     file = tmp_path / "module.py"
     file.write_text(code)
     found = draw.imports(file, "bench.package.module")
-    assert found == ("bench.package.near", "bench.room.far", "reference.curve")
+    assert found == ("bench.package.near", "bench.room.far", "plumbob.reference.curve")

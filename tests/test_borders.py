@@ -15,15 +15,15 @@ import numpy as np
 import public_calls
 import pytest
 
-from reference import arguments, curves, scenes, solve_ik
-from reference.arguments import array, integer, shown
+from plumbob.reference import arguments, curves, scenes, solve_ik
+from plumbob.reference.arguments import array, integer, shown
 
 PROGRAM = Path(border_walk.__file__)
 # What the walks have to be about, so that none of them shrinks unnoticed.
 FEWEST = {"arrays": 9_000, "bounds": 1_200, "magnitudes": 4_500, "objects": 40_000, "random": 600}
 # Arguments that are no number or array in any call, and why.
 WITHOUT_NUMBERS = {
-    "reference.implicit_euler.ImplicitEuler.certify: result": "of a StepResult in one call",
+    "plumbob.reference.implicit_euler.ImplicitEuler.certify: result": "of a StepResult in one call",
 }
 
 

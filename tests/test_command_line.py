@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import cli, terminal
-from bench.commands import bench, report
-from bench.harness.record import Record, RecordFile
-from bench.presentation.figures import sketch
-from crosscheck.claims import CLAIMS
-from crosscheck.verdict import Verdict
+from plumbob import cli, terminal
+from plumbob.bench.figures import sketch
+from plumbob.bench.harness.record import Record, RecordFile
+from plumbob.commands import bench, report
+from plumbob.crosscheck.claims import CLAIMS
+from plumbob.crosscheck.verdict import Verdict
 
 
 @pytest.fixture(autouse=True)
@@ -247,7 +247,7 @@ HOSTILE = ("[red]x", "[/]", ":smile:", "\x1b[2J", "\x00", "right\u202eleft", "$\
 
 
 def test_hostile_names_are_data_on_the_terminal(capsys, empty_folder):
-    from bench.harness import run
+    from plumbob.bench.harness import run
 
     records = [a_record(name) for name in HOSTILE]
     RecordFile("out").append(records)
@@ -279,7 +279,7 @@ def test_a_reader_that_leaves_ends_it_without_a_word(arguments, buffered):
     """Nor is it taken for a claim that is missed, which is 1."""
     read, write = os.pipe()
     os.close(read)
-    script = f"from bench.cli import main; main({arguments})"
+    script = f"from plumbob.cli import main; main({arguments})"
     both = arguments == READERS["complaint"]
     done = subprocess.run(
         [sys.executable, "-c", script], stdout=write, stderr=write if both else subprocess.PIPE,
@@ -327,7 +327,7 @@ def judged(missed):
 
 
 def test_a_missed_claim_exits_1_and_stands_in_the_table(capsys, monkeypatch):
-    monkeypatch.setattr("crosscheck.claims.run_claims", judged("they differ"))
+    monkeypatch.setattr("plumbob.crosscheck.claims.run_claims", judged("they differ"))
     code, out, _ = plumbob(capsys, "check", "spring forces")
     assert code == 1
     assert "MISSED: spring forces (they differ)" in out
@@ -335,7 +335,7 @@ def test_a_missed_claim_exits_1_and_stands_in_the_table(capsys, monkeypatch):
 
 
 def test_claims_that_hold_exit_0(capsys, monkeypatch):
-    monkeypatch.setattr("crosscheck.claims.run_claims", judged(""))
+    monkeypatch.setattr("plumbob.crosscheck.claims.run_claims", judged(""))
     code, out, _ = plumbob(capsys, "check")
     assert code == 0
     assert f"{len(CLAIMS)} of {len(CLAIMS)} claims held" in out
@@ -355,8 +355,8 @@ CHARACTER = "<mujoco><worldbody>{}</worldbody></mujoco>".format
 @pytest.fixture
 def robots(empty_folder, monkeypatch):
     """A folder of files, read without a process of their own."""
-    from crosscheck import child_process
-    from crosscheck.robots import files
+    from plumbob.crosscheck import child_process
+    from plumbob.crosscheck.robots import files
 
     monkeypatch.setattr(
         child_process.ChildProcess, "call", lambda self, function, *given: function(*given)
@@ -434,7 +434,7 @@ def test_version(capsys, main_job):
 
 def test_help_imports_no_engine_no_reference_and_no_matplotlib():
     script = (
-        "import sys, bench.cli; bench.cli.run_command(['--help']);"
+        "import sys, plumbob.cli; plumbob.cli.run_command(['--help']);"
         "print(sorted({name.partition('.')[0] for name in sys.modules}))"
     )
     done = subprocess.run(
@@ -474,9 +474,9 @@ def test_a_picture_of_a_scene_is_written_and_named(capsys, empty_folder):
 @pytest.mark.parametrize("coherent", [False, True])
 def test_a_motion_is_written_for_animation_programs(capsys, empty_folder, coherent):
     """Six decimals leave joint n of the arm off by (n + 1) 9e-7 + n 2.6 m 2.7e-8 at the most."""
-    from bench.experiments.arm.problem import MAX_SPACING, MIN_SPACING
-    from reference import curves, resample, scenes, track
-    from reference.formats import bvh
+    from plumbob.bench.experiments.arm.problem import MAX_SPACING, MIN_SPACING
+    from plumbob.reference import curves, resample, scenes, track
+    from plumbob.reference.formats import bvh
 
     options = ["--coherent"] if coherent else []
     code, out, err = plumbob(capsys, "show", "heart", "-o", "heart.bvh", *options)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import plumbob
-import reference
+from plumbob import reference
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))

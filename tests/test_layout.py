@@ -95,10 +95,14 @@ RULES = [
 
 SLIPS = [
     (arrows_against_the_direction, "reference/a.py", "import crosscheck"),
-    (arrows_against_the_direction, "reference/a.py", "from crosscheck.verdict import judge"),
+    (
+        arrows_against_the_direction,
+        "reference/a.py",
+        "from plumbob.crosscheck.verdict import judge",
+    ),
     (arrows_against_the_direction, "reference/formats/a.py", "from bench import cli"),
     (arrows_against_the_direction, "crosscheck/a.py", "def f():\n    import bench.run"),
-    (arrows_against_the_direction, "crosscheck/a.py", "import_module('bench.harness.run')"),
+    (arrows_against_the_direction, "crosscheck/a.py", "import_module('plumbob.bench.harness.run')"),
     (arrows_against_the_direction, "bench/a.py", "from tests import conftest"),
     (arrows_against_the_direction, "bench/a.py", "from plumbob import solve_ik"),
     (arrows_against_the_direction, "reference/a.py", "import plumbob"),
@@ -126,8 +130,8 @@ FINE = [
     ("reference/a.py", "import math\nimport numpy as np\nfrom .compiled import Kernel"),
     ("reference/formats/a.py", "from pathlib import Path\nopen(Path('a'))"),
     ("crosscheck/a.py", "import mujoco\nfrom reference import Skeleton\nfrom . import samples"),
-    ("plumbob/__init__.py", "from reference import *\nfrom bench.cli import main"),
-    ("bench/a.py", "import time\nfrom crosscheck.verdict import judge\nprint(time.time())"),
+    ("plumbob/__init__.py", "from reference import *\nfrom plumbob.cli import main"),
+    ("bench/a.py", "import time\nfrom plumbob.crosscheck.verdict import judge\nprint(time.time())"),
 ]
 
 

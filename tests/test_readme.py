@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.verify import json_file
-from crosscheck.conformance import catalogue
-from crosscheck.conformance.language import translator
-from reference import Skeleton, forward_kinematics, rotation
+from plumbob.crosscheck.verify import catalogue
+from plumbob.crosscheck.verify.language import translator
+from plumbob.crosscheck.verify.output import json_file
+from plumbob.reference import Skeleton, forward_kinematics, rotation
 
 README = Path(__file__).parents[1] / "README.md"
 CHINESE = README.with_name("README.zh-CN.md")

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.arguments import distinct_texts
+from plumbob.reference.arguments import distinct_texts
 
 from ..harness.metrics import chance_of_pairs
-from ..presentation.tables.table import words
+from ..tables.table import words
 from .quantities import SOLVED, ended_by_clock, is_answer, is_cut_by_clock, same_bits, worse_sign
 from .rows import Pair, Row, RowKey, Verdict
 

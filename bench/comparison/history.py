@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..harness.record import Record, RecordFile
-from ..presentation.results import plain
-from ..presentation.tables.columns import text
-from ..presentation.tables.table import Column, Table, cells
+from ..harness.results import plain
+from ..tables.columns import text
+from ..tables.table import Column, Table, cells
 from ..text import visible
 from .rows import Row, RowKey, Verdict, by_row, distinguishing
 
@@ -136,9 +136,9 @@ def table(runs: Sequence[Run], courses: Sequence[Course], quantity: str) -> Tabl
 
 def draw(runs: Sequence[Run], made: Sequence[Course], quantity: str) -> str:
     """Return the courses as SVG: those that changed most in colour, the others grey."""
-    from ..presentation.figures.chart import LOOKS
-    from ..presentation.figures.drawing import canvas, styled, svg_of
-    from ..presentation.figures.style import COLOURS, written
+    from ..figures.chart import LOOKS
+    from ..figures.drawing import canvas, styled, svg_of
+    from ..figures.style import COLOURS, written
 
     with styled():
         figure, (ax,) = canvas(4.2, 1)

@@ -5,8 +5,8 @@ from collections import Counter
 from collections.abc import Sequence
 from textwrap import wrap
 
-from ..presentation.tables.columns import text
-from ..presentation.tables.table import Summary, Table, cells
+from ..tables.columns import text
+from ..tables.table import Summary, Table, cells
 from ..text import visible
 from .compare import Comparison
 from .rows import ORDER, Row, Verdict, distinguishing

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.child_process import kill_group, one_thread
+from plumbob.crosscheck.child_process import kill_group, one_thread
 
 from ..harness.metrics import adjusted
 from ..harness.record import Record, decode

@@ -18,8 +18,8 @@ def main(folder: str, scale: str, *suites: str) -> None:
     threading.Thread(target=end_with_parent, daemon=True).start()
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what an engine prints is no answer
-    from bench import experiments
-    from bench.harness import record, run
+    from .. import experiments
+    from ..harness import record, run
 
     if not Path(run.__file__).is_relative_to(folder):
         sys.exit(f"expected the bench of {folder}, got {run.__file__}")

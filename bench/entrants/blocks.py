@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from reference import scenes
+from plumbob.reference import scenes
 
 from ..experiments import chain, published
 from ..experiments.chain.measurement import (
@@ -246,7 +246,7 @@ def as_cloth_peer(entrant: Entrant) -> EnteredCloth:
     return EnteredCloth(
         title=entrant.name,
         engine=entrant.name,
-        module="bench.entrants.cloth",
+        module="plumbob.bench.entrants.cloth",
         package=version,
         kind=kind if entrant.step else UNDECLARED,
         settings={"spec": entrant.spec},

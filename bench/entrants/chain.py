@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import Skeleton, forward_kinematics
-from reference.arguments import FloatArray
+from plumbob.reference import Skeleton, forward_kinematics
+from plumbob.reference.arguments import FloatArray
 
 from ..experiments.chain.measurement import Limits
 from ..harness import metrics

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference import Skeleton, forward_kinematics
-from reference.arguments import FloatArray, IndexArray
+from plumbob.reference import Skeleton, forward_kinematics
+from plumbob.reference.arguments import FloatArray, IndexArray
 
 from ..harness.stopwatch import Budget, round_trips, timed
 from ..harness.worker import Done, Message, NoAnswerError, Ready, Solved, Unfit, describe

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.greeting import Greeting
-from reference import MassSpring, State
-from reference.arguments import FloatArray
+from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.reference import MassSpring, State
+from plumbob.reference.arguments import FloatArray
 
 from ..peers.cloth.protocol import Mover
 from .contestants import Asked, asked, remark

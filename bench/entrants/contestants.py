@@ -3,18 +3,18 @@
 from collections.abc import Mapping
 from typing import Any
 
-from crosscheck.conformance.case import Case
-from crosscheck.conformance.contestant import Answer, Contestant, Failure
-from crosscheck.conformance.doors import Limits, open_contestant
-from crosscheck.conformance.message import NO_SECONDS
-from crosscheck.conformance.sentence import sentence
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer, Contestant, Failure
+from plumbob.crosscheck.verify.message import NO_SECONDS
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.crosscheck.verify.solvers import Limits, open_contestant
 
 from ..harness.progress import TROUBLE, announce
 from ..harness.stopwatch import behind_door
 from ..harness.worker import NoAnswerError
 from .entrant import Spec
 
-# The bench itself loses patience with a silent worker sooner: see `bench.harness.isolation`.
+# The bench itself loses patience with a silent worker sooner: see `plumbob.bench.harness.isolation`.
 LIMITS = Limits(first=900.0, request=900.0, line=1 << 26)
 _ABOUT = sentence("")
 

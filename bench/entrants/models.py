@@ -5,9 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from reference import Articulation, MassSpring, Skeleton, State, forward_kinematics, rotation
-from reference.arguments import FloatArray, IndexArray, name_list
-from reference.formats import bvh, mjcf, read_obj, urdf
+from plumbob.reference import (
+    Articulation,
+    MassSpring,
+    Skeleton,
+    State,
+    forward_kinematics,
+    rotation,
+)
+from plumbob.reference.arguments import FloatArray, IndexArray, name_list
+from plumbob.reference.formats import bvh, mjcf, read_obj, urdf
 
 from ..experiments.chain.problem import TargetsForSkeleton, random_rotations
 from ..experiments.robots.problem import TWO_REVOLUTIONS, Robot, chain_from

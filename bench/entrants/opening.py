@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from crosscheck.conformance.contestant import NoGreetingError
-from crosscheck.conformance.doors import LIMITS, open_contestant
-from crosscheck.conformance.greeting import Greeting
-from crosscheck.conformance.message import shown
+from plumbob.crosscheck.verify.contestant import NoGreetingError
+from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.crosscheck.verify.message import shown
+from plumbob.crosscheck.verify.solvers import LIMITS, open_contestant
 
 from ..peers import registry
 from ..text import visible

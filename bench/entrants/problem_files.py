@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from reference import MassSpring, Skeleton, State
-from reference.formats.source import read_bytes, read_text
+from plumbob.reference import MassSpring, Skeleton, State
+from plumbob.reference.formats.source import read_bytes, read_text
 
 from ..experiments.chain.problem import TargetsForSkeleton
 from ..experiments.robots.problem import ALL

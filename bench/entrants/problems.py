@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from reference import MassSpring, State
+from plumbob.reference import MassSpring, State
 
 from ..experiments.chain.problem import TargetsForSkeleton
 from ..experiments.robots.problem import Robot

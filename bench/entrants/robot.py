@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.kinematics import robot_models
-from reference import rotation
-from reference.arguments import FloatArray
+from plumbob.crosscheck.verify.kinematics import robot_models
+from plumbob.reference import rotation
+from plumbob.reference.arguments import FloatArray
 
 from ..experiments.robots.evaluate import Tolerance
 from ..experiments.robots.problem import Robot, links

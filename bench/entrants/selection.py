@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from reference.arguments import name_list
+from plumbob.reference.arguments import name_list
 
 from ..experiments import SCALES, blocks
 from ..experiments.published import TOOLBOX, TRAC_IK

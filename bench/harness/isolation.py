@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from crosscheck.child_process import PipedProcess, one_thread
+from plumbob.crosscheck.child_process import PipedProcess, one_thread
 
 from .progress import Progress, announce
 from .worker import LAST, Begun, Calculation, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
@@ -14,7 +14,7 @@ from .worker import LAST, Begun, Calculation, Done, Found, Lost, Message, Ready,
 # A worker that says nothing for so long [s] is ended: before it is ready it may compile.
 START_PATIENCE = 180.0
 TARGET_PATIENCE = 10.0
-_START = "import bench.harness.worker as w; w.main({})"
+_START = "import plumbob.bench.harness.worker as w; w.main({})"
 
 
 class Outcome(NamedTuple):

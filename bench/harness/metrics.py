@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtr, stdtrit
 
-from reference import rotation
+from plumbob.reference import rotation
 
 Floats = NDArray[np.float64]
 

@@ -95,7 +95,7 @@ class Record:
         size: how much was measured, such as the number of random targets.
         arrays: what came out, each an array of numbers with one entry a target, frame or step.
         notes: words that belong to it; "failed" says why there are no arrays.
-        stamp: machine, versions and digest of the sources, see `bench.harness.machine`.
+        stamp: machine, versions and digest of the sources, see `plumbob.bench.harness.machine`.
         when: the moment it was produced, ISO 8601 with time zone.
         seconds: how long it took to produce.
         facts: what tables select and sort by: numbers, words, truth values and lists of words.

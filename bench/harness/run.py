@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference.arguments import distinct_texts
+from plumbob.reference.arguments import distinct_texts
 
 from ..experiments import SCALES, Block, blocks
 from .choice import Choice

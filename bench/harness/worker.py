@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from crosscheck.child_process import attach
+from plumbob.crosscheck.child_process import attach
 
 from .progress import Progress, listening
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from reference import IK_SOLVERS, STEP_SOLVERS
+from plumbob.reference import IK_SOLVERS, STEP_SOLVERS
 
 from . import environments
 
@@ -212,7 +212,7 @@ _SIX = "poses of six hinges or fewer, analytically; timed without the choice of 
 
 
 def _peer(title: str, adapter: str, package: str, license: str, can: str, *entries: Entry) -> Peer:
-    return Peer(title, f"bench.peers.ik.{adapter}", package, license, can, entries)
+    return Peer(title, f"plumbob.bench.peers.ik.{adapter}", package, license, can, entries)
 
 
 OURS = _peer(
@@ -322,7 +322,7 @@ def _of_ours(solver: StepSolver) -> ClothPeer:
     return ClothPeer(
         f"Plumbob {solver.label}",
         PLUMBOB,
-        "bench.peers.cloth.step_solvers",
+        "plumbob.bench.peers.cloth.step_solvers",
         "plumbob",
         LINEARISED if solver.is_linear else ITERATED,
         settings,
@@ -331,13 +331,13 @@ def _of_ours(solver: StepSolver) -> ClothPeer:
 
 
 def _explicit(title: str, integrator: str) -> ClothPeer:
-    adapter, settings = "bench.peers.cloth.explicit", {"integrator": integrator}
+    adapter, settings = "plumbob.bench.peers.cloth.explicit", {"integrator": integrator}
     return ClothPeer(f"Plumbob {title}", PLUMBOB, adapter, "plumbob", EXPLICIT, settings)
 
 
 def _mujoco(title: str, kind: str, **settings: Any) -> ClothPeer:
     """Return one of MuJoCo's integrators, with springs as tendons."""
-    adapter = "bench.peers.cloth.mujoco_tendons"
+    adapter = "plumbob.bench.peers.cloth.mujoco_tendons"
     return ClothPeer(f"MuJoCo {title}", MUJOCO, adapter, "mujoco", kind, settings)
 
 
@@ -348,7 +348,7 @@ def _newton(
     return ClothPeer(
         f"Newton engine, {title}",
         NEWTON,
-        f"bench.peers.cloth.newton_{adapter}",
+        f"plumbob.bench.peers.cloth.newton_{adapter}",
         "newton",
         kind,
         settings,
@@ -362,7 +362,9 @@ CLOTH_ENGINES = (
     _explicit("Runge-Kutta", "runge_kutta"),
     _mujoco("Euler", EXPLICIT, integrator="Euler"),
     _mujoco("implicitfast", EXPLICIT, integrator="implicitfast"),
-    ClothPeer("MuJoCo flex, Euler", MUJOCO, "bench.peers.cloth.mujoco_flex", "mujoco", EXPLICIT),
+    ClothPeer(
+        "MuJoCo flex, Euler", MUJOCO, "plumbob.bench.peers.cloth.mujoco_flex", "mujoco", EXPLICIT
+    ),
     _mujoco("discrete", LINEARISED, integrator="discrete"),
     _mujoco(
         "discrete, to the end", LINEARISED, integrator="discrete", iterations=5000, tolerance=1e-15
@@ -376,7 +378,7 @@ CLOTH_ENGINES = (
         *(
             "PyBullet deformable, Euler",
             BULLET,
-            "bench.peers.cloth.pybullet_deformable",
+            "plumbob.bench.peers.cloth.pybullet_deformable",
             "pybullet",
         ),
         EXPLICIT,

@@ -15,11 +15,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from ..presentation.figures.drawing import STYLE
-from ..presentation.figures.scene_drawing import COLOUR_MAP, draw_arm, draw_cloth
-from ..presentation.figures.style import COLOURS, written
-from ..presentation.figures.view import seen
-from ..presentation.motion.motion import Moving, Scene, decades, length
+from ..figures.drawing import STYLE
+from ..figures.scene_drawing import COLOUR_MAP, draw_arm, draw_cloth
+from ..figures.style import COLOURS, written
+from ..figures.view import seen
+from ..motion.motion import Moving, Scene, decades, length
 
 # A picture shows so many moments beside each other.
 MOMENTS = 4

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import (
+from plumbob.reference import (
     IKSolution,
     ImplicitEuler,
     MassSpring,
@@ -16,12 +16,12 @@ from reference import (
     scenes,
     track,
 )
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ..experiments.arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING
-from ..presentation.figures.view import ARM_VIEW, CLOTH_VIEW
-from ..presentation.motion.motion import Moving, Scene
-from ..presentation.results import label
+from ..figures.view import ARM_VIEW, CLOTH_VIEW
+from ..harness.results import label
+from ..motion.motion import Moving, Scene
 
 ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *curves)

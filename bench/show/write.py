@@ -4,13 +4,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from reference import IK_SOLVERS, STEP_SOLVERS, scenes
-from reference.arguments import choice
-from reference.formats import bvh
+from plumbob.reference import IK_SOLVERS, STEP_SOLVERS, scenes
+from plumbob.reference.arguments import choice
+from plumbob.reference.formats import bvh
 
-from ..presentation.motion import motion
-from ..presentation.motion.motion import Scene
-from ..presentation.results import label
+from ..harness.results import label
+from ..motion import motion
+from ..motion.motion import Scene
 from .ours import CLOTH, EXACT, SCENES, SECONDS, arm_scene, cloth_scene, drawn, fallen
 from .yours import ARM_TASKS, CLOTH_TASKS, Yours
 

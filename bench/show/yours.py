@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.case import Case
-from crosscheck.conformance.contestant import Contestant, Failure, NoGreetingError
-from crosscheck.conformance.doors import open_contestant
-from crosscheck.conformance.message import shown
-from crosscheck.conformance.sentence import sentence
-from reference import Skeleton, forward_kinematics
-from reference.arguments import FloatArray
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Contestant, Failure, NoGreetingError
+from plumbob.crosscheck.verify.message import shown
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.crosscheck.verify.solvers import open_contestant
+from plumbob.reference import Skeleton, forward_kinematics
+from plumbob.reference.arguments import FloatArray
 
 from .ours import ARM, CLOTH, Drawn, Fallen, H
 

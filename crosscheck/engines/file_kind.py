@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-from reference.formats.source import read_bytes
+from plumbob.reference.formats.source import read_bytes
 
 URDF, MJCF, BVH = "URDF", "MJCF", "BVH"
 # The content of an <include> in other files, not a model by itself.

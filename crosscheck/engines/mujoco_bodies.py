@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 
 def add_point_mass(

@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
-from reference.arguments import FloatArray
-from reference.mass_spring import MassSpring
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.mass_spring import MassSpring
 
 from .mujoco_mass_spring import MujocoMassSpring, particle_name, particles_spec
 

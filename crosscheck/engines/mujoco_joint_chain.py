@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reference.arguments import FloatArray, choice
-from reference.mass_spring import MassSpring, State
+from plumbob.reference.arguments import FloatArray, choice
+from plumbob.reference.mass_spring import MassSpring, State
 
 from .mujoco_bodies import add_point_mass
 

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from .file_kind import URDF, file_kind, xml_root
 from .robot_engine import LinkPoses, UnreadableError, select_columns

@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
-from reference.arguments import FloatArray
-from reference.skeleton import Pose, Skeleton
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.skeleton import Pose, Skeleton
 
 from .mujoco_bodies import add_point_mass
 

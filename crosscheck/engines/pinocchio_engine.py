@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio
 
-from reference.arguments import FloatArray
-from reference.skeleton import Pose, Skeleton
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.skeleton import Pose, Skeleton
 
 # Indices of w, x, y, z in Pinocchio's quaternions (x, y, z, w).
 XYZW = np.array([3, 0, 1, 2])

@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio
 
-from reference import rotation
-from reference.arguments import FloatArray
+from plumbob.reference import rotation
+from plumbob.reference.arguments import FloatArray
 
 from .file_kind import URDF, file_kind, xml_root
 from .robot_engine import LinkPoses, UnreadableError, select_columns

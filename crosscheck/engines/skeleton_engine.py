@@ -5,8 +5,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reference.arguments import FloatArray
-from reference.skeleton import Pose, Skeleton
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.skeleton import Pose, Skeleton
 
 
 class SkeletonEngine(Protocol):

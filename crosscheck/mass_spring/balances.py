@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reference.arguments import FloatArray
-from reference.implicit_euler import ImplicitEuler
-from reference.mass_spring import MassSpring, State
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.mass_spring import MassSpring, State
 
 from .. import samples
 from ..engines import MujocoMassSpring

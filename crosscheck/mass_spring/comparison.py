@@ -4,8 +4,8 @@ import functools
 
 import numpy as np
 
-from reference.arguments import FloatArray
-from reference.mass_spring import State
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.mass_spring import State
 
 from .. import samples
 from ..engines import MujocoFlex, MujocoMassSpring

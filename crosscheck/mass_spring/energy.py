@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference.arguments import FloatArray, integer
-from reference.mass_spring import MassSpring, State, kinetic_energy, potential_energy
+from plumbob.reference.arguments import FloatArray, integer
+from plumbob.reference.mass_spring import MassSpring, State, kinetic_energy, potential_energy
 
 from .integrators import Simulation
 

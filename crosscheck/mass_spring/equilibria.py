@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import scenes
-from reference.arguments import FloatArray
-from reference.explicit import symplectic_euler
-from reference.implicit_euler import ImplicitEuler
-from reference.mass_spring import MassSpring, State
+from plumbob.reference import scenes
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.explicit import symplectic_euler
+from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.mass_spring import MassSpring, State
 
 from .. import samples
 from ..engines import MujocoMassSpring

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from reference.arguments import FloatArray
-from reference.implicit_euler.objective import Objective
-from reference.mass_spring import MassSpring, State
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.implicit_euler.objective import Objective
+from plumbob.reference.mass_spring import MassSpring, State
 
 DIGITS, REFINEMENTS = 40, 20
 # Refinement ends with a correction that is smaller than this, over the norm of the positions.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from reference.mass_spring import (
+from plumbob.reference.mass_spring import (
     State,
     damper_forces,
     kinetic_energy,

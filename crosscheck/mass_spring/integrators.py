@@ -5,9 +5,9 @@ from functools import partial
 
 from numpy.typing import ArrayLike
 
-from reference.explicit import runge_kutta, symplectic_euler
-from reference.implicit_euler import ImplicitEuler
-from reference.mass_spring import MassSpring, State
+from plumbob.reference.explicit import runge_kutta, symplectic_euler
+from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.mass_spring import MassSpring, State
 
 from .. import samples
 from ..engines import MujocoMassSpring

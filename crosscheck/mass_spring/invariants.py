@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reference.arguments import FloatArray
-from reference.mass_spring import MassSpring, State
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.mass_spring import MassSpring, State
 
 from .. import samples
 from ..verdict import Comparison

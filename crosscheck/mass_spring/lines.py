@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from reference.implicit_euler import ImplicitEuler
+from plumbob.reference.implicit_euler import ImplicitEuler
 
 from .. import samples
 from ..engines.mujoco_joint_chain import JOINTS, MujocoJointChain

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reference.arguments import FloatArray
-from reference.explicit import runge_kutta, symplectic_euler
-from reference.implicit_euler import ImplicitEuler
-from reference.mass_spring import MassSpring, State, damping_matrix
-from reference.mass_spring import forces as all_forces
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.explicit import runge_kutta, symplectic_euler
+from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.mass_spring import MassSpring, State, damping_matrix
+from plumbob.reference.mass_spring import forces as all_forces
 
 from .. import samples
 from ..verdict import Comparison

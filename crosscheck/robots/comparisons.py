@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ..engines.robot_engine import UnreadableError
 from ..verdict import Comparison

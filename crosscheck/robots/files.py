@@ -10,9 +10,9 @@ from xml.etree.ElementTree import Element, ElementTree
 
 import numpy as np
 
-from reference import Articulation, Skeleton, forward_kinematics, jacobians, rotation
-from reference.formats import bvh
-from reference.formats.source import read_text
+from plumbob.reference import Articulation, Skeleton, forward_kinematics, jacobians, rotation
+from plumbob.reference.formats import bvh
+from plumbob.reference.formats.source import read_text
 
 from ..child_process import ChildProcess, LostError
 from ..engines import ROBOT_ENGINES

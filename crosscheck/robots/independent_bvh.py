@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 MOTION = re.compile(r"^[ \t]*MOTION[ \t]*$", re.IGNORECASE | re.MULTILINE)
 FRAMES = re.compile(r"Frames:\s*(\d+)\s*Frame Time:\s*\S+", re.IGNORECASE)

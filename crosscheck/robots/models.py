@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from reference.arguments import FloatArray
-from reference.articulation import Articulation
-from reference.formats import mjcf, urdf
-from reference.formats.robot import Robot
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.articulation import Articulation
+from plumbob.reference.formats import mjcf, urdf
+from plumbob.reference.formats.robot import Robot
 
 from ..engines.file_kind import URDF, file_kind
 from .deviations import CLASS_ANCHOR, OUTER_ROOT, ROTATED_ROOT

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference import jacobians, rotation
-from reference.arguments import FloatArray
-from reference.formats.robot import Robot
-from reference.kinematics import forward_kinematics
+from plumbob.reference import jacobians, rotation
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.formats.robot import Robot
+from plumbob.reference.kinematics import forward_kinematics
 
 from .. import samples
 from ..engines import ROBOT_ENGINES

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.experiments import SUITES
-from bench.harness.record import FINISHED, Record
+from plumbob.bench.experiments import SUITES
+from plumbob.bench.harness.record import FINISHED, Record
 
 STAMP = {
     "machine": {"processor": "a <b>slide</b> rule", "cores": 1, "memory_gib": 0.5, "system": "x"},

@@ -5,16 +5,16 @@ import re
 import numpy as np
 import pytest
 
-from bench.comparison.answers import compare_answers
-from bench.comparison.rows import Pair, row_key
-from bench.experiments.check import tables as check
-from bench.verify import comparison
-from crosscheck.conformance.case import Case
-from crosscheck.conformance.kinematics import inverse_kinematics, laws, resample
-from crosscheck.conformance.kinematics.polylines import Line
-from reference import Skeleton, arguments
-from reference.articulation import Articulation
-from reference.formats import mjcf, urdf
+from plumbob.bench.comparison.answers import compare_answers
+from plumbob.bench.comparison.rows import Pair, row_key
+from plumbob.bench.experiments.check import tables as check
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.kinematics import inverse_kinematics, laws, resample
+from plumbob.crosscheck.verify.kinematics.polylines import Line
+from plumbob.crosscheck.verify.output import comparison
+from plumbob.reference import Skeleton, arguments
+from plumbob.reference.articulation import Articulation
+from plumbob.reference.formats import mjcf, urdf
 
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 CLOSE = 1.0 + 1e-9

@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 
-from bench.experiments import Scale
-from bench.experiments.cloth_peers import measurement as peers_cloth
-from bench.experiments.cloth_peers import tables
-from bench.experiments.cloth_peers.job import ClothJob, Shape
-from bench.experiments.cloth_peers.problem import (
+from plumbob.bench.experiments import Scale
+from plumbob.bench.experiments.cloth_peers import measurement as peers_cloth
+from plumbob.bench.experiments.cloth_peers import tables
+from plumbob.bench.experiments.cloth_peers.job import ClothJob, Shape
+from plumbob.bench.experiments.cloth_peers.problem import (
     FRAME,
     MASS,
     FallingCloth,
@@ -21,19 +21,19 @@ from bench.experiments.cloth_peers.problem import (
     highest_mode,
     level_cloth,
 )
-from bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, true_motion
-from bench.harness import metrics
-from bench.harness.isolation import Outcome, WorkerProcess
-from bench.harness.worker import Done, Ready, Solved, Unfit
-from bench.peers import registry
-from bench.peers.cloth.ladder import Rung, motion_rungs, step_rungs
-from bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
-from bench.presentation.figures.sketch import drawn
-from bench.presentation.report import all_figures
-from bench.presentation.results import Results
-from bench.presentation.tables.table import best_cells
-from reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
-from reference.mass_spring import stiffness_matrix
+from plumbob.bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, true_motion
+from plumbob.bench.figures.sketch import drawn
+from plumbob.bench.harness import metrics
+from plumbob.bench.harness.isolation import Outcome, WorkerProcess
+from plumbob.bench.harness.results import Results
+from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
+from plumbob.bench.peers import registry
+from plumbob.bench.peers.cloth.ladder import Rung, motion_rungs, step_rungs
+from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
+from plumbob.bench.report.report import all_figures
+from plumbob.bench.tables.table import best_cells
+from plumbob.reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
+from plumbob.reference.mass_spring import stiffness_matrix
 
 SIZE, STIFFNESS = 5, 100.0
 # Single precision rounds positions of two metres to 1e-7, over and over.
@@ -139,7 +139,7 @@ def test_converged_implicit_euler_is_the_same_by_another_solver(cloth):
 
 
 def test_newton_that_does_not_converge_is_no_answer(cloth, monkeypatch):
-    monkeypatch.setattr("bench.experiments.cloth_peers.truth.MOST_ITERATIONS", 1)
+    monkeypatch.setattr("plumbob.bench.experiments.cloth_peers.truth.MOST_ITERATIONS", 1)
     with pytest.raises(ArithmeticError, match="frame 0 as ITERATION_LIMIT"):
         implicit_motion(cloth, 1)
 
@@ -258,7 +258,9 @@ def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
 
 
 def test_colours_are_proper_and_few(cloth):
-    newton_model = pytest.importorskip("bench.peers.cloth.newton_model", exc_type=ImportError)
+    newton_model = pytest.importorskip(
+        "plumbob.bench.peers.cloth.newton_model", exc_type=ImportError
+    )
     groups = newton_model.colours(cloth.system.springs, cloth.system.particle_count)
     colour = np.full(cloth.system.particle_count, -1)
     for number, group in enumerate(groups):
@@ -270,14 +272,18 @@ def test_colours_are_proper_and_few(cloth):
 
 
 def test_by_itself_newton_gives_springs_one_colour(cloth):
-    newton_model = pytest.importorskip("bench.peers.cloth.newton_model", exc_type=ImportError)
+    newton_model = pytest.importorskip(
+        "plumbob.bench.peers.cloth.newton_model", exc_type=ImportError
+    )
     model = newton_model.model(cloth.system, own_colours=True)
     assert len(model.particle_color_groups) == 1
 
 
 @pytest.mark.parametrize("size", [3, 6])
 def test_bullets_mesh_has_the_springs_for_edges_and_no_corners_in_line(size):
-    bullet = pytest.importorskip("bench.peers.cloth.pybullet_deformable", exc_type=ImportError)
+    bullet = pytest.importorskip(
+        "plumbob.bench.peers.cloth.pybullet_deformable", exc_type=ImportError
+    )
     system, _ = level_cloth(size, STIFFNESS)
     flat, triangles = bullet.mesh(system)
     ends = np.diff(flat[system.springs], axis=1)[:, 0]
@@ -288,7 +294,9 @@ def test_bullets_mesh_has_the_springs_for_edges_and_no_corners_in_line(size):
 
 @pytest.mark.parametrize("change", ["masses", "stiffnesses", "rest_lengths", "dampings"])
 def test_bullet_refuses_what_it_cannot_move(change):
-    bullet = pytest.importorskip("bench.peers.cloth.pybullet_deformable", exc_type=ImportError)
+    bullet = pytest.importorskip(
+        "plumbob.bench.peers.cloth.pybullet_deformable", exc_type=ImportError
+    )
     system, _ = level_cloth(4, STIFFNESS)
     values = getattr(system, change).copy()
     values[-1] += 0.1
@@ -300,7 +308,9 @@ def test_bullet_refuses_what_it_cannot_move(change):
 
 def test_bullet_goes_where_symplectic_euler_goes_whatever_was_before(cloth):
     """A cloth whose spacing is no binary fraction; before, it was thrown until it blew up."""
-    bullet = pytest.importorskip("bench.peers.cloth.pybullet_deformable", exc_type=ImportError)
+    bullet = pytest.importorskip(
+        "plumbob.bench.peers.cloth.pybullet_deformable", exc_type=ImportError
+    )
     system, level = level_cloth(6, STIFFNESS)
     thrown = State(level.positions, 50.0 * np.ones_like(level.positions))
     mover = bullet.prepare(system, 3.0)

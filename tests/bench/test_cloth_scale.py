@@ -7,12 +7,12 @@ import subprocess
 import numpy as np
 import pytest
 
-from bench.experiments import SCALES, blocks
-from bench.experiments.cloth_scale import measurement as suite
-from bench.experiments.cloth_scale import tables as cloth_scale
-from bench.harness.progress import listening
-from bench.presentation.results import Results
-from reference.implicit_euler.objective import Objective
+from plumbob.bench.experiments import SCALES, blocks
+from plumbob.bench.experiments.cloth_scale import measurement as suite
+from plumbob.bench.experiments.cloth_scale import tables as cloth_scale
+from plumbob.bench.harness.progress import listening
+from plumbob.bench.harness.results import Results
+from plumbob.reference.implicit_euler.objective import Objective
 
 SMALL = min(suite.SIZES)
 SETTINGS = {"particles": 10_000, "h": 1 / 60, "stiffness": 1e4, "iterations": 10}

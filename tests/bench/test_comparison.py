@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench import cli
-from bench.comparison import compare as comparing
-from bench.comparison import intervals, times
-from bench.comparison.compare import Limits, compare, limits, stops_at
-from bench.comparison.rows import ORDER, Verdict
-from bench.harness import metrics
-from bench.harness.record import RecordFile
+from plumbob import cli
+from plumbob.bench.comparison import compare as comparing
+from plumbob.bench.comparison import intervals, times
+from plumbob.bench.comparison.compare import Limits, compare, limits, stops_at
+from plumbob.bench.comparison.rows import ORDER, Verdict
+from plumbob.bench.harness import metrics
+from plumbob.bench.harness.record import RecordFile
 
 
 def changed(record, **arrays):

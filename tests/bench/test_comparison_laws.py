@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.comparison import times
-from bench.comparison.compare import Limits, compare, stops_at
-from bench.comparison.intervals import ERROR_RATE, Ratio
-from bench.comparison.rows import Verdict, by_row
-from bench.comparison.times import judged
+from plumbob.bench.comparison import times
+from plumbob.bench.comparison.compare import Limits, compare, stops_at
+from plumbob.bench.comparison.intervals import ERROR_RATE, Ratio
+from plumbob.bench.comparison.rows import Verdict, by_row
+from plumbob.bench.comparison.times import judged
 
 KEY = ("timing", "p", "mine", "{}")
 

@@ -18,20 +18,20 @@ from pathlib import Path
 
 import pytest
 
-from bench import cli
-from bench.entrants.entrant import Entrant
-from bench.entrants.sources import digest_of
-from bench.executors import dask, executor_at, work
-from bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
-from bench.harness import run
-from bench.harness.choice import Choice
-from bench.harness.machine import stamp
-from bench.harness.measure import block_key, measure
-from bench.harness.progress import Progress, listening
-from bench.harness.record import RecordFile, encode
-from bench.presentation.results import Results, plain
-from bench.presentation.sections import tables
-from bench.presentation.tables.table import markdown
+from plumbob import cli
+from plumbob.bench.entrants.entrant import Entrant
+from plumbob.bench.entrants.sources import digest_of
+from plumbob.bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
+from plumbob.bench.harness import run
+from plumbob.bench.harness.choice import Choice
+from plumbob.bench.harness.executors import dask, executor_at, work
+from plumbob.bench.harness.machine import stamp
+from plumbob.bench.harness.measure import block_key, measure
+from plumbob.bench.harness.progress import Progress, listening
+from plumbob.bench.harness.record import RecordFile, encode
+from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.report.sections import tables
+from plumbob.bench.tables.table import markdown
 
 TINY = Scale(targets=3, seconds=0.001)
 ROOT = Path(__file__).parents[2]
@@ -135,7 +135,7 @@ def test_another_server_at_the_address_is_misuse_soon(name):
         threading.Thread(target=_serve, args=(server, answer), daemon=True).start()
         address = f"127.0.0.1:{server.getsockname()[1]}"
         program = (
-            "from bench.executors.dask import DaskExecutor\n"
+            "from plumbob.bench.harness.executors.dask import DaskExecutor\n"
             f"try: DaskExecutor('{address}', answer=0.5)\n"
             "except ValueError as error: print(error)"
         )
@@ -460,10 +460,10 @@ def test_every_suite_gives_the_same_tables_on_two_workers(executor, monkeypatch,
 
 CLIENT = """
 import os, sys, signal
-from bench.experiments import SCALES, Scale
-from bench.executors import executor_at
-from bench.harness import run
-from bench.harness.choice import Choice
+from plumbob.bench.experiments import SCALES, Scale
+from plumbob.bench.harness.executors import executor_at
+from plumbob.bench.harness import run
+from plumbob.bench.harness.choice import Choice
 from pathlib import Path
 SCALES["quick"] = Scale(targets=3, seconds=0.001)
 done = 0

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from bench.experiments import Scale, blocks
-from bench.experiments.energy import figures, tables
-from bench.experiments.energy import measurement as suite
-from bench.presentation.figures.sketch import drawn
-from bench.presentation.results import Results
+from plumbob.bench.experiments import Scale, blocks
+from plumbob.bench.experiments.energy import figures, tables
+from plumbob.bench.experiments.energy import measurement as suite
+from plumbob.bench.figures.sketch import drawn
+from plumbob.bench.harness.results import Results
 
 STEPS = 100
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.cli import run_command
-from bench.entrants import opening
-from bench.experiments.chain import figures as chain_figures
-from bench.experiments.cloth_peers import figures as cloth_figures
-from bench.experiments.robots.problem import ROBOTS, robot
-from bench.harness import stopwatch
-from bench.harness.record import RecordFile
-from bench.presentation.figures.sketch import drawn
-from bench.presentation.results import Results, plain
-from bench.presentation.sections import tables
-from crosscheck.conformance.doors import open_contestant
+from plumbob.bench.entrants import opening
+from plumbob.bench.experiments.chain import figures as chain_figures
+from plumbob.bench.experiments.cloth_peers import figures as cloth_figures
+from plumbob.bench.experiments.robots.problem import ROBOTS, robot
+from plumbob.bench.figures.sketch import drawn
+from plumbob.bench.harness import stopwatch
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.report.sections import tables
+from plumbob.cli import run_command
+from plumbob.crosscheck.verify.solvers import open_contestant
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
 IK, CLOTH, ROBOT, PROBLEMS = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
@@ -145,7 +145,7 @@ def test_a_later_plain_run_keeps_what_was_entered(folder, capsys, monkeypatch):
     (before,) = records()
     assert not any(one.suite == "finished" for one in RecordFile("out").read().records)
     capsys.readouterr()
-    from bench.harness import run  # what a plain run asks for, without measuring all of it
+    from plumbob.bench.harness import run  # what a plain run asks for, without measuring all of it
 
     few = [one for one in run.blocks("ik", run.SCALES["quick"]) if one.problem == "chain/near"][:2]
     monkeypatch.setattr(run, "blocks", lambda suite, scale: iter(few))
@@ -172,7 +172,7 @@ def test_a_changed_file_is_measured_again_and_a_part_forgets_nothing(folder, cap
 
 
 def test_a_file_that_the_solver_imports_belongs_to_it(folder):
-    from bench.entrants.sources import digest_of
+    from plumbob.bench.entrants.sources import digest_of
 
     (folder / "my_ik.py").write_text("import mine.one\n" + IK, encoding="utf-8")
     (folder / "mine").mkdir()
@@ -185,7 +185,7 @@ def test_a_file_that_the_solver_imports_belongs_to_it(folder):
 def test_the_commit_of_the_solver_is_on_record(folder):
     import subprocess
 
-    from bench.entrants.sources import commit_of
+    from plumbob.bench.entrants.sources import commit_of
 
     git = ["git", "-C", str(folder), "-c", "user.name=n", "-c", "user.email=e"]
     for words in (["init", "-q"], ["add", "my_ik.py"], ["commit", "-qm", "one"]):
@@ -223,8 +223,8 @@ def test_a_program_enters_by_lines_and_is_timed_by_itself_or_says_so(folder, ext
     ("extra", "done"), [('"seconds": 1e-7', 6), pytest.param("", 2, marks=pytest.mark.slow)]
 )
 def test_a_budget_goes_by_the_seconds_that_a_solver_behind_a_slow_door_counts(folder, extra, done):
-    from bench.entrants import chain
-    from bench.experiments.chain.problem import chain_targets
+    from plumbob.bench.entrants import chain
+    from plumbob.bench.experiments.chain.problem import chain_targets
 
     slow = PROGRAM.replace("EXTRA", extra).replace("print(json", "time.sleep(0.15); print(json")
     (folder / "slow.py").write_text(slow.replace("import json", "import json, time"))
@@ -300,8 +300,8 @@ def test_a_broken_solver_loses_its_own_rows_only_and_says_why(folder, name, caps
 
 @pytest.mark.slow
 def test_a_solver_that_hangs_is_ended(folder, monkeypatch):
-    from bench.entrants import chain
-    from bench.harness.isolation import WorkerProcess
+    from plumbob.bench.entrants import chain
+    from plumbob.bench.harness.isolation import WorkerProcess
 
     impatient = WorkerProcess(30.0, 0.5)
     monkeypatch.setattr(chain, "worker_process", lambda: impatient)
@@ -432,12 +432,12 @@ def test_one_start_of_robots_and_restarts_through_the_door_are_those_of_the_solv
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
 def test_a_request_calls_the_tool_as_the_protocol_says(name):
     """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
-    from bench.entrants.robot import robot_inputs
-    from bench.experiments.robots.evaluate import evaluator_of
-    from crosscheck.conformance.kinematics.robot_models import tool_pose
-    from crosscheck.conformance.task import TASKS
-    from reference import forward_kinematics
-    from reference.formats import urdf
+    from plumbob.bench.entrants.robot import robot_inputs
+    from plumbob.bench.experiments.robots.evaluate import evaluator_of
+    from plumbob.crosscheck.verify.kinematics.robot_models import tool_pose
+    from plumbob.crosscheck.verify.task import TASKS
+    from plumbob.reference import forward_kinematics
+    from plumbob.reference.formats import urdf
 
     inputs = robot_inputs(robot(name))
     (field,) = [field for field in TASKS["robot_inverse_kinematics"].inputs if field.name == "urdf"]
@@ -522,8 +522,8 @@ def test_problems_of_a_python_file_stand_in_the_same_tables(folder):
 
 
 def dry(folder, *words):
-    from bench.commands.bench import Asked, _choice
-    from bench.entrants import outlook
+    from plumbob.bench.entrants import outlook
+    from plumbob.commands.bench import Asked, _choice
 
     given = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--problem"]
     entered = [words[i + 1] for i in range(0, len(words), 2) if words[i] == "--with"]
@@ -552,7 +552,7 @@ OBJ += "".join(f"f {i} {i + 1} {i + 4} {i + 3}\n" for i in (1, 2, 4, 5))
     ("rule", "pinned"), [(None, [0, 8]), ("0,2", [0, 2]), ("top", [*range(9)])]
 )
 def test_an_obj_becomes_a_cloth_with_pins_by_a_rule(folder, rule, pinned):
-    from bench.entrants import models
+    from plumbob.bench.entrants import models
 
     (folder / "mesh.obj").write_text(OBJ)
     system, state = models.cloth(folder / "mesh.obj", rule)
@@ -573,10 +573,10 @@ URDF = """<robot name="r"><link name="b"/><link name="l1"/><link name="l2"/><lin
 
 
 def test_a_urdf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
-    from bench.entrants import models
-    from bench.experiments.robots.evaluate import Evaluator
-    from reference import forward_kinematics
-    from reference.formats import urdf
+    from plumbob.bench.entrants import models
+    from plumbob.bench.experiments.robots.evaluate import Evaluator
+    from plumbob.reference import forward_kinematics
+    from plumbob.reference.formats import urdf
 
     path = folder / "mine.urdf"
     path.write_text(URDF)
@@ -598,10 +598,10 @@ MJCF = """<mujoco><compiler angle="radian"/><worldbody><body name="a" pos="0 0 .
 
 
 def test_an_mjcf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
-    from bench.entrants import models
-    from bench.experiments.robots.evaluate import Evaluator
-    from reference import forward_kinematics
-    from reference.formats import mjcf
+    from plumbob.bench.entrants import models
+    from plumbob.bench.experiments.robots.evaluate import Evaluator
+    from plumbob.reference import forward_kinematics
+    from plumbob.reference.formats import mjcf
 
     path = folder / "mine.xml"
     path.write_text(MJCF)
@@ -615,7 +615,7 @@ def test_an_mjcf_becomes_a_chain_with_the_kinematics_of_the_file(folder):
 
 
 def test_a_slide_is_refused_by_its_name(folder):
-    from bench.entrants import models
+    from plumbob.bench.entrants import models
 
     path = folder / "slides.urdf"
     axis, limit = '<axis xyz="0 1 0"/>', '<limit lower="0" upper="1" effort="1" velocity="1"/>'
@@ -653,7 +653,7 @@ Frame Time: 0.01
 
 
 def test_a_bvh_becomes_targets_that_its_joints_can_reach(folder):
-    from bench.entrants import models
+    from plumbob.bench.entrants import models
 
     path = folder / "walk.bvh"
     path.write_text(BVH)

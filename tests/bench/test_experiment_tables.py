@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import bench
-from bench.experiments import SUITES
-from bench.experiments.chain import tables as kinematics
-from bench.experiments.check import tables as check
-from bench.experiments.cloth import tables as cloth
-from bench.experiments.cloth_peers import SOLVED
-from bench.experiments.published import tables as published
-from bench.experiments.robots import tables as robots
-from bench.experiments.timing import tables as timing
-from bench.presentation.results import Results, label
-from bench.presentation.sections import SECTIONS, tables
-from bench.presentation.tables.table import Share, comma_separated, markdown, words
-from bench.presentation.tables.tex_text import escaped
+from plumbob import bench
+from plumbob.bench.experiments import SUITES
+from plumbob.bench.experiments.chain import tables as kinematics
+from plumbob.bench.experiments.check import tables as check
+from plumbob.bench.experiments.cloth import tables as cloth
+from plumbob.bench.experiments.cloth_peers import SOLVED
+from plumbob.bench.experiments.published import tables as published
+from plumbob.bench.experiments.robots import tables as robots
+from plumbob.bench.experiments.timing import tables as timing
+from plumbob.bench.harness.results import Results, label
+from plumbob.bench.report.sections import SECTIONS, tables
+from plumbob.bench.tables.table import Share, comma_separated, markdown, words
+from plumbob.bench.tables.tex_text import escaped
 
 
 def column(table, heading):

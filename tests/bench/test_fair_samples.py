@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bench.experiments.robots import tables as robots
-from bench.presentation.figures.sketch import drawn
-from bench.presentation.results import Results
-from bench.presentation.tables.table import best_cells
+from plumbob.bench.experiments.robots import tables as robots
+from plumbob.bench.figures.sketch import drawn
+from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.table import best_cells
 
 KIND = "one start"
 ONE = robots.OF_KIND[KIND]

@@ -10,14 +10,14 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from bench.presentation import report
-from bench.presentation.figures import drawing
-from bench.presentation.figures import sketch as figures
-from bench.presentation.figures.chart import LOOKS, MOST, Axis, Chart, Panel, looks, series
-from bench.presentation.figures.sketch import Drawing, chart_sketch, drawn
-from bench.presentation.figures.svg import inline
-from bench.presentation.page import page
-from bench.presentation.results import Results, label
+from plumbob.bench.figures import drawing
+from plumbob.bench.figures import sketch as figures
+from plumbob.bench.figures.chart import LOOKS, MOST, Axis, Chart, Panel, looks, series
+from plumbob.bench.figures.sketch import Drawing, chart_sketch, drawn
+from plumbob.bench.figures.svg import inline
+from plumbob.bench.harness.results import Results, label
+from plumbob.bench.report import report
+from plumbob.bench.report.page import page
 
 ENTRANT = "my very own solver, a name of some length"
 CHARTS = 15

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.experiments.timing import tables as timing
-from bench.harness import metrics
-from bench.harness.record import FINISHED
-from bench.peers import registry
-from bench.presentation import headlines
-from bench.presentation.results import Results
-from bench.presentation.tables.layout import source
-from bench.presentation.tables.table import words
+from plumbob.bench.experiments.timing import tables as timing
+from plumbob.bench.harness import metrics
+from plumbob.bench.harness.record import FINISHED
+from plumbob.bench.harness.results import Results
+from plumbob.bench.peers import registry
+from plumbob.bench.report import headlines
+from plumbob.bench.tables.layout import source
+from plumbob.bench.tables.table import words
 
 N = 200
 ACCURATE, FASTEST = "Most accurate, one start", "Fastest, one start"

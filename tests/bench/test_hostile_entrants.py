@@ -15,17 +15,17 @@ import numpy as np
 import pytest
 from hostile_programs import LIMITS, running
 
-from bench.entrants import chain
-from bench.harness.isolation import WorkerProcess
-from bench.harness.progress import TROUBLE, listening
-from bench.harness.worker import NoAnswerError
-from crosscheck.conformance.case import Case
-from crosscheck.conformance.contestant import Answer
-from crosscheck.conformance.doors import export, open_contestant
-from crosscheck.conformance.greeting import Greeting
-from crosscheck.conformance.message import NO_SECONDS
-from crosscheck.conformance.sentence import sentence
-from reference import Skeleton
+from plumbob.bench.entrants import chain
+from plumbob.bench.harness.isolation import WorkerProcess
+from plumbob.bench.harness.progress import TROUBLE, listening
+from plumbob.bench.harness.worker import NoAnswerError
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer
+from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.crosscheck.verify.message import NO_SECONDS
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.crosscheck.verify.solvers import export, open_contestant
+from plumbob.reference import Skeleton
 
 NOT_TIMED = sentence('Not timed: the answers hold no valid "seconds".')
 TASK = "inverse_kinematics"

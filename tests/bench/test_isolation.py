@@ -9,22 +9,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bench.experiments import Scale
-from bench.experiments.robots import measurement as robots
-from bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
-from bench.experiments.robots.job import AGAIN, Job
-from bench.experiments.robots.problem import robot
-from bench.experiments.robots.tables import OF_KIND
-from bench.harness import stopwatch
-from bench.harness.isolation import WorkerProcess, raised
-from bench.harness.measure import record_of
-from bench.harness.worker import Begun, Done, Ready, Solved, Unfit, serve
-from bench.peers import registry
-from bench.peers.ik.protocol import SolverOutput
-from bench.peers.ik.restarts import restarted
-from bench.peers.registry import ONE_START, Entry, Peer
-from bench.presentation.results import Results
-from bench.presentation.tables.table import markdown
+from plumbob.bench.experiments import Scale
+from plumbob.bench.experiments.robots import measurement as robots
+from plumbob.bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.experiments.robots.job import AGAIN, Job
+from plumbob.bench.experiments.robots.problem import robot
+from plumbob.bench.experiments.robots.tables import OF_KIND
+from plumbob.bench.harness import stopwatch
+from plumbob.bench.harness.isolation import WorkerProcess, raised
+from plumbob.bench.harness.measure import record_of
+from plumbob.bench.harness.results import Results
+from plumbob.bench.harness.worker import Begun, Done, Ready, Solved, Unfit, serve
+from plumbob.bench.peers import registry
+from plumbob.bench.peers.ik.protocol import SolverOutput
+from plumbob.bench.peers.ik.restarts import restarted
+from plumbob.bench.peers.registry import ONE_START, Entry, Peer
+from plumbob.bench.tables.table import markdown
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 COUNT = 4
@@ -34,7 +34,7 @@ COUNT = 4
 FAKES = """
 import ctypes, os, random, sys, time
 import numpy as np
-from bench.peers.ik.protocol import SolverOutput, UnableError
+from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
 
 def prepare(robot, tolerance, manner="perfect", at=2):
     if manner == "unable":
@@ -145,7 +145,7 @@ def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(worker, targ
 
 def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monkeypatch):
     """What is timed is timed as in a loop of solves and nothing else."""
-    monkeypatch.setattr("bench.experiments.robots.job.QUICK", 0.1)
+    monkeypatch.setattr("plumbob.bench.experiments.robots.job.QUICK", 0.1)
     counts, called = [], 0
 
     def timed(call):
@@ -154,7 +154,7 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
         called = 0
         return stopwatch.timed(call)
 
-    monkeypatch.setattr("bench.experiments.robots.job.timed", timed)
+    monkeypatch.setattr("plumbob.bench.experiments.robots.job.timed", timed)
     fake = importlib.import_module("fake_solvers")
     prepare = fake.prepare
 
@@ -188,8 +188,8 @@ def test_the_answers_are_the_same_however_often_a_quick_solve_is_made_again(
     """On a quick machine solves are warmed up and on a slow one not: no answer may depend on it."""
 
     def answers(quick, again):
-        monkeypatch.setattr("bench.experiments.robots.job.QUICK", quick)
-        monkeypatch.setattr("bench.experiments.robots.job.AGAIN", again)
+        monkeypatch.setattr("plumbob.bench.experiments.robots.job.QUICK", quick)
+        monkeypatch.setattr("plumbob.bench.experiments.robots.job.AGAIN", again)
         said = messages(targets, manner, restarts=restarts)
         return np.array([one.q for one in said if isinstance(one, Solved)])
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
 
-from bench.harness.record import RecordFile
-from bench.peers import registry
-from bench.presentation import report
-from bench.presentation.figures.drawing import power, ticks
+from plumbob.bench.figures.drawing import power, ticks
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.peers import registry
+from plumbob.bench.report import report
 
 WIDTHS = (1440, 390)
 DOCS = Path(__file__).parents[2] / "docs"

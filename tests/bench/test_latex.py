@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.harness.metrics import Share, share
-from bench.presentation import sections
-from bench.presentation.results import Results, plain
-from bench.presentation.tables import fitting, latex, tex_text
-from bench.presentation.tables.fitting import Need
-from bench.presentation.tables.table import Column, Table
+from plumbob.bench.harness.metrics import Share, share
+from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.report import sections
+from plumbob.bench.tables import fitting, latex, tex_text
+from plumbob.bench.tables.fitting import Need
+from plumbob.bench.tables.table import Column, Table
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
 NAMES = (

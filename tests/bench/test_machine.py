@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.harness import machine
+from plumbob.bench.harness import machine
 
 PACKAGES = ("reference", "crosscheck", "bench")
 ROOT = Path(machine.__file__).parents[2]
@@ -114,12 +114,12 @@ def test_what_measures_never_imports_what_only_shows():
 @pytest.mark.parametrize(
     "line",
     [
-        "import bench.presentation.report",
+        "import plumbob.bench.report.report",
         "from ..presentation import tables",
         "from ..presentation import results",
-        "from bench.presentation import figures",
+        "from plumbob.bench.report import figures",
         "def f():\n    from ..presentation.results import label",
-        'importlib.import_module("bench.presentation.results")',
+        'importlib.import_module("plumbob.bench.harness.results")',
     ],
 )
 def test_an_import_of_what_only_shows_is_found(copy, line):

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from bench.harness import metrics
-from reference import rotation
+from plumbob.bench.harness import metrics
+from plumbob.reference import rotation
 
 
 @pytest.mark.parametrize("n", [1, 10, 1000])

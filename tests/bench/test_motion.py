@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
 
-from bench.experiments.pictures.readings import arm_motion, cloth_motion
-from bench.harness.record import RecordFile
-from bench.presentation import report
-from bench.presentation.motion import motion
-from bench.presentation.motion.motion import Moving, Scene, data_of
-from bench.presentation.results import Results
+from plumbob.bench.experiments.pictures.readings import arm_motion, cloth_motion
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.results import Results
+from plumbob.bench.motion import motion
+from plumbob.bench.motion.motion import Moving, Scene, data_of
+from plumbob.bench.report import report
 
 KILOBYTE = 1024
 

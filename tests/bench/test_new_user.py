@@ -8,20 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from bench.cli import run_command
-from bench.entrants import opening, selection
-from bench.experiments import SUITES, blocks
-from bench.experiments.chain import figures
-from bench.experiments.chain.tables import accuracy, beyond_reach
-from bench.experiments.robots.tables import who
-from bench.harness.record import RecordFile
-from bench.peers import registry
-from bench.presentation.entered import remarks_of_entrants
-from bench.presentation.figures.sketch import drawn
-from bench.presentation.headlines import absent, not_asked
-from bench.presentation.results import Results, plain
-from bench.presentation.sections import tables
-from bench.presentation.tables.table import words
+from plumbob.bench.entrants import opening, selection
+from plumbob.bench.experiments import SUITES, blocks
+from plumbob.bench.experiments.chain import figures
+from plumbob.bench.experiments.chain.tables import accuracy, beyond_reach
+from plumbob.bench.experiments.robots.tables import who
+from plumbob.bench.figures.sketch import drawn
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.peers import registry
+from plumbob.bench.report.entered import remarks_of_entrants
+from plumbob.bench.report.headlines import absent, not_asked
+from plumbob.bench.report.sections import tables
+from plumbob.bench.tables.table import words
+from plumbob.cli import run_command
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
 IK = re.search(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)[1]

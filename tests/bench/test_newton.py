@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from bench.experiments import SCALES, Scale, blocks
-from bench.experiments.cloth import tables
-from bench.experiments.cloth.problem import HEAVY_STIFFNESSES
-from bench.experiments.newton import measurement as suite
-from bench.presentation.results import Results
-from reference import STEP_SOLVERS
+from plumbob.bench.experiments import SCALES, Scale, blocks
+from plumbob.bench.experiments.cloth import tables
+from plumbob.bench.experiments.cloth.problem import HEAVY_STIFFNESSES
+from plumbob.bench.experiments.newton import measurement as suite
+from plumbob.bench.harness.results import Results
+from plumbob.reference import STEP_SOLVERS
 
 SIZE = 6
 

@@ -14,12 +14,12 @@ import pytest
 from browser import CHROMIUM, Browser
 from PIL import Image
 
-from bench.harness.record import FINISHED, RecordFile
-from bench.peers import registry
-from bench.presentation import report
-from bench.presentation.motion import motion
-from bench.presentation.page import page as pages
-from bench.presentation.sections import SECTIONS
+from plumbob.bench.harness.record import FINISHED, RecordFile
+from plumbob.bench.motion import motion
+from plumbob.bench.peers import registry
+from plumbob.bench.report import report
+from plumbob.bench.report.page import page as pages
+from plumbob.bench.report.sections import SECTIONS
 
 DESK, PHONE = (1440, 900), (390, 844)
 ROBOTS = ("Panda", "UR5", "xArm7", "PR2", "character")

@@ -6,16 +6,20 @@ import sys
 import numpy as np
 import pytest
 
-from bench.experiments.robots import LIMIT_TOLERANCE
-from bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
-from bench.experiments.robots.job import Job
-from bench.experiments.robots.problem import CHARACTER, is_installed, robot
-from bench.experiments.robots.targets import robot_targets, uniform_targets, unreachable_targets
-from bench.harness import stopwatch
-from bench.harness.worker import Solved
-from bench.peers.ik.protocol import SolverOutput, UnableError
-from bench.peers.ik.restarts import restarted
-from bench.peers.registry import ONE_START, OURS, PEERS, PLACO, RESTARTS
+from plumbob.bench.experiments.robots import LIMIT_TOLERANCE
+from plumbob.bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.experiments.robots.job import Job
+from plumbob.bench.experiments.robots.problem import CHARACTER, is_installed, robot
+from plumbob.bench.experiments.robots.targets import (
+    robot_targets,
+    uniform_targets,
+    unreachable_targets,
+)
+from plumbob.bench.harness import stopwatch
+from plumbob.bench.harness.worker import Solved
+from plumbob.bench.peers.ik.protocol import SolverOutput, UnableError
+from plumbob.bench.peers.ik.restarts import restarted
+from plumbob.bench.peers.registry import ONE_START, OURS, PEERS, PLACO, RESTARTS
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Those that take trees with several effectors.
@@ -195,7 +199,7 @@ def test_every_entry_has_a_name_of_its_own_within_its_kind():
 def test_the_choice_among_its_solutions_is_not_charged_to_eaik():
     """The bench's loop over them took as long as the library."""
     pytest.importorskip("eaik")
-    from bench.peers.ik import eaik
+    from plumbob.bench.peers.ik import eaik
 
     targets = robot_targets("ur5", 2)
     ask = eaik.prepare(robot("ur5"), TOLERANCE)

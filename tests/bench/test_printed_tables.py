@@ -8,16 +8,16 @@ import numpy as np
 import printed_table
 import pytest
 
-from bench import cli, terminal
-from bench.comparison.history import sparkline
-from bench.harness.record import RecordFile
-from bench.presentation import sections
-from bench.presentation.results import Results, plain
-from bench.presentation.tables.table import is_blank, without_empty, words
-from bench.verify import terminal as verify_terminal
-from crosscheck.claims import CLAIMS
-from crosscheck.conformance.judgement import Verdict as TaskVerdict
-from crosscheck.verdict import Verdict
+from plumbob import cli, terminal
+from plumbob.bench.comparison.history import sparkline
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.report import sections
+from plumbob.bench.tables.table import is_blank, without_empty, words
+from plumbob.crosscheck.claims import CLAIMS
+from plumbob.crosscheck.verdict import Verdict
+from plumbob.crosscheck.verify.judgement import Verdict as TaskVerdict
+from plumbob.crosscheck.verify.output import terminal as verify_terminal
 
 # Of a terminal; None is a pipe.
 WIDTHS = (80, 120, 200, None)
@@ -79,7 +79,7 @@ def verdicts(monkeypatch):
         for i, claim in enumerate(CLAIMS.values())
     ]
     made[8] = replace(made[8], difference=float("nan"))
-    monkeypatch.setattr("crosscheck.claims.run_claims", lambda *_: made)
+    monkeypatch.setattr("plumbob.crosscheck.claims.run_claims", lambda *_: made)
     return made
 
 
@@ -148,8 +148,8 @@ def test_records_are_listed_as_counted(capsys, tmp_path, monkeypatch, make, widt
 
 
 def test_files_are_listed_with_what_each_engine_reads(capsys, tmp_path, monkeypatch, width):
-    from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF
-    from crosscheck.robots import files
+    from plumbob.crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF
+    from plumbob.crosscheck.robots import files
 
     def checked(name, kind, *readings):
         file = files.File(tmp_path / "robots" / name, kind, tmp_path / "robots")

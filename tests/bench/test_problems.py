@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bench.experiments.arm.problem import MAX_SPACING, MIN_SPACING, arm_beyond, arm_curves
-from bench.experiments.chain.problem import STRATA, chain_targets
-from bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.arm.problem import MAX_SPACING, MIN_SPACING, arm_beyond, arm_curves
+from plumbob.bench.experiments.chain.problem import STRATA, chain_targets
+from plumbob.bench.experiments.cloth.problem import cloth_swing
 
 
 @pytest.mark.parametrize("stratum", STRATA)

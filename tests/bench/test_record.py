@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from bench.harness.record import FILE_NAME, Record, RecordFile, decode, encode, key
+from plumbob.bench.harness.record import FILE_NAME, Record, RecordFile, decode, encode, key
 
 ANY_FLOATS = arrays.arrays(
     np.float64, arrays.array_shapes(max_dims=3), elements=st.floats(allow_nan=True)

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pytest
 
-import bench
-from bench.experiments import Block, Measured
-from bench.harness import machine, run
-from bench.harness.folder_lock import locked
-from bench.harness.machine import stamp
-from bench.harness.record import FORMAT, RecordFile, decode, encode
-from bench.presentation.results import Results
+from plumbob import bench
+from plumbob.bench.experiments import Block, Measured
+from plumbob.bench.harness import machine, run
+from plumbob.bench.harness.folder_lock import locked
+from plumbob.bench.harness.machine import stamp
+from plumbob.bench.harness.record import FORMAT, RecordFile, decode, encode
+from plumbob.bench.harness.results import Results
 
 ROOT = Path(bench.__file__).parents[1]
 
@@ -178,7 +178,7 @@ def test_two_runs_into_one_folder_exclude_each_other(solvers, tmp_path):
 
 def test_a_lock_is_free_once_its_process_was_killed(tmp_path):
     script = (
-        "import sys, time; from bench.harness.folder_lock import locked\n"
+        "import sys, time; from plumbob.bench.harness.folder_lock import locked\n"
         "with locked(sys.argv[1]): print('locked', flush=True); time.sleep(60)"
     )
     child = subprocess.Popen(
@@ -234,8 +234,8 @@ COUNT = 40
 RUN = f"""
 import sys, time
 import numpy as np
-from bench.experiments import Block, Measured
-from bench.harness import run
+from plumbob.bench.experiments import Block, Measured
+from plumbob.bench.harness import run
 
 def measure(i):
     time.sleep(0.002)

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from bench import cli
-from bench.harness.folder_lock import locked
-from bench.harness.record import RecordFile, encode
+from plumbob import cli
+from plumbob.bench.harness.folder_lock import locked
+from plumbob.bench.harness.record import RecordFile, encode
 
 
 @pytest.fixture

@@ -6,28 +6,28 @@ from functools import partial
 
 import pytest
 
-import bench.experiments
-from bench.experiments import Scale, blocks
-from bench.experiments.chain import tables as chain_tables
-from bench.experiments.cloth import measurement as cloth
-from bench.experiments.cloth import tables as cloth_tables
-from bench.experiments.cloth.problem import cloth_swing
-from bench.experiments.robots import measurement as robots
-from bench.experiments.robots import tables as robot_tables
-from bench.harness import run
-from bench.harness.experiment import Experiment
-from bench.harness.isolation import Outcome
-from bench.harness.record import RecordFile
-from bench.harness.worker import Found, Solved, Unfit
-from bench.peers import registry
-from bench.peers.registry import ONE_START, Entry, Peer
-from bench.presentation import report
-from bench.presentation.results import Results
-from bench.presentation.sections import tables
-from bench.presentation.tables.layout import Layout
-from bench.presentation.tables.table import Column
-from reference import STEP_SOLVERS
-from reference.implicit_euler.local_global import LocalGlobal
+import plumbob.bench.experiments
+from plumbob.bench.experiments import Scale, blocks
+from plumbob.bench.experiments.chain import tables as chain_tables
+from plumbob.bench.experiments.cloth import measurement as cloth
+from plumbob.bench.experiments.cloth import tables as cloth_tables
+from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.robots import measurement as robots
+from plumbob.bench.experiments.robots import tables as robot_tables
+from plumbob.bench.harness import run
+from plumbob.bench.harness.experiment import Experiment
+from plumbob.bench.harness.isolation import Outcome
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.results import Results
+from plumbob.bench.harness.worker import Found, Solved, Unfit
+from plumbob.bench.peers import registry
+from plumbob.bench.peers.registry import ONE_START, Entry, Peer
+from plumbob.bench.report import report
+from plumbob.bench.report.sections import tables
+from plumbob.bench.tables.layout import Layout
+from plumbob.bench.tables.table import Column
+from plumbob.reference import STEP_SOLVERS
+from plumbob.reference.implicit_euler.local_global import LocalGlobal
 
 TINY = Scale(targets=1, seconds=0.01)
 
@@ -67,7 +67,7 @@ def test_a_new_step_solver_stands_in_the_tables(make):
 
 
 ADAPTER = """
-from bench.peers.ik.protocol import SolverOutput
+from plumbob.bench.peers.ik.protocol import SolverOutput
 
 def prepare(robot, tolerance):
     return lambda positions, rotations, start: lambda: SolverOutput(start, False)
@@ -137,14 +137,14 @@ def test_a_new_table_is_a_function_and_a_line_and_stands_in_the_page(
 FOLDER = {
     "__init__.py": "",
     "measurement.py": """
-from bench.harness.block import Block, Measured
+from plumbob.bench.harness.block import Block, Measured
 
 def blocks(scale):
     yield Block("sums", "1 + 1", "Python", lambda: Measured({"sum": 2}), facts={"title": "One"})
 """,
     "tables.py": """
-from bench.presentation.tables.columns import number, titled
-from bench.presentation.tables.layout import Layout
+from plumbob.bench.tables.columns import number, titled
+from plumbob.bench.tables.layout import Layout
 
 sums = Layout(
     "What is 1 + 1?",
@@ -168,16 +168,16 @@ def test_a_new_experiment_is_a_folder_and_a_line(tmp_path, monkeypatch):
         (folder / name).write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     line = Experiment("sums_experiment", "sums", "speed")
-    bench.experiments.EXPERIMENTS.append(line)
+    plumbob.bench.experiments.EXPERIMENTS.append(line)
     try:
-        monkeypatch.setitem(bench.experiments.SUITES, "sums", "is 1 + 1 two?")
+        monkeypatch.setitem(plumbob.bench.experiments.SUITES, "sums", "is 1 + 1 two?")
         states = [event.state for event in run.run(["sums"], "quick", tmp_path / "out")]
         assert states == [run.MEASURING, run.MEASURED]
         results = Results(RecordFile(tmp_path / "out").read().records)
         (table,) = [t for t in tables(results, ["sums"]) if t.name == "sums"]
         assert table.rows == (("One", 2),)
     finally:
-        bench.experiments.EXPERIMENTS.remove(line)
+        plumbob.bench.experiments.EXPERIMENTS.remove(line)
 
 
 def test_every_solver_has_one_entry_and_every_style_is_its_own():

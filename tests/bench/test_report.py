@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import pytest
 
-from bench.harness.record import RecordFile
-from bench.presentation import report
-from bench.presentation.results import Results, plain
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.report import report
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import cli
-from bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
-from bench.comparison.rows import Verdict
-from bench.harness import machine
+from plumbob import cli
+from plumbob.bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
+from plumbob.bench.comparison.rows import Verdict
+from plumbob.bench.harness import machine
 
 LOOPS = 20_000
 # A bench of two rows, as far as a rerun asks for one and in lines that start at once: work of a

@@ -2,14 +2,14 @@
 
 import pytest
 
-from bench.experiments.robot_models.measurement import compare
-from bench.experiments.robot_models.peers import beside, differences
-from bench.experiments.robot_models.tables import agreement, peers_kinematics
-from bench.experiments.robots.problem import ALL, CHARACTER, is_installed
-from bench.peers.registry import DRAKE, KINEMATICS, SINGLE_PRECISION
-from bench.presentation.results import Results
-from crosscheck.engines import ROBOT_ENGINES
-from crosscheck.robots.models import Model
+from plumbob.bench.experiments.robot_models.measurement import compare
+from plumbob.bench.experiments.robot_models.peers import beside, differences
+from plumbob.bench.experiments.robot_models.tables import agreement, peers_kinematics
+from plumbob.bench.experiments.robots.problem import ALL, CHARACTER, is_installed
+from plumbob.bench.harness.results import Results
+from plumbob.bench.peers.registry import DRAKE, KINEMATICS, SINGLE_PRECISION
+from plumbob.crosscheck.engines import ROBOT_ENGINES
+from plumbob.crosscheck.robots.models import Model
 
 URDF = """<robot name="arm"><link name="base"/><link name="arm"/><link name="tip"/>
   <joint name="shoulder" type="continuous">

@@ -4,16 +4,23 @@ import mujoco
 import numpy as np
 import pytest
 
-from bench.experiments import SCALES
-from bench.experiments.robots import LIMIT_TOLERANCE, UNREACHABLE, measurement
-from bench.experiments.robots.evaluate import (
+from plumbob.bench.experiments import SCALES
+from plumbob.bench.experiments.robots import LIMIT_TOLERANCE, UNREACHABLE, measurement
+from plumbob.bench.experiments.robots.evaluate import (
     Targets,
     Tolerance,
     angle_between,
     evaluator_of,
 )
-from bench.experiments.robots.problem import ALL, CHARACTER, AbsentError, is_installed, links, robot
-from bench.experiments.robots.targets import (
+from plumbob.bench.experiments.robots.problem import (
+    ALL,
+    CHARACTER,
+    AbsentError,
+    is_installed,
+    links,
+    robot,
+)
+from plumbob.bench.experiments.robots.targets import (
     STRATA,
     farthest,
     least_distances,
@@ -25,8 +32,8 @@ from bench.experiments.robots.targets import (
     uniform_targets,
     unreachable_targets,
 )
-from bench.peers import registry
-from reference import rotation
+from plumbob.bench.peers import registry
+from plumbob.reference import rotation
 
 COUNT = 8
 TOLERANCE = Tolerance(1e-3, 1e-3)

@@ -2,10 +2,10 @@
 
 import pytest
 
-from bench.experiments import Block, Measured
-from bench.harness import run
-from bench.harness.machine import stamp
-from bench.harness.record import RecordFile
+from plumbob.bench.experiments import Block, Measured
+from plumbob.bench.harness import run
+from plumbob.bench.harness.machine import stamp
+from plumbob.bench.harness.record import RecordFile
 
 
 class Suite:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.harness.record import RecordFile
+from plumbob.bench.harness.record import RecordFile
 
 ROOT = Path(__file__).parents[2]
 

@@ -10,14 +10,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench import cli
-from bench.harness.metrics import Share, share
-from bench.harness.record import RecordFile
-from bench.presentation import sections
-from bench.presentation.results import Results, plain
-from bench.presentation.tables.fragment import fragment
-from bench.presentation.tables.selection import column_numbers, selected
-from bench.presentation.tables.table import (
+from plumbob import cli
+from plumbob.bench.harness.metrics import Share, share
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.report import sections
+from plumbob.bench.tables.fragment import fragment
+from plumbob.bench.tables.selection import column_numbers, selected
+from plumbob.bench.tables.table import (
     NO_SUMMARY,
     Column,
     Summary,
@@ -286,7 +286,7 @@ def chosen(capsys, table, form, **options):
 def test_every_table_can_be_exported_with_every_option(capsys, folder, records, monkeypatch, form):
     """Those with rows of absent engines, too, about which nothing was measured."""
     every = sections.tables(Results([plain(record) for record in records]))
-    monkeypatch.setattr("bench.commands.report._tables", lambda folder: every)
+    monkeypatch.setattr("plumbob.commands.report._tables", lambda folder: every)
     assert any(not source.suite for table in every for source in table.sources)
     for table in every:
         count = len(table.columns)

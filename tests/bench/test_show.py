@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench import cli
-from bench.presentation.motion import motion
-from bench.show import film, ours
-from bench.show.yours import Yours
-from reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
+from plumbob import cli
+from plumbob.bench.motion import motion
+from plumbob.bench.show import film, ours
+from plumbob.bench.show.yours import Yours
+from plumbob.reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
 
 IK = """
     import numpy as np

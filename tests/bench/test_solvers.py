@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from bench.experiments.chain import BEYOND, CHAIN
-from bench.experiments.chain.measurement import Limits, solve_targets, solve_with_engine
-from bench.experiments.chain.problem import chain_targets
-from bench.experiments.chain.tables import beyond_reach
-from bench.harness.record import Record
-from bench.peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
-from bench.peers.ik.reference_kinematics import ReferenceKinematics
-from bench.presentation.results import Results
-from crosscheck.engines import SKELETON_ENGINES
-from crosscheck.engines.skeleton_engine import coordinates
-from reference import Skeleton, forward_kinematics, rotation, solve_ik
+from plumbob.bench.experiments.chain import BEYOND, CHAIN
+from plumbob.bench.experiments.chain.measurement import Limits, solve_targets, solve_with_engine
+from plumbob.bench.experiments.chain.problem import chain_targets
+from plumbob.bench.experiments.chain.tables import beyond_reach
+from plumbob.bench.harness.record import Record
+from plumbob.bench.harness.results import Results
+from plumbob.bench.peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
+from plumbob.bench.peers.ik.reference_kinematics import ReferenceKinematics
+from plumbob.crosscheck.engines import SKELETON_ENGINES
+from plumbob.crosscheck.engines.skeleton_engine import coordinates
+from plumbob.reference import Skeleton, forward_kinematics, rotation, solve_ik
 
 KINEMATICS = {"Plumbob": ReferenceKinematics, **SKELETON_ENGINES}
 

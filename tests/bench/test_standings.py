@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
 
-from bench import terminal
-from bench.cli import run_command
-from bench.entrants import opening
-from bench.harness import metrics
-from bench.harness.record import RecordFile
-from bench.presentation import outcome, report
-from bench.presentation.results import Results, plain
-from bench.presentation.sections import tables
-from bench.presentation.standings import CLOTHS, standings
+from plumbob import terminal
+from plumbob.bench.entrants import opening
+from plumbob.bench.harness import metrics
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.report import outcome, report
+from plumbob.bench.report.sections import tables
+from plumbob.bench.report.standings import CLOTHS, standings
+from plumbob.cli import run_command
 
 N = 200
 
@@ -277,8 +277,8 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
 
 
 def test_what_fails_alike_is_said_once_and_counted(tmp_path, monkeypatch, capsys):
-    from bench.commands.bench import run_suites
-    from bench.harness import run
+    from plumbob.bench.harness import run
+    from plumbob.commands.bench import run_suites
 
     why = {"chain/near": "It raised", "chain/far": "It raised", "robots/all": "It crashed"}
     events = [run.Event(run.FAILED, "ik", f"{at}, Mine", message) for at, message in why.items()]

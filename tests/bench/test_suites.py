@@ -7,19 +7,19 @@ from functools import partial
 import numpy as np
 import pytest
 
-from bench.experiments import SUITES, Scale, blocks
-from bench.experiments.cloth import ONE_STEP
-from bench.experiments.cloth import measurement as cloth
-from bench.experiments.cloth.problem import cloth_swing
-from bench.experiments.cloth.tables import convergence
-from bench.harness.block import Block
-from bench.harness.machine import stamp
-from bench.harness.measure import measure
-from bench.harness.record import Record, decode, encode, key
-from bench.harness.run import now
-from bench.presentation.results import Results
-from bench.presentation.tables.table import markdown
-from reference import ImplicitEuler
+from plumbob.bench.experiments import SUITES, Scale, blocks
+from plumbob.bench.experiments.cloth import ONE_STEP
+from plumbob.bench.experiments.cloth import measurement as cloth
+from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.cloth.tables import convergence
+from plumbob.bench.harness.block import Block
+from plumbob.bench.harness.machine import stamp
+from plumbob.bench.harness.measure import measure
+from plumbob.bench.harness.record import Record, decode, encode, key
+from plumbob.bench.harness.results import Results
+from plumbob.bench.harness.run import now
+from plumbob.bench.tables.table import markdown
+from plumbob.reference import ImplicitEuler
 
 TINY = Scale(targets=3, seconds=0.001)
 

@@ -6,8 +6,8 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from bench.presentation.figures.sketch import Drawing
-from bench.presentation.figures.svg import inline, shorter_path
+from plumbob.bench.figures.sketch import Drawing
+from plumbob.bench.figures.svg import inline, shorter_path
 
 NUMBERS = re.compile(r"-?[\d.]+")
 STEPS = "M 0 5.000001  L 1 5  L 2 5  L 3 5  L 3 7  L 3 9.123456  L 4 9.123456 L 2 9.123456 z "

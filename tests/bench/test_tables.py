@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.harness.metrics import Share, share
-from bench.presentation.tables import table as tables
-from bench.presentation.tables.table import Column, Summary, Table, best_cells, words
+from plumbob.bench.harness.metrics import Share, share
+from plumbob.bench.tables import table as tables
+from plumbob.bench.tables.table import Column, Summary, Table, best_cells, words
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
 

@@ -8,13 +8,13 @@ import pytest
 from rich.cells import cell_len
 from rich.console import Console
 
-from bench import cli, terminal
-from bench.harness.record import RecordFile
-from bench.presentation import outcome, report, sections
-from bench.presentation.headlines import Answers, Headline, Verdict
-from bench.presentation.results import Results, plain
-from bench.presentation.tables import aligned
-from bench.presentation.tables.table import Column, Table, naming, without_empty, words
+from plumbob import cli, terminal
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.report import outcome, report, sections
+from plumbob.bench.report.headlines import Answers, Headline, Verdict
+from plumbob.bench.tables import aligned
+from plumbob.bench.tables.table import Column, Table, naming, without_empty, words
 
 WIDTHS = range(40, 201)
 FEW = (40, 57, 80, 133, 200)

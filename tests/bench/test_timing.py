@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from bench.experiments import Scale
-from bench.experiments.cloth.problem import cloth_swing
-from bench.experiments.timing import case as timing_case
-from bench.experiments.timing import cloth, job, kinematics, measurement
-from bench.experiments.timing.case import (
+from plumbob.bench.experiments import Scale
+from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.timing import case as timing_case
+from plumbob.bench.experiments.timing import cloth, job, kinematics, measurement
+from plumbob.bench.experiments.timing.case import (
     COMPILED,
     LIMIT,
     Case,
@@ -20,14 +20,14 @@ from bench.experiments.timing.case import (
     stream,
     streaming,
 )
-from bench.experiments.timing.cases import cases
-from bench.experiments.timing.job import ROUNDS, SWEEPS, Timed, TimingJob
-from bench.harness import run
-from bench.harness.machine import stamp
-from bench.harness.record import RecordFile
-from bench.harness.worker import Done, Found, Unfit
-from crosscheck.engines import MujocoMassSpring
-from reference import forward_kinematics, set_num_threads
+from plumbob.bench.experiments.timing.cases import cases
+from plumbob.bench.experiments.timing.job import ROUNDS, SWEEPS, Timed, TimingJob
+from plumbob.bench.harness import run
+from plumbob.bench.harness.machine import stamp
+from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.worker import Done, Found, Unfit
+from plumbob.crosscheck.engines import MujocoMassSpring
+from plumbob.reference import forward_kinematics, set_num_threads
 
 WORK = Work("p", "s", "g", "t")
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from small_discipline import SMALL
 
-from bench import cli
-from bench.verify import saved
-from crosscheck.conformance import verify
-from crosscheck.conformance.case import Case
-from crosscheck.conformance.sentence import sentence
+from plumbob import cli
+from plumbob.crosscheck.verify import verify
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.output import saved
+from plumbob.crosscheck.verify.sentence import sentence
 
 RIGHT = """
 import numpy as np
@@ -277,7 +277,7 @@ def templates(monkeypatch):
     made = ModuleType("templates")
     made.LANGUAGES = languages
     made.template = lambda language: {one: f"// {one}\n" for one in languages[language].files}
-    monkeypatch.setitem(sys.modules, "crosscheck.conformance.templates", made)
+    monkeypatch.setitem(sys.modules, "plumbob.crosscheck.verify.templates", made)
 
 
 def test_a_template_is_written_and_says_what_comes_next(capsys, folder, templates):
@@ -344,7 +344,7 @@ def test_misuse_exits_2_with_one_sentence(capsys, folder, arguments, words):
 LAWS = """
 from plumbob.testing import laws
 import right, wrong
-from crosscheck.conformance import verify
+from plumbob.crosscheck.verify import verify
 from small_discipline import SMALL
 
 verify.DISCIPLINES.update(SMALL)
@@ -355,7 +355,7 @@ test_wrong = laws(forward_kinematics=wrong.forward_kinematics, seed=1)
 
 def test_laws_run_under_plain_pytest(folder):
     (folder / "test_mine.py").write_text(LAWS)
-    root = str(cli.__file__).removesuffix("bench/cli.py")
+    root = str(cli.__file__).removesuffix("plumbob/cli.py")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([root, f"{root}tests", "."])}
     run = subprocess.run(
         [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-rA", "test_mine.py"],
@@ -372,7 +372,7 @@ def test_laws_run_under_plain_pytest(folder):
 
 
 def test_letters_that_a_terminal_lacks_cost_no_output():
-    code = "from bench.cli import main; main(['verify', '--list', '--lang', 'zh'])"
+    code = "from plumbob.cli import main; main(['verify', '--list', '--lang', 'zh'])"
     root = str(Path(cli.__file__).parents[1])
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONPATH": root}
     run = subprocess.run(
@@ -384,7 +384,7 @@ def test_letters_that_a_terminal_lacks_cost_no_output():
 
 @pytest.mark.parametrize("solver", ["right.py", "wrong.py"])
 def test_a_full_disk_behind_the_screen_costs_no_file(folder, solver):
-    code = "from bench.cli import main; main()"
+    code = "from plumbob.cli import main; main()"
     root = str(Path(cli.__file__).parents[1])
     with Path("/dev/full").open("w") as full:
         run = subprocess.run(

@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 from small_discipline import SMALL, own_rotation
 
-from bench.verify import comparison, drawing, geometry, json_file, junit, page, terminal
-from bench.verify.words import GOOD, Presentation, complaints, explanations, speaker
-from crosscheck.conformance import verify
-from crosscheck.conformance.case import Case
-from crosscheck.conformance.contestant import Answer, Failure, FailureKind
-from crosscheck.conformance.functions import FunctionContestant
-from crosscheck.conformance.greeting import Greeting
-from crosscheck.conformance.judgement import (
+from plumbob.crosscheck.verify import verify
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer, Failure, FailureKind
+from plumbob.crosscheck.verify.functions import FunctionContestant
+from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.crosscheck.verify.judgement import (
     CaseJudgement,
     Diagnosis,
     Explanation,
@@ -27,9 +25,25 @@ from crosscheck.conformance.judgement import (
     TaskReport,
     Verdict,
 )
-from crosscheck.conformance.language import translator
-from crosscheck.conformance.sentence import Sentence, sentence
-from reference import Skeleton, forward_kinematics
+from plumbob.crosscheck.verify.language import translator
+from plumbob.crosscheck.verify.output import (
+    comparison,
+    drawing,
+    geometry,
+    json_file,
+    junit,
+    page,
+    terminal,
+)
+from plumbob.crosscheck.verify.output.words import (
+    GOOD,
+    Presentation,
+    complaints,
+    explanations,
+    speaker,
+)
+from plumbob.crosscheck.verify.sentence import Sentence, sentence
+from plumbob.reference import Skeleton, forward_kinematics
 
 HOSTILE = '<script>alert(1)</script>\x1b[31m\u202e & "quotes" \' ]]>'
 TASKS = tuple(SMALL)

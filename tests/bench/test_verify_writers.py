@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.verify import files, json_file, junit, page, saved, terminal
-from bench.verify.files import Files
-from bench.verify.question import Question
-from bench.verify.words import Presentation, speaker
-from crosscheck.conformance.functions import FunctionContestant
-from crosscheck.conformance.self_test import subjects
-from crosscheck.conformance.verify import verify
+from plumbob.crosscheck.verify.functions import FunctionContestant
+from plumbob.crosscheck.verify.output import files, json_file, junit, page, saved, terminal
+from plumbob.crosscheck.verify.output.files import Files
+from plumbob.crosscheck.verify.output.question import Question
+from plumbob.crosscheck.verify.output.words import Presentation, speaker
+from plumbob.crosscheck.verify.self_test import subjects
+from plumbob.crosscheck.verify.verify import verify
 
 FAULTY = {f"{one.family}, {one.name}": one for one in subjects() if one.fault}
 SOME = ("forces, gravity g/m", "steps, gravity g/m")

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from bench.harness import isolation
-from bench.harness.isolation import WorkerProcess
-from bench.harness.worker import Ready
-from crosscheck.child_process import PipedProcess
+from plumbob.bench.harness import isolation
+from plumbob.bench.harness.isolation import WorkerProcess
+from plumbob.bench.harness.worker import Ready
+from plumbob.crosscheck.child_process import PipedProcess
 
 ROOT = Path(isolation.__file__).parent.parent
 PATIENCE = 3.0
@@ -24,7 +24,7 @@ JOBS = """
 import ctypes, gc, os, pickle, signal, struct, subprocess, sys, time
 from multiprocessing.connection import Connection
 import numpy as np
-from bench.harness.worker import Done, Ready, Solved
+from plumbob.bench.harness.worker import Done, Ready, Solved
 
 def descriptor():
     (own,) = [o for o in gc.get_objects() if isinstance(o, Connection)]
@@ -239,7 +239,7 @@ def test_a_worker_ends_with_the_program_that_started_it(jobs, tmp_path):
     """Even if that is killed while a solver sleeps."""
     script = (
         "import sys; import os; from pathlib import Path\n"
-        "from bench.harness.isolation import WorkerProcess\n"
+        "from plumbob.bench.harness.isolation import WorkerProcess\n"
         "from dying_jobs import WithChild\n"
         "next(WorkerProcess().stream(WithChild(sys.argv[1]))); os.kill(os.getpid(), 9)"
     )
@@ -285,9 +285,9 @@ COMMAND = """
 import sys
 from functools import partial
 from bench import cli, experiments as suites
-from bench.harness import isolation, run
-from bench.experiments import Block, Measured
-from bench.experiments.robots import measurement as robots
+from plumbob.bench.harness import isolation, run
+from plumbob.bench.experiments import Block, Measured
+from plumbob.bench.experiments.robots import measurement as robots
 isolation._START = "raise SystemExit(3)"
 import dying_jobs
 
@@ -302,7 +302,7 @@ cli.main(["bench", "ik", "--quick", "-o", sys.argv[1]])
 
 
 def test_the_command_survives_a_worker_that_dies_before_it_reads_its_job(jobs, tmp_path):
-    from bench.harness.record import RecordFile
+    from plumbob.bench.harness.record import RecordFile
 
     done = subprocess.run(
         [sys.executable, "-c", COMMAND.format(load=LARGE), str(tmp_path)],

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from crosscheck import samples
-from crosscheck.mass_spring import balance_residual
-from crosscheck.tolerances import BALANCE
-from reference.implicit_euler import ImplicitEuler
+from plumbob.crosscheck import samples
+from plumbob.crosscheck.mass_spring import balance_residual
+from plumbob.crosscheck.tolerances import BALANCE
+from plumbob.reference.implicit_euler import ImplicitEuler
 
 CASES = range(4)  # one pin and two, ropes in odd cases, and ends that coincide
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.child_process import PipedProcess, kill_group
+from plumbob.crosscheck.child_process import PipedProcess, kill_group
 
-ECHO = "import crosscheck.child_process as c; p = c.attach({}); p.send((p.recv(), None)); p.recv()"
+ECHO = "import plumbob.crosscheck.child_process as c; p = c.attach({}); p.send((p.recv(), None)); p.recv()"
 
 
 @pytest.fixture

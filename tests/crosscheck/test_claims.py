@@ -10,15 +10,15 @@ import sys
 import numpy as np
 import pytest
 
-from bench.experiments.check.tables import verdicts
-from bench.harness.record import Record
-from bench.presentation.results import Results
-from crosscheck.claims import CLAIMS, MASS_SPRING_CLAIMS, run_claims, skeleton_claims
-from crosscheck.engines import SKELETON_ENGINES
-from crosscheck.robots.claims import ROBOT_CLAIMS
-from crosscheck.tolerances import ORDER, STIFFNESS
-from crosscheck.verdict import check_claim
-from reference.backend.compiled import set_backend
+from plumbob.bench.experiments.check.tables import verdicts
+from plumbob.bench.harness.record import Record
+from plumbob.bench.harness.results import Results
+from plumbob.crosscheck.claims import CLAIMS, MASS_SPRING_CLAIMS, run_claims, skeleton_claims
+from plumbob.crosscheck.engines import SKELETON_ENGINES
+from plumbob.crosscheck.robots.claims import ROBOT_CLAIMS
+from plumbob.crosscheck.tolerances import ORDER, STIFFNESS
+from plumbob.crosscheck.verdict import check_claim
+from plumbob.reference.backend.compiled import set_backend
 
 # A chain and a tree, one pin and two.
 FEW = 2
@@ -140,8 +140,8 @@ def test_no_claim_hides_another_of_its_name():
 # Prints which claims are checked where neither engine makes a model; nothing is cached there.
 WITHOUT_ENGINES = """
 import mujoco, pinocchio
-from crosscheck.claims import CLAIMS
-from crosscheck.verdict import check_claim
+from plumbob.crosscheck.claims import CLAIMS
+from plumbob.crosscheck.verdict import check_claim
 
 class Missing:
     def __getattr__(self, name):

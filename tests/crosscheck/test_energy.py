@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from crosscheck import samples
-from crosscheck.mass_spring.energy import energy_series, mechanical_energy
-from crosscheck.mass_spring.integrators import SIMULATORS
+from plumbob.crosscheck import samples
+from plumbob.crosscheck.mass_spring.energy import energy_series, mechanical_energy
+from plumbob.crosscheck.mass_spring.integrators import SIMULATORS
 
 # Steps of an undamped spring, twelve to a radian.
 STEPS, SHARE = 600, 1 / 12

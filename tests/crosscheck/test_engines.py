@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from crosscheck import samples
-from crosscheck.engines import (
+from plumbob.crosscheck import samples
+from plumbob.crosscheck.engines import (
     SKELETON_ENGINES,
     MujocoFlex,
     MujocoJointChain,
@@ -12,14 +12,14 @@ from crosscheck.engines import (
     forward_kinematics_by,
     mujoco_mass_spring,
 )
-from crosscheck.engines.mujoco_bodies import add_point_mass
-from crosscheck.engines.skeleton_engine import coordinates
-from crosscheck.tolerances import STEP
-from reference import rotation
-from reference.implicit_euler import ImplicitEuler
-from reference.mass_spring import MassSpring, State
-from reference.scenes import lab_cloth
-from reference.skeleton import Skeleton
+from plumbob.crosscheck.engines.mujoco_bodies import add_point_mass
+from plumbob.crosscheck.engines.skeleton_engine import coordinates
+from plumbob.crosscheck.tolerances import STEP
+from plumbob.reference import rotation
+from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.mass_spring import MassSpring, State
+from plumbob.reference.scenes import lab_cloth
+from plumbob.reference.skeleton import Skeleton
 
 # Second differences of a step of 1e-6 m leave 1e-12; rounding over the step leaves 1e-10.
 DIFFERENCE_STEP = 1e-6

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from crosscheck.mass_spring import exact_step as module
-from crosscheck.mass_spring.exact_step import exact_step
-from reference import ImplicitEuler, scenes
+from plumbob.crosscheck.mass_spring import exact_step as module
+from plumbob.crosscheck.mass_spring.exact_step import exact_step
+from plumbob.reference import ImplicitEuler, scenes
 
 H = 1 / 30
 

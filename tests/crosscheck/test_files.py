@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from crosscheck.child_process import ChildProcess, LostError
-from crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
-from crosscheck.robots import comparisons, files, independent_bvh
-from crosscheck.robots.deviations import FRAME, INCLUDE
-from crosscheck.robots.files import (
+from plumbob.crosscheck.child_process import ChildProcess, LostError
+from plumbob.crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
+from plumbob.crosscheck.robots import comparisons, files, independent_bvh
+from plumbob.crosscheck.robots.deviations import FRAME, INCLUDE
+from plumbob.crosscheck.robots.files import (
     AGREES,
     DEVIATES,
     DIFFERS,
@@ -27,10 +27,10 @@ from crosscheck.robots.files import (
     compare,
     find,
 )
-from crosscheck.robots.sweep import sweep_in_parts
-from crosscheck.tolerances import POSITION
-from reference import Skeleton, rotation
-from reference.formats import bvh, mjcf
+from plumbob.crosscheck.robots.sweep import sweep_in_parts
+from plumbob.crosscheck.tolerances import POSITION
+from plumbob.reference import Skeleton, rotation
+from plumbob.reference.formats import bvh, mjcf
 
 ARM = """<robot name="arm"><link name="base"/><link name="arm"/>
 <joint name="j" type="revolute"><parent link="base"/><child link="arm"/>

@@ -5,14 +5,14 @@ from functools import partial
 import numpy as np
 import pytest
 
-from crosscheck import kinematics
-from crosscheck.claims import CLAIMS, skeleton_claims
-from crosscheck.engines import SKELETON_ENGINES
-from crosscheck.verdict import check_claim
-from reference import rotation
-from reference.inverse_kinematics import solve_ik
-from reference.kinematics import forward_kinematics
-from reference.skeleton import Pose, Skeleton
+from plumbob.crosscheck import kinematics
+from plumbob.crosscheck.claims import CLAIMS, skeleton_claims
+from plumbob.crosscheck.engines import SKELETON_ENGINES
+from plumbob.crosscheck.verdict import check_claim
+from plumbob.reference import rotation
+from plumbob.reference.inverse_kinematics import solve_ik
+from plumbob.reference.kinematics import forward_kinematics
+from plumbob.reference.skeleton import Pose, Skeleton
 
 # A chain and a tree; for IK a chain by two solvers.
 FEW = 2

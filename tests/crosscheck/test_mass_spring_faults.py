@@ -6,15 +6,15 @@ from functools import partial
 import numpy as np
 import pytest
 
-from crosscheck.claims import CLAIMS
-from crosscheck.mass_spring import balances, equilibria, integrators, lines, steps
-from crosscheck.mass_spring import forces as force_claims
-from crosscheck.mass_spring.claims import MASS_SPRING_CLAIMS
-from crosscheck.mass_spring.steps import damper_blocks, semi_implicit
-from crosscheck.verdict import check_claim
-from reference.explicit import symplectic_euler
-from reference.implicit_euler import ImplicitEuler
-from reference.mass_spring import (
+from plumbob.crosscheck.claims import CLAIMS
+from plumbob.crosscheck.mass_spring import balances, equilibria, integrators, lines, steps
+from plumbob.crosscheck.mass_spring import forces as force_claims
+from plumbob.crosscheck.mass_spring.claims import MASS_SPRING_CLAIMS
+from plumbob.crosscheck.mass_spring.steps import damper_blocks, semi_implicit
+from plumbob.crosscheck.verdict import check_claim
+from plumbob.reference.explicit import symplectic_euler
+from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.mass_spring import (
     MassSpring,
     State,
     damper_forces,
@@ -27,7 +27,7 @@ from reference.mass_spring import (
     spring_forces,
     stiffness_matrix,
 )
-from reference.sparse.assembly import BlockSum
+from plumbob.reference.sparse.assembly import BlockSum
 
 # One pin and two, and a spring whose ends coincide.
 FEW = 2

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from crosscheck.kinematics import full_reach
-from crosscheck.robots.comparisons import Differences, differences
-from crosscheck.robots.sweep import LinkKinematics, Sweep, reference_kinematics
-from reference import Skeleton
-from reference.formats import urdf
+from plumbob.crosscheck.kinematics import full_reach
+from plumbob.crosscheck.robots.comparisons import Differences, differences
+from plumbob.crosscheck.robots.sweep import LinkKinematics, Sweep, reference_kinematics
+from plumbob.reference import Skeleton
+from plumbob.reference.formats import urdf
 
 ARM = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/>
 <joint name="h" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>

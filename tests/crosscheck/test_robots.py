@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from crosscheck.engines import ROBOT_ENGINES, mujoco_robot, pinocchio_robot
-from crosscheck.engines.robot_engine import UnreadableError
-from crosscheck.robots import comparisons, models
-from crosscheck.robots.claims import ROBOT_CLAIMS, robot_claims
-from crosscheck.robots.comparisons import differences
-from crosscheck.robots.deviations import (
+from plumbob.crosscheck.engines import ROBOT_ENGINES, mujoco_robot, pinocchio_robot
+from plumbob.crosscheck.engines.robot_engine import UnreadableError
+from plumbob.crosscheck.robots import comparisons, models
+from plumbob.crosscheck.robots.claims import ROBOT_CLAIMS, robot_claims
+from plumbob.crosscheck.robots.comparisons import differences
+from plumbob.crosscheck.robots.deviations import (
     CLASS_ANCHOR,
     DEVIATIONS,
     FRAME,
@@ -27,11 +27,11 @@ from crosscheck.robots.deviations import (
     SHARED_REF,
     known_deviations,
 )
-from crosscheck.robots.models import CAUSES, CHARACTERS, IMMOBILE, ROBOTS, UNREAD, Model
-from crosscheck.robots.sweep import reference_kinematics, sweep
-from crosscheck.verdict import check_claim
-from reference import Articulation
-from reference.formats import FormatWarning, mjcf, urdf
+from plumbob.crosscheck.robots.models import CAUSES, CHARACTERS, IMMOBILE, ROBOTS, UNREAD, Model
+from plumbob.crosscheck.robots.sweep import reference_kinematics, sweep
+from plumbob.crosscheck.verdict import check_claim
+from plumbob.reference import Articulation
+from plumbob.reference.formats import FormatWarning, mjcf, urdf
 
 URDF = """<robot name="all">
   <link name="base"/><link name="wrist"/><link name="arm"/><link name="tool"/><link name="rail"/>
@@ -482,7 +482,7 @@ def test_differences_show_the_fault_of_an_adapter(fault, tmp_path, monkeypatch):
     engine, name, instead, (file, text) = ADAPTERS[fault]
     model = written(tmp_path, text, file)
     assert max(differences([sweep(engine, model)])) < 1e-14
-    monkeypatch.setattr(f"crosscheck.engines.{name}", instead, raising=False)
+    monkeypatch.setattr(f"plumbob.crosscheck.engines.{name}", instead, raising=False)
     sweep.cache_clear()
     assert max(differences([sweep(engine, model)])) > 0.01
     sweep.cache_clear()

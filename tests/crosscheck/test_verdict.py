@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from crosscheck.tolerances import Tolerance
-from crosscheck.verdict import Claim, Comparison, check_claim
+from plumbob.crosscheck.tolerances import Tolerance
+from plumbob.crosscheck.verdict import Claim, Comparison, check_claim
 
 TOLERANCE = Tolerance(1e-12, "made up")
 

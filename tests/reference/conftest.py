@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from reference import Articulation, Mimic, Skeleton, rotation
-from reference.mass_spring import MassSpring, State
+from plumbob.reference import Articulation, Mimic, Skeleton, rotation
+from plumbob.reference.mass_spring import MassSpring, State
 
 
 def random_tree(rng, joints, branching=True):

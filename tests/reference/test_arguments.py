@@ -3,7 +3,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from reference import arguments, rotation
+from plumbob.reference import arguments, rotation
 
 
 def test_lists_and_single_precision_become_contiguous_doubles():

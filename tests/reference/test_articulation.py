@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from reference import Articulation, Mimic, Skeleton, forward_kinematics, rotation
-from reference.articulation import KINDS, clamp_ball, swing_twist
+from plumbob.reference import Articulation, Mimic, Skeleton, forward_kinematics, rotation
+from plumbob.reference.articulation import KINDS, clamp_ball, swing_twist
 
 # Eight joints with offsets of a few metres, slides and free joints: some dozens of roundings.
 ROUNDING = 1e-13

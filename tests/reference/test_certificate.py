@@ -8,9 +8,9 @@ import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import rotation, scenes
-from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, certificate
-from reference.implicit_euler.certificate import (
+from plumbob.reference import rotation, scenes
+from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, certificate
+from plumbob.reference.implicit_euler.certificate import (
     Coverage,
     RoundingErrors,
     certify,
@@ -20,8 +20,8 @@ from reference.implicit_euler.certificate import (
     least_curvature,
     newton_length,
 )
-from reference.mass_spring import MassSpring, State
-from reference.sparse.linear_solver import factorize
+from plumbob.reference.mass_spring import MassSpring, State
+from plumbob.reference.sparse.linear_solver import factorize
 
 h = 0.05
 EPS = np.finfo(float).eps

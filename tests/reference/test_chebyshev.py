@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from reference import ImplicitEuler, scenes
-from reference.implicit_euler import chebyshev
-from reference.implicit_euler.chebyshev import PLAIN, Acceleration
+from plumbob.reference import ImplicitEuler, scenes
+from plumbob.reference.implicit_euler import chebyshev
+from plumbob.reference.implicit_euler.chebyshev import PLAIN, Acceleration
 
 h = 1 / 30
 

@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     IK_SOLVERS,
     STEP_SOLVERS,
     Articulation,

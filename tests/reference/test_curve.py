@@ -4,7 +4,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from reference import curves, resample
+from plumbob.reference import curves, resample
 
 # Dividing a gap rounds: each spacing is met but for a few eps of the coordinates.
 ROUNDING = 1e-12

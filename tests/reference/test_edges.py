@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     Articulation,
     Mimic,
     Outcome,
@@ -16,12 +16,16 @@ from reference import (
     solve_ik,
     tracking,
 )
-from reference.formats import urdf
-from reference.implicit_euler.certificate import Certificate, Coverage
-from reference.inverse_kinematics.box_step import activate_limits, new_task_system, take_step
-from reference.inverse_kinematics.mechanism import new_data
-from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.restarts import (
+from plumbob.reference.formats import urdf
+from plumbob.reference.implicit_euler.certificate import Certificate, Coverage
+from plumbob.reference.inverse_kinematics.box_step import (
+    activate_limits,
+    new_task_system,
+    take_step,
+)
+from plumbob.reference.inverse_kinematics.mechanism import new_data
+from plumbob.reference.inverse_kinematics.reduce import prepare
+from plumbob.reference.inverse_kinematics.restarts import (
     COST,
     GIVEN_UP,
     SETTLED,
@@ -31,8 +35,8 @@ from reference.inverse_kinematics.restarts import (
     most_promising,
     new_progress,
 )
-from reference.inverse_kinematics.solve_mechanism import mechanism_criteria
-from reference.judging import judge_pose
+from plumbob.reference.inverse_kinematics.solve_mechanism import mechanism_criteria
+from plumbob.reference.judging import judge_pose
 
 # ---- limits
 

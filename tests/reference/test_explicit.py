@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from reference.backend import compiled
-from reference.explicit import runge_kutta, symplectic_euler
-from reference.mass_spring import MassSpring, State, forces
+from plumbob.reference.backend import compiled
+from plumbob.reference.explicit import runge_kutta, symplectic_euler
+from plumbob.reference.mass_spring import MassSpring, State, forces
 
 INTEGRATORS = [symplectic_euler, runge_kutta]
 

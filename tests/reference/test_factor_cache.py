@@ -5,11 +5,11 @@ import gc
 import numpy as np
 import pytest
 
-from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, factor_cache
-from reference.implicit_euler.objective import Objective, global_matrix
-from reference.mass_spring import State
-from reference.sparse import factor
-from reference.sparse.linear_solver import NotPositiveDefiniteError
+from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, factor_cache
+from plumbob.reference.implicit_euler.objective import Objective, global_matrix
+from plumbob.reference.mass_spring import State
+from plumbob.reference.sparse import factor
+from plumbob.reference.sparse.linear_solver import NotPositiveDefiniteError
 
 h = 0.05
 

@@ -6,14 +6,14 @@ import itertools
 import numpy as np
 import pytest
 
-from reference import rotation, scenes
-from reference.backend import compiled
-from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
-from reference.implicit_euler.chebyshev import PLAIN
-from reference.implicit_euler.line_search import line_search
-from reference.implicit_euler.newton_cg import _product
-from reference.implicit_euler.objective import Objective, global_matrix
-from reference.mass_spring import (
+from plumbob.reference import rotation, scenes
+from plumbob.reference.backend import compiled
+from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from plumbob.reference.implicit_euler.chebyshev import PLAIN
+from plumbob.reference.implicit_euler.line_search import line_search
+from plumbob.reference.implicit_euler.newton_cg import _product
+from plumbob.reference.implicit_euler.objective import Objective, global_matrix
+from plumbob.reference.mass_spring import (
     MassSpring,
     State,
     damping_matrix,
@@ -24,7 +24,7 @@ from reference.mass_spring import (
     potential_energy,
     spring_blocks,
 )
-from reference.outcome import Outcome
+from plumbob.reference.outcome import Outcome
 
 h = 0.05
 # A central difference is off by DX² times the third derivative and by precision / DX.

@@ -5,9 +5,9 @@ import pytest
 from drawn_trees import TREES, drawn
 from hypothesis import given
 
-from reference import Articulation, Mimic, Skeleton, forward_kinematics, rotation
-from reference.articulation import KINDS
-from reference.jacobians import difference, integrate, jacobian, jacobians
+from plumbob.reference import Articulation, Mimic, Skeleton, forward_kinematics, rotation
+from plumbob.reference.articulation import KINDS
+from plumbob.reference.jacobians import difference, integrate, jacobian, jacobians
 
 # Central differences over a step of 1e-5 are off by 1e-10 of a few metres, and rounding by 1e-11.
 STEP, DIFFERENCE = 1e-5, 1e-8

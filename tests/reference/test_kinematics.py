@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     Skeleton,
     forward_kinematics,
     kinematics,
@@ -10,8 +10,8 @@ from reference import (
     scenes,
     set_num_threads,
 )
-from reference.backend import compiled
-from reference.backend.simd.lanes import LANES
+from plumbob.reference.backend import compiled
+from plumbob.reference.backend.simd.lanes import LANES
 
 # Six joints: a dozen products and sums of numbers of order one.
 ROUNDING = 1e-14

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from reference import rotation
-from reference.backend import compiled
-from reference.mass_spring import (
+from plumbob.reference import rotation
+from plumbob.reference.backend import compiled
+from plumbob.reference.mass_spring import (
     MassSpring,
     State,
     damper_forces,

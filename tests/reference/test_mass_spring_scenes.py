@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from reference import scenes
-from reference.mass_spring import forces, lengths, stretches
+from plumbob.reference import scenes
+from plumbob.reference.mass_spring import forces, lengths, stretches
 
 SCENES = [
     scenes.lab_cloth,

@@ -3,10 +3,17 @@
 import numpy as np
 import pytest
 
-from reference import scenes
-from reference.explicit import runge_kutta, symplectic_euler
-from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
-from reference.mass_spring import MassSpring, State, damping_matrix, derivation, forces, lengths
+from plumbob.reference import scenes
+from plumbob.reference.explicit import runge_kutta, symplectic_euler
+from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from plumbob.reference.mass_spring import (
+    MassSpring,
+    State,
+    damping_matrix,
+    derivation,
+    forces,
+    lengths,
+)
 
 h = 0.02
 DISPLACEMENT = np.array([0.3, -0.1, 0.2])

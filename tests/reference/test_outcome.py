@@ -2,7 +2,7 @@
 
 import pytest
 
-from reference.outcome import Outcome
+from plumbob.reference.outcome import Outcome
 
 
 def test_the_outcomes_are_those_of_the_interface():

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, certificate
-from reference.implicit_euler.certificate import (
+from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, certificate
+from plumbob.reference.implicit_euler.certificate import (
     RoundingErrors,
     certify,
     laplacian_norm,
     rounding_errors,
 )
-from reference.mass_spring import (
+from plumbob.reference.mass_spring import (
     MassSpring,
     State,
     damper_forces,

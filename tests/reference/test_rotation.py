@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import rotation
-from reference.quaternion import half_angle, perpendicular
+from plumbob.reference import rotation
+from plumbob.reference.quaternion import half_angle, perpendicular
 
 # Products of unit quaternions round to a few eps; 32 allows a dozen operations.
 ROUNDING = 32 * np.finfo(float).eps

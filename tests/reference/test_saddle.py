@@ -3,9 +3,17 @@
 import numpy as np
 import pytest
 
-from reference import STEP_SOLVERS, ImplicitEuler, MassSpring, Outcome, State, judge_step, scenes
-from reference.implicit_euler.certificate import Coverage
-from reference.sparse import CholeskyFactor
+from plumbob.reference import (
+    STEP_SOLVERS,
+    ImplicitEuler,
+    MassSpring,
+    Outcome,
+    State,
+    judge_step,
+    scenes,
+)
+from plumbob.reference.implicit_euler.certificate import Coverage
+from plumbob.reference.sparse import CholeskyFactor
 
 SEEDS = range(20)
 OTHERS = [name for name in STEP_SOLVERS if name != "newton"]

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from reference import Skeleton
+from plumbob.reference import Skeleton
 
 FORK = {"parents": [-1, 0, 1, 1, 0], "offsets": np.arange(15.0).reshape(5, 3)}
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from reference import scenes
-from reference.implicit_euler import ImplicitEuler
-from reference.mass_spring import (
+from plumbob.reference import scenes
+from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.mass_spring import (
     MassSpring,
     State,
     damper_forces,

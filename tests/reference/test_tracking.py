@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     IK_SOLVERS,
     Articulation,
     Outcome,

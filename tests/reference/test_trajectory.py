@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     IK_SOLVERS,
     Articulation,
     Mimic,
@@ -21,23 +21,23 @@ from reference import (
     track,
     trajectory,
 )
-from reference.articulation import BALL
-from reference.inverse_kinematics.mechanism import TARGET
-from reference.inverse_kinematics.problem import checked_targets
-from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.solve import balls, target_rows
-from reference.jacobians import difference, integrate, jacobian
-from reference.trajectory import riemannian_newton
-from reference.trajectory.augmented_lagrangian import joint_limits
-from reference.trajectory.cyclic_banded import CyclicBandedSystem
-from reference.trajectory.problem import (
+from plumbob.reference.articulation import BALL
+from plumbob.reference.inverse_kinematics.mechanism import TARGET
+from plumbob.reference.inverse_kinematics.problem import checked_targets
+from plumbob.reference.inverse_kinematics.reduce import prepare
+from plumbob.reference.inverse_kinematics.solve import balls, target_rows
+from plumbob.reference.jacobians import difference, integrate, jacobian
+from plumbob.reference.trajectory import riemannian_newton
+from plumbob.reference.trajectory.augmented_lagrangian import joint_limits
+from plumbob.reference.trajectory.cyclic_banded import CyclicBandedSystem
+from plumbob.reference.trajectory.problem import (
     errors_and_jacobians,
     near_singular,
     new_problem,
     project,
 )
-from reference.trajectory.problem import integrate as integrate_step
-from reference.trajectory.riemannian_newton import (
+from plumbob.reference.trajectory.problem import integrate as integrate_step
+from plumbob.reference.trajectory.riemannian_newton import (
     add_limits,
     cost,
     project_derivatives,

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from reference import rotation, scenes
-from reference.backend import compiled
-from reference.implicit_euler import ImplicitEuler
-from reference.mass_spring import State
-from reference.wind import wind_forces
+from plumbob.reference import rotation, scenes
+from plumbob.reference.backend import compiled
+from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.mass_spring import State
+from plumbob.reference.wind import wind_forces
 
 WIND = np.array([3.0, -1.0, 2.0])
 BOTH = {"drag": 1.1, "lift": 0.4}

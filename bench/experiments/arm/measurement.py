@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
-from reference import IK_SOLVERS, scenes, track
+from plumbob.reference import IK_SOLVERS, scenes, track
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference import Articulation, Skeleton, curves, resample, scenes
-from reference.arguments import FloatArray
+from plumbob.reference import Articulation, Skeleton, curves, resample, scenes
+from plumbob.reference.arguments import FloatArray
 
 from ..chain.problem import TargetsForSkeleton, unit
 

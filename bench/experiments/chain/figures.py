@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from ...figures.chart import GREATER, SPAN, Axis, Chart, Panel, Series, series
+from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.figures.chart import GREATER, SPAN, Axis, Chart, Panel, Series, series
-from ...presentation.figures.sketch import Sketch, chart_sketch
-from ...presentation.results import Results, by_problem
-from ...presentation.tables.columns import iterations_said
-from ...presentation.tables.table import in_unit
+from ...harness.results import Results, by_problem
+from ...tables.columns import iterations_said
+from ...tables.table import in_unit
 from .. import arm
 from . import BEYOND, CHAIN
 

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.engines import SKELETON_ENGINES
-from crosscheck.engines.skeleton_engine import coordinates
-from reference import IK_SOLVERS, Skeleton, forward_kinematics, solve_ik
-from reference.arguments import FloatArray
+from plumbob.crosscheck.engines import SKELETON_ENGINES
+from plumbob.crosscheck.engines.skeleton_engine import coordinates
+from plumbob.reference import IK_SOLVERS, Skeleton, forward_kinematics, solve_ik
+from plumbob.reference.arguments import FloatArray
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale

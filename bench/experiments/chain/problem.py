@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reference import Skeleton, scenes
-from reference.arguments import FloatArray, choice
+from plumbob.reference import Skeleton, scenes
+from plumbob.reference.arguments import FloatArray, choice
 
 from . import BEYOND
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, by_problem, label, solvers
-from ...presentation.tables.columns import iterations_said, largest
+from ...harness.results import Results, by_problem, label, solvers
+from ...tables.columns import iterations_said, largest
 from .. import arm
 from ..closed_curves import COHERENT, COLD, CURVE, DRIFT, WARM
 from . import BEYOND, CHAIN

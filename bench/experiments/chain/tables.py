@@ -8,9 +8,9 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.entered import entered
-from ...presentation.results import counted, label, leaders, settings
-from ...presentation.tables.columns import (
+from ...harness.results import counted, label, leaders, settings
+from ...report.entered import entered
+from ...tables.columns import (
     LARGEST,
     MEDIAN,
     P95,
@@ -31,8 +31,8 @@ from ...presentation.tables.columns import (
     titled,
     words_in,
 )
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from ..closed_curves import COHERENT, COLD, WARM
 from . import figures, readings
 from .readings import MODES, RIVALS, STRAIGHT, Motions, Pair, Straightness

@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from crosscheck.engines.file_kind import FRAGMENT
-from crosscheck.robots.files import (
+from plumbob.crosscheck.engines.file_kind import FRAGMENT
+from plumbob.crosscheck.robots.files import (
     AGREES,
     DEVIATES,
     DIFFERS,
@@ -20,8 +20,8 @@ from crosscheck.robots.files import (
     Reading,
 )
 
-from ...presentation.tables.columns import text
-from ...presentation.tables.table import Column, Summary, Table, cells, words
+from ...tables.columns import text
+from ...tables.table import Column, Summary, Table, cells, words
 
 OUTCOMES = (AGREES, DIFFERS, DEVIATES, UNREAD, REFUSED, NEITHER, LOST)
 NAMES = tuple(dict.fromkeys(engine for engines in ENGINES.values() for engine in engines))

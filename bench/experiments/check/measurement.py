@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from functools import partial
 
-from crosscheck.claims import CLAIMS, run_claims
+from plumbob.crosscheck.claims import CLAIMS, run_claims
 
 from ...harness.block import Block, Measured, Scale
 

@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 
-from reference.arguments import distinct_texts
+from plumbob.reference.arguments import distinct_texts
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...harness.results import listed
 from ...peers.registry import MUJOCO, PINOCCHIO
-from ...presentation.results import listed
-from ...presentation.tables.columns import folded, number, text
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Summary, in_unit, words
+from ...tables.columns import folded, number, text
+from ...tables.layout import Layout
+from ...tables.table import Summary, in_unit, words
 
 # The claims that rest on one name it in the words of either side.
 ENGINES = (PINOCCHIO, MUJOCO)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rotation, track
-from reference.arguments import FloatArray
+from plumbob.reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rotation, track
+from plumbob.reference.arguments import FloatArray
 
 from ...harness.block import Block, Measured, Scale
 from ..arm.problem import FollowedCurve

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reference import curves, resample, scenes
-from reference.formats import urdf
+from plumbob.reference import curves, resample, scenes
+from plumbob.reference.formats import urdf
 
 from ..arm.problem import (
     CUSTOM,

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from ...figures.chart import Axis, Chart, Panel, Series, series
+from ...figures.sketch import Sketch, chart_sketch
 from ...harness.record import Record
-from ...presentation.figures.chart import Axis, Chart, Panel, Series, series
-from ...presentation.figures.sketch import Sketch, chart_sketch
-from ...presentation.results import Results, by_problem
+from ...harness.results import Results, by_problem
 from . import ONE_STEP
 
 

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.mass_spring.exact_step import exact_step
-from reference import ImplicitEuler, State
-from reference.arguments import FloatArray
-from reference.mass_spring import MassSpring, damper_forces, lengths, spring_forces
+from plumbob.crosscheck.mass_spring.exact_step import exact_step
+from plumbob.reference import ImplicitEuler, State
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.mass_spring import MassSpring, damper_forces, lengths, spring_forces
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale

@@ -3,7 +3,7 @@
 import functools
 from dataclasses import dataclass
 
-from reference import ImplicitEuler, MassSpring, State, scenes
+from plumbob.reference import ImplicitEuler, MassSpring, State, scenes
 
 STIFFNESS = 100.0
 FACTORS = (1, 10, 100)

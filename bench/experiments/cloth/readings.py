@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference import Outcome
+from plumbob.reference import Outcome
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, label
-from ...presentation.tables.columns import spread_of
-from ...presentation.tables.table import words
+from ...harness.results import Results, label
+from ...tables.columns import spread_of
+from ...tables.table import words
 from ..cloth_peers import DECADES, NEEDED
 from . import DAMPERS, FEW, ONE_STEP, SWING
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import counted, listed, settings
-from ...presentation.tables.columns import (
+from ...harness.results import counted, listed, settings
+from ...tables.columns import (
     LARGEST,
     MEDIAN,
     SOLVER,
@@ -20,8 +20,8 @@ from ...presentation.tables.columns import (
     text,
     words_in,
 )
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import INTERVAL, Column, Summary, words
+from ...tables.layout import Layout
+from ...tables.table import INTERVAL, Column, Summary, words
 from ..cloth_peers import DECADES, SOLVED, TARGETS
 from ..pictures import figures as pictures
 from . import figures, readings

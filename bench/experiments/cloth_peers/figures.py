@@ -1,9 +1,9 @@
 """Work-precision diagrams: the error of every solver against its time for a frame."""
 
-from ...presentation.figures.chart import Axis, Chart, Panel, Series, series
-from ...presentation.figures.sketch import Sketch, chart_sketch
-from ...presentation.results import Results
-from ...presentation.tables.layout import Figure
+from ...figures.chart import Axis, Chart, Panel, Series, series
+from ...figures.sketch import Sketch, chart_sketch
+from ...harness.results import Results
+from ...tables.layout import Figure
 from . import MOTION, ONE_STEP
 from .readings import Point, points
 

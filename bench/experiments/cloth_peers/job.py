@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference import MassSpring, State, scenes
-from reference.mass_spring import SystemArrays
+from plumbob.reference import MassSpring, State, scenes
+from plumbob.reference.mass_spring import SystemArrays
 
 from ...harness.stopwatch import Budget, round_trips, timed
 from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe

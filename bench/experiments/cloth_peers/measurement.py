@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from reference import ImplicitEuler, MassSpring, State
+from plumbob.reference import ImplicitEuler, MassSpring, State
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
@@ -363,7 +363,7 @@ def liu_2013(solver: str) -> Measured:
     settings = {"solver": solver, **published.LIU_2013[solver].settings}
     shape = Shape(1, REPEATS, 5.0, published.LIU_2013_FRAME)
     outcome = worker_process().perform(
-        job("bench.peers.cloth.step_solvers", cloth, settings, shape)
+        job("plumbob.bench.peers.cloth.step_solvers", cloth, settings, shape)
     )
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from crosscheck.mass_spring.equilibria import equilibrium
-from reference import MassSpring, State, scenes, symplectic_euler
-from reference.arguments import FloatArray
-from reference.mass_spring import stiffness_matrix
+from plumbob.crosscheck.mass_spring.equilibria import equilibrium
+from plumbob.reference import MassSpring, State, scenes, symplectic_euler
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.mass_spring import stiffness_matrix
 
 SIDE, MASS, GRAVITY = 2.0, 1.0, 9.81
 STIFFNESSES = (1e2, 1e3, 1e4)

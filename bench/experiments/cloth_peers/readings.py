@@ -7,9 +7,9 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...harness.results import Results
 from ...peers import registry
-from ...presentation.results import Results
-from ...presentation.tables.table import words
+from ...tables.table import words
 from ..published import problem as published
 from . import LIU, MOTION, ONE_STEP, STABILITY
 

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ...harness.record import Record
-from ...presentation.entered import entered
-from ...presentation.results import Results, label, listed
-from ...presentation.tables.columns import SOLVER, folded, greatest, least, number, text, words_in
-from ...presentation.tables.layout import Layout, source
-from ...presentation.tables.table import Column, Summary, Table, words
+from ...harness.results import Results, label, listed
+from ...report.entered import entered
+from ...tables.columns import SOLVER, folded, greatest, least, number, text, words_in
+from ...tables.layout import Layout, source
+from ...tables.table import Column, Summary, Table, words
 from ..published import problem as published
 from . import MISSING, TARGETS, figures, readings
 from .measurement import AMPLITUDE, BISECTION, GROWTH, REPEATS, STABILITY_SIZE, STABILITY_STEPS

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.mass_spring.exact_step import ExactStep, exact_step
-from reference import ImplicitEuler, State, runge_kutta
-from reference.arguments import FloatArray
+from plumbob.crosscheck.mass_spring.exact_step import ExactStep, exact_step
+from plumbob.reference import ImplicitEuler, State, runge_kutta
+from plumbob.reference.arguments import FloatArray
 
 from ...harness import metrics
 from .problem import FRAME, FallingCloth, explicit_substeps, falling_cloth

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from reference import ImplicitEuler, MassSpring, State, scenes
-from reference.arguments import FloatArray
-from reference.backend.compiled import Kernel
-from reference.implicit_euler.factor_cache import clear as clear_factor_cache
-from reference.implicit_euler.factor_cache import prefactored
-from reference.implicit_euler.objective import global_matrix
-from reference.sparse import CholeskyFactor
-from reference.sparse.linear_solver import factorize
+from plumbob.reference import ImplicitEuler, MassSpring, State, scenes
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.backend.compiled import Kernel
+from plumbob.reference.implicit_euler.factor_cache import clear as clear_factor_cache
+from plumbob.reference.implicit_euler.factor_cache import prefactored
+from plumbob.reference.implicit_euler.objective import global_matrix
+from plumbob.reference.sparse import CholeskyFactor
+from plumbob.reference.sparse.linear_solver import factorize
 
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import in_a_fresh_process

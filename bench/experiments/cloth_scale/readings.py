@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...harness.results import Results
 from ...peers import registry
-from ...presentation.results import Results
 
 OURS = registry.SUPERNODAL.name
 LABELS = {library.name: library.label for library in registry.FACTORS}

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from ...presentation.results import settings
-from ...presentation.tables.columns import folded, least, text
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...harness.results import settings
+from ...tables.columns import folded, least, text
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from .readings import OURS, Scaled, cloths, ratios
 
 

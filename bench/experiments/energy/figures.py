@@ -1,8 +1,8 @@
 """The energy that every integrator leaves, against the time."""
 
-from ...presentation.figures.chart import GREATER, Axis, Chart, Panel, series
-from ...presentation.figures.sketch import Sketch, chart_sketch
-from ...presentation.results import Results, by_problem
+from ...figures.chart import GREATER, Axis, Chart, Panel, series
+from ...figures.sketch import Sketch, chart_sketch
+from ...harness.results import Results, by_problem
 
 
 def energy(results: Results) -> Sketch | None:

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator
 from functools import partial
 
-from crosscheck.mass_spring.energy import energy_series
-from crosscheck.mass_spring.integrators import SIMULATORS, Simulation, implicit
-from reference import MassSpring
+from plumbob.crosscheck.mass_spring.energy import energy_series
+from plumbob.crosscheck.mass_spring.integrators import SIMULATORS, Simulation, implicit
+from plumbob.reference import MassSpring
 
 from ...harness.block import Block, Measured, Scale
 from .problem import DAMPINGS, H, long_swing

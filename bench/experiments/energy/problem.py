@@ -3,9 +3,9 @@
 import functools
 from dataclasses import dataclass
 
-from crosscheck.mass_spring.energy import mechanical_energy
-from crosscheck.mass_spring.equilibria import equilibrium
-from reference import MassSpring, State, scenes, symplectic_euler
+from plumbob.crosscheck.mass_spring.energy import mechanical_energy
+from plumbob.crosscheck.mass_spring.equilibria import equilibrium
+from plumbob.reference import MassSpring, State, scenes, symplectic_euler
 
 H = 1 / 60
 SIZE = 5

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from functools import partial
 
 from ...harness.record import Record
-from ...presentation.results import label, settings
-from ...presentation.tables.columns import lengths_of_steps, text, titled
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, in_unit, words
+from ...harness.results import label, settings
+from ...tables.columns import lengths_of_steps, text, titled
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, in_unit, words
 from . import figures, readings
 from .problem import DAMPINGS, SIZE
 

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.mass_spring import balance_residual
-from crosscheck.mass_spring.exact_step import ExactStep, exact_step
-from reference import STEP_SOLVERS, ImplicitEuler
-from reference.arguments import FloatArray
-from reference.implicit_euler.certificate import Certificate, certify
-from reference.implicit_euler.objective import Objective
+from plumbob.crosscheck.mass_spring import balance_residual
+from plumbob.crosscheck.mass_spring.exact_step import ExactStep, exact_step
+from plumbob.reference import STEP_SOLVERS, ImplicitEuler
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.implicit_euler.certificate import Certificate, certify
+from plumbob.reference.implicit_euler.objective import Objective
 
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry

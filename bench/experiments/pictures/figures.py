@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from ...presentation.figures.sketch import Sketch
-from ...presentation.results import Results
+from ...figures.sketch import Sketch
+from ...harness.results import Results
 from . import ARM, CLOTH
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def falling_cloth(results: Results) -> Sketch | None:
 
 
 def _draw_arms(data: Any) -> "Figure":
-    from ...presentation.figures.drawing import canvas, power
+    from ...figures.drawing import canvas, power
 
     figure, axes = canvas(5.2, len(data), sharex=True, sharey=True)
     for ax, (evened, curve, spacing, ghosts) in zip(axes, data, strict=True):
@@ -67,8 +67,8 @@ def _draw_arms(data: Any) -> "Figure":
 
 
 def _draw_cloths(data: Any) -> "Figure":
-    from ...presentation.figures.drawing import canvas
-    from ...presentation.figures.scene_drawing import draw_cloth
+    from ...figures.drawing import canvas
+    from ...figures.scene_drawing import draw_cloth
 
     moments, times, pinned = data
     rows = -(-len(times) // COLUMNS)
@@ -88,7 +88,7 @@ def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "ScalarMappable"
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 
-    from ...presentation.figures.view import ARM_VIEW, seen
+    from ...figures.view import ARM_VIEW, seen
 
     scale = ScalarMappable(LogNorm(1e-4, 1), mpl.colormaps["viridis"].resampled(SHADES))
     points, shades = np.stack(seen(curve[:-1], ARM_VIEW)[:2], axis=-1), scale.to_rgba(spacing)
@@ -99,7 +99,7 @@ def _points_by_spacing(ax: "Axes", curve: Any, spacing: Any) -> "ScalarMappable"
 
 
 def _ghosts(ax: "Axes", ghosts: Any) -> None:
-    from ...presentation.figures.scene_drawing import draw_arm
+    from ...figures.scene_drawing import draw_arm
 
     for joints, alpha in zip(ghosts, [0.12] * (len(ghosts) - 1) + [0.9], strict=True):
         draw_arm(ax, joints, alpha)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from reference import IK_SOLVERS, ImplicitEuler, scenes, track
+from plumbob.reference import IK_SOLVERS, ImplicitEuler, scenes, track
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...figures.view import ARM_VIEW, CLOTH_VIEW
 from ...harness.record import Record
-from ...presentation.figures.view import ARM_VIEW, CLOTH_VIEW
-from ...presentation.motion.motion import Moving, Scene
-from ...presentation.results import Results, counted, label
+from ...harness.results import Results, counted, label
+from ...motion.motion import Moving, Scene
 from . import ARM_MOTION, CLOTH_MOTION
 
 # So many motions of a kind are on the page, those of entrants first: a cloth costs it some 60 kB.

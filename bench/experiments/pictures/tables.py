@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import label, listed, settings, solvers
-from ...presentation.tables.columns import LARGEST, MEDIAN, spread, spread_of, text, words_in
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...harness.results import label, listed, settings, solvers
+from ...tables.columns import LARGEST, MEDIAN, spread, spread_of, text, words_in
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from . import ARM, figures
 
 

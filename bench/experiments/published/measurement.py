@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from reference import scenes, solve_ik
+from plumbob.reference import scenes, solve_ik
 
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import Results, label, settings
-from ...presentation.tables.columns import (
+from ...harness.results import Results, label, settings
+from ...tables.columns import (
     claimed,
     effort,
     iterations_said,
@@ -18,8 +18,8 @@ from ...presentation.tables.columns import (
     text,
     words_in,
 )
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import INTERVAL, Cell, Column, Summary, in_unit, listing, words
+from ...tables.layout import Layout
+from ...tables.table import INTERVAL, Cell, Column, Summary, in_unit, listing, words
 from ..robots.readings import RULE, cut, solved, total
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from functools import partial
 
-from crosscheck.engines import ROBOT_ENGINES
-from crosscheck.engines.robot_engine import UnreadableError
-from crosscheck.robots.comparisons import differences
-from crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
-from crosscheck.robots.sweep import CONFIGURATIONS, sweep
+from plumbob.crosscheck.engines import ROBOT_ENGINES
+from plumbob.crosscheck.engines.robot_engine import UnreadableError
+from plumbob.crosscheck.robots.comparisons import differences
+from plumbob.crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
+from plumbob.crosscheck.robots.sweep import CONFIGURATIONS, sweep
 
 from ...harness.block import Block, Measured, Scale
 from . import peers

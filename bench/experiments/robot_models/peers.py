@@ -6,9 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from crosscheck import samples
-from reference import forward_kinematics, rotation
-from reference.formats import mjcf, urdf
+from plumbob.crosscheck import samples
+from plumbob.reference import forward_kinematics, rotation
+from plumbob.reference.formats import mjcf, urdf
 
 from ...harness.block import Block, Measured
 from ...harness.worker import Calculation

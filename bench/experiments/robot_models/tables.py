@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from functools import partial
 
 from ...harness.record import Record
+from ...harness.results import Results, by_problem, counted, listed, problems, settings
 from ...peers import registry
-from ...presentation.results import Results, by_problem, counted, listed, problems, settings
-from ...presentation.tables.columns import text, titled
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...tables.columns import text, titled
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from . import PEERS
 
 SIZES = {"links": "links", "moving joints": "joints", "freedoms": "freedoms"}

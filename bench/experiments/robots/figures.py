@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...figures.chart import GREATER, Axis, Chart, Panel, Series, series
+from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.figures.chart import GREATER, Axis, Chart, Panel, Series, series
-from ...presentation.figures.sketch import Sketch, chart_sketch
-from ...presentation.results import Results
-from ...presentation.tables.layout import Figure
+from ...harness.results import Results
+from ...tables.layout import Figure
 from . import readings
 
 

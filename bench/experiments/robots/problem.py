@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reference.arguments import FloatArray, choice
+from plumbob.reference.arguments import FloatArray, choice
 
 PACKAGE = "example-robot-data"
 _FOLDER = "cmeel.prefix/share/example-robot-data/robots"

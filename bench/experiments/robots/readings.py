@@ -15,11 +15,11 @@ import numpy as np
 from ...harness import metrics
 from ...harness.metrics import Floats, Ranking
 from ...harness.record import Record
+from ...harness.results import Results, settings, steadiness
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
-from ...presentation.results import Results, settings, steadiness
-from ...presentation.tables.columns import words_in
-from ...presentation.tables.table import words
+from ...tables.columns import words_in
+from ...tables.table import words
 from . import LIMIT_TOLERANCE, REACHABLE
 
 KINDS = {ONE_START: "one_start", RESTARTS: "restarts"}

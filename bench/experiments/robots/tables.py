@@ -13,10 +13,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
+from ...harness.results import Results, leaders, listed
 from ...peers import registry
 from ...peers.registry import Entry, Peer
-from ...presentation.results import Results, leaders, listed
-from ...presentation.tables.columns import (
+from ...tables.columns import (
     LARGEST,
     MEDIAN,
     at,
@@ -29,8 +29,8 @@ from ...presentation.tables.columns import (
     titled,
     words_in,
 )
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Cell, Column, Summary, in_unit, listing, words
+from ...tables.layout import Layout
+from ...tables.table import Cell, Column, Summary, in_unit, listing, words
 from . import REACHABLE, UNREACHABLE, figures
 from .overall.tables import aggregate, problem_map
 from .readings import (

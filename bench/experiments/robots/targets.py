@@ -9,7 +9,7 @@ import functools
 
 import numpy as np
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ..chain.problem import random_rotations, unit
 from .evaluate import Evaluator, Targets, evaluator_of

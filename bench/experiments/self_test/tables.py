@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from functools import partial
 
 from ...harness.record import Record
-from ...presentation.results import Results
-from ...presentation.tables.columns import folded, number, text, titled
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary
+from ...harness.results import Results
+from ...tables.columns import folded, number, text, titled
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary
 
 Group = tuple[str, list[Record]]
 # So many laws have a column of their own, those that most faults break.

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from reference.arguments import FloatArray
-from reference.backend.compiled import Kernel
-from reference.backend.threads import in_slices
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.backend.compiled import Kernel
+from plumbob.reference.backend.threads import in_slices
 
 from ...harness.record import Key, key
 from ...peers import registry

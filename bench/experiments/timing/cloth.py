@@ -7,10 +7,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from crosscheck.engines import MujocoMassSpring
-from reference import ImplicitEuler, State, symplectic_euler
-from reference.implicit_euler.factor_cache import global_factor
-from reference.sparse import CholeskyFactor
+from plumbob.crosscheck.engines import MujocoMassSpring
+from plumbob.reference import ImplicitEuler, State, symplectic_euler
+from plumbob.reference.implicit_euler.factor_cache import global_factor
+from plumbob.reference.sparse import CholeskyFactor
 
 from ..cloth.measurement import MIDDLE, converged_motion, motion
 from ..cloth.problem import ClothSwing, cloth_swing

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from ...figures.chart import MARKS, Axis, Chart, Panel, Series, series
+from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.figures.chart import MARKS, Axis, Chart, Panel, Series, series
-from ...presentation.figures.sketch import Sketch, chart_sketch
-from ...presentation.results import Results, by_problem, solvers
-from ...presentation.tables.layout import Figure
+from ...harness.results import Results, by_problem, solvers
+from ...tables.layout import Figure
 
 
 def timing(subject: str, unit: str, scale: float, title: str) -> Figure:

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
-from crosscheck.engines import SKELETON_ENGINES, SkeletonEngine
-from crosscheck.engines.skeleton_engine import coordinates
-from reference import IK_SOLVERS, solve_ik
+from plumbob.crosscheck.engines import SKELETON_ENGINES, SkeletonEngine
+from plumbob.crosscheck.engines.skeleton_engine import coordinates
+from plumbob.reference import IK_SOLVERS, solve_ik
 
 from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.engines import SKELETON_ENGINES
-from crosscheck.engines.skeleton_engine import coordinates
-from reference import Skeleton, forward_kinematics, rotation, scenes
-from reference.kinematics import THREAD_JOINTS
+from plumbob.crosscheck.engines import SKELETON_ENGINES
+from plumbob.crosscheck.engines.skeleton_engine import coordinates
+from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes
+from plumbob.reference.kinematics import THREAD_JOINTS
 
 from .case import COMPILED, PLAIN, Case, Work, streaming
 

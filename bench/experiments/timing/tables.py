@@ -9,10 +9,10 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...presentation.results import PRECISION, Results, by_problem, leaders, steadiness
-from ...presentation.tables.columns import at, text, words_in
-from ...presentation.tables.layout import Layout
-from ...presentation.tables.table import Column, Summary, words
+from ...harness.results import PRECISION, Results, by_problem, leaders, steadiness
+from ...tables.columns import at, text, words_in
+from ...tables.layout import Layout
+from ...tables.table import Column, Summary, words
 from . import figures
 from .case import COMPILED, LIMIT, PLAIN
 

@@ -2,8 +2,9 @@
 
 from typing import Any
 
-from bench.harness.machine import pace
-from reference import set_backend, set_num_threads
+from plumbob.reference import set_backend, set_num_threads
+
+from ...harness.machine import pace
 
 # A call that took less [s] is made once more, uncounted, before it is timed in a later sweep, so
 # that caches are as in a loop of such calls.

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from reference import MassSpring, runge_kutta, symplectic_euler
+from plumbob.reference import MassSpring, runge_kutta, symplectic_euler
 
 from .protocol import Mover
 from .step_solvers import Steps

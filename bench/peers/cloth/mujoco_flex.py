@@ -1,7 +1,7 @@
 """MuJoCo: point masses on slides, springs as the edges of a one-dimensional flex, by `Euler`."""
 
-from crosscheck.engines import MujocoFlex
-from reference import MassSpring
+from plumbob.crosscheck.engines import MujocoFlex
+from plumbob.reference import MassSpring
 
 from .mujoco_models import kept
 from .mujoco_tendons import MujocoSteps

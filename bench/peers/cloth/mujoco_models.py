@@ -4,8 +4,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from crosscheck.engines import MujocoMassSpring
-from reference import MassSpring
+from plumbob.crosscheck.engines import MujocoMassSpring
+from plumbob.reference import MassSpring
 
 Engine = TypeVar("Engine", bound=MujocoMassSpring)
 

@@ -6,9 +6,9 @@ tolerance of 1e-8; more, and a smaller one, are a matter of settings here.
 
 import mujoco
 
-from crosscheck.engines import MujocoMassSpring
-from reference import MassSpring, State
-from reference.arguments import FloatArray
+from plumbob.crosscheck.engines import MujocoMassSpring
+from plumbob.reference import MassSpring, State
+from plumbob.reference.arguments import FloatArray
 
 from .mujoco_models import kept
 from .protocol import Mover

@@ -11,8 +11,8 @@ import newton
 import numpy as np
 import warp as wp
 
-from reference import MassSpring, State
-from reference.arguments import FloatArray, IndexArray
+from plumbob.reference import MassSpring, State
+from plumbob.reference.arguments import FloatArray, IndexArray
 
 Solver = Callable[[Any], Any]
 

@@ -2,7 +2,7 @@
 
 from newton.solvers import SolverSemiImplicit
 
-from reference import MassSpring
+from plumbob.reference import MassSpring
 
 from .newton_model import NewtonSteps
 from .protocol import Mover

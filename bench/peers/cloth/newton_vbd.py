@@ -8,7 +8,7 @@ from functools import partial
 
 from newton.solvers import SolverVBD
 
-from reference import MassSpring
+from plumbob.reference import MassSpring
 
 from .newton_model import NewtonSteps
 from .protocol import Mover

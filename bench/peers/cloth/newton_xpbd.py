@@ -7,7 +7,7 @@ from functools import partial
 
 from newton.solvers import SolverXPBD
 
-from reference import MassSpring
+from plumbob.reference import MassSpring
 
 from .newton_model import NewtonSteps
 from .protocol import Mover

@@ -8,8 +8,8 @@ cannot move `prepare` raises a `ValueError`.
 
 from typing import Protocol
 
-from reference import State
-from reference.arguments import FloatArray
+from plumbob.reference import State
+from plumbob.reference.arguments import FloatArray
 
 
 class Mover(Protocol):

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from reference import ImplicitEuler, MassSpring, State
-from reference.arguments import FloatArray, IndexArray
+from plumbob.reference import ImplicitEuler, MassSpring, State
+from plumbob.reference.arguments import FloatArray, IndexArray
 
 from .protocol import Mover
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from reference import ImplicitEuler, MassSpring, State
-from reference.arguments import FloatArray
+from plumbob.reference import ImplicitEuler, MassSpring, State
+from plumbob.reference.arguments import FloatArray
 
 from .protocol import Mover
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot

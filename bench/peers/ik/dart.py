@@ -7,7 +7,7 @@ the joints' limits. DART's own restarts draw from a generator without a seed, so
 import dartpy
 import numpy as np
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot

@@ -8,7 +8,7 @@ start. Its time is that of `calculate_IK`: which of all solutions to take is for
 import numpy as np
 from eaik.pybindings import EAIK
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots import LIMIT_TOLERANCE
 from ...experiments.robots.evaluate import Tolerance

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from mujoco import minimize
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance, mujoco_model
 from ...experiments.robots.problem import Robot

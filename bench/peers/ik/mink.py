@@ -7,7 +7,7 @@ of the task must not be zero: full steps then jump about.
 import mink
 import numpy as np
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance, mujoco_model
 from ...experiments.robots.problem import Robot

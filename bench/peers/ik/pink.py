@@ -9,7 +9,7 @@ With pink's own damping of 1e-12 the quadratic program is infeasible, and pink r
 import numpy as np
 import pink
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pinocchio
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.problem import Robot
 

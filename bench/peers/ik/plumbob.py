@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from reference import Outcome, Target, rotation, solve_ik
-from reference.arguments import FloatArray
-from reference.formats import mjcf, urdf
+from plumbob.reference import Outcome, Target, rotation, solve_ik
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.formats import mjcf, urdf
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot

@@ -13,7 +13,7 @@ which returns a `Forward`.
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.problem import Robot
 from ...harness.worker import describe

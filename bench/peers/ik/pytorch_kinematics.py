@@ -9,7 +9,7 @@ import numpy as np
 import pytorch_kinematics
 import torch
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.evaluate import Tolerance
 from ...experiments.robots.problem import Robot

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from reference import Skeleton, forward_kinematics, rotation
-from reference.arguments import FloatArray
+from plumbob.reference import Skeleton, forward_kinematics, rotation
+from plumbob.reference.arguments import FloatArray
 
 
 class ReferenceKinematics:

@@ -4,7 +4,7 @@ import zlib
 
 import numpy as np
 
-from reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray
 
 from ...experiments.robots.problem import Robot
 from .protocol import Ask, Solve, SolverOutput, attempt

@@ -16,7 +16,7 @@ from ..compiled import compiled_in
 # A row of doubles that fills an AVX-512 register, or two of AVX.
 LANES = 8
 
-in_vector_registers = compiled_in("reference.backend.simd.lane_instructions")
+in_vector_registers = compiled_in("plumbob.reference.backend.simd.lane_instructions")
 
 
 @in_vector_registers

@@ -7,7 +7,7 @@ array; compiled it is a register of four doubles, and these functions are the in
 
 from ..compiled import compiled_in
 
-in_vector_registers = compiled_in("reference.backend.simd.row_instructions")
+in_vector_registers = compiled_in("plumbob.reference.backend.simd.row_instructions")
 
 
 @in_vector_registers

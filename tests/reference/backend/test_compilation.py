@@ -7,9 +7,9 @@ import pytest
 from numba.core.compiler import Flags
 from numba.core.errors import TypingError
 
-from reference import IK_SOLVERS
-from reference.backend import compiled, linking
-from reference.backend.compilation import on_compile
+from plumbob.reference import IK_SOLVERS
+from plumbob.reference.backend import compiled, linking
+from plumbob.reference.backend.compilation import on_compile
 
 
 def power(x, n):

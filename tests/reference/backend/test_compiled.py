@@ -6,7 +6,7 @@ import textwrap
 import numpy as np
 import pytest
 
-from reference.backend import compiled
+from plumbob.reference.backend import compiled
 
 FACTOR = 3.0
 
@@ -279,8 +279,8 @@ CALLEE = textwrap.dedent("""
 CALLER = textwrap.dedent("""
     import numpy as np
     from callee import callee
-    from reference.backend.compiled import Kernel
-    from reference.backend.simd.lanes import LANES, store_vectors, load_vectors
+    from plumbob.reference.backend.compiled import Kernel
+    from plumbob.reference.backend.simd.lanes import LANES, store_vectors, load_vectors
 
     def caller(tile):
         a, b, c = load_vectors(tile, 0)

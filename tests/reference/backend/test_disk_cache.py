@@ -11,7 +11,7 @@ import pytest
 CALLER = textwrap.dedent("""
     import numpy as np
     from shapes import Disc
-    from reference.backend.compiled import Kernel
+    from plumbob.reference.backend.compiled import Kernel
 
     def area(disc):
         return 3.0 * disc.radius[0] * disc.radius[0]

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from reference import quaternion
-from reference.backend import compiled
-from reference.backend.simd import lanes
-from reference.backend.simd.lanes import (
+from plumbob.reference import quaternion
+from plumbob.reference.backend import compiled
+from plumbob.reference.backend.simd import lanes
+from plumbob.reference.backend.simd.lanes import (
     LANES,
     all_within,
     load_lanes,
@@ -14,7 +14,7 @@ from reference.backend.simd.lanes import (
     store_quaternions,
     store_vectors,
 )
-from reference.quaternion import (
+from plumbob.reference.quaternion import (
     IDENTITY,
     add,
     conjugate,
@@ -163,7 +163,7 @@ def test_one_lane_out_of_bounds_is_out_of_bounds(lane, value, numbers, backend):
 
 
 def test_every_function_of_lanes_has_its_instructions():
-    from reference.backend.simd import lane_instructions
+    from plumbob.reference.backend.simd import lane_instructions
 
     marked = [value for value in vars(lanes).values() if hasattr(value, "compiled_in")]
     assert len(marked) == 7

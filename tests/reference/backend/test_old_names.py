@@ -2,8 +2,8 @@
 
 import pytest
 
-import reference
-from reference.backend import compiled, threads
+from plumbob import reference
+from plumbob.reference.backend import compiled, threads
 
 
 @pytest.mark.parametrize(("old", "new"), [("plain", "python"), ("compiled", "numba")])

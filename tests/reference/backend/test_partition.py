@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from reference import ImplicitEuler, State, scenes
-from reference.backend.partition import cut
-from reference.backend.threads import set_num_threads
-from reference.implicit_euler.objective import Objective
+from plumbob.reference import ImplicitEuler, State, scenes
+from plumbob.reference.backend.partition import cut
+from plumbob.reference.backend.threads import set_num_threads
+from plumbob.reference.implicit_euler.objective import Objective
 
 H = 1 / 30
 EPS = np.finfo(float).eps
@@ -36,7 +36,7 @@ def in_regions(moving, monkeypatch):
     """The same system and state, taken for a large one."""
     system, state = moving
     assert system.with_separate_dampers.regions is None
-    monkeypatch.setattr("reference.mass_spring.LARGE", 1)
+    monkeypatch.setattr("plumbob.reference.mass_spring.LARGE", 1)
     large = system.replaced()
     assert large.with_separate_dampers.regions is not None
     return large, state

@@ -4,10 +4,10 @@ import threading
 import numpy as np
 import pytest
 
-from reference import set_num_threads
-from reference.backend import compiled
-from reference.backend import threads as parallel
-from reference.backend.threads import SLICES_PER_CORE, in_slices
+from plumbob.reference import set_num_threads
+from plumbob.reference.backend import compiled
+from plumbob.reference.backend import threads as parallel
+from plumbob.reference.backend.threads import SLICES_PER_CORE, in_slices
 
 CORES = [1, 2, 3]
 

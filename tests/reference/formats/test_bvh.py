@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from crosscheck.robots.independent_bvh import global_poses
-from reference import (
+from plumbob.crosscheck.robots.independent_bvh import global_poses
+from plumbob.reference import (
     Articulation,
     Skeleton,
     curves,
@@ -15,8 +15,8 @@ from reference import (
     solve_ik,
     track,
 )
-from reference.formats import FormatWarning, bvh
-from reference.formats.bvh.writer import ORDERS, euler_angles
+from plumbob.reference.formats import FormatWarning, bvh
+from plumbob.reference.formats.bvh.writer import ORDERS, euler_angles
 
 ONE_JOINT = """HIERARCHY
 ROOT hip

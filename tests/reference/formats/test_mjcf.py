@@ -2,8 +2,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from reference import forward_kinematics, rotation
-from reference.formats import FormatWarning, mjcf
+from plumbob.reference import forward_kinematics, rotation
+from plumbob.reference.formats import FormatWarning, mjcf
 
 SOLID = '<geom size="1"/>'
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import scenes
-from reference.formats import parse_obj, read_obj
+from plumbob.reference import scenes
+from plumbob.reference.formats import parse_obj, read_obj
 
 CORNERS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 

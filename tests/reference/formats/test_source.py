@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from reference.formats.source import read_text
+from plumbob.reference.formats.source import read_text
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import forward_kinematics, rotation
-from reference.formats import FormatWarning, urdf
+from plumbob.reference import forward_kinematics, rotation
+from plumbob.reference.formats import FormatWarning, urdf
 
 PI, inf = np.pi, np.inf
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reference.formats import FormatWarning, mjcf, urdf
+from plumbob.reference.formats import FormatWarning, mjcf, urdf
 
 GOOD = {
     urdf: """<?xml version="1.0" encoding="utf-8"?>

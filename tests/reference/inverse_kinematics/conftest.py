@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     IK_SOLVERS,
     Articulation,
     Skeleton,
@@ -13,15 +13,15 @@ from reference import (
     forward_kinematics,
     rotation,
 )
-from reference.inverse_kinematics.box_step import new_task_system
-from reference.inverse_kinematics.fabrik import new_fabrik_workspace
-from reference.inverse_kinematics.mechanism import (
+from plumbob.reference.inverse_kinematics.box_step import new_task_system
+from plumbob.reference.inverse_kinematics.fabrik import new_fabrik_workspace
+from plumbob.reference.inverse_kinematics.mechanism import (
     TARGET,
     gather,
     new_data,
     update_forward_kinematics,
 )
-from reference.inverse_kinematics.reduce import prepare
+from plumbob.reference.inverse_kinematics.reduce import prepare
 
 
 @pytest.fixture(params=IK_SOLVERS)

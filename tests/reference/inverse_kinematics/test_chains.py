@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import (
+from plumbob.reference import (
     IK_SOLVERS,
     Outcome,
     Skeleton,
@@ -17,8 +17,8 @@ from reference import (
     scenes,
     solve_ik,
 )
-from reference.inverse_kinematics.ccd import pointing
-from reference.inverse_kinematics.chain import BEND, bend, new_chain, pose_chain
+from plumbob.reference.inverse_kinematics.ccd import pointing
+from plumbob.reference.inverse_kinematics.chain import BEND, bend, new_chain, pose_chain
 
 # Distances of order one after a sweep over six joints, positions recomputed from rotations.
 ROUNDING = 1e-14
@@ -101,7 +101,7 @@ def test_solving_at_another_scale_scales_the_answer(skeleton, local, target, sol
 
 
 def test_both_speeds_take_the_same_path(skeleton, local, target, solver):
-    from reference import set_backend
+    from plumbob.reference import set_backend
 
     fast = solve_ik(skeleton, local, target, solver, record=True)
     with set_backend("python"):

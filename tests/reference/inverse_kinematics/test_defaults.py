@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     Articulation,
     Skeleton,
     Target,
@@ -14,9 +14,9 @@ from reference import (
     solve_ik,
     track,
 )
-from reference.formats import urdf
-from reference.inverse_kinematics import RESTARTS
-from reference.jacobians import difference, integrate, jacobian, jacobians
+from plumbob.reference.formats import urdf
+from plumbob.reference.inverse_kinematics import RESTARTS
+from plumbob.reference.jacobians import difference, integrate, jacobian, jacobians
 
 LINKS = Skeleton([-1, 0, 1, 2], [[0, 0, 0.3], [0, 0, 0.4], [0.4, 0, 0], [0.3, 0, 0]])
 AXES = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0]]

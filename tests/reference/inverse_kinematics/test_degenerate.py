@@ -5,7 +5,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from reference import (
+from plumbob.reference import (
     IK_SOLVERS,
     Articulation,
     Outcome,
@@ -16,7 +16,7 @@ from reference import (
     scenes,
     solve_ik,
 )
-from reference.articulation import KINDS
+from plumbob.reference.articulation import KINDS
 
 shared = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

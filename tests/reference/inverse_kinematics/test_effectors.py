@@ -6,7 +6,7 @@ from drawn_trees import TREES, drawn
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import (
+from plumbob.reference import (
     Articulation,
     Mimic,
     Outcome,
@@ -16,7 +16,7 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.inverse_kinematics.mechanism import least_residual
+from plumbob.reference.inverse_kinematics.mechanism import least_residual
 
 shared = drawn()
 

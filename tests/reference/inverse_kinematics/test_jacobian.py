@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import forward_kinematics, local_from_global, rotation, scenes, solve_ik
-from reference.inverse_kinematics.chain import new_chain, pose_chain
-from reference.inverse_kinematics.jacobian import (
+from plumbob.reference import forward_kinematics, local_from_global, rotation, scenes, solve_ik
+from plumbob.reference.inverse_kinematics.chain import new_chain, pose_chain
+from plumbob.reference.inverse_kinematics.jacobian import (
     linearise,
     rotate_joints,
     solve_damped,

@@ -5,7 +5,7 @@ import pytest
 from drawn_trees import TREES, drawn, with_examples
 from hypothesis import given
 
-from reference import (
+from plumbob.reference import (
     Articulation,
     Mimic,
     Outcome,
@@ -15,15 +15,15 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.inverse_kinematics.ccd import descend, update_joint
-from reference.inverse_kinematics.fabrik import (
+from plumbob.reference.inverse_kinematics.ccd import descend, update_joint
+from plumbob.reference.inverse_kinematics.fabrik import (
     backward_pass,
     fabrik_update,
     forward_joint,
     update_joint_pose,
 )
-from reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
-from reference.inverse_kinematics.reduce import prepare
+from plumbob.reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
+from plumbob.reference.inverse_kinematics.reduce import prepare
 
 # Squared distances of a few metres, and quaternions normalised after a rotation.
 ROUNDING = 1e-12

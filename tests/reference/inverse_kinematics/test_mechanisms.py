@@ -8,7 +8,7 @@ import pytest
 from drawn_trees import TREES, drawn, with_examples
 from hypothesis import example, given
 
-from reference import (
+from plumbob.reference import (
     IK_SOLVERS,
     Articulation,
     Mimic,
@@ -19,12 +19,12 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.arguments import frozen
-from reference.backend.threads import set_num_threads
-from reference.inverse_kinematics.problem import checked_targets
-from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.settings import checked_settings
-from reference.inverse_kinematics.solve import solve_checked
+from plumbob.reference.arguments import frozen
+from plumbob.reference.backend.threads import set_num_threads
+from plumbob.reference.inverse_kinematics.problem import checked_targets
+from plumbob.reference.inverse_kinematics.reduce import prepare
+from plumbob.reference.inverse_kinematics.settings import checked_settings
+from plumbob.reference.inverse_kinematics.solve import solve_checked
 
 # Distances of a few metres over six joints, positions recomputed.
 ROUNDING = 1e-13
@@ -171,7 +171,7 @@ def test_the_history_holds_the_distance_before_and_after_each_iteration(
 
 
 def test_both_speeds_take_the_same_path(problem, solver):
-    from reference import set_backend
+    from plumbob.reference import set_backend
 
     for seed in range(5):
         model, q, targets = problem(["ball", "hinge", "slide", "free", "hinge", "ball"], seed)

@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     Articulation,
     Outcome,
     Skeleton,
@@ -14,7 +14,7 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.inverse_kinematics.mechanism import (
+from plumbob.reference.inverse_kinematics.mechanism import (
     LEVER,
     cost,
     residuals,

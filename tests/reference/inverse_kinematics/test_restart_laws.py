@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     IK_SOLVERS,
     Articulation,
     Mimic,
@@ -15,11 +15,15 @@ from reference import (
     scenes,
     solve_ik,
 )
-from reference.inverse_kinematics.mechanism import LEVER
-from reference.inverse_kinematics.problem import checked_targets
-from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.settings import checked_settings
-from reference.inverse_kinematics.solve import solve_checked, solve_on_chain, solve_on_mechanism
+from plumbob.reference.inverse_kinematics.mechanism import LEVER
+from plumbob.reference.inverse_kinematics.problem import checked_targets
+from plumbob.reference.inverse_kinematics.reduce import prepare
+from plumbob.reference.inverse_kinematics.settings import checked_settings
+from plumbob.reference.inverse_kinematics.solve import (
+    solve_checked,
+    solve_on_chain,
+    solve_on_mechanism,
+)
 
 COUNTS = range(13)
 # Merits come from positions recomputed: some roundings of a few metres.

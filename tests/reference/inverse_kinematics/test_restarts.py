@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from reference import Outcome, Target, forward_kinematics, rotation, solve_ik
-from reference.inverse_kinematics.mechanism import LEVER
-from reference.inverse_kinematics.reduce import prepare
-from reference.inverse_kinematics.restarts import RANK, new_progress
-from reference.inverse_kinematics.solve_mechanism import rank_restarts, take_nearest
+from plumbob.reference import Outcome, Target, forward_kinematics, rotation, solve_ik
+from plumbob.reference.inverse_kinematics.mechanism import LEVER
+from plumbob.reference.inverse_kinematics.reduce import prepare
+from plumbob.reference.inverse_kinematics.restarts import RANK, new_progress
+from plumbob.reference.inverse_kinematics.solve_mechanism import rank_restarts, take_nearest
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from drawn_trees import TREES, drawn, with_examples
 from hypothesis import given
 from scipy.optimize import lsq_linear
 
-from reference import (
+from plumbob.reference import (
     Articulation,
     Mimic,
     Outcome,
@@ -16,7 +16,7 @@ from reference import (
     rotation,
     solve_ik,
 )
-from reference.inverse_kinematics.box_step import (
+from plumbob.reference.inverse_kinematics.box_step import (
     damped_step,
     linearise_task,
     solve_damped,
@@ -24,11 +24,11 @@ from reference.inverse_kinematics.box_step import (
     transposed_step,
     wrap,
 )
-from reference.inverse_kinematics.damped_least_squares import DAMPING
-from reference.inverse_kinematics.levenberg_marquardt import DAMPING as OF_POSITIONS
-from reference.inverse_kinematics.levenberg_marquardt import DAMPING_OF_POSES
-from reference.inverse_kinematics.mechanism import LEVER
-from reference.jacobians import integrate, jacobian
+from plumbob.reference.inverse_kinematics.damped_least_squares import DAMPING
+from plumbob.reference.inverse_kinematics.levenberg_marquardt import DAMPING as OF_POSITIONS
+from plumbob.reference.inverse_kinematics.levenberg_marquardt import DAMPING_OF_POSES
+from plumbob.reference.inverse_kinematics.mechanism import LEVER
+from plumbob.reference.jacobians import integrate, jacobian
 
 # A dozen products and sums of numbers of order one to ten.
 ROUNDING = 1e-12

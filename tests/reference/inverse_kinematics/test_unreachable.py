@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from reference import (
+from plumbob.reference import (
     Articulation,
     Outcome,
     Skeleton,

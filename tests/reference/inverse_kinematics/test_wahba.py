@@ -5,8 +5,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from reference import rotation
-from reference.inverse_kinematics.wahba import (
+from plumbob.reference import rotation
+from plumbob.reference.inverse_kinematics.wahba import (
     LEAST_ROTATION,
     ZERO_MATRIX,
     add_outer,

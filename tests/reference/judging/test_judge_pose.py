@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reference import (
+from plumbob.reference import (
     Articulation,
     Skeleton,
     Target,

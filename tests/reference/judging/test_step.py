@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from reference import STEP_SOLVERS, ImplicitEuler, Outcome, State, judge_step, scenes
-from reference.mass_spring import MassSpring
+from plumbob.reference import STEP_SOLVERS, ImplicitEuler, Outcome, State, judge_step, scenes
+from plumbob.reference.mass_spring import MassSpring
 
 h = 1 / 30
 FLOAT32 = float(np.finfo(np.float32).eps)

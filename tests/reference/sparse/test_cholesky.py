@@ -9,14 +9,14 @@ import scipy.sparse
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reference import scenes
-from reference.backend import compiled
-from reference.implicit_euler.objective import global_matrix
-from reference.sparse import CholeskyFactor, NotPositiveDefiniteError
-from reference.sparse.dense import PANEL, STRIP, eliminate
-from reference.sparse.dissection import HARD, LEAF
-from reference.sparse.linear_solver import factorize
-from reference.sparse.triangular import NEAR
+from plumbob.reference import scenes
+from plumbob.reference.backend import compiled
+from plumbob.reference.implicit_euler.objective import global_matrix
+from plumbob.reference.sparse import CholeskyFactor, NotPositiveDefiniteError
+from plumbob.reference.sparse.dense import PANEL, STRIP, eliminate
+from plumbob.reference.sparse.dissection import HARD, LEAF
+from plumbob.reference.sparse.linear_solver import factorize
+from plumbob.reference.sparse.triangular import NEAR
 
 EPS = np.finfo(float).eps
 
@@ -177,7 +177,7 @@ def test_nothing_is_computed_from_memory_that_was_never_written(matrix, monkeypa
         return np.full(count, signal).view(float) if dtype is float else np.empty(count, dtype)
 
     fresh = SimpleNamespace(empty=unwritten, int32=np.int32)
-    monkeypatch.setattr("reference.sparse.multifrontal.np", fresh)
+    monkeypatch.setattr("plumbob.reference.sparse.multifrontal.np", fresh)
     with compiled.set_backend("python"), np.errstate(all="raise"):
         factor = CholeskyFactor(matrix)
     assert np.isfinite(factor._values).all()

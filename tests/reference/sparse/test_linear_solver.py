@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from reference import scenes
-from reference.implicit_euler.objective import global_matrix
-from reference.sparse.linear_solver import LIBRARIES, NotPositiveDefiniteError, factorize
+from plumbob.reference import scenes
+from plumbob.reference.implicit_euler.objective import global_matrix
+from plumbob.reference.sparse.linear_solver import LIBRARIES, NotPositiveDefiniteError, factorize
 
 
 @pytest.fixture(params=LIBRARIES)

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ....presentation.figures.sketch import Sketch
-from ....presentation.figures.style import COLOURS, written
-from ....presentation.results import Results
-from ....presentation.tables.layout import Figure
+from ....figures.sketch import Sketch
+from ....figures.style import COLOURS, written
+from ....harness.results import Results
+from ....tables.layout import Figure
 from ..readings import KINDS
 from .readings import Line, lines
 
@@ -98,7 +98,7 @@ def _star(line: Line, robot: str) -> str:
 
 def draw_map(data: Map) -> "Canvas":
     """Return the maps as a figure of matplotlib's."""
-    from ....presentation.figures.drawing import canvas
+    from ....figures.drawing import canvas
 
     rows = 1 if len(data.robots) <= MOST_BESIDE else len(data.panels)
     height = rows * (1.3 + 0.27 * len(data.solvers))

@@ -9,8 +9,8 @@ import numpy as np
 from ....harness import metrics
 from ....harness.metrics import Floats, Interval, Ranking, Share
 from ....harness.record import Record
-from ....presentation.results import Results, listed
-from ....presentation.tables.table import words
+from ....harness.results import Results, listed
+from ....tables.table import words
 from ..readings import (
     SHIFT,
     by_robot,

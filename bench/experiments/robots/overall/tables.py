@@ -6,10 +6,10 @@ from functools import partial
 from operator import methodcaller
 
 from ....harness import metrics
-from ....presentation.results import leaders, listed
-from ....presentation.tables.columns import text, words_in
-from ....presentation.tables.layout import Layout
-from ....presentation.tables.table import INTERVAL, Column, Summary, in_unit, listing, words
+from ....harness.results import leaders, listed
+from ....tables.columns import text, words_in
+from ....tables.layout import Layout
+from ....tables.table import INTERVAL, Column, Summary, in_unit, listing, words
 from ..readings import KINDS, OUTCOMES, RULE, SCORE, TIES, how
 from . import figures
 from .readings import Line, Overall, lines, most_solved, overall

@@ -1,0 +1,23 @@
+"""Where blocks are measured, by its address: in this process, or by the workers of a cluster."""
+
+from ..executor import HERE, Executor
+
+LOCAL, DASK = "local", "dask://"
+
+
+def executor_at(address: str, mix_machines: bool = False) -> Executor:
+    """Return the executor of an address; see `plumbob.bench.harness.executors.dask` for what it may cost.
+
+    Raises:
+        ValueError: if there is no such executor, it needs what is not installed, or it does not
+            answer.
+    """
+    if address == LOCAL:
+        return HERE
+    scheduler = address.removeprefix(DASK)
+    host, _, port = scheduler.rpartition(":")
+    if scheduler == address or not (host and port.isdigit()):
+        raise ValueError(f"--executor: expected local or dask://HOST:PORT, got {address!r}")
+    from .dask import DaskExecutor
+
+    return DaskExecutor(scheduler, mix_machines)

@@ -1,0 +1,166 @@
+"""The records of a report, and how problems and solvers are written."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..peers import registry
+from ..tables.table import words
+from ..text import all_visible, shortened, visible
+from .metrics import Ranking
+from .record import Record
+
+# So much may a time that is shown be off, in relative terms, by the drift of its machine.
+PRECISION = 0.05
+
+
+class Results:
+    """The records that hold numbers, in the order of the file, to be asked for by what they are."""
+
+    def __init__(self, records: Iterable[Record]) -> None:
+        """Leave out those that say why there are none, and those under settings of before."""
+        current = [record for record in records if not record.superseded]
+        self.records = [record for record in current if not record.failed]
+        self.failed = [record for record in current if record.failed]
+
+    @property
+    def entrants(self) -> frozenset[str]:
+        """The solvers that a user has entered."""
+        return frozenset(r.solver for r in self.records if r.facts.get("entrant") is True)
+
+    def all(self, suite: str, failed: bool = False, **wanted: Any) -> list[Record]:
+        """Return a suite's records with these facts and settings; failed ones only on demand."""
+        records = [*self.records, *self.failed] if failed else self.records
+        return [record for record in records if record.suite == suite and _has(record, wanted)]
+
+    def one(self, suite: str, problem: str, solver: str, **wanted: Any) -> Record | None:
+        """Return the record of exactly this problem and solver, or None."""
+        found = self.all(suite, **wanted)
+        return next((r for r in found if (r.problem, r.solver) == (problem, solver)), None)
+
+
+def _has(record: Record, wanted: dict[str, Any]) -> bool:
+    known = {**record.settings, **record.facts}
+    return all(known.get(name) == value for name, value in wanted.items())
+
+
+def plain(record: Record) -> Record:
+    """Return a record whose words can be shown anywhere."""
+    names = ("suite", "problem", "solver", "settings", "notes", "stamp", "facts")
+    return replace(record, **{name: all_visible(getattr(record, name)) for name in names})
+
+
+def sift(
+    make: Callable[[Results], Any], records: Sequence[Record]
+) -> tuple[list[Record], list[str]]:
+    """Return the records without those over which `make` raises, and a sentence on each of these.
+
+    Raises:
+        Exception: whatever `make` raises without any record.
+    """
+    make(Results([]))
+    return _joined(make, [], list(records))
+
+
+def _joined(
+    make: Callable[[Results], Any], valid: list[Record], more: list[Record]
+) -> tuple[list[Record], list[str]]:
+    """Return what of more records goes with those that are valid, by halves, and what is said."""
+    try:
+        make(Results([*valid, *more]))
+        return [*valid, *more], []
+    except Exception as error:  # a record may hold anything
+        if len(more) == 1:
+            return valid, [_does_not_fit(more[0], error)]
+    half, said = len(more) // 2, []
+    for part in (more[:half], more[half:]):
+        valid, sentences = _joined(make, valid, part)
+        said += sentences
+    return valid, said
+
+
+def _does_not_fit(record: Record, error: Exception) -> str:
+    names = ", ".join(shortened(name, 40) for name in (record.problem, record.solver))
+    return (
+        f"The record of {names} is left out, for no table can be made of what it holds "
+        f"({reason(error)})."
+    )
+
+
+def reason(error: Exception) -> str:
+    """Return an error in at most 100 letters."""
+    return shortened(visible(f"{type(error).__name__}: {error}"), 100)
+
+
+def check_any(folder: Path, records: Sequence[Record], left_out: Sequence[str]) -> None:
+    """Make sure that some records can be shown.
+
+    Raises:
+        ValueError: with the first sentence on what was left out, if there are no records.
+    """
+    if not records:
+        sentence = left_out[0] if left_out else "All are superseded: run `plumbob bench` first"
+        others = f" So are {len(left_out) - 1} others." if len(left_out) > 1 else ""
+        raise ValueError(f"no record in {folder} can be shown: {sentence}{others}")
+
+
+def label(solver: str) -> str:
+    """Return how a solver is written."""
+    return registry.find(solver).label
+
+
+def by_problem(records: Iterable[Record]) -> dict[str, list[Record]]:
+    """Return the records of each problem, in order."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(record.problem, []).append(record)
+    return groups
+
+
+def problems(records: Iterable[Record]) -> list[str]:
+    """Return the names of the problems, each once, in the order of the records."""
+    return list(dict.fromkeys(record.problem for record in records))
+
+
+def solvers(records: Iterable[Record]) -> list[str]:
+    """Return the names of the solvers, each once, in the order of the records."""
+    return list(dict.fromkeys(record.solver for record in records))
+
+
+def settings(records: Iterable[Record], name: str) -> str:
+    """Return the values of a setting as words, smallest first: "100 or 1,000"."""
+    values = sorted({r.settings[name] for r in records if name in r.settings})
+    return listed([words(value) for value in values], "or")
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Return names as a list in a sentence: "a, b and c", or "a, 1; b, 2 and c"."""
+    comma = "; " if any(", " in name for name in names) else ", "
+    return f" {last} ".join(filter(None, [comma.join(names[:-1]), *names[-1:]]))
+
+
+def counted(count: int, name: str) -> str:
+    """Return a count of things: "1 iteration", "2 iterations"."""
+    return f"{words(count)} {name}{'' if count == 1 else 's'}"
+
+
+def leaders(ranking: Ranking) -> str:
+    """Return who is first, and who is not told from that one: "a, in a tie with b and c"."""
+    first, *tied = ranking.first
+    return f"{first}, in a tie with {listed(tied)}" if tied else first
+
+
+def steadiness(noise: float) -> str:
+    """Return whether a machine was steady enough for the precision that is stated, "" if unknown.
+
+    `noise` is half the width of the middle eight tenths of a fixed loop's times, over their median.
+    """
+    if math.isnan(noise):
+        return ""
+    said = f"a fixed loop timed meanwhile varied by ± {round(100 * noise, 1):g} %"
+    stated = f"{100 * PRECISION:g} %"
+    if noise > PRECISION:
+        return f"The machine was too noisy for the {stated} that are aimed at: {said}."
+    return f"The machine was steady within the {stated} that are aimed at: {said}."

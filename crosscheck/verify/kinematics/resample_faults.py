@@ -1,0 +1,134 @@
+"""Faults of resampling, as whole answers: most programs' rules are their own, and right."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+
+from ..case import Case
+from ..contestant import Answer, Asked
+from ..explain import Variant, explain
+from ..greeting import Greeting
+from ..judgement import Diagnosis
+from ..sentence import Sentence, sentence
+from .polylines import Line, even_by_count
+
+
+def _count(case: Case) -> int:
+    """Return how many points there are to be."""
+    inputs, line = case.inputs, case.facts["line"]
+    if "count" in inputs:
+        return int(inputs["count"])
+    pieces = max(1, int(np.ceil(line.length / inputs["spacing"] - 1e-9)))
+    return pieces if inputs["closed"] else pieces + 1
+
+
+def _by_index(case: Case) -> FloatArray:
+    """Space points by the number of samples instead of the length along the curve."""
+    points, closed = case.facts["line"].points, bool(case.inputs["closed"])
+    at = np.linspace(0.0, len(points) - 1.0, _count(case), endpoint=not closed)
+    return np.stack([np.interp(at, np.arange(len(points)), x) for x in points.T], axis=-1)
+
+
+def _without_end(case: Case) -> FloatArray:
+    return even_by_count(case.facts["line"], _count(case), True)
+
+
+def _one_less(case: Case) -> FloatArray:
+    return even_by_count(case.facts["line"], _count(case) - 1, bool(case.inputs["closed"]))
+
+
+def _one_more(case: Case) -> FloatArray:
+    return even_by_count(case.facts["line"], _count(case) + 1, bool(case.inputs["closed"]))
+
+
+def _left_open(case: Case) -> FloatArray:
+    """Forget the segment from the end of a closed curve to its start."""
+    curve, closed = case.inputs["curve"], bool(case.inputs["closed"])
+    line = Line(curve, case.facts["line"].strokes, False)
+    return even_by_count(line, _count(case), False) if closed else _right(case)
+
+
+def _reversed(case: Case) -> FloatArray:
+    return _right(case)[::-1]
+
+
+def _right(case: Case) -> FloatArray:
+    return even_by_count(case.facts["line"], _count(case), bool(case.inputs["closed"]))
+
+
+def _nearest_sample(case: Case) -> FloatArray:
+    """Take the samples at or before the even lengths, without interpolating between them."""
+    line, closed = case.facts["line"], bool(case.inputs["closed"])
+    at = np.linspace(0.0, line.length, _count(case), endpoint=not closed)
+    last = np.searchsorted(line.at, at, side="right") - 1
+    return line.points[np.minimum(last, len(line.points) - 1)]
+
+
+FAULTS: dict[str, tuple[Callable[[Case], FloatArray], Sentence]] = {
+    "by index": (
+        _by_index,
+        sentence(
+            "Points are spaced by the number of samples, not by the length along the curve: they "
+            "are as uneven as the samples. Add up the lengths of the segments and divide those."
+        ),
+    ),
+    "end left out": (
+        _without_end,
+        sentence(
+            "The last point is left out on open curves: divide the length by count - 1, so that "
+            "the end is kept."
+        ),
+    ),
+    "one point less": (
+        _one_less,
+        sentence("There is one point less than asked for: the loop ends too early."),
+    ),
+    "one point more": (
+        _one_more,
+        sentence("There is one point more than asked for: count points, not gaps."),
+    ),
+    "left open": (
+        _left_open,
+        sentence("The segment from the end of a closed curve back to its start is missing."),
+    ),
+    "reversed": (
+        _reversed,
+        sentence("The points come in the reverse order of the curve."),
+    ),
+    "samples only": (
+        _nearest_sample,
+        sentence(
+            "Points are taken from the samples. Interpolate between two samples where the even "
+            "length falls between them."
+        ),
+    ),
+}
+
+
+def _predict(make: Callable[[Case], FloatArray], case: Case) -> Mapping[str, Any]:
+    return {"points": make(case)}
+
+
+def diagnosis(asked: Sequence[Asked], wrong: Sequence[Asked], greeting: Greeting) -> Diagnosis:
+    """Return the faults that reproduce the answers."""
+    if not any(isinstance(one.answer, Answer) for one in wrong):
+        return Diagnosis()
+    variants = [Variant((), partial(_predict, _right))]
+    variants += [Variant((key,), partial(_predict, make)) for key, (make, _) in FAULTS.items()]
+    compared = [*wrong, *(one for one in asked if one not in wrong)]
+    found, tried = explain(variants, compared, partial(_likeness, greeting), _describe)
+    return Diagnosis(tuple(one for one in found if one.faults != ("",)), tried=tried)
+
+
+def _likeness(greeting: Greeting, case: Case) -> float:
+    return max(1e-9, 64.0 * greeting.epsilon * len(case.inputs["curve"]))
+
+
+def _describe(keys: Sequence[str]) -> Sentence:
+    if keys[0] not in FAULTS:
+        return sentence("It does what the textbook does.")
+    return FAULTS[keys[0]][1]

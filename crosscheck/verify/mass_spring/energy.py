@@ -1,0 +1,281 @@
+"""The task energy: its cases and its judgement.
+
+Zero of the gravitational energy is where the solver has it: the states of a case are asked in
+several places, and only differences to the first of them count.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plumbob.reference.mass_spring import kinetic_energy, potential_energy
+
+from ..case import Case
+from ..contestant import Answer, Asked
+from ..explain import either, first_broken
+from ..greeting import Greeting
+from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..sentence import Sentence, sentence
+from ..timing import timed
+from . import laws
+from .cases import task_cases
+from .faults import GRAVITY, SPRINGS, Option
+from .problem import (
+    Problem,
+    all_forces,
+    elastic_energy,
+    problem_of,
+    state_of,
+    system_of,
+)
+
+TASK = "energy"
+PARTS = ("total", "kinetic", "potential", "elastic", "gravitational")
+ROUNDINGS = 16.0
+# Gauss points that integrate the force along a displacement of a tenth of a spring to rounding.
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(24)
+
+
+def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
+    """Return cases that suit the solver, most of them followed by a displaced one."""
+    found = []
+    for case in task_cases(TASK, greeting, seed, thorough):
+        found.append(case)
+        if "of" not in case.facts:
+            found.append(_displaced(case, seed))
+    return found
+
+
+def _displaced(case: Case, seed: int) -> Case:
+    """Return the same system a little elsewhere."""
+    x = case.inputs["positions"]
+    rng = np.random.default_rng([13, seed, len(x)])
+    inputs = dict(case.inputs) | {"positions": x + 0.02 * rng.standard_normal(x.shape)}
+    return replace(
+        case,
+        name=case.name + ", displaced",
+        inputs=inputs,
+        about=sentence("The case before, its particles displaced."),
+        facts=dict(case.facts) | {"from": case.name},
+    )
+
+
+def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+    """Hold the energies against formulas and the work of forces, and name the faults."""
+    judgements = [_judge_case(one, asked, greeting) for one in asked]
+    return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
+
+
+def right(p: Problem) -> dict[str, float]:
+    """Return all energies by the formulas [J]."""
+    kinetic = 0.5 * float((p.masses[:, None] * p.velocities**2).sum())
+    return _sums(kinetic, elastic_energy(p), -float((p.constant * p.positions).sum()))
+
+
+def _sums(kinetic: float, elastic: float, gravitational: float) -> dict[str, float]:
+    potential = elastic + gravitational
+    values = (kinetic + potential, kinetic, potential, elastic, gravitational)
+    return dict(zip(PARTS, values, strict=True))
+
+
+def tolerance(p: Problem, epsilon: float) -> float:
+    """Return how far rounding may take an energy [J]."""
+    x, v = np.abs(p.positions), np.abs(p.velocities)
+    size = float(x.max() + p.rest_lengths.max(initial=0.0))
+    stretch = np.abs(p.incidence @ p.positions).max(initial=0.0) + p.rest_lengths.max(initial=0.0)
+    terms = float((p.stiffnesses * size * stretch).sum())
+    terms += float((p.masses[:, None] * v**2).sum())
+    terms += float((p.masses[:, None] * x * np.abs(p.gravity).max()).sum())
+    return ROUNDINGS * epsilon * terms + 1e-300
+
+
+def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJudgement:
+    p = problem_of(one.case.inputs)
+    system, state = system_of(p), state_of(p)
+    _, seconds = timed(
+        lambda: potential_energy(system, state.positions) + kinetic_energy(system, state)
+    )
+    expected = right(p)
+    if not isinstance(one.answer, Answer):
+        return CaseJudgement(one.case, one.answer, (), expected, None, seconds)
+    given = one.answer.values
+    allowed = tolerance(p, greeting.epsilon)
+    findings = _findings(one, asked, p, allowed)
+    errors = [abs(given[name] - expected[name]) for name in ("kinetic", "elastic") if name in given]
+    size, worst = max(expected["kinetic"], expected["elastic"]), max(errors, default=np.nan)
+    digits = None
+    if size > allowed and worst >= 0.0:
+        digits = float(min(16.0, max(0.0, -np.log10(max(worst / size, 1e-16)))))
+    return CaseJudgement(one.case, one.answer, tuple(findings), expected, digits, seconds)
+
+
+def _findings(one: Asked, asked: Sequence[Asked], p: Problem, allowed: float) -> list[Finding]:
+    assert isinstance(one.answer, Answer)
+    given, expected = one.answer.values, right(p)
+    if not np.isfinite(list(given.values())).all():
+        said = sentence("Energies hold NaN or infinity.")
+        return [Finding("finite numbers", Verdict.BROKEN, np.inf, 0.0, "", said)]
+    found = [
+        _finding(name, abs(given[name] - expected[name]), allowed,
+                 sentence("The {name} energy is {gap:.2g} J off its formula.",
+                          name=name, gap=abs(given[name] - expected[name])))
+        for name in ("kinetic", "elastic") if name in given
+    ]  # fmt: skip
+    found += [] if p.h else _sum_laws(given, allowed)
+    before = [other for other in asked if other.case.name == one.case.facts.get("from")]
+    if before and isinstance(before[0].answer, Answer):
+        found += _work(
+            problem_of(before[0].case.inputs), p, before[0].answer.values, given, allowed
+        )
+    found.append(laws.equal_requests(one, PARTS, dict.fromkeys(PARTS, allowed)))
+    return found + [
+        Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", said) for said in one.answer.remarks
+    ]
+
+
+def _finding(law: str, gap: float, allowed: float, said: Sentence) -> Finding:
+    verdict = Verdict.RIGHT if gap <= allowed else Verdict.WRONG
+    return Finding(law, verdict, gap, allowed, "J", said)
+
+
+def _sum_laws(given: Mapping[str, Any], allowed: float) -> list[Finding]:
+    """Return whether the parts add up, where all of them were answered."""
+    found = []
+    for whole, parts in (
+        ("total", ("kinetic", "potential")),
+        ("potential", ("elastic", "gravitational")),
+    ):
+        if all(name in given for name in (whole, *parts)):
+            gap = abs(given[whole] - sum(given[name] for name in parts))
+            said = sentence("The {whole} energy is {gap:.2g} J off the sum of its parts.",
+                            whole=whole, gap=gap)  # fmt: skip
+            found.append(_finding("sum of energies", gap, 4.0 * allowed, said))
+    return found
+
+
+def _work(
+    p: Problem, q: Problem, before: Mapping[str, Any], after: Mapping[str, Any], allowed: float
+) -> list[Finding]:
+    """Return whether energies change by the work of forces between the two states."""
+    found = []
+    for name, work in works(p, q).items():
+        if name not in before or name not in after:
+            continue
+        gap = abs((after[name] - before[name]) + work)
+        said = sentence(
+            "From one place to another the {name} energy changes by {gap:.2g} J other than by the "
+            "work of the forces.",
+            name=name, gap=gap,
+        )  # fmt: skip
+        found.append(_finding("energy and work", gap, 4.0 * allowed, said))
+    return found
+
+
+def works(p: Problem, q: Problem) -> dict[str, float]:
+    """Return the work of forces along the line from one state to the other, by energy [J]."""
+    d = q.positions - p.positions
+    still = p.changed(velocities=0.0 * p.velocities)
+    elastic = sum(
+        0.5 * weight * float(
+            ((all_forces(still.changed(positions=p.positions + 0.5 * (1.0 + t) * d))
+              - p.constant) * d).sum()
+        )
+        for t, weight in zip(POINTS, WEIGHTS, strict=True)
+    )  # fmt: skip
+    gravitational = float((p.constant * d).sum())
+    return {
+        "elastic": elastic,
+        "gravitational": gravitational,
+        "potential": elastic + gravitational,
+        "total": elastic + gravitational,
+    }
+
+
+class Fault(NamedTuple):
+    """A fault of an energy: a change of the problem, or of the three parts."""
+
+    key: str
+    aspect: str
+    sentence: Sentence
+    change: Callable[[Problem], Problem] | None = None
+    parts: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+def _from_option(option: Option) -> Fault:
+    return Fault(option.key, option.aspect, option.sentence, option.change)
+
+
+_OF_FORCES = ("first end only", "second end only", "both ends alike",
+              "last spring of a particle only", "direction not normalised",
+              "springs push", "springs twice", "tension only ignored")  # fmt: skip
+FAULTS = (
+    Fault("kinetic without 1/2", "kinetic",
+         sentence("The kinetic energy lacks its 1/2: it is m/2 v²."), None, (2.0, 1.0, 1.0)),
+    Fault("kinetic missing", "kinetic",
+         sentence("The kinetic energy is missing."), None, (0.0, 1.0, 1.0)),
+    Fault("kinetic without mass", "kinetic",
+         sentence("The kinetic energy lacks the mass: it is m/2 v²."),
+         lambda p: p.changed(masses=np.ones(p.count), weighing=p.masses)),
+    Fault("kinetic subtracted", "kinetic",
+         sentence("The kinetic energy is subtracted."), None, (-1.0, 1.0, 1.0)),
+    Fault("elastic without 1/2", "elastic",
+         sentence("The elastic energy lacks its 1/2: it is k/2 (l - r)²."), None,
+         (1.0, 2.0, 1.0)),
+    Fault("elastic missing", "elastic",
+         sentence("The elastic energy is missing."), None, (1.0, 0.0, 1.0)),
+    Fault("elastic subtracted", "elastic",
+         sentence("The elastic energy is subtracted."), None, (1.0, -1.0, 1.0)),
+    *(_from_option(one) for one in SPRINGS if one.key not in _OF_FORCES),
+    *(_from_option(one) for one in GRAVITY[:-3]),
+)  # fmt: skip
+
+
+def predict(faults: Sequence[Fault], p: Problem) -> dict[str, float]:
+    """Return the energies that a solver with these faults answers."""
+    factors = np.ones(3)
+    for fault in faults:
+        factors = factors * fault.parts
+        p = fault.change(p) if fault.change is not None else p
+    values = right(p)
+    parts = (values["kinetic"], values["elastic"], values["gravitational"])
+    return _sums(*(float(f * part) for f, part in zip(factors, parts, strict=True)))
+
+
+def _diagnose(
+    asked: Sequence[Asked], judgements: Sequence[CaseJudgement], greeting: Greeting
+) -> Diagnosis:
+    wrong = any(one.verdict >= Verdict.WRONG for one in judgements)
+    answered = [
+        (problem_of(one.case.inputs), one.answer.values)
+        for one in asked
+        if isinstance(one.answer, Answer)
+    ]
+    if not wrong or not answered:
+        return Diagnosis()
+    tried = 0
+    for count in (1, 2, 3):
+        matches = []
+        for faults in combinations(FAULTS, count):
+            if len({one.aspect for one in faults}) < count:
+                continue
+            tried += 1
+            if all(_matches(faults, *one, greeting.epsilon) for one in answered):
+                matches.append(faults)
+        if matches:
+            return Diagnosis((_explanation(matches),), tried=tried)
+    return Diagnosis(first_broken=first_broken(judgements), tried=tried)
+
+
+def _matches(faults: Sequence[Fault], p: Problem, given: Mapping[str, Any], epsilon: float) -> bool:
+    expected = predict(faults, p)
+    limit = 8.0 * tolerance(p, epsilon)
+    return all(abs(given[name] - expected[name]) <= limit for name in PARTS if name in given)
+
+
+def _explanation(matches: Sequence[Sequence[Fault]]) -> Explanation:
+    keys = tuple(" + ".join(one.key for one in faults) for faults in matches)[:3]
+    said = either([[one.sentence for one in faults] for faults in matches])
+    return Explanation(keys, said, 1.0, 0.0)

@@ -1,0 +1,220 @@
+"""A small mass-spring system as dense arrays, with the changes that a wrong solver makes to it.
+
+Its forces are written from the formulas, apart from `reference`: a spring pulls its first end with
+-(k (l - r) + c (v_i - v_j)·u) u. What a faulty solver does otherwise, as to forget an end, is a
+field.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray, IndexArray
+from plumbob.reference.mass_spring import MassSpring, State
+
+# Ends nearer than this [m] count as coincident: their direction is then (1, 0, 0).
+COINCIDENT = 1e-150
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What a request of a force, an energy or a step says, and how a faulty solver reads it.
+
+    Attributes:
+        gravity: acceleration [m/s^2], shape (3,).
+        external: forces besides gravity [N], shape (particle, 3).
+        pinned: indices of pinned particles.
+        h: time step [s]; h_before: that of the request before; both 0 for forces and energies.
+        steps: number of steps, or None for a task of one step.
+        weights: the force of gravity if it is not m gravity [N], shape (particle, 3).
+        weighing: the masses m in m gravity, if they are others than those of inertia.
+        ends: what share of its force a spring exerts on its first and on its second end.
+        accumulated: whether forces of springs at one particle add up; else the last one stays, of
+            those whose first end it is and of those whose second.
+        damping: what the dampers see: the velocity along the spring, all of the relative velocity,
+            the particle's own velocity, or the particle's own along the spring.
+        normalised: whether a spring's direction is of length one.
+    """
+
+    masses: FloatArray
+    springs: IndexArray
+    rest_lengths: FloatArray
+    stiffnesses: FloatArray
+    dampings: FloatArray
+    gravity: FloatArray
+    positions: FloatArray
+    velocities: FloatArray
+    pinned: IndexArray
+    tension_only: Any
+    external: FloatArray
+    h: float = 0.0
+    h_before: float = 0.0
+    steps: int | None = None
+    weights: FloatArray | None = None
+    weighing: FloatArray | None = None
+    ends: tuple[float, float] = (1.0, 1.0)
+    accumulated: bool = True
+    damping: str = "along"
+    normalised: bool = True
+
+    @property
+    def count(self) -> int:
+        """Number of particles."""
+        return len(self.masses)
+
+    @cached_property
+    def incidence(self) -> FloatArray:
+        """Rows with 1 at a spring's first end and -1 at its second, shape (spring, particle)."""
+        return self._rows((1.0, 1.0))
+
+    @cached_property
+    def pulled(self) -> FloatArray:
+        """The incidence with the ends that the springs pull, shape (spring, particle)."""
+        rows = self.incidence if self.ends == (1.0, 1.0) else self._rows(self.ends)
+        return rows if self.accumulated else rows * self._is_last
+
+    @property
+    def _is_last(self) -> Any:
+        """Where no later spring has the particle at the same end, shape (spring, particle)."""
+        last = np.zeros((len(self.springs), self.count), dtype=bool)
+        for end in self.springs.T:
+            for particle in np.unique(end):
+                last[np.flatnonzero(end == particle)[-1], particle] = True
+        return last
+
+    def _rows(self, ends: tuple[float, float]) -> FloatArray:
+        rows, every = np.zeros((len(self.springs), self.count)), np.arange(len(self.springs))
+        rows[every, self.springs[:, 0]] = ends[0]
+        rows[every, self.springs[:, 1]] = -ends[1]
+        return rows
+
+    @cached_property
+    def stiff(self) -> bool:
+        """Whether any spring has a stiffness."""
+        return bool(self.stiffnesses.any())
+
+    @cached_property
+    def damped(self) -> bool:
+        """Whether any spring has a damper."""
+        return bool(self.dampings.any())
+
+    @cached_property
+    def constant(self) -> FloatArray:
+        """Gravity and external forces [N], shape (particle, 3)."""
+        weights = self.weighed[:, None] * self.gravity if self.weights is None else self.weights
+        return weights + self.external
+
+    @property
+    def weighed(self) -> FloatArray:
+        """The masses that gravity pulls."""
+        return self.masses if self.weighing is None else self.weighing
+
+    def changed(self, **fields: Any) -> "Problem":
+        """Return the problem with other fields."""
+        return dataclasses.replace(self, **fields)
+
+
+def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> Problem:
+    """Return the problem that a request states; the velocities of pins count as zero."""
+    n, s = len(inputs["masses"]), len(inputs["springs"])
+    pinned = np.asarray(inputs.get("pinned", ()), dtype=int)
+    velocities = np.array(inputs["velocities"], dtype=float)
+    velocities[pinned] = 0.0
+    h = float(inputs.get("h", 0.0))
+    given: dict[str, Any] = {name: np.asarray(inputs[name], dtype=float) for name in _NUMBERS}
+    return Problem(
+        **given,
+        springs=np.asarray(inputs["springs"], dtype=int).reshape(-1, 2),
+        velocities=velocities,
+        pinned=pinned,
+        tension_only=np.asarray(inputs.get("tension_only", np.zeros(s)), dtype=bool),
+        external=np.asarray(inputs.get("external_forces", np.zeros((n, 3))), dtype=float),
+        h=h,
+        h_before=h if h_before is None else h_before,
+        steps=inputs.get("steps"),
+    )
+
+
+_NUMBERS = ("masses", "rest_lengths", "stiffnesses", "dampings", "gravity", "positions")
+
+
+def system_of(p: Problem) -> MassSpring:
+    """Return the same system for `reference`."""
+    return MassSpring(
+        p.masses, p.springs, p.rest_lengths, p.stiffnesses, p.dampings, p.pinned, p.gravity,
+        p.tension_only,
+    )  # fmt: skip
+
+
+def state_of(p: Problem) -> State:
+    """Return the same state for `reference`."""
+    return State(p.positions, p.velocities)
+
+
+def frames(p: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the length of each spring and its direction from the second end to the first."""
+    d = x[p.springs[:, 0]] - x[p.springs[:, 1]]
+    length = np.sqrt((d * d).sum(axis=1))
+    u = np.where(
+        length[:, None] > COINCIDENT, d / np.maximum(length, COINCIDENT)[:, None], (1.0, 0.0, 0.0)
+    )
+    return length, u
+
+
+def stretches(p: Problem, length: FloatArray) -> FloatArray:
+    """Return l - r, zero for a slack spring."""
+    stretch = length - p.rest_lengths
+    return np.where(p.tension_only & (stretch < 0.0), 0.0, stretch)
+
+
+def spring_forces(p: Problem, x: FloatArray) -> FloatArray:
+    """Return the springs' forces on the particles [N], shape (particle, 3)."""
+    length, u = frames(p, x)
+    pull = p.stiffnesses * stretches(p, length) * (1.0 if p.normalised else length)
+    return -p.pulled.T @ (pull[:, None] * u)
+
+
+def damper_forces(p: Problem, x: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the dampers' forces at velocities v on the particles [N], shape (particle, 3)."""
+    if not p.dampings.any():
+        return np.zeros_like(x)
+    c = p.dampings[:, None]
+    if p.damping == "drag":
+        return -p.dampings[0] * v
+    _, u = frames(p, x)
+    first, second = v[p.springs[:, 0]], v[p.springs[:, 1]]
+    if p.damping == "own":
+        return -sum(
+            np.maximum(sign * p.pulled, 0.0).T @ (c * (end * u).sum(1, keepdims=True) * u)
+            for sign, end in ((1.0, first), (-1.0, second))
+        )
+    rate = first - second
+    if p.damping == "along":
+        rate = (rate * u).sum(axis=1, keepdims=True) * u
+    return -p.pulled.T @ (c * rate)
+
+
+def all_forces(p: Problem) -> FloatArray:
+    """Return springs, dampers, gravity and external forces on the particles, (particle, 3) [N]."""
+    x, v = p.positions, p.velocities
+    return p.constant + spring_forces(p, x) + damper_forces(p, x, v)
+
+
+def accelerations(p: Problem, x: FloatArray, v: FloatArray) -> FloatArray:
+    """Return M^-1 f, pins included, shape (particle, 3) [m/s^2]."""
+    total = p.constant
+    if p.stiff:
+        total = total + spring_forces(p, x)
+    if p.damped:
+        total = total + damper_forces(p, x, v)
+    return total / p.masses[:, None]
+
+
+def elastic_energy(p: Problem) -> float:
+    """Return the energy of the springs [J]."""
+    length, _ = frames(p, p.positions)
+    return float((0.5 * p.stiffnesses * stretches(p, length) ** 2).sum())

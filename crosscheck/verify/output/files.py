@@ -1,0 +1,103 @@
+"""The files that `verify` writes: JSON, JUnit XML, a page, failing cases."""
+
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from plumbob.bench.harness.record import check_regular
+from plumbob.bench.text import visible
+
+from ..judgement import Report
+from ..sentence import Sentence, sentence
+from . import json_file, junit, page, saved, terminal
+from .question import Question
+from .words import GOOD, Presentation
+
+FAILURES = Path("plumbob_failures")
+SCREEN = Path("/dev/stdout")
+RIGHT, WRONG, FAILED = 0, 1, 2
+
+
+class Files(NamedTuple):
+    """Where to write, None for nowhere; all three and the failing cases into `folder`."""
+
+    json: Path | None
+    junit: Path | None
+    html: Path | None
+    folder: Path | None
+
+    def check(self) -> None:
+        """Find out before anything is asked whether the files can be written.
+
+        Raises:
+            ValueError, OSError: naming the file or folder that cannot.
+        """
+        from plumbob.commands.options import writable
+
+        for path in filter(None, self._paths()):
+            check_regular(path)
+            writable(path.parent)
+
+    def _paths(self) -> tuple[Path | None, Path | None, Path | None]:
+        if self.folder is None:
+            return self.json, self.junit, self.html
+        return (
+            self.json or self.folder / "verdict.json",
+            self.junit or self.folder / "verdict.xml",
+            self.html or self.folder / "index.html",
+        )
+
+    def write(self, report: Report, question: Question, context: Presentation) -> int:
+        """Print the screen, write the files, and return the exit code.
+
+        A file that cannot be written is one sentence on standard error, and the exit code is 2.
+        """
+        failures: list[Sentence] = []
+        folder = self.folder / "failures" if self.folder else FAILURES
+        options = folder, question.seed, question.thorough
+        paths = {
+            (task.task, task.method): question.rerun
+            or _attempt(folder, partial(saved.save, task, *options), failures)
+            for task in report.tasks
+        }
+        context = context._replace(files={key: path for key, path in paths.items() if path})
+        screen = _attempt(SCREEN, partial(_show, report, context), failures)
+        makers = (
+            lambda: json_file.text(report, context.say),
+            lambda: junit.text(report, context.say),
+            lambda: page.render(report, context),
+        )
+        written = [
+            _attempt(path, partial(_write, path, make), failures)
+            for path, make in zip(self._paths(), makers, strict=True)
+            if path is not None
+        ]
+        if screen and any(written):
+            print(" ".join(visible(str(path)) for path in written if path))
+        for failure in failures:
+            print(f"plumbob: {context.say(failure)}", file=sys.stderr)
+        return FAILED if failures else RIGHT if report.verdict in GOOD else WRONG
+
+
+def _show(report: Report, context: Presentation) -> Path:
+    with suppress(BrokenPipeError, SystemExit):  # files are wanted though nobody reads this
+        terminal.show(report, context)
+    return SCREEN
+
+
+def _write(path: Path, make: Callable[[], str]) -> Path:
+    path.write_text(make(), encoding="utf-8")
+    return path
+
+
+def _attempt(path: Path, write: Callable[[], Path | None], failures: list[Sentence]) -> Path | None:
+    """Return the file that is written; where that fails, note why and return None."""
+    try:
+        return write()
+    except Exception as error:
+        why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
+        failures.append(sentence("{file} could not be written: {why}", file=path, why=why))
+        return None

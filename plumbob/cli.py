@@ -1,0 +1,162 @@
+"""The command line. Engines, the reference and matplotlib are imported inside the commands."""
+
+import io
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from plumbob.bench.text import visible
+
+from . import compile_notice, entry_point
+from .commands import bench, check, records, report, show
+from .commands import compare as comparison
+from .commands import verify as verify
+from .commands.options import INTERRUPTED, MISUSED, REPORT, SUCCESS, UNREAD, Fresh
+from .help_text import Command, Group, block
+
+_UsageError: Any = typer.BadParameter.__base__
+
+app = typer.Typer(
+    cls=Group, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit code.
+
+    A reader that has seen enough, such as `head`, ends the program without a word. The signal for
+    it stays ignored: it would also strike where a worker has ended that we are writing to. Signals
+    to end become exceptions, so that commands clean up, unless they are ignored, as under nohup.
+    """
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, _leave)
+    entry_point.open_closed_streams()
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a letter that it lacks costs no verdict
+        sys.stdout.reconfigure(errors="backslashreplace")
+    interrupts: list[int] = []
+    entry_point.handle_interrupt(partial(_interrupt, interrupts))
+    try:
+        code = run_command(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        code = UNREAD
+    except (Exception, KeyboardInterrupt):
+        if not interrupts:
+            raise
+        code = _say_interrupted()  # a module that is interrupted as it starts raises ImportError
+    entry_point.leave_at_interrupt()
+    if code == UNREAD:  # what is not yet written has nowhere to go
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    sys.exit(code)
+
+
+def run_command(arguments: Sequence[str] | None = None) -> int:
+    """Return the exit code.
+
+    0 success, 1 a check failed, 2 bad usage or input, 130 interrupted, 141 nobody reads the output.
+    """
+    try:
+        code = app(arguments, prog_name="plumbob", standalone_mode=False)
+        if code == INTERRUPTED:  # typer's own answer to Ctrl-C
+            raise KeyboardInterrupt
+        return code if isinstance(code, int) else SUCCESS
+    except (KeyboardInterrupt, typer.Abort):
+        return _say_interrupted()
+    except _UsageError as error:
+        return _complain(error.format_message())
+    except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):  # typer's own answer to that
+            return UNREAD
+        raise
+    except BrokenPipeError:
+        return UNREAD
+    except OSError as error:
+        return _complain(f"{error.filename or ''}: {error.strerror or error}".lstrip(": "))
+    except ValueError as error:
+        return _complain(str(error))
+
+
+@app.callback(
+    invoke_without_command=True,
+    epilog=block(
+        "Examples",
+        "plumbob verify my_solver.py    is your solver right, and if not, why?",
+        "plumbob                        the main job",
+        "plumbob check                  is the reference right?",
+        "plumbob bench ik cloth         measure two suites at full length",
+        "plumbob report                 write the report again from the records",
+        "plumbob show cloth             an animation of the falling cloth",
+    ),
+)
+def plumbob(
+    context: typer.Context,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder to write to, else report."),
+    ] = None,
+    fresh: Fresh = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> int:
+    """Validate, measure and report: skeleton kinematics and implicit mass-spring dynamics.
+
+    Without a command it does the main job: check the reference against Pinocchio and MuJoCo, run
+    the quick bench, and write report/index.html, in a few minutes.
+    """
+    if version:
+        import importlib.metadata
+
+        print(f"plumbob {importlib.metadata.version('plumbob')}")
+        raise typer.Exit
+    if sys.stderr.isatty():
+        compile_notice.install()
+    if context.invoked_subcommand is not None:
+        if output or fresh:
+            raise ValueError(f"write options behind the command: {context.invoked_subcommand}")
+        return SUCCESS
+    return bench.main_job(output or REPORT, fresh)
+
+
+app.command(cls=verify.SolverCommand, epilog=block("Examples", *verify.EXAMPLES))(verify.verify)
+app.command(cls=Command, epilog=check.EXAMPLES)(check.check)
+app.command(cls=verify.SolverCommand, epilog=bench.EXAMPLES)(bench.bench)
+app.command(cls=Command, epilog=report.EXAMPLES)(report.report)
+app.command(cls=verify.SolverCommand, epilog=show.EXAMPLES)(show.show)
+app.command(cls=Command, epilog=comparison.COMPARE_EXAMPLES)(comparison.compare)
+app.command(cls=Command, epilog=comparison.HISTORY_EXAMPLES)(comparison.history)
+app.add_typer(records.app, name="records")
+
+
+def _leave(number: int, _: object) -> None:
+    """Leave by an exception; the same signal again, as from a shell, does not interrupt that."""
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(128 + number)
+
+
+def _interrupt(interrupts: list[int], number: int, _: object) -> None:
+    interrupts.append(number)
+    raise KeyboardInterrupt
+
+
+def _say_interrupted() -> int:
+    return _say(entry_point.INTERRUPTION, INTERRUPTED)
+
+
+def _complain(message: str) -> int:
+    return _say(f"plumbob: {visible(message)}", MISUSED)
+
+
+def _say(line: str, code: int) -> int:
+    try:
+        print(line, file=sys.stderr)
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            raise
+    return code  # on a full disk it alone says what happened

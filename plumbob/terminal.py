@@ -1,0 +1,185 @@
+"""The terminal: tables as text, the bar of a long run."""
+
+import contextlib
+import shutil
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from plumbob.bench.harness.results import Results
+    from plumbob.bench.report.report import Written
+    from plumbob.bench.tables.table import Table
+    from plumbob.crosscheck.verdict import Verdict as ClaimVerdict
+
+# In a pipe no line is broken: each row and each sentence stands in one.
+IN_A_PIPE = 10**6
+# After so long [s] a pipe gets its first line on progress, then ever more seldom.
+PAUSE, LONGEST_PAUSE = 10.0, 60.0
+
+
+def width() -> int:
+    """Return how many letters a line may have: the terminal's, or in a pipe any."""
+    return shutil.get_terminal_size((IN_A_PIPE, 24)).columns
+
+
+def print_tables(suites: Sequence[str], output: Path) -> None:
+    """Print the tables with numbers that come from these suites."""
+    from plumbob.bench.report.sections import tables
+    from plumbob.bench.tables.table import is_blank
+
+    for made in _made(lambda results: tables(results, suites), suites, output):
+        if not is_blank(made):
+            print_aligned(made, f"plumbob report {output} --table {made.name}")
+
+
+def print_ending(suites: Sequence[str], output: Path) -> None:
+    """Print what a bench of these suites came to, in about eight lines."""
+    from plumbob.bench.report.outcome import ending
+
+    lines = _made(lambda results: ending(results, suites, width()), suites, output)
+    print("\n".join(lines))
+
+
+def _made(make: "Callable[[Results], Any]", suites: Sequence[str], output: Path) -> Any:
+    """Return what is made of a folder's records of these suites, but for those that do not fit."""
+    from plumbob.bench.harness.record import FINISHED, RecordFile
+    from plumbob.bench.harness.results import Results, plain, sift
+
+    stored = RecordFile(output).read().records
+    records, _ = sift(make, [plain(r) for r in stored if r.suite in (*suites, FINISHED)])
+    return make(Results(records))
+
+
+def print_summary(table: "Table") -> None:
+    """Print what a table is called and says."""
+    from plumbob.bench.tables.aligned import filled
+
+    print()
+    for text in (table.title, table.summary.sentence):
+        print("\n".join(filled(text, width())) if text else "", end="\n" if text else "")
+    for point in table.summary.points:
+        print("\n".join(f"  {line}" for line in filled(point, width() - 2)))
+
+
+def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe") -> None:
+    """Print a table with what it says, as wide as the terminal; say what shows columns left out."""
+    from plumbob.bench.tables.aligned import filled, left_out
+
+    print_summary(table)
+    missing = print_lines(table)
+    if missing:
+        print("\n".join(filled(left_out(table, missing, shown_by), width())))
+
+
+def print_lines(table: "Table") -> list[str]:
+    """Print the lines of a table; return the headings of the columns that had no place."""
+    from rich.console import Console
+    from rich.text import Text
+
+    from plumbob.bench.tables.aligned import aligned
+
+    made = aligned(table, width())
+    console = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
+    for line in made.lines:
+        text = Text.assemble(*((span.text, span.style) for span in line))
+        text.rstrip()
+        console.print(text)
+    return made.left_out
+
+
+def print_outcome(written: "Written") -> None:
+    """Print what a report came to, in ten lines."""
+    from plumbob.bench.report.outcome import outcome
+
+    print("\n".join(outcome(written, width())), flush=True)
+
+
+def print_verdicts(verdicts: Sequence["ClaimVerdict"]) -> None:
+    """Print a row for each verdict, then why claims were missed and how many held."""
+    from plumbob.bench.harness.metrics import ratio
+    from plumbob.bench.tables.table import Column, Table, cells
+
+    columns = (
+        Column("claim", words=True, read=lambda v: v.claim.name),
+        Column("verdict", words=True, read=lambda v: "held" if v.holds else "MISSED"),
+        Column("cases", read=lambda v: v.cases),
+        Column("largest difference", read=lambda v: v.difference),
+        Column("tolerance", read=lambda v: v.claim.tolerance.value),
+        Column("tolerance used", "%", read=lambda v: ratio(v.difference, v.claim.tolerance.value)),
+    )
+    print_lines(Table("verdicts", "", columns, cells(columns, verdicts)))
+    for verdict in verdicts:
+        if not verdict.holds:
+            print(f"MISSED: {verdict.claim.name} ({verdict.failure})")
+    print(f"{sum(verdict.holds for verdict in verdicts)} of {len(verdicts)} claims held")
+
+
+def progress() -> Any:
+    """Return a progress bar on a terminal, and nothing to see in a pipe.
+
+    Bar, count and time left keep their place at any width; what is being done takes the rest. The
+    field "kept" of its task counts steps that took no time.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn
+    from rich.table import Column
+    from rich.text import Text
+
+    class TimeLeft(ProgressColumn):
+        def render(self, task: Any) -> Text:
+            return Text(time_left(task.elapsed, task.completed, task.total, task.fields))
+
+    console = Console(stderr=True)
+    rigid, rest = Column(no_wrap=True), Column(no_wrap=True, overflow="ellipsis", ratio=1)
+    return Progress(
+        BarColumn(max(4, min(24, console.width // 6 - 1)), table_column=rigid.copy()),
+        MofNCompleteColumn(table_column=rigid.copy()),
+        TimeLeft(table_column=rigid.copy()),
+        TextColumn("{task.description}", markup=False, table_column=rest),
+        console=console,
+        transient=True,
+        expand=True,
+        refresh_per_second=2,
+        disable=not sys.stderr.isatty(),
+    )
+
+
+@contextlib.contextmanager
+def lines_in_a_pipe(bar: Any) -> Iterator[None]:
+    """Print how far a bar is, now and then, where standard error is no terminal."""
+    end = threading.Event()
+
+    def report() -> None:
+        pause = PAUSE
+        while not end.wait(pause):
+            pause = min(1.5 * pause, LONGEST_PAUSE)
+            for task in bar.tasks:
+                left = time_left(task.elapsed, task.completed, task.total, task.fields)
+                line = f"{task.completed:g}/{task.total:g}, {left}: {task.description}"
+                print(line, file=sys.stderr, flush=True)
+
+    if not sys.stderr.isatty():
+        threading.Thread(target=report, daemon=True).start()
+    try:
+        yield
+    finally:
+        end.set()
+
+
+def time_left(
+    elapsed: float | None, completed: float, total: float | None, fields: Mapping[str, Any]
+) -> str:
+    """Return how long the rest takes if it goes on as it went: "1:05 left".
+
+    "?" before a hundredth is done, for the first calls compile.
+    """
+    done = completed - fields.get("kept", 0)
+    if not elapsed or total is None or done <= 0.01 * total:
+        return "? left"
+    minutes, seconds = divmod(round(elapsed / done * (total - completed)), 60)
+    hours, minutes = divmod(minutes, 60)
+    clock = f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes}:{seconds:02}"
+    return f"{clock} left"

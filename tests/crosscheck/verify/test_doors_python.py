@@ -1,0 +1,568 @@
+"""Laws of Python files and objects as contestants, in real processes."""
+
+import math
+import re
+import sys
+
+import numpy as np
+import pytest
+from hostile_programs import LIMITS, case, running
+
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer, Failure, NoGreetingError
+from plumbob.crosscheck.verify.functions import call
+from plumbob.crosscheck.verify.message import (
+    Request,
+    decode_answer,
+    decode_error,
+    decode_greeting,
+    decode_object,
+    decode_request,
+    encode_answer,
+    encode_case,
+)
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.crosscheck.verify.solvers import Limits, host, open_contestant
+from plumbob.crosscheck.verify.solvers.files import FileContestant
+from plumbob.crosscheck.verify.solvers.program import ProgramContestant
+from plumbob.crosscheck.verify.task import TASKS
+
+FORWARD = "def forward_kinematics(parents, offsets, local_rotations):\n    "
+
+
+@pytest.fixture
+def solver(tmp_path):
+    """Make a contestant of a file's text; ends it afterwards and sees that nothing stays."""
+    opened = []
+
+    def make(text, spec="my_ik.py", limits=LIMITS, **files):
+        for name, content in {"my_ik": text, **files}.items():
+            (tmp_path / f"{name}.py").write_text(content, encoding="utf-8")
+        opened.append(open_contestant(f"{tmp_path}/{spec}", limits))
+        return opened[-1]
+
+    yield make
+    for contestant in opened:
+        contestant.close()
+    assert not running(tmp_path)
+
+
+class Inside:
+    """The host of a Python solver in this process, asked as a child process is."""
+
+    def __init__(self, spec, folder):
+        self._solver, self._failure = host._loaded(spec, folder)
+
+    @property
+    def greeting(self):
+        fields = self._fields(Request(0, "greeting", {}))
+        if "error" in fields:
+            raise NoGreetingError(decode_error(fields))
+        return decode_greeting(fields)
+
+    def answer(self, case):
+        request = decode_request(encode_case(1, case))
+        return decode_answer(self._fields(request), TASKS[case.task], case.inputs, math.inf)
+
+    def _fields(self, request):
+        fields = self._solver.answer(request) if self._solver else self._failure
+        return decode_object(encode_answer(request.id, **fields))
+
+
+@pytest.fixture
+def inside(tmp_path, monkeypatch):
+    """Make a contestant of a file's text without a process of its own."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    known = set(sys.modules)
+
+    def make(text, spec="my_ik.py", **files):
+        for name, content in {"my_ik": text, **files}.items():
+            (tmp_path / f"{name}.py").write_text(content, encoding="utf-8")
+        return Inside(f"{tmp_path}/{spec}", str(tmp_path))
+
+    yield make
+    for name in set(sys.modules) - known:
+        del sys.modules[name]
+
+
+def inverse(method=None):
+    inputs = dict(case(2).inputs) | {"target": np.array([0.1, 0.2, 0.3]), "effector": 1}
+    inputs |= {"method": method} if method else {}
+    return Case("one", "inverse_kinematics", inputs, "", sentence("one"))
+
+
+def words(failure):
+    assert isinstance(failure, Failure), failure
+    return f"{failure.kind}: {failure.sentence}"
+
+
+ANSWERS = {
+    "an array": "np.ones((2, 3)) / 3",
+    "lists": "[[1 / 3] * 3] * 2",
+    "single precision": "np.full((2, 3), 1 / 3, dtype=np.float32)",
+    "a tuple": "np.ones((2, 3)) / 3, np.eye(4)[:2]",
+    "rotations first": "np.eye(4)[:2]",
+    "a dict": "{'positions': np.ones((2, 3)) / 3, 'other': object()}",
+    "not numbers": "np.full((2, 3), [np.nan, np.inf, -np.inf])",
+    "tiny ones": "np.full((2, 3), 5e-324)",
+}
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_an_answer_is_what_the_function_returns_bit_for_bit(inside, name):
+    expression = ANSWERS[name]
+    contestant = inside(f"import numpy as np\n{FORWARD}return {expression}\n")
+    expected = call(lambda parents: eval(expression), TASKS["forward_kinematics"], case(2).inputs)
+    answer = contestant.answer(case(2))
+    assert answer.values.keys() == expected.values.keys()
+    for key, value in expected.values.items():
+        np.testing.assert_array_equal(answer.values[key], value)
+    assert 0.0 < answer.seconds < 0.1
+    assert answer.remarks == ()
+
+
+def test_inputs_arrive_as_arrays_and_only_those_that_are_taken(inside):
+    contestant = inside(
+        "def mass_spring_step(masses, h, **rest):\n"
+        "    assert masses.dtype == float and rest['springs'].shape == (0, 2)\n"
+        "    assert type(h) is float and 'tension_only' not in rest\n"
+        "    return {'positions': rest['positions'] + h}\n"
+        "def energy(positions, velocities=None):\n"
+        "    return {'kinetic': 0.5 if velocities is not None else 0}\n"
+    )
+    state = {"positions": np.ones((2, 3)), "velocities": np.ones((2, 3))}
+    inputs = {"masses": np.ones(2), "springs": np.zeros((0, 2), dtype=int), **state, "h": 0.5}
+    step = contestant.answer(Case("a", "mass_spring_step", inputs, "", sentence("a")))
+    np.testing.assert_array_equal(step.values["positions"], np.full((2, 3), 1.5))
+    energy = contestant.answer(Case("a", "energy", inputs, "", sentence("a")))
+    assert energy.values == {"kinetic": 0.5}
+
+
+def test_own_time_is_measured_inside(solver):
+    contestant = solver(f"import time\n{FORWARD}time.sleep(0.2)\n    return offsets\n")
+    assert 0.2 <= contestant.answer(case(2)).seconds < 0.4
+
+
+@pytest.mark.parametrize(
+    ("text", "methods"),
+    [
+        ("def ccd(target, offsets): return offsets + 1", ("ccd",)),
+        (
+            "def fabrik(target, offsets): return offsets + 2\n"
+            "def ccd(target, offsets): return offsets + 1",
+            ("ccd", "fabrik"),
+        ),
+        ("def inverse_kinematics(offsets): return offsets + 1", ("",)),
+        (
+            "PLUMBOB = {'methods': ['ccd', 'my own']}\n"
+            "def inverse_kinematics(offsets, method):\n"
+            "    return offsets + (1 if method == 'ccd' else 2)",
+            ("ccd", "my own"),
+        ),
+        (
+            "PLUMBOB = {'methods': ('ccd', 'jacobian')}\n"
+            "def ccd(offsets): return offsets + 1\n"
+            "def jacobian(offsets): return offsets + 2",
+            ("ccd", "jacobian"),
+        ),
+    ],
+    ids=["ccd", "two", "one function", "one function of two methods", "declared"],
+)
+def test_methods_of_inverse_kinematics_are_found(inside, text, methods):
+    contestant = inside(text)
+    assert contestant.greeting.tasks == ("inverse_kinematics",)
+    assert contestant.greeting.methods == methods
+    for method, value in zip(methods, (1.0, 2.0), strict=False):
+        assert contestant.answer(inverse(method)).values["positions"][0, 0] == value
+
+
+def test_an_answer_of_another_kind_names_the_kind(inside):
+    text = f"import numpy as np\n{FORWARD}return {{'positions': np.zeros((2, 3), complex)}}\n"
+    told = str(inside(text).answer(case(2)).sentence)
+    assert told.endswith(
+        "expected numbers of shape (joint, 3), got complex128 values of shape (2, 3)"
+    )
+
+
+def test_an_answer_without_outputs_is_described(inside):
+    none = inside("def inverse_kinematics(target): return None\n").answer(inverse(""))
+    assert str(none.sentence).endswith("got None")
+    failure = inside(f"{FORWARD}return {{}}\n").answer(case(2))
+    assert str(failure.sentence).endswith("got an empty dict")
+    failure = inside(f"{FORWARD}return {{'x': 1, 'y': 2}}\n").answer(case(2))
+    assert str(failure.sentence).endswith("got the keys x, y")
+
+
+def test_a_method_is_no_answer_to_another_task(inside):
+    contestant = inside(
+        "def ccd(target): 1 / 0\ndef track(offsets): return {'positions': offsets[None]}"
+    )
+    assert contestant.greeting.tasks == ("inverse_kinematics", "track")
+    asked = Case("a", "track", inverse("ccd").inputs, "", sentence("a"))
+    assert contestant.answer(asked).values["positions"].shape == (1, 2, 3)
+
+
+def test_what_a_file_says_of_itself_is_its_greeting(inside):
+    contestant = inside(
+        "PLUMBOB = {'name': 'mine', 'precision': 'single', 'step': {'substeps': 3}}\n"
+        f"{FORWARD}return offsets\n"
+    )
+    greeting = contestant.greeting
+    assert (greeting.name, greeting.precision, greeting.step.substeps) == ("mine", "single", 3)
+    assert (greeting.tasks, greeting.language) == (("forward_kinematics",), "Python")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "import numpy as np\nclass A:\n    def forwardKinematics(self): pass\n"
+            "def forwardKinematics(): pass",
+            r"my_ik.py: expected functions named as some of forward_kinematics, .*"
+            r"got A, forwardKinematics \(did you mean forward_kinematics\?\)$",
+        ),
+        (
+            "from math import cos\ndef part1_forward_kinematics(): pass\ndef spring_forces(): pass",
+            r"got part1_forward_kinematics \(did you mean forward_kinematics\?\), "
+            r"spring_forces \(did you mean mass_spring_forces\?\)$",
+        ),
+        ("x = 3", "expected functions named as some of .*, got none"),
+        ("def energy(chain): pass", "expected energy to take some of masses, .*, got others"),
+        ("PLUMBOB = 3\ndef energy(masses): pass", "PLUMBOB: expected a dict .*, got 3"),
+        (
+            "PLUMBOB = {'precision': 'float'}\ndef energy(masses): pass",
+            "PLUMBOB: precision: expected 'single' or 'double', got 'float'",
+        ),
+        (
+            "PLUMBOB = {'tasks': ['enegry']}\ndef energy(masses): pass",
+            r"PLUMBOB: tasks: .* did you mean energy\?",
+        ),
+        (
+            "PLUMBOB = {'max_joints': object()}\ndef energy(masses): pass",
+            "PLUMBOB: max_joints: expected an integer of 1 or more, got",
+        ),
+        (
+            "PLUMBOB = {'name': 'x' * 10**6}\ndef energy(masses): pass",
+            "PLUMBOB: name: expected a text of at most 100 characters, got 1000000 characters: ",
+        ),
+        (
+            "PLUMBOB = {'step': {'substeps': 100000}}\ndef energy(masses): pass",
+            "PLUMBOB: step: substeps: expected an integer from 1 to 1000, got 100000",
+        ),
+        (
+            "PLUMBOB = {'methods': ['ccd'] * 5000}\ndef ccd(target): pass",
+            "PLUMBOB: methods: expected a list of .*, at most 20 of them, got 5000 entries",
+        ),
+        (
+            "PLUMBOB = ['x' * 10**6] * 3\ndef energy(masses): pass",
+            "PLUMBOB: expected a dict with texts as keys, got 3 entries: ",
+        ),
+        ("PLUMBOB = {3: 4}\ndef energy(masses): pass", "PLUMBOB: expected a dict with texts"),
+        ("def f(:\n  pass", "raised: It raised SyntaxError in line 1 of my_ik.py: invalid syntax"),
+        ("\n\nx = y", "raised: It raised NameError in line 3 of my_ik.py: name 'y' is not defined"),
+        ("\nimport numpyy", "raised: It raised ModuleNotFoundError in line 2 of my_ik.py"),
+        ("import broken", "raised: It raised ZeroDivisionError in line 2 of broken.py: division"),
+        ("x = 0\nexit(3)", "raised: It raised SystemExit in line 2 of my_ik.py: 3"),
+        ("raise KeyError", "raised: It raised KeyError in line 1 of my_ik.py: no message"),
+    ],
+)
+def test_a_file_that_offers_nothing_says_what_to_mend(inside, text, message):
+    contestant = inside(text, broken="x = 1\nx / 0")
+    with pytest.raises(NoGreetingError) as caught:
+        _ = contestant.greeting
+    said = words(caught.value.failure)
+    assert re.search(message, said), said
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("name", ["forward_kinematics", "mass_spring_step", "ccd"])
+def test_a_function_of_a_task_is_asked_even_if_no_argument_is_known(inside, name):
+    contestant = inside(f"def {name}(joint_parent): pass\ndef energy(masses): pass")
+    task = "inverse_kinematics" if name == "ccd" else name
+    assert set(contestant.greeting.tasks) == {task, "energy"}
+
+
+def test_a_helper_of_a_common_name_is_not_taken_for_a_task(inside):
+    contestant = inside(f"{FORWARD}return offsets\ndef resample(signal, n): pass\n")
+    assert contestant.greeting.tasks == ("forward_kinematics",)
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("return 1 / 0", "raised: It raised ZeroDivisionError in line 4 of my_ik.py: division by"),
+        ("return helper.deep(0)", "raised: .*ZeroDivisionError in line 2 of helper.py: "),
+        ("import numpy; return numpy.linalg.inv(offsets)", "LinAlgError in line 4 of my_ik.py"),
+        ("raise SystemExit('bye')", "raised: It raised SystemExit in line 4 of my_ik.py: bye"),
+        ("return forward_kinematics(parents, offsets, 0)", "raised: It raised RecursionError in l"),
+        ("return offsets[:1]", r"garbage: .*positions \(joint, 3\).*got \(1, 3\)"),
+        ("return None", "garbage: .*got None"),
+        ("return 'text', {}", "garbage: .*got 'text'"),
+        ("return {'positions': [[1]]}", r"garbage: positions: expected shape \(3, 3\)"),
+        ("return {'positions': 10**5000}", "garbage: positions: expected numbers"),
+        ("raise ValueError('{x.y} %s <b>' * 99)", "raised: .*: {x.y} %s <b>"),
+    ],
+)
+def test_what_a_function_does_wrong_is_told_with_its_line(inside, body, message):
+    contestant = inside(three_joints(body), helper="def deep(x):\n    return 1 / x\n")
+    assert isinstance(contestant.answer(case(2)), Answer)
+    said = words(contestant.answer(case(3)))
+    assert re.search(message, said), said
+    assert len(said) < 700
+
+
+def three_joints(body):
+    """A file with a function that does something else where it is given three joints."""
+    return f"import helper\n{FORWARD}if len(parents) == 3:\n        {body}\n    return offsets\n"
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("return helper.deep(0)", "raised: .*ZeroDivisionError in line 2 of helper.py: division"),
+        ("return offsets[:1]", r"garbage: .*positions \(joint, 3\).*got \(1, 3\)"),
+        ("import os; os._exit(4)", "crashed: It ended instead of answering: exit code 4"),
+        (
+            "import os; os.kill(os.getpid(), 11)",
+            "crashed: .*not its own.* line 4 in forward_kinematics$",
+        ),
+        ("import os; os.close(0); os.close(1); os.close(2); return 3 / 0", "raised: .*Zero"),
+        (
+            "for _ in iter(int, 1): pass",
+            "hung: It computed for 0.5 s .*: It was in line 4 of my_ik.py",
+        ),
+    ],
+)
+def test_a_process_survives_or_is_started_anew(solver, body, message):
+    contestant = solver(three_joints(body), helper="def deep(x):\n    return 1 / x\n")
+    assert isinstance(contestant.answer(case(2)), Answer)
+    said = words(contestant.answer(case(3)))
+    assert re.search(message, said), said
+    assert isinstance(contestant.answer(case(2)), Answer)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = input()", "raised: It raised EOFError in line 1 of my_ik.py"),
+        ("import os; os._exit(3)", "crashed: .*exit code 3"),
+        ("def f(:\n  pass", "raised: It raised SyntaxError in line 1 of my_ik.py: invalid syntax"),
+        ("def energies(masses): pass", r"garbage: .*energies \(did you mean energy\?\)"),
+    ],
+)
+def test_a_process_that_cannot_load_its_file_says_so(solver, text, message):
+    with pytest.raises(NoGreetingError) as caught:
+        _ = solver(text).greeting
+    assert re.search(message, words(caught.value.failure))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            "offsets, chain",
+            "no input is called chain: There are parents, offsets, local_ro",
+        ),
+        ("parents, offset", r"called offset; did you mean offsets\? There are parents"),
+        (
+            "offsets, *, rotations",
+            r"called rotations; did you mean local_rotations\? There are parents",
+        ),
+    ],
+)
+def test_an_argument_that_no_input_has_is_told_with_those_there_are(inside, arguments, message):
+    contestant = inside(f"def forward_kinematics({arguments}): return offsets")
+    said = words(contestant.answer(case(2)))
+    assert re.search(message, said), said
+
+
+PRINTS = {
+    "print": "print('joint 1')",
+    "much": "print('joint 1' * 10**6)",
+    "bytes": "sys.stdout.buffer.write(b'joint 1\\xff')",
+    "a line and a half": "print('joint 1\\nand', end='')",
+}
+
+
+@pytest.mark.parametrize("name", PRINTS)
+def test_prints_do_no_harm_and_are_remarked(solver, name):
+    contestant = solver(f"import sys\n{FORWARD}{PRINTS[name]}\n    return offsets\n")
+    for _ in range(2):
+        remarks = contestant.answer(case(2)).remarks
+        assert len(remarks) == 1
+        assert "prints to its standard output, for example: joint 1" in str(remarks[0])
+
+
+@pytest.mark.parametrize("body", ["os.system('echo hello')", "os.write(1, b'hello\\n' * 1000)"])
+def test_prints_past_python_do_no_harm(solver, body):
+    contestant = solver(f"import os\n{FORWARD}{body}\n    return offsets\n")
+    for _ in range(2):
+        assert isinstance(contestant.answer(case(2)), Answer)
+
+
+def test_a_print_while_loading_is_remarked_once(solver):
+    contestant = solver(f"print('loading')\n{FORWARD}return offsets\n")
+    first, second = contestant.answer(case(2)), contestant.answer(case(2))
+    assert ["loading" in str(one) for one in first.remarks] == [True]
+    assert second.remarks == ()
+
+
+def test_changed_arguments_are_remarked(inside):
+    contestant = inside(f"{FORWARD}offsets[0] = 3\n    return offsets\n")
+    assert [str(one) for one in contestant.answer(case(2)).remarks] == [
+        "It changed its argument offsets."
+    ]
+    assert contestant.answer(case(2)).values["positions"][1, 0] == 0.0
+
+
+def test_the_demonstration_below_the_main_guard_does_not_run(inside):
+    text = f"{FORWARD}return offsets\nif __name__ == '__main__':\n    1 / 0\n"
+    assert inside(text).greeting.tasks == ("forward_kinematics",)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [("rotation", "skeleton"), ("crosscheck", "message"), ("reference", "task"), ("host", "case")],
+)
+def test_modules_beside_the_file_are_its_own(solver, names):
+    imports = "".join(f"import {name}\n" for name in names if name != "crosscheck")
+    last = names[-1]
+    contestant = solver(
+        f"{imports}{FORWARD}return offsets + {last}.VALUE\n",
+        **dict.fromkeys(names, "VALUE = 7.0\n"),
+    )
+    assert contestant.answer(case(2)).values["positions"][0, 0] == 7.0
+
+
+def test_a_file_runs_in_its_own_folder_wherever_it_is_called_from(solver, tmp_path, monkeypatch):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "data.txt").write_text("5")
+    contestant = solver(
+        f"value = float(open('data.txt').read())\n{FORWARD}return offsets + value\n"
+    )
+    assert contestant.answer(case(2)).values["positions"][0, 0] == 5.0
+    monkeypatch.chdir(tmp_path / "sub")
+    other = open_contestant("../my_ik.py", LIMITS)
+    assert other.answer(case(2)).values["positions"][0, 0] == 5.0
+    other.close()
+
+
+@pytest.mark.parametrize("name", ["my ik-2", "json", "numpy", "2", "message"])
+def test_a_file_may_have_any_name(solver, name):
+    text = f"import math\n{FORWARD}return offsets + math.pi\n"
+    contestant = solver(text, f"{name}.py", **{name: text})
+    assert contestant.answer(case(2)).values["positions"][0, 0] == math.pi
+    assert contestant.greeting.name == f"{name}.py"
+
+
+OBJECTS = """
+class Arm:
+    PLUMBOB = {"name": "an arm"}
+    def forward_kinematics(self, offsets):
+        return offsets + 1
+class Lazy:
+    def __getattr__(self, name):
+        raise AttributeError(name)
+arm = Arm()
+table = {"energy": lambda masses: 3.0, "other": 4}
+def energy(masses): return 2.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("attribute", "tasks", "name"),
+    [
+        ("Arm", ("forward_kinematics",), "an arm"),
+        ("arm", ("forward_kinematics",), "an arm"),
+        ("table", ("energy",), "table"),
+        ("energy", ("energy",), "energy"),
+    ],
+)
+def test_an_object_offers_what_it_has(inside, tmp_path, attribute, tasks, name):
+    contestant = inside(OBJECTS, f"my_ik.py:{attribute}")
+    of_module = Inside(f"my_ik:{attribute}", str(tmp_path))
+    for one in (contestant, of_module):
+        assert (one.greeting.tasks, one.greeting.name) == (tasks, name)
+
+
+def test_a_module_of_this_folder_is_found(tmp_path, monkeypatch):
+    (tmp_path / "my_ik.py").write_text(OBJECTS)
+    monkeypatch.chdir(tmp_path)
+    contestant = open_contestant("my_ik:arm", LIMITS)
+    assert contestant.answer(case(2)).values["positions"][0, 0] == 1.0
+    contestant.close()
+
+
+@pytest.mark.parametrize(
+    ("attribute", "message"),
+    [("Amr", "Amr: expected something .*did you mean arm"), ("Lazy", "Lazy: expected functions")],
+)
+def test_an_object_that_is_not_there_has_a_hint(inside, attribute, message):
+    with pytest.raises(NoGreetingError, match=message):
+        _ = inside(OBJECTS, f"my_ik.py:{attribute}").greeting
+
+
+def test_the_host_loads_nothing_of_ours_that_it_does_not_need(solver):
+    contestant = solver(
+        f"import sys\n{FORWARD}return offsets + sum(\n"
+        "        name.split('.')[0] in ('reference', 'numba', 'scipy', 'bench', 'mujoco')\n"
+        "        for name in sys.modules)\n"
+    )
+    assert contestant.answer(case(2)).values["positions"][0, 0] == 0.0
+
+
+def test_what_a_function_starts_is_ended(solver):
+    contestant = solver(
+        "import subprocess, sys\n"
+        f"{FORWARD}subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)', "
+        "__file__], start_new_session=True)\n    return offsets\n"
+    )
+    assert isinstance(contestant.answer(case(2)), Answer)
+    contestant.close()
+    assert "left processes running that it had started (1)" in str(contestant.remarks[0])
+
+
+@pytest.mark.parametrize("kind", ["list", "program", "folder"])
+def test_a_door_opens_to_each_kind(tmp_path, kind):
+    (tmp_path / "run").write_text("#!/bin/sh\nexit 3\n")
+    (tmp_path / "run").chmod(0o755)
+    (tmp_path / "export.json").write_text("{}")
+    spec = {"list": ["sh", "-c", "exit 3"], "program": tmp_path / "run", "folder": tmp_path}[kind]
+    contestant = open_contestant(spec, Limits())
+    if kind == "folder":
+        assert isinstance(contestant, FileContestant)
+    else:
+        assert isinstance(contestant, ProgramContestant)
+        with pytest.raises(NoGreetingError, match="exit code 3"):
+            _ = contestant.greeting
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("nowhere.py", "expected a Python file, got nowhere.py, which does not exist"),
+        ("nowhere.py:Arm", "expected a Python file, got nowhere.py, which does not exist"),
+        ("nowhere", "got nowhere, which does not exist"),
+        ("solver.js", "give the command that runs it, as in: -- node solver.js"),
+        (".", "expected a folder of exported cases, got"),
+    ],
+)
+def test_a_door_that_leads_nowhere_is_a_misuse(tmp_path, monkeypatch, spec, message):
+    (tmp_path / "solver.js").write_text("")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=message):
+        open_contestant(spec)
+
+
+def test_a_module_that_is_not_there_is_told():
+    contestant = open_contestant("nowhere.at.all:solver")
+    with pytest.raises(
+        NoGreetingError, match="raised ModuleNotFoundError: No module named 'nowhere'"
+    ):
+        _ = contestant.greeting
+
+
+def test_compiled_functions_that_do_not_say_what_they_take_are_given_all():
+    failure = call(math.hypot, TASKS["energy"], {"masses": np.ones(2)})
+    assert "takes no keyword arguments" in str(failure.sentence)
+    assert sys.modules["math"] is math

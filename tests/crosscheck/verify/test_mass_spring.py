@@ -1,0 +1,551 @@
+"""Faults of mass-spring solvers are caught by laws and named; honest solvers are not accused."""
+
+import dataclasses
+import re
+import sys
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from mass_spring_solvers import (
+    CONVERGED,
+    DECLARED,
+    LINEARISED,
+    LOCAL_GLOBAL,
+    SYMPLECTIC,
+    Stepper,
+    named,
+    report,
+)
+
+from plumbob.crosscheck.engines.mujoco_mass_spring import MujocoMassSpring
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer
+from plumbob.crosscheck.verify.functions import FunctionContestant
+from plumbob.crosscheck.verify.greeting import Greeting, Step, System
+from plumbob.crosscheck.verify.judgement import CaseJudgement, Finding, Report, Verdict
+from plumbob.crosscheck.verify.mass_spring import energy, forces, stepping
+from plumbob.crosscheck.verify.mass_spring.cases import task_cases
+from plumbob.crosscheck.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
+from plumbob.crosscheck.verify.mass_spring.model import Integrator, Model, simulate
+from plumbob.crosscheck.verify.mass_spring.problem import (
+    all_forces,
+    problem_of,
+    state_of,
+    system_of,
+)
+from plumbob.crosscheck.verify.output import terminal
+from plumbob.crosscheck.verify.output.words import Presentation, speaker
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.crosscheck.verify.verify import verify
+from plumbob.reference.explicit import runge_kutta, symplectic_euler
+from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+
+EVERYTHING = System(external_forces=True, tension_only=True)
+BY_KEY = {one.key: one for one in reversed(STEP_FAULTS)}
+# A fault that a model cannot have, or has under another name.
+ON_SUBSTEPS = ("h not divided", "pins free until the end", "velocity over the whole h")
+ON_LOCAL_GLOBAL = ("pins at the origin",)
+ON_SYMPLECTIC = ("moved in place",)
+SOME = ("gravity g/m", "factor kept", "pins free", "damping as drag")
+
+
+def base_of(key):
+    if key in ON_SUBSTEPS or key in ON_SYMPLECTIC:
+        return DECLARED["symplectic"]
+    return DECLARED["local/global" if key in ON_LOCAL_GLOBAL else "linearised"]
+
+
+def mark(values, some):
+    """Return parameters of which only some run by default."""
+    return [
+        pytest.param(one, marks=() if one in some else pytest.mark.slow, id=str(one))
+        for one in values
+    ]
+
+
+def broken_laws(found):
+    return {
+        finding.law
+        for one in found.judgements
+        for finding in one.findings
+        if finding.verdict >= Verdict.WRONG
+    }
+
+
+def ours(name):
+    """Return a step of the reference by a function of the system, the state and h."""
+
+    def step(system, state, h):
+        return _REFERENCE[name](system, state, h)
+
+    return step
+
+
+def _solver(name, **options):
+    return lambda s, state, h: ImplicitEuler(s, h=h, solver=name, **options).step(state).state
+
+
+_REFERENCE = {
+    "converged": _solver("newton", tolerance=0.0),
+    "local_global": _solver("local_global", tolerance=0.0, max_iterations=3),
+    "newton": _solver("newton", tolerance=0.0, max_iterations=2),
+    "gauss_newton": _solver("gauss_newton", tolerance=0.0, max_iterations=1),
+    "symplectic": symplectic_euler,
+    "runge_kutta": runge_kutta,
+}
+_DENSE = {
+    "converged": CONVERGED,
+    "local_global": Model(Integrator("local_global", "y", 3)),
+    "newton": Model(Integrator("newton", "y", 2)),
+    "gauss_newton": Model(Integrator("newton", "x_n", 1, "gauss")),
+    "symplectic": Model(Integrator("symplectic"), 1, "explicit", velocity="separate"),
+    "runge_kutta": Model(Integrator("runge_kutta"), 1, "explicit", velocity="separate"),
+}
+
+
+@pytest.mark.parametrize("name", _DENSE)
+def test_the_dense_step_is_the_reference_s(name):
+    for case in task_cases("mass_spring_step", Greeting(1, ("mass_spring_step",)), 0, False):
+        if case.family == "compression" or case.name == "stiff cloth":
+            continue  # there Newton's safeguards act, which nobody declares
+        p = problem_of(case.inputs)
+        found, wanted = simulate(p, _DENSE[name]), ours(name)(system_of(p), state_of(p), p.h)
+        moved = np.abs(wanted.positions - p.positions).max()
+        np.testing.assert_allclose(
+            found["positions"], wanted.positions, rtol=0, atol=1e-13 + 1e-9 * moved
+        )
+
+
+@pytest.mark.parametrize("key", mark(BY_KEY, SOME))
+def test_every_fault_of_a_step_is_caught_and_named(key):
+    model, declared = base_of(key)
+    found = report(Stepper(model, [BY_KEY[key]]), step=declared, system=EVERYTHING)
+    assert found.verdict >= Verdict.WRONG
+    assert broken_laws(found) - {"remarks"}
+    assert key in named(found)
+    assert found.smallest_failure is not None
+
+
+PAIRS = [
+    (first, second)
+    for i, first in enumerate(BY_KEY)
+    for second in [list(BY_KEY)[(7 * i + 13) % len(BY_KEY)]]
+    if BY_KEY[first].aspect != BY_KEY[second].aspect
+    and not {first, second} & {*ON_SUBSTEPS, *ON_LOCAL_GLOBAL, *ON_SYMPLECTIC, "springs missing",
+                               "factor kept", "matrix L", "matrix L without h²",
+                               "tension only ignored"}
+    and not any(BY_KEY[one].aspect == "integrator" for one in (first, second))
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("pair", mark(PAIRS[::4], PAIRS[8:9]))
+def test_two_faults_at_once_are_named(pair):
+    model, declared = DECLARED["linearised"]
+    found = report(Stepper(model, [BY_KEY[one] for one in pair]), step=declared, system=EVERYTHING)
+    assert found.verdict >= Verdict.WRONG
+    assert any(set(one.split(" + ")) <= set(pair) for one in named(found))
+
+
+def test_three_faults_at_once_are_named():
+    three = ("gravity doubled", "matrix doubled beside", "velocity over 2h")
+    model, declared = DECLARED["linearised"]
+    found = report(Stepper(model, [BY_KEY[one] for one in three]), step=declared)
+    assert {frozenset(one.split(" + ")) for one in named(found)} == {frozenset(three)}
+
+
+HONEST = {
+    "linearised": (LINEARISED, DECLARED["linearised"][1], "double"),
+    "converged": (CONVERGED, DECLARED["converged"][1], "double"),
+    "local/global": (LOCAL_GLOBAL, DECLARED["local/global"][1], "double"),
+    "symplectic": (SYMPLECTIC, DECLARED["symplectic"][1], "double"),
+    "linearised, single": (LINEARISED, DECLARED["linearised"][1], "single"),
+    "converged, single": (CONVERGED, DECLARED["converged"][1], "single"),
+    "symplectic, single": (SYMPLECTIC, DECLARED["symplectic"][1], "single"),
+    "linearised, undeclared": (LINEARISED, Step(), "double"),
+    "converged, undeclared": (CONVERGED, Step(), "single"),
+    "local/global, undeclared": (LOCAL_GLOBAL, Step(), "double"),
+    "explicit, undeclared": (
+        Model(Integrator("explicit"), 100, "explicit", velocity="separate"), Step(), "double",
+    ),
+    "overwritten pins": (
+        LOCAL_GLOBAL._replace(pins="overwritten"),
+        Step("local_global", "y", 10, 1, "length_rate", None, "overwritten"), "double",
+    ),
+    "overwritten pins, undeclared": (LINEARISED._replace(pins="overwritten"), Step(), "double"),
+    "penalty": (LINEARISED._replace(pins="penalty 1e10"), Step(pins="penalty"), "double"),
+    "penalty, undeclared": (LINEARISED._replace(pins="penalty 1e10"), Step(), "double"),
+    "heavy pins": (LINEARISED._replace(pins="heavy 1e8"), Step(pins="heavy"), "double"),
+    "end velocity": (CONVERGED._replace(damper="end_velocity"), Step("converged"), "double"),
+    "no damping": (CONVERGED._replace(damper="none"), Step("converged", damper="none"), "double"),
+    "global factor": (
+        CONVERGED._replace(damper="none", scaling=0.98),
+        Step("converged", damper="global_factor", damping_factor=0.98), "double",
+    ),
+    "substeps": (CONVERGED._replace(substeps=3), Step("converged", substeps=3), "double"),
+    "from x_n": (
+        Model(Integrator("local_global", "x_n", 10), damper="none"),
+        Step("local_global", "x_n", 10), "double",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", mark(HONEST, ("linearised, undeclared", "symplectic, single")))
+def test_an_honest_step_is_not_accused(name):
+    model, declared, precision = HONEST[name]
+    kind = np.float32 if precision == "single" else np.float64
+    found = report(Stepper(model, (), kind), step=declared, precision=precision)
+    assert found.verdict <= Verdict.RIGHT_BUT, broken_laws(found)
+    assert found.diagnosis.explanations == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [one for one in STEP_SOLVERS if one != "gauss_newton"])
+def test_the_reference_s_solvers_are_converged(name):
+    def step(**inputs):
+        p = problem_of(inputs)
+        euler = ImplicitEuler(
+            system_of(p), h=p.h, solver=name, tolerance=1e-12, max_iterations=20000
+        )
+        state = euler.step(state_of(p)).state
+        return {"positions": state.positions, "velocities": state.velocities}
+
+    found = report(step, step=Step("converged", damper="length_rate", pins="eliminated"))
+    assert found.verdict <= Verdict.RIGHT_BUT, broken_laws(found)
+    assert found.diagnosis.explanations == ()
+
+
+MUJOCO = {
+    "Euler": Step("symplectic"),
+    "discrete": Step("linearised"),
+    "implicitfast": Step(),
+    "implicit": Step(),
+    "RK4": Step(),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("integrator", MUJOCO)
+def test_mujoco_is_not_accused(integrator):
+    def step(**inputs):
+        p = problem_of(inputs)
+        engine = MujocoMassSpring(system_of(p), h=p.h, integrator=integrator)
+        state = engine.step(state_of(p))
+        return {"positions": state.positions, "velocities": state.velocities}
+
+    found = report(step, step=MUJOCO[integrator])
+    assert found.verdict <= Verdict.RIGHT_BUT, broken_laws(found)
+    assert found.diagnosis.explanations == ()
+
+
+@pytest.mark.slow
+def test_a_float_explicit_step_of_a_thousand_substeps_is_not_accused():
+    """The sum of 1,000 increments, each rounded, is 5e-5 m off."""
+
+    def step(**inputs):
+        p = problem_of(inputs)
+        half = np.float32
+        x, v = p.positions.astype(half), p.velocities.astype(half)
+        free = np.ones(p.count, dtype=half)
+        free[p.pinned] = 0
+        hs = half(p.h / 1000)
+        for _ in range(1000):
+            now = p.changed(positions=x.astype(float), velocities=v.astype(float))
+            a = (all_forces(now) / p.masses[:, None]).astype(half) * free[:, None]
+            x, v = x + hs * v, v + hs * a
+        return {"positions": x, "velocities": v}
+
+    found = report(
+        step, step=Step("explicit", substeps=1000, damper="explicit"), precision="single"
+    )
+    assert found.verdict <= Verdict.RIGHT_BUT, broken_laws(found)
+
+
+def test_one_iteration_is_not_taken_for_convergence():
+    one = Model(Integrator("local_global", "x_n", 1))
+    found = report(Stepper(one), step=DECLARED["converged"][1])
+    assert found.verdict is Verdict.WRONG
+    assert any("local_global x_n 1" in key or "newton x_n 1" in key for key in named(found))
+
+
+ONE_ITERATION = Model(Integrator("local_global", "x_n", 1), damper="none")
+THOUSAND = Model(Integrator("explicit"), 1000, "explicit", velocity="separate")
+LAB = System("one", "one", "one", "measured", "number")
+# What public programs do that declare nothing: model, faults, system, precision.
+UNDECLARED = {
+    "linearised, pins overwritten": (
+        LINEARISED._replace(pins="overwritten"), ("gravity g/m",), LAB, "single",
+    ),
+    "one iteration, penalty": (
+        ONE_ITERATION._replace(pins="penalty 1e10"), ("gravity doubled",), System(), "double",
+    ),
+    "one iteration, springs": (
+        ONE_ITERATION._replace(pins="springs 5e5"), ("gravity of its own 0.3",), LAB, "single",
+    ),
+    "factor kept": (ONE_ITERATION, ("factor kept",), System(), "single"),
+    "a thousand substeps": (THOUSAND, ("pins free until the end",), System(), "double"),
+    "two faults": (LINEARISED, ("gravity g/m", "velocity kept"), System(), "double"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", mark(UNDECLARED, ("one iteration, penalty",)))
+def test_faults_of_a_solver_that_declares_nothing_are_named(name):
+    model, keys, system, precision = UNDECLARED[name]
+    kind = np.float32 if precision == "single" else np.float64
+    step = Stepper(model, [BY_KEY[key] for key in keys], kind)
+    found = report(step, system=system, precision=precision)
+    assert found.verdict is Verdict.WRONG
+    assert any(set(one.split(" + ")) == set(keys) for one in named(found))
+
+
+def extended_position_based(**inputs):
+    """A step of extended position-based dynamics, which is none of those that are known."""
+    p = problem_of(inputs)
+    weights = 1.0 / p.masses
+    weights[p.pinned] = 0.0
+    x = p.positions + p.h * (p.velocities + p.h * p.gravity) * (weights > 0.0)[:, None]
+    multipliers = np.zeros(len(p.springs))
+    for _ in range(7):
+        for s, (i, j) in enumerate(p.springs):
+            d = x[i] - x[j]
+            length = np.linalg.norm(d)
+            compliance = 1.0 / max(p.stiffnesses[s] * p.h**2, 1e-9)
+            gap = length - p.rest_lengths[s] + compliance * multipliers[s]
+            change = -gap / (weights[i] + weights[j] + compliance)
+            multipliers[s] += change
+            x[i] += weights[i] * change * d / length
+            x[j] -= weights[j] * change * d / length
+    return {"positions": x, "velocities": (x - p.positions) / p.h}
+
+
+def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told():
+    found = report(extended_position_based)
+    assert found.verdict is Verdict.UNDECIDED
+    nearest, holds = map(str, found.diagnosis.hints)
+    assert re.search(r"nearest step that is known is \d+ local/global iterations from y", nearest)
+    median, worst = (float(x) for x in re.search(r"by (\S+) of .* by (\S+) in", nearest).groups())
+    assert 0.0 < median <= worst < 0.1
+    laws_that_hold = set(holds.removesuffix(".").partition(": ")[2].split(", "))
+    assert laws_that_hold == {"pins", "momentum", "equal requests", "symmetry", "consistency"}
+    screen = " ".join(" ".join(terminal.lines(
+        Report(Greeting(1, ("mass_spring_step",)), [found], 0),
+        Presentation(speaker("en"), "en", ["x.py"]), terminal.ENDLESS,
+    )).split())  # fmt: skip
+    assert nearest in screen
+    assert holds in screen
+    assert 'Next: declare the step that you make, by "step" in the greeting' in screen
+    sentences = {str(f.sentence) for one in found.judgements for f in one.findings if f.verdict}
+    assert not any("inf" in words.split() for words in sentences)
+    assert not any("Another model than converged" in words for words in sentences)
+
+
+def test_a_step_that_is_wrong_in_large_systems_is_not_said_to_behave_like_a_right_one():
+    right = Stepper(LINEARISED)
+
+    def step(**inputs):
+        found = right(**inputs)
+        found["positions"] = found["positions"] + 0.01 * (len(inputs["masses"]) > 8)
+        return found
+
+    step.__signature__ = right.__signature__
+    for function, words in ((step, "In small cases it behaves like"), (right, "It behaves like")):
+        found = report(function)
+        assert str(found.diagnosis.behaviour).startswith(f"{words} one linearised implicit step")
+        assert (found.verdict is Verdict.WRONG) is (function is step)
+
+
+@pytest.mark.parametrize("first", [Verdict.RIGHT, Verdict.RIGHT_BUT, Verdict.UNDECIDED])
+@pytest.mark.parametrize("family", ["springs", "dampers", "pins", "h changes", "cloth"])
+def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family):
+    def judged(name, family, verdict):
+        case = Case(name, "mass_spring_step", {}, family, sentence(""))
+        finding = Finding("a law", verdict, 1.0, 0.0, "m", sentence("It is off."))
+        return CaseJudgement(case, Answer({}, 0.0), (finding,), {})
+
+    told = str(stepping._first_broken([
+        judged("one", "flight", first), judged("two", family, Verdict.WRONG),
+        judged("three", "cloth", Verdict.WRONG),
+    ]))  # fmt: skip
+    assert "in the case 'two': It is off." in told
+    assert (str(stepping._TRACES[family]) in told) is (first is not Verdict.UNDECIDED)
+    assert stepping._first_broken([judged("one", "flight", first)]) is None
+
+
+def test_noise_is_named():
+    rng = np.random.default_rng(3)
+    right = Stepper(LINEARISED)
+
+    def step(masses, springs, rest_lengths, stiffnesses, dampings, pinned, gravity, positions,
+             velocities, h):  # fmt: skip
+        found = right(masses=masses, springs=springs, rest_lengths=rest_lengths, h=h,
+                      stiffnesses=stiffnesses, dampings=dampings, pinned=pinned, gravity=gravity,
+                      positions=positions, velocities=velocities)  # fmt: skip
+        found["positions"] = found["positions"] + 7e-4 * rng.standard_normal(positions.shape)
+        return found
+
+    found = report(step, step=DECLARED["linearised"][1])
+    assert "equal requests" in broken_laws(found)
+    assert any("-fsanitize" in str(one) for one in found.diagnosis.hints)
+
+
+SYSTEMS = {
+    "the lab's": System("one", "one", "one", "measured", "number", state="previous_positions"),
+    "without pins": System(pinned=False),
+}
+
+
+@pytest.mark.parametrize("name", mark(SYSTEMS, ("the lab's",)))
+def test_a_solver_gets_the_systems_that_it_takes(name):
+    system = SYSTEMS[name]
+    cases = task_cases("mass_spring_step", Greeting(1, (), system=system), 0, False)
+    assert len(cases) >= 15
+    assert all(("previous_positions" in one.inputs) == (system.state != "velocities")
+               for one in cases)  # fmt: skip
+    if system.masses == "one":
+        assert all(np.ptp(one.inputs["masses"]) == 0 != one.inputs["masses"][0] - 1
+                   for one in cases)  # fmt: skip
+    fault = BY_KEY["gravity g/m"]
+    model, declared = DECLARED["linearised"]
+    found = report(Stepper(model, [fault]), step=declared, system=system)
+    assert fault.key in named(found)
+
+
+class GoesOn:
+    """A solver that starts a case that follows another from its own last answer."""
+
+    def __init__(self, step, declared):
+        hello = Greeting(1, ("mass_spring_step",), system=System(continues=True), step=declared)
+        self.door = FunctionContestant({"mass_spring_step": step}, hello)
+        self.greeting, self.last = hello, {}
+
+    def answer(self, case):
+        state = self.last if case.follows else {}
+        found = self.door.answer(dataclasses.replace(case, inputs={**case.inputs, **state}))
+        self.last = found.values
+        return found
+
+    def close(self):
+        """Nothing was started."""
+
+
+def test_a_solver_that_goes_on_is_judged_from_its_own_state():
+    model, declared = DECLARED["linearised"]
+    found = verify(GoesOn(Stepper(model), declared)).tasks[0]
+    assert found.verdict is Verdict.RIGHT_BUT, broken_laws(found)
+
+
+@pytest.mark.parametrize("key", mark([None, "velocity kept", "gravity g/m"], [None]))
+def test_a_motion_is_judged_as_its_steps(key):
+    model, declared = DECLARED["linearised"]
+    faults = [BY_KEY[key]] if key else []
+    found = report(Stepper(model, faults), "mass_spring_motion", declared)
+    if key:
+        assert found.verdict is Verdict.WRONG
+        assert key in named(found)
+    else:
+        assert found.verdict <= Verdict.RIGHT_BUT, broken_laws(found)
+
+
+def force_function(faults, precision=np.float64):
+    def function(**inputs):
+        p = problem_of({k: np.asarray(v) for k, v in inputs.items()})
+        for fault in faults:
+            p = fault.change(p)
+        return all_forces(p).astype(precision)
+
+    return function
+
+
+# Faults of what forces are not asked for.
+NO_FORCES = ("tension only ignored",)
+LAST_ONLY = "last spring of a particle only"
+FORCES = {one.key: one for one in FORCE_FAULTS if one.key not in NO_FORCES}
+
+
+@pytest.mark.parametrize("key", mark(FORCES, ("gravity g/m", "damping not projected", LAST_ONLY)))
+def test_every_fault_of_forces_is_caught_and_named(key):
+    found = report(force_function([FORCES[key]]), "mass_spring_forces")
+    assert found.verdict is Verdict.WRONG
+    assert "force formula" in broken_laws(found)
+    assert key in named(found)
+
+
+def test_forces_that_numpy_does_not_add_up_are_named():
+    def forces(masses, springs, rest_lengths, stiffnesses, dampings, gravity, positions,
+               velocities):  # fmt: skip
+        i, j = springs.T
+        d, v = positions[i] - positions[j], velocities[i] - velocities[j]
+        length = np.maximum(np.linalg.norm(d, axis=1), 1e-300)[:, None]
+        rate = (v * d).sum(1, keepdims=True) / length
+        pull = stiffnesses[:, None] * (length - rest_lengths[:, None]) + dampings[:, None] * rate
+        total = masses[:, None] * gravity
+        total[i] -= pull * d / length
+        total[j] += pull * d / length
+        return total
+
+    assert named(report(forces, "mass_spring_forces")) == {LAST_ONLY}
+
+
+# Faults that together are one of another name.
+AS_ONE = {frozenset({"stiffness doubled", "damping doubled"}): "springs twice"}
+
+
+@pytest.mark.slow
+def test_pairs_of_faults_of_forces_are_named():
+    pairs = [
+        (FORCES[a], FORCES[b])
+        for a in list(FORCES)[::3]
+        for b in list(FORCES)[1::4]
+        if FORCES[a].aspect != FORCES[b].aspect
+    ]
+    for pair in islice(pairs, 0, None, 3):
+        found = report(force_function(pair), "mass_spring_forces")
+        keys = frozenset(one.key for one in pair)
+        expected = {AS_ONE[keys]} if keys in AS_ONE else keys
+        assert any(set(one.split(" + ")) <= expected for one in named(found)), keys
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_right_forces_are_not_accused(precision):
+    kind = np.float32 if precision == "single" else np.float64
+    found = report(force_function([], kind), "mass_spring_forces", precision=precision)
+    assert found.verdict is Verdict.RIGHT
+
+
+def energies(faults, shift=0.0):
+    def function(**inputs):
+        found = energy.predict(faults, problem_of(inputs))
+        for name in ("total", "potential", "gravitational"):
+            found[name] += shift
+        return found
+
+    return function
+
+
+@pytest.mark.parametrize("fault", [one for one in energy.FAULTS if one.key not in NO_FORCES],
+                         ids=lambda one: one.key)  # fmt: skip
+def test_every_fault_of_energies_is_caught_and_named(fault):
+    found = report(energies([fault]), "energy")
+    assert found.verdict is Verdict.WRONG
+    assert fault.key in named(found)
+
+
+def test_the_zero_of_gravity_is_free():
+    assert report(energies([], shift=42.0), "energy").verdict is Verdict.RIGHT
+
+
+def test_keys_of_faults_are_distinct_and_have_a_sentence():
+    for options in (STEP_FAULTS, FORCE_FAULTS):
+        assert all(str(one.sentence).endswith(".") for one in options)
+    assert len({one.key for one in STEP_FAULTS}) >= 90
+    assert len(list(forces.variants())) > 1000
+
+
+def test_answers_of_every_case_are_judged():
+    model, declared = DECLARED["linearised"]
+    found = report(Stepper(model), step=declared)
+    assert all(isinstance(one.answer, Answer) and one.findings for one in found.judgements)
+    assert found.digits > 12

@@ -1,0 +1,369 @@
+"""Laws of the lines that requests and answers travel in."""
+
+import json
+import re
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer, Failure, FailureKind
+from plumbob.crosscheck.verify.functions import understand
+from plumbob.crosscheck.verify.message import (
+    decode_answer,
+    decode_greeting,
+    decode_object,
+    decode_request,
+    did_you_mean,
+    encode_answer,
+    encode_case,
+    encode_greeting,
+    shown,
+)
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.crosscheck.verify.task import TASKS
+
+DOUBLES = st.floats(allow_nan=True, allow_infinity=False, allow_subnormal=True)
+HOSTILE = [5e-324, -0.0, 2.2250738585072011e-308, 1.7976931348623157e308, 0.1, 1 / 3, 1e22, 1e23]
+
+
+def case(task, **inputs):
+    return Case("a", task, inputs, "", sentence("one"))
+
+
+def skeleton(count=2):
+    return {
+        "parents": np.arange(-1, count - 1),
+        "offsets": np.ones((count, 3)),
+        "local_rotations": np.eye(4)[np.zeros(count, dtype=int)],
+    }
+
+
+def same_bits(one, other):
+    one, other = np.asarray(one), np.asarray(other)
+    nan = np.isnan(one)
+    assert one.dtype == other.dtype
+    assert one.shape == other.shape
+    assert (nan == np.isnan(other)).all()
+    assert (one[~nan].view(np.uint64) == other[~nan].view(np.uint64)).all()
+
+
+@given(arrays.arrays(np.float64, (4, 3), elements=DOUBLES))
+@example(np.resize(HOSTILE, (4, 3)))
+def test_a_request_arrives_bit_for_bit(offsets):
+    sent = case("forward_kinematics", **skeleton() | {"offsets": offsets})
+    line = encode_case(7, sent)
+    request = decode_request(line)
+    assert (request.id, request.task) == (7, "forward_kinematics")
+    assert line.count(b"\n") == 1
+    same_bits(offsets, request.inputs["offsets"])
+    assert (request.inputs["parents"] == sent.inputs["parents"]).all()
+
+
+@given(arrays.arrays(np.float64, (2, 3), elements=st.floats()))
+@example(np.resize([*HOSTILE, np.nan, np.inf, -np.inf], (2, 3)))
+def test_an_answer_arrives_bit_for_bit(positions):
+    line = encode_answer(3, positions=positions, seconds=np.float64(0.5))
+    answer = decoded(line)
+    assert answer.seconds == 0.5
+    same_bits(positions, answer.values["positions"])
+
+
+@given(DOUBLES.filter(np.isfinite))
+def test_digits_of_other_writers_give_the_same_number(number):
+    for digits in (repr(number), f"{number:.17g}", f"{number:+.16e}".removeprefix("+")):
+        found = decode_object(f'{{"id": 1, "a": [{digits}]}}'.encode())["a"]
+        same_bits(np.array([number], dtype=float), np.asarray(found, dtype=float))
+
+
+@given(DOUBLES, st.booleans(), st.integers(-(2**53), 2**53))
+def test_numbers_of_their_own_arrive_as_they_are(spacing, closed, count):
+    inputs = {"curve": np.zeros((0, 3)), "spacing": spacing, "closed": closed, "count": count}
+    found = decode_request(encode_case(1, case("resample", **inputs))).inputs
+    assert found["curve"].shape == (0, 3)
+    assert found["closed"] is closed
+    assert found["count"] == count
+    same_bits(np.float64(spacing).reshape(1), np.float64(found["spacing"]).reshape(1))
+
+
+def test_what_is_left_out_stays_out():
+    line = encode_case(1, case("resample", curve=np.ones((2, 3)), count=None))
+    assert json.loads(line).keys() == {"id", "task", "curve"}
+
+
+@pytest.mark.parametrize("value", [np.inf, np.array([1.0, -np.inf])])
+def test_a_request_holds_no_infinity(value):
+    with pytest.raises(ValueError, match="h: expected finite numbers"):
+        encode_case(1, case("mass_spring_step", h=value))
+
+
+def test_the_first_request_is_a_greeting():
+    assert json.loads(encode_greeting()) == {"id": 0, "task": "greeting", "protocol": 1}
+    assert decode_request(encode_greeting()).task == "greeting"
+
+
+def decoded(line, task="forward_kinematics", seconds=1.0, **inputs):
+    return decode_answer(decode_object(line), TASKS[task], inputs or skeleton(), seconds)
+
+
+@pytest.mark.parametrize(
+    ("word", "value"),
+    [
+        *((word, np.nan) for word in ("null", "NaN", "nan", "-nan", "-nan(ind)", "nan(0x8000)")),
+        *((word, np.inf) for word in ("Infinity", "inf", "1e999")),
+        *((word, -np.inf) for word in ("-Infinity", "-inf", "-INF")),
+    ],
+)
+def test_words_for_what_is_no_number_are_understood(word, value):
+    line = f'{{"id": 1, "nan": "an inf, \\"nan\\"", "positions": [[1, {word}, 3], [4, 5, 6]]}}'
+    found = decoded(line.encode()).values["positions"]
+    np.testing.assert_array_equal(found, [[1, value, 3], [4, 5, 6]])
+
+
+@pytest.mark.parametrize("line", [b"", b"hello", b"[1, 2]", b"3", b'"a"', b"\xff\xfe", b"nan"])
+def test_what_is_no_object_is_a_print(line):
+    assert decode_object(line) is None
+
+
+@pytest.mark.parametrize("before", [b"", b"\xef\xbb\xbf", b"debug 12 ", b"  "])
+@pytest.mark.parametrize("after", [b"", b"\r", b"  "])
+def test_an_object_is_found_beside_what_other_writers_add(before, after):
+    assert decode_object(before + b'{"id": 1}' + after) == {"id": 1}
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (b'{"id": 1, "positions": [1, 2,]}', "got '.*1, 2,]"),
+        (b'{"id": 1', "expected JSON"),
+        (b"{'id': 1}", "expected JSON"),
+        (b'{"id": 1} trailing', "expected JSON"),
+        (b'{"id": 1, "a": "\xff"}', "expected UTF-8, got byte 0xff"),
+        (b'{"a":' + b"[" * 100_000, "nested too deeply"),
+        (b'{"a": [nan, ' + b"[" * 100_000, "nested too deeply"),
+        (b'{"a": ' + b"9" * 5000 + b"}", "expected JSON"),
+    ],
+)
+def test_a_broken_object_says_where(line, words):
+    with pytest.raises(ValueError, match=words) as caught:
+        decode_object(line)
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize(
+    ("positions", "words"),
+    [
+        ([[1, 2, 3]], r"positions: expected shape \(2, 3\), got \(1, 3\)"),
+        ([], r"expected shape \(2, 3\), got \(0, 3\)"),
+        ([["1", "2", "3"], ["4", "5", "6"]], "expected numbers"),
+        ("nonsense", "expected numbers"),
+        ([[1, 2], [3]], "expected numbers"),
+        ({"x": 1}, "expected numbers"),
+        ([[10**400, 2, 3], [4, 5, 6]], "expected numbers"),
+        ([[[[[[[[[[1]]]]]]]]]], "expected shape"),
+        (True, "expected shape"),
+    ],
+)
+def test_another_shape_or_kind_is_garbage(positions, words):
+    failure = decode_answer(
+        {"id": 1, "positions": positions}, TASKS["forward_kinematics"], skeleton(), 1.0
+    )
+    assert isinstance(failure, Failure)
+    assert failure.kind is FailureKind.GARBAGE
+    assert re.search(words, str(failure.sentence))
+
+
+def test_lists_as_deep_as_json_goes_are_garbage():
+    deep = []
+    for _ in range(900):
+        deep = [deep]
+    failure = decode_answer(
+        {"id": 1, "positions": deep}, TASKS["forward_kinematics"], skeleton(), 1.0
+    )
+    assert failure.kind is FailureKind.GARBAGE
+
+
+@pytest.mark.parametrize("value", [1e300, 1.5, np.nan, np.inf, 2**63, 2**64, 10**30, "3"])
+def test_what_is_no_integer_is_garbage(value):
+    inputs = skeleton() | {"target": np.zeros(3)}
+    failure = decode_answer({"iterations": value}, TASKS["inverse_kinematics"], inputs, 1.0)
+    assert failure.kind is FailureKind.GARBAGE
+    assert "iterations: expected one integer" in str(failure.sentence)
+
+
+def test_nothing_that_is_known_is_garbage():
+    failure = decoded(b'{"id": 1, "position": []}')
+    assert failure.kind is FailureKind.GARBAGE
+    assert "positions (joint, 3)" in str(failure.sentence)
+    assert "position" in str(failure.sentence)
+
+
+def test_null_and_keys_that_are_no_outputs_are_left_aside():
+    answer = decoded(b'{"id": 1, "positions": null, "rotations": [[1,0,0,0],[1,0,0,0]], "x": {}}')
+    assert answer.values.keys() == {"rotations"}
+
+
+def test_an_error_is_a_refusal_in_its_words():
+    failure = decoded(b'{"id": 1, "error": "trees\\u001b[31m are not \\n mine"}')
+    assert failure.kind is FailureKind.REFUSED
+    assert str(failure.sentence) == "It says that it cannot: trees [31m are not mine"
+
+
+def test_an_exception_has_its_line():
+    line = (
+        b'{"id":1,"error":"no","kind":"raised","exception":"KeyError","file":"a{0.b}.py","line":3}'
+    )
+    failure = decoded(line)
+    assert failure.kind is FailureKind.RAISED
+    assert str(failure.sentence) == "It raised KeyError in line 3 of a{0.b}.py: no"
+
+
+@pytest.mark.parametrize("own", [0.25, 0, 0.0])
+def test_a_solver_may_time_itself(own):
+    answer = timed_answer(own)
+    assert (answer.seconds, answer.untimed) == (own, None)
+
+
+@pytest.mark.parametrize("own", [2.0, 1.5, -1, "1", True, np.nan, np.inf, 10**400, [0.1]])
+def test_seconds_that_cannot_be_are_no_time_of_the_solver(own):
+    answer = timed_answer(own)
+    assert answer.seconds == 1.0
+    assert f"got {own!r}"[:40] in str(answer.untimed)
+
+
+def test_a_solver_without_seconds_is_told_that_only_round_trips_are_known():
+    answer = timed_answer(None)
+    assert answer.seconds == 1.0
+    assert "only the round trips" in str(answer.untimed)
+
+
+def timed_answer(own):
+    """An answer after a round trip of a second."""
+    fields = {"positions": np.zeros((2, 3)).tolist(), "seconds": own}
+    answer = decode_answer(fields, TASKS["forward_kinematics"], skeleton(), 1.0)
+    assert isinstance(answer, Answer)
+    return answer
+
+
+def greeting(**fields):
+    return {"id": 0, "protocol": 1, "tasks": ["energy", "energy"]} | fields
+
+
+def test_a_greeting_with_nothing_optional_is_understood():
+    found = decode_greeting(greeting())
+    assert (found.tasks, found.name, found.methods) == (("energy",), "solver", ("",))
+
+
+def test_a_greeting_says_all():
+    system = {"masses": "one", "pinned": False}
+    step = {"method": "linearised", "substeps": 3, "damping_factor": 1}
+    fields = greeting(precision="single", methods=["ccd"], system=system, step=step, max_joints=9)
+    found = decode_greeting(fields)
+    assert (found.step.substeps, found.step.damping_factor) == (3, 1.0)
+    assert (found.system.masses, found.methods, found.max_joints) == ("one", ("ccd",), 9)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"protocol": 2}, "protocol: expected 1, got 2"),
+        ({"protocol": None}, "protocol: expected 1, got None"),
+        ({"tasks": []}, "tasks: expected some of forward_kinematics, .*, got \\[\\]"),
+        ({"tasks": "energy"}, "tasks: expected some of"),
+        ({"tasks": ["ForwardKinematics"]}, "did you mean forward_kinematics?"),
+        ({"tasks": [{}]}, "tasks: expected one of"),
+        ({"precision": "float"}, "precision: expected 'single' or 'double', got 'float'"),
+        ({"presicion": "single"}, "got 'presicion'; did you mean precision?"),
+        ({"chains_only": "yes"}, "chains_only: expected a boolean, got 'yes'"),
+        ({"max_joints": 1.5}, "max_joints: expected an integer of 1 or more, got 1.5"),
+        ({"max_joints": 0}, "max_joints: expected an integer of 1 or more, got 0"),
+        ({"methods": "ccd"}, "methods: expected a list of texts of .*, got 'ccd'"),
+        ({"step": "implicit"}, "step: expected an object, got 'implicit'"),
+        ({"step": {"damper": "some"}}, "step: damper: expected 'none' or 'explicit' or"),
+        ({"step": {"substep": 3}}, "step: expected one of .*; did you mean substeps?"),
+        ({"system": {"gravity": [0, 0, 1]}}, "gravity: expected 'vector' or 'number'"),
+        ({"step": {"damping_factor": float("nan")}}, "expected a finite number"),
+    ],
+)
+def test_a_greeting_that_is_not_understood_says_what_to_mend(fields, words):
+    with pytest.raises(ValueError, match=f"greeting: .*{words}"):
+        decode_greeting(greeting(**fields))
+
+
+LONG, MANY = "x" * 10**6, [f"m{i}" for i in range(5000)]
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"protocol": LONG}, "protocol: expected 1, got 1000000 characters: 'xxx"),
+        ({"tasks": LONG}, "tasks: expected some of .*, got 1000000 characters: 'xxx"),
+        ({"tasks": [LONG]}, "tasks: expected one of .*, got 1000000 characters: 'xxx"),
+        ({LONG: 1}, "expected one of .*, got 1000000 characters: 'xxx"),
+        ({"step": MANY}, "step: expected an object, got 5000 entries: \\['m0', "),
+        ({"name": LONG}, "name: expected a text of at most 100 characters, got 1000000 char"),
+        ({"version": LONG}, "version: expected a text of at most 100 characters, got 1000000"),
+        ({"language": LONG}, "language: expected a text of at most 100 characters, got 1000000"),
+        ({"methods": MANY}, "methods: expected a list of .*, at most 20 of them, got 5000 entries"),
+        ({"methods": ["x" * 41]}, "methods: expected a list of texts of at most 40 characters, "),
+        ({"step": {"iterations": 10**5}}, "step: iterations: expected an integer from 1 to 1000,"),
+        ({"step": {"iterations": 0}}, "step: iterations: expected .* from 1 to 1000, got 0"),
+        ({"step": {"substeps": 10**5}}, "substeps: expected .* from 1 to 1000, got 100000"),
+        ({"step": {"substeps": -1}}, "step: substeps: expected .* from 1 to 1000, got -1"),
+        (
+            {"step": {"substeps": 50, "iterations": 50}},
+            "iterations: expected at most 1000 in all substeps together, got 2500",
+        ),
+    ],
+    ids=lambda value: str(value)[:40],
+)
+def test_a_greeting_beyond_a_limit_is_refused_in_a_short_sentence(fields, words):
+    with pytest.raises(ValueError, match=f"greeting: .*{words}") as error:
+        decode_greeting(greeting(**fields))
+    assert len(str(error.value)) < 400
+
+
+def test_a_greeting_at_its_limits_is_understood():
+    fields = greeting(name="x" * 100, methods=MANY[:20], step={"iterations": 2, "substeps": 500})
+    assert decode_greeting(fields).methods == tuple(MANY[:20])
+
+
+def test_a_motion_of_more_frames_than_steps_is_no_answer():
+    motion = {name: np.zeros((2, 3)) for name in ("positions", "velocities")}
+    words = re.escape("positions: expected shape (4, 2, 3), got (5, 2, 3)")
+    line = encode_answer(1, positions=np.zeros((5, 2, 3)))
+    failure = decoded(line, "mass_spring_motion", **motion, steps=4)
+    assert re.search(words, str(failure.sentence))
+
+
+def test_an_answer_of_any_length_ends_at_a_limit():
+    """The judge looks at every point of a resampled curve."""
+    inputs = {"curve": np.zeros((2, 3)), "strokes": np.zeros(1, dtype=int), "closed": False}
+    right = decoded(encode_answer(1, points=np.zeros((1000, 3))), "resample", **inputs)
+    assert right.values["points"].shape == (1000, 3)
+    failure = decoded(encode_answer(1, points=np.zeros((1001, 3))), "resample", **inputs)
+    assert "points: expected at most 1000 rows, got 1001" in str(failure.sentence)
+
+
+def test_texts_among_numbers_take_no_memory_in_proportion_to_the_longest():
+    """As NumPy's arrays of texts do: 4,000 bytes times a million, here."""
+    values = ["x" * 1000, *[""] * 10**6]
+    tracemalloc.start()
+    with pytest.raises(ValueError, match="positions: expected numbers"):
+        understand(TASKS["forward_kinematics"], {"joint": 2}, {"positions": values})
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 100e6
+
+
+def test_a_name_far_from_all_has_no_hint():
+    assert did_you_mean("draw", TASKS) == ""
+
+
+def test_what_a_solver_says_is_shown_on_one_line_without_control_characters():
+    assert shown(b"a\x1b[2J\r\n\tb\x00\xff") == "a [2J b \ufffd"
+    assert len(shown("x" * 10**6, 50)) == 50

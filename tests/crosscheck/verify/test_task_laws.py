@@ -1,0 +1,322 @@
+"""The laws of forces, energies, curves and robots at the edges of their tolerances.
+
+The faults of the other files are gross, and most are in every frame and at every joint.
+"""
+
+import numpy as np
+import pytest
+
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer, Asked
+from plumbob.crosscheck.verify.explain import Match, Variant, _telling
+from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.crosscheck.verify.judgement import (
+    CaseJudgement,
+    Diagnosis,
+    Finding,
+    TaskReport,
+    Verdict,
+    smallest_failure,
+)
+from plumbob.crosscheck.verify.kinematics import (
+    laws,
+    resample,
+    robot_inverse_kinematics,
+    robot_models,
+    track,
+)
+from plumbob.crosscheck.verify.kinematics.faults import Switches
+from plumbob.crosscheck.verify.kinematics.polylines import Line, even_by_count
+from plumbob.crosscheck.verify.kinematics.predictions import predict_track
+from plumbob.crosscheck.verify.mass_spring import energy, forces
+from plumbob.crosscheck.verify.mass_spring.problem import all_forces, problem_of
+from plumbob.crosscheck.verify.precision import AS_SINGLE, is_off_by_single, judging_greeting
+from plumbob.crosscheck.verify.sentence import sentence
+
+EPSILON = 2.0**-52
+RIGHT, RIGHT_BUT, WRONG = Verdict.RIGHT, Verdict.RIGHT_BUT, Verdict.WRONG
+EDGES = [(0.5, RIGHT), (2.0, WRONG)]
+
+
+def by_law(findings):
+    return {finding.law: finding for finding in findings}
+
+
+# ---- forces and energies
+
+
+@pytest.fixture
+def spring():
+    """A stretched spring, one kilogram at each end, one of them moving."""
+    return problem_of(
+        {
+            "masses": [1.0, 1.0],
+            "springs": [[0, 1]],
+            "rest_lengths": [1.0],
+            "stiffnesses": [100.0],
+            "dampings": [2.0],
+            "gravity": [0.0, -10.0, 0.0],
+            "positions": [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]],
+            "velocities": [[0.0, 0.0, 0.0], [0.0, 3.0, 0.0]],
+        }
+    )
+
+
+def test_rounding_of_a_force_is_that_of_its_terms(spring):
+    """Eight epsilons of k (|x| + r) + c |v| + m g: 300, 6 and 10 N."""
+    assert forces.tolerance(spring, EPSILON) == pytest.approx(8 * EPSILON * 316.0)
+
+
+def test_rounding_of_an_energy_is_that_of_its_terms(spring):
+    """Sixteen epsilons of k (|x| + r) (|l| + r), m v² and m |x| g of each: 900, 9 and 20 J."""
+    assert energy.tolerance(spring, EPSILON) == pytest.approx(16 * EPSILON * 929.0)
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+def test_a_force_is_that_of_the_formula_to_rounding(spring, share, verdict):
+    expected, allowed = all_forces(spring), forces.tolerance(spring, EPSILON)
+    given = expected.copy()
+    given[1, 2] += share * allowed
+    found = forces._formula(spring, given, expected, allowed)
+    assert (found.verdict, found.where) == (verdict, 1)
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+def test_forces_add_up_to_the_weight_to_rounding(spring, share, verdict):
+    """Twice the rounding of one, times the root of the number of particles."""
+    allowed = forces.tolerance(spring, EPSILON)
+    given = all_forces(spring)
+    given[:, 1] += share * allowed * np.sqrt(2.0)
+    assert forces._balance(spring, given, allowed).verdict is verdict
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+@pytest.mark.parametrize("name", ["total", "potential"])
+def test_parts_of_the_energy_add_up_to_rounding(spring, name, share, verdict):
+    """Four times the rounding of one part."""
+    allowed = energy.tolerance(spring, EPSILON)
+    given = energy.right(spring)
+    shift = share * 4.0 * allowed
+    given[name] += shift
+    if name == "potential":
+        given["total"] += shift
+    found = energy._sum_laws(given, allowed)
+    wrong = [finding for finding in found if finding.verdict]
+    assert [finding.verdict for finding in wrong] == ([] if verdict is RIGHT else [verdict])
+
+
+# ---- resampled polylines
+
+
+GREETING = Greeting(1, ("resample",))
+
+
+@pytest.fixture
+def segments():
+    """A request for eleven points on a line of five metres with a corner."""
+    curve = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 2.0, 0.0]])
+    line = Line(curve, (0,), False)
+    inputs = {"curve": curve, "strokes": np.array([0]), "closed": False, "count": 11}
+    case = Case("", "resample", inputs, "", laws.HOLDS, facts={"line": line, "size": 3.0})
+    return case, even_by_count(line, 11, False)
+
+
+# Sixteen epsilons of three points of three metres and of the line's length.
+ON_LINE = 16 * EPSILON * (3 * 3.0 + 5.0)
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+@pytest.mark.parametrize(("end", "back"), [(0, [1.0, 0, 0]), (-1, [0, -1.0, 0])])
+def test_both_ends_are_kept_to_rounding(segments, end, back, share, verdict):
+    case, points = segments
+    points[end] += share * ON_LINE * np.array(back)
+    found = by_law(resample.point_laws(points, case, GREETING))
+    assert found["ends"].verdict is verdict
+    assert found["on the line"].verdict is RIGHT
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+@pytest.mark.parametrize("point", [2, 8])
+def test_points_are_on_the_line_to_rounding(segments, point, share, verdict):
+    case, points = segments
+    points[point, 2] += share * ON_LINE
+    found = by_law(resample.point_laws(points, case, GREETING))
+    assert found["on the line"].verdict is verdict
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(0.015, RIGHT), (0.025, WRONG)])
+def test_gaps_differ_from_the_mean_by_a_fiftieth_at_most(segments, share, verdict):
+    case, points = segments
+    points[2, 0] += share * 0.5  # a gap is half a metre long
+    found = by_law(resample.point_laws(points, case, GREETING))
+    assert found["spacing"].verdict is verdict
+    assert found["spacing"].error == pytest.approx(share)
+
+
+def test_the_last_side_of_a_closed_curve_counts():
+    """It may be a fiftieth longer than the others, and is not if the start comes again."""
+    curve = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    line = Line(curve, (0,), True)
+    inputs = {"curve": curve, "strokes": np.array([0]), "closed": True, "count": 8}
+    case = Case("", "resample", inputs, "", laws.HOLDS, facts={"line": line, "size": 1.0})
+    points = even_by_count(line, 8, True)
+    for shortened, verdict in ((0.0, RIGHT), (0.001, RIGHT), (0.005, WRONG)):
+        uneven = line.point_at(np.arange(8) * (0.5 - shortened))
+        found = by_law(resample.point_laws(uneven, case, GREETING))
+        assert found["closing side"].verdict is verdict
+    found = by_law(resample.point_laws(np.concatenate([points, points[:1]]), case, GREETING))
+    assert found["closing side"].verdict is RIGHT
+
+
+# ---- motions
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """The request for a chain's small circle, and the textbook's answer by FABRIK."""
+    case = track.cases(Greeting(1, ("track",)), "fabrik", 0, False)[0]
+    found = predict_track("fabrik", Switches(), case)
+    return case, np.array(found["positions"])
+
+
+@pytest.mark.parametrize("frame", [0, 4, -1])
+def test_a_single_frame_that_breaks_a_law_breaks_it(motion, frame):
+    case, positions = motion
+    lengthened = positions.copy()
+    lengthened[frame, -1] += 1e-6
+    findings = []
+    for x in (positions, lengthened):
+        asked = Asked(case, Answer({"positions": x}, 0.0), Answer({"positions": x}, 0.0))
+        poses = track.frames_of(asked)
+        findings.append(by_law(track._frame_laws(poses, Greeting(1, ("track",)))))
+    assert findings[0]["link lengths"].verdict is RIGHT
+    assert findings[1]["link lengths"].verdict is WRONG
+    number = range(len(positions))[frame]
+    assert str(findings[1]["link lengths"].sentence).startswith(f"Frame {number}: ")
+
+
+@pytest.mark.parametrize(("distance", "verdict"), [(0.99, RIGHT), (1.01, RIGHT_BUT)])
+def test_a_joint_that_moves_more_than_a_metre_in_a_frame_has_jumped(motion, distance, verdict):
+    case, positions = motion
+    moved = np.repeat(positions[:1], len(positions), axis=0)
+    moved[5:, 2, 1] += distance
+    asked = Asked(case, Answer({"positions": moved}, 0.0), None)
+    poses = [posed for _, posed in track.frames_of(asked)]
+    (found,) = track._continuity(poses)
+    assert (found.verdict, found.where) == (verdict, 2)
+    assert found.error == pytest.approx(distance)
+
+
+# ---- robots
+
+
+ROBOTS = Greeting(1, (robot_inverse_kinematics.TASK,))
+
+
+@pytest.fixture(scope="module")
+def robot():
+    """A request for a robot of seven hinges, from where its target is."""
+    cases = robot_models.cases(ROBOTS, "", 0, False)
+    return next(c for c in cases if c.name.startswith("seven") and c.family == robot_models.AT)
+
+
+@pytest.mark.parametrize(("share", "verdict"), EDGES)
+@pytest.mark.parametrize(("side", "sign"), [("lower", -1.0), ("upper", 1.0)])
+def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verdict):
+    """Sixteen epsilons of the largest limit, 2.4 rad."""
+    q = robot.inputs["start"].copy()
+    q[3] = robot.inputs[side][3] + sign * share * 16 * EPSILON * 2.4
+    found = robot_inverse_kinematics._limits(q, robot, ROBOTS)
+    assert (found.law, found.verdict, found.where) == ("limits kept", verdict, 3)
+
+
+@pytest.mark.parametrize(
+    ("distance", "angle", "claim", "verdicts"),
+    [
+        (0.9, 0.9, True, []),
+        (1.1, 0.9, True, [WRONG]),
+        (0.9, 1.1, True, [WRONG]),
+        (0.9, 0.9, False, [RIGHT_BUT]),
+        (1.1, 0.9, False, []),
+        (0.9, 1.1, False, []),
+    ],
+)
+def test_a_claim_is_about_the_position_and_the_rotation(distance, angle, claim, verdicts):
+    found = robot_inverse_kinematics._claims(distance, angle, 1.0, 1.0, {"converged": claim})
+    assert [finding.verdict for finding in found] == verdicts
+
+
+def test_a_target_s_quaternion_may_have_either_sign(robot):
+    pose = robot_models.tool_pose(robot.inputs, robot.inputs["start"])
+    for sign in (1.0, -1.0):
+        inputs = {**robot.inputs, "target_rotation": sign * robot.inputs["target_rotation"]}
+        distance, angle = robot_models.apart(pose, inputs)
+        assert distance <= 1e-12
+        assert angle <= 1e-12
+
+
+# ---- what is said of a task
+
+
+def judgement(size, verdict, digits=None):
+    """Return a judgement of a case of so many numbers."""
+    case = Case(str(size), "", {"x": np.zeros(size)}, "", sentence(""))
+    finding = Finding("a law", verdict, 1.0, 0.0, "", sentence(""))
+    return CaseJudgement(case, Answer({}, 0.0), (finding,), {}, digits)
+
+
+def test_the_smallest_failure_is_shown_and_an_unexplained_one_is_of_the_worst_verdict():
+    told = [
+        judgement(1, RIGHT),
+        judgement(7, WRONG),
+        judgement(5, WRONG),
+        judgement(9, Verdict.BROKEN),
+    ]
+    assert smallest_failure(told, explained=True) is told[2]
+    assert smallest_failure(told, explained=False) is told[3]
+    assert smallest_failure(told[:3], explained=False) is told[2]
+    assert smallest_failure(told[:1], explained=False) is None
+
+
+def test_digits_are_those_of_the_worst_case():
+    told = [judgement(1, RIGHT, 12.0), judgement(2, RIGHT, 7.0), judgement(3, RIGHT)]
+    assert TaskReport("", "", told, Diagnosis()).digits == 7.0
+    assert TaskReport("", "", told[2:], Diagnosis()).digits is None
+
+
+@pytest.mark.parametrize(
+    ("digits", "expected"),
+    [([5.1, 8.9, 8.9], True), ([4.9, 8.0, 8.0], False), ([5.1, 9.1, 9.1], False), ([], False)],
+)
+def test_answers_are_off_by_single_precision_from_five_digits_to_nine(digits, expected):
+    """The least decides where a fault is small in most cases, the median where it is in few."""
+    told = [judgement(1, WRONG, count) for count in (*digits, None)]
+    assert is_off_by_single(TaskReport("", "", told, Diagnosis())) is expected
+
+
+@pytest.mark.parametrize("single", ["positions", "velocities"])
+def test_the_least_precise_output_is_what_all_answers_are_judged_by(rng, single):
+    case = Case("", "mass_spring_step", {"positions": rng.standard_normal(30)}, "", sentence(""))
+    answer = {name: rng.standard_normal(30) for name in ("positions", "velocities")}
+    greeting = Greeting(1, ("mass_spring_step",))
+    whole = Asked(case, Answer(answer, 0.0), None)
+    assert judging_greeting([whole], greeting) == (greeting, None)
+    answer = answer | {single: answer[single].astype(np.float32).astype(float)}
+    coarse, reason = judging_greeting([Asked(case, Answer(answer, 0.0), None)], greeting)
+    assert coarse.epsilon == pytest.approx(2.0**-23, rel=0.1)
+    assert reason is AS_SINGLE
+
+
+def test_a_fault_is_told_only_if_it_explains_more_than_no_fault_does():
+    def match(share, *faults):
+        return Match(Variant(faults, lambda case: {}), share, 0.0, [])
+
+    right, as_good, better = match(0.6), match(0.6, "a"), match(0.7, "b")
+    assert _telling([right, as_good, better]) == [better]
+    whole = match(1.0, "c")
+    assert _telling([right, as_good, better, whole]) == [whole]
+    assert _telling([replace_share(right, 1.0), whole]) == [replace_share(right, 1.0), whole]
+
+
+def replace_share(match, share):
+    return match._replace(share=share)

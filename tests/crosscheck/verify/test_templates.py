@@ -1,0 +1,175 @@
+"""The starters build, greet, survive stray prints, and lack nothing but the user's code."""
+
+import json
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import msgspec
+import planted_programs
+import pytest
+
+from plumbob.crosscheck.verify.greeting import Greeting, Step, System
+from plumbob.crosscheck.verify.solvers import open_contestant
+from plumbob.crosscheck.verify.task import TASKS
+from plumbob.crosscheck.verify.templates import GREETING_FIELDS, LANGUAGES, template
+
+REQUESTS = planted_programs.requests()
+OFFERED = ["forward_kinematics", "inverse_kinematics", "mass_spring_step"]
+# In each language: where the user's forward kinematics goes and what could stand there, with a
+# print and a wait of 50 ms. It puts every joint where its offset is: right for a root alone.
+FILLED = {
+    "cpp": (
+        'throw plumbob::missing("forward_kinematics");',
+        'std::puts("stray"); usleep(50000); x = offsets; r = local_rotations;',
+    ),
+    "rust": (
+        'Err("forward_kinematics is not written yet".into())',
+        'println!("stray"); std::thread::sleep(std::time::Duration::from_millis(50)); '
+        "Ok((offsets.to_vec(), local_rotations.to_vec()))",
+    ),
+    "javascript": (
+        'missing("forward_kinematics");\n    return { positions, rotations };',
+        'console.log("stray"); Atomics.wait(new Int32Array(new SharedArrayBuffer(4)), 0, 0, 50); '
+        "return { positions: offsets, rotations: local_rotations };",
+    ),
+    "csharp": (
+        'throw new Exception("forward_kinematics is not written yet");',
+        '(Print("stray"), answer["positions"] = ask.offsets, '
+        'answer["rotations"] = ask.local_rotations).ToString();\n'
+        "    static int Print(string what) { Console.WriteLine(what); Thread.Sleep(50); "
+        "return 0; }",
+    ),
+    "python": (
+        'raise RuntimeError("forward_kinematics is not written yet")',
+        'print("stray"); time.sleep(0.05); '
+        'return {"positions": offsets, "rotations": local_rotations}',
+    ),
+}
+
+
+def build(language, folder, edit=str):
+    """Write a starter, compile it, and return what runs it; skip without its compiler."""
+    for name, text in template(language).items():
+        (folder / name).write_text(edit(text), encoding="utf-8")
+    make, run = (shlex.split(one) for one in LANGUAGES[language][1:])
+    for tool in (one[0] for one in (make, run) if one and not one[0].startswith("./")):
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not on this machine: the {language} starter was not built")
+    if make:
+        quick = ["-O1" if one == "-O2" else one for one in make if one != "-O"]
+        subprocess.run(quick, cwd=folder, check=True, timeout=180, capture_output=True)
+    return [sys.executable if one == "python3" else one for one in run]
+
+
+def ask(run, folder, requests):
+    lines = "".join(json.dumps(one) + "\n" for one in requests)
+    done = subprocess.run(
+        run, cwd=folder, input=lines, capture_output=True, text=True, timeout=60, check=True
+    )
+    return [json.loads(line) for line in done.stdout.splitlines()], done.stderr
+
+
+@pytest.fixture(scope="module", params=LANGUAGES)
+def language(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def replies(language, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(language)
+    return ask(build(language, folder), folder, REQUESTS)[0]
+
+
+def test_a_starter_greets(replies):
+    assert replies[0].pop("id", 0) == 0
+    greeting = msgspec.convert(replies[0], Greeting)
+    assert list(greeting.tasks) == OFFERED
+    assert greeting.language
+
+
+def test_a_starter_fails_only_where_code_is_missing(replies):
+    for request, reply in zip(REQUESTS, replies, strict=True):
+        assert reply.get("id", 0) == request["id"]
+        if request["task"] in OFFERED:
+            expected = f"{request['task']} is not written yet"
+            assert reply == {"id": request["id"], "error": expected}
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_filled_in_starter_answers_and_times_itself_through_stray_prints(language, tmp_path):
+    missing, code = FILLED[language]
+    assert sum(text.count(missing) for text in template(language).values()) == 1
+    run = build(language, tmp_path, lambda text: text.replace(missing, code))
+    pose = {
+        "parents": [-1],
+        "offsets": [[0.1, 1e-17, -1e22]],
+        "local_rotations": [[0.6, 0, 0.8, 0]],
+    }
+    request = {"id": 7, "task": "forward_kinematics", **pose}
+    (reply,), printed = ask(run, tmp_path, [request])
+    assert reply["positions"] == pose["offsets"]  # to the last digit
+    assert reply["rotations"] == pose["local_rotations"]
+    assert "stray" in printed
+    assert reply["seconds"] > 0.04  # a wait may end a little early by another clock
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_what_the_user_fills_in_has_sixty_lines_at_most(language):
+    first, *others = LANGUAGES[language].files
+    lines = template(language)[first].splitlines()
+    assert len(lines) - len(GREETING_FIELDS.split("\n")) <= 60
+    assert max(map(len, lines)) <= 100
+    assert all(name in template(language) for name in others)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_a_starter_lists_every_field_of_the_greeting_and_its_values(language):
+    text = template(language)[LANGUAGES[language].files[0]]
+    words = re.findall(r"\w+", " ".join(re.findall(r"(?://|#) (.*)", text)))
+    for kind in (Greeting, System, Step):
+        for field in msgspec.structs.fields(kind):
+            assert field.name in words
+            for values in re.findall(r"Literal\[(.*?)\]", str(field.type)):
+                assert set(re.findall(r"'(\w+)'", values)) <= set(words), field.name
+    assert "GREETING_FIELDS" not in text
+
+
+def test_a_starter_greets_with_its_precision_and_says_that_there_is_another(replies):
+    assert replies[0]["precision"] == "double"
+
+
+def test_the_python_starter_declares_what_it_greets_with(tmp_path):
+    path = tmp_path / "solver.py"
+    text = template("python")["solver.py"].replace('"precision": "double"', '"precision": "single"')
+    path.write_text(text)
+    for door in (open_contestant(str(path)), open_contestant([sys.executable, str(path)])):
+        try:
+            assert door.greeting.precision == "single"
+            assert list(door.greeting.tasks) == OFFERED
+        finally:
+            door.close()
+
+
+def test_starters_offer_tasks_that_exist():
+    assert set(OFFERED) <= set(TASKS)
+
+
+def test_an_unknown_language_is_refused():
+    with pytest.raises(ValueError, match="expected one of cpp, rust"):
+        template("cobol")
+
+
+def test_the_starters_are_installed_with_the_package():
+    project = Path(__file__).parents[3] / "pyproject.toml"
+    data = tomllib.loads(project.read_text(encoding="utf-8"))
+    patterns = data["tool"]["setuptools"]["package-data"]["crosscheck"]
+    room = Path(sys.modules["plumbob.crosscheck.verify"].__file__).parents[1]
+    shipped = {path for pattern in patterns for path in room.glob(pattern)}
+    for language in LANGUAGES.values():
+        assert {room / "conformance" / "templates" / name for name in language.files} <= shipped
+    assert room / "conformance" / "protocol.schema.json" in shipped
