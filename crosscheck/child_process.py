@@ -24,7 +24,7 @@ _WALL = 10
 _LEAVE = 1.0
 # In safe-path mode (-P) nothing is imported from the working directory; our packages come from
 # where this file is, before any other that the path may lead to.
-_ROOT = Path(__file__).resolve().parents[1]
+_ROOT = Path(__file__).parents[2]
 _PATH = "import sys; sys.path.insert(0, sys.argv[1]); "
 _CALLS = "import plumbob.crosscheck.child_process as c; c.perform_calls({})"
 

@@ -7,6 +7,7 @@ there as well, it is left out. Between rooms all imports together are one arrow.
 
 import ast
 import functools
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
@@ -25,6 +26,9 @@ LETTER = 6.6  # the width of one [px]
 TEXT = {"font_family": "DejaVu Sans, sans-serif", "font_size": 11, "fill": "#22272e"}
 TITLE = TEXT | {"font_size": 14, "font_weight": "bold"}
 ARROW = {"fill": "none", "stroke": "#8b949e", "stroke_width": 0.8, "marker_end": "url(#head)"}
+
+# The three folders are installed as packages of `plumbob`; here they are panels beside it.
+FOLDERS = r"^plumbob\.(?=(bench|crosscheck|reference)\b)"
 
 Graph = dict[str, set[str]]
 
@@ -48,7 +52,7 @@ def imports(path: Path, name: str) -> tuple[str, ...]:
             above = package[: len(package) - node.level + 1] if node.level else []
             stem = [*above, *(node.module.split(".") if node.module else [])]
             found += [".".join([*stem, alias.name]) for alias in node.names]
-    return tuple(found)
+    return tuple(re.sub(FOLDERS, "", name) for name in found)
 
 
 def box(name: str) -> str | None:

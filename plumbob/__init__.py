@@ -1,25 +1,81 @@
-"""The front door: the public names of the reference; `python -m plumbob` is the command line.
+"""The public names of Plumbob; `python -m plumbob` is the command line.
 
-On a terminal a line on stderr says what is compiled, once it takes more than a second.
+The names are imported when the first of them is used, so that the command line starts at once. On a
+terminal a line on stderr says what is compiled, once it takes more than a second.
 """
 
-import sys
-from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from . import entry_point
+# Git on Windows may write the links to `reference`, `crosscheck` and `bench` as text files.
+if Path(__file__).with_name("reference").is_file():
+    __path__.append(str(Path(__file__).parents[1]))
 
-# `python -m plumbob` comes through here before it reaches the command line.
-if sys.argv[:1] == ["-m"] and sys.orig_argv[-len(sys.argv)] == "plumbob":
-    entry_point.leave_at_interrupt()
+if TYPE_CHECKING:
+    from .reference import *
+    from .reference import formats, jacobians, mass_spring
 
-from plumbob.reference import *
-from plumbob.reference import __all__ as _names
-from plumbob.reference import formats, jacobians, mass_spring
+    __version__: str
 
-from . import compile_notice
+__all__ = [
+    "IK_SOLVERS",
+    "STEP_SOLVERS",
+    "Articulation",
+    "Certificate",
+    "Coverage",
+    "IKSolution",
+    "ImplicitEuler",
+    "MassSpring",
+    "Mimic",
+    "Outcome",
+    "Pose",
+    "PoseJudgement",
+    "Skeleton",
+    "State",
+    "StepJudgement",
+    "StepResult",
+    "Target",
+    "__version__",
+    "cores",
+    "curves",
+    "formats",
+    "forward_kinematics",
+    "jacobians",
+    "judge_pose",
+    "judge_step",
+    "local_from_global",
+    "mass_spring",
+    "resample",
+    "rotation",
+    "runge_kutta",
+    "scenes",
+    "set_backend",
+    "set_num_threads",
+    "solve_ik",
+    "speed",
+    "symplectic_euler",
+    "track",
+    "wind_forces",
+]
 
-compile_notice.install()
 
-__version__ = version("plumbob")
-__all__ = ["__version__", "formats", "jacobians", "mass_spring"]
-__all__ += _names
+def __getattr__(name: str) -> Any:
+    """Import the public names, all at once (PEP 562)."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("plumbob")
+    from . import compile_notice, reference
+    from .reference import formats, jacobians, mass_spring
+
+    compile_notice.install()
+    names = {"formats": formats, "jacobians": jacobians, "mass_spring": mass_spring}
+    names |= {public: getattr(reference, public) for public in reference.__all__}
+    globals().update(names)
+    return names[name]
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

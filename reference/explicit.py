@@ -1,7 +1,7 @@
 """Explicit integrators: symplectic Euler, and the classical Runge-Kutta method of order 4.
 
 Dampers pull with -c ((v_i - v_j)·u) u at the current velocities, unlike in a step of implicit
-Euler; `plumbob.reference.mass_spring.damper_forces` compares the two laws. A pin moves to its position at
+Euler; `mass_spring.damper_forces` compares the two laws. A pin moves to its position at
 the end of the step in a straight line at constant velocity; the velocity of pins in the state is
 ignored.
 """

@@ -15,7 +15,7 @@ import numpy as np
 
 from plumbob.crosscheck.verify import templates
 
-ROOM = Path(__file__).parent / "crosscheck" / "conformance" / "programs"
+ROOM = Path(__file__).parent / "crosscheck" / "verify" / "programs"
 TEMPLATES = Path(templates.__file__).parent
 FK, IK, TRACK, RESAMPLE = "forward_kinematics", "inverse_kinematics", "track", "resample"
 FORCES, ENERGY, STEP = "mass_spring_forces", "energy", "mass_spring_step"

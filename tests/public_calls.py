@@ -55,51 +55,51 @@ MODULES = [
 
 # What stands in these modules for other modules of ours, and why no user calls it.
 INTERNAL = {
-    "plumbob.reference.articulation.one_batch": "reshapes what is checked already",
-    "plumbob.reference.articulation.rotated_by_pi": "of joints that are checked already",
-    "plumbob.reference.articulation.number_coordinates": "of joints that are checked already",
-    "plumbob.reference.mass_spring.MassSpring.replaced": "unchecked twin of the constructor",
-    "plumbob.reference.mass_spring.State.of": "unchecked twin of the constructor",
-    "plumbob.reference.rotation.check_unit": "of lengths that the caller has computed",
-    "plumbob.reference.skeleton.checked_skeleton": "is a border itself",
-    "plumbob.reference.skeleton.Skeleton.path_array": "of an index that is checked already",
-    "plumbob.reference.articulation.Articulation.checked": "is a border itself",
-    "plumbob.reference.mass_spring.checked_state": "is a border itself",
-    "plumbob.reference.mass_spring.pin_targets": "is a border itself",
-    "plumbob.reference.mass_spring.constant_forces": "is a border itself",
-    "plumbob.reference.implicit_euler.objective.Objective.iterate_at": "unchecked twin of evaluate",
-    "plumbob.reference.implicit_euler.objective.Objective.hessian_at": "unchecked twin of hessian",
-    "plumbob.reference.implicit_euler.objective.Objective.pin_gradient_at": "unchecked twin",
-    "plumbob.reference.implicit_euler.objective.Iterate": "made only by an Objective",
-    "plumbob.crosscheck.verdict.each_case": "of a comparison in our own sources",
-    "plumbob.reference.implicit_euler.objective.Iterate.within": "of a share in our own sources",
-    "plumbob.reference.judging.step.StepJudgement": "made only by judge_step",
-    "plumbob.reference.judging.pose.PoseJudgement": "made only by judge_pose",
-    "plumbob.reference.implicit_euler.objective.Iterate.is_above": "compares what an Objective has made",
-    "plumbob.reference.implicit_euler.objective.global_matrix": "of a system that is checked already",
-    "plumbob.reference.implicit_euler.objective.effective_stiffnesses": "likewise",
-    "plumbob.reference.implicit_euler.StepSolver.iterates": "a protocol",
-    "plumbob.reference.implicit_euler.StepResult": "made only by a step",
-    "plumbob.reference.implicit_euler.certificate.Certificate": "made only by certify",
-    "plumbob.reference.implicit_euler.certificate.Certificate.shares_minimiser_within": "unchecked twin",
-    "plumbob.reference.implicit_euler.certificate.kantorovich_distance": "a part of the proof",
-    "plumbob.reference.implicit_euler.certificate.least_curvature": "a part of the proof",
-    "plumbob.reference.implicit_euler.certificate.newton_length": "a part of the proof",
-    "plumbob.reference.implicit_euler.certificate.hessian_change": "a part of the proof",
-    "plumbob.reference.implicit_euler.certificate.laplacian_norm": "a part of the proof",
-    "plumbob.reference.implicit_euler.certificate.rounding_errors": "a part of the proof",
-    "plumbob.reference.sparse.linear_solver.Factor.solve": "a protocol",
-    "plumbob.reference.sparse.linear_solver.Factor.refactorize": "a protocol",
-    "plumbob.reference.backend.compiled.Kernel": "for kernels",
-    "plumbob.reference.backend.compiled.compile_kernel": "for kernels",
-    "plumbob.reference.backend.compiled.bind": "for kernels",
-    "plumbob.reference.backend.compiled.Slot": "for kernels",
-    "plumbob.reference.backend.compiled.compiled_in": "for kernels",
-    "plumbob.reference.backend.threads.in_slices": "for kernels",
-    "plumbob.crosscheck.verdict.Verdict": "made only by check_claim",
-    "plumbob.crosscheck.verdict.Claim": "made by claims",
-    "plumbob.crosscheck.samples.generator": "of names in the sources",
-    "plumbob.crosscheck.samples.particles": "of a case that is checked already",
+    "reference.articulation.one_batch": "reshapes what is checked already",
+    "reference.articulation.rotated_by_pi": "of joints that are checked already",
+    "reference.articulation.number_coordinates": "of joints that are checked already",
+    "reference.mass_spring.MassSpring.replaced": "unchecked twin of the constructor",
+    "reference.mass_spring.State.of": "unchecked twin of the constructor",
+    "reference.rotation.check_unit": "of lengths that the caller has computed",
+    "reference.skeleton.checked_skeleton": "is a border itself",
+    "reference.skeleton.Skeleton.path_array": "of an index that is checked already",
+    "reference.articulation.Articulation.checked": "is a border itself",
+    "reference.mass_spring.checked_state": "is a border itself",
+    "reference.mass_spring.pin_targets": "is a border itself",
+    "reference.mass_spring.constant_forces": "is a border itself",
+    "reference.implicit_euler.objective.Objective.iterate_at": "unchecked twin of evaluate",
+    "reference.implicit_euler.objective.Objective.hessian_at": "unchecked twin of hessian",
+    "reference.implicit_euler.objective.Objective.pin_gradient_at": "unchecked twin",
+    "reference.implicit_euler.objective.Iterate": "made only by an Objective",
+    "crosscheck.verdict.each_case": "of a comparison in our own sources",
+    "reference.implicit_euler.objective.Iterate.within": "of a share in our own sources",
+    "reference.judging.step.StepJudgement": "made only by judge_step",
+    "reference.judging.pose.PoseJudgement": "made only by judge_pose",
+    "reference.implicit_euler.objective.Iterate.is_above": "compares what an Objective has made",
+    "reference.implicit_euler.objective.global_matrix": "of a system that is checked already",
+    "reference.implicit_euler.objective.effective_stiffnesses": "likewise",
+    "reference.implicit_euler.StepSolver.iterates": "a protocol",
+    "reference.implicit_euler.StepResult": "made only by a step",
+    "reference.implicit_euler.certificate.Certificate": "made only by certify",
+    "reference.implicit_euler.certificate.Certificate.shares_minimiser_within": "unchecked twin",
+    "reference.implicit_euler.certificate.kantorovich_distance": "a part of the proof",
+    "reference.implicit_euler.certificate.least_curvature": "a part of the proof",
+    "reference.implicit_euler.certificate.newton_length": "a part of the proof",
+    "reference.implicit_euler.certificate.hessian_change": "a part of the proof",
+    "reference.implicit_euler.certificate.laplacian_norm": "a part of the proof",
+    "reference.implicit_euler.certificate.rounding_errors": "a part of the proof",
+    "reference.sparse.linear_solver.Factor.solve": "a protocol",
+    "reference.sparse.linear_solver.Factor.refactorize": "a protocol",
+    "reference.backend.compiled.Kernel": "for kernels",
+    "reference.backend.compiled.compile_kernel": "for kernels",
+    "reference.backend.compiled.bind": "for kernels",
+    "reference.backend.compiled.Slot": "for kernels",
+    "reference.backend.compiled.compiled_in": "for kernels",
+    "reference.backend.threads.in_slices": "for kernels",
+    "crosscheck.verdict.Verdict": "made only by check_claim",
+    "crosscheck.verdict.Claim": "made by claims",
+    "crosscheck.samples.generator": "of names in the sources",
+    "crosscheck.samples.particles": "of a case that is checked already",
 }
 
 
@@ -136,10 +136,10 @@ def public_names(modules=None):
     for module in modules or MODULES:
         for name in getattr(module, "__all__", [n for n in vars(module) if n[0] != "_"]):
             thing = getattr(module, name)
-            home = getattr(thing, "__module__", None)
-            if home is None or not home.startswith(("reference", "crosscheck")):
+            home = (getattr(thing, "__module__", None) or "").removeprefix("plumbob.")
+            if not home.startswith(("reference", "crosscheck")):
                 continue
-            if not hasattr(module, "__all__") and home != module.__name__:
+            if not hasattr(module, "__all__") and f"plumbob.{home}" != module.__name__:
                 continue
             for path, part in _parts(f"{home}.{name}", thing):
                 if path not in seen:
@@ -201,7 +201,7 @@ def system():
 def _rotations():
     q, p = rotation.random(RNG(), 6), rotation.random(np.random.default_rng(1), 6)
     v, w = RNG().uniform(-1.0, 1.0, (2, 6, 3))
-    r = "plumbob.reference.rotation."
+    r = "reference.rotation."
     table = {
         "identity": Call(lambda shape: rotation.identity(2, shape), {"shape": 3}),
         "random": Call(lambda rng, shape: rotation.random(rng, 2, shape),
@@ -222,7 +222,7 @@ def _rotations():
 
 
 def _curves():
-    c = "plumbob.reference.curve."
+    c = "reference.curve."
     table = {
         c + name: Call(getattr(curve, name), {"count": 12})
         for name in ("circle", "square", "heart", "triangle", "star", "plumb_bob")
@@ -236,7 +236,7 @@ def _curves():
 def _skeletons():
     model, local = tree(), rotation.random(RNG(), 5, 6)
     turned = kinematics.forward_kinematics(model, local).rotations
-    s, k = "plumbob.reference.skeleton.Skeleton", "plumbob.reference.kinematics."
+    s, k = "reference.skeleton.Skeleton", "reference.kinematics."
     built = {"parents": model.parents, "offsets": model.offsets, "names": list("uvwxyz")}
     return {
         s: Call(Skeleton, built),
@@ -264,7 +264,7 @@ def _skeletons():
 
 
 def _articulations():
-    model, a = robot(), "plumbob.reference.articulation.Articulation"
+    model, a = robot(), "reference.articulation.Articulation"
     q = model.random(RNG(), 5)
     built = {
         "skeleton": tree(), "kinds": list(model.kinds), "axes": np.array(model.axes),
@@ -302,7 +302,7 @@ def _articulations():
 
 
 def _derivatives():
-    model, balls, d = robot(), tree(), "plumbob.reference.jacobians."
+    model, balls, d = robot(), tree(), "reference.jacobians."
     q, q0 = model.random(RNG(), 2, 5)
     v = RNG().uniform(-1.0, 1.0, (5, model.freedom_count))
     local = rotation.random(RNG(), 5, 6)
@@ -328,8 +328,8 @@ def _solves():
     numbers = {"tolerance": 1e-4, "tolerance_rotation": 1e-4, "max_iterations": 4}
     settings = {"solver": "ccd", "effector": "f", **numbers}
     drawn = {"restarts": 1, "seed": 3, "record": True}
-    i, t = "plumbob.reference.inverse_kinematics.solve_ik", "plumbob.reference.tracking.track"
-    j = "plumbob.reference.judging.pose.judge_pose"
+    i, t = "reference.inverse_kinematics.solve_ik", "reference.tracking.track"
+    j = "reference.judging.pose.judge_pose"
 
     def posed(position, rotation, effector, weight):
         target = Target(position, rotation, effector, weight), Target([0.1, 0.2, 0.3], None, "c")
@@ -387,7 +387,7 @@ def _solves():
 
 def _systems():
     model, state = system()
-    x, m = state.positions, "plumbob.reference.mass_spring."
+    x, m = state.positions, "reference.mass_spring."
     outer = RNG().uniform(-1.0, 1.0, (5, 3))
     per_spring = {
         "rest_lengths": np.full(7, 0.9), "stiffnesses": np.full(7, 50.0),
@@ -417,9 +417,7 @@ def _systems():
              "density": 1.2, "drag": 1.0, "lift": 0.5}  # fmt: skip
     blown = Call(reference.wind_forces, moved, single="wind", free="triangles",
                  raises=(FloatingPointError,))  # fmt: skip
-    return {m + name: call for name, call in table.items()} | {
-        "plumbob.reference.wind.wind_forces": blown
-    }
+    return {m + name: call for name, call in table.items()} | {"reference.wind.wind_forces": blown}
 
 
 def _steps():
@@ -433,15 +431,15 @@ def _steps():
     result = euler.step(state)
     proof = euler.certify(state, result)
     o, e = (
-        "plumbob.reference.implicit_euler.objective.Objective",
-        "plumbob.reference.implicit_euler.ImplicitEuler",
+        "reference.implicit_euler.objective.Objective",
+        "reference.implicit_euler.ImplicitEuler",
     )
 
     def iterates(state, external_forces, pin_positions):
         return list(itertools.islice(euler.iterates(state, external_forces, pin_positions), 2))
 
     table = {
-        f"plumbob.reference.explicit.{name}": Call(getattr(reference, name), explicit_step,
+        f"reference.explicit.{name}": Call(getattr(reference, name), explicit_step,
                                            raises=(FloatingPointError,))
         for name in ("symplectic_euler", "runge_kutta")
     }  # fmt: skip
@@ -457,7 +455,7 @@ def _steps():
         e + ".certify": Call(euler.certify, {**moved, "result": result}, names="positions"),
         e + ".iterates": Call(iterates, moved),
         o: Call(objective.Objective, {"system": model, **moved, "h": 0.01, "start": "x_n"}),
-        "plumbob.reference.judging.step.judge_step": Call(
+        "reference.judging.step.judge_step": Call(
             reference.judge_step,
             {"system": model, **moved, "h": 0.01, "positions": x, "velocities": outer},
         ),
@@ -465,9 +463,9 @@ def _steps():
         o + ".hessian": Call(g.hessian, {"positions": x, "geometric": True}),
         o + ".pin_gradient": Call(g.pin_gradient, {"positions": x, "geometric": False}),
         o + ".quadratic_form": Call(g.quadratic_form, {"positions": x, "d": g.rest_vectors(x)}),
-        "plumbob.reference.implicit_euler.certificate.certify": Call(
+        "reference.implicit_euler.certificate.certify": Call(
             certificate.certify, {"objective": g, "positions": x}),
-        "plumbob.reference.implicit_euler.certificate.Certificate.shares_minimiser": Call(
+        "reference.implicit_euler.certificate.Certificate.shares_minimiser": Call(
             proof.shares_minimiser, {"other": proof, "apart": 0.1}),
     }  # fmt: skip
 
@@ -478,7 +476,7 @@ def _scenes():
     grid = {"rows": 3, "columns": 4, "spacing": 0.2, "height": 1.5, "mass": 1.0, **elastic}
     mesh = {"vertices": vertices, "triangles": np.array([[0, 1, 2], [0, 2, 3]]), **elastic,
             "bending_stiffness": 1.0, "tension_only": True, "pinned": np.array([0, 1])}  # fmt: skip
-    s = "plumbob.reference.scenes."
+    s = "reference.scenes."
     return {
         s + "grids.lab_cloth": Call(
             scenes.lab_cloth, {"size": 3, "side": 2.0, "height": 1.5, "mass": 1.0, **elastic},
@@ -716,7 +714,7 @@ def _files():
     shifts = np.tile(model.offsets, (4, 1, 1)) * np.arange(1.0, 5.0)[:, None, None]
     moved = {"skeleton": model, "local_rotations": local, "frame_time": 0.02, "offsets": shifts,
              "order": "ZXY"}  # fmt: skip
-    f = "plumbob.reference.formats."
+    f = "reference.formats."
 
     def named(function, text, **options):
         """Return a call by path, IT being that of a file with the text."""
@@ -761,8 +759,8 @@ def _matrices():
     b = np.arange(4.0)
     factor = cholesky.CholeskyFactor(A)
     c, library = (
-        "plumbob.reference.sparse.factor.CholeskyFactor",
-        "plumbob.reference.sparse.linear_solver.",
+        "reference.sparse.factor.CholeskyFactor",
+        "reference.sparse.linear_solver.",
     )
     lu = linear_solver.SuperLUFactor(A)
     table = {
@@ -797,7 +795,7 @@ def _settings():
 
         return call
 
-    compiled, threads = "plumbob.reference.backend.compiled.", "plumbob.reference.backend.threads."
+    compiled, threads = "reference.backend.compiled.", "reference.backend.threads."
     backends = {
         "set_backend": Call(within(reference.set_backend), {"name": "python"}, names="backend"),
         "speed": Call(within(reference.speed), {"name": "plain"}, names="speed"),
@@ -812,7 +810,7 @@ def _settings():
 
 
 def _samples():
-    s = "plumbob.crosscheck.samples."
+    s = "crosscheck.samples."
     tree = samples.skeleton(3)
     claim = verdict.Claim("a", "b", "c", _compared, POSITION, 1)
     table = {
@@ -826,7 +824,7 @@ def _samples():
             lambda case, skeleton, batch: samples.local_rotations(case, skeleton, batch),
             {"case": 0, "skeleton": tree, "batch": 2}, names="shape"),
         s + "highest_rate": Call(samples.highest_rate, {"system": system()[0]}),
-        "plumbob.crosscheck.verdict.check_claim": Call(verdict.check_claim, {"claim": claim, "cases": 1}),
+        "crosscheck.verdict.check_claim": Call(verdict.check_claim, {"claim": claim, "cases": 1}),
     }  # fmt: skip
 
 

@@ -8,6 +8,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ["reference", "crosscheck", "bench", "plumbob"]  # each may import those before it
+FOLDERS = set(ROOMS) - {"plumbob"}  # linked into `plumbob`, and imported as its packages
 LIBRARIES = {"numpy", "scipy", "numba", "llvmlite", "cholespy"}  # llvmlite is numba's own
 RUBBISH = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = {"pathlib", "os", "io", "shutil", "tempfile", "open", "fromfile", "tofile", "loadtxt"}
@@ -16,7 +17,7 @@ PRINTS = {"print", "logging", "stdout", "stderr"}
 
 
 def imported(tree):
-    """The dotted names a module imports from outside its own room, those in functions included."""
+    """The dotted names that a module imports absolutely, those in functions included."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -24,6 +25,26 @@ def imported(tree):
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.Call) and named(node.func) in {"import_module", "__import__"}:
             yield from (str(a.value) for a in node.args[:1] if isinstance(a, ast.Constant))
+
+
+def imported_room(name):
+    """The room that an absolute name lies in; what is not in one of the three is `plumbob`'s."""
+    first, *rest = name.split(".")
+    if first == "plumbob":
+        return rest[0] if rest and rest[0] in ROOMS else "plumbob"
+    return first
+
+
+def relative_steps_out(path, tree):
+    """Relative imports that leave the room: they would depend on where the folder is linked."""
+    depth = len(path.parts) - 1
+    nodes = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom))
+    return {node.module for node in nodes if node.level > depth}
+
+
+def bare_imports(path, tree):
+    """Imports of a room by its folder's name, which only work where a checkout is on the path."""
+    return {name for name in imported(tree) if name.split(".")[0] in FOLDERS}
 
 
 def named(node):
@@ -47,7 +68,7 @@ def is_door_for_files(path):
 
 def arrows_against_the_direction(path, tree):
     later = {*ROOMS[ROOMS.index(room(path)) + 1 :], "tests"}
-    return {name for name in imported(tree) if name.split(".")[0] in later}
+    return {name for name in imported(tree) if imported_room(name) in later}
 
 
 def names_that_say_nothing(path, tree):
@@ -57,7 +78,7 @@ def names_that_say_nothing(path, tree):
 def foreign_imports_in_reference(path, tree):
     if room(path) != "reference":
         return set()
-    known = LIBRARIES | set(sys.stdlib_module_names) | set(ROOMS)
+    known = LIBRARIES | set(sys.stdlib_module_names) | {"plumbob"}
     return {name for name in imported(tree) if name.split(".")[0] not in known}
 
 
@@ -76,11 +97,12 @@ def prints_in_reference(path, tree):
     return PRINTS & used(tree) if room(path) == "reference" else set()
 
 
-def definitions_at_the_front_door(path, tree):
-    defined = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.Lambda)
-    return {
-        node for node in ast.walk(tree) if isinstance(node, defined) and room(path) == "plumbob"
-    }
+def definitions_among_the_public_names(path, tree):
+    if path != PurePosixPath("plumbob/__init__.py"):
+        return set()
+    defined = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+    names = {node.name for node in ast.walk(tree) if isinstance(node, defined)}
+    return names - {"__getattr__", "__dir__"}
 
 
 RULES = [
@@ -90,24 +112,27 @@ RULES = [
     files_in_reference,
     clocks_in_reference,
     prints_in_reference,
-    definitions_at_the_front_door,
+    definitions_among_the_public_names,
+    bare_imports,
+    relative_steps_out,
 ]
 
 SLIPS = [
-    (arrows_against_the_direction, "reference/a.py", "import crosscheck"),
-    (
-        arrows_against_the_direction,
-        "reference/a.py",
-        "from plumbob.crosscheck.verdict import judge",
-    ),
-    (arrows_against_the_direction, "reference/formats/a.py", "from bench import cli"),
-    (arrows_against_the_direction, "crosscheck/a.py", "def f():\n    import bench.run"),
+    (arrows_against_the_direction, "reference/a.py", "import plumbob.crosscheck"),
+    (arrows_against_the_direction, "reference/a.py", "from plumbob.crosscheck.verdict import a"),
+    (arrows_against_the_direction, "reference/formats/a.py", "from plumbob.bench import text"),
+    (arrows_against_the_direction, "crosscheck/a.py", "def f():\n    import plumbob.bench.run"),
     (arrows_against_the_direction, "crosscheck/a.py", "import_module('plumbob.bench.harness.run')"),
     (arrows_against_the_direction, "bench/a.py", "from tests import conftest"),
     (arrows_against_the_direction, "bench/a.py", "from plumbob import solve_ik"),
+    (arrows_against_the_direction, "bench/a.py", "from plumbob.cli import main"),
     (arrows_against_the_direction, "reference/a.py", "import plumbob"),
-    (definitions_at_the_front_door, "plumbob/a.py", "def f():\n    return 1"),
-    (definitions_at_the_front_door, "plumbob/__init__.py", "class A:\n    pass"),
+    (bare_imports, "plumbob/a.py", "from reference import solve_ik"),
+    (bare_imports, "bench/a.py", "import crosscheck.verdict"),
+    (relative_steps_out, "bench/a.py", "from ..reference import solve_ik"),
+    (relative_steps_out, "bench/peers/a.py", "from ...reference import solve_ik"),
+    (definitions_among_the_public_names, "plumbob/__init__.py", "def f():\n    return 1"),
+    (definitions_among_the_public_names, "plumbob/__init__.py", "class A:\n    pass"),
     (names_that_say_nothing, "reference/utils.py", ""),
     (names_that_say_nothing, "bench/helpers/a.py", ""),
     (names_that_say_nothing, "crosscheck/common.py", ""),
@@ -129,9 +154,10 @@ SLIPS = [
 FINE = [
     ("reference/a.py", "import math\nimport numpy as np\nfrom .compiled import Kernel"),
     ("reference/formats/a.py", "from pathlib import Path\nopen(Path('a'))"),
-    ("crosscheck/a.py", "import mujoco\nfrom reference import Skeleton\nfrom . import samples"),
-    ("plumbob/__init__.py", "from reference import *\nfrom plumbob.cli import main"),
-    ("bench/a.py", "import time\nfrom plumbob.crosscheck.verdict import judge\nprint(time.time())"),
+    ("crosscheck/a.py", "import mujoco\nfrom plumbob.reference import Skeleton\nfrom . import a"),
+    ("plumbob/__init__.py", "from .reference import *\ndef __getattr__(name):\n    return 1"),
+    ("plumbob/cli.py", "from plumbob.bench import text\ndef main():\n    return text"),
+    ("bench/a.py", "import time\nfrom plumbob.crosscheck.verdict import a\nprint(time.time())"),
 ]
 
 

@@ -4,6 +4,7 @@ This is a program of its own, run by path: it imports the revision's bench, what
 and uses only what the bench had from its first records on.
 """
 
+import importlib
 import json
 import os
 import select
@@ -18,10 +19,12 @@ def main(folder: str, scale: str, *suites: str) -> None:
     threading.Thread(target=end_with_parent, daemon=True).start()
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what an engine prints is no answer
-    from .. import experiments
-    from ..harness import record, run
+    bench = "plumbob.bench" if Path(folder, "plumbob", "bench").exists() else "bench"
+    experiments = importlib.import_module(f"{bench}.experiments")
+    record = importlib.import_module(f"{bench}.harness.record")
+    run = importlib.import_module(f"{bench}.harness.run")
 
-    if not Path(run.__file__).is_relative_to(folder):
+    if not Path(str(run.__file__)).resolve().is_relative_to(folder):
         sys.exit(f"expected the bench of {folder}, got {run.__file__}")
     blocks = {
         run.block_key(block): block

@@ -14,7 +14,7 @@ from ..harness.stopwatch import behind_door
 from ..harness.worker import NoAnswerError
 from .entrant import Spec
 
-# The bench itself loses patience with a silent worker sooner: see `plumbob.bench.harness.isolation`.
+# The bench itself loses patience with a silent worker sooner: see `bench/harness/isolation.py`.
 LIMITS = Limits(first=900.0, request=900.0, line=1 << 26)
 _ABOUT = sentence("")
 

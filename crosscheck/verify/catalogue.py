@@ -15,9 +15,9 @@ from pathlib import Path
 from .language import DOMAIN, LANGUAGES, LOCALES
 from .task import TASKS
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).resolve().parents[2]
 # Where sentences stand.
-SOURCES = ("crosscheck/conformance", "crosscheck/verify/output")
+SOURCES = ("crosscheck/verify", "plumbob/commands/verify.py")
 _ENTRY = re.compile(r'^msgid ((?:".*"\n)+)msgstr ((?:".*"\n?)+)', re.MULTILINE)
 _UNIT = re.compile(r"\[[^\]]*\]")
 _MAGIC, _HEAD = 0x950412DE, 28
@@ -27,7 +27,7 @@ def templates() -> dict[str, str]:
     """Return every template that can be shown, and the file in which it stands first."""
     found: dict[str, str] = {}
     for folder in SOURCES:
-        for path in sorted((ROOT / folder).rglob("*.py")):
+        for path in sorted((ROOT / folder).rglob("*.py")) or [ROOT / folder]:
             place = path.relative_to(ROOT).as_posix()
             for template in literal_templates(path.read_text(encoding="utf-8"), place):
                 found.setdefault(template, place)

@@ -9,11 +9,11 @@ import pytest
 
 PROGRAM = """
 import numpy as np
-from bench import compile_notice
+from plumbob import compile_notice
 compile_notice.install()
 compile_notice.install()
 compile_notice.DELAY = {delay}
-from reference import forward_kinematics, scenes
+from plumbob.reference import forward_kinematics, scenes
 forward_kinematics(*scenes.lab_arm())
 """
 LINE = "compiling forward_kinematics, once"

@@ -174,7 +174,7 @@ BEHAVIOURS = {
         "^crashed: It ended instead of answering: exit code 1. .* TypeError: 'NoneType' object",
     ),
     "replaces the reference": Row(
-        "import reference\nreference.forward_kinematics = reference.Skeleton = None\n"
+        "from plumbob import reference\nreference.forward_kinematics = reference.Skeleton = None\n"
         "return right(request)",
         "^answer$",
     ),

@@ -10,7 +10,7 @@ import pytest
 from plumbob.bench.harness import machine
 
 PACKAGES = ("reference", "crosscheck", "bench")
-ROOT = Path(machine.__file__).parents[2]
+ROOT = Path(machine.__file__).resolve().parents[2]
 
 
 @pytest.fixture

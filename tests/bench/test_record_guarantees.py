@@ -21,7 +21,7 @@ from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import FORMAT, RecordFile, decode, encode
 from plumbob.bench.harness.results import Results
 
-ROOT = Path(bench.__file__).parents[1]
+ROOT = Path(bench.__file__).resolve().parents[1]
 
 
 @pytest.fixture

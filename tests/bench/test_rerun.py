@@ -322,7 +322,7 @@ def test_the_command_measures_the_clone_in_which_it_is_run(capsys, repository, m
 @pytest.mark.slow
 def test_this_revision_beside_itself_differs_in_nothing():
     """The real bench, its working copy beside its last commit, on two rows of timing."""
-    root = Path(machine.__file__).parents[2]
+    root = Path(machine.__file__).resolve().parents[2]
     made = rerun(Plan("HEAD", ("timing",), ("10 balls/one pose",)), root)
     assert len(made.rows) >= 4
     assert called(made) == {}

@@ -17,14 +17,14 @@ from plumbob.reference import ImplicitEuler, State, curves, resample, scenes, so
 
 IK = """
     import numpy as np
-    from reference import Skeleton, solve_ik
+    from plumbob import Skeleton, solve_ik
 
     def inverse_kinematics(parents, offsets, local_rotations, target, effector):
         found = solve_ik(Skeleton(parents, offsets), local_rotations, target, solver="ccd"{})
         return {{"local_rotations": found.local_rotations}}
 """
 STEP = """
-    from reference import ImplicitEuler, MassSpring, State
+    from plumbob import ImplicitEuler, MassSpring, State
 
     def mass_spring_step(masses, springs, rest_lengths, stiffnesses, dampings, pinned, gravity,
                          positions, velocities, h):

@@ -15,7 +15,7 @@ from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.worker import Ready
 from plumbob.crosscheck.child_process import PipedProcess
 
-ROOT = Path(isolation.__file__).parent.parent
+ROOT = Path(isolation.__file__).resolve().parents[2]
 PATIENCE = 3.0
 LARGE = 2**22
 
@@ -257,7 +257,7 @@ def test_a_worker_ends_with_the_program_that_started_it(jobs, tmp_path):
 SHADOW = 'open({path!r}, "a").write(__name__); raise SystemExit("the wrong one")'
 
 
-@pytest.mark.parametrize("name", ["bench", "reference", "numpy", "multiprocessing", "pickle"])
+@pytest.mark.parametrize("name", ["plumbob", "bench", "numpy", "multiprocessing", "pickle"])
 def test_what_lies_where_one_works_is_not_imported(jobs, tmp_path, monkeypatch, name):
     (tmp_path / name).mkdir()
     trace = tmp_path / "imported"
@@ -272,8 +272,8 @@ def test_what_lies_where_one_works_is_not_imported(jobs, tmp_path, monkeypatch, 
 
 
 def test_another_bench_on_the_path_is_not_imported(jobs, tmp_path, monkeypatch):
-    (tmp_path / "bench").mkdir()
-    (tmp_path / "bench" / "__init__.py").write_text("raise SystemExit(9)")
+    (tmp_path / "plumbob").mkdir()
+    (tmp_path / "plumbob" / "__init__.py").write_text("raise SystemExit(9)")
     path = os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     monkeypatch.setenv("PYTHONPATH", path)
     worker = WorkerProcess(start_patience=60.0)
@@ -284,7 +284,8 @@ def test_another_bench_on_the_path_is_not_imported(jobs, tmp_path, monkeypatch):
 COMMAND = """
 import sys
 from functools import partial
-from bench import cli, experiments as suites
+from plumbob import cli
+from plumbob.bench import experiments as suites
 from plumbob.bench.harness import isolation, run
 from plumbob.bench.experiments import Block, Measured
 from plumbob.bench.experiments.robots import measurement as robots

@@ -10,7 +10,10 @@ import pytest
 
 from plumbob.crosscheck.child_process import PipedProcess, kill_group
 
-ECHO = "import plumbob.crosscheck.child_process as c; p = c.attach({}); p.send((p.recv(), None)); p.recv()"
+ECHO = (
+    "import plumbob.crosscheck.child_process as c; p = c.attach({}); "
+    "p.send((p.recv(), None)); p.recv()"
+)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ LOCAL, DASK = "local", "dask://"
 
 
 def executor_at(address: str, mix_machines: bool = False) -> Executor:
-    """Return the executor of an address; see `plumbob.bench.harness.executors.dask` for what it may cost.
+    """Return the executor of an address; see `.dask` for what it may cost.
 
     Raises:
         ValueError: if there is no such executor, it needs what is not installed, or it does not

@@ -8,7 +8,7 @@ from .program import ProgramContestant
 
 # After this share of its time a solver's line is noted, in case it takes longer.
 TOLD_AFTER = 0.6
-_HOME = str(Path(__file__).resolve().parents[3])
+_HOME = str(Path(__file__).parents[4])
 # Ours is found first only while the host is loaded; then the solver's modules come first.
 _START = """\
 import sys

@@ -167,9 +167,9 @@ def test_an_unknown_language_is_refused():
 def test_the_starters_are_installed_with_the_package():
     project = Path(__file__).parents[3] / "pyproject.toml"
     data = tomllib.loads(project.read_text(encoding="utf-8"))
-    patterns = data["tool"]["setuptools"]["package-data"]["crosscheck"]
-    room = Path(sys.modules["plumbob.crosscheck.verify"].__file__).parents[1]
+    patterns = data["tool"]["setuptools"]["package-data"]["plumbob.crosscheck.verify"]
+    room = Path(sys.modules["plumbob.crosscheck.verify"].__file__).parent
     shipped = {path for pattern in patterns for path in room.glob(pattern)}
     for language in LANGUAGES.values():
-        assert {room / "conformance" / "templates" / name for name in language.files} <= shipped
-    assert room / "conformance" / "protocol.schema.json" in shipped
+        assert {room / "templates" / name for name in language.files} <= shipped
+    assert room / "protocol.schema.json" in shipped
