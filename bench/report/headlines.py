@@ -17,7 +17,7 @@ from ..experiments.cloth_peers.readings import points
 from ..experiments.robots import REACHABLE
 from ..experiments.robots.overall.readings import Overall, overall
 from ..experiments.robots.readings import KINDS, SHIFT, measured, records_of
-from ..experiments.timing.tables import median_time, ranked_by_time
+from ..experiments.timing.readings import median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED, Record
 from ..harness.results import Results, by_problem, counted, listed

@@ -283,7 +283,7 @@ def test_times_are_shown_with_the_interval_of_their_sweeps_and_ties_are_called_s
         swept(make, "MuJoCo", 2e-6 * drift),
     )
     table = timing.kinematics(Results([ours, rival]))
-    known = column(table, "median known to ± [%]")
+    known = column(table, "95 % interval of the median, ± [%]")
     assert known[0] == pytest.approx(known[1])
     assert known[0] == pytest.approx(
         50.0 * (np.sort(drift)[7] - np.sort(drift)[1]) / np.median(drift)
