@@ -4,7 +4,7 @@ import contextlib
 import shutil
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +30,7 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
     from plumbob.bench.report.sections import tables
     from plumbob.bench.tables.table import is_blank
 
-    for made in _made(lambda results: tables(results, suites), suites, output):
+    for made in tables(_results(suites, output), suites):
         if not is_blank(made):
             print_aligned(made, f"plumbob report {output} --table {made.name}")
 
@@ -39,18 +39,15 @@ def print_ending(suites: Sequence[str], output: Path) -> None:
     """Print what a bench of these suites came to, in about eight lines."""
     from plumbob.bench.report.outcome import ending
 
-    lines = _made(lambda results: ending(results, suites, width()), suites, output)
-    print("\n".join(lines))
+    print("\n".join(ending(_results(suites, output), suites, width())))
 
 
-def _made(make: "Callable[[Results], Any]", suites: Sequence[str], output: Path) -> Any:
-    """Return what is made of a folder's records of these suites, but for those that do not fit."""
+def _results(suites: Sequence[str], output: Path) -> "Results":
     from plumbob.bench.harness.record import FINISHED, RecordFile
-    from plumbob.bench.harness.results import Results, plain, sift
+    from plumbob.bench.harness.results import Results
 
-    stored = RecordFile(output).read().records
-    records, _ = sift(make, [plain(r) for r in stored if r.suite in (*suites, FINISHED)])
-    return make(Results(records))
+    records = RecordFile(output).read().records
+    return Results(record for record in records if record.suite in (*suites, FINISHED))
 
 
 def print_summary(table: "Table") -> None:

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..harness.record import Record, RecordFile
-from ..harness.results import plain
+from ..harness.record import Record, on_record
+from ..harness.results import printable
 from ..tables.columns import text
 from ..tables.table import Column, Table, cells
 from ..text import visible
@@ -62,12 +62,12 @@ def read_runs(folders: Iterable[Path]) -> list[Run]:
 
 
 def _read(folder: Path) -> Run:
-    records = [plain(record) for record in RecordFile(folder).read().records]
-    if not records:
-        raise ValueError(f"no records in {folder}: run `plumbob bench` first")
+    records = on_record(folder, typed=False).records
     newest = max(records, key=lambda record: record.when)
     commit = newest.commit or newest.stamp.get("source", "")
-    return Run(visible(f"{folder.name} {commit}".strip()), newest.when, by_row(records))
+    return Run(
+        visible(f"{folder.name} {commit}".strip()), newest.when, by_row(map(printable, records))
+    )
 
 
 def courses(runs: Sequence[Run], quantity: str, words: Sequence[str] = ()) -> list[Course]:

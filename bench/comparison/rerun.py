@@ -23,7 +23,7 @@ import numpy as np
 from plumbob.crosscheck.child_process import kill_group, one_thread
 
 from ..harness.metrics import adjusted
-from ..harness.record import Record, decode
+from ..harness.record import Record, untyped
 from . import revision_process
 from .compare import Comparison, decide
 from .intervals import ERROR_RATE, Deviation, Ratio, pairs_needed, ratio_of_pairs
@@ -159,7 +159,7 @@ class Revision:
         assert self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError):  # what ended it is said by the answer
             print(json.dumps(key), file=self._process.stdin, flush=True)
-        return decode(self._answer())
+        return untyped(self._answer())
 
     def _answer(self) -> str:
         assert self._process.stdout is not None

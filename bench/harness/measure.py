@@ -35,12 +35,12 @@ def measure(block: Block) -> Record:
 
 def failure(why: str) -> Measured:
     """Return a block without numbers that says why it could not be measured."""
-    return Measured({}, {"failed": why})
+    return Measured(None, {"failed": why})
 
 
 def not_installed(package: str) -> Measured:
     """Return a block without numbers that says what is missing."""
-    return Measured({}, {"remark": f"{package} is not installed"})
+    return Measured(None, {"remark": f"{package} is not installed"})
 
 
 def record_of(block: Block, measured: Measured, seconds: float) -> Record:

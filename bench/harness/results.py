@@ -1,29 +1,32 @@
 """The records of a report, and how problems and solvers are written."""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..peers import registry
 from ..tables.table import words
-from ..text import all_visible, shortened, visible
+from ..text import all_visible
 from .metrics import Ranking
-from .record import Record
+from .record import Record, on_record
 
 # So much may a time that is shown be off, in relative terms, by the drift of its machine.
 PRECISION = 0.05
 
 
 class Results:
-    """The records that hold numbers, in the order of the file, to be asked for by what they are."""
+    """The records that hold numbers, in the order of the file, to be asked for by what they are.
+
+    Whatever their words are, they can be shown anywhere.
+    """
 
     def __init__(self, records: Iterable[Record]) -> None:
         """Leave out those that say why there are none, and those under settings of before."""
-        current = [record for record in records if not record.superseded]
-        self.records = [record for record in current if not record.failed]
-        self.failed = [record for record in current if record.failed]
+        self.every = [printable(record) for record in records if not record.superseded]
+        self.records = [record for record in self.every if not record.failed]
+        self.failed = [record for record in self.every if record.failed]
 
     @property
     def entrants(self) -> frozenset[str]:
@@ -46,64 +49,23 @@ def _has(record: Record, wanted: dict[str, Any]) -> bool:
     return all(known.get(name) == value for name, value in wanted.items())
 
 
-def plain(record: Record) -> Record:
+def printable(record: Record) -> Record:
     """Return a record whose words can be shown anywhere."""
     names = ("suite", "problem", "solver", "settings", "notes", "stamp", "facts")
     return replace(record, **{name: all_visible(getattr(record, name)) for name in names})
 
 
-def sift(
-    make: Callable[[Results], Any], records: Sequence[Record]
-) -> tuple[list[Record], list[str]]:
-    """Return the records without those over which `make` raises, and a sentence on each of these.
+def results_of(folder: Path) -> tuple[Results, str]:
+    """Return what a folder has on record to be shown, and a sentence on what cannot be, or "".
 
     Raises:
-        Exception: whatever `make` raises without any record.
+        ValueError: if there are no records, or they cannot be read.
     """
-    make(Results([]))
-    return _joined(make, [], list(records))
-
-
-def _joined(
-    make: Callable[[Results], Any], valid: list[Record], more: list[Record]
-) -> tuple[list[Record], list[str]]:
-    """Return what of more records goes with those that are valid, by halves, and what is said."""
-    try:
-        make(Results([*valid, *more]))
-        return [*valid, *more], []
-    except Exception as error:  # a record may hold anything
-        if len(more) == 1:
-            return valid, [_does_not_fit(more[0], error)]
-    half, said = len(more) // 2, []
-    for part in (more[:half], more[half:]):
-        valid, sentences = _joined(make, valid, part)
-        said += sentences
-    return valid, said
-
-
-def _does_not_fit(record: Record, error: Exception) -> str:
-    names = ", ".join(shortened(name, 40) for name in (record.problem, record.solver))
-    return (
-        f"The record of {names} is left out, for no table can be made of what it holds "
-        f"({reason(error)})."
-    )
-
-
-def reason(error: Exception) -> str:
-    """Return an error in at most 100 letters."""
-    return shortened(visible(f"{type(error).__name__}: {error}"), 100)
-
-
-def check_any(folder: Path, records: Sequence[Record], left_out: Sequence[str]) -> None:
-    """Make sure that some records can be shown.
-
-    Raises:
-        ValueError: with the first sentence on what was left out, if there are no records.
-    """
-    if not records:
-        sentence = left_out[0] if left_out else "All are superseded: run `plumbob bench` first"
-        others = f" So are {len(left_out) - 1} others." if len(left_out) > 1 else ""
-        raise ValueError(f"no record in {folder} can be shown: {sentence}{others}")
+    records, warning = on_record(folder)
+    results = Results(records)
+    if not results.every:
+        raise ValueError(f"no records in {folder}: all are superseded; run `plumbob bench` first")
+    return results, warning
 
 
 def label(solver: str) -> str:

@@ -90,13 +90,9 @@ COMPARE_EXAMPLES = block(
 
 def _of_folders(old: Path, new: Path) -> "Comparison":
     from plumbob.bench.comparison.compare import compare as compare_records
-    from plumbob.bench.harness.record import RecordFile
+    from plumbob.bench.harness.record import on_record
 
-    found = [RecordFile(folder).read().records for folder in (old, new)]
-    for folder, records in zip((old, new), found, strict=True):
-        if not records:
-            raise ValueError(f"no records in {folder}: run `plumbob bench` first")
-    return compare_records(*found)
+    return compare_records(*(on_record(folder, typed=False).records for folder in (old, new)))
 
 
 def _side_by_side(revision: str, suites: list[str], words: list[str], pairs: int) -> "Comparison":

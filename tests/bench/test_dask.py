@@ -29,7 +29,7 @@ from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import block_key, measure
 from plumbob.bench.harness.progress import Progress, listening
 from plumbob.bench.harness.record import RecordFile, encode
-from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.harness.results import Results
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.table import markdown
 
@@ -426,7 +426,7 @@ def address(cluster):
 
 def shown(folder, suites):
     """All tables as text."""
-    made = tables(Results([plain(record) for record in RecordFile(folder).read().records]), suites)
+    made = tables(Results(RecordFile(folder).read().records), suites)
     return {table.name: markdown(table) for table in made if table.rows}
 
 

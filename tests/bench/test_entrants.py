@@ -14,7 +14,7 @@ from plumbob.bench.experiments.robots.problem import ROBOTS, robot
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.harness.results import Results, printable
 from plumbob.bench.report.sections import tables
 from plumbob.cli import run_command
 from plumbob.crosscheck.verify.solvers import open_contestant
@@ -54,7 +54,7 @@ def bench(*words):
 
 
 def records(solver=None):
-    found = [plain(one) for one in RecordFile("out").read().records if one.suite != "finished"]
+    found = [printable(one) for one in RecordFile("out").read().records if one.suite != "finished"]
     return [one for one in found if solver in (None, one.solver)]
 
 

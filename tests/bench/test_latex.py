@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plumbob.bench.harness.metrics import Share, share
-from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.harness.results import Results
 from plumbob.bench.report import sections
 from plumbob.bench.tables import fitting, latex, tex_text
 from plumbob.bench.tables.fitting import Need
@@ -63,7 +63,7 @@ def mixed():
 @pytest.fixture(scope="module")
 def every_table(records):
     """The tables of a report, and some that are harder."""
-    made = sections.tables(Results([plain(record) for record in records]))
+    made = sections.tables(Results(records))
     long = [(f"solver {i}", 1.0 / (i + 1)) for i in range(120)]
     return [
         *made,
@@ -260,7 +260,7 @@ def test_what_is_too_wide_loses_folded_columns_then_stands_in_parts():
 
 
 def test_a_caption_says_how_many_on_which_machine_with_what(records):
-    made = sections.tables(Results([plain(record) for record in records]))
+    made = sections.tables(Results(records))
     captions = {t.name: latex.latex(t).split(r"\caption")[1].split(r"\label")[0] for t in made}
     arm = captions["accuracy"]
     for fact in ("n = 2 to 3", r"tolerance \num{1.0e-4}", "slide", "Plumbob 0.0", "2000-01-02"):

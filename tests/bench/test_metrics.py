@@ -79,11 +79,6 @@ def test_errors_and_distances():
     assert metrics.rms_distance(points, np.zeros((2, 3))) == pytest.approx(math.sqrt(12.5))
 
 
-def test_every_value_is_counted_once_also_beyond_the_edges():
-    counts = metrics.counts(np.array([0, 1, 1, 5, 1000]), np.array([0.5, 1.5, 10.0]))
-    np.testing.assert_array_equal(counts, [3, 2])
-
-
 def test_first_below():
     assert metrics.first_below(np.array([1.0, 0.1, 0.2, 0.01]), 0.1) == 1
     assert metrics.first_below(np.array([1.0, np.nan]), 0.1) is None

@@ -15,7 +15,7 @@ from plumbob.bench.experiments.chain.tables import accuracy, beyond_reach
 from plumbob.bench.experiments.robots.tables import who
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.harness.results import Results, printable
 from plumbob.bench.peers import registry
 from plumbob.bench.report.entered import remarks_of_entrants
 from plumbob.bench.report.headlines import absent, not_asked
@@ -57,7 +57,7 @@ def printed(folder):
 
 @pytest.fixture(scope="module")
 def records(printed):
-    return [plain(one) for one in RecordFile("out").read().records]
+    return [printable(one) for one in RecordFile("out").read().records]
 
 
 @pytest.fixture(scope="module")

@@ -57,8 +57,9 @@ def measure(block):
 RECORD = """
 import json
 REST = {"settings": {}, "size": 0, "notes": {}, "stamp": {}, "when": "", "seconds": 0}
+REST |= {"facts": {}, "conditions": {}}
 def encode(record):
-    return json.dumps({"format": 1, **record, **REST})
+    return json.dumps({"format": 3, **record, **REST})
 """
 
 

@@ -14,7 +14,7 @@ from plumbob import terminal
 from plumbob.bench.entrants import opening
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.harness.results import Results
 from plumbob.bench.report import outcome, report
 from plumbob.bench.report.sections import tables
 from plumbob.bench.report.standings import CLOTHS, standings
@@ -264,7 +264,7 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
     said = " ".join(out.split())
     rank = "My raiser, suite ik: trouble on 2 of 2 problems"
     assert f"{rank}; robots/ur5: {why}, on 12 of 12 targets." in said
-    results = Results([plain(record) for record in RecordFile("out").read().records])
+    results = Results(RecordFile("out").read().records)
     made = {table.name: table for table in tables(results, ["ik"])}
     for name, title in (
         ("robots_success_one_start", "mark"),

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from plumbob import cli, terminal
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.harness.results import Results
 from plumbob.bench.report import outcome, report, sections
 from plumbob.bench.report.headlines import Answers, Headline, Verdict
 from plumbob.bench.tables import aligned
@@ -23,7 +23,7 @@ FEW = (40, 57, 80, 133, 200)
 @pytest.fixture(scope="module")
 def every_table(records):
     """The tables of a report, and one of long names, many columns and long numbers."""
-    made = sections.tables(Results([plain(record) for record in records]))
+    made = sections.tables(Results(records))
     columns = (Column("solver", words=True), Column("of", words=True))
     columns += tuple(Column(f"time, kind {i}", "µs", best="least") for i in range(20))
     names = ("Levenberg-Marquardt, 100 restarts", "Levenberg-Marquardt, 20 restarts", "手腕" * 9)

@@ -225,7 +225,7 @@ def motion_on(peer: ClothPeer, falls: Sequence["Fall"]) -> Measured:
     measured = _columns(names, rows, remarks)
     truths = [fall.truth for fall in falls]
     known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
-    return measured._replace(arrays={**measured.arrays, **known})
+    return measured._replace(values={**measured.arrays, **known})
 
 
 class Fall:

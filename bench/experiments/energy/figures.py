@@ -13,7 +13,7 @@ def energy(results: Results) -> Sketch | None:
     panels = tuple(
         Panel(
             group[0].title,
-            tuple(series(r.solver, r.arrays["time"], r.arrays["left"]) for r in group),
+            tuple(series(r.solver, r.values.time, r.values.left) for r in group),
         )
         for group in by_problem(records).values()
     )

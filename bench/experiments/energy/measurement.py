@@ -9,6 +9,7 @@ from plumbob.reference import MassSpring
 
 from ...harness.block import Block, Measured, Scale
 from .problem import DAMPINGS, H, long_swing
+from .values import Swing
 
 STEPS = 10_000
 EVERY = 10
@@ -42,4 +43,4 @@ def swing(name: str, integrator: str, steps: int = STEPS) -> Measured:
         INTEGRATORS[integrator], problem.system, problem.start, H, steps=steps, every=EVERY
     )
     above = energies - problem.rest
-    return Measured({"time": times, "left": above / above[0]})
+    return Measured(Swing(times, above / above[0]))

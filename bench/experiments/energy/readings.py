@@ -6,15 +6,15 @@ from ...harness.record import Record
 
 def left_after(record: Record, steps: int) -> float | None:
     """Return the energy after so many steps, as a share of the start's; None if not that many."""
-    left, i = record.arrays["left"], steps // record.settings["every"]
+    left, i = record.values.left, steps // record.details.every
     return float(left[i]) if i < left.size else None
 
 
 def least(record: Record) -> float:
     """Return the least energy, as a share of the start's."""
-    return metrics.extent(record.arrays["left"])[0]
+    return metrics.extent(record.values.left)[0]
 
 
 def greatest(record: Record) -> float:
     """Return the greatest energy, as a share of the start's."""
-    return metrics.extent(record.arrays["left"])[1]
+    return metrics.extent(record.values.left)[1]

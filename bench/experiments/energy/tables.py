@@ -15,7 +15,7 @@ LISTED = (100, 1_000, 10_000)
 
 
 def _summary(records: Sequence[Record]) -> Summary:
-    undamped = [record for record in records if record.facts["damping"] == 0.0]
+    undamped = [record for record in records if record.details.damping == 0.0]
     if not undamped:
         return Summary()
     return Summary(
@@ -26,7 +26,7 @@ def _summary(records: Sequence[Record]) -> Summary:
 
 
 def _range(record: Record) -> str:
-    shares = float(record.arrays["left"][-1]), readings.least(record), readings.greatest(record)
+    shares = float(record.values.left[-1]), readings.least(record), readings.greatest(record)
     last, low, high = (words(in_unit(share, "%")) for share in shares)
     return f"{last}, never less than {low} nor more than {high}"
 

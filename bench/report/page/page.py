@@ -34,9 +34,8 @@ MOST_NAMED = 5
 
 
 class Shown(NamedTuple):
-    """All that a report shows: its records, and what is made of them."""
+    """All that a report shows: what is made of its records."""
 
-    records: Sequence[Record]
     tables: Mapping[Layout, Table]
     drawings: Mapping[Figure, Drawing]
     answers: Answers
