@@ -24,17 +24,14 @@ IK, CLOTH, ROBOT, PROBLEMS = re.findall(r"```python\n(.*?)```", PAGE.read_text("
 FACTS = {"task": "chain", "stratum": "near", "entrant": True}
 CHAIN = {
     "residual": [0.0],
+    "solved": [True],
     "iterations": [1],
-    "history_low": [1.0, 0.1],
-    "history_median": [1.0, 0.1],
-}
-CHAIN |= {
-    "history_high": [1.0, 0.1],
-    "bend": [0.0],
-    "reach": 1.0,
-    "excess": [0.0],
     "distance": [1.0],
+    "bend": [0.0],
+    "excess": [0.0],
+    "reach": 1.0,
 }
+CHAIN |= {f"history_{name}": [1.0, 0.1] for name in ("low", "median", "high")}
 SMALL = ["--quick", "--targets", "2", "--problem", "chain/near"]
 EXPLICIT = ("--solver", "My symplectic Euler", "--solver", "Plumbob symplectic Euler")
 
@@ -97,7 +94,6 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
         for row in made[name].rows:
             claims = [cell for cell in row if str(cell).endswith("claimed")]
             assert bool(claims) == ("My FABRIK" in row), (name, row)
-    assert re.search(r"My FABRIK: .* iterations? claimed", str(made["q1_beyond_reach"].summary))
     for draw in (chain_figures.ik_residuals, chain_figures.iterations):
         assert "My FABRIK" in drawn(draw(Results(records()))).svg
     shows = chain_figures.iterations(Results(records())).shows

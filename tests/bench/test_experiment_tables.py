@@ -106,8 +106,8 @@ def test_chains_are_counted_as_straight_only_if_they_are(make):
     table = kinematics.beyond_reach(Results([make.beyond("ccd", 0.5), make.beyond("fabrik", 1e-9)]))
     assert column(table, "off the line, largest [m]") == [0.5, 1e-9]
     ccd, fabrik = table.summary.points
-    assert ccd.startswith("CCD: 1/2 = 50 % (9.5–90.5); at worst 25.0 % of the reach")
-    assert fabrik.startswith("FABRIK: 2/2 = 100 % (34.2–100);")
+    assert ccd == "CCD: 1/2 = 50 % (9.5–90.5)"
+    assert fabrik == "FABRIK: 2/2 = 100 % (34.2–100)"
 
 
 def unanswered(record, *names, count=1):
@@ -133,11 +133,7 @@ def test_targets_without_an_answer_are_said_to_have_none(make):
     ]
     made = {table.name: table for table in tables(Results([*beyond, *others]))}
     q1 = made["q1_beyond_reach"]
-    assert q1.summary.points == (
-        "CCD: 1/2 = 50 % (9.5–90.5); at worst 0 % of the reach off the line, 0 m above "
-        "distance − reach, 1 iteration; no answer to 1 target",
-        "mine: 0/2 = 0 % (0–65.8); no answer to 2 targets",
-    )
+    assert column(q1, "targets without an answer") == [1, 2]
     assert list(map(words, column(q1, "off the line, largest [m]"))) == ["no answer"] * 2
     assert list(map(words, column(made["accuracy"], "residual, largest [m]"))) == ["no answer"]
     assert column(made["cloth_peers_step"], "least error") == ["diverged"]

@@ -45,7 +45,8 @@ def test_no_two_blocks_have_the_same_key(suite):
 @pytest.mark.parametrize("suite", SUITES)
 def test_the_settings_of_every_block_can_be_read_again(suite):
     for b in blocks(suite, TINY):
-        made = Record(b.suite, b.problem, b.solver, b.settings, b.size, stamp=stamp(), when=now())
+        made = Record(b.suite, b.problem, b.solver, b.settings, b.size, facts=b.facts,
+                      stamp=stamp(), when=now())  # fmt: skip
         back = decode(encode(made))
         assert back.key == made.key
         assert back.stamp == made.stamp

@@ -43,8 +43,8 @@ def _counts(record: Record) -> bool:
 
 def _reached(record: Record) -> Series:
     """Return the share of the targets that is reached within each number of iterations [%]."""
-    done = record.arrays["residual"] <= record.settings["tolerance"]
-    taken = record.arrays["iterations"]
+    done = record.values.residual <= record.details.tolerance
+    taken = record.values.iterations
     shares = [metrics.share(done & (taken <= most)) for most in COUNTED]
     low, high = (100 * np.array([getattr(s, end) for s in shares]) for end in ("low", "high"))
     middle = [100 * share.hits / max(1, share.total) for share in shares]
@@ -63,7 +63,7 @@ def ik_residuals(results: Results) -> Sketch | None:
             "Line: the median target; band: from the 10th to the 90th percentile; dotted: the "
             "tolerance, at which a target is done and keeps its residual.",
             tuple(
-                Panel(of[0].title, tuple(map(_residuals, of)), of[0].settings["tolerance"])
+                Panel(of[0].title, tuple(map(_residuals, of)), of[0].details.tolerance)
                 for of in panels
             ),
             Axis("iteration, log scale", log=True),
@@ -74,7 +74,11 @@ def ik_residuals(results: Results) -> Sketch | None:
 
 
 def _residuals(record: Record) -> Series:
-    low, median, high = (record.arrays[f"history_{name}"] for name in ("low", "median", "high"))
+    low, median, high = (
+        record.values.history_low,
+        record.values.history_median,
+        record.values.history_high,
+    )
     after = slice(1, None)
     k = np.arange(len(median))
     return series(record.solver, k[after], median[after], (low[after], high[after]))
@@ -82,8 +86,8 @@ def _residuals(record: Record) -> Series:
 
 def _ik_panels(results: Results) -> list[list[Record]]:
     """Return the records with a history of each stratum within reach."""
-    records = [r for r in results.all("ik", task=CHAIN) if r.facts["stratum"] != BEYOND]
-    records = [record for record in records if "history_median" in record.arrays]
+    records = [r for r in results.all("ik", task=CHAIN) if r.details.stratum != BEYOND]
+    records = [record for record in records if record.values.history_median is not None]
     return list(by_problem(records).values())
 
 
@@ -108,7 +112,7 @@ def jitter(results: Results) -> Sketch | None:
             (Panel("", tuple(spans)),),
             Axis("largest rotation of a joint between frames [°], log scale", log=True),
             columns=1,
-            rows=tuple(str(of[0].facts["curve"]) for of in rows.values()),
+            rows=tuple(str(of[0].details.curve) for of in rows.values()),
             entrants=results.entrants,
             hollow="from rest",
             filled="from the last solution",
@@ -117,4 +121,4 @@ def jitter(results: Results) -> Sketch | None:
 
 
 def _largest_angle(record: Record) -> float:
-    return in_unit(metrics.spread(record.arrays["largest_angle"]).largest, "°")
+    return in_unit(metrics.spread(record.values.largest_angle).largest, "°")

@@ -7,11 +7,12 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import Results, by_problem, label, solvers
-from ...tables.columns import iterations_said, largest
+from ...harness.results import Results, by_problem, label
+from ...tables.columns import largest
 from .. import arm
 from ..closed_curves import COHERENT, COLD, CURVE, DRIFT, WARM
 from . import BEYOND, CHAIN
+from .values import Reached
 
 # A chain counts as straight if no joint is off the line by more than this share of the reach.
 STRAIGHT = 0.01
@@ -32,18 +33,18 @@ def within_reach(results: Results) -> list[Record]:
     """Return the records of targets within reach, problem by problem."""
     records = results.all("arm", task=arm.CURVE, warm=False)
     records += results.all("arm", task=arm.CURVE, warm=True)
-    records += [r for r in results.all("ik", task=CHAIN) if r.facts["stratum"] != BEYOND]
+    records += [r for r in results.all("ik", task=CHAIN) if r.details.stratum != BEYOND]
     return [record for group in by_problem(records).values() for record in group]
 
 
 def within_tolerance(record: Record) -> np.ndarray:
     """Return which residuals are within the tolerance."""
-    return np.asarray(record.arrays["residual"] <= record.settings["tolerance"])
+    return np.asarray(record.values.residual <= record.details.tolerance)
 
 
 def start(record: Record) -> str:
     """Return where the solves start."""
-    return STARTS[record.settings.get("warm")]
+    return STARTS[record.details.warm]
 
 
 def success(records: Iterable[Record]) -> tuple[dict[str, metrics.Share], metrics.Ranking | None]:
@@ -66,61 +67,30 @@ def success(records: Iterable[Record]) -> tuple[dict[str, metrics.Share], metric
 # Beyond reach.
 
 
-class Straightness(NamedTuple):
-    """How straight a solver's chains are where targets are beyond reach.
-
-    Attributes:
-        solver: the solver's label.
-        record: one of its records.
-        straight: the share of the chains that are straight.
-        unanswered: targets without an answer.
-        bend: the largest distance off the line, as a share of the reach; None without answers.
-        excess: the largest residual above distance - reach [m]; None without answers.
-        iterations: the most iterations, None where the solver does not say them.
-    """
-
-    solver: str
-    record: Record
-    straight: metrics.Share
-    unanswered: int
-    bend: float | None
-    excess: float | None
-    iterations: int | None
-
-
 def beyond_reach(results: Results) -> list[Record]:
     """Return the records of targets beyond reach."""
-    chains = [r for r in results.all("ik", task=CHAIN, stratum=BEYOND) if r.arrays]
+    chains = [r for r in results.all("ik", task=CHAIN, stratum=BEYOND) if r.values]
     return results.all("arm", task=arm.BEYOND) + chains
 
 
-def over_reach(records: Sequence[Record], name: str) -> metrics.Floats:
-    """Return an array of all records, each in units of its reach."""
-    return np.concatenate([record.arrays[name] / record.arrays["reach"] for record in records])
+def distances(records: Sequence[Record]) -> tuple[float, float]:
+    """Return the least and greatest distance of the targets, in units of the reach."""
+    values: list[Reached] = [record.values for record in records]
+    return metrics.extent(np.concatenate([v.distance / v.reach for v in values]))
 
 
-def straightness(records: Sequence[Record]) -> list[Straightness]:
-    """Return how straight the chains of each solver are."""
-    return [_straightness([r for r in records if r.solver == name]) for name in solvers(records)]
+def straightness(records: Sequence[Record]) -> dict[str, metrics.Share]:
+    """Return the share of straight chains of each solver."""
+    straight: dict[str, list[np.ndarray]] = {}
+    for record in records:
+        values: Reached = record.values
+        straight.setdefault(label(record.solver), []).append(values.bend <= STRAIGHT * values.reach)
+    return {solver: metrics.share(np.concatenate(hits)) for solver, hits in straight.items()}
 
 
-def _straightness(records: Sequence[Record]) -> Straightness:
-    bends, name = over_reach(records, "bend"), label(records[0].solver)
-    answered = np.isfinite(bends)
-    straight, unanswered = metrics.share(bends <= STRAIGHT), int(np.sum(~answered))
-    if not answered.any():
-        return Straightness(name, records[0], straight, unanswered, None, None, None)
-    counts = np.concatenate([iterations_said(record) for record in records])
-    excess = np.concatenate([record.arrays["excess"] for record in records])[answered]
-    return Straightness(
-        name,
-        records[0],
-        straight,
-        unanswered,
-        metrics.spread(bends[answered]).largest,
-        metrics.spread(excess).largest,
-        int(counts.max()) if counts.size else None,
-    )
+def unanswered(record: Record) -> int:
+    """Return how many targets have no answer."""
+    return int(np.isinf(record.values.bend).sum())
 
 
 # CCD and FABRIK.
@@ -136,13 +106,13 @@ def rivals(results: Results) -> list[Pair]:
 
 def iterations_ratio(pair: Pair) -> float:
     """Return the mean iterations of CCD over those of FABRIK."""
-    ccd, fabrik = (metrics.mean(record.arrays["iterations"]) for record in pair)
+    ccd, fabrik = (metrics.mean(record.values.iterations) for record in pair)
     return metrics.ratio(ccd, fabrik)
 
 
 def fewer_iterations(pair: Pair) -> str:
     """Return who needs fewer iterations on average for the same targets, "" if that is a tie."""
-    scores = zip(RIVALS, (-record.arrays["iterations"] for record in pair), strict=True)
+    scores = zip(RIVALS, (-record.values.iterations for record in pair), strict=True)
     first = metrics.ranking(dict(scores)).first
     return first[0] if len(first) == 1 else ""
 
@@ -175,7 +145,7 @@ class Motions(NamedTuple):
     @property
     def shared_iterations(self) -> int:
         """The iterations over all frames: what even the frame with the fewest more has more."""
-        coherent, warm = (self.by_mode[mode].arrays["iterations"] for mode in (COHERENT, WARM))
+        coherent, warm = (self.by_mode[mode].values.iterations for mode in (COHERENT, WARM))
         return int(metrics.extent(coherent - warm)[0])
 
     @property
@@ -192,7 +162,7 @@ class Motions(NamedTuple):
     def drift(self, mode: str, repetition: int) -> float | None:
         """Return the drift after a repetition [rad], None where it was not measured."""
         record = self.drifts.get(mode)
-        return float(record.arrays["drift"][repetition - 1]) if record else None
+        return float(record.values.drift[repetition - 1]) if record else None
 
 
 def motions(results: Results) -> list[Motions]:
@@ -209,23 +179,23 @@ def _by_curve(results: Results, task: str) -> dict[tuple[str, str], dict[str, Re
     groups: dict[tuple[str, str], dict[str, Record]] = {}
     for record in results.all("tracking", task=task):
         modes = groups.setdefault((record.problem, record.solver), {})
-        modes[record.settings["mode"]] = record
+        modes[record.details.mode] = record
     return groups
 
 
 def largest_angle(record: Record) -> float:
     """Return the largest rotation of a joint between neighbouring frames [rad]."""
-    return metrics.spread(record.arrays["largest_angle"][:-1]).largest
+    return metrics.spread(record.values.largest_angle[:-1]).largest
 
 
 def mean_angle(record: Record) -> float:
     """Return the mean rotation of a joint between neighbouring frames [rad]."""
-    return metrics.mean(record.arrays["mean_angle"][:-1])
+    return metrics.mean(record.values.mean_angle[:-1])
 
 
 def closing_angle(record: Record) -> float:
     """Return the largest rotation of a joint from the last frame back to the first [rad]."""
-    return float(record.arrays["largest_angle"][-1])
+    return float(record.values.largest_angle[-1])
 
 
 def path_error(record: Record) -> float:
@@ -235,7 +205,7 @@ def path_error(record: Record) -> float:
 
 def mean_iterations(record: Record) -> float:
     """Return the mean iterations of a frame."""
-    return metrics.mean(record.arrays["iterations"])
+    return metrics.mean(record.values.iterations)
 
 
 def hits_within_tolerance(record: Record) -> metrics.Share:

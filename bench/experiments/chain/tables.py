@@ -8,7 +8,7 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import counted, label, leaders, settings
+from ...harness.results import label, leaders, settings
 from ...report.entered import entered
 from ...tables.columns import (
     LARGEST,
@@ -16,7 +16,6 @@ from ...tables.columns import (
     P95,
     SOLVER,
     allowed,
-    claimed,
     effort,
     folded,
     greatest,
@@ -35,34 +34,20 @@ from ...tables.layout import Layout
 from ...tables.table import Column, Summary, words
 from ..closed_curves import COHERENT, COLD, WARM
 from . import figures, readings
-from .readings import MODES, RIVALS, STRAIGHT, Motions, Pair, Straightness
+from .readings import MODES, RIVALS, STRAIGHT, Motions, Pair
 
 
 def _beyond_summary(records: Sequence[Record]) -> Summary:
+    shares = readings.straightness(records).items()
     return Summary(
         "The best answer is the straight line from root to target. Answers within "
         f"{words_in(STRAIGHT, '%')} of the reach of that line:",
-        tuple(map(_straightness, readings.straightness(records))),
+        tuple(f"{solver}: {words(share)}" for solver, share in shares),
     )
 
 
-def _straightness(found: Straightness) -> str:
-    parts = [words(found.straight)]
-    if found.bend is not None and found.excess is not None:
-        count = "iterations unsaid"
-        if found.iterations is not None:
-            count = words(claimed(counted(found.iterations, "iteration"), found.record))
-        parts.append(
-            f"at worst {words_in(found.bend, '%')} of the reach off the line, "
-            f"{words(found.excess)} m above distance − reach, {count}"
-        )
-    if found.unanswered:
-        parts.append(f"no answer to {counted(found.unanswered, 'target')}")
-    return f"{found.solver}: {'; '.join(parts)}"
-
-
-def _distances(records: Sequence[Record]) -> str:
-    return " to ".join(map(words, metrics.extent(readings.over_reach(records, "distance"))))
+def _extent(records: Sequence[Record]) -> str:
+    return " to ".join(map(words, readings.distances(records)))
 
 
 beyond_reach = Layout(
@@ -80,6 +65,7 @@ beyond_reach = Layout(
         *folded(
             [
                 Column("targets", read=lambda record: int(record.size)),
+                Column("targets without an answer", read=readings.unanswered),
                 *spread("off the line", "bend", "m", (MEDIAN,)),
                 *spread("residual above distance − reach", "excess", "m", (MEDIAN,)),
             ]
@@ -89,7 +75,7 @@ beyond_reach = Layout(
     shows="The best answer is the straight line from root to target, which leaves exactly "
     "distance − reach. “Off the line” is the joint farthest from that line.",
     measured=lambda records: (
-        f"Seeded targets in all directions, {_distances(records)} times the reach away. "
+        f"Seeded targets in all directions, {_extent(records)} times the reach away. "
         f"Solvers stop at a residual of {settings(records, 'tolerance')} m, ours and the loops on "
         "the engines, which draw a target to within reach as ours do, also as close as that to the "
         f"best one, or after {settings(records, 'max_iterations')} iterations."
@@ -106,7 +92,7 @@ def _rival_summary(pairs: Sequence[Pair]) -> Summary:
     ratios = [readings.iterations_ratio(pair) for pair in pairs]
     first = [readings.fewer_iterations(pair) for pair in pairs]
     ccd, fabrik = (first.count(name) for name in RIVALS)
-    solves = sum(pair[0].arrays["iterations"].size for pair in pairs)
+    solves = sum(pair[0].values.iterations.size for pair in pairs)
     return Summary(
         f"FABRIK needs fewer iterations than CCD on {fabrik} of {len(pairs)} problems, more on "
         f"{ccd}, and on {len(pairs) - fabrik - ccd} they tie (n = {words(solves)} solves); CCD "
@@ -125,7 +111,7 @@ rivals = Layout(
         Column("CCD / FABRIK, means", read=readings.iterations_ratio),
         *folded(
             [
-                Column("solves", read=lambda pair: pair[0].arrays["iterations"].size),
+                Column("solves", read=lambda pair: pair[0].values.iterations.size),
                 *(column for i in range(len(RIVALS)) for column in _counts(i, (P95, LARGEST))),
             ]
         ),
@@ -225,7 +211,7 @@ jitter = Layout(
                 *_by_mode("largest path error", readings.path_error, "m"),
                 *_by_mode("mean", readings.mean_angle, "°"),
                 *(_drift(mode, i) for mode in (WARM, COHERENT) for i in (1, 2, 3)),
-                Column("frames", read=lambda row: row.by_mode[WARM].arrays["residual"].size),
+                Column("frames", read=lambda row: row.by_mode[WARM].values.residual.size),
             ]
         ),
     ),

@@ -13,7 +13,8 @@ from ...harness.results import Results, label
 from ...tables.columns import spread_of
 from ...tables.table import words
 from ..cloth_peers import DECADES, NEEDED
-from . import DAMPERS, FEW, ONE_STEP, SWING
+from ..newton.values import Certified, CertifiedDetails
+from . import DAMPERS, FEW, ONE_STEP, SWING, values
 
 # Iterations after which errors are listed; consecutive steps make as many, but for the last.
 LISTED = (1, 10, 100, 1000)
@@ -58,14 +59,14 @@ class Convergence(NamedTuple):
 
     def after(self, quantity: str, count: int) -> float | None:
         """Return the error or residual of one step after so many iterations."""
-        values = self.one_step.arrays[quantity] if self.one_step else np.zeros(0)
+        values = getattr(self.one_step.values, quantity) if self.one_step else np.zeros(0)
         return float(values[count]) if count < values.size else None
 
     def needed(self, decade: str) -> int | None:
         """Return the iterations of one step to an error of so much, None if none sufficed."""
         if self.one_step:
-            return metrics.first_below(self.one_step.arrays["error"], float(decade))
-        counts = self.counted.arrays["needed"] if self.counted else np.full(len(DECADES), np.nan)
+            return metrics.first_below(self.one_step.values.error, float(decade))
+        counts = self.counted.values.needed if self.counted else np.full(len(DECADES), np.nan)
         count = counts[DECADES.index(decade)]
         return None if np.isnan(count) else int(count)
 
@@ -73,15 +74,15 @@ class Convergence(NamedTuple):
     def tried(self) -> int:
         """The iterations that were made of one step."""
         if self.one_step:
-            return int(self.one_step.arrays["error"].size) - 1
-        return int(self.counted.arrays["tried"]) if self.counted else 0
+            return int(self.one_step.values.error.size) - 1
+        return int(self.counted.values.tried) if self.counted else 0
 
     @property
     def least(self) -> float | None:
         """The least error of one step."""
         if self.one_step:
-            return metrics.extent(self.one_step.arrays["error"])[0]
-        return float(self.counted.arrays["least"]) if self.counted else None
+            return metrics.extent(self.one_step.values.error)[0]
+        return float(self.counted.values.least) if self.counted else None
 
     @property
     def hits(self) -> metrics.Share | None:
@@ -89,7 +90,7 @@ class Convergence(NamedTuple):
         if not self.converged:
             return None
         solved = [outcome for outcome in Outcome if outcome.solved]
-        return metrics.share(np.isin(self.converged.arrays["outcome"], solved))
+        return metrics.share(np.isin(self.converged.values.outcome, solved))
 
     @property
     def iterations(self) -> Sequence[float | None]:
@@ -104,7 +105,7 @@ class Convergence(NamedTuple):
     @property
     def at_floor(self) -> int | None:
         """Converged steps that ended at the rounding floor."""
-        return int(self.converged.arrays["at_floor"].sum()) if self.converged else None
+        return int(self.converged.values.at_floor.sum()) if self.converged else None
 
 
 def convergence(results: Results) -> list[Convergence]:
@@ -122,22 +123,23 @@ def convergence(results: Results) -> list[Convergence]:
 def _cloth(record: Record) -> str:
     if record.facts["task"] != NEEDED:
         return f"lab cloth, {record.title}"
-    size, stiffness = record.settings["size"], int(record.settings["stiffness"])
-    return f"falling cloth, {words(stiffness)} N/m, {size} × {size}"
+    size, stiffness = record.details.size, words(int(record.details.stiffness))
+    return f"falling cloth, {stiffness} N/m, {size} × {size}"
 
 
 def _joined(row: Convergence, task: str, record: Record) -> Convergence:
     if task == FEW:
-        return row._replace(few={**row.few, record.settings["iterations"]: _few(record)})
+        return row._replace(few={**row.few, record.details.iterations: _few(record)})
     field = {ONE_STEP: "one_step", SWING: "converged", NEEDED: "counted"}[task]
     changes: dict[str, Any] = {field: record}
     return row._replace(**changes)
 
 
 def _few(record: Record) -> FewIterations:
-    errors = metrics.spread(record.arrays["error"])
-    drift, path = (float(record.arrays[name][-1]) for name in ("drift", "path"))
-    return FewIterations(record, errors.median, errors.largest, drift, metrics.ratio(drift, path))
+    steps: values.FewIterations = record.values
+    errors, drift = metrics.spread(steps.error), float(steps.drift[-1])
+    share = metrics.ratio(drift, float(steps.path[-1]))
+    return FewIterations(record, errors.median, errors.largest, drift, share)
 
 
 class DampedStep(NamedTuple):
@@ -160,7 +162,7 @@ def damped_steps(results: Results) -> list[DampedStep]:
     """Return the steps of every damped cloth, the longest first."""
     steps = []
     for record in results.all("cloth", task=DAMPERS):
-        h, apart = record.arrays["h"], record.arrays["apart"]
+        h, apart = record.values.h, record.values.apart
         orders = [None, *np.log2(apart[:-1] / apart[1:]).tolist()]
         steps += list(map(DampedStep, [record] * h.size, h.tolist(), apart.tolist(), orders))
     return steps
@@ -168,25 +170,24 @@ def damped_steps(results: Results) -> list[DampedStep]:
 
 def minimiser_distance(record: Record) -> float | None:
     """Return how near a minimiser is proven to be [m], None without a bound."""
-    distance = float(record.arrays["distance"])
-    return distance if np.isfinite(distance) else None
+    step: Certified = record.values
+    return step.distance if np.isfinite(step.distance) else None
 
 
 def bound(record: Record) -> str:
     """Return whether there is a bound, or why there is none."""
-    if record.arrays["covered"]:
-        return "yes"
-    return record.notes["coverage"].lower().replace("_", " ")
+    details: CertifiedDetails = record.details
+    return "yes" if record.values.covered else details.coverage.lower().replace("_", " ")
 
 
 def shares_minimiser(record: Record) -> str:
     """Return whether the answer is proven to belong to Newton's minimiser."""
-    if record.arrays["same"]:
+    if record.values.same:
         return "yes"
-    return "no" if record.arrays["different"] else "not proven"
+    return "no" if record.values.different else "not proven"
 
 
 def is_solved(record: Record) -> bool:
     """Return whether a step came to its tolerance or to the rounding floor."""
-    arrays = record.arrays
-    return bool(arrays["at_floor"]) or float(arrays["residual"]) <= record.settings["tolerance"]
+    step: Certified = record.values
+    return step.at_floor or step.residual <= record.details.tolerance

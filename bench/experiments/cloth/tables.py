@@ -198,7 +198,7 @@ dampers = Layout(
 def _proof_summary(records: Sequence[Record]) -> Summary:
     newton = [record for record in records if record.solver == "newton"]
     others = [record for record in records if record.solver != "newton"]
-    same = [float(record.arrays["apart"]) for record in others if record.arrays["same"]]
+    same = [float(record.values.apart) for record in others if record.values.same]
     return Summary(
         "Newton reached the tolerance or the rounding floor in "
         f"{words(sum(map(readings.is_solved, newton)))} of {counted(len(newton), 'cloth')}. Of the "
@@ -209,7 +209,7 @@ def _proof_summary(records: Sequence[Record]) -> Summary:
 
 
 def _sizes(records: Sequence[Record]) -> str:
-    sizes = sorted({int(record.arrays["size"]) for record in records})
+    sizes = sorted({int(record.values.size) for record in records})
     return listed([f"{size} × {size}" for size in sizes], "or")
 
 
@@ -219,9 +219,9 @@ proofs = Layout(
     "One step of a cloth in mid-swing: which answers are proven",
     subjects=lambda results: results.all("newton"),
     columns=(
-        Column("stiffness", "N/m", read=lambda record: float(record.facts["stiffness"])),
+        Column("stiffness", "N/m", read=lambda record: record.details.stiffness),
         SOLVER,
-        text("from", lambda record: record.settings["start"]),
+        text("from", lambda record: record.details.start),
         number("iterations"),
         *least([number("residual")]),
         Column("a minimiser within", "m", read=readings.minimiser_distance, best="least"),

@@ -41,7 +41,7 @@ class Point(NamedTuple):
     @property
     def own(self) -> str:
         """The name of a user's cloth, "" of ours."""
-        return str(self.record.facts.get("cloth", ""))
+        return str(self.record.details.cloth)
 
     @property
     def cloth(self) -> str:
@@ -66,7 +66,7 @@ class Point(NamedTuple):
     @property
     def remark(self) -> str:
         """What its record says of its cloth."""
-        remarks = zip(self.record.arrays["remark_particles"], self.record.facts["remarks"],
+        remarks = zip(self.record.values.remark_particles, self.record.details.remarks,
                       strict=True)  # fmt: skip
         return "; ".join(sentence for count, sentence in remarks if count == self.particles)
 
@@ -82,13 +82,13 @@ def points(results: Results, task: str) -> list[Point]:
 
 
 def _points_of(record: Record) -> Iterator[Point]:
-    if "particles" not in record.arrays:
+    if record.values is None:
         return
-    count = record.arrays["particles"].size
+    count = record.values.particles.size
     whole = {name: values for name, values in record.arrays.items() if values.size == count}
-    for i, rung in enumerate(record.facts["rungs"]):
+    for i, rung in enumerate(record.details.rungs):
         values = {name: float(array[i]) for name, array in whole.items()}
-        stiffness, particles = record.settings["stiffness"], int(values["particles"])
+        stiffness, particles = record.details.stiffness, int(values["particles"])
         yield Point(stiffness, particles, record.solver, rung, values, record)
 
 
@@ -174,7 +174,9 @@ def limits(results: Results) -> dict[tuple[str, float], Limit]:
         )
         for record in results.all("cloth", task=STABILITY)
         for stiffness, limit, frequency in zip(
-            *(record.arrays[name].tolist() for name in ("stiffness", "limit", "frequency")),
+            record.values.stiffness.tolist(),
+            record.values.limit.tolist(),
+            record.values.frequency.tolist(),
             strict=True,
         )
     }
@@ -189,7 +191,7 @@ class Motion(NamedTuple):
     @property
     def remark(self) -> str:
         """What came of it, and of its limit."""
-        limit = self.limit.record.notes["remark"] if self.limit else ""
+        limit = self.limit.record.details.remark if self.limit else ""
         return "; ".join(filter(None, (self._fate, limit)))
 
     @property
@@ -205,7 +207,7 @@ class Motion(NamedTuple):
     def simulated_second(self) -> float | None:
         """The time for a simulated second [s]."""
         frame = self.point.number("seconds")
-        return None if frame is None else metrics.ratio(frame, self.point.record.settings["frame"])
+        return None if frame is None else metrics.ratio(frame, self.point.record.details.frame)
 
 
 def motions(results: Results) -> list[Motion]:
@@ -235,17 +237,17 @@ class Certainty(NamedTuple):
 def certainty(rows: Sequence[Motion]) -> Certainty:
     """Return how sure the true motions are, at worst."""
     records = {id(row.point.record): row.point.record for row in rows}.values()
-    unsure = max(float(record.arrays["unsure"].max()) for record in records)
-    orders = np.concatenate([record.arrays["order"] for record in records])
+    unsure = max(float(record.values.unsure.max()) for record in records)
+    orders = np.concatenate([record.values.order for record in records])
     return Certainty(unsure, *metrics.extent(orders))
 
 
 def as_published(results: Results) -> list[Record]:
     """Return the records of the cloth of Liu et al. (2013)."""
     records = results.all("cloth", task=LIU)
-    return [r for r in records if r.solver in published.LIU_2013 and "seconds" in r.arrays]
+    return [r for r in records if r.solver in published.LIU_2013]
 
 
 def median_time(record: Record) -> float:
     """Return the median time for a frame [s]."""
-    return metrics.spread(record.arrays["seconds"]).median
+    return metrics.spread(record.values.seconds).median

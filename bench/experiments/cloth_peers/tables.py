@@ -178,7 +178,7 @@ motion = WithMissing(
 
 
 def _vertices(records: Sequence[Record]) -> str:
-    return words(int(records[0].arrays["vertices"]))
+    return words(int(records[0].values.vertices))
 
 
 def _liu_summary(records: Sequence[Record]) -> Summary:
@@ -186,7 +186,7 @@ def _liu_summary(records: Sequence[Record]) -> Summary:
         f"{label(record.solver)}, {published.LIU_2013[record.solver].done}: "
         f"{words_in(readings.median_time(record), 'ms')}, published "
         f"{words_in(published.LIU_2013[record.solver].seconds, 'ms')}; here an error of "
-        f"{words(float(record.arrays['error']))} is left"
+        f"{words(record.values.error)} is left"
         for record in records
     )
     return Summary(f"A frame of {_vertices(records)} vertices:", tuple(points))

@@ -21,27 +21,26 @@ class Scaled(NamedTuple):
     def library(self) -> str:
         """By which library, and why not where it is missing."""
         name = LABELS.get(self.record.solver, self.record.solver)
-        missing = self.record.notes.get("missing")
+        missing = self.record.details.missing
         return f"{name}: {missing}" if missing else name
 
     @property
     def particles(self) -> int:
         """How many there are."""
-        return int(self.record.settings["particles"])
+        return int(self.record.details.particles)
 
     @property
     def iterations(self) -> int:
         """How many make a step."""
-        return int(self.record.settings["iterations"])
+        return int(self.record.details.iterations)
 
     def value(self, name: str) -> float | None:
         """Return a time [s] or another number, None where it was not measured."""
         if name == "iteration":
             step = self.value("step")
             return None if step is None else step / self.iterations
-        if name not in self.record.arrays:
-            return None
-        return metrics.timing(self.record.arrays[name]).median
+        value = getattr(self.record.values, name, None)
+        return None if value is None else metrics.spread(value).median
 
     def over(self, name: str, other: str | int) -> float | None:
         """Return a value over another one, or over a number."""
@@ -58,7 +57,7 @@ def ratios(rows: Sequence[Scaled]) -> dict[int, list[float]]:
     """Return first factor, solve and memory of ours over those of CHOLMOD, by particles."""
     sizes: dict[int, dict[str, Scaled]] = {}
     for row in rows:
-        if row.record.arrays:
+        if row.record.values:
             sizes.setdefault(row.particles, {})[row.record.solver] = row
     return {
         particles: [_ratio(pair, name) for name in ("factor", "solve", "memory")]

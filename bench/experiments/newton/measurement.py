@@ -18,6 +18,7 @@ from plumbob.reference.implicit_euler.objective import Objective
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from ..cloth.problem import FRAME, HEAVY_STIFFNESSES, ClothSwing, mid_swing
+from .values import Certified
 
 SUITE = "newton"
 TOLERANCE = 1e-10
@@ -62,23 +63,23 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
     known, here, apart = certify(objective, x), objective.evaluate(x), np.linalg.norm(x - newton.x)
     same = known.shares_minimiser(newton.certificate, float(apart))
     return Measured(
-        {
-            "size": size,
-            "iterations": iterations,
-            "residual": known.residual,
-            "at_floor": here.at_floor,
-            "balance": balance_residual(problem.system, problem.start, x, problem.h),
-            "distance": known.distance,
-            "curvature": known.curvature,
-            "lipschitz": known.lipschitz,
-            "newton_step": known.newton_step,
-            "apart": apart,
-            "error": newton.exact.error(x, objective.y),
-            "above": here.value - newton.value,
-            "covered": known.covered,
-            "same": same is True,
-            "different": same is False,
-        },
+        Certified(
+            size=size,
+            iterations=iterations,
+            residual=known.residual,
+            at_floor=here.at_floor,
+            balance=balance_residual(problem.system, problem.start, x, problem.h),
+            distance=known.distance,
+            curvature=known.curvature,
+            lipschitz=known.lipschitz,
+            newton_step=known.newton_step,
+            apart=float(apart),
+            error=newton.exact.error(x, objective.y),
+            above=here.value - newton.value,
+            covered=known.covered,
+            same=same is True,
+            different=same is False,
+        ),
         {"coverage": known.coverage.name, "why": known.coverage.sentence},
     )
 

@@ -21,6 +21,7 @@ from ...harness.record import Key
 from ...harness.worker import describe
 from . import cloth, ik, kinematics
 from .case import TIMING, Case
+from .values import Timed
 
 # So long [s] a case may take.
 PATIENCE = 1800.0
@@ -80,8 +81,8 @@ def _together(run: str, subject: str, group: str, seconds: float) -> dict[Key, M
 
 
 def _measured(case: Case, rounds: Sequence[Sequence[float]], facts: Mapping[str, Any]) -> Measured:
-    seconds, moved = np.array(rounds) / case.operations, np.array(case.moved / case.operations)
-    return Measured({"seconds": seconds, "moved": moved}, facts=facts)
+    seconds, moved = np.array(rounds) / case.operations, case.moved / case.operations
+    return Measured(Timed(seconds, moved), facts=facts)
 
 
 def sweep(keys: Sequence[Key], seconds: float) -> dict[str, Any]:

@@ -22,7 +22,7 @@ class Timed(NamedTuple):
     @property
     def timing(self) -> metrics.Timing:
         """Where the rounds lie [s]."""
-        return metrics.timing(self.record.arrays["seconds"])
+        return metrics.timing(self.record.values.seconds)
 
     @property
     def precision(self) -> float | None:
@@ -33,7 +33,7 @@ class Timed(NamedTuple):
     @property
     def mark(self) -> str:
         """Whether the machine was too noisy while it was timed."""
-        return "noisy" if self.record.facts.get("noise", 0.0) > PRECISION else ""
+        return "noisy" if self.record.details.noise > PRECISION else ""
 
     @property
     def of_ours(self) -> float | None:
@@ -50,7 +50,7 @@ class Timed(NamedTuple):
         """The bandwidth of the copy [GB/s], None where there is none."""
         if self.copy is None:
             return None
-        moved = float(self.copy.arrays["moved"])
+        moved = float(self.copy.values.moved)
         return metrics.gigabytes_per_second(moved, median_time(self.copy))
 
 
@@ -70,7 +70,7 @@ def timed(subject: str, results: Results) -> list[Timed]:
 
 def median_time(record: Record) -> float:
     """Return the median of all rounds [s]."""
-    return metrics.timing(record.arrays["seconds"]).median
+    return metrics.timing(record.values.seconds).median
 
 
 def _ratio(record: Record, other: Record | None) -> float | None:
@@ -79,7 +79,7 @@ def _ratio(record: Record, other: Record | None) -> float | None:
 
 def noise(works: Sequence[Timed]) -> float:
     """Return by how much a fixed loop varied where it varied most, NaN if that is not known."""
-    return max((timed.record.facts.get("noise", math.nan) for timed in works), default=math.nan)
+    return max((timed.record.details.noise for timed in works), default=math.nan)
 
 
 def written(solver: str) -> str:
@@ -90,7 +90,7 @@ def written(solver: str) -> str:
 def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
     """Return who takes the least time by the medians of shared sweeps, None if they share none."""
     sweeps = {written(record.solver): _of_sweeps(record) for record in records}
-    apart = len({record.facts.get("together") for record in records}) > 1
+    apart = len({record.details.together for record in records}) > 1
     if apart or len(sweeps) < 2 or len({len(medians) for medians in sweeps.values()}) > 1:
         return None
     return metrics.ranking(sweeps)
@@ -98,5 +98,5 @@ def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
 
 def _of_sweeps(record: Record) -> metrics.Floats:
     """Return how good each sweep was, the logarithm of one over its median, (sweep,)."""
-    seconds = record.arrays["seconds"]
+    seconds = record.values.seconds
     return -np.log(np.median(seconds, axis=-1) if seconds.ndim == 2 else seconds)

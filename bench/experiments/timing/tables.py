@@ -44,7 +44,7 @@ def _summary(unit: str, works: Sequence[Timed]) -> Summary:
     """Say who takes how long for what, plain Python left out, a point for each group of works."""
     rivals: dict[tuple[str, str], list[Timed]] = {}
     for timed in works:
-        place = timed.record.facts["group"], timed.record.facts["work"]
+        place = timed.record.details.group, timed.record.details.work
         rivals.setdefault(place, []).extend([timed] * (timed.record.solver != PLAIN))
     groups: dict[str, list[str]] = {}
     for (group, work), of in rivals.items():
