@@ -117,9 +117,3 @@ def test_our_parts_stand_beside_cholmods(make):
     )
     (point,) = table.summary.points
     assert point.endswith("as a multiple of CHOLMOD’s: factor 0.500, solve 0.500, memory 2.00")
-
-
-def test_nothing_measured_is_nothing_said():
-    table = cloth_scale.scale(Results([]))
-    assert table.rows == ()
-    assert table.summary.sentence == ""

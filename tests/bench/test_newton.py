@@ -112,7 +112,3 @@ def test_another_minimiser_and_a_newton_that_fails_are_said(make, stiff):
     table = tables.proofs(Results([failed]))
     assert "no" in table.rows[0]
     assert "in 0 of 1 cloth." in table.summary.sentence
-
-
-def test_without_records_nothing_is_said():
-    assert tables.proofs(Results([])).summary.sentence == ""

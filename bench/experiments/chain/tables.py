@@ -200,8 +200,8 @@ jitter = Layout(
     columns=(
         text("curve", lambda row: row.title),
         text("solver", lambda row: row.solver),
-        *least(_by_mode("largest", readings.largest_angle, "°")),
-        *least(_by_mode("last to first", readings.closing_angle, "°", (WARM, COHERENT))),
+        *least(_by_mode("largest rotation", readings.largest_angle, "°")),
+        *least(_by_mode("closing rotation", readings.closing_angle, "°", (WARM, COHERENT))),
         *_by_mode("mean iterations", readings.mean_iterations, modes=(WARM, COHERENT)),
         *folded(
             [
@@ -209,7 +209,7 @@ jitter = Layout(
                 Column("iterations over all frames at once", read=lambda m: m.shared_iterations),
                 *greatest(_by_mode("within tolerance", readings.hits_within_tolerance)),
                 *_by_mode("largest path error", readings.path_error, "m"),
-                *_by_mode("mean", readings.mean_angle, "°"),
+                *_by_mode("mean rotation", readings.mean_angle, "°"),
                 *(_drift(mode, i) for mode in (WARM, COHERENT) for i in (1, 2, 3)),
                 Column("frames", read=lambda row: row.by_mode[WARM].values.residual.size),
             ]

@@ -57,7 +57,7 @@ def _columns(rows: Sequence[Scaled]) -> Sequence[Column]:
         ),
         _over_particles("iteration", "ns/particle", "iteration"),
         _ratio("iteration", "plain reads", "iteration", "limit"),
-        _value("residual then", "", "residual"),
+        _value("final residual", "", "residual"),
         *folded(
             [
                 _ratio(f"{count} iterations", "solves", "step", "solve"),

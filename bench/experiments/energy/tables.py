@@ -8,8 +8,7 @@ from ...harness.results import label, settings
 from ...tables.columns import lengths_of_steps, text, titled
 from ...tables.layout import Layout
 from ...tables.table import Column, Summary, in_unit, words
-from . import figures, readings
-from .problem import DAMPINGS, SIZE
+from . import DAMPINGS, SIZE, figures, readings
 
 LISTED = (100, 1_000, 10_000)
 

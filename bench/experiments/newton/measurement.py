@@ -10,18 +10,18 @@ import numpy as np
 
 from plumbob.crosscheck.mass_spring import balance_residual
 from plumbob.crosscheck.mass_spring.exact_step import ExactStep, exact_step
-from plumbob.reference import STEP_SOLVERS, ImplicitEuler
+from plumbob.reference import STEP_SOLVERS
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.implicit_euler.certificate import Certificate, certify
 from plumbob.reference.implicit_euler.objective import Objective
 
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
+from ..cloth.measurement import TOLERANCE, integrator_of
 from ..cloth.problem import FRAME, HEAVY_STIFFNESSES, ClothSwing, mid_swing
 from .values import Certified
 
 SUITE = "newton"
-TOLERANCE = 1e-10
 # Iterations that are usual where steps have to be quick, and more than those of a quick solver.
 USUAL, SLOW = 10, 1000
 # From this stiffness on [N/m] the slow solvers also start beside Newton's answer, every coordinate
@@ -54,7 +54,7 @@ def _block(size: int, stiffness: float, solver: str, start: str, limit: int) -> 
 def certified_step(size: int, stiffness: float, solver: str, start: str, limit: int) -> Measured:
     """Solve the step; keep what is known of the answer, and how far it is from Newton's."""
     problem = mid_swing(stiffness, size)
-    newton, objective = newtons_answer(problem), _objective(problem)
+    newton, objective = newtons_answer(problem), Objective(problem.system, problem.start, problem.h)
     x, iterations = (
         _solved(problem, solver, limit)
         if start == FROM_Y
@@ -96,20 +96,17 @@ class Converged(NamedTuple):
 @functools.cache
 def newtons_answer(problem: ClothSwing) -> Converged:
     """Return what Newton's method comes to, iterated far beyond the rounding floor."""
-    integrator = ImplicitEuler(problem.system, h=problem.h, tolerance=0.0, max_iterations=50)
-    x, objective = integrator.step(problem.start).state.positions, _objective(problem)
+    integrator = integrator_of(problem, tolerance=0.0, max_iterations=50)
+    x, objective = (
+        integrator.step(problem.start).state.positions,
+        Objective(problem.system, problem.start, problem.h),
+    )
     exact = exact_step(problem.system, problem.start, problem.h, x)
     return Converged(x, exact, certify(objective, x), objective.value(x))
 
 
-def _objective(problem: ClothSwing) -> Objective:
-    return Objective(problem.system, problem.start, problem.h)
-
-
 def _solved(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
-    result = ImplicitEuler(
-        problem.system, h=problem.h, solver=solver, tolerance=TOLERANCE, max_iterations=limit
-    ).step(problem.start)
+    result = integrator_of(problem, solver, TOLERANCE, limit).step(problem.start)
     return result.state.positions, result.iterations
 
 
@@ -118,7 +115,7 @@ def _solved_from_beside(problem: ClothSwing, solver: str, limit: int) -> tuple[F
 
     Solvers start where the objective starts; the residual stays that of the step from y.
     """
-    objective = _objective(problem)
+    objective = Objective(problem.system, problem.start, problem.h)
     moved = copy.copy(objective)
     noise = np.random.default_rng(20130).standard_normal(objective.y.shape)
     noise[problem.system.pinned] = 0.0
