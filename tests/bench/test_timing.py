@@ -70,22 +70,22 @@ def fails():
 
 @pytest.fixture
 def compared(monkeypatch):
-    """Three cases that are compared, the last of which fails, measured here; which was called."""
+    """The names of two cases as they are called, compared with a third that fails."""
     called = []
     made = [Case(WORK, name, lambda name=name: lambda: called.append(name)) for name in "ab"]
     made.append(Case(WORK, "c", fails))
     monkeypatch.setattr(measurement, "cases", lambda: tuple(made))
     here = lambda patience, function, *arguments: function(*arguments)  # noqa: E731
     monkeypatch.setattr(measurement, "in_a_fresh_process", here)
-    return made, called
+    return called
 
 
 def test_cases_that_are_compared_alternate_in_an_order_by_seed(compared):
-    made, called = compared
+    called = compared
     orders = []
     for _ in range(2):
         called.clear()
-        result = measurement.sweep([case.key for case in made], 0.001)
+        result = measurement.sweep("s", "g", 0.001)
         orders.append([name for name, _ in itertools.groupby(called)])
         assert all(np.shape(rounds)[0] == SWEEPS for rounds in result["rounds"][:2])
     assert orders[0] == orders[1]
@@ -93,9 +93,9 @@ def test_cases_that_are_compared_alternate_in_an_order_by_seed(compared):
     assert len(result["paces"]) == 3 * SWEEPS
 
 
-def test_a_case_that_fails_costs_none_that_it_is_compared_with(compared):
-    made, _ = compared
-    results = measurement.sweep([case.key for case in made], 0.001)
+@pytest.mark.usefixtures("compared")
+def test_a_case_that_fails_costs_none_that_it_is_compared_with():
+    results = measurement.sweep("s", "g", 0.001)
     assert results["rounds"][2] == []
     assert results["troubles"] == ["", "", "OSError: no engine"]
     first, *_, last = measurement.blocks(Scale(1, 0.001))
@@ -104,7 +104,8 @@ def test_a_case_that_fails_costs_none_that_it_is_compared_with(compared):
         last.measure()
 
 
-def test_a_group_is_timed_once_in_a_run_and_again_in_the_next(compared):
+@pytest.mark.usefixtures("compared")
+def test_a_group_is_timed_once_in_a_run_and_again_in_the_next():
     runs = []
     for _ in range(2):
         a, b, _ = measurement.blocks(Scale(1, 0.001))

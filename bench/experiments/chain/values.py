@@ -7,35 +7,20 @@ from . import CHAIN
 
 
 class Reached(Values, frozen=True):
-    """The answers to a batch of targets, (target,).
+    """The answers to a batch of targets, (target,); lengths in metres."""
 
-    Attributes:
-        residual: distance from the target, infinite without an answer [m].
-        solved: whether it is within the tolerance.
-        iterations: NaN where the solver does not say them.
-        distance: of the target from the root [m].
-        bend: how far the joints are off the line from root to target [m].
-        excess: residual above distance - reach [m].
-        reach: of the chain [m].
-        outcome: the number of an `Outcome`, of our solvers.
-        history_low: the 10th percentile of the residuals by iteration, (iteration + 1,) [m].
-        history_median: their median.
-        history_high: their 90th percentile.
-        seconds: for a target by itself.
-    """
-
-    residual: Floats1
-    solved: Booleans1
-    iterations: Floats1
-    distance: Floats1
-    bend: Floats1
-    excess: Floats1
+    residual: Floats1  # infinite without an answer
+    solved: Booleans1  # whether the residual is within the tolerance
+    iterations: Floats1  # NaN where the solver does not say them
+    distance: Floats1  # of the target from the root
+    bend: Floats1  # how far joints are off the line from root to target
+    excess: Floats1  # residual above distance - reach
     reach: float
-    outcome: Integers1 | None = None
-    history_low: Floats1 | None = None
+    outcome: Integers1 | None = None  # the number of an `Outcome`, of our solvers
+    history_low: Floats1 | None = None  # 10th percentile of the residuals by iteration
     history_median: Floats1 | None = None
-    history_high: Floats1 | None = None
-    seconds: Floats1 | None = None
+    history_high: Floats1 | None = None  # 90th percentile
+    seconds: Floats1 | None = None  # for a target by itself
 
 
 class ReachedDetails(Details, frozen=True):

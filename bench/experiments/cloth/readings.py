@@ -59,48 +59,36 @@ class Convergence(NamedTuple):
 
     def after(self, quantity: str, count: int) -> float | None:
         """Return the error or residual of one step after so many iterations."""
-        values = getattr(self.one_step.values, quantity) if self.one_step else np.zeros(0)
-        return float(values[count]) if count < values.size else None
+        numbers = getattr(self.one_step.values, quantity) if self.one_step else np.zeros(0)
+        return float(numbers[count]) if count < numbers.size else None
 
     def needed(self, decade: str) -> int | None:
         """Return the iterations of one step to an error of so much, None if none sufficed."""
         if self.one_step:
             return metrics.first_below(self.one_step.values.error, float(decade))
-        counts = self.counted.values.needed if self.counted else np.full(len(DECADES), np.nan)
-        count = counts[DECADES.index(decade)]
+        count = self.counted.values.needed[DECADES.index(decade)] if self.counted else np.nan
         return None if np.isnan(count) else int(count)
 
     @property
-    def tried(self) -> int:
-        """The iterations that were made of one step."""
+    def trial(self) -> tuple[int, float] | tuple[None, None]:
+        """The iterations that were made of one step, and the least error."""
         if self.one_step:
-            return int(self.one_step.values.error.size) - 1
-        return int(self.counted.values.tried) if self.counted else 0
-
-    @property
-    def least(self) -> float | None:
-        """The least error of one step."""
-        if self.one_step:
-            return metrics.extent(self.one_step.values.error)[0]
-        return float(self.counted.values.least) if self.counted else None
+            errors = self.one_step.values.error
+            return errors.size - 1, metrics.extent(errors)[0]
+        counted = self.counted and self.counted.values
+        return (counted.tried, counted.least) if counted else (None, None)
 
     @property
     def hits(self) -> metrics.Share | None:
         """The share of consecutive steps that converged."""
-        if not self.converged:
+        if self.converged is None:
             return None
         solved = [outcome for outcome in Outcome if outcome.solved]
         return metrics.share(np.isin(self.converged.values.outcome, solved))
 
-    @property
-    def iterations(self) -> Sequence[float | None]:
-        """Median, 95th percentile and largest of the iterations of converged steps."""
-        return spread_of(self.converged, "iterations") if self.converged else (None, None, None)
-
-    @property
-    def residuals(self) -> Sequence[float | None]:
-        """Median, 95th percentile and largest of the residuals of converged steps."""
-        return spread_of(self.converged, "residual") if self.converged else (None, None, None)
+    def spread(self, name: str) -> Sequence[float | None]:
+        """Return median, 95th percentile and largest iterations or residual of converged steps."""
+        return spread_of(self.converged, name) if self.converged else (None, None, None)
 
     @property
     def at_floor(self) -> int | None:

@@ -58,6 +58,10 @@ def _consecutive(count: int) -> list[Column]:
     ]
 
 
+def _converged(name: str) -> list[Column]:
+    return places(f"their {name}", "", (MEDIAN, LARGEST), lambda row: row.spread(name))
+
+
 def _convergence_summary(rows: Sequence[Convergence]) -> Summary:
     points = (*_counts(rows), *_one_iteration(rows), *_newton(rows))
     return Summary(f"Iterations until the error of one step is {SOLVED}:", points)
@@ -65,13 +69,15 @@ def _convergence_summary(rows: Sequence[Convergence]) -> Summary:
 
 def _counts(rows: Sequence[Convergence]) -> Iterable[str]:
     for cloth in dict.fromkeys(row.cloth for row in rows):
-        counts = [_count(row) for row in rows if row.cloth == cloth and row.least is not None]
+        counts = [_count(row) for row in rows if row.cloth == cloth and row.trial[0]]
         yield f"{cloth}: {listed(counts)}"
 
 
 def _count(row: Convergence) -> str:
     count = row.needed(SOLVED)
-    return f"{row.solver} {words(count) if count is not None else f'more than {words(row.tried)}'}"
+    return (
+        f"{row.solver} {words(count) if count is not None else f'more than {words(row.trial[0])}'}"
+    )
 
 
 def _one_iteration(rows: Sequence[Convergence]) -> Iterable[str]:
@@ -88,35 +94,31 @@ def _one_iteration(rows: Sequence[Convergence]) -> Iterable[str]:
 def _newton(rows: Sequence[Convergence]) -> Iterable[str]:
     shares = [row.hits for row in rows if row.hits]
     if shares:
+        runs = [row for row in rows if row.hits]
         iterations, residual = (
-            max(of[2] for row in rows if (of := getattr(row, name))[2] is not None)
-            for name in ("iterations", "residuals")
+            max(row.spread(name)[2] or 0 for row in runs) for name in ("iterations", "residual")
         )
         yield (
             f"Newton converged in {words(sum(share.hits for share in shares))} of "
             f"{words(sum(share.total for share in shares))} consecutive steps, with at most "
-            f"{counted(iterations, 'iteration')} and a residual of at most {words(residual)}"
+            f"{counted(int(iterations), 'iteration')} and a residual of at most {words(residual)}"
         )
 
 
 def _how_converged(rows: Sequence[Convergence]) -> str:
     one_step = [row.one_step for row in rows if row.one_step]
-    consecutive = [steps.record for row in rows for steps in row.few.values()]
-    consecutive += [row.converged for row in rows if row.converged]
-    sentences = ["x* to 25 digits: Newton’s answer, refined in decimal arithmetic."]
-    if consecutive:
-        sentences.insert(
-            0,
-            f"Consecutive steps: {settings(consecutive, 'steps')} after the first "
-            f"{settings(consecutive, 'first')}.",
-        )
-    if one_step:
-        sentences.insert(
-            0,
-            f"The lab’s cloth is let go from rest; one step is step {settings(one_step, 'step')} "
-            f"of its motion. Steps of {lengths_of_steps(one_step)} ms.",
-        )
-    return " ".join(sentences)
+    consecutive = [row.converged for row in rows if row.converged]
+    consecutive += [steps.record for row in rows for steps in row.few.values()]
+    sentences = [
+        f"The lab’s cloth is let go from rest; one step is step {settings(one_step, 'step')} of "
+        f"its motion. Steps of {lengths_of_steps(one_step)} ms."
+    ] * bool(one_step)
+    sentences += [
+        f"Consecutive steps: {settings(consecutive, 'steps')} after the first "
+        f"{settings(consecutive, 'first')}."
+    ] * bool(consecutive)
+    exact = "x* to 25 digits: Newton’s answer, refined in decimal arithmetic."
+    return " ".join([*sentences, exact])
 
 
 convergence = Layout(
@@ -129,17 +131,21 @@ convergence = Layout(
         text("solver", lambda row: row.solver),
         *(_after("error", count) for count in LISTED[:3]),
         *map(_iterations_to, TARGETS),
-        *least([Column("least error", read=lambda row: row.least)]),
+        *least([Column("least error", read=lambda row: row.trial[1])]),
         *folded(
             [
                 *(_after("error", count) for count in LISTED[3:]),
                 *(_iterations_to(decade) for decade in DECADES if decade not in TARGETS),
-                Column("iterations tried", read=lambda row: row.tried),
+                Column("iterations tried", read=lambda row: row.trial[0]),
                 *(_after("residual", count) for count in LISTED),
                 *(column for count in LISTED[:3] for column in _consecutive(count)),
                 Column("converged steps", note=INTERVAL, read=lambda row: row.hits),
-                *places("their iterations", "", (MEDIAN, LARGEST), lambda row: row.iterations),
-                *places("their residual", "", (MEDIAN, LARGEST), lambda row: row.residuals),
+                *places(
+                    "their iterations", "", (MEDIAN, LARGEST), lambda row: row.spread("iterations")
+                ),
+                *places(
+                    "their residual", "", (MEDIAN, LARGEST), lambda row: row.spread("residual")
+                ),
                 Column("steps at the rounding floor", read=lambda row: row.at_floor),
             ]
         ),

@@ -66,8 +66,8 @@ class Point(NamedTuple):
     @property
     def remark(self) -> str:
         """What its record says of its cloth."""
-        remarks = zip(self.record.values.remark_particles, self.record.details.remarks,
-                      strict=True)  # fmt: skip
+        counts, sentences = self.record.values.remark_particles, self.record.details.remarks
+        remarks = zip(counts, sentences, strict=True)
         return "; ".join(sentence for count, sentence in remarks if count == self.particles)
 
     def number(self, name: str) -> float | None:
@@ -77,8 +77,8 @@ class Point(NamedTuple):
 
 def points(results: Results, task: str) -> list[Point]:
     """Return all points of a task, cloth by cloth: stiffness first, then particles."""
-    found = [p for record in results.all("cloth", task=task) for p in _points_of(record)]
-    return sorted(found, key=lambda point: (point.own, point.stiffness, point.particles))
+    cloths = [p for record in results.all("cloth", task=task) for p in _points_of(record)]
+    return sorted(cloths, key=lambda point: (point.own, point.stiffness, point.particles))
 
 
 def _points_of(record: Record) -> Iterator[Point]:
@@ -212,9 +212,9 @@ class Motion(NamedTuple):
 
 def motions(results: Results) -> list[Motion]:
     """Return the motions by every solver, cloth by cloth."""
-    known = limits(results)
+    stable = limits(results)
     return [
-        Motion(point, None if point.own else known.get((point.solver, point.stiffness)))
+        Motion(point, None if point.own else stable.get((point.solver, point.stiffness)))
         for point in points(results, MOTION)
     ]
 

@@ -5,49 +5,28 @@ from . import LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 
 
 class StepWork(Values, frozen=True):
-    """One step with ever more work, (rung,).
+    """One step with ever more work, (rung,)."""
 
-    Attributes:
-        particles: along a side.
-        seconds: for the step.
-        error: |x - x*| / |y - x*|.
-        remark_particles: along a side, of the cloth of each remark, (remark,).
-    """
-
-    particles: Integers1
+    particles: Integers1  # along a side
     seconds: Floats1
-    error: Floats1
-    remark_particles: Integers1
+    error: Floats1  # |x - x*| / |y - x*|
+    remark_particles: Integers1  # along a side of the cloth of each remark, (remark,)
 
 
 class MotionWork(Values, frozen=True):
-    """Motions with ever more work, (rung,), and how sure the true ones are, (size,).
+    """Motions with ever more work, (rung,), and how sure the true ones are, (size,)."""
 
-    Attributes:
-        particles: along a side.
-        frames: that the motion got to.
-        wanted: frames that it was to get to.
-        seconds: for a frame.
-        setup: the time to set the solver up [s].
-        implicit: distance from converged implicit Euler in the end [m].
-        true: distance from the true motion in the end [m].
-        diverged: whether a particle was ever too far away.
-        remark_particles: along a side, of the cloth of each remark, (remark,).
-        order: observed, of the true motion.
-        unsure: by how much halving its steps moves the true motion [m].
-    """
-
-    particles: Integers1
-    frames: Integers1
-    wanted: Integers1
-    seconds: Floats1
-    setup: Floats1
-    implicit: Floats1
-    true: Floats1
+    particles: Integers1  # along a side
+    frames: Integers1  # that the motion got to
+    wanted: Integers1  # frames that it was to get to
+    seconds: Floats1  # for a frame
+    setup: Floats1  # time to set the solver up [s]
+    implicit: Floats1  # distance from converged implicit Euler in the end [m]
+    true: Floats1  # distance from the true motion in the end [m]
     diverged: Booleans1
-    remark_particles: Integers1
-    order: Floats1
-    unsure: Floats1
+    remark_particles: Integers1  # along a side of the cloth of each remark, (remark,)
+    order: Floats1  # observed, of the true motion
+    unsure: Floats1  # by how much halving its steps moves the true motion [m]
 
 
 class Counted(Values, frozen=True):
@@ -75,25 +54,15 @@ class Published(Values, frozen=True):
 
 
 class ClothDetails(Details, frozen=True):
-    """Which cloth it is.
+    """Which cloth it is, and with which settings."""
 
-    Attributes:
-        size: particles along a side.
-        stiffness: of the springs [N/m].
-        frame: the length of a frame [s].
-        cloth: the name of a user's cloth.
-        rungs: the settings, (rung,).
-        remarks: sentences on what happened, (remark,).
-        remark: why an engine is missing, or what is to be said of its stability.
-    """
-
-    size: int = 0
-    stiffness: float = 0.0
-    frame: float = 0.0
-    cloth: str = ""
-    rungs: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
-    remark: str = ""
+    size: int = 0  # particles along a side
+    stiffness: float = 0.0  # of the springs [N/m]
+    frame: float = 0.0  # its length [s]
+    cloth: str = ""  # the name of a user's cloth
+    rungs: tuple[str, ...] = ()  # the settings, (rung,)
+    remarks: tuple[str, ...] = ()  # what happened, (remark,)
+    remark: str = ""  # why an engine is missing, or what is to be said of its stability
 
 
 KINDS = {

@@ -61,8 +61,8 @@ def in_its_own_process(size: int, library: str) -> Measured:
     """Measure one cloth in a process that does nothing else; say so if there is no such library."""
     if library != OURS and importlib.util.find_spec(library) is None:
         return Measured(None, {"missing": f"{library} is not installed"})
-    found = in_a_fresh_process(PATIENCE, compiled_and_measured, size, library)
-    return Measured(read(Scaled, found))
+    numbers = in_a_fresh_process(PATIENCE, compiled_and_measured, size, library)
+    return Measured(read(Scaled, numbers))
 
 
 def compiled_and_measured(size: int, library: str) -> dict[str, Any]:

@@ -1,71 +1,49 @@
 """What the records of growing cloths say: times of iterations and of their parts, memory."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import Results
 from ...peers import registry
 
 OURS = registry.SUPERNODAL.name
 LABELS = {library.name: library.label for library in registry.FACTORS}
 
 
-class Scaled(NamedTuple):
-    """A cloth factored by one library, and stepped if by ours; medians of rounds."""
-
-    record: Record
-
-    @property
-    def library(self) -> str:
-        """By which library, and why not where it is missing."""
-        name = LABELS.get(self.record.solver, self.record.solver)
-        missing = self.record.details.missing
-        return f"{name}: {missing}" if missing else name
-
-    @property
-    def particles(self) -> int:
-        """How many there are."""
-        return int(self.record.details.particles)
-
-    @property
-    def iterations(self) -> int:
-        """How many make a step."""
-        return int(self.record.details.iterations)
-
-    def value(self, name: str) -> float | None:
-        """Return a time [s] or another number, None where it was not measured."""
-        if name == "iteration":
-            step = self.value("step")
-            return None if step is None else step / self.iterations
-        value = getattr(self.record.values, name, None)
-        return None if value is None else metrics.spread(value).median
-
-    def over(self, name: str, other: str | int) -> float | None:
-        """Return a value over another one, or over a number."""
-        value, divisor = self.value(name), self.value(other) if isinstance(other, str) else other
-        return None if value is None or divisor is None else metrics.ratio(value, divisor)
+def library(record: Record) -> str:
+    """Return by which library a cloth was factored, and why not where it is missing."""
+    missing = record.details.missing
+    return LABELS.get(record.solver, record.solver) + (f": {missing}" if missing else "")
 
 
-def cloths(results: Results) -> list[Scaled]:
-    """Return all cloths, as they were measured."""
-    return [Scaled(record) for record in results.all("cloth_scale")]
+def value(record: Record, name: str) -> float | None:
+    """Return a number, the median of several; None where it was not measured."""
+    if name == "particles":
+        return float(record.details.particles)
+    if name == "iteration":
+        step = value(record, "step")
+        return None if step is None else step / record.details.iterations
+    numbers = getattr(record.values, name, None)
+    return None if numbers is None else metrics.spread(numbers).median
 
 
-def ratios(rows: Sequence[Scaled]) -> dict[int, list[float]]:
+def ratio(record: Record, name: str, other: str) -> float | None:
+    """Return a number over another one, None where either was not measured."""
+    dividend, divisor = value(record, name), value(record, other)
+    return None if dividend is None or divisor is None else metrics.ratio(dividend, divisor)
+
+
+def beside_cholmod(records: Sequence[Record]) -> dict[int, list[float]]:
     """Return first factor, solve and memory of ours over those of CHOLMOD, by particles."""
-    sizes: dict[int, dict[str, Scaled]] = {}
-    for row in rows:
-        if row.record.values:
-            sizes.setdefault(row.particles, {})[row.record.solver] = row
+    sizes: dict[int, dict[str, Record]] = {}
+    for record in records:
+        if record.values:
+            sizes.setdefault(record.details.particles, {})[record.solver] = record
+    pairs = {n: [by[name] for name in LABELS] for n, by in sizes.items() if by.keys() >= {*LABELS}}
     return {
-        particles: [_ratio(pair, name) for name in ("factor", "solve", "memory")]
-        for particles, pair in sizes.items()
-        if LABELS.keys() <= pair.keys()
+        particles: [
+            metrics.ratio(value(ours, name) or 0.0, value(cholmod, name) or 0.0)
+            for name in ("factor", "solve", "memory")
+        ]
+        for particles, (ours, cholmod) in pairs.items()
     }
-
-
-def _ratio(pair: dict[str, Scaled], name: str) -> float:
-    ours, theirs = (pair[library].value(name) for library in LABELS)
-    return metrics.ratio(ours or 0.0, theirs or 0.0)

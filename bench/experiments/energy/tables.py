@@ -5,7 +5,7 @@ from functools import partial
 
 from ...harness.record import Record
 from ...harness.results import label, settings
-from ...tables.columns import lengths_of_steps, text, titled
+from ...tables.columns import at, lengths_of_steps, text, titled
 from ...tables.layout import Layout
 from ...tables.table import Column, Summary, in_unit, words
 from . import DAMPINGS, SIZE, figures, readings
@@ -25,7 +25,7 @@ def _summary(records: Sequence[Record]) -> Summary:
 
 
 def _range(record: Record) -> str:
-    shares = float(record.values.left[-1]), readings.least(record), readings.greatest(record)
+    shares = float(record.values.left[-1]), *readings.extent(record)
     last, low, high = (words(in_unit(share, "%")) for share in shares)
     return f"{last}, never less than {low} nor more than {high}"
 
@@ -47,8 +47,8 @@ energy = Layout(
             )
             for k in LISTED
         ),
-        Column("greatest", "%", read=readings.greatest),
-        Column("least", "%", read=readings.least),
+        Column("greatest", "%", read=at(1, readings.extent)),
+        Column("least", "%", read=at(0, readings.extent)),
     ),
     shows="Energy of motion, springs and gravity above that of the cloth at rest, in percent "
     "of the start. Without dampers all of it should stay. implicit, implicitfast, discrete "

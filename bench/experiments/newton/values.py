@@ -4,41 +4,23 @@ from ...harness.values import Details, Kind, Values
 
 
 class Certified(Values, frozen=True):
-    """One solver's answer to the step.
+    """One solver's answer to the step; lengths in metres."""
 
-    Attributes:
-        size: particles along a side.
-        iterations: that the solver made.
-        residual: |grad g| over its value at the start.
-        at_floor: whether the residual is at the rounding floor.
-        balance: the residual in MuJoCo's forces.
-        distance: within which a minimiser is proven to be, infinite without a bound [m].
-        curvature: the least eigenvalue of the Hessian, as far as it is proven.
-        lipschitz: how fast the Hessian may change.
-        newton_step: the length of the Newton step [m].
-        apart: the distance from Newton's answer [m].
-        error: |x - x*| / |y - x*|.
-        above: g above that of Newton's answer [kg m²].
-        covered: whether there is a bound.
-        same: whether it is proven to belong to Newton's minimiser.
-        different: whether it is proven not to.
-    """
-
-    size: int
+    size: int  # particles along a side
     iterations: int
     residual: float
-    at_floor: bool
-    balance: float
-    distance: float
-    curvature: float
-    lipschitz: float
-    newton_step: float
-    apart: float
-    error: float
-    above: float
-    covered: bool
-    same: bool
-    different: bool
+    at_floor: bool  # whether the residual is at the rounding floor
+    balance: float  # the residual in MuJoCo's forces
+    distance: float  # within which a minimiser is proven to be, infinite without a bound
+    curvature: float  # the least eigenvalue of the Hessian, as far as it is proven
+    lipschitz: float  # how fast the Hessian may change
+    newton_step: float  # its length
+    apart: float  # the distance from Newton's answer
+    error: float  # |x - x*| / |y - x*|
+    above: float  # g above that of Newton's answer [kg m²]
+    covered: bool  # whether there is a bound
+    same: bool  # whether it is proven to belong to Newton's minimiser
+    different: bool  # whether it is proven not to
 
 
 class CertifiedDetails(Details, frozen=True):
@@ -48,7 +30,6 @@ class CertifiedDetails(Details, frozen=True):
     tolerance: float
     start: str
     coverage: str = ""
-    why: str = ""
 
 
 KINDS = {"": Kind(Certified, CertifiedDetails)}

@@ -3,7 +3,7 @@
 import functools
 import math
 import secrets
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from timeit import Timer
 from typing import Any
@@ -17,10 +17,9 @@ from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import in_a_fresh_process
 from ...harness.machine import pace
 from ...harness.progress import announce
-from ...harness.record import Key
 from ...harness.worker import describe
 from . import cloth, ik, kinematics
-from .case import TIMING, Case
+from .case import Case
 from .values import Timed
 
 # So long [s] a case may take.
@@ -41,61 +40,57 @@ def cases() -> tuple[Case, ...]:
     return tuple(case for subject in (kinematics, ik, cloth) for case in subject.cases())
 
 
+def compared(subject: str, group: str) -> list[Case]:
+    """Return the cases that are compared: all that work on the same."""
+    return [c for c in cases() if (c.work.subject, c.work.group) == (subject, group)]
+
+
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield a block a case; its size is the time [s] that it is measured for."""
     run = secrets.token_hex(8)
     for case in cases():
         measure = partial(timed, run, case, scale.seconds)
-        name, settings = case.work.problem, case.settings
-        yield Block(TIMING, name, case.solver, measure, settings, scale.seconds, case.facts)
+        settings, facts = {"operations": case.operations}, case.work.facts
+        yield Block(
+            "timing", case.work.problem, case.solver, measure, settings, scale.seconds, facts
+        )
 
 
 def timed(run: str, case: Case, seconds: float) -> Measured:
     """Return what is measured of a case, together with all that it is compared with.
 
-    The seconds of one operation, (sweep, round), the bytes that it moves, by how much a fixed loop
-    varied meanwhile, and a word that those measured together in a run have in common.
+    By how much a fixed loop varied meanwhile and a word that those measured together in a run have
+    in common are its facts.
 
     Raises:
         RuntimeError: if there are no rounds; the message says why.
     """
-    result = _together(run, case.work.subject, case.work.group, seconds)[case.key]
-    if isinstance(result, str):
-        raise RuntimeError(result)
-    return result
+    results = _together(run, case.work.subject, case.work.group, seconds)
+    i = compared(case.work.subject, case.work.group).index(case)
+    if trouble := results["troubles"][i]:
+        raise RuntimeError(trouble)
+    rounds = np.array(results["rounds"][i]) / case.operations
+    return Measured(Timed(rounds, case.moved / case.operations), facts=results["facts"])
 
 
 @functools.lru_cache(maxsize=1)  # blocks that are compared follow one another
-def _together(run: str, subject: str, group: str, seconds: float) -> dict[Key, Measured | str]:
-    """Return what is measured of each case of a group, or what it raised."""
-    compared = [c for c in cases() if (c.work.subject, c.work.group) == (subject, group)]
-    keys = tuple(case.key for case in compared)
-    results = in_a_fresh_process(PATIENCE, sweep, keys, seconds)
-    noise, word = metrics.relative_spread(np.array(results["paces"])), secrets.token_hex(4)
-    return {
-        case.key: trouble or _measured(case, rounds, {"noise": noise, "together": word})
-        for case, rounds, trouble in zip(
-            compared, results["rounds"], results["troubles"], strict=True
-        )
-    }
+def _together(run: str, subject: str, group: str, seconds: float) -> dict[str, Any]:
+    """Return what is measured of all cases of a group."""
+    results = in_a_fresh_process(PATIENCE, sweep, subject, group, seconds)
+    noise = metrics.relative_spread(np.array(results["paces"]))
+    return {**results, "facts": {"noise": noise, "together": secrets.token_hex(4)}}
 
 
-def _measured(case: Case, rounds: Sequence[Sequence[float]], facts: Mapping[str, Any]) -> Measured:
-    seconds, moved = np.array(rounds) / case.operations, case.moved / case.operations
-    return Measured(Timed(seconds, moved), facts=facts)
-
-
-def sweep(keys: Sequence[Key], seconds: float) -> dict[str, Any]:
-    """Time the cases of these keys for so long each, sweep after sweep.
+def sweep(subject: str, group: str, seconds: float) -> dict[str, Any]:
+    """Time the cases of a group for so long each, sweep after sweep.
 
     Return the rounds of each [s], (sweep, round), what it raised first, and how long a fixed loop
     took beside each measurement.
     """
-    known = {case.key: case for case in cases()}
-    rounds = [Rounds(known[key], seconds) for key in keys]
+    rounds = [Rounds(case, seconds) for case in compared(subject, group)]
     lot, paces = np.random.default_rng(len(rounds)), []
     for i in range(SWEEPS):
-        announce(f"{known[keys[0]].work.group}, sweep {i + 1} of {SWEEPS}")
+        announce(f"{group}, sweep {i + 1} of {SWEEPS}")
         for number in lot.permutation(len(rounds)):
             paces.append(pace())
             rounds[number].take()

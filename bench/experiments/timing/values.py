@@ -13,21 +13,13 @@ class Timed(Values, frozen=True):
 
 
 class WorkDetails(Details, frozen=True):
-    """What was timed.
-
-    Attributes:
-        subject: kinematics, ik or cloth.
-        group: what the work is done on.
-        work: how the work is written within its group.
-        noise: half the width of the middle eight tenths of a fixed loop's times, over their median.
-        together: a word that all that were timed in turns have in common.
-    """
+    """What was timed: see `case.Work`."""
 
     subject: str
     group: str
     work: str
-    noise: float = math.nan
-    together: str = ""
+    noise: float = math.nan  # half the width of the middle 80 % of a fixed loop's times
+    together: str = ""  # a word that all that were timed in turns have in common
 
 
 KINDS = {"": Kind(Timed, WorkDetails)}
