@@ -8,7 +8,6 @@ import numpy as np
 from ...harness import metrics
 from ...harness.record import Record
 from ...harness.results import Results, by_problem, label
-from ...tables.columns import largest
 from .. import arm
 from ..closed_curves import COHERENT, COLD, CURVE, DRIFT, WARM
 from . import BEYOND, CHAIN
@@ -42,6 +41,11 @@ def within_tolerance(record: Record) -> np.ndarray:
     return np.asarray(record.values.residual <= record.details.tolerance)
 
 
+def hits(record: Record) -> metrics.Share:
+    """Return the share of the residuals that are within the tolerance."""
+    return metrics.share(within_tolerance(record))
+
+
 def start(record: Record) -> str:
     """Return where the solves start."""
     return STARTS[record.details.warm]
@@ -49,15 +53,15 @@ def start(record: Record) -> str:
 
 def success(records: Iterable[Record]) -> tuple[dict[str, metrics.Share], metrics.Ranking | None]:
     """Return what each solver solves of all problems, and a ranking of those that take them all."""
-    hits: dict[str, dict[tuple[str, str], metrics.Floats]] = {}
+    solved: dict[str, dict[tuple[str, str], metrics.Floats]] = {}
     for record in records:
-        places = hits.setdefault(label(record.solver), {})
+        places = solved.setdefault(label(record.solver), {})
         places[record.problem, start(record)] = within_tolerance(record)
-    sizes = {place: hit.size for places in hits.values() for place, hit in places.items()}
-    joined = {solver: np.concatenate(list(places.values())) for solver, places in hits.items()}
+    sizes = {place: hit.size for places in solved.values() for place, hit in places.items()}
+    joined = {solver: np.concatenate(list(places.values())) for solver, places in solved.items()}
     complete = {
         solver: np.concatenate([places[place] for place in sizes])
-        for solver, places in hits.items()
+        for solver, places in solved.items()
         if {place: hit.size for place, hit in places.items()} == sizes
     }
     ranking = metrics.ranking(complete) if len(complete) > 1 else None
@@ -188,26 +192,6 @@ def largest_angle(record: Record) -> float:
     return metrics.spread(record.values.largest_angle[:-1]).largest
 
 
-def mean_angle(record: Record) -> float:
-    """Return the mean rotation of a joint between neighbouring frames [rad]."""
-    return metrics.mean(record.values.mean_angle[:-1])
-
-
 def closing_angle(record: Record) -> float:
     """Return the largest rotation of a joint from the last frame back to the first [rad]."""
     return float(record.values.largest_angle[-1])
-
-
-def path_error(record: Record) -> float:
-    """Return the largest distance from the effector to its point on the curve [m]."""
-    return largest([record], "residual")
-
-
-def mean_iterations(record: Record) -> float:
-    """Return the mean iterations of a frame."""
-    return metrics.mean(record.values.iterations)
-
-
-def hits_within_tolerance(record: Record) -> metrics.Share:
-    """Return the share of the residuals that are within the tolerance."""
-    return metrics.share(within_tolerance(record))

@@ -16,6 +16,7 @@ from ...tables.columns import (
     P95,
     SOLVER,
     allowed,
+    at,
     effort,
     folded,
     greatest,
@@ -142,6 +143,10 @@ def _by_mode(
     return [Column(f"{title}, {mode}", unit, read=read_in(mode), group=title) for mode in modes]
 
 
+def _mean_iterations(record: Record) -> float:
+    return metrics.mean(record.values.iterations)
+
+
 def _drift(mode: str, repetition: int) -> Column:
     title = f"drift, {mode}"
     read = partial(Motions.drift, mode=mode, repetition=repetition)
@@ -162,7 +167,7 @@ def _motions_summary(rows: Sequence[Motions]) -> Summary:
 def _mode_summary(rows: Sequence[Motions], mode: str) -> str:
     records = [row.by_mode[mode] for row in rows]
     worst = max(records, key=readings.largest_angle)
-    hits = [readings.hits_within_tolerance(record) for record in records]
+    hits = [readings.hits(record) for record in records]
     return (
         f"{mode}: {words_in(readings.largest_angle(worst), '°')} ({worst.title}, "
         f"{label(worst.solver)}); {words(sum(hit.hits for hit in hits))} of "
@@ -202,14 +207,14 @@ jitter = Layout(
         text("solver", lambda row: row.solver),
         *least(_by_mode("largest rotation", readings.largest_angle, "°")),
         *least(_by_mode("closing rotation", readings.closing_angle, "°", (WARM, COHERENT))),
-        *_by_mode("mean iterations", readings.mean_iterations, modes=(WARM, COHERENT)),
+        *_by_mode("mean iterations", _mean_iterations, modes=(WARM, COHERENT)),
         *folded(
             [
-                *_by_mode("mean iterations", readings.mean_iterations, modes=(COLD,)),
+                *_by_mode("mean iterations", _mean_iterations, modes=(COLD,)),
                 Column("iterations over all frames at once", read=lambda m: m.shared_iterations),
-                *greatest(_by_mode("within tolerance", readings.hits_within_tolerance)),
-                *_by_mode("largest path error", readings.path_error, "m"),
-                *_by_mode("mean rotation", readings.mean_angle, "°"),
+                *greatest(_by_mode("within tolerance", readings.hits)),
+                *_by_mode("largest path error", at(2, partial(spread_of, name="residual")), "m"),
+                *_by_mode("mean rotation", lambda r: metrics.mean(r.values.mean_angle[:-1]), "°"),
                 *(_drift(mode, i) for mode in (WARM, COHERENT) for i in (1, 2, 3)),
                 Column("frames", read=lambda row: row.by_mode[WARM].values.residual.size),
             ]

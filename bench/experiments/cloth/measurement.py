@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -43,32 +43,26 @@ def blocks(scale: Scale) -> Iterator[Block]:
             yield Block("cloth", f"{problem.name}{name}", solver, measure, settings, facts=facts)
 
 
-class _Measurement(NamedTuple):
-    """What is measured of a cloth: its task, name, solver, how, and with which settings."""
-
-    task: str
-    name: str
-    solver: str
-    measure: Callable[[], Measured]
-    settings: dict[str, Any]
+# Its task, name and solver, how it is measured, and with which settings.
+_Measurement = tuple[str, str, str, Callable[[], Measured], dict[str, Any]]
 
 
 def _measurements(problem: ClothSwing, factor: float) -> Iterator[_Measurement]:
     swinging = {"h": H, "first": FALLING, "steps": STEPS}
     settings = {**swinging, "tolerance": TOLERANCE}
-    yield _Measurement(SWING, "", "newton", partial(newton_steps, problem), settings)
+    yield (SWING, "", "newton", partial(newton_steps, problem), settings)
     for solver in registry.followed_step_solvers():
         measure = partial(one_step, problem, solver.name, solver.followed)
         settings = {"h": H, "step": MIDDLE, "iterations": solver.followed}
-        yield _Measurement(ONE_STEP, "/one step", solver.name, measure, settings)
+        yield (ONE_STEP, "/one step", solver.name, measure, settings)
     for count in FEW_ITERATIONS:
         measure = partial(few_iterations, problem, count)
         settings = {**swinging, "iterations": count}
-        yield _Measurement(FEW, "/few iterations", "local_global", measure, settings)
+        yield (FEW, "/few iterations", "local_global", measure, settings)
     measure = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
     settings = {"first": MIDDLE, "damping": DAMPING}
     settings |= {"longest": HALVED[0], "halvings": len(HALVED) - 1}
-    yield _Measurement(DAMPERS, "/dampers", "newton", measure, settings)
+    yield (DAMPERS, "/dampers", "newton", measure, settings)
 
 
 def newton_steps(problem: ClothSwing) -> Measured:

@@ -12,6 +12,7 @@ from ...peers import registry
 from ...tables.table import words
 from ..published import problem as published
 from . import LIU, MOTION, ONE_STEP, STABILITY
+from .values import Stability
 
 # A motion as near as this to the true one [m] is hard to tell from it by eye.
 NEAR = 1e-2
@@ -72,7 +73,8 @@ class Point(NamedTuple):
 
     def number(self, name: str) -> float | None:
         """Return a value, None where it is not a number."""
-        return _number_or_none(self.values[name])
+        value = self.values[name]
+        return None if np.isnan(value) else value
 
 
 def points(results: Results, task: str) -> list[Point]:
@@ -90,10 +92,6 @@ def _points_of(record: Record) -> Iterator[Point]:
         values = {name: float(array[i]) for name, array in whole.items()}
         stiffness, particles = record.details.stiffness, int(values["particles"])
         yield Point(stiffness, particles, record.solver, rung, values, record)
-
-
-def _number_or_none(value: float) -> float | None:
-    return None if np.isnan(value) else value
 
 
 def grouped(members: Sequence[T], key: Callable[[T], Any]) -> dict[Any, list[T]]:
@@ -148,38 +146,32 @@ def fastest(rows: Sequence[Steps], target: str) -> list[Point]:
 
 
 class Limit(NamedTuple):
-    """The longest stable step of a solver on a hanging cloth.
+    """The longest stable step of a solver on a hanging cloth [s], None if there is none.
 
-    Attributes:
-        record: what was measured.
-        step: the longest stable one [s], None if there is none.
-        theory: 2 / ω, that of symplectic Euler [s].
+    The theory is 2 / ω, the limit of symplectic Euler [s], the share the step in units of it.
     """
 
     record: Record
     step: float | None
     theory: float
-
-    @property
-    def share(self) -> float | None:
-        """The step in units of 2 / ω."""
-        return None if self.step is None else metrics.ratio(self.step, self.theory)
+    share: float | None
 
 
 def limits(results: Results) -> dict[tuple[str, float], Limit]:
     """Return the limits of stability by solver and stiffness [N/m]."""
     return {
-        (record.solver, stiffness): Limit(
-            record, _number_or_none(limit), metrics.ratio(2.0, frequency)
-        )
+        (record.solver, stiffness): limit
         for record in results.all("cloth", task=STABILITY)
-        for stiffness, limit, frequency in zip(
-            record.values.stiffness.tolist(),
-            record.values.limit.tolist(),
-            record.values.frequency.tolist(),
-            strict=True,
-        )
+        for stiffness, limit in _limits(record)
     }
+
+
+def _limits(record: Record) -> Iterator[tuple[float, Limit]]:
+    values: Stability = record.values
+    columns = (values.stiffness.tolist(), values.limit.tolist(), (2.0 / values.frequency).tolist())
+    for stiffness, step, theory in zip(*columns, strict=True):
+        limit = (None, theory, None) if np.isnan(step) else (step, theory, step / theory)
+        yield stiffness, Limit(record, *limit)
 
 
 class Motion(NamedTuple):
@@ -226,20 +218,11 @@ def nearest(whole: Sequence[Point]) -> tuple[Point, Point | None]:
     return min(whole, key=lambda point: point.values["true"]), fast
 
 
-class Certainty(NamedTuple):
-    """How sure the true motion is: by how much half its steps move it [m], and at which order."""
-
-    unsure: float
-    low: float
-    high: float
-
-
-def certainty(rows: Sequence[Motion]) -> Certainty:
-    """Return how sure the true motions are, at worst."""
+def certainty(rows: Sequence[Motion]) -> tuple[float, float, float]:
+    """Return by how much halving its steps moves a true motion [m], and the range of its order."""
     records = {id(row.point.record): row.point.record for row in rows}.values()
     unsure = max(float(record.values.unsure.max()) for record in records)
-    orders = np.concatenate([record.values.order for record in records])
-    return Certainty(unsure, *metrics.extent(orders))
+    return unsure, *metrics.extent(np.concatenate([record.values.order for record in records]))
 
 
 def as_published(results: Results) -> list[Record]:
