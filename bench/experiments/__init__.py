@@ -1,13 +1,11 @@
 """What is measured: an experiment is a folder, a suite is one experiment or several."""
 
-import functools
 from collections.abc import Iterator
 
 from ..harness.block import SCALES, Block, Measured, Scale
 from ..harness.experiment import Experiment
-from ..harness.values import Kind
 
-__all__ = ["EXPERIMENTS", "SCALES", "SUITES", "Block", "Measured", "Scale", "blocks", "kind_of"]
+__all__ = ["EXPERIMENTS", "SCALES", "SUITES", "Block", "Measured", "Scale", "blocks"]
 
 # What the command line calls the suites, and what each answers.
 SUITES = {
@@ -67,10 +65,3 @@ def blocks(suite: str, scale: Scale) -> Iterator[Block]:
 
         known = iter(joined(list(known), suite, scale))
     yield from known
-
-
-@functools.cache
-def kind_of(suite: str, task: str) -> Kind | None:
-    """Return the types of the records of a task ("" if they name none); None if none is known."""
-    kinds = (made.kinds() for made in EXPERIMENTS if made.suite == suite)
-    return next((known[task] for known in kinds if task in known), None)

@@ -1,13 +1,11 @@
 """An experiment: a folder that holds a problem, its measurement, its tables and its figures."""
 
 import importlib
-import importlib.util
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
 from .block import Block, Scale
-from .values import Kind
 
 
 class Experiment(NamedTuple):
@@ -30,10 +28,3 @@ class Experiment(NamedTuple):
         """Yield what there is to be measured; engines are imported only now."""
         for block in importlib.import_module(f"{self.package}.measurement").blocks(scale):
             yield replace(block, times=self.times)
-
-    def kinds(self) -> Mapping[str, Kind]:
-        """Return the types of its records by their tasks; no engine is imported."""
-        if importlib.util.find_spec(f"{self.package}.values") is None:
-            return {}
-        kinds: Mapping[str, Kind] = importlib.import_module(f"{self.package}.values").KINDS
-        return kinds

@@ -19,7 +19,6 @@ from typing import Annotated, Any, Literal, NamedTuple, TypedDict
 import msgspec
 import numpy as np
 
-from ..experiments import kind_of
 from . import values
 
 FORMAT = 3
@@ -112,7 +111,7 @@ class Record:
 
     @property
     def _kind(self) -> values.Kind | None:
-        return kind_of(self.suite, str(self.facts.get("task", "")))
+        return values.kind_of(self.suite, str(self.facts.get("task", "")))
 
     @functools.cached_property
     def values(self) -> Any:

@@ -4,6 +4,9 @@ An experiment declares its types in `values.py`, in `KINDS`. What stands in the 
 read into them, so that a record that lacks a field, or has one of another type, is refused.
 """
 
+import functools
+import importlib
+import importlib.util
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar, get_args
 
@@ -42,6 +45,26 @@ class Kind(NamedTuple):
     details: type[Details] = Details
 
 
+@functools.cache
+def kind_of(suite: str, task: str) -> Kind | None:
+    """Return the types of the records of a task ("" if they name none); None of other suites.
+
+    No engine is imported.
+
+    Raises:
+        ValueError: if the suite has no such task.
+    """
+    from ..experiments import EXPERIMENTS
+
+    modules = [f"{made.package}.values" for made in EXPERIMENTS if made.suite == suite]
+    declared = list(filter(importlib.util.find_spec, modules))
+    kinds = {name: kind for module in declared
+             for name, kind in importlib.import_module(module).KINDS.items()}  # fmt: skip
+    if modules == declared and modules and task not in kinds:
+        raise ValueError(f"task: expected one of {', '.join(map(repr, kinds))}, got {task[:40]!r}")
+    return kinds.get(task)
+
+
 Typed = TypeVar("Typed", bound=msgspec.Struct)
 
 
@@ -75,8 +98,10 @@ def _array(kind: Any, value: Any) -> np.ndarray:
     shape, dtype = get_args(kind)
     axes, wanted = len(get_args(shape)), np.dtype(get_args(dtype)[0])
     array = np.asarray(value)
+    if not array.size:
+        return np.empty((0,) * axes, wanted)
     if array.ndim != axes:
         raise ValueError(f"expected {axes} dimensions, got {array.ndim}")
-    if array.size and array.dtype.kind not in _TAKES[wanted.kind]:
+    if array.dtype.kind not in _TAKES[wanted.kind]:
         raise ValueError(f"expected {wanted.name}, got {array.dtype.name}")
     return array.astype(wanted, copy=False)

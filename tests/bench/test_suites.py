@@ -41,8 +41,8 @@ def test_no_two_blocks_have_the_same_key_and_every_one_can_be_read_again(suite):
     assert len(keys) == len(set(keys)) > 0
     assert {name for name, *_ in keys} == {suite}
     for b, known in zip(blocks(suite, TINY), keys, strict=True):
-        made = Record(b.suite, b.problem, b.solver, b.settings, b.size, facts=b.facts,
-                      stamp=stamp(), when=now())  # fmt: skip
+        about = {"stamp": stamp(), "when": now(), "facts": b.facts}
+        made = Record(b.suite, b.problem, b.solver, b.settings, b.size, **about)
         back = decode(encode(made))
         assert back.key == made.key == known
         assert back.stamp == made.stamp
