@@ -28,7 +28,6 @@ PACKAGES = (
     "example-robot-data",
     "gymnasium",
     "dm_control",
-    "pytest-benchmark",
     "matplotlib",
 )
 ROOT = Path(__file__).resolve().parents[2]

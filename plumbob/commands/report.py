@@ -19,8 +19,8 @@ EXAMPLES = block(
     "plumbob report",
     "plumbob report --output results/laptop",
     "plumbob report --list",
-    "plumbob report --table cloth_stability --list",
-    "plumbob report --table cloth_stability --format tex --width column -o stable.tex",
+    "plumbob report --table cloth_dampers --list",
+    "plumbob report --table cloth_dampers --format tex --width column -o dampers.tex",
     "plumbob report --table accuracy --columns 'solver, within tolerance' --rows 'problem~circle'",
 )
 FORMATS = ("md", "tex", "csv", "html")

@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 
 from plumbob.bench.experiments import SUITES, blocks
-from plumbob.bench.experiments.arm.tables import accuracy
 from plumbob.bench.experiments.chain import figures
-from plumbob.bench.experiments.chain.tables import beyond_reach
+from plumbob.bench.experiments.chain.tables import accuracy, beyond_reach
 from plumbob.bench.experiments.robots.participants import participants
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.record import RecordFile

@@ -40,5 +40,5 @@ def cloth_convergence(results: Results) -> Sketch | None:
 
 
 def _iterated(record: Record, quantity: str) -> Series:
-    values = record.arrays[quantity][1:]
+    values = getattr(record.values, quantity)[1:]
     return series(record.solver, np.arange(1, 1 + len(values)), values)

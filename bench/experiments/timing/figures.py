@@ -39,7 +39,7 @@ def timing(subject: str, unit: str, scale: float, title: str) -> Figure:
 
 def _marks(records: list[Record], solver: str, works: list[str], scale: float) -> Series:
     mine = [record for record in records if record.solver == solver]
-    times = np.array([metrics.timing(record.arrays["seconds"])[:3] for record in mine])
+    times = np.array([metrics.timing(record.values.seconds)[:3] for record in mine])
     median, low, high = scale * times.T
     y = [works.index(record.problem) for record in mine]
     return series(solver, median, y, (low, high), form=MARKS)
