@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from plumbob.bench.harness.results import Results
     from plumbob.bench.report.report import Written
+    from plumbob.bench.tables.results import Results
     from plumbob.bench.tables.table import Table
     from plumbob.crosscheck.verdict import Verdict as ClaimVerdict
 
@@ -44,7 +44,7 @@ def print_ending(suites: Sequence[str], output: Path) -> None:
 
 def _results(suites: Sequence[str], output: Path) -> "Results":
     from plumbob.bench.harness.record import FINISHED, RecordFile
-    from plumbob.bench.harness.results import Results
+    from plumbob.bench.tables.results import Results
 
     records = RecordFile(output).read().records
     return Results(record for record in records if record.suite in (*suites, FINISHED))

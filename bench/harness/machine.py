@@ -36,7 +36,6 @@ _PACKAGES = ("reference", "crosscheck", "bench")
 PRESENTATION = (
     "bench/comparison",
     "bench/figures",
-    "bench/harness/results.py",
     "bench/motion",
     "bench/report",
     "bench/show",

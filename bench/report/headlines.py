@@ -17,8 +17,8 @@ from ..experiments.robots.readings import STARTS, Score, fields_of, over_sets, r
 from ..experiments.timing.readings import median_time, ranked_by_time
 from ..harness import metrics
 from ..harness.record import FINISHED
-from ..harness.results import Results, by_problem, counted, listed
 from ..peers import registry
+from ..tables.results import Results, by_problem, counted, listed
 from ..tables.table import words
 from .standings import Headline, of_finishers, solved, speed, standings
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 from ..experiments import EXPERIMENTS
 from ..experiments.pictures.readings import arm_motion, cloth_motion
 from ..harness.experiment import Experiment
-from ..harness.results import Results
 from ..motion.motion import Scene
 from ..tables.layout import Layout
+from ..tables.results import Results
 from ..tables.table import Table
 
 

@@ -108,8 +108,8 @@ def _tables(folder: Path) -> list["Table"]:
     Raises:
         ValueError: if there are no records.
     """
-    from plumbob.bench.harness.results import results_of
     from plumbob.bench.report.sections import tables
+    from plumbob.bench.tables.results import results_of
 
     results, _ = results_of(folder)
     return tables(results)

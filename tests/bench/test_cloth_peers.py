@@ -16,7 +16,6 @@ from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_mo
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.isolation import Outcome, WorkerProcess
-from plumbob.bench.harness.results import Results
 from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
@@ -32,6 +31,7 @@ from plumbob.bench.problems.falling_cloth import (
     level_cloth,
 )
 from plumbob.bench.report.report import all_figures
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import best_cells
 from plumbob.reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
 from plumbob.reference.mass_spring import stiffness_matrix

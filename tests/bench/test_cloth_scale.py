@@ -11,7 +11,7 @@ from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.cloth_scale import measurement as suite
 from plumbob.bench.experiments.cloth_scale import tables as cloth_scale
 from plumbob.bench.harness.progress import listening
-from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.results import Results
 from plumbob.reference.implicit_euler.objective import Objective
 
 SMALL = min(suite.SIZES)

@@ -27,10 +27,10 @@ from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import block_key, measure
 from plumbob.bench.harness.progress import Progress, listening
 from plumbob.bench.harness.record import RecordFile, encode
-from plumbob.bench.harness.results import Results
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.sources import digest_of
 from plumbob.bench.report.sections import tables
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import markdown
 
 TINY = Scale(targets=3, seconds=0.001)

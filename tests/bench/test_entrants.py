@@ -16,7 +16,6 @@ from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, printable
 from plumbob.bench.peers import contestant, opening, registry
 from plumbob.bench.peers.entrant import CHAIN_TASK, Entrant
 from plumbob.bench.peers.protocol import OwnTime
@@ -26,6 +25,7 @@ from plumbob.bench.problems.chains import chain_targets
 from plumbob.bench.problems.evaluate import Evaluator
 from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.report.sections import tables
+from plumbob.bench.tables.results import Results, printable
 from plumbob.cli import run_command
 from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.solvers import open_contestant

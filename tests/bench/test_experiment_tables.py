@@ -18,8 +18,8 @@ from plumbob.bench.experiments.check import tables as check
 from plumbob.bench.experiments.cloth import tables as cloth
 from plumbob.bench.experiments.cloth_peers import SOLVED
 from plumbob.bench.experiments.timing import tables as timing
-from plumbob.bench.harness.results import Results, label
 from plumbob.bench.report.sections import SECTIONS, tables
+from plumbob.bench.tables.results import Results, label
 from plumbob.bench.tables.table import comma_separated, markdown, words
 from plumbob.bench.tables.tex_text import escaped
 

@@ -14,9 +14,9 @@ from plumbob.bench.figures import drawing
 from plumbob.bench.figures import sketch as figures
 from plumbob.bench.figures.chart import LOOKS, MOST, Axis, Chart, Panel, looks, series
 from plumbob.bench.figures.sketch import chart_sketch, drawn
-from plumbob.bench.harness.results import Results, label
 from plumbob.bench.report import report
 from plumbob.bench.report.page import page
+from plumbob.bench.tables.results import Results, label
 
 ENTRANT = "my very own solver, a name of some length"
 CHARTS = 15

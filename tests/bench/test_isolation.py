@@ -14,7 +14,6 @@ from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess, raised
 from plumbob.bench.harness.job import AGAIN, Job
 from plumbob.bench.harness.measure import record_of
-from plumbob.bench.harness.results import Results
 from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
@@ -22,6 +21,7 @@ from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.registry import ONE_START, Entry, Peer
 from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robots import robot
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import markdown
 
 TOLERANCE = Tolerance(1e-3, 1e-3)

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plumbob.bench.harness.metrics import Share, share
-from plumbob.bench.harness.results import Results
 from plumbob.bench.report import sections
 from plumbob.bench.tables import latex, tex_text
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column, Table
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'

@@ -110,7 +110,7 @@ def test_what_measures_never_imports_what_only_shows():
         "from ..report import sections",
         "from plumbob.bench.report import sections",
         "def f():\n    from .results import label",
-        'importlib.import_module("plumbob.bench.harness.results")',
+        'importlib.import_module("plumbob.bench.tables.results")',
     ],
 )
 def test_an_import_of_what_only_shows_is_found(copy, line):

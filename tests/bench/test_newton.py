@@ -7,7 +7,7 @@ from plumbob.bench.experiments import SCALES, Scale, blocks
 from plumbob.bench.experiments.cloth import tables
 from plumbob.bench.experiments.cloth.problem import HEAVY_STIFFNESSES
 from plumbob.bench.experiments.newton import measurement as suite
-from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.results import Results
 from plumbob.reference import STEP_SOLVERS
 
 SIZE = 6

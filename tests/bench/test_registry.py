@@ -18,12 +18,12 @@ from plumbob.bench.harness import run
 from plumbob.bench.harness.experiment import Experiment
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import ONE_START, Entry, Peer
 from plumbob.bench.report import report
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.layout import Layout
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column
 from plumbob.reference import STEP_SOLVERS
 from plumbob.reference.implicit_euler.local_global import LocalGlobal

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, results_of
 from plumbob.bench.report import report
+from plumbob.bench.tables.results import Results, results_of
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 

@@ -16,8 +16,8 @@ from plumbob.bench.harness.block import Block
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import measure
 from plumbob.bench.harness.record import Record, decode, encode, key
-from plumbob.bench.harness.results import Results
 from plumbob.bench.harness.run import now
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import markdown
 from plumbob.reference import ImplicitEuler
 

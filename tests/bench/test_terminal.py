@@ -11,10 +11,10 @@ from rich.console import Console
 
 from plumbob import cli, terminal
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results
 from plumbob.bench.report import outcome, report, sections
 from plumbob.bench.report.headlines import Answers, Headline, Verdict
 from plumbob.bench.tables import aligned
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column, Table, naming, without_empty, words
 
 WIDTHS = range(40, 201)

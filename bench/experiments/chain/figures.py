@@ -6,8 +6,8 @@ from ...figures.chart import GREATER, SPAN, Axis, Chart, Panel, Series, series
 from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import Results, by_problem
 from ...tables.columns import iterations_said
+from ...tables.results import Results, by_problem
 from ...tables.table import in_unit
 from .. import arm
 from . import BEYOND, CHAIN

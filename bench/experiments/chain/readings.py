@@ -7,7 +7,7 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import Results, by_problem, label
+from ...tables.results import Results, by_problem, label
 from .. import arm
 from ..closed_curves import COHERENT, COLD, CURVE, DRIFT, WARM
 from . import BEYOND, CHAIN

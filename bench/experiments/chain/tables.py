@@ -8,7 +8,6 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import label, leaders, settings
 from ...tables.columns import (
     LARGEST,
     MEDIAN,
@@ -31,6 +30,7 @@ from ...tables.columns import (
     words_in,
 )
 from ...tables.layout import Layout
+from ...tables.results import label, leaders, settings
 from ...tables.table import Column, Summary, words
 from ..closed_curves import COHERENT, COLD, WARM
 from . import figures, readings

@@ -5,7 +5,7 @@ import numpy as np
 from ...figures.chart import Axis, Chart, Panel, Series, series
 from ...figures.sketch import Sketch, chart_sketch
 from ...harness.record import Record
-from ...harness.results import Results, by_problem
+from ...tables.results import Results, by_problem
 from . import ONE_STEP
 
 

@@ -9,8 +9,8 @@ from plumbob.reference import Outcome
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import Results, label
 from ...tables.columns import spread_of
+from ...tables.results import Results, label
 from ...tables.table import words
 from ..cloth_peers import DECADES, NEEDED
 from ..newton.values import Certified, CertifiedDetails

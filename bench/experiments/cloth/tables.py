@@ -7,7 +7,6 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import counted, listed, settings
 from ...tables.columns import (
     LARGEST,
     MEDIAN,
@@ -21,6 +20,7 @@ from ...tables.columns import (
     words_in,
 )
 from ...tables.layout import Layout
+from ...tables.results import counted, listed, settings
 from ...tables.table import INTERVAL, Column, Summary, words
 from ..cloth_peers import DECADES, SOLVED, TARGETS
 from ..pictures import figures as pictures

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import Results
 from ...peers import registry
+from ...tables.results import Results
 from ...tables.table import words
 from ..published import problem as published
 from . import LIU, MOTION, ONE_STEP, STABILITY

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ...harness.record import Record
-from ...harness.results import Results, label, listed
 from ...problems.falling_cloth import FALLING, FRAME, GRAVITY, MASS, SIDE
 from ...tables.columns import SOLVER, folded, greatest, least, number, text, words_in
 from ...tables.layout import Layout, source
+from ...tables.results import Results, label, listed
 from ...tables.table import Column, Summary, Table, words
 from ..published import problem as published
 from . import MISSING, TARGETS, figures, readings

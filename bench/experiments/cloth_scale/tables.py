@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from functools import partial
 
 from ...harness.record import Record
-from ...harness.results import settings
 from ...tables.columns import folded, least, text
 from ...tables.layout import Layout
+from ...tables.results import settings
 from ...tables.table import Column, Summary, words
 from . import readings
 

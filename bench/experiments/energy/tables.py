@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from functools import partial
 
 from ...harness.record import Record
-from ...harness.results import label, settings
 from ...tables.columns import at, lengths_of_steps, text, titled
 from ...tables.layout import Layout
+from ...tables.results import label, settings
 from ...tables.table import Column, Summary, in_unit, words
 from . import DAMPINGS, SIZE, figures, readings
 

@@ -14,10 +14,10 @@ import numpy as np
 from ...harness import metrics
 from ...harness.metrics import Floats, Interval, Ranking, Share, Spread
 from ...harness.record import Record
-from ...harness.results import Results, listed
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
 from ...problems.robots import LIMIT_TOLERANCE
+from ...tables.results import Results, listed
 from ...tables.table import words
 from . import REACHABLE, UNREACHABLE
 

@@ -6,8 +6,8 @@ from ...figures.chart import MARKS, Axis, Chart, Panel, Series, series
 from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import Results, by_problem, solvers
 from ...tables.layout import Figure
+from ...tables.results import Results, by_problem, solvers
 
 
 def timing(subject: str, unit: str, scale: float, title: str) -> Figure:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import PRECISION, Results
+from ...tables.results import PRECISION, Results
 from .case import COMPILED, LIMIT
 
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from functools import partial
 
-from ...harness.results import PRECISION, leaders, steadiness
 from ...tables.columns import at, folded, text, words_in
 from ...tables.layout import Layout
+from ...tables.results import PRECISION, leaders, steadiness
 from ...tables.table import Column, Summary, words
 from . import figures, readings
 from .case import PLAIN

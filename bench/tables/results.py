@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..harness.metrics import Ranking
+from ..harness.record import Record, on_record
 from ..peers import registry
-from ..tables.table import words
 from ..text import all_visible
-from .metrics import Ranking
-from .record import Record, on_record
+from .table import words
 
 # So much may a time that is shown be off, in relative terms, by the drift of its machine.
 PRECISION = 0.05
