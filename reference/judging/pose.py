@@ -23,38 +23,27 @@ from ..skeleton import Skeleton
 
 @dataclass(frozen=True, eq=False)
 class PoseJudgement:
-    """What is known of a pose that is said to bring effectors to targets.
+    """What is known of a pose that is said to bring effectors to targets."""
 
-    Attributes:
-        distance: from effector to target [m], the largest of several.
-        angle: from the effector's to the target's rotation [rad], the largest of several; 0 where
-            no rotation is asked for.
-        distances: from each effector to its target [m], (target,).
-        angles: likewise [rad], (target,).
-        norm_deviation: the largest difference of a quaternion's length from one, as given.
-        limit_excess: how far each joint is beyond its limits [rad, of slides m], (joint,).
-        position_error: the largest distance between a joint's position as given and where the
-            rotations put it [m]; None if no positions were given.
-        length_error: the largest difference between a link's length by the positions given and as
-            the model has it [m]; None if none were given. Links that slide are left out.
-        positions: of all joints by forward kinematics of the normalised pose [m], (joint, 3).
-        names: of the joints.
-        tolerance: distance that counts as reached [m].
-        tolerance_rotation: angle that does [rad].
-    """
-
-    distance: float
+    distance: float  # from effector to target [m], the largest of several
+    # from the effector's to the target's rotation [rad], the largest of several; 0 where no
+    # rotation is asked for
     angle: float
-    distances: FloatArray
-    angles: FloatArray
-    norm_deviation: float
-    limit_excess: FloatArray
+    distances: FloatArray  # from each effector to its target [m], (target,)
+    angles: FloatArray  # likewise [rad], (target,)
+    norm_deviation: float  # the largest difference of a quaternion's length from one, as given
+    limit_excess: FloatArray  # how far each joint is beyond its limits [rad, of slides m], (joint,)
+    # the largest distance between a joint's position as given and where the rotations put it [m];
+    # None if no positions were given
     position_error: float | None
+    # the largest difference between a link's length by the positions given and as the model has it
+    # [m]; None if none were given. Links that slide are left out
     length_error: float | None
+    # of all joints by forward kinematics of the normalised pose [m], (joint, 3)
     positions: FloatArray
-    names: tuple[str, ...]
-    tolerance: float
-    tolerance_rotation: float
+    names: tuple[str, ...]  # of the joints
+    tolerance: float  # distance that counts as reached [m]
+    tolerance_rotation: float  # angle that does [rad]
 
     @property
     def reached(self) -> bool:

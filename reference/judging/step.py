@@ -29,40 +29,28 @@ MOST_ITERATIONS = 500
 
 @dataclass(frozen=True, eq=False)
 class StepJudgement:
-    """Errors and proven bounds of positions x as the result of a step.
+    """Errors and proven bounds of positions x as the result of a step."""
 
-    Attributes:
-        error: |x - x*| / |y - x*|; 0 if both distances are 0, infinite if only |y - x*| is, or if
-            Newton's method found no x*.
-        distance: |x - x*| over all coordinates [m].
-        displacement: |y - x*| over all coordinates [m].
-        pin_displacement: the largest distance of a pinned particle from its position at the end of
-            the step [m].
-        velocity_error: the largest difference of a velocity from (x - x_n) / h [m/s]; None without
-            velocities.
-        residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles.
-        certificate: the certificate of x with the pins moved to their positions at the end of the
-            step.
-        reference_certificate: the certificate of where Newton's method ended.
-        same_minimiser: whether the minimiser near x is proven to be the one near x* (True) or
-            another one (False); None if neither is proven.
-        minimiser: x*, shape (particle, 3) [m]; if there is none, where Newton's method ended.
-        iterations: number of iterations of Newton's method.
-        outcome: the outcome of Newton's method; there is no x* unless it is `solved`.
-    """
-
+    # |x - x*| / |y - x*|; 0 if both distances are 0, infinite if only |y - x*| is, or if Newton's
+    # method found no x*
     error: float
-    distance: float
-    displacement: float
+    distance: float  # |x - x*| over all coordinates [m]
+    displacement: float  # |y - x*| over all coordinates [m]
+    # the largest distance of a pinned particle from its position at the end of the step [m]
     pin_displacement: float
+    # the largest difference of a velocity from (x - x_n) / h [m/s]; None without velocities
     velocity_error: float | None
-    residual: float
+    residual: float  # |grad g(x)| / max(|grad g(y)|, floor), over the free particles
+    # the certificate of x with the pins moved to their positions at the end of the step
     certificate: Certificate
-    reference_certificate: Certificate
+    reference_certificate: Certificate  # the certificate of where Newton's method ended
+    # whether the minimiser near x is proven to be the one near x* (True) or another one (False);
+    # None if neither is proven
     same_minimiser: bool | None
+    # x*, shape (particle, 3) [m]; if there is none, where Newton's method ended
     minimiser: FloatArray
-    iterations: int
-    outcome: Outcome
+    iterations: int  # number of iterations of Newton's method
+    outcome: Outcome  # the outcome of Newton's method; there is no x* unless it is `solved`
 
     @property
     def summary(self) -> str:
