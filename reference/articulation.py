@@ -410,10 +410,7 @@ def joint_excess(joints, j, q):
 
 
 def normalise_start(joints, q):
-    """Make the quaternions among coordinates unit; return whether they and all others are valid.
-
-    Valid are numbers up to 1e75, and quaternions unit within 1e-6.
-    """
+    """Make quaternions unit; return whether they are so to 1e-6, and all numbers up to 1e75."""
     valid = True
     for k in range(len(q)):
         valid &= abs(q[k]) <= LARGEST_COORDINATE

@@ -67,10 +67,7 @@ def runge_kutta(
 def _accelerations(
     system: MassSpring, x: FloatArray, v: FloatArray, constant: FloatArray
 ) -> FloatArray:
-    """Return M^-1 f, zero at the pins, shape (particle, 3) [m/s²].
-
-    `constant` holds all forces but those of springs and dampers [N], shape (particle, 3).
-    """
+    """Return M^-1 f [m/s²], zero at the pins, f the constant forces plus those of springs."""
     total, free = constant + pulls(x, v, system.arrays), system.free
     result = np.zeros_like(total)
     result[free] = total[free] / system.masses[free, None]

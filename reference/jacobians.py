@@ -55,10 +55,7 @@ def jacobians(articulation: Model, q: ArrayLike, joints: ArrayLike | None = None
 
 
 def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
-    """Return the coordinates reached from q by moving with the velocity v for one second.
-
-    They are shaped like q; limits are not regarded.
-    """
+    """Return q, in its own shape, moved by the velocity v for one second, limits not regarded."""
     model, start = _coordinates("q", articulation, q)
     step = arguments.coordinates("v", v, "...", model.freedom_count)
     start, step = arguments.together("v", start, step)

@@ -225,11 +225,7 @@ class State(KeepsReadOnly):
     velocities: FloatArray
 
     def __init__(self, positions: ArrayLike, velocities: ArrayLike) -> None:
-        """Check and copy both.
-
-        Raises:
-            ValueError: if a shape is wrong, or a number not finite or beyond 1e75.
-        """
+        """Check and copy both; a ValueError if a shape is wrong, or a number not finite."""
         x = coordinates("positions", positions, "particle", 3)
         v = array("velocities", velocities, len(x), 3)
         self._store(x.copy(), v.copy())
@@ -249,19 +245,12 @@ class State(KeepsReadOnly):
 
 
 class Derivation(NamedTuple):
-    """The sparse matrices of Liu et al. 2013, before the Kronecker product with the 3 x 3 identity.
+    """Sparse matrices of Liu et al. 2013, before the Kronecker product with the 3 x 3 identity."""
 
-    Attributes:
-        A: shape (particle, spring); column A_i is 1 at spring i's first end, -1 at the other.
-        S: shape (spring, spring); column S_i is 1 at spring i.
-        L: the sum of k_i A_i A_i', shape (particle, particle) [N/m].
-        J: the sum of k_i A_i S_i', shape (particle, spring) [N/m].
-    """
-
-    A: Any
-    S: Any
-    L: Any
-    J: Any
+    A: Any  # shape (particle, spring); column A_i is 1 at spring i's first end, -1 at the other
+    S: Any  # shape (spring, spring); column S_i is 1 at spring i
+    L: Any  # the sum of k_i A_i A_i', shape (particle, particle) [N/m]
+    J: Any  # the sum of k_i A_i S_i', shape (particle, spring) [N/m]
 
 
 def derivation(system: MassSpring) -> Derivation:
@@ -298,10 +287,7 @@ def stretches(system: MassSpring, positions: ArrayLike) -> FloatArray:
 
 
 def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
-    """Return the energy of springs and gravity [J]: sum of k/2 (l - r)² - sum of m g·x.
-
-    Slack springs store none.
-    """
+    """Return the energy of springs and gravity [J]: sum of k/2 (l - r)² - sum of m g·x."""
     x = _positions(system, positions)
     return spring_energy(system, x) - float(np.sum(system.weights * x))
 
@@ -321,10 +307,7 @@ def kinetic_energy(system: MassSpring, state: State) -> float:
 def forces(
     system: MassSpring, state: State, external_forces: ArrayLike | None = None
 ) -> FloatArray:
-    """Return the total force on each particle [N], shape (particle, 3), external forces included.
-
-    At a pinned particle it is the load on the pin.
-    """
+    """Return the total force on each particle [N], (particle, 3); at a pin it is the load on it."""
     x, v = checked_state(system, state)
     return constant_forces(system, external_forces) + pulls(x, v, system.arrays)
 
@@ -386,11 +369,7 @@ def spring_blocks(
 
 
 def checked_state(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
-    """Return copies of a state's positions and velocities, the velocities of the pins set to zero.
-
-    Raises:
-        ValueError: if they are no MassSpring and State, or differ in their number of particles.
-    """
+    """Return copies of a state's positions and velocities, zero at the pins; else an error."""
     _system(system)
     instance("state", state, State)
     if len(state.positions) != system.particle_count:

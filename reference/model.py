@@ -12,10 +12,7 @@ Model: TypeAlias = "Skeleton | Articulation | Robot"
 
 
 def checked_model(model: Any, argument: str = "skeleton") -> Skeleton | Articulation:
-    """Return the model, of a Robot its articulation.
-
-    Anything else is a ValueError that speaks of the argument named.
-    """
+    """Return the model, of a Robot its articulation; else raise a ValueError about the argument."""
     if isinstance(model, Skeleton) or isinstance(model, Articulation):  # noqa: SIM101, a union is slow
         return model
     from .formats.robot import Robot  # the readers are loaded by whoever has read a robot

@@ -32,10 +32,7 @@ def random(rng: np.random.Generator, *shape: int) -> FloatArray:
 
 
 def unit(name: str, q: ArrayLike) -> FloatArray:
-    """Return quaternions within 1e-6 of unit length, (..., 4), normalised once.
-
-    `name` is the argument's, for the error.
-    """
+    """Return quaternions within 1e-6 of unit length, (..., 4), made unit; or raise an error."""
     values = arguments.array(name, q, "...", 4)
     lengths = np.linalg.norm(values, axis=-1, keepdims=True)
     check_unit(name, lengths[..., 0])

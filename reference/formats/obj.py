@@ -30,23 +30,14 @@ NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 
 
 class Mesh(NamedTuple):
-    """A triangle mesh.
+    """A triangle mesh."""
 
-    Attributes:
-        vertices: [m], shape (vertex, 3).
-        triangles: indices of vertices, shape (triangle, 3).
-    """
-
-    vertices: FloatArray
-    triangles: IndexArray
+    vertices: FloatArray  # [m], shape (vertex, 3)
+    triangles: IndexArray  # indices of vertices, shape (triangle, 3)
 
 
 def read_obj(path: str | os.PathLike[str]) -> Mesh:
-    """Return the mesh in an OBJ file of at most 256 MiB.
-
-    Raises:
-        ValueError: naming the file, if it cannot be read as text, or as `parse_obj` says.
-    """
+    """Return the mesh in an OBJ file of at most 256 MiB; errors are those of `parse_obj`."""
     return parse_obj(read_text(path), name=str(path))
 
 

@@ -17,18 +17,14 @@ INFINITY = float("inf")
 
 
 class Robot(NamedTuple):
-    """A robot or a character read from a file.
+    """A robot or a character read from a file."""
 
-    Attributes:
-        articulation: one joint for each link or body of the file, with its name and pose.
-        joints: index of the articulation's joint by the name of the file's joint; its coordinates
-            in q are `articulation.coordinates_of(joints[name])`.
-        home: the coordinates of the configuration in the file, (coordinate,).
-    """
-
+    # one joint for each link or body of the file, with its name and pose
     articulation: Articulation
+    # index of the articulation's joint by the name of the file's joint; its coordinates in q are
+    # `articulation.coordinates_of(joints[name])`
     joints: dict[str, int]
-    home: FloatArray
+    home: FloatArray  # the coordinates of the configuration in the file, (coordinate,)
 
 
 class Link(NamedTuple):

@@ -230,11 +230,7 @@ class ImplicitEuler:
 
 
 def _start(solver: str, start: str | None) -> str:
-    """Return the checked first iterate of a solver.
-
-    Raises:
-        ValueError: if the start is unknown, or y for Gauss-Newton.
-    """
+    """Return the checked first iterate of a solver; Gauss-Newton has no choice."""
     valid = STARTS[1:] if solver == "gauss_newton" else STARTS
     return valid[0] if start is None else choice("start", start, valid)
 

@@ -29,11 +29,7 @@ class GlobalMatrixSolver:
 
 
 def global_factor(system: MassSpring, h: float) -> Factor:
-    """Return the factor of M + h² L.
-
-    Raises:
-        NotPositiveDefiniteError: if it is singular to rounding because masses are too small.
-    """
+    """Return the factor of M + h² L; an error if masses are too small beside h² k."""
     try:
         return prefactored(global_matrix(system, h))
     except NotPositiveDefiniteError:

@@ -184,10 +184,7 @@ def is_better(attempt, best):
 
 
 def most_promising(progress):
-    """Return the attempt to go on with of those given up, -1 if there is none.
-
-    The least patient come first, and among them the one of the least merit.
-    """
+    """Return the attempt given up to go on with: the least patient, then the best; -1 if none."""
     best, row = -1, progress[-1]
     for k in range(len(progress) - 1):
         attempt = progress[k]

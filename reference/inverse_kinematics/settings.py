@@ -66,11 +66,7 @@ def default_solver(model: Any, target: Any) -> tuple[str, int]:
 
 
 def checked_settings(*given: Any) -> Settings:
-    """Return the settings, of which the same are often asked for again.
-
-    Raises:
-        ValueError: if one is out of range or unknown.
-    """
+    """Return the settings, of which the same are often asked for again."""
     try:
         return _known_settings(*given)
     except TypeError:  # one has no hash, and so is no number or name

@@ -243,10 +243,7 @@ def balls(skeleton: Skeleton) -> Articulation:
 
 
 def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> RecordArray:
-    """Return targets as the kernels take them, records TARGET, (target, effector).
-
-    Weights count beside one another, so that the largest may be one.
-    """
+    """Return targets as records TARGET, (target, effector), the largest weight one."""
     count, heaviest = len(targets), max([target.weight for target in targets])
     rows = np.empty((*batch, count), TARGET)
     for e, target in enumerate(targets):
@@ -259,10 +256,7 @@ def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> RecordA
 def batch_shape(
     starts: tuple[int, ...], targets: list[CheckedTarget], name: str
 ) -> tuple[int, ...]:
-    """Return the leading axes of starts and targets, broadcast against one another.
-
-    The name is that of the starts, for the error.
-    """
+    """Return the leading axes of starts, called `name` in errors, and targets, broadcast."""
     batch = starts
     for target in targets:
         for values in (target.position, target.rotation):

@@ -110,10 +110,7 @@ def grid_cloth(
 
 
 def grid_triangles(rows: int, columns: int) -> IndexArray:
-    """Return the triangles of a `grid_cloth`, two per square, shape (triangle, 3).
-
-    They are counter-clockwise as seen from above.
-    """
+    """Return the triangles of a `grid_cloth`, two per square, facing up, (triangle, 3)."""
     rows, columns = _shape(rows, columns)
     corner = np.arange(rows * columns).reshape(rows, columns)
     a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
@@ -134,10 +131,7 @@ def net(
     damping: float = 0.0,
     gravity: float = 9.81,
 ) -> tuple[MassSpring, State]:
-    """Return a horizontal net of tension-only ropes, pinned at its four corners.
-
-    It is a `grid_cloth` without shear and bending springs.
-    """
+    """Return a net of tension-only ropes, a `grid_cloth` pinned at its four corners."""
     rows, columns = _shape(rows, columns)
     particles = rows * columns
     return grid_cloth(

@@ -18,11 +18,7 @@ def at_rest(
     gravity: float,
     tension_only: ArrayLike = False,
 ) -> tuple[MassSpring, State]:
-    """Return a system at rest at its positions, with one damping and gravity downwards.
-
-    Raises:
-        ValueError: as `MassSpring` does, and if damping or gravity is not a number.
-    """
+    """Return a system at rest at its positions, with one damping and gravity downwards."""
     system = MassSpring(
         masses=masses,
         springs=springs,

@@ -26,19 +26,13 @@ from ..quaternion import add, cross, dot, load_vector, scale, store_vector, subt
 
 
 class Motions(NamedTuple):
-    """The motions by all freedoms, from the root on: each a rotation or a translation.
+    """The motions by all freedoms, from the root on: each a rotation or a translation."""
 
-    Attributes:
-        owners: the joint and the freedom of each, (motion, 2).
-        angular: angular velocities by a unit of the freedom, in the world, (motion, 3).
-        linear: linear velocities of the joint [m], (motion, 3).
-        moments: vectors whose product with the angular velocity of a motion above is m times the
-            effector's second derivative by both, (motion, 3).
-    """
-
-    owners: IndexArray
-    angular: FloatArray
-    linear: FloatArray
+    owners: IndexArray  # the joint and the freedom of each, (motion, 2)
+    angular: FloatArray  # angular velocities by a unit of the freedom, in the world, (motion, 3)
+    linear: FloatArray  # linear velocities of the joint [m], (motion, 3)
+    # vectors whose product with the angular velocity of a motion above is m times the effector's
+    # second derivative by both, (motion, 3)
     moments: FloatArray
 
 

@@ -317,12 +317,8 @@ def test_slightly_long_quaternions_are_normalised_once(arm, q, backend):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda q: q[:-1], r"expected shape \(..., 13\), got \(12,\)"),
-        (lambda q: np.where(q == q[0], np.nan, q), "expected finite numbers, got nan"),
-        (lambda q: np.where(q == q[1], 1e80, q), "expected coordinates of at most 1e.75"),
         (lambda q: np.where(q == q[4], 2.0, q), "expected unit quaternions"),
         (lambda q: 0.0 * q, "expected unit quaternions .* length 0"),
-        (lambda q: "pose", "expected an array of numbers"),
     ],
 )
 @pytest.mark.parametrize("use", ["clamp", "within_limits", "local_transforms", "forward"])
@@ -334,34 +330,22 @@ def test_bad_coordinates_are_named(use, change, message, arm, q, backend):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"skeleton": "arm"}, "skeleton: expected a Skeleton, got str"),
         ({"kinds": ["hinge"]}, "kinds: expected 3 kinds, one a joint, got 1"),
         ({"kinds": "wheel"}, "kinds: expected one of fixed, hinge, .*, got 'wheel'"),
         ({"axes": [0, 0, 0]}, "axes: expected lengths of at least 1e-75, got 0"),
         ({"axes": np.ones((2, 3))}, r"axes: expected one, or one for each of 3 joints, got \(2,\)"),
-        ({"axes": [1.0, np.nan, 0.0]}, "axes: expected finite numbers"),
-        ({"axes": [1.0, 0.0]}, r"axes: expected shape \(..., 3\), got \(2,\)"),
         ({"frames": [1.0, 1.0, 0.0, 0.0]}, "frames: expected unit quaternions"),
         ({"frames": rotation.identity(2)}, "frames: expected one, or one for each of 3 joints"),
         ({"lower": [1.0, 2.0]}, "lower: expected one, or one for each of 3 joints"),
-        ({"upper": np.nan}, "upper: expected numbers or infinity, got NaN"),
-        (
-            {"lower": [0, 2, 0], "upper": [1, 1, 1]},
-            "lower: expected at most the upper limit, 1, got 2 for joint 1",
-        ),
         ({"lower": 3.2}, "lower: expected limits of a ball's twist .* got 3.2 to inf for joint 2"),
         ({"upper": -3.2}, "lower: expected limits of a ball's twist .* got -inf to -3.2"),
         ({"cones": -1.0}, "cones: expected none below 0, got -1"),
-        ({"cones": np.nan}, "cones: expected numbers or infinity, got NaN"),
         ({"cones": [1.0, 2.0]}, "cones: expected one, or one for each of 3 joints"),
-        ({"mimics": {7: Mimic(0)}}, "mimics: expected an integer .* got 7"),
         ({"mimics": {1: Mimic("hip")}}, "mimics: expected one of .* got 'hip'"),
         ({"mimics": {1: Mimic(2)}}, "mimics: expected hinges or slides, got 'ball' for joint 2"),
         ({"mimics": {2: Mimic(1)}}, "mimics: expected hinges or slides, got 'ball' for joint 2"),
         ({"mimics": {0: Mimic(1), 1: Mimic(0)}}, "mimics: expected a leader, got .* in a ring"),
         ({"mimics": {1: Mimic(1)}}, "mimics: expected a leader, got 'joint1' in a ring"),
-        ({"mimics": {1: Mimic(0, np.inf)}}, "mimics: expected a finite number, got inf"),
-        ({"mimics": {1: Mimic(0, 1.0, np.nan)}}, "mimics: expected a finite number, got nan"),
     ],
 )
 def test_bad_arguments_are_named(arguments, message):

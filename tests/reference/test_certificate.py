@@ -341,11 +341,6 @@ class TestDistance:
         assert known.covered
         assert known.distance < 1e-6
 
-    def test_wrong_positions_are_named(self, network):
-        objective, _ = step_of(*network)
-        with pytest.raises(ValueError, match=r"^positions: expected shape \(7, 3\)"):
-            certify(objective, np.zeros((6, 3)))
-
 
 class TestMinimisers:
     """Whether two answers stand for one and the same minimiser."""

@@ -191,37 +191,6 @@ class TestObjective:
         assert bend == pytest.approx(np.sum(direction * (Q @ direction)), rel=1e-12)
         assert (Q[[2]].toarray() == np.eye(7)[2]).all()
 
-    def test_a_wrong_d_is_named(self, problem):
-        with pytest.raises(ValueError, match=r"^d: expected shape"):
-            problem[0].quadratic_form(problem[1], np.zeros((2, 3)))
-
-    METHODS = ("evaluate", "value", "gradient", "hessian", "rest_vectors")
-
-    @pytest.mark.parametrize("method", METHODS)
-    @pytest.mark.parametrize("shape", [(6, 3), (8, 3), (7, 2), (3, 7), (21,), (7, 3, 1), (0, 3)])
-    def test_wrong_positions_are_named(self, problem, method, shape):
-        with pytest.raises(ValueError, match=r"^positions: expected shape \(7, 3\)"):
-            getattr(problem[0], method)(np.zeros(shape))
-
-    @pytest.mark.parametrize("method", METHODS)
-    def test_positions_that_are_no_numbers_are_named(self, problem, method):
-        for wrong, message in (
-            (np.full((7, 3), np.nan), "finite numbers, got nan"),
-            (np.full((7, 3), 1e200), "coordinates of at most"),
-            ("cloth", "an array of numbers"),
-        ):
-            with pytest.raises(ValueError, match=f"^positions: expected {message}"):
-                getattr(problem[0], method)(wrong)
-
-    def test_lists_and_single_precision_are_evaluated_as_they_are(self, problem):
-        objective, x = problem
-        x = x.astype(np.float32)
-        expected = objective.evaluate(x.astype(float))
-        for same in (x, x.tolist(), np.asfortranarray(x)):
-            found = objective.evaluate(same)
-            assert (found.value, found.gradient_norm) == (expected.value, expected.gradient_norm)
-            np.testing.assert_array_equal(found.gradient, expected.gradient)
-
     def test_a_wrong_step_is_named(self, network):
         for wrong in (0.0, -1.0, np.nan, "fast"):
             with pytest.raises(ValueError, match=r"^h: expected a"):
@@ -908,15 +877,9 @@ class TestInputs:
         [
             ("h", 0.0, "greater than 0"),
             ("h", -1.0, "greater than 0"),
-            ("h", np.nan, "finite"),
-            ("h", 1e200, "expected a number of at most 1e.75"),
-            ("h", "fast", "a number, got 'fast'"),
             ("solver", "simplex", f"one of {', '.join(STEP_SOLVERS)}, got 'simplex'"),
             ("tolerance", -1e-3, "at least 0"),
-            ("tolerance", np.inf, "finite"),
             ("max_iterations", -1, "at least 0"),
-            ("max_iterations", 2.5, "integer"),
-            ("max_iterations", True, "integer"),
             ("start", "z", "one of y, x_n, got 'z'"),
             ("start", 1, "one of y, x_n, got 1"),
         ],
@@ -925,21 +888,12 @@ class TestInputs:
         with pytest.raises(ValueError, match=f"^{name}: .*{message}"):
             ImplicitEuler(cloth[0], **{name: value})
 
-    def test_a_wrong_system_is_named(self, cloth):
-        with pytest.raises(ValueError, match=r"^system: expected a MassSpring, got State"):
-            ImplicitEuler(cloth[1])
-
     def test_a_wrong_state_is_named(self, cloth, network, solver):
         integrator = ImplicitEuler(cloth[0], solver=solver)
         with pytest.raises(ValueError, match=r"^state: expected 25 particles, got 7"):
             integrator.step(network[1])
         with pytest.raises(ValueError, match=r"^state: expected a State, got ndarray"):
             integrator.step(cloth[1].positions)
-
-    @pytest.mark.parametrize("given", [np.zeros(3), np.zeros((7, 2)), np.full((25, 3), np.nan)])
-    def test_wrong_external_forces_are_named(self, cloth, given):
-        with pytest.raises(ValueError, match=r"^external_forces: "):
-            ImplicitEuler(cloth[0]).step(cloth[1], given)
 
     def test_settings_cannot_be_changed_behind_the_factor(self, cloth):
         integrator = ImplicitEuler(cloth[0])

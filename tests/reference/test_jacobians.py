@@ -173,20 +173,12 @@ def test_inputs_stay_as_they_were(arm, q, backend):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda m, q: jacobian("arm", q), "articulation: expected a Skeleton, an Articulation or"),
-        (lambda m, q: jacobian(m, q[:-1]), "q: expected shape"),
         (lambda m, q: jacobians(m, 2.0 * q), "q: expected unit quaternions"),
-        (lambda m, q: jacobian(m, q, 7), "effector: expected an integer"),
         (lambda m, q: jacobian(m, q, "hand"), "effector: expected one of"),
-        (lambda m, q: jacobian(m.skeleton, q), r"q: expected shape \(..., 7, 4\)"),
-        (lambda m, q: integrate(m, q, np.ones(10)), r"v: expected shape \(..., 11\), got \(10,\)"),
-        (lambda m, q: integrate(m, q, np.full(11, np.nan)), "v: expected finite numbers"),
         (
             lambda m, q: integrate(m, np.stack([q, q]), np.ones((3, 11))),
             r"v: expected leading axes that broadcast with \(2,\), got \(3,\)",
         ),
-        (lambda m, q: difference(m, q[:-1], q), "q1: expected shape"),
-        (lambda m, q: difference(m, q, q[:-1]), "q0: expected shape"),
         (lambda m, q: difference(m, [q, q], [q, q, q]), "q1: expected leading axes"),
     ],
 )

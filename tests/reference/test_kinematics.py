@@ -151,13 +151,9 @@ def test_a_scene_not_unpacked_is_named(convert):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda q: q[:-1], r"expected shape \(..., 6, 4\), got \(5, 4\)"),
-        (lambda q: q[..., :3], r"expected shape \(..., 6, 4\), got \(6, 3\)"),
-        (lambda q: np.where(q == q[2, 1], np.nan, q), "expected finite numbers, got nan"),
         (lambda q: 0.0 * q, "expected unit quaternions .* length 0 at index"),
         (lambda q: 1.00001 * q, "expected unit quaternions"),
         (lambda q: 0.99999 * q, "expected unit quaternions"),
-        (lambda q: "pose", "expected an array of numbers"),
     ],
 )
 def test_bad_rotations_are_named(convert, change, message, skeleton, local, backend):

@@ -205,11 +205,8 @@ class TestClothFromMesh:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            ({"vertices": KITE[:, :2]}, "^vertices: expected shape"),
-            ({"vertices": np.full((5, 3), np.nan)}, "^vertices: .*finite"),
             ({"triangles": [[0, 1, 5]]}, "^triangles: .*from 0 to 4, got 5"),
             ({"triangles": [[0, 1, -1]]}, "^triangles: .*got -1"),
-            ({"triangles": [[0, 1]]}, "^triangles: expected shape"),
             ({"triangles": [[0, 1, 2], [3, 1, 3]]}, r"^triangles: .*\[3, 1, 3\] at index 1"),
             ({"triangles": [[0, 1, 2], [1, 0, 3], [2, 0, 1]]}, "^triangles: .*indices 0, 2"),
             ({"density": 1.0}, "^density, mass: .*got both"),

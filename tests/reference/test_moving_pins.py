@@ -177,17 +177,3 @@ def test_a_system_without_pins_takes_an_empty_path(network, altered, step):
     system = altered(network[0], pinned=())
     one, other = (step(system, network[1], h, None, pins) for pins in (None, np.empty((0, 3))))
     np.testing.assert_array_equal(one.positions, other.positions)
-
-
-@pytest.mark.parametrize(
-    ("pins", "message"),
-    [
-        (np.zeros((7, 3)), r"shape \(2, 3\), got \(7, 3\)"),
-        (np.zeros(3), r"shape \(2, 3\), got \(3,\)"),
-        (np.full((2, 3), np.nan), "finite"),
-        ("up", "numbers"),
-    ],
-)
-def test_a_wrong_path_is_named(hung, step, pins, message):
-    with pytest.raises(ValueError, match=f"^pin_positions: .*{message}"):
-        step(hung[0], hung[1], h, None, pins)

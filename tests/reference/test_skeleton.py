@@ -11,12 +11,7 @@ FORK = {"parents": [-1, 0, 1, 1, 0], "offsets": np.arange(15.0).reshape(5, 3)}
 @pytest.mark.parametrize(
     ("parents", "offsets", "names", "message"),
     [
-        ([-1, 0], np.zeros((2, 2)), None, r"offsets: expected shape \(joint, 3\), got \(2, 2\)"),
         ([], np.zeros((0, 3)), None, "offsets: expected at least one joint"),
-        ([-1, 0], [[0, 0, 0], [0, np.nan, 0]], None, "offsets: expected finite numbers, got nan"),
-        ([-1, 0], [[0, 0, 0], [0, 1e80, 0]], None, r"offsets: expected .* at most 1e\+75"),
-        ([-1], np.zeros((2, 3)), None, r"parents: expected shape \(2,\), got \(1,\)"),
-        ([-1.0, 0.0], np.zeros((2, 3)), None, "parents: expected integer indices, got float64"),
         ([0, 0], np.zeros((2, 3)), None, r"parents: expected one root \(parent -1\), got 0"),
         ([-1, -1], np.zeros((2, 3)), None, r"parents: expected one root \(parent -1\), got 2"),
         ([-1, 5], np.zeros((2, 3)), None, "parents: expected indices from -1 to 1, got 5"),

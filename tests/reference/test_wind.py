@@ -162,15 +162,8 @@ def test_a_curtain_is_blown_aside():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"state": np.zeros((3, 3))}, "^state: expected a State, got ndarray"),
         ({"triangles": [[0, 1, 3]]}, "^triangles: .* from 0 to 2, got 3"),
-        ({"triangles": [0, 1, 2]}, "^triangles: expected shape"),
-        ({"triangles": [[0.0, 1.0, 2.0]]}, "^triangles: expected integer"),
-        ({"wind": np.zeros((2, 3))}, r"^wind: expected shape \(3, 3\)"),
-        ({"wind": 3.0}, "^wind: expected shape"),
-        ({"wind": [0, np.nan, 0]}, "^wind: expected finite"),
         ({"density": -1.0}, "^density: .*at least 0"),
-        ({"drag": np.inf}, "^drag: .*finite"),
         ({"lift": "much"}, "^lift: .*number"),
     ],
 )

@@ -12,19 +12,13 @@ from ...skeleton import Pose, Skeleton, checked_skeleton
 
 
 class Motion(NamedTuple):
-    """A skeleton and its poses over time; `bvh.write(path, *motion)` writes it to a file.
+    """A skeleton and its poses over time; `bvh.write(path, *motion)` writes it to a file."""
 
-    Attributes:
-        skeleton: the offset of its root is the root's position in the first frame.
-        local_rotations: (frame, joint, 4).
-        frame_time: time between frames [s].
-        offsets: each joint's position in its parent's frame, for the root in the world, (frame,
-            joint, 3); equal to the skeleton's offsets for joints without position channels.
-    """
-
-    skeleton: Skeleton
-    local_rotations: FloatArray
-    frame_time: float
+    skeleton: Skeleton  # the offset of its root is the root's position in the first frame
+    local_rotations: FloatArray  # (frame, joint, 4)
+    frame_time: float  # time between frames [s]
+    # each joint's position in its parent's frame, for the root in the world, (frame, joint, 3);
+    # equal to the skeleton's offsets for joints without position channels
     offsets: FloatArray
 
     def pose(self) -> Pose:

@@ -222,10 +222,7 @@ def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, Floa
 
 
 def _extra_frame(lines: _Lines, values: FloatArray) -> int:
-    """Return the line number of a single extra frame after the last one, 0 if the text ends.
-
-    Anything else is a ValueError.
-    """
+    """Return the line number of a single extra frame, 0 if the text ends after the last one."""
     count, width = values.shape
     line = next(iter(lines), "")
     number = lines.number

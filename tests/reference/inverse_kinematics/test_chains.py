@@ -453,18 +453,9 @@ def test_a_target_names_its_effector(skeleton, local, target, solver, backend):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"target": [1.0, np.nan, 0.0]}, "target: expected finite numbers, got nan"),
-        ({"target": [1e80, 0.0, 0.0]}, "target: expected coordinates of at most"),
         ({"target": np.zeros((2, 3))}, "target: expected leading axes that broadcast"),
         ({"effector": "hand"}, "effector: expected one of joint0"),
-        ({"effector": 6}, "effector: expected an integer of at least -6 and at most 5, got 6"),
-        (
-            {"skeleton": scenes.lab_arm()},
-            "skeleton: expected a Skeleton, an Articulation or a Robot, got t",
-        ),
         ({"local_rotations": np.zeros((3, 6, 4))}, "local_rotations: expected unit quaternions"),
-        ({"local_rotations": np.full((3, 6, 4), np.nan)}, "local_rotations: expected finite"),
-        ({"local_rotations": np.ones((5, 4))}, r"local_rotations: expected shape \(..., 6, 4\)"),
     ],
 )
 def test_bad_input_is_named(change, message, skeleton, rng, backend):
