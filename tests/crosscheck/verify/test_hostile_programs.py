@@ -39,7 +39,7 @@ HUNG = {
         FORK.format(before="os.setsid(); os.fork() and os._exit(0)") + "while True: tick()",
         "no answer",
     ),
-    "forks and forks": ("for _ in range(4): os.fork()\nwhile True: tick()", "no answer"),
+    "forks and forks": ("for _ in range(4): os.fork()\nwhile True: tick()", " 0.5 s"),
     "ignores all signals": (
         "for one in (1, 2, 3, 13, 15): signal.signal(one, signal.SIG_IGN)\nwhile True: tick()",
         "no answer",
