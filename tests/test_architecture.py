@@ -53,4 +53,4 @@ def test_relative_imports_are_resolved(draw, tmp_path):
     file = tmp_path / "module.py"
     file.write_text(code)
     found = draw.imports(file, "bench.package.module")
-    assert found == ("bench.package.near", "bench.room.far", "plumbob.reference.curve")
+    assert found == ("bench.package.near", "bench.room.far", "reference.curve")

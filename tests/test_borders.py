@@ -23,7 +23,7 @@ PROGRAM = Path(border_walk.__file__)
 FEWEST = {"arrays": 9_000, "bounds": 1_200, "magnitudes": 4_500, "objects": 40_000, "random": 600}
 # Arguments that are no number or array in any call, and why.
 WITHOUT_NUMBERS = {
-    "plumbob.reference.implicit_euler.ImplicitEuler.certify: result": "of a StepResult in one call",
+    "reference.implicit_euler.ImplicitEuler.certify: result": "of a StepResult in one call",
 }
 
 

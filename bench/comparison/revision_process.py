@@ -20,7 +20,7 @@ def main(folder: str, scale: str, *suites: str) -> None:
     record = importlib.import_module(f"{bench}.harness.record")
     run = importlib.import_module(f"{bench}.harness.run")
 
-    if not Path(str(run.__file__)).is_relative_to(folder):
+    if not Path(str(run.__file__)).resolve().is_relative_to(Path(folder).resolve()):
         sys.exit(f"expected the bench of {folder}, got {run.__file__}")
     blocks = {
         run.block_key(block): block

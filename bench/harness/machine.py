@@ -8,13 +8,13 @@ import os
 import platform
 import re
 import statistics
-import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import psutil
 
+from ..peers.sources import git_commit
 from .stopwatch import timed
 
 PACKAGES = (
@@ -28,7 +28,6 @@ PACKAGES = (
     "example-robot-data",
     "gymnasium",
     "dm_control",
-    "pytest-benchmark",
     "matplotlib",
 )
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,7 +36,6 @@ _PACKAGES = ("reference", "crosscheck", "bench")
 PRESENTATION = (
     "bench/comparison",
     "bench/figures",
-    "bench/harness/results.py",
     "bench/motion",
     "bench/report",
     "bench/show",
@@ -45,7 +43,7 @@ PRESENTATION = (
     "crosscheck/verify/output",
 )
 # Likewise in every experiment.
-PRESENTATION_FILES = ("tables.py", "figures.py", "readings.py", "files.py")
+PRESENTATION_FILES = ("tables.py", "participants.py", "figures.py", "readings.py", "files.py")
 
 
 @functools.cache
@@ -90,18 +88,6 @@ def _our_commit() -> str:
 def commit_of(root: Path) -> str:
     """Return the commit of sources, and whether they were changed since; "" outside of git."""
     return git_commit(root, _PACKAGES) if (root / ".git").exists() else ""
-
-
-def git_commit(folder: Path, paths: Sequence[str]) -> str:
-    """Return the commit of a folder, and whether these paths differ from it; "" outside of git."""
-    git = ["git", "-C", str(folder)]
-    try:
-        head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, check=True)
-        status = [*git, "status", "--porcelain", "--", *paths]
-        changed = subprocess.run(status, capture_output=True, check=True).stdout
-    except (OSError, subprocess.CalledProcessError):  # no git, or no commit yet
-        return ""
-    return head.stdout.decode().strip() + (" with changes" if changed else "")
 
 
 def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:

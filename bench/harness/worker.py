@@ -12,6 +12,7 @@ import numpy as np
 
 from plumbob.crosscheck.child_process import connect
 
+from ..peers.protocol import describe
 from .progress import Progress, listening
 
 
@@ -49,6 +50,11 @@ class Solved(NamedTuple):
     trouble: str
     round_trip: float = 0.0
     doubt: str = ""
+
+    @property
+    def at_door(self) -> float:
+        """What its door cost beside it [s]."""
+        return max(0.0, self.round_trip - self.seconds)
 
 
 class Unfit(NamedTuple):
@@ -99,16 +105,6 @@ class Calculation(NamedTuple):
             yield Done()
         except Exception as error:
             yield Unfit(describe(error))
-
-
-class NoAnswerError(Exception):
-    """A solver gave no answer; the message is a sentence that says why."""
-
-
-def describe(error: Exception) -> str:
-    """Return what an exception says, on one line; its type too unless it is a `NoAnswerError`."""
-    kind = "" if isinstance(error, NoAnswerError) else f"{type(error).__name__}: "
-    return " ".join(f"{kind}{error}".split())[:300]
 
 
 def serve(requests: Connection, answers: Connection) -> None:

@@ -19,8 +19,6 @@ from pathlib import Path
 import pytest
 
 from plumbob import cli
-from plumbob.bench.entrants.entrant import Entrant
-from plumbob.bench.entrants.sources import digest_of
 from plumbob.bench.experiments import EXPERIMENTS, SCALES, Block, Measured, Scale, blocks
 from plumbob.bench.harness import run
 from plumbob.bench.harness.choice import Choice
@@ -29,8 +27,10 @@ from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import block_key, measure
 from plumbob.bench.harness.progress import Progress, listening
 from plumbob.bench.harness.record import RecordFile, encode
-from plumbob.bench.harness.results import Results, plain
+from plumbob.bench.peers.entrant import Entrant
+from plumbob.bench.peers.sources import digest_of
 from plumbob.bench.report.sections import tables
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import markdown
 
 TINY = Scale(targets=3, seconds=0.001)
@@ -408,7 +408,7 @@ def address(cluster):
 
 def shown(folder, suites):
     """All tables as text."""
-    made = tables(Results([plain(record) for record in RecordFile(folder).read().records]), suites)
+    made = tables(Results(RecordFile(folder).read().records), suites)
     return {table.name: markdown(table) for table in made if table.rows}
 
 

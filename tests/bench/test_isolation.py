@@ -9,19 +9,19 @@ import pytest
 
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.robots import measurement as robots
-from plumbob.bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
-from plumbob.bench.experiments.robots.job import AGAIN, Job
-from plumbob.bench.experiments.robots.problem import robot
-from plumbob.bench.experiments.robots.tables import OF_KIND
+from plumbob.bench.experiments.robots.tables import outcomes
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess, raised
+from plumbob.bench.harness.job import AGAIN, Job
 from plumbob.bench.harness.measure import record_of
-from plumbob.bench.harness.results import Results
 from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.registry import ONE_START, Entry, Peer
+from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.problems.robots import robot
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import markdown
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
@@ -141,7 +141,7 @@ def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(worker, targ
 
 def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monkeypatch):
     """What is timed is timed as in a loop of solves and nothing else."""
-    monkeypatch.setattr("plumbob.bench.experiments.robots.job.QUICK", 0.1)
+    monkeypatch.setattr("plumbob.bench.harness.job.QUICK", 0.1)
     counts, called = [], 0
 
     def timed(call):
@@ -150,7 +150,7 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
         called = 0
         return stopwatch.timed(call)
 
-    monkeypatch.setattr("plumbob.bench.experiments.robots.job.timed", timed)
+    monkeypatch.setattr("plumbob.bench.harness.job.timed", timed)
     fake = importlib.import_module("fake_solvers")
     prepare = fake.prepare
 
@@ -184,8 +184,8 @@ def test_the_answers_are_the_same_however_often_a_quick_solve_is_made_again(
     """On a quick machine solves are warmed up and on a slow one not: no answer may depend on it."""
 
     def answers(quick, again):
-        monkeypatch.setattr("plumbob.bench.experiments.robots.job.QUICK", quick)
-        monkeypatch.setattr("plumbob.bench.experiments.robots.job.AGAIN", again)
+        monkeypatch.setattr("plumbob.bench.harness.job.QUICK", quick)
+        monkeypatch.setattr("plumbob.bench.harness.job.AGAIN", again)
         said = messages(targets, manner, restarts=restarts)
         return np.array([one.q for one in said if isinstance(one, Solved)])
 
@@ -337,41 +337,41 @@ def test_a_missing_peer_costs_one_block_that_says_so(suite):
 
 
 def test_every_manner_becomes_one_record(suite):
-    arrays, notes, _ = suite.blocks["liar", "robots/iiwa14"].measure()
-    assert arrays["claimed"].tolist() == [1] * 6
-    assert not arrays["solved"].any()
+    solves, notes, _ = suite.blocks["liar", "robots/iiwa14"].measure()
+    assert solves.claimed.tolist() == [1] * 6
+    assert not solves.solved.any()
     assert notes["remark"] == ""
-    arrays, notes, _ = suite.blocks["unable", "robots/iiwa14"].measure()
-    assert "solved" not in arrays
+    solves, notes, _ = suite.blocks["unable", "robots/iiwa14"].measure()
+    assert solves.solved is None
     assert notes["remark"] == "takes no iiwas"
 
 
 def test_the_target_that_a_solver_hangs_on_counts_as_failed_with_the_time_it_took(suite):
     """The next targets are given to a new process, in which it hangs on its second again."""
-    arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
-    assert arrays["exception"].tolist() == [False, True] * 3
-    assert not arrays["solved"][1]
-    assert arrays["seconds"][1] == 0.5
-    assert np.isnan(arrays["position"][1])
+    solves, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
+    assert solves.exception.tolist() == [False, True] * 3
+    assert not solves.solved[1]
+    assert solves.seconds[1] == 0.5
+    assert np.isnan(solves.position[1])
     assert notes["remark"] == "ended after 0.5 s of silence, on 3 of 6 targets"
 
 
 def test_a_process_lost_at_the_end_of_the_budget_is_not_started_again(suite, monkeypatch):
     """Else a solver that hangs on every target would take hours."""
     monkeypatch.setattr(robots, "Budget", lambda seconds: SimpleNamespace(is_spent=True))
-    arrays, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
-    assert arrays["exception"].tolist() == [False, True]
+    solves, notes, _ = suite.blocks["hangs", "robots/iiwa14"].measure()
+    assert solves.exception.tolist() == [False, True]
     assert notes["remark"] == "ended after 0.5 s of silence"
 
 
 @pytest.mark.parametrize(("solver", "count"), [("hangs", 3), ("raises", 1)])
 def test_what_a_solver_raises_is_printed_as_such_and_not_as_no_answer(suite, solver, count):
     block = suite.blocks[solver, "robots/iiwa14"]
-    table = OF_KIND[ONE_START].outcomes(Results([record_of(block, block.measure(), 0.0)]))
+    table = outcomes(Results([record_of(block, block.measure(), 0.0)]))
     heading, _, row = (line.split(" | ") for line in markdown(table).splitlines() if "|" in line)
     printed = {name.strip("| "): cell.strip("| ") for name, cell in zip(heading, row, strict=True)}
     assert printed["wrong claim"] == str(6 - count)
     assert printed["exception or crash"] == str(count)
     assert printed["no answer"] == printed["not begun"] == "0"
     expected = f"{solver}: {6 - count} wrong claim and {count} exception or crash, of 6"
-    assert table.summary.points == (expected,)
+    assert table.summary.points[0] == expected

@@ -46,7 +46,7 @@ def test_an_edit_of_any_file_changes_the_digest_unless_it_only_shows_numbers(cop
 
 
 def test_the_files_that_were_once_left_out_count():
-    names = ("peers/cloth/explicit.py", "experiments/cloth_peers/job.py")
+    names = ("peers/cloth/plumbob.py", "experiments/cloth_peers/job.py")
     files = machine.source_files()
     assert all(ROOT / "bench" / name in files for name in names)
 
@@ -110,7 +110,7 @@ def test_what_measures_never_imports_what_only_shows():
         "from ..report import sections",
         "from plumbob.bench.report import sections",
         "def f():\n    from .results import label",
-        'importlib.import_module("plumbob.bench.harness.results")',
+        'importlib.import_module("plumbob.bench.tables.results")',
     ],
 )
 def test_an_import_of_what_only_shows_is_found(copy, line):

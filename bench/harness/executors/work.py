@@ -17,16 +17,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...entrants.entrant import Entrant
-from ...entrants.sources import digest_of
-from ...experiments import Block, Scale, blocks
+from ...peers.entrant import Entrant
+from ...peers.protocol import describe
+from ...peers.sources import digest_of
+from ..block import Block, Scale
+from ..experiment import blocks
 from ..folder_lock import open_lock
 from ..isolation import WorkerProcess
 from ..machine import difference, stamp
 from ..measure import block_key, measure
 from ..progress import Progress, listening
 from ..record import Key, encode
-from ..worker import Calculation, describe
+from ..worker import Calculation
 
 # A block that says nothing for so long [s] is given up.
 PATIENCE = 24 * 3600.0

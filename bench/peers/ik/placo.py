@@ -11,12 +11,19 @@ from typing import Any
 import numpy as np
 
 from plumbob.crosscheck.child_process import ChildProcess, LostError
-from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
 from .. import environments
-from .protocol import Ask, Solve, SolverOutput, UnableError, needs_a_chain
+from ..protocol import OwnTime
+from .protocol import (
+    Ask,
+    FloatArray,
+    Robot,
+    Solve,
+    SolverOutput,
+    Tolerance,
+    UnableError,
+    needs_a_chain,
+)
 
 NAME = "placo"
 PROGRAM = Path(__file__).with_name("placo_program.py")
@@ -43,7 +50,7 @@ def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 100) -> Ask:
 
         def solve() -> SolverOutput:
             done, seconds, q = _answer(program, question)
-            return SolverOutput(np.array(q), done, seconds)
+            return SolverOutput(np.array(q), done, OwnTime(float(seconds)))
 
         return solve
 
