@@ -183,10 +183,10 @@ class ChildProcess:
     @property
     def ending(self) -> str:
         """How it ended: "with code 3" or "by SIGSEGV"."""
+        if self.code >= 0:
+            return f"with code {self.code}"
         names = {-known: known.name for known in signal.Signals}
-        return (
-            f"with code {self.code}" if self.code >= 0 else f"by {names.get(self.code, -self.code)}"
-        )
+        return f"by {names.get(self.code, f'signal {-self.code}')}"
 
     def send(self, message: bytes) -> None:
         """Let a message be written while the answer is awaited."""
@@ -201,13 +201,12 @@ class ChildProcess:
 
         Args:
             seconds: how long to wait [s].
-            processor: how much time of processors the program may take for it [s].
+            processor: how much time of processors the program may take for it, after a `TICK` [s].
 
         Raises:
             LostError: if none comes in time, the program ended, or takes too much.
         """
-        start = time.monotonic()
-        looked = -math.inf if processor < math.inf else start
+        start = looked = time.monotonic()
         self._looks.clear()
         while not (message := self._next_message()):
             now = time.monotonic()

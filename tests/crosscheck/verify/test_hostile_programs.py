@@ -24,11 +24,11 @@ HUNG = {
     "waits": ("while True: tick()", "was not computing: does it .* flush"),
     "computes": ("while True: pass", "It computed for 0.5 s without an answer"),
     "answers without an end of line": (
-        "sys.stdout.write('{\"id\": 2'); sys.stdout.flush()\nwhile True: tick()",
+        "os.write(1, b'{\"id\": 2')\nwhile True: tick()",
         'printed 8 bytes, but no end of line within 0.5 s: {"id": 2',
     ),
     "prints bytes": (
-        "sys.stdout.buffer.write(b'\\xff\\x00\\xfe\\n'); sys.stdout.flush()\nwhile True: tick()",
+        "os.write(1, b'\\xff\\x00\\xfe\\n')\nwhile True: tick()",
         "Before it had printed lines that are no answers",
     ),
     "closes its input": (
@@ -39,7 +39,7 @@ HUNG = {
         FORK.format(before="os.setsid(); os.fork() and os._exit(0)") + "while True: tick()",
         "no answer",
     ),
-    "forks and forks": ("for _ in range(4): os.fork()\nwhile True: tick()", "no answer"),
+    "forks and forks": ("for _ in range(4): os.fork()\nwhile True: tick()", " 0.5 s"),
     "ignores all signals": (
         "for one in (1, 2, 3, 13, 15): signal.signal(one, signal.SIG_IGN)\nwhile True: tick()",
         "no answer",
@@ -63,10 +63,7 @@ CRASHED = {
         'sys.stdout.write(\'{"id": 2, "posi\'); sys.stdout.flush(); os._exit(0)',
         r'ended in the middle of a line \({"id": 2, "posi\): exit code 0',
     ),
-    "closes its output": (
-        "os.close(1)\nwhile True: tick()",
-        "closed its standard output, but runs on",
-    ),
+    "closes its output": ("os.close(1)\nwhile True: tick()", "its standard output, but runs on"),
     "closes all": ("os.closerange(0, 99)\nwhile True: tick()", "its standard output, but runs on"),
     "leaves its output to a child": (
         "if os.fork() == 0:\n    while True: tick()\nos._exit(4)",
@@ -85,11 +82,11 @@ CRASHED = {
 GARBAGE = {
     "prints garbage without end": (
         "while True: print('garbage')",
-        "printed more than 100 lines that are no answers, for example: garbage",
+        "more than 100 lines that are no answers, for example: gar",
     ),
     "a gigabyte without an end of line": (
         "while True: os.write(1, b'x' * 65536)",
-        "more than 1048576 bytes without an end of line, beginning with: xxx",
+        "than 1048576 bytes without an end of line, beginning with: xxx",
     ),
     "the wrong id": ("request['id'] += 7; right(request)", "answered request 2 with the id 9"),
     "no id": ("say(positions=[])", "answered request 2 without an id"),
