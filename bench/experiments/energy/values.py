@@ -11,10 +11,14 @@ class Swing(Values, frozen=True):
 
 
 class SwingDetails(Details, frozen=True):
-    """The damping of every spring [N s/m]; of so many steps, one is looked at."""
+    """How the cloth swings."""
 
-    damping: float
-    every: int
+    title: str
+    damping: float  # of every spring [N s/m]
+    h: float  # length of a step [s]
+    steps: int
+    every: int  # of so many steps, one is looked at
+    tolerance: float  # residual of the implicit steps
 
 
 KINDS = {"": Kind(Swing, SwingDetails)}
