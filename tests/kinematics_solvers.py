@@ -14,9 +14,8 @@ from plumbob.crosscheck.verify.kinematics.predictions import (
 from plumbob.crosscheck.verify.verify import verify
 from plumbob.reference import Skeleton, forward_kinematics, solve_ik, track
 
-FORWARD, INVERSE, TRACK, RESAMPLE = (
-    "forward_kinematics", "inverse_kinematics", "track", "resample",
-)  # fmt: skip
+FORWARD, INVERSE = "forward_kinematics", "inverse_kinematics"
+TRACK, RESAMPLE = "track", "resample"
 METHODS = ("ccd", "fabrik")
 LIMITS = ("effector", "tolerance", "max_iterations")
 

@@ -4,13 +4,14 @@
 """
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from .greeting import PROTOCOL, Greeting
-from .task import TASKS, Field, Task
+from .task import TASKS, Field
 
 FILE = Path(__file__).with_name("protocol.schema.json")
 GREETING_REQUEST, GREETING, ERROR = "greeting_request", "greeting", "error"
@@ -26,10 +27,23 @@ _TYPES: dict[str, Any] = {
 
 def schema() -> dict[str, Any]:
     """Return the schema of any message; `$defs` has each kind of message by its name."""
-    messages = {GREETING_REQUEST: _greeting_request(), **_greeting(), ERROR: _error()}
+    hello = {"id": {"const": 0}, "task": {"const": "greeting"}, "protocol": {"const": PROTOCOL}}
+    messages = {
+        GREETING_REQUEST: _message("What is asked first.", hello, list(hello)),
+        **_greeting(),
+        ERROR: _message(
+            "Why there is no answer.", {"id": _ID, "error": {"type": "string"}}, ["id", "error"]
+        ),
+    }
     for task in TASKS.values():
-        messages[request_name(task.name)] = _request(task)
-        messages[answer_name(task.name)] = _answer(task)
+        inputs = {"id": _ID, "task": {"const": task.name}} | _fields(task.inputs)
+        required = [field.name for field in task.inputs if not field.optional]
+        messages[request_name(task.name)] = _message(task.about, inputs, ["id", "task", *required])
+        outputs = {"id": _ID, "seconds": _SECONDS} | _fields(task.outputs)
+        messages[answer_name(task.name)] = {
+            **_message(f"Of {task.name}.", outputs, ["id"]),
+            "anyOf": [{"required": [field.name]} for field in task.outputs],
+        }
     kinds = [name for name in messages if name not in ("System", "Step")]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -49,15 +63,6 @@ def answer_name(task: str) -> str:
     return f"{task}_answer"
 
 
-def _greeting_request() -> dict[str, Any]:
-    properties = {
-        "id": {"const": 0},
-        "task": {"const": "greeting"},
-        "protocol": {"const": PROTOCOL},
-    }
-    return _object("What is asked first.", properties, list(properties))
-
-
 def _greeting() -> dict[str, Any]:
     """Return the schemas of the greeting and of its parts, as msgspec makes them, with an id."""
     _, parts = msgspec.json.schema_components([Greeting], ref_template="#/$defs/{name}")
@@ -71,49 +76,24 @@ def _greeting() -> dict[str, Any]:
     return {GREETING: greeting, **parts}
 
 
-def _error() -> dict[str, Any]:
-    properties = {"id": _ID, "error": {"type": "string"}}
-    return _object("Why there is no answer.", properties, ["id", "error"])
+def _message(about: str, properties: dict[str, Any], required: list[str]) -> dict[str, Any]:
+    head = {"description": about, "type": "object"}
+    return {**head, "properties": properties, "required": required}
 
 
-def _request(task: Task) -> dict[str, Any]:
-    properties = {
-        "id": _ID,
-        "task": {"const": task.name},
-        **{field.name: _field(field) for field in task.inputs},
-    }
-    required = [field.name for field in task.inputs if not field.optional]
-    return _object(task.about, properties, ["id", "task", *required])
-
-
-def _answer(task: Task) -> dict[str, Any]:
-    properties = {
-        "id": _ID,
-        "seconds": _SECONDS,
-        **{field.name: _field(field) for field in task.outputs},
-    }
-    some = [{"required": [field.name]} for field in task.outputs]
-    return {**_object(f"Of {task.name}.", properties, ["id"]), "anyOf": some}
-
-
-def _object(about: str, properties: dict[str, Any], required: list[str]) -> dict[str, Any]:
-    return {
-        "description": about,
-        "type": "object",
-        "properties": properties,
-        "required": required,
-    }
+def _fields(fields: Iterable[Field]) -> dict[str, Any]:
+    return {field.name: _field(field) for field in fields}
 
 
 def _field(field: Field) -> dict[str, Any]:
     """Return nested arrays; a count that is a word may be any."""
-    found = _TYPES[field.kind]
+    values = _TYPES[field.kind]
     for count in reversed(field.shape):
-        found = {"type": "array", "items": found}
+        values = {"type": "array", "items": values}
         if isinstance(count, int):
-            found |= {"minItems": count, "maxItems": count}
+            values |= {"minItems": count, "maxItems": count}
     shape = f" ({', '.join(map(str, field.shape))})" if field.shape else ""
-    return {**found, "description": field.about + shape}
+    return {**values, "description": field.about + shape}
 
 
 def text() -> str:

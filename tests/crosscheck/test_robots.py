@@ -15,7 +15,14 @@ from plumbob.crosscheck.engines import ROBOT_ENGINES, mujoco_robot, pinocchio_ro
 from plumbob.crosscheck.engines.robot_engine import UnreadableError
 from plumbob.crosscheck.robots import comparisons, models
 from plumbob.crosscheck.robots.claims import ROBOT_CLAIMS, robot_claims
-from plumbob.crosscheck.robots.comparisons import differences, reference_kinematics, sweep
+from plumbob.crosscheck.robots.comparisons import (
+    Differences,
+    LinkKinematics,
+    Sweep,
+    differences,
+    reference_kinematics,
+    sweep,
+)
 from plumbob.crosscheck.robots.deviations import (
     CLASS_ANCHOR,
     DEVIATIONS,
@@ -257,6 +264,44 @@ def test_claims_go_red_under_the_fault(fault, engine, small, monkeypatch):
 def test_without_a_fault_the_copy_holds(engine, small, monkeypatch):
     monkeypatch.setattr(comparisons, "reference_kinematics", partial(faulty, fault=None))
     assert all(verdict(ROBOTS, engine, quantity).holds for quantity in QUANTITIES)
+
+
+PLANAR = """<robot name="arm"><link name="a"/><link name="b"/><link name="c"/>
+<joint name="h" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
+<joint name="k" type="continuous"><parent link="b"/><child link="c"/>
+<origin xyz="2 0 0"/><axis xyz="0 0 1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("positions", "rotations", "linear", "angular", "expected"),
+    [
+        (0.3, 0.0, 0.0, 0.0, (0.1, 0.0, 0.0)),
+        (0.0, 0.3, 0.0, 0.0, (0.0, 0.3, 0.0)),
+        (0.0, 0.0, 0.3, 0.0, (0.0, 0.0, 0.1)),
+        (0.0, 0.0, 0.3, 0.2, (0.0, 0.0, 0.2)),
+        (0.0, 0.0, 0.9, 0.2, (0.0, 0.0, 0.3)),
+    ],
+)
+def test_lengths_are_over_the_extent_of_all_links_and_angles_over_a_radian(
+    positions, rotations, linear, angular, expected
+):
+    """The hand is at (2, 0), (0, 2) and (-1, root of 3): the box is three metres wide."""
+    robot, links = urdf.parse(PLANAR), np.arange(3)
+    q = np.array([[0.0, 0.0], [np.pi / 2, 0.0], [2 * np.pi / 3, 0.0]])
+    ours = reference_kinematics(robot, q, links)
+    x, R, J = (part.copy() for part in ours)
+    x[1, 2, 0] += positions
+    R[0, 1, 2, 1] -= rotations
+    J[2, 2, 1, 0] -= linear
+    J[1, 1, 5, 1] += angular
+    theirs = LinkKinematics(x, R, J)
+    parts = [
+        Sweep(
+            robot, q, links[i : i + 1], LinkKinematics(*(part[:, i : i + 1] for part in theirs)), ""
+        )
+        for i in range(3)
+    ]
+    assert differences(parts) == pytest.approx(Differences(*expected), abs=1e-15)
 
 
 def written(folder, text, name="a.xml"):

@@ -179,13 +179,15 @@ def test_methods_of_inverse_kinematics_are_found(inside, text, methods):
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        ("{'positions': np.zeros((2, 3), complex)}",
-         "expected numbers of shape (joint, 3), got complex128 values of shape (2, 3)"),
+        (
+            "{'positions': np.zeros((2, 3), complex)}",
+            "expected numbers of shape (joint, 3), got complex128 values of shape (2, 3)",
+        ),
         ("None", "got None"),
         ("{}", "got an empty dict"),
         ("{'x': 1, 'y': 2}", "got the keys x, y"),
     ],
-)  # fmt: skip
+)
 def test_an_answer_that_is_none_is_described(inside, answer, words):
     contestant = inside(f"import numpy as np\n{FORWARD}return {answer}\n")
     assert str(contestant.answer(case(2)).sentence).endswith(words)
