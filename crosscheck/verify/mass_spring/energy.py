@@ -122,7 +122,7 @@ def _findings(
             "The {name} energy is {gap:.2g} J off its formula.", name=name, gap=gap))
         for name, gap in gaps.items()
     ]  # fmt: skip
-    found += [] if p.h else _sum_laws(given, allowed)
+    found += _sum_laws(given, allowed)
     before = next((o for o in asked if o.case.name == one.case.facts.get("from")), None)
     if before is not None and isinstance(before.answer, Answer):
         found += _work(problem_of(before.case.inputs), p, before.answer.values, given, allowed)
