@@ -25,10 +25,11 @@ FEW = 10  # one round
 TENDONS = "MuJoCo's spatial tendons"
 
 
-def _claims(
-    *rows: tuple[str, str, str, Callable[[int], Comparison], Tolerance, int],
-) -> list[Claim]:
-    """Return claims of their name, our quantity, theirs, comparison, tolerance and cases."""
+# The name, our quantity, theirs, the comparison, the tolerance and the number of cases.
+Row = tuple[str, str, str, Callable[[int], Comparison], Tolerance, int]
+
+
+def _claims(*rows: Row) -> list[Claim]:
     return [
         Claim(name, ours, theirs, each_case(compare), tolerance, cases)
         for name, ours, theirs, compare, tolerance, cases in rows

@@ -115,12 +115,17 @@ def difference(one: Mapping[str, Any], other: Mapping[str, Any]) -> float:
 
 def _apart(name: str, one: Any, other: Any) -> float:
     a, b = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
+    if name.endswith("rotations") and a.shape == b.shape:
+        b = b * np.where(np.nansum(a * b, -1, keepdims=True) < 0.0, -1.0, 1.0)
+    return largest_gap(a, b) / max(float(np.abs(np.nan_to_num(a)).max(initial=0.0)), 1e-300)
+
+
+def largest_gap(one: Any, other: Any) -> float:
+    """Return the largest difference of two arrays, infinite between shapes, or NaN and number."""
+    a, b = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
     if a.shape != b.shape or (np.isnan(a) != np.isnan(b)).any():
         return np.inf
-    a, b = np.nan_to_num(a), np.nan_to_num(b)
-    if name.endswith("rotations"):
-        b = b * np.where((a * b).sum(-1, keepdims=True) < 0.0, -1.0, 1.0)
-    return float(np.abs(a - b).max(initial=0.0) / max(np.abs(a).max(initial=0.0), 1e-300))
+    return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
 
 
 def _classes(

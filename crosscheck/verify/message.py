@@ -41,7 +41,6 @@ _WORDS = re.compile(
     r'"(?:[^"\\]|\\.)*+"?|([+-]?)\b(nan(?:\(\w*\))?|inf(?:inity)?)(?!\w)',
     re.IGNORECASE | re.DOTALL,
 )
-_PLACE = re.compile(r" \((?:byte|char) (\d+)\)$")
 _NAMES: Mapping[Any, str] = {str: "a text", int: "an integer", float: "a number", bool: "a boolean"}
 
 

@@ -188,8 +188,9 @@ def verified_program(capsys, folder, seconds):
 
 
 def test_answers_are_judged_in_files(capsys, folder):
-    code, out, _ = plumbob(capsys, "--export-cases", "cases", "--task", "forward_kinematics",
-                           "--seed", "3")  # fmt: skip
+    code, out, _ = plumbob(
+        capsys, "--export-cases", "cases", "--task", "forward_kinematics", "--seed", "3"
+    )
     assert code == 0
     assert "4 cases are in cases" in out
     assert "plumbob verify --answers cases" in out
@@ -269,11 +270,11 @@ def test_tasks_are_listed_with_what_they_ask(capsys):
 def templates(monkeypatch):
     """Starters in two languages."""
     languages = {
-        "cpp": SimpleNamespace(files=("solver.cpp", "plumbob.hpp"),
-                               build="g++ -o solver solver.cpp",
-                               run="./solver"),
+        "cpp": SimpleNamespace(
+            files=("solver.cpp", "plumbob.hpp"), build="g++ -o solver solver.cpp", run="./solver"
+        ),
         "python": SimpleNamespace(files=("solver.py",), build="", run="python3 solver.py"),
-    }  # fmt: skip
+    }
     made = ModuleType("templates")
     made.LANGUAGES = languages
     made.template = lambda language: {one: f"// {one}\n" for one in languages[language].files}
@@ -392,8 +393,9 @@ def test_a_full_disk_behind_the_screen_costs_no_file(folder, solver):
             stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": root}, timeout=120,
         )  # fmt: skip
     assert (run.returncode, run.stderr) == (
-        2, "plumbob: /dev/stdout could not be written: No space left on device\n"
-    )  # fmt: skip
+        2,
+        "plumbob: /dev/stdout could not be written: No space left on device\n",
+    )
     verdict = json.loads((folder / "out" / "verdict.json").read_text())["verdict"]
     assert f"{verdict}.py" == solver
     assert (folder / "out" / "verdict.xml").exists()

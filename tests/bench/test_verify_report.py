@@ -390,8 +390,9 @@ def test_nothing_that_a_solver_says_stands_unescaped_in_the_page(wrong):
 
 
 def test_the_page_draws_theirs_and_ours(wrong):
-    forward, inverse, cloth = (Page(page.render(Report(wrong.greeting, [task], 0), shown()))
-                               for task in wrong.tasks)  # fmt: skip
+    forward, inverse, cloth = (
+        Page(page.render(Report(wrong.greeting, [task], 0), shown())) for task in wrong.tasks
+    )
     assert forward.tags.count("svg") == cloth.tags.count("svg") == 2  # one is the bob
     assert inverse.tags.count("svg") == 2  # where ours goes, as there is no answer
     assert cloth.tags.count("use") == 2 * 121 + 2  # and two pins

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck.claims import CLAIMS
-from plumbob.crosscheck.mass_spring import balances, equilibria, integrators, lines, steps
+from plumbob.crosscheck.mass_spring import balances, equilibria, integrators, steps
 from plumbob.crosscheck.mass_spring import forces as force_claims
 from plumbob.crosscheck.mass_spring.claims import MASS_SPRING_CLAIMS
 from plumbob.crosscheck.mass_spring.steps import damper_blocks, semi_implicit
@@ -253,162 +253,83 @@ def faulty_implicit_step(system, state, h, external, *, fault):
     return faulty_euler(system, h=h, fault=fault).step(state, external).state
 
 
-STEP_FAULTS = [
-    "gravity times mass twice",
-    "gravity left out",
-    "rest lengths left out",
-    "external forces left out",
-]
+STEP_FAULTS = ["gravity times mass twice", "gravity left out", "rest lengths left out",
+               "external forces left out"]  # fmt: skip
 LOOSE = "slack springs push"
-IMPLICIT_FAULTS = [
-    *STEP_FAULTS,
-    "gravity without h²",
-    "L in place of M + h² L",
-    "pins put back after the solve",
-    "one local/global iteration",
-]
-DAMPER_FAULTS = [
-    "dampers left out",
-    "dampers twice",
-    "dampers push",
-    "dampers across the springs too",
-]
+IMPLICIT_FAULTS = [*STEP_FAULTS, "gravity without h²", "L in place of M + h² L",
+                   "pins put back after the solve", "one local/global iteration"]  # fmt: skip
+DAMPER_FAULTS = ["dampers left out", "dampers twice", "dampers push",
+                 "dampers across the springs too"]  # fmt: skip
 ENERGY_FAULTS = ["k (l - r)²", "gravity upwards", "gravity times mass twice"]
 SPRING_FAULTS = ["push", "twice", "rest lengths left out", "one spring forgotten"]
 REST_FAULTS = ["gravity times mass twice", "gravity left out", "rest lengths left out"]
 
 # What a claim uses, and what takes its place: (module or SIMULATORS, name, stand-in).
-SYMPLECTIC_MOTION = (
-    integrators.SIMULATORS,
-    "symplectic Euler",
-    partial(faulty_motion, faulty_symplectic),
-)
-RUNGE_KUTTA_MOTION = (
-    integrators.SIMULATORS,
-    "Runge-Kutta",
-    partial(faulty_motion, faulty_runge_kutta),
-)
-IMPLICIT_MOTION = (
-    integrators.SIMULATORS,
-    "implicit Euler",
-    partial(faulty_motion, faulty_implicit_step),
-)
+SYMPLECTIC_MOTION = (integrators.SIMULATORS, "symplectic Euler",
+                     partial(faulty_motion, faulty_symplectic))  # fmt: skip
+RUNGE_KUTTA_MOTION = (integrators.SIMULATORS, "Runge-Kutta",
+                      partial(faulty_motion, faulty_runge_kutta))  # fmt: skip
+IMPLICIT_MOTION = (integrators.SIMULATORS, "implicit Euler",
+                   partial(faulty_motion, faulty_implicit_step))  # fmt: skip
 
 # For each claim: what its comparison uses and what takes its place, and the faults of that.
 FAULTS = {
     "spring forces": ((force_claims, "spring_forces", faulty_springs), [*SPRING_FAULTS, LOOSE]),
-    "damper forces": (
-        (force_claims, "damper_forces", faulty_dampers),
-        ["push", "twice", "across the spring too", "pins with a velocity"],
-    ),
-    "stiffness matrix": (
-        (force_claims, "stiffness_matrix", faulty_stiffness),
-        [
-            "geometric term dropped",
-            "geometric term with the wrong sign",
-            "rest lengths left out",
-            "negated",
-            "one spring forgotten",
-        ],
-    ),
-    "potential energy": (
-        (force_claims, "potential_energy", faulty_potential),
-        [*ENERGY_FAULTS, "pinned weights left out"],
-    ),
-    "kinetic energy": (
-        (force_claims, "kinetic_energy", faulty_kinetic),
-        ["m |v|²", "pins counted", "mass left out"],
-    ),
+    "damper forces": ((force_claims, "damper_forces", faulty_dampers),
+        ["push", "twice", "across the spring too", "pins with a velocity"]),
+    "stiffness matrix": ((force_claims, "stiffness_matrix", faulty_stiffness),
+        ["geometric term dropped", "geometric term with the wrong sign", "rest lengths left out",
+         "negated", "one spring forgotten"]),
+    "potential energy": ((force_claims, "potential_energy", faulty_potential),
+        [*ENERGY_FAULTS, "pinned weights left out"]),
+    "kinetic energy": ((force_claims, "kinetic_energy", faulty_kinetic),
+        ["m |v|²", "pins counted", "mass left out"]),
     "flex forces": ((force_claims, "spring_forces", faulty_springs), SPRING_FAULTS),
     "flex energy": ((force_claims, "potential_energy", faulty_potential), ENERGY_FAULTS),
-    "symplectic Euler step": (
-        (steps, "symplectic_euler", faulty_symplectic),
-        [*STEP_FAULTS, *DAMPER_FAULTS, LOOSE, "old velocities move", "pins fall"],
-    ),
-    "symplectic Euler step, flex": (
-        (steps, "symplectic_euler", faulty_symplectic),
-        [*STEP_FAULTS, *DAMPER_FAULTS, "old velocities move", "pins fall"],
-    ),
-    "symplectic Euler, 1,000 steps": (
-        SYMPLECTIC_MOTION,
-        ["gravity left out", "dampers twice", "old velocities move"],
-    ),
-    "Runge-Kutta step": (
-        (steps, "runge_kutta", faulty_runge_kutta),
-        [*STEP_FAULTS, *DAMPER_FAULTS, "equal weights", "whole steps to the middle"],
-    ),
+    "symplectic Euler step": ((steps, "symplectic_euler", faulty_symplectic),
+        [*STEP_FAULTS, *DAMPER_FAULTS, LOOSE, "old velocities move", "pins fall"]),
+    "symplectic Euler step, flex": ((steps, "symplectic_euler", faulty_symplectic),
+        [*STEP_FAULTS, *DAMPER_FAULTS, "old velocities move", "pins fall"]),
+    "symplectic Euler, 1,000 steps": (SYMPLECTIC_MOTION,
+        ["gravity left out", "dampers twice", "old velocities move"]),
+    "Runge-Kutta step": ((steps, "runge_kutta", faulty_runge_kutta),
+        [*STEP_FAULTS, *DAMPER_FAULTS, "equal weights", "whole steps to the middle"]),
     "Runge-Kutta, 2,000 steps": (RUNGE_KUTTA_MOTION, ["equal weights"]),
-    "damper diagonal step": (
-        (steps, "semi_implicit", faulty_semi_implicit),
-        [
-            *STEP_FAULTS,
-            LOOSE,
-            "nothing implicit",
-            "D twice",
-            "D with the wrong sign",
-            "the whole block",
-            "old velocities move",
-        ],
-    ),
-    "damper block step": (
-        (steps, "semi_implicit", faulty_semi_implicit),
-        ["nothing implicit", "D twice", "D with the wrong sign", "only the diagonal"],
-    ),
-    "Gauss-Newton step": (
-        (steps, "ImplicitEuler", faulty_euler),
-        [*IMPLICIT_FAULTS, LOOSE, "velocities not recomputed", "the converged step"],
-    ),
+    "damper diagonal step": ((steps, "semi_implicit", faulty_semi_implicit),
+        [*STEP_FAULTS, LOOSE, "nothing implicit", "D twice", "D with the wrong sign",
+         "the whole block", "old velocities move"]),
+    "damper block step": ((steps, "semi_implicit", faulty_semi_implicit),
+        ["nothing implicit", "D twice", "D with the wrong sign", "only the diagonal"]),
+    "Gauss-Newton step": ((steps, "ImplicitEuler", faulty_euler),
+        [*IMPLICIT_FAULTS, LOOSE, "velocities not recomputed", "the converged step"]),
     "Gauss-Newton step, damped": ((steps, "ImplicitEuler", faulty_euler), DAMPER_FAULTS),
-    "implicit Euler on a line": (
-        (lines, "ImplicitEuler", faulty_euler),
-        [
-            "gravity times mass twice",
-            "external forces left out",
-            "dampers left out",
-            "dampers twice",
-            "velocities not recomputed",
-        ],
-    ),
-    "implicit Euler balance": (
-        (balances, "ImplicitEuler", faulty_euler),
-        [*IMPLICIT_FAULTS, LOOSE, "one iteration"],
-    ),
+    "implicit Euler on a line": ((integrators, "ImplicitEuler", faulty_euler),
+        ["gravity times mass twice", "external forces left out", "dampers left out",
+         "dampers twice", "velocities not recomputed"]),
+    "implicit Euler balance": ((balances, "ImplicitEuler", faulty_euler),
+        [*IMPLICIT_FAULTS, LOOSE, "one iteration"]),
     "implicit Euler balance, damped": ((balances, "ImplicitEuler", faulty_euler), DAMPER_FAULTS),
     "rope at rest, closed form": ((equilibria, "ImplicitEuler", faulty_euler), REST_FAULTS),
     "rope at rest": ((equilibria, "ImplicitEuler", faulty_euler), [*REST_FAULTS, "one iteration"]),
     "cloth at rest": ((equilibria, "ImplicitEuler", faulty_euler), ["gravity left out"]),
     "order of symplectic Euler": (SYMPLECTIC_MOTION, ["gravity left out", "dampers twice"]),
-    "order of implicit Euler": (
-        IMPLICIT_MOTION,
-        ["dampers left out", "gravity times mass twice", "the trapezoid in its place"],
-    ),
+    "order of implicit Euler": (IMPLICIT_MOTION,
+        ["dampers left out", "gravity times mass twice", "the trapezoid in its place"]),
     "order of Runge-Kutta": (RUNGE_KUTTA_MOTION, ["equal weights", "dampers twice"]),
     "order of MuJoCo's integrators": (RUNGE_KUTTA_MOTION, ["dampers twice"]),
-    "order between implicit Euler and discrete": (
-        IMPLICIT_MOTION,
-        ["dampers twice", "external forces left out"],
-    ),
-    "linear momentum": (
-        SYMPLECTIC_MOTION,
-        ["gravity times mass twice", "external forces left out", "springs pull one end only"],
-    ),
-    "angular momentum": (
-        SYMPLECTIC_MOTION,
-        ["old velocities move", "dampers across the springs too", "springs pull one end only"],
-    ),
-    "angular momentum lost by implicit Euler": (
-        IMPLICIT_MOTION,
-        ["the trapezoid in its place", "dampers across the springs too"],
-    ),
-    "angular momentum lost by Runge-Kutta": (
-        RUNGE_KUTTA_MOTION,
-        ["equal weights", "dampers across the springs too"],
-    ),
-    "energy lost on one spring": (
-        IMPLICIT_MOTION,
-        ["symplectic Euler in its place", "the trapezoid in its place"],
-    ),
-}
+    "order between implicit Euler and discrete": (IMPLICIT_MOTION,
+        ["dampers twice", "external forces left out"]),
+    "linear momentum": (SYMPLECTIC_MOTION,
+        ["gravity times mass twice", "external forces left out", "springs pull one end only"]),
+    "angular momentum": (SYMPLECTIC_MOTION,
+        ["old velocities move", "dampers across the springs too", "springs pull one end only"]),
+    "angular momentum lost by implicit Euler": (IMPLICIT_MOTION,
+        ["the trapezoid in its place", "dampers across the springs too"]),
+    "angular momentum lost by Runge-Kutta": (RUNGE_KUTTA_MOTION,
+        ["equal weights", "dampers across the springs too"]),
+    "energy lost on one spring": (IMPLICIT_MOTION,
+        ["symplectic Euler in its place", "the trapezoid in its place"]),
+}  # fmt: skip
 
 
 def put(monkeypatch, claim, fault):

@@ -34,6 +34,7 @@ from .problem import (
 from .rounding import correct_digits
 
 TASK = "energy"
+Values = Mapping[str, Any]
 PARTS = ("total", "kinetic", "potential", "elastic", "gravitational")
 # Those of which each has a formula of its own.
 FORMULAS = ("kinetic", "elastic")
@@ -122,7 +123,7 @@ def _findings(
             "The {name} energy is {gap:.2g} J off its formula.", name=name, gap=gap))
         for name, gap in gaps.items()
     ]  # fmt: skip
-    found += [] if p.h else _sum_laws(given, allowed)
+    found += _sum_laws(given, allowed)
     before = next((o for o in asked if o.case.name == one.case.facts.get("from")), None)
     if before is not None and isinstance(before.answer, Answer):
         found += _work(problem_of(before.case.inputs), p, before.answer.values, given, allowed)
@@ -130,7 +131,7 @@ def _findings(
     return found + laws.remarks(answer)
 
 
-def _sum_laws(given: Mapping[str, Any], allowed: float) -> list[Finding]:
+def _sum_laws(given: Values, allowed: float) -> list[Finding]:
     """Return whether the parts add up, where all of them were answered."""
     found = []
     for whole, parts in (
@@ -146,9 +147,7 @@ def _sum_laws(given: Mapping[str, Any], allowed: float) -> list[Finding]:
     return found
 
 
-def _work(
-    p: Problem, q: Problem, before: Mapping[str, Any], after: Mapping[str, Any], allowed: float
-) -> list[Finding]:
+def _work(p: Problem, q: Problem, before: Values, after: Values, allowed: float) -> list[Finding]:
     """Return whether energies change by the work of forces between the two states."""
     found = []
     for name, work in works(p, q).items():
@@ -246,9 +245,7 @@ def _diagnose(
     return Diagnosis(first_broken=first_broken(judgements), tried=tried)
 
 
-def _matches(
-    faults: Sequence[Option], p: Problem, given: Mapping[str, Any], epsilon: float
-) -> bool:
+def _matches(faults: Sequence[Option], p: Problem, given: Values, epsilon: float) -> bool:
     expected = predict(faults, p)
     limit = 8.0 * tolerance(p, epsilon)
     return all(abs(given[name] - expected[name]) <= limit for name in PARTS if name in given)

@@ -11,6 +11,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.judging import StepJudgement, judge_step
 
 from ..contestant import Answer, Asked
+from ..explain import largest_gap
 from ..judgement import Finding, Verdict
 from ..sentence import Sentence, sentence
 from .model import Model
@@ -254,7 +255,7 @@ def equal_requests(asked: Asked, allowed: Mapping[str, float]) -> Finding:
         said = sentence("Asked a second time, it gave no answer.")
         return Finding("equal requests", Verdict.BROKEN, np.inf, 0.0, "", said)
     gaps = {
-        name: _gap(answer.values[name], again.values[name])
+        name: largest_gap(answer.values[name], again.values[name])
         for name in allowed
         if name in answer.values and name in again.values
     }
@@ -266,13 +267,6 @@ def equal_requests(asked: Asked, allowed: Mapping[str, float]) -> Finding:
         gap=gap, name=worst,
     ) if gap else sentence("Equal requests have equal answers.")  # fmt: skip
     return bounded("equal requests", gap, tolerance, "", said)
-
-
-def _gap(one: Any, other: Any) -> float:
-    a, b = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
-    if a.shape != b.shape or (np.isnan(a) != np.isnan(b)).any():
-        return np.inf
-    return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
 
 
 def symmetry(asked: Asked, every: Sequence[Asked], allowed: Mapping[str, float]) -> Finding | None:

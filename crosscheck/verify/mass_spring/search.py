@@ -301,10 +301,12 @@ def _keys(found: Found) -> tuple[str, ...]:
     return tuple(fault.key for fault in found.faults)
 
 
-def probes_of(asked: Sequence[Asked], problems: Mapping[str, Problem]) -> list[Probe]:
-    """Return the probes that were answered, in their order."""
+def probes_of(
+    asked: Sequence[Asked], problems: Mapping[str, Problem], every: bool = False
+) -> list[Probe]:
+    """Return the probes, or every case, that were answered, in their order."""
     return [
         Probe(problems[one.case.name], one.answer.values, one.case.name)
         for one in asked
-        if one.case.facts.get("probe") and isinstance(one.answer, Answer)
+        if isinstance(one.answer, Answer) and (every or one.case.facts.get("probe"))
     ]

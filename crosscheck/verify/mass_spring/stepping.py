@@ -25,10 +25,9 @@ from .laws import Context
 from .model import Model, predicted
 from .problem import Problem, problem_of, state_of, system_of
 from .rounding import SOLVED, apart, correct_digits, rounding
-from .search import Found, Search, probes_of
+from .search import Found, Probe, Search, probes_of
 
 MOST_TOLD = 3
-Problems = Mapping[str, Problem]
 LAWS: tuple[Callable[[Context], Finding | None], ...] = (
     laws.pins, laws.declared_step, laws.velocities, laws.momentum, laws.minimiser,
 )  # fmt: skip
@@ -54,7 +53,7 @@ class Stepping(NamedTuple):
             _judge_case(one, asked, problems[one.case.name], greeting, right, known)
             for one in asked
         ]
-        diagnosis = _diagnose(asked, problems, judgements, search, found, greeting)
+        diagnosis = _diagnose(judgements, search, found, probes_of(asked, problems, every=True))
         return TaskReport(self.task, "", _with_faults(judgements, diagnosis, known), diagnosis)
 
 
@@ -176,30 +175,25 @@ def _reference_seconds(p: Problem, model: Model) -> float:
 
 
 def _diagnose(
-    asked: Sequence[Asked],
-    problems: Problems,
-    judgements: Sequence[CaseJudgement],
-    search: Search,
-    found: Sequence[Found],
-    greeting: Greeting,
+    judgements: Sequence[CaseJudgement], search: Search, found: Sequence[Found], every: list[Probe]
 ) -> Diagnosis:
     explanations: tuple[Explanation, ...] = ()
-    behaviour = None
+    behaviour, step = None, search.step
     if found and found[0].faults:
-        explanations = _explanations(found, asked, problems, greeting)
-    elif found and any(getattr(greeting.step, name) is None for name in _DECLARED):
+        explanations = (_explanation(found, every, search.epsilon),)
+    elif found and any(getattr(step, name) is None for name in _DECLARED):
         behaviour = sentence(
             "In small cases it behaves like {model}, with which it is compared."
             if any(one.verdict >= Verdict.WRONG for one in judgements)
             else "It behaves like {model}.",
-            model=describe_model(honest_options(found, greeting.step)),
+            model=describe_model(honest_options(found, step)),
         )
     hints = hints_of(judgements)
     diagnosis = Diagnosis(explanations, behaviour, None, hints, search.tried)
     if diagnosis.explained:
         return diagnosis
-    if search.probes and behaviour is None and greeting.step.method is None:
-        hints += (_nearest(asked, problems, greeting), _what_holds(judgements))
+    if search.probes and behaviour is None and step.method is None:
+        hints += (_nearest(search), _what_holds(judgements))
     return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)
 
 
@@ -207,16 +201,15 @@ def _diagnose(
 _DECLARED = ("method", "substeps", "damper", "pins", "velocity")
 
 
-def _nearest(asked: Sequence[Asked], problems: Problems, greeting: Greeting) -> Sentence:
+def _nearest(search: Search) -> Sentence:
     """Return which of the steps that are known comes nearest to the answers to the probes."""
-    probes = [question for question in asked if question.case.facts.get("probe")]
-    usual = {option.aspect: option for option in honest_options((), greeting.step)}
+    usual = {option.aspect: option for option in honest_options((), search.step)}
     steps = []
-    for integrator, damper in product(honest(greeting.step)["integrator"], DAMPERS):
+    for integrator, damper in product(honest(search.step)["integrator"], DAMPERS):
         velocity = HONEST_VELOCITIES[integrator.fields["integrator"].explicit]
         step = usual | {"integrator": integrator, "damper": damper, "velocity": velocity}
         if compatible(step):
-            errors = _errors(tuple(step.values()), probes, problems, greeting)
+            errors = _errors(tuple(step.values()), search.probes, search.epsilon)
             steps.append((float(np.median(errors)), max(errors), tuple(step.values())))
     median, worst, options = min(steps, key=lambda step: step[0])
     return sentence(
@@ -237,13 +230,11 @@ def _what_holds(judgements: Sequence[CaseJudgement]) -> Sentence:
     return sentence("What holds in every case: {laws}.", laws=names or "–")
 
 
-def _explanations(
-    found: Sequence[Found], asked: Sequence[Asked], problems: Problems, greeting: Greeting
-) -> tuple[Explanation, ...]:
+def _explanation(found: Sequence[Found], every: Sequence[Probe], epsilon: float) -> Explanation:
     """Return the faults found with the share of all answers that they reproduce, in classes."""
     scores = []
     for one in found:
-        errors = _errors(one.options, asked, problems, greeting)
+        errors = _errors(one.options, every, epsilon)
         hits = [error for error in errors if error <= SOLVED]
         scores.append((-len(hits) / max(len(errors), 1), max(hits, default=0.0), one.faults))
     scores.sort(key=lambda score: score[:2])
@@ -253,21 +244,16 @@ def _explanations(
     }
     keys = tuple(classes)[:MOST_TOLD]
     said = either([list(map(_fault_sentence, classes[key])) for key in keys])
-    return (Explanation(keys, said, -share, distance),)
+    return Explanation(keys, said, -share, distance)
 
 
-def _errors(
-    options: tuple[Option, ...], asked: Sequence[Asked], problems: Problems, greeting: Greeting
-) -> list[float]:
+def _errors(options: tuple[Option, ...], probes: Sequence[Probe], epsilon: float) -> list[float]:
     """Return how far each answer is from a step with these options, relative to what it moves."""
     errors = []
-    for question in asked:
-        if isinstance(question.answer, Answer):
-            plain = problems[question.case.name]
-            p, model = apply(options, plain, Model(damper="none"))
-            expected, allowed = predicted(p, model), rounding(plain, model, greeting.epsilon)
-            values = question.answer.values
-            errors.append(apart(plain, expected, values, allowed) if expected else np.inf)
+    for plain, answered, _ in probes:
+        p, model = apply(options, plain, Model(damper="none"))
+        expected, allowed = predicted(p, model), rounding(plain, model, epsilon)
+        errors.append(apart(plain, expected, answered, allowed) if expected else np.inf)
     return errors
 
 

@@ -351,11 +351,13 @@ def test_a_solver_gets_the_systems_that_it_takes(name):
     system = SYSTEMS[name]
     cases = task_cases("mass_spring_step", Greeting(1, (), system=system), 0, False)
     assert len(cases) >= 15
-    assert all(("previous_positions" in one.inputs) == (system.state != "velocities")
-               for one in cases)  # fmt: skip
+    assert all(
+        ("previous_positions" in one.inputs) == (system.state != "velocities") for one in cases
+    )
     if system.masses == "one":
-        assert all(np.ptp(one.inputs["masses"]) == 0 != one.inputs["masses"][0] - 1
-                   for one in cases)  # fmt: skip
+        assert all(
+            np.ptp(one.inputs["masses"]) == 0 != one.inputs["masses"][0] - 1 for one in cases
+        )
     fault = BY_KEY["gravity g/m"]
     model, declared = DECLARED["linearised"]
     found = report(Stepper(model, [fault]), step=declared, system=system)
@@ -415,8 +417,9 @@ FORCES = {one.key: one for one in FORCE_FAULTS if one.key not in NO_FORCES}
 
 
 def test_forces_that_numpy_does_not_add_up_are_named():
-    def forces(masses, springs, rest_lengths, stiffnesses, dampings, gravity, positions,
-               velocities):  # fmt: skip
+    def forces(
+        masses, springs, rest_lengths, stiffnesses, dampings, gravity, positions, velocities
+    ):
         i, j = springs.T
         d, v = positions[i] - positions[j], velocities[i] - velocities[j]
         length = np.maximum(np.linalg.norm(d, axis=1), 1e-300)[:, None]
@@ -466,8 +469,9 @@ def energies(faults, shift=0.0):
     return function
 
 
-@pytest.mark.parametrize("fault", [one for one in energy.FAULTS if one.key not in NO_FORCES],
-                         ids=lambda one: one.key)  # fmt: skip
+@pytest.mark.parametrize(
+    "fault", [one for one in energy.FAULTS if one.key not in NO_FORCES], ids=lambda one: one.key
+)
 def test_every_fault_of_energies_is_caught_and_named(fault):
     found = report(energies([fault]), "energy")
     assert found.verdict is Verdict.WRONG
