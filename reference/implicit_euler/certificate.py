@@ -89,19 +89,24 @@ class Certificate:
     """Proven bounds for positions x as the result of a step.
 
     Distances are Euclidean norms over all coordinates and so bound that of every particle.
+
+    Attributes:
+        residual: |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows.
+        coverage: whether there is a bound, or why not.
+        distance: radius about x that contains a minimiser of g [m]; infinite without a bound.
+        unique_within: radius about x that contains no other stationary point [m]; 0 without a
+            bound.
+        newton_step: eta, an upper bound of the length of the Newton step [m]; NaN if unknown.
+        curvature: mu, a lower bound of the eigenvalues of the Hessian [kg]; 0 if none is positive.
+        lipschitz: L, a Lipschitz constant of the Hessian within 2 eta of x [kg/m]; NaN if unknown.
     """
 
-    residual: float  # |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows
-    coverage: Coverage  # whether there is a bound, or why not
-    # radius about x that contains a minimiser of g [m]; infinite without a bound
+    residual: float
+    coverage: Coverage
     distance: float = math.inf
-    # radius about x that contains no other stationary point [m]; 0 without a bound
     unique_within: float = 0.0
-    # eta, an upper bound of the length of the Newton step [m]; NaN if unknown
     newton_step: float = math.nan
-    # mu, a lower bound of the eigenvalues of the Hessian [kg]; 0 if none is positive
     curvature: float = 0.0
-    # L, a Lipschitz constant of the Hessian within 2 eta of x [kg/m]; NaN if unknown
     lipschitz: float = math.nan
 
     @property
