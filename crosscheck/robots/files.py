@@ -15,7 +15,7 @@ from plumbob.reference import Articulation, Skeleton, forward_kinematics, jacobi
 from plumbob.reference.formats import bvh
 from plumbob.reference.formats.source import read_text
 
-from ..child_process import ChildProcess, LostError
+from ..child_process import CallProcess, LostError
 from ..engines import ROBOT_ENGINES
 from ..engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind, xml_root
 from ..engines.robot_engine import UnreadableError
@@ -107,7 +107,7 @@ def check(files: Iterable[File], patience: float = 60.0) -> Iterator[Checked]:
     """
     files = tuple(files)
     included = {path for file in files for path in _includes(file)}
-    with ChildProcess(prepare, patience) as child:
+    with contextlib.closing(CallProcess(prepare, patience)) as child:
         for file in files:
             readings = [_read(child, engine, file) for engine in ENGINES.get(file.kind, ())]
             if file.path.resolve() in included and all(r.outcome == NEITHER for r in readings):
@@ -182,14 +182,14 @@ def _refusal(file: File) -> str:
     return ""
 
 
-def _read(child: ChildProcess, engine: str, file: File) -> Reading:
+def _read(child: CallProcess, engine: str, file: File) -> Reading:
     try:
         return child.call(compare, engine, file)
     except LostError as error:
         return Reading(engine, LOST, why=str(error))
 
 
-def _with_causes(child: ChildProcess, file: File, readings: list[Reading]) -> tuple[Reading, ...]:
+def _with_causes(child: CallProcess, file: File, readings: list[Reading]) -> tuple[Reading, ...]:
     """Explain a difference of Pinocchio by known causes if MuJoCo agrees with the reference.
 
     Where MuJoCo refuses the file, it reads a copy without settings, which kinematics does not need.

@@ -116,16 +116,10 @@ def judge_pose(
 ) -> PoseJudgement:
     """Return how far a pose is from its targets, its limits, and the positions said to be its own.
 
-    Args:
-        model: a Skeleton, an Articulation, or a Robot read from a file.
-        pose: local rotations of a Skeleton, (joint, 4), w first, or coordinates q of an
-            Articulation, (coordinate,); quaternions of any length but zero. None judges the
-            positions alone.
-        target: as for `solve_ik`, of one pose.
-        effector: as for `solve_ik`.
-        positions: global positions of all joints that came with the pose [m], (joint, 3).
-        tolerance: distance that counts as reached [m].
-        tolerance_rotation: angle that counts as reached [rad].
+    `pose` holds the local rotations of a Skeleton, (joint, 4), w first, or the coordinates q of an
+    Articulation, (coordinate,), with quaternions of any length but zero; None judges `positions`
+    alone, the global ones of all joints that came with it [m], (joint, 3). The other arguments are
+    as for `solve_ik`.
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion has no length,

@@ -12,7 +12,7 @@ import pytest
 
 from plumbob.bench.experiments.check.tables import verdicts
 from plumbob.bench.harness.record import Record
-from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.claims import CLAIMS, MASS_SPRING_CLAIMS, run_claims, skeleton_claims
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.robots.claims import ROBOT_CLAIMS

@@ -4,12 +4,13 @@ import os
 import signal
 import time
 import tracemalloc
+from contextlib import closing
 from functools import partial
 
 import numpy as np
 import pytest
 
-from plumbob.crosscheck.child_process import ChildProcess, LostError
+from plumbob.crosscheck.child_process import CallProcess, LostError
 from plumbob.crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
 from plumbob.crosscheck.robots import comparisons, files, independent_bvh
 from plumbob.crosscheck.robots.comparisons import sweep_in_parts
@@ -71,10 +72,7 @@ class Here:
     def __init__(self, prepare, patience):
         pass
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
+    def close(self):
         pass
 
     def call(self, function, *arguments):
@@ -84,7 +82,7 @@ class Here:
 @pytest.fixture
 def here(monkeypatch):
     """Let files be read in this process."""
-    monkeypatch.setattr(files, "ChildProcess", Here)
+    monkeypatch.setattr(files, "CallProcess", Here)
 
 
 def outcomes(folder, **options):
@@ -431,7 +429,7 @@ def loud():
 
 
 def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
-    with ChildProcess(nothing, patience=0.5) as child:
+    with closing(CallProcess(nothing, patience=0.5)) as child:
         first = child.call(loud)
         assert child.call(loud) == first != os.getpid()
         with pytest.raises(LostError, match="ends by SIGSEGV"):
@@ -443,14 +441,14 @@ def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
         with pytest.raises(LostError, match="gives no answer within 5 s"):
             child.call(time.sleep, 60)
         assert child.call(loud) not in (first, os.getpid())
-        process = child._child.process
+        process = child._child._process
     assert process.returncode is not None
     assert capfd.readouterr() == ("", "")
 
 
 def test_a_call_that_waits_for_the_processor_is_not_lost():
     """Only its own processor time counts: no waiting, no start, nothing between two calls."""
-    with ChildProcess(partial(spin, 1.0), patience=0.5) as child:
+    with closing(CallProcess(partial(spin, 1.0), patience=0.5)) as child:
         process = child.call(os.getpid)
         for _ in range(3):
             child.call(time.sleep, 1.0)

@@ -13,7 +13,7 @@ import math
 from typing import Any, NamedTuple
 
 from plumbob.reference.arguments import FloatArray, IndexArray
-from plumbob.reference.backend.compiled import Kernel, Slot, bind
+from plumbob.reference.backend.compiled import Kernel, bind
 from plumbob.reference.quaternion import (
     IDENTITY,
     add,
@@ -145,10 +145,6 @@ def base_of(chain: Chain, pose: Pose, p: int, fault: int) -> Any:
     return load_vector(pose.positions, 0 if fault == 2 else p)
 
 
-sweep = Slot("sweep")
-finish = Slot("finish")
-
-
 def solve(chain: Chain, target: Any, ending: Ending, faults: Switches, pose: Pose) -> int:
     """Sweep until the end of the solve; `pose.local` is the start and becomes the result.
 
@@ -165,9 +161,9 @@ def solve(chain: Chain, target: Any, ending: Ending, faults: Switches, pose: Pos
         if is_reached(distance, before, ending.tolerance, i, faults.test):
             break
         before = distance
-        sweep(chain, target, i, faults, pose)
+        method.sweep(chain, target, i, faults, pose)
         i += 1
-    finish(chain, i, faults, pose)
+    method.finish(chain, i, faults, pose)
     return i
 
 
@@ -337,8 +333,16 @@ def point_link(
     store_quaternion(pose.local, child if fault == 3 else j, renormalised(Q))
 
 
+class Method(NamedTuple):
+    """The kernels of a solver: one sweep, and what makes rotations of its last positions."""
+
+    sweep: Any
+    finish: Any
+
+
+method = Method(sweep_ccd, keep)
 place_all = Kernel(place, label="forward kinematics with faults")
 SOLVERS = {
-    "ccd": Kernel(bind(solve, sweep=sweep_ccd, finish=keep), label="CCD with faults"),
-    "fabrik": Kernel(bind(solve, sweep=sweep_fabrik, finish=follow), label="FABRIK with faults"),
+    "ccd": Kernel(solve, label="CCD with faults"),
+    "fabrik": Kernel(bind(solve, method=Method(sweep_fabrik, follow)), label="FABRIK with faults"),
 }
