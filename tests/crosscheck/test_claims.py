@@ -172,6 +172,8 @@ def test_a_claim_is_missed(name):
     assert verdict.failure == failure
     if "baseline" not in name:
         assert verdict.difference == pytest.approx(difference, nan_ok=True)
+    elif failure == "nothing moved":
+        assert verdict.displacement == pytest.approx(5e-6)
 
 
 @pytest.mark.parametrize(("ours", "theirs"), [((1.0, 2.0), (1.0,)), ((), ())])

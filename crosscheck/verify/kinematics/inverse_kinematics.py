@@ -21,7 +21,7 @@ from . import laws, pose_laws, problems, rounding, sweeps
 from .pose_laws import AnsweredPose
 from .predictions import solve
 from .report import diagnosed, report
-from .sweeps import Comparison, Trial
+from .sweeps import AnsweredCase, SweepComparison
 
 TASK = "inverse_kinematics"
 cases = problems.cases
@@ -36,7 +36,7 @@ AS_SLOW = 1.5
 def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
     """Hold poses against the laws and sweeps against the textbook's; name the faults."""
     declared = method.lower() if method.lower() in KNOWN else ""
-    trials = [Trial(one) for one in asked]
+    trials = [AnsweredCase(one) for one in asked]
     swept = [trial for trial in trials if trial.is_sweep and trial.posed.finite]
     known = declared if method else sweeps.seen(swept, greeting)
     for trial in trials:
@@ -76,7 +76,7 @@ def _graver(finding: Finding) -> Finding:
     return replace(finding, verdict=Verdict.WRONG) if is_forgiven else finding
 
 
-def _judged(trial: Trial, method: str, greeting: Greeting) -> CaseJudgement:
+def _judged(trial: AnsweredCase, method: str, greeting: Greeting) -> CaseJudgement:
     case, posed, inputs = trial.case, trial.posed, trial.case.inputs
 
     def findings(values: Mapping[str, Any]) -> list[Finding]:
@@ -94,7 +94,7 @@ def _judged(trial: Trial, method: str, greeting: Greeting) -> CaseJudgement:
     return laws.judged(trial.asked, greeting, findings, reference, expected, digits)
 
 
-def _expected(trial: Trial, method: str) -> tuple[Mapping[str, Any], float | None]:
+def _expected(trial: AnsweredCase, method: str) -> tuple[Mapping[str, Any], float | None]:
     """Return the textbook's answer to a sweep, and how many digits agree with it."""
     if not method or not trial.is_sweep or not isinstance(trial.asked.answer, Answer):
         return {}, None
@@ -217,7 +217,9 @@ def claims(distance: float, slack: float, values: Mapping[str, Any], case: Case)
     return findings
 
 
-def _alike(trial: Trial, base: Trial, method: str, greeting: Greeting) -> list[Finding]:
+def _alike(
+    trial: AnsweredCase, base: AnsweredCase, method: str, greeting: Greeting
+) -> list[Finding]:
     """Return whether an answer in another world is the one that it is like, brought there."""
     if not (trial.posed.finite and base.posed.finite):
         return []
@@ -235,7 +237,9 @@ def _alike(trial: Trial, base: Trial, method: str, greeting: Greeting) -> list[F
     return [laws.bounded("equal worlds", error, tolerance, "m", message, verdict=verdict)]
 
 
-def _diagnosis(trials: Sequence[Trial], comparison: Comparison, greeting: Greeting) -> Diagnosis:
+def _diagnosis(
+    trials: Sequence[AnsweredCase], comparison: SweepComparison, greeting: Greeting
+) -> Diagnosis:
     """Return the faults that reproduce the answers, of the method declared or inferred."""
     posed = [one for one in trials if one.posed.comparable]
     all_sweeps = [one for one in posed if one.is_sweep]
@@ -255,5 +259,5 @@ def _diagnosis(trials: Sequence[Trial], comparison: Comparison, greeting: Greeti
     return Diagnosis(behaviour=comparison.behaviour)
 
 
-def _is_late(one: Trial) -> bool:
+def _is_late(one: AnsweredCase) -> bool:
     return any(finding.law == STOPS and finding.verdict for finding in one.judgement.findings)

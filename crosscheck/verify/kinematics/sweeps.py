@@ -32,7 +32,7 @@ SEEN_FAULTS = 2
 LAW = "one sweep"
 
 
-class Trial:
+class AnsweredCase:
     """A case, its answer as the laws see it, and the judgement, which grows.
 
     Attributes:
@@ -73,7 +73,7 @@ class Trial:
         self.judgement = replace(self.judgement, findings=findings)
 
 
-class Comparison(NamedTuple):
+class SweepComparison(NamedTuple):
     """What the sweeps say."""
 
     method: str  # "ccd", "fabrik" or "", as declared or inferred
@@ -93,11 +93,11 @@ def likeness(greeting: Greeting, case: Case) -> float:
 
 
 def compare(
-    swept: Sequence[Trial], method: str, declared: str, others_hold: bool, greeting: Greeting
-) -> Comparison:
+    swept: Sequence[AnsweredCase], method: str, declared: str, others_hold: bool, greeting: Greeting
+) -> SweepComparison:
     """Return the findings of the sweeps of a method that is declared, or seen."""
     if not method:
-        return Comparison("")
+        return SweepComparison("")
     errors = {one.case.name: _error(one, method, greeting) for one in swept}
     wrong = [name for name, (error, bound) in errors.items() if not error <= bound]
     behaviour = None
@@ -124,10 +124,10 @@ def compare(
         outcome, words = (verdict, message) if name in wrong else holds
         findings[name] = [Finding(LAW, outcome, error, bound, "m", words)]
     is_honest = verdict is Verdict.RIGHT_BUT
-    return Comparison(method, behaviour, wrong, findings, is_honest, damped)
+    return SweepComparison(method, behaviour, wrong, findings, is_honest, damped)
 
 
-def seen(swept: Sequence[Trial], greeting: Greeting) -> str:
+def seen(swept: Sequence[AnsweredCase], greeting: Greeting) -> str:
     """Return the method whose sweeps most of the answers are, right or with a fault, or ""."""
     for method in NAMES:
         errors = [_error(one, method, greeting) for one in swept]
@@ -143,14 +143,14 @@ def seen(swept: Sequence[Trial], greeting: Greeting) -> str:
     return best if fits[best][0] >= MOST else ""
 
 
-def _is_another_solver(greeting: Greeting, one: Trial) -> bool:
+def _is_another_solver(greeting: Greeting, one: AnsweredCase) -> bool:
     """Return whether a pose keeps all laws and has arrived, whatever was asked for."""
     findings = pose_laws.all_of(one.posed, one.case, greeting)
     keeps = all(finding.verdict < Verdict.WRONG for finding in findings)
     return keeps and _goes_on(one, greeting)
 
 
-def _best_fit(swept: Sequence[Trial], method: str, greeting: Greeting) -> tuple[float, int]:
+def _best_fit(swept: Sequence[AnsweredCase], method: str, greeting: Greeting) -> tuple[float, int]:
     """Return what share of the sweeps a faulty textbook reproduces, and minus its faults."""
     asked = [one.seen for one in swept]
     alike = partial(likeness, greeting)
@@ -162,7 +162,7 @@ def _best_fit(swept: Sequence[Trial], method: str, greeting: Greeting) -> tuple[
     )
 
 
-def _error(one: Trial, method: str, greeting: Greeting) -> tuple[float, float]:
+def _error(one: AnsweredCase, method: str, greeting: Greeting) -> tuple[float, float]:
     """Return how far the path's joints are from the textbook's, and what rounding allows [m]."""
     _, x, _ = solve(method, one.case.inputs)
     size, amplification = one.case.facts["size"], one.case.facts["amplification"]
@@ -170,7 +170,7 @@ def _error(one: Trial, method: str, greeting: Greeting) -> tuple[float, float]:
 
 
 def _verdict(
-    swept: Sequence[Trial], method: str, others_hold: bool, greeting: Greeting
+    swept: Sequence[AnsweredCase], method: str, others_hold: bool, greeting: Greeting
 ) -> tuple[Verdict, Sentence]:
     """Return what follows from sweeps that are not the textbook's."""
     if others_hold and all(_goes_on(one, greeting) for one in swept):
@@ -193,13 +193,13 @@ def _verdict(
     )
 
 
-def _goes_on(one: Trial, greeting: Greeting) -> bool:
+def _goes_on(one: AnsweredCase, greeting: Greeting) -> bool:
     """Return whether the effector has arrived, or as near as helpers let it."""
     stall = rounding.STALL[greeting.precision] * max(one.case.facts["reach"], 1e-300)
     return one.posed.distance <= stall
 
 
-def _ends_well(one: Trial) -> bool:
+def _ends_well(one: AnsweredCase) -> bool:
     """Return whether the last joint of a sweep has brought the effector onto its line."""
     x, target = one.posed.positions, one.case.inputs["target"]
     return any(
@@ -212,7 +212,9 @@ def _angle(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
 
-def honest_variant(swept: Sequence[Trial], method: str, greeting: Greeting) -> Sentence | None:
+def honest_variant(
+    swept: Sequence[AnsweredCase], method: str, greeting: Greeting
+) -> Sentence | None:
     """Return what an honest solver does otherwise than the textbook, if it explains all sweeps."""
     for fault in (one for one in FAULTS[method] if one.honest and one.key != "tolerance squared"):
         if _explains(swept, method, greeting, switches([fault])):
@@ -220,7 +222,7 @@ def honest_variant(swept: Sequence[Trial], method: str, greeting: Greeting) -> S
     return None
 
 
-def damping_of(swept: Sequence[Trial], greeting: Greeting) -> Sentence | None:
+def damping_of(swept: Sequence[AnsweredCase], greeting: Greeting) -> Sentence | None:
     """Return by how much a CCD scales or caps its rotations, if that explains all sweeps."""
     for switched in (Switches(), switches([by_key("ccd")["root to tip"]])):
         gain, most = _damping(swept, switched)
@@ -237,7 +239,7 @@ def damping_of(swept: Sequence[Trial], greeting: Greeting) -> Sentence | None:
     return None
 
 
-def _damping(swept: Sequence[Trial], switched: Switches) -> tuple[float, float]:
+def _damping(swept: Sequence[AnsweredCase], switched: Switches) -> tuple[float, float]:
     """Return by what share the first joint of a sweep was rotated, and the largest angle."""
     gain, most = 1.0, 0.0
     for one in swept:
@@ -253,7 +255,9 @@ def _damping(swept: Sequence[Trial], switched: Switches) -> tuple[float, float]:
     return gain, most
 
 
-def _explains(swept: Sequence[Trial], method: str, greeting: Greeting, switched: Switches) -> bool:
+def _explains(
+    swept: Sequence[AnsweredCase], method: str, greeting: Greeting, switched: Switches
+) -> bool:
     return all(
         difference(predict_inverse(method, switched, one.case), one.posed.comparable)
         <= likeness(greeting, one.case)
@@ -262,7 +266,10 @@ def _explains(swept: Sequence[Trial], method: str, greeting: Greeting, switched:
 
 
 def explained(
-    comparison: Comparison, all_sweeps: Sequence[Trial], wrong: Sequence[Trial], greeting: Greeting
+    comparison: SweepComparison,
+    all_sweeps: Sequence[AnsweredCase],
+    wrong: Sequence[AnsweredCase],
+    greeting: Greeting,
 ) -> Diagnosis:
     """Return the faults that reproduce the sweeps."""
     if not comparison.method:
