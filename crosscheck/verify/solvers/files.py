@@ -14,7 +14,7 @@ from ..contestant import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
 from ..sentence import Sentence, did_you_mean, sentence
 from ..task import TASKS, Task
-from .line_process import LIMITS
+from .losses import LIMITS
 from .tables import read_table
 
 GREETING, SETTINGS, REQUEST, ANSWER = "greeting.json", "export.json", "request.json", "answer.json"
