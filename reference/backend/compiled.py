@@ -133,9 +133,9 @@ def _entry(kernel: PythonKernel, relaxed: bool, label: str | None) -> PythonKern
     from . import disk_cache, linking
 
     compilation.watch_numba()
-    compiled = _jit(kernel, relaxed, pipeline_class=linking.KernelCompiler)
+    options = {"pipeline_class": linking.KernelCompiler} if linking.is_supported() else {}
+    compiled = _jit(kernel, relaxed, **options)
     compiled.label = label or kernel.__name__.strip("_").replace("_", " ")
-    linking.fix_flags(compiled)
     disk_cache.use_cache(compiled)
     return compiled
 
@@ -151,6 +151,8 @@ def _callee(kernel: PythonKernel, relaxed: bool, inline: bool) -> PythonKernel:
     options: dict[str, Any] = {"no_cpython_wrapper": True, "forceinline": inline}
     if not allocates(kernel):
         options["_nrt"] = False
+    if not linking.is_supported():
+        return _jit(kernel, relaxed, **options)
     compiled = _jit(kernel, relaxed, pipeline_class=linking.LinkedCompiler, **options)
     return linking.compile_directly(compiled)
 
