@@ -184,11 +184,13 @@ def run(
     figures = np.empty((n, len(FIGURES)))
     if settings.record:
         history = _new_history(n, 1 if coordinates is None else 2, settings)
-    rows: tuple[np.ndarray, ...] = (starts, targets, local, positions, figures, history)
-    q, least = local, LEAST_ON_CHAINS
-    if coordinates is not None:
+    rows: tuple[np.ndarray, ...]
+    if coordinates is None:
+        q, least = local, LEAST_ON_CHAINS
+        rows = starts, targets, local, positions, figures, history
+    else:
         q, least = np.empty((n, coordinates)), LEAST
-        rows = (*rows, q)
+        rows = starts, targets, local, positions, figures, history, q
     if n < 2 * least or settings.limits.chained:
         valid = kernel(*arrays, settings.numbers, *rows)
     else:

@@ -131,7 +131,7 @@ def net(
     damping: float = 0.0,
     gravity: float = 9.81,
 ) -> tuple[MassSpring, State]:
-    """Return a net of tension-only ropes, a `grid_cloth` pinned at its four corners."""
+    """Return a net of ropes: a `grid_cloth` without shear and bending, its corners pinned."""
     rows, columns = _shape(rows, columns)
     particles = rows * columns
     return grid_cloth(
