@@ -84,9 +84,8 @@ class Job(NamedTuple):
             if budget.is_spent:
                 return
             solve = ask(*self.targets.request(i))
-            if (
-                before is not None and self.warms_up
-            ):  # so that caches are as in a loop of solves and nothing else
+            if before is not None and self.warms_up:
+                # So that caches are as in a loop of solves and nothing else.
                 for _ in range(AGAIN):
                     again = attempt(before)
                     budget.excuse(again.time.at_door if again.time else 0.0)
