@@ -4,13 +4,13 @@ import contextlib
 import shutil
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from plumbob.bench.harness.results import Results
     from plumbob.bench.report.report import Written
+    from plumbob.bench.tables.results import Results
     from plumbob.bench.tables.table import Table
     from plumbob.crosscheck.verdict import Verdict as ClaimVerdict
 
@@ -30,7 +30,7 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
     from plumbob.bench.report.sections import tables
     from plumbob.bench.tables.table import is_blank
 
-    for made in _made(lambda results: tables(results, suites), suites, output):
+    for made in tables(_results(suites, output), suites):
         if not is_blank(made):
             print_aligned(made, f"plumbob report {output} --table {made.name}")
 
@@ -39,18 +39,15 @@ def print_ending(suites: Sequence[str], output: Path) -> None:
     """Print what a bench of these suites came to, in about eight lines."""
     from plumbob.bench.report.outcome import ending
 
-    lines = _made(lambda results: ending(results, suites, width()), suites, output)
-    print("\n".join(lines))
+    print("\n".join(ending(_results(suites, output), suites, width())))
 
 
-def _made(make: "Callable[[Results], Any]", suites: Sequence[str], output: Path) -> Any:
-    """Return what is made of a folder's records of these suites, but for those that do not fit."""
+def _results(suites: Sequence[str], output: Path) -> "Results":
     from plumbob.bench.harness.record import FINISHED, RecordFile
-    from plumbob.bench.harness.results import Results, plain, sift
+    from plumbob.bench.tables.results import Results
 
-    stored = RecordFile(output).read().records
-    records, _ = sift(make, [plain(r) for r in stored if r.suite in (*suites, FINISHED)])
-    return make(Results(records))
+    records = RecordFile(output).read().records
+    return Results(record for record in records if record.suite in (*suites, FINISHED))
 
 
 def print_summary(table: "Table") -> None:
@@ -77,16 +74,13 @@ def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe")
 def print_lines(table: "Table") -> list[str]:
     """Print the lines of a table; return the headings of the columns that had no place."""
     from rich.console import Console
-    from rich.text import Text
 
     from plumbob.bench.tables.aligned import aligned
 
     made = aligned(table, width())
     console = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
     for line in made.lines:
-        text = Text.assemble(*((span.text, span.style) for span in line))
-        text.rstrip()
-        console.print(text)
+        console.print(line)
     return made.left_out
 
 

@@ -6,9 +6,8 @@ from typing import Any, NamedTuple
 from ..harness.metrics import adjusted
 from ..harness.record import Record
 from .answers import chance_by_clock, compare_answers, compare_cut_answers
-from .intervals import ERROR_RATE, Ratio
-from .rows import Pair, Row, RowKey, Verdict, by_row, come_and_gone, pairs, worst_first
-from .times import Drift, drift, judged, time_ratios
+from .rows import Pair, Ratio, Row, RowKey, Verdict, by_row, come_and_gone, pairs, worst_first
+from .times import ERROR_RATE, Drift, clocked, drift, has_rounds, judged, time_ratios
 
 ACCURACY, TIME, GONE = "accuracy", "time", "gone"
 
@@ -21,12 +20,14 @@ class Comparison(NamedTuple):
         drift: by how much the machine differs from itself.
         how: a sentence on how times were decided.
         is_rerun: whether both were measured side by side.
+        short: how many times have too few rounds to be compared.
     """
 
     rows: list[Row]
     drift: Drift
     how: str
     is_rerun: bool = False
+    short: int = 0
 
 
 class Limits(NamedTuple):
@@ -47,11 +48,11 @@ HOW = (
 def compare(old: Iterable[Record], new: Iterable[Record]) -> Comparison:
     """Return what two runs differ in, by their records."""
     before, after = by_row(old), by_row(new)
-    both = dict(pairs(before, after))
+    both = pairs(before, after)
     machine = drift(both)
-    ratios = time_ratios(both, machine)
-    rows = [*come_and_gone(before, after), *decide(both, ratios)]
-    return Comparison(worst_first(rows), machine, HOW)
+    rows = [*come_and_gone(before, after), *decide(both, time_ratios(both, machine))]
+    short = sum(not has_rounds(pair, name) for pair in both.values() for name in clocked(pair))
+    return Comparison(worst_first(rows), machine, HOW, short=short)
 
 
 def decide(
@@ -60,16 +61,17 @@ def decide(
     """Return a row on the answers of each pair, and one on each of its times."""
     cut = {key: chance for key, pair in both.items()
            if (chance := chance_by_clock(pair)) is not None}  # fmt: skip
-    timed = {at: ratio for at, ratio in ratios.items() if isinstance(ratio, Ratio)}
-    family = [*cut.values(), *(ratio.chance for ratio in timed.values())]
-    chances = iter(adjusted(family).tolist())
+    known = {at: ratio.chance for at, ratio in ratios.items() if isinstance(ratio, Ratio)}
+    chances = iter(adjusted([*cut.values(), *known.values()]).tolist())
     rows = [compare_cut_answers(key, both[key], next(chances), ERROR_RATE) for key in cut]
-    rows += [judged(*at, ratio, next(chances)) for at, ratio in timed.items()]
     rows += [compare_answers(key, pair) for key, pair in both.items() if key not in cut]
-    return rows + [
-        Row(*at, Verdict.UNDECIDED, why=ratio)
-        for at, ratio in ratios.items() if isinstance(ratio, str)
-    ]  # fmt: skip
+    for at, ratio in ratios.items():
+        rows.append(
+            judged(*at, ratio, next(chances))
+            if isinstance(ratio, Ratio)
+            else Row(*at, Verdict.UNDECIDED, why=ratio)
+        )
+    return rows
 
 
 def limits(text: str) -> Limits:
@@ -109,8 +111,6 @@ def stops_at(rows: Sequence[Row], limit: Limits) -> list[Row]:
 def _stops(row: Row, limit: Limits) -> bool:
     if row.verdict in (Verdict.LESS_RIGHT, Verdict.CHANGED):
         return limit.accuracy is not None and row.change >= limit.accuracy
-    if row.verdict == Verdict.SLOWER:
-        return (
-            limit.time is not None and row.ratio is not None and row.ratio.value >= 1 + limit.time
-        )
+    if row.verdict == Verdict.SLOWER and row.ratio:
+        return limit.time is not None and row.ratio.value >= 1 + limit.time
     return row.verdict == Verdict.GONE and limit.gone

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..harness.record import Record, RecordFile
-from ..harness.results import plain
+from ..harness.record import Record, on_record
 from ..tables.columns import text
+from ..tables.results import counted, printable
 from ..tables.table import Column, Table, cells
 from ..text import visible
-from .rows import Row, RowKey, Verdict, by_row, distinguishing
+from .rows import RowKey, by_row, distinguishing, is_meant
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 # Rows on a terminal; curves of a figure that are labelled, the others are grey.
@@ -62,12 +62,12 @@ def read_runs(folders: Iterable[Path]) -> list[Run]:
 
 
 def _read(folder: Path) -> Run:
-    records = [plain(record) for record in RecordFile(folder).read().records]
-    if not records:
-        raise ValueError(f"no records in {folder}: run `plumbob bench` first")
+    records = on_record(folder, typed=False).records
     newest = max(records, key=lambda record: record.when)
     commit = newest.commit or newest.stamp.get("source", "")
-    return Run(visible(f"{folder.name} {commit}".strip()), newest.when, by_row(records))
+    return Run(
+        visible(f"{folder.name} {commit}".strip()), newest.when, by_row(map(printable, records))
+    )
 
 
 def courses(runs: Sequence[Run], quantity: str, words: Sequence[str] = ()) -> list[Course]:
@@ -78,23 +78,18 @@ def courses(runs: Sequence[Run], quantity: str, words: Sequence[str] = ()) -> li
     Raises:
         ValueError: if no row has it; the message lists what rows have.
     """
-    keys = list(dict.fromkeys(key for run in runs for key in run.rows if _is_meant(key, words)))
-    settings = distinguishing(Row(key, quantity, Verdict.SAME) for key in keys)
-    found = [_course(runs, key, quantity, settings[key]) for key in keys]
-    known = [course for course in found if np.isfinite(course.values).any()]
+    keys = list(dict.fromkeys(key for run in runs for key in run.rows if is_meant(key, words)))
+    if not keys:
+        raise ValueError(f"only: expected part of a problem or solver, got {' '.join(words)!r}")
+    settings = distinguishing(keys)
+    every = [_course(runs, key, quantity, settings[key]) for key in keys]
+    known = [course for course in every if len(course.finite)]
     if not known:
         names = {n for run in runs for key in keys if key in run.rows for n in run.rows[key].arrays}
-        if not keys:
-            raise ValueError(f"only: expected part of a problem or solver, got {' '.join(words)!r}")
         if quantity in names:
             raise ValueError(f"quantity: expected finite numbers of {quantity!r}, got none")
-        valid = ", ".join(sorted(names))
-        raise ValueError(f"quantity: expected one of {valid}, got {quantity!r}")
+        raise ValueError(f"quantity: expected one of {', '.join(sorted(names))}, got {quantity!r}")
     return sorted(known, key=lambda course: -abs(course.change))
-
-
-def _is_meant(key: RowKey, words: Sequence[str]) -> bool:
-    return not words or any(word in part for word in words for part in key[1:3])
 
 
 def _course(runs: Sequence[Run], key: RowKey, quantity: str, settings: str) -> Course:
@@ -130,7 +125,7 @@ def table(runs: Sequence[Run], courses: Sequence[Course], quantity: str) -> Tabl
         text("course", lambda course: sparkline(course.values)),
     )
     more = f"; {len(courses) - LINES} more rows changed less" if len(courses) > LINES else ""
-    title = f"{quantity}, {len(runs)} runs: {', '.join(run.name for run in runs)}{more}"
+    title = f"{quantity}, {counted(len(runs), 'run')}: {', '.join(run.name for run in runs)}{more}"
     return Table("history", title, columns, cells(columns, courses[:LINES]))
 
 
@@ -154,5 +149,4 @@ def draw(runs: Sequence[Run], made: Sequence[Course], quantity: str) -> str:
         ax.set_ylabel(written(quantity))
         handles, labels = ax.get_legend_handles_labels()
         figure.legend(handles[::-1], labels[::-1], loc="outside lower center")
-        title = f"{quantity} over {len(runs)} runs"
-        return svg_of(figure, title)
+        return svg_of(figure, f"{quantity} over {counted(len(runs), 'run')}")

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from textwrap import wrap
 
 from ..tables.columns import text
+from ..tables.results import counted
 from ..tables.table import Summary, Table, cells
 from ..text import visible
 from .compare import Comparison
-from .rows import ORDER, Row, Verdict, distinguishing
+from .rows import ORDER, Row, RowKey, Verdict, distinguishing
+from .times import ROUNDS
 
 # Lines of the summary on a terminal, its rows among them; rows of the table in a pull request.
 LINES, MOST = 10, 50
@@ -33,10 +35,11 @@ def counts(comparison: Comparison) -> str:
 
 def summary(comparison: Comparison, stopped: Sequence[Row], width: int) -> list[str]:
     """Return ten lines of at most so many letters, the worst rows first, as many as fit."""
-    changed = [row for row in comparison.rows if row.verdict != Verdict.SAME]
-    names = distinguishing(comparison.rows)
+    changed, names = _changed(comparison)
     begin = [headline(comparison, stopped), counts(comparison) or "no rows in common"]
     drift = f"the machine's drift: {comparison.drift.sentence}"
+    if comparison.short:
+        drift += f"; {_short(comparison)}"
     if any(row.verdict == Verdict.UNDECIDED for row in changed) and not comparison.is_rerun:
         drift += "; --rerun REV decides"
     for count in range(min(LINES, len(changed)), -1, -1):
@@ -56,9 +59,9 @@ def _line(row: Row, settings: str) -> str:
 
 def table(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) -> Table:
     """Return the rows that are not known to be the same, with what decides them."""
-    told = [row for row in comparison.rows if row.verdict != Verdict.SAME]
-    names = distinguishing(comparison.rows)
-    points = [f"{_rows(len(told) - MOST)} more are in the JSON"] if len(told) > MOST else []
+    changed, names = _changed(comparison)
+    points = [f"{_rows(len(changed) - MOST)} more are in the JSON"] if len(changed) > MOST else []
+    points += [_short(comparison)] if comparison.short else []
     columns = (
         text("verdict", lambda row: str(row.verdict)),
         text("problem", lambda row: row.key[1]),
@@ -71,7 +74,7 @@ def table(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) ->
         "compare",
         f"plumbob compare: {headline(comparison, stopped)}",
         columns,
-        cells(columns, told[:MOST]),
+        cells(columns, changed[:MOST]),
         shows=f"{old} beside {new}.",
         measured=f"{comparison.how} The machine's drift: {comparison.drift.sentence}.",
         summary=Summary(counts(comparison) or "No rows in common", tuple(points)),
@@ -88,6 +91,7 @@ def as_json(comparison: Comparison, stopped: Sequence[Row], old: str, new: str) 
         "drift": comparison.drift.value,
         "drift_source": comparison.drift.source,
         "how": comparison.how,
+        "short": comparison.short,
         "counts": Counter(str(row.verdict) for row in comparison.rows),
         "rows": [_as_json(row, row in stopped) for row in comparison.rows],
     }
@@ -106,9 +110,20 @@ def _as_json(row: Row, stops: bool) -> dict[str, object]:
     }  # fmt: skip
 
 
+def _changed(comparison: Comparison) -> tuple[list[Row], dict[RowKey, str]]:
+    """Return the rows that are not known to be the same, and what tells rows apart."""
+    rows = comparison.rows
+    changed = [row for row in rows if row.verdict != Verdict.SAME]
+    return changed, distinguishing(row.key for row in rows)
+
+
+def _short(comparison: Comparison) -> str:
+    return f"{counted(comparison.short, 'time')} of fewer than {ROUNDS} rounds not compared"
+
+
 def _finite(value: float) -> float | None:
     return value if abs(value) < float("inf") else None
 
 
 def _rows(count: int) -> str:
-    return f"{count} row{'' if count == 1 else 's'}"
+    return counted(count, "row")

@@ -5,38 +5,43 @@ fast or slow by the accident of its addresses too.
 """
 
 import contextlib
-import fcntl
 import json
 import math
 import os
 import shutil
-import stat
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.crosscheck.child_process import kill_group, one_thread
+from plumbob.crosscheck.child_process import ChildProcess, LostError, one_thread
 
 from ..harness.metrics import adjusted
-from ..harness.record import Record, decode
+from ..harness.record import Record, untyped
 from . import revision_process
+from .answers import is_clocked
 from .compare import Comparison, decide
-from .intervals import ERROR_RATE, Deviation, Ratio, pairs_needed, ratio_of_pairs
-from .quantities import is_clocked
-from .rows import Pair, RowKey, by_row, come_and_gone, pairs, row_key, worst_first
-from .times import FLOOR, UNKNOWN, Drift, known_drift
+from .rows import Pair, Ratio, RowKey, by_row, come_and_gone, is_meant, pairs, row_key, worst_first
+from .times import (
+    ERROR_RATE,
+    FLOOR,
+    UNKNOWN,
+    Deviation,
+    Drift,
+    known_drift,
+    pairs_needed,
+    ratio_of_pairs,
+)
 
 # Pairs of median times, old and new, of each time of each row.
 Taken = dict[tuple[RowKey, str], list[tuple[float, float]]]
 Ratios = dict[tuple[RowKey, str], Ratio]
 
 SEED = 20130
-PREFIX = "plumbob-rerun-"
 HOW = (
     "Both revisions are measured side by side in fresh processes, {pairs} times each, the order "
     "drawn by lot. Answers are compared to the bit. Times are decided by Wilcoxon's signed-rank "
@@ -72,8 +77,8 @@ def rerun(plan: Plan, root: Path, tell: Callable[[str], None] = lambda _: None) 
         ValueError: if there is no such revision, nothing to measure in both, or a process ends
             before it has measured all.
     """
-    with _temporary_folder() as folder:
-        old, new = folder / "old", folder / "new"
+    with tempfile.TemporaryDirectory(prefix="plumbob-rerun-") as folder:
+        old, new = Path(folder, "old"), Path(folder, "new")
         _check_out(root, plan.revision, old)
         new.symlink_to(root, target_is_directory=True)  # so that both paths are as long
         return _measured((old, new), plan, tell)
@@ -95,26 +100,6 @@ def clone_root(folder: Path) -> Path:
         "--rerun: expected to be run in a clone of Plumbob, whose revisions it measures, "
         f"got {folder}: change to a clone, or compare two folders of records"
     )
-
-
-@contextlib.contextmanager
-def _temporary_folder() -> Iterator[Path]:
-    """Yield a locked folder; remove those whose process was killed, which ended its lock."""
-    for old in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/old"):
-        with contextlib.suppress(OSError):
-            _remove_abandoned(old.parent)
-    with tempfile.TemporaryDirectory(prefix=PREFIX) as name, Path(name, "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield Path(name)
-
-
-def _remove_abandoned(folder: Path) -> None:
-    """Remove a folder of this user's that no process holds; others may have put any there."""
-    status = folder.lstat()
-    if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid():
-        with Path(folder, "lock").open() as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            shutil.rmtree(folder)
 
 
 def _check_out(root: Path, revision: str, folder: Path) -> None:
@@ -142,13 +127,9 @@ class Revision:
     """A process that measures blocks of one revision, by the sources in a folder."""
 
     def __init__(self, folder: Path, suites: Sequence[str], scale: str) -> None:
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (open as long as the process)
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", revision_process.__file__, str(folder), scale, *suites],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, cwd=folder.parent,
-            env={**one_thread(), "PYTHONPATH": str(folder)}, text=True, encoding="utf-8",
-            process_group=0,
-        )  # fmt: skip
+        command = [sys.executable, "-P", revision_process.__file__, str(folder), scale, *suites]
+        environment = {**one_thread(), "PYTHONPATH": str(folder)}
+        self._process = ChildProcess(command, folder=folder.parent, environment=environment)
 
     def blocks(self) -> list[list[str]]:
         """Return the keys of what there is to be measured: suite, problem, solver, settings."""
@@ -156,82 +137,91 @@ class Revision:
 
     def measure(self, key: Sequence[str]) -> Record:
         """Return a fresh record of a block."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # what ended it is said by the answer
-            print(json.dumps(key), file=self._process.stdin, flush=True)
-        return decode(self._answer())
+        self._process.send(f"{json.dumps(key)}\n".encode())
+        return untyped(self._answer())
 
     def _answer(self) -> str:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            self._process.wait()
-            self._said.seek(0)
-            last = self._said.read().decode(errors="replace").strip().splitlines()[-1:]
-            raise ValueError(f"a process of the rerun ended: {' '.join(last) or 'without a word'}")
-        return line
+        try:
+            line: bytes = self._process.receive()
+        except LostError:
+            last = self._process.last_words.decode(errors="replace").strip().splitlines()[-1:]
+            why = " ".join(last) or "without a word"
+            raise ValueError(f"a process of the rerun ended: {why}") from None
+        return line.decode()
 
     def close(self) -> None:
         """End the process and what it has started."""
-        kill_group(self._process)
-        self._process.communicate()
-        self._said.close()
+        self._process.end()
 
 
 @contextlib.contextmanager
 def _both(
-    folders: tuple[Path, Path], plan: Plan, new_first: bool = False
+    folders: tuple[Path, Path], plan: Plan, order: tuple[int, ...] = (0, 1)
 ) -> Iterator[tuple[Revision, Revision]]:
     """Yield a process of each revision, begun in this order: the first may find a cold machine."""
     with contextlib.ExitStack() as stack:
         made: dict[int, Revision] = {}
-        for i in _order(new_first):
+        for i in order:
             made[i] = Revision(folders[i], plan.suites, plan.scale)
             stack.callback(made[i].close)
         yield made[0], made[1]
 
 
-def _order(new_first: bool) -> tuple[int, int]:
-    """Return the order of old, 0, and new, 1."""
-    return (1, 0) if new_first else (0, 1)
+def _drawn(lot: np.random.Generator) -> tuple[int, ...]:
+    """Return the order of old, 0, and new, 1, drawn by lot."""
+    return (1, 0) if lot.integers(2) else (0, 1)
 
 
 def _measured(folders: tuple[Path, Path], plan: Plan, tell: Callable[[str], None]) -> Comparison:
     """Measure once for the answers, which also compiles, and then pair by pair for the times."""
-    with _both(folders, plan) as both:
-        keys = [_chosen(one.blocks(), plan.words) for one in both]
-        if not any(keys):
-            raise ValueError(
-                "--rerun: expected something to measure in both revisions, got nothing"
-            )
-        found = []
-        for one, blocks in zip(both, keys, strict=True):
-            tell(f"answers of {len(blocks)} rows")
-            found.append([one.measure(key) for key in blocks])
-    old, new = by_row(found[0]), by_row(found[1])
-    rows = dict(pairs(old, new))
+    old, new = (by_row(records) for records in _answers(folders, plan, tell))
+    rows = pairs(old, new)
     taken = _take_pairs(folders, plan, rows, tell)
     ratios = _ratios(taken)
+    count = max(map(len, taken.values()), default=0)
     if called := _called(ratios):
-        again = plan._replace(seed=plan.seed + 1, pairs=max(map(len, taken.values())))
+        again = plan._replace(seed=plan.seed + 1, pairs=count)
         few = {key: rows[key] for key, _ in called}
         ratios |= _confirmed(called, _ratios(_take_pairs(folders, again, few, tell)))
-    count = max((len(values) for values in taken.values()), default=0)
     decided = [*come_and_gone(old, new), *decide(rows, ratios)]
     return Comparison(worst_first(decided), _drift(taken, count), HOW.format(pairs=count), True)
 
 
+def _answers(
+    folders: tuple[Path, Path], plan: Plan, tell: Callable[[str], None]
+) -> list[list[Record]]:
+    """Return the records of both revisions.
+
+    Raises:
+        ValueError: if there is nothing to measure.
+    """
+    with _both(folders, plan) as both:
+        keys = [[key for key in one.blocks() if is_meant(key, plan.words)] for one in both]
+        if not any(keys):
+            raise ValueError(
+                "--rerun: expected something to measure in both revisions, got nothing"
+            )
+        records = []
+        for one, wanted in zip(both, keys, strict=True):
+            tell(f"answers of {len(wanted)} rows")
+            records.append(list(map(one.measure, wanted)))
+    return records
+
+
 def _ratios(taken: Taken) -> Ratios:
-    return {at: _floored(ratio_of_pairs(*np.array(values).T)) for at, values in taken.items()}
+    """Return the ratio of each time; one too near to 1 to matter counts as chance."""
+    ratios = {at: ratio_of_pairs(*np.array(values).T) for at, values in taken.items()}
+    return {
+        at: ratio._replace(chance=1.0) if abs(math.log(ratio.value)) < FLOOR else ratio
+        for at, ratio in ratios.items()
+    }
 
 
 def _called(ratios: Ratios) -> Ratios:
     """Return what would be called faster or slower."""
     chances = adjusted([ratio.chance for ratio in ratios.values()])
-    return {
-        at: ratio for (at, ratio), chance in zip(ratios.items(), chances, strict=True)
-        if chance <= ERROR_RATE
-    }  # fmt: skip
+    return {at: ratios[at] for at, chance in zip(ratios, chances, strict=True)
+            if chance <= ERROR_RATE}  # fmt: skip
 
 
 def _confirmed(called: Ratios, again: Ratios) -> Ratios:
@@ -241,69 +231,54 @@ def _confirmed(called: Ratios, again: Ratios) -> Ratios:
     """
     known = _called({at: ratio for at, ratio in again.items() if at in called})
     return {
-        at: again[at]._replace(chance=first.chance)
-        if at in known and (again[at].value > 1) == (first.value > 1)
+        at: known[at]._replace(chance=first.chance)
+        if at in known and (known[at].value > 1) == (first.value > 1)
         else first._replace(chance=1.0)
         for at, first in called.items()
     }
 
 
-def _floored(ratio: Ratio) -> Ratio:
-    """Return a ratio that counts as chance if it is too near to 1 to matter."""
-    return ratio._replace(chance=1.0) if abs(math.log(ratio.value)) < FLOOR else ratio
-
-
 def _drift(taken: Taken, count: int) -> Drift:
     """Return by how much the old revision's times differ among themselves."""
-    logs = [np.log(np.array(values)[:, 0]) for values in taken.values()]
-    if not logs:
+    if not taken:
         return known_drift(0.0, "no times were compared")
     if count < 2:
         return known_drift(UNKNOWN, "assumed, for one pair does not tell")
-    spread = math.sqrt(2 * np.mean([np.var(values, ddof=1) for values in logs]))
-    freedom = len(logs) * (count - 1)
-    return Drift(Deviation(spread, freedom), f"the old revision beside itself, {count} times")
-
-
-def _chosen(keys: Sequence[Sequence[str]], words: Sequence[str]) -> list[Sequence[str]]:
-    """Return the keys whose problem or solver contains one of the words."""
-    return [key for key in keys if not words or any(w in part for w in words for part in key[1:3])]
+    variances = [np.var(np.log(np.array(values)[:, 0]), ddof=1) for values in taken.values()]
+    deviation = Deviation(math.sqrt(2 * np.mean(variances)), len(taken) * (count - 1))
+    return Drift(deviation, f"the old revision beside itself, {count} times")
 
 
 def _take_pairs(
-    folders: tuple[Path, Path], plan: Plan, rows: dict[RowKey, Pair], tell: Callable[[str], None]
+    folders: tuple[Path, Path], plan: Plan, rows: Mapping[RowKey, Pair], tell: Callable[[str], None]
 ) -> Taken:
     """Return pairs of median times, old and new, of each time of each row."""
-    clocked = {key: pair for key, pair in rows.items() if _times(pair.old) and _times(pair.new)}
-    quantities = sum(len(_times(pair.old)) for pair in clocked.values())
-    count = plan.pairs or pairs_needed(quantities)
+    timed = [pair for pair in rows.values() if all(map(_times, pair))]
+    count = plan.pairs or pairs_needed(sum(len(_times(pair.old)) for pair in timed))
     lot = np.random.default_rng(plan.seed)
     taken: Taken = {}
-    for i in range(count if clocked else 0):
-        tell(f"pair {i + 1} of {count}, {len(clocked)} rows")
-        with _both(folders, plan, bool(lot.integers(2))) as both:
+    for i in range(count if timed else 0):
+        tell(f"pair {i + 1} of {count}, {len(timed)} rows")
+        with _both(folders, plan, _drawn(lot)) as both:
             for one in both:
                 one.blocks()
-            for key in [list(clocked)[j] for j in lot.permutation(len(clocked))]:
-                _take_pair(both, clocked[key], bool(lot.integers(2)), taken)
+            for j in lot.permutation(len(timed)):
+                _take_pair(both, timed[j], _drawn(lot), taken)
     return taken
 
 
 def _take_pair(
-    both: tuple[Revision, Revision], pair: Pair, new_first: bool,
-    taken: Taken,
-) -> None:  # fmt: skip
-    found: dict[int, dict[str, float]] = {}
-    for i in _order(new_first):
-        record = pair[i]
-        found[i] = _times(both[i].measure(record.key))
-    for name in found[0].keys() & found[1].keys():
-        taken.setdefault((row_key(pair.old), name), []).append((found[0][name], found[1][name]))
+    both: tuple[Revision, Revision], pair: Pair, order: tuple[int, ...], taken: Taken
+) -> None:
+    medians = {i: _times(both[i].measure(pair[i].key)) for i in order}
+    for name in medians[0].keys() & medians[1].keys():
+        times = medians[0][name], medians[1][name]
+        taken.setdefault((row_key(pair.old), name), []).append(times)
 
 
 def _times(record: Record) -> dict[str, float]:
     """Return the medians of the times of a record."""
-    medians: dict[str, Any] = {
+    medians = {
         name: float(np.median(values)) for name, values in record.arrays.items()
         if is_clocked(record.suite, name) and values.size
     }  # fmt: skip

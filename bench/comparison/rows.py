@@ -1,14 +1,13 @@
 """The rows of a comparison: what two runs have of the same problem, solver and settings."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
+from ..harness import record as records
 from ..harness.record import FINISHED, Record
-from .intervals import Ratio
-from .quantities import row_settings
 
 RowKey = tuple[str, str, str, str]
 
@@ -28,9 +27,20 @@ class Verdict(StrEnum):
 
 
 ORDER = list(Verdict)
-# What is said of answers, and of times.
-OF_ANSWERS = frozenset({Verdict.LESS_RIGHT, Verdict.CHANGED, Verdict.MORE_RIGHT})
-OF_TIMES = frozenset({Verdict.SLOWER, Verdict.FASTER, Verdict.UNDECIDED})
+# What may change between runs of one row: the version of what is measured.
+_MOVING = frozenset({"version"})
+
+
+class Ratio(NamedTuple):
+    """New time over old, its interval, and how likely as much is by chance.
+
+    The interval holds the ratio in 95 % of runs.
+    """
+
+    value: float
+    low: float
+    high: float
+    chance: float
 
 
 class Pair(NamedTuple):
@@ -73,57 +83,57 @@ class Row:
 
 def row_key(record: Record) -> RowKey:
     """Return what makes two records of two runs the same row."""
-    settings = json.dumps(row_settings(record.settings), sort_keys=True)
-    return record.suite, record.problem, record.solver, settings
+    settings = {name: value for name, value in record.settings.items() if name not in _MOVING}
+    return records.key(record.suite, record.problem, record.solver, settings)
 
 
-def by_row(records: Iterable[Record]) -> dict[RowKey, Record]:
-    """Return the records that measured something, by row, the latest where there are several."""
-    kept = [r for r in records if r.suite != FINISHED and not r.superseded and holds_anything(r)]
-    return {row_key(record): record for record in sorted(kept, key=lambda record: record.when)}
+def by_row(some: Iterable[Record]) -> dict[RowKey, Record]:
+    """Return the records that measured something or failed, by row, the latest if several."""
+    return {
+        row_key(record): record
+        for record in sorted(some, key=lambda record: record.when)
+        if record.suite != FINISHED and not record.superseded and (record.arrays or record.failed)
+    }
 
 
-def holds_anything(record: Record) -> bool:
-    """Return whether a record has numbers or says why it failed."""
-    return bool(record.arrays) or bool(record.failed)
+def pairs(old: Mapping[RowKey, Record], new: Mapping[RowKey, Record]) -> dict[RowKey, Pair]:
+    """Return the rows that both runs have numbers of."""
+    both = {key: Pair(record, new[key]) for key, record in old.items() if key in new}
+    return {key: pair for key, pair in both.items() if not any(r.failed for r in pair)}
 
 
-def pairs(old: dict[RowKey, Record], new: dict[RowKey, Record]) -> Iterator[tuple[RowKey, Pair]]:
-    """Yield the rows that both runs have numbers of."""
-    for key, record in old.items():
-        other = new.get(key)
-        if other is not None and not record.failed and not other.failed:
-            yield key, Pair(record, other)
-
-
-def come_and_gone(old: dict[RowKey, Record], new: dict[RowKey, Record]) -> Iterator[Row]:
+def come_and_gone(old: Mapping[RowKey, Record], new: Mapping[RowKey, Record]) -> Iterator[Row]:
     """Yield the rows that only one run has numbers of."""
     for key in {**old, **new}:
         before, after = old.get(key), new.get(key)
-        if after is not None and after.failed and not (before is not None and before.failed):
-            why = f"it failed: {after.failed}"
-            yield Row(key, "", Verdict.LESS_RIGHT if before else Verdict.NEW, 1.0, why)
-        elif before is None or (before.failed and after is not None and not after.failed):
+        fails, failed = (record is not None and bool(record.failed) for record in (after, before))
+        if after and fails and not failed:
+            verdict = Verdict.LESS_RIGHT if before else Verdict.NEW
+            yield Row(key, "", verdict, 1.0, f"it failed: {after.failed}")
+        elif before is None or (failed and after and not fails):
             yield Row(key, "", Verdict.NEW, why="measured in the new run only")
         elif after is None:
             yield Row(key, "", Verdict.GONE, why="measured in the old run only")
 
 
-def distinguishing(rows: Iterable[Row]) -> dict[RowKey, str]:
+def distinguishing(keys: Iterable[RowKey]) -> dict[RowKey, str]:
     """Return the settings that tell a row from others of its problem and solver, as words."""
-    groups: dict[tuple[str, ...], dict[RowKey, dict[str, Any]]] = {}
-    for row in rows:
-        groups.setdefault(row.key[:3], {})[row.key] = row.settings
+    groups: dict[tuple[str, ...], dict[RowKey, dict[str, str]]] = {}
+    for key in keys:
+        settings = {name: json.dumps(value) for name, value in json.loads(key[3]).items()}
+        groups.setdefault(key[:3], {})[key] = settings
     return {
-        key: ", ".join(f"{n} {json.dumps(v)}" for n, v in settings.items() if _varies(group, n))
+        key: ", ".join(f"{name} {value}" for name, value in settings.items()
+                       if len({other.get(name) for other in group.values()}) > 1)
         for group in groups.values() for key, settings in group.items()
     }  # fmt: skip
-
-
-def _varies(group: dict[RowKey, dict[str, Any]], name: str) -> bool:
-    return len({json.dumps(settings.get(name)) for settings in group.values()}) > 1
 
 
 def worst_first(rows: Iterable[Row]) -> list[Row]:
     """Return rows by verdict, and within a verdict the greatest change first."""
     return sorted(rows, key=lambda row: (ORDER.index(row.verdict), -row.change, row.title))
+
+
+def is_meant(key: Sequence[str], words: Sequence[str]) -> bool:
+    """Return whether a problem or a solver contains one of the words; any does if there is none."""
+    return not words or any(word in part for word in words for part in key[1:3])

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..peers.entrant import Entrant
+from .values import Values, stored
 
 if TYPE_CHECKING:
     from ..problems.own import OwnProblem
@@ -14,14 +15,19 @@ class Measured(NamedTuple):
     """What a block found.
 
     Attributes:
-        arrays: numbers, by name.
+        values: numbers, of the type that the experiment declares; None where there are none.
         notes: sentences that belong to them, by name.
         facts: what tables select and sort by, beside the facts of the block; see `Block`.
     """
 
-    arrays: Mapping[str, Any]
+    values: Any  # Values, or a mapping until every experiment declares its own
     notes: Mapping[str, str] = {}
     facts: Mapping[str, Any] = {}
+
+    @property
+    def arrays(self) -> Mapping[str, Any]:
+        """The values by the names they have on record."""
+        return stored(self.values) if isinstance(self.values, Values) else self.values or {}
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ SUITES = {
     "self_test": "planted faults and honest solvers, judged by plumbob verify",
     "robot_models": "robots and characters from files of others, beside both engines",
     "ik": "a chain of ten ball joints, robots and a character, beside every solver installed",
-    "many_targets": "as many targets as are asked for on one arm: how rare are failures",
     "tracking": "closed curves: frames from rest, from the last solution, and coherently",
     "arm": "the lab's arm on every curve, and reaching for what is too far",
     "pictures": "the poses and cloths that the report draws",
@@ -25,7 +24,6 @@ SUITES = {
     "energy": "what integrators do to the energy of a cloth over 10,000 steps",
     "timing": "forward kinematics, solves and steps beside both engines",
     "cloth_scale": "cloths of a thousand particles and more: factors, solves, memory",
-    "first_call": "the first call of each public function, with nothing compiled yet",
 }
 
 
@@ -68,14 +66,12 @@ EXPERIMENTS = [
         ("pictures", "pictures", "kinematics", UNTIMED),
         ("robots", "ik", "kinematics", TIMED),
         ("published", "ik", "kinematics", TIMED),
-        ("many_targets", "many_targets", "kinematics", UNTIMED),
         ("cloth", "cloth", "cloth", UNTIMED),
         ("newton", "newton", "cloth", UNTIMED),
         ("cloth_peers", "cloth", "cloth", TIMED),
         ("energy", "energy", "cloth", UNTIMED),
         ("timing", "timing", "speed", TIMED),
         ("cloth_scale", "cloth_scale", "speed", TIMED),
-        ("first_call", "first_call", "speed", TIMED),
     )
 ]
 

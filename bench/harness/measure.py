@@ -26,21 +26,23 @@ def measure(block: Block) -> Record:
     begin = time.perf_counter()
     try:
         measured = block.measure()
+        record = record_of(block, measured, time.perf_counter() - begin)
+        record.check()
+        return record
     except Exception as error:  # whatever a solver raises is a result of that solver
         if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
             raise KeyboardInterrupt from None
-        measured = failure(describe(error))
-    return record_of(block, measured, time.perf_counter() - begin)
+        return record_of(block, failure(describe(error)), time.perf_counter() - begin)
 
 
 def failure(why: str) -> Measured:
     """Return a block without numbers that says why it could not be measured."""
-    return Measured({}, {"failed": why})
+    return Measured(None, {"failed": why})
 
 
 def not_installed(package: str) -> Measured:
     """Return a block without numbers that says what is missing."""
-    return Measured({}, {"remark": f"{package} is not installed"})
+    return Measured(None, {"remark": f"{package} is not installed"})
 
 
 def not_asked(why: str) -> Measured:

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import bdtr, stdtrit
+from scipy import stats
 
 from plumbob.reference import rotation
 
@@ -132,17 +132,17 @@ def median_interval(values: Floats) -> Interval:
     distribution (Conover 1999, section 3.2).
     """
     ordered = np.sort(np.asarray(values, dtype=float).ravel())
+    if not len(ordered):
+        return Interval(math.nan, math.nan, math.nan)
     cut = _coin_quantile(len(ordered))
     low, high = (ordered[cut], ordered[-1 - cut]) if cut >= 0 else (math.nan, math.nan)
-    middle = float(np.median(ordered)) if len(ordered) else math.nan
-    return Interval(middle, float(low), float(high))
+    return Interval(float(np.median(ordered)), float(low), float(high))
 
 
 @functools.cache
 def _coin_quantile(throws: int) -> int:
     """Return the greatest k for which k heads or fewer fall in 2.5 % of cases at most, else -1."""
-    chances = bdtr(np.arange(throws // 2 + 1), throws, 0.5)
-    return int(np.count_nonzero(chances <= (1 - CONFIDENCE) / 2)) - 1
+    return int(stats.binom.ppf((1 - CONFIDENCE) / 2, throws, 0.5)) - 1
 
 
 def mean_interval(values: Floats) -> Interval:
@@ -150,8 +150,7 @@ def mean_interval(values: Floats) -> Interval:
     count, middle = int(np.size(values)), mean(values)
     if count < 2:
         return Interval(middle, math.nan, math.nan)
-    half = float(stdtrit(count - 1, (1 + CONFIDENCE) / 2) * np.std(values, ddof=1))
-    half /= math.sqrt(count)
+    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, count - 1) * stats.sem(values))
     return Interval(middle, middle - half, middle + half)
 
 
@@ -185,8 +184,7 @@ def chance_of_pairs(a: Floats, b: Floats) -> float:
     if not len(apart):
         return 1.0
     if size.min() == size.max():
-        losses = min(int(np.sum(apart > 0)), int(np.sum(apart < 0)))
-        return min(1.0, 2.0 * float(bdtr(losses, len(apart), 0.5)))
+        return float(stats.binomtest(int(np.sum(apart > 0)), len(apart)).pvalue)
     if len(apart) <= _FEW:
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(apart))))
         return float(np.mean(np.abs(signs @ size) >= total * (1.0 - 1e-12)))
@@ -273,12 +271,10 @@ def paired_ratio(values: Floats, others: Floats) -> Ratio:
     """
     logs = np.log(np.asarray(values) / np.asarray(others))
     logs = logs[np.isfinite(logs)]
-    count = int(logs.size)
-    if count < 2:
-        return Ratio(float(np.exp(logs[0])) if count else math.nan, 0.0, math.inf, count)
-    half = stdtrit(count - 1, 0.975) * logs.std(ddof=1) / math.sqrt(count)
-    mean, low, high = np.exp(logs.mean() + np.array([0.0, -half, half]))
-    return Ratio(float(mean), float(low), float(high), count)
+    middle, low, high = np.exp(mean_interval(logs))
+    if len(logs) < 2:
+        low, high = 0.0, math.inf
+    return Ratio(float(middle), float(low), float(high), len(logs))
 
 
 def whole(values: Floats) -> tuple[int | float, int | float, int | float]:
@@ -344,16 +340,6 @@ def convergence(history: Floats) -> Convergence:
     """
     low, median, high = np.quantile(history, [0.1, 0.5, 0.9], axis=0)
     return Convergence(low, median, high)
-
-
-def counts(values: Floats, edges: Floats) -> NDArray[np.int64]:
-    """Return how many values fall between neighbouring edges; the last bin takes all beyond.
-
-    What is not a number falls nowhere.
-    """
-    values = np.asarray(values, dtype=float).ravel()
-    inside = np.clip(values[~np.isnan(values)], edges[0], edges[-1])
-    return np.histogram(inside, bins=edges)[0].astype(np.int64)
 
 
 def ratio(a: float, b: float) -> float:

@@ -19,10 +19,9 @@ from typing import Annotated, Any, Literal, NamedTuple, TypedDict
 import msgspec
 import numpy as np
 
+from . import values
+
 FORMAT = 3
-# Those that are read: what lines of the two formats before lack is empty. Format 1 has no facts,
-# formats 1 and 2 have no conditions.
-_FORMATS = (1, 2, FORMAT)
 FILE_NAME = "records.jsonl"
 # Reading a file takes several times its size of memory; the whole bench writes a hundredth of this.
 LARGEST = 1 << 30
@@ -36,7 +35,7 @@ _WORDS = {"nan", "inf", "-inf"}
 
 Key = tuple[str, str, str, str]
 
-
+_Single = str | int | float | bool | None
 _Moment = Annotated[
     str, msgspec.Meta(pattern=r"^(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(Z|[+-]\d\d:\d\d))?$")
 ]
@@ -58,28 +57,22 @@ class _Stamp(TypedDict, total=False):
 class _Line(msgspec.Struct):
     """What a line has to hold."""
 
-    format: Literal[1, 2, 3]
+    format: Literal[3]
     suite: str
     problem: str
     solver: str
-    settings: dict[str, str | int | float | bool | None]
+    settings: dict[str, _Single]
     size: float
     arrays: dict[str, Any]
     notes: dict[str, str]
     stamp: _Stamp
     when: _Moment
     seconds: float
-    facts: dict[str, str | int | float | bool | list[str] | None] = {}
-    conditions: dict[str, str | int | float | None] = {}
+    facts: dict[str, _Single | list[str]]
+    conditions: dict[str, str | int | float | None]
 
 
-class _Head(msgspec.Struct):
-    """What a line of any format has."""
-
-    format: int
-
-
-_FIELDS = tuple(name for name in _Line.__struct_fields__ if name != "format")
+_FIELDS = _Line.__struct_fields__[1:]
 _DECODER = msgspec.json.Decoder(_Line)
 
 
@@ -115,6 +108,31 @@ class Record:
     seconds: float = 0.0
     facts: Mapping[str, Any] = field(default_factory=dict)
     conditions: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def _kind(self) -> values.Kind | None:
+        return values.kind_of(self.suite, str(self.facts.get("task", "")))
+
+    @functools.cached_property
+    def values(self) -> Any:
+        """The arrays as the type that the experiment declares; None if there are none."""
+        kind = self._kind
+        return values.read(kind.values, self.arrays) if kind and self.arrays else None
+
+    @functools.cached_property
+    def details(self) -> Any:
+        """Settings, notes and facts as the type that the experiment declares; None without one."""
+        kind = self._kind
+        return kind and values.read(kind.details, {**self.settings, **self.notes, **self.facts})
+
+    def check(self) -> None:
+        """Make sure that the record is of its type, unless nothing shows it any more.
+
+        Raises:
+            ValueError: naming a field that is missing, or of another type.
+        """
+        if not self.superseded:
+            self.values, self.details  # noqa: B018
 
     @property
     def trouble(self) -> str:
@@ -166,19 +184,22 @@ class RecordFile:
     def __init__(self, folder: str | os.PathLike[str]):
         self.path = Path(folder) / FILE_NAME
 
-    def read(self) -> Reading:
+    def read(self, typed: bool = True) -> Reading:
         """Return the records, the later of two with the same key; none if there is no file.
 
-        A line that is no record costs itself and a part of the sentence.
+        A line that is no record costs itself and a part of the sentence; so does one whose fields
+        are not of the type that its experiment declares, unless `typed` is false.
 
         Raises:
             ValueError: naming the file, if it is no regular file, or no line of it is a record.
         """
         lines, unfinished = self._lines()
-        records = {line.record.key: line.record for line in lines if line.record}
-        sentences = [_cut_off(self.path)] if unfinished else []
-        if damaged := [line for line in lines if not line.record]:
-            sentences.append(_no_records(self.path, damaged))
+        valid = [line for line in lines if line.record and not (typed and line.why)]
+        records = {line.record.key: line.record for line in valid if line.record}
+        wrong = [line for line in lines if line.why and (typed or not line.record)]
+        left_out = [one for one in wrong if not one.record or one.record.key not in records]
+        sentences = [_cut_off(self.path)] * bool(unfinished)
+        sentences += [_no_records(self.path, left_out)] * bool(left_out)
         return Reading(list(records.values()), " ".join(sentences))
 
     def append(self, records: Iterable[Record]) -> None:
@@ -210,11 +231,11 @@ class RecordFile:
             ValueError: as `read` does.
         """
         lines, _ = self._lines()
-        latest = {line.record.key: line.record for line in lines if line.record}
-        if any(unwanted(record) for record in latest.values()):
+        of_their_type_last = sorted(lines, key=lambda line: not line.why)
+        latest = {line.record.key: line.record for line in of_their_type_last if line.record}
+        if any(map(unwanted, latest.values())):
             kept = {id(record) for record in latest.values() if not unwanted(record)}
-            stays = [line.text for line in lines if not line.record or id(line.record) in kept]
-            self._replace(b"".join(text + b"\n" for text in stays))
+            self._replace(line.text for line in lines if not line.record or id(line.record) in kept)
 
     def arrange(self, order: Iterable[Key]) -> None:
         """Bring the records of these keys into order, each in the place of one of them.
@@ -228,24 +249,25 @@ class RecordFile:
         """
         lines, _ = self._lines()
         rank = {key: i for i, key in enumerate(order)}
-        found = [(rank.get(line.record.key), i) for i, line in enumerate(lines) if line.record]
-        ranked = [(number, i) for number, i in found if number is not None]
-        if (shown := list(dict.fromkeys(number for number, _ in ranked))) != sorted(shown):
+        places = [i for i, line in enumerate(lines) if line.record and line.record.key in rank]
+        ranks = [rank[record.key] for i in places if (record := lines[i].record)]
+        if (firsts := list(dict.fromkeys(ranks))) != sorted(firsts):
             texts = [line.text for line in lines]
-            for (_, place), (_, source) in zip(ranked, sorted(ranked), strict=True):
+            for place, (_, source) in zip(
+                places, sorted(zip(ranks, places, strict=True)), strict=True
+            ):
                 texts[place] = lines[source].text
-            self._replace(b"".join(text + b"\n" for text in texts))
-
-    def _bytes(self) -> bytes:
-        check_regular(self.path)
-        return self.path.read_bytes() if self.path.exists() else b""
+            self._replace(texts)
 
     def _lines(self) -> tuple[list["_Decoded"], bytes]:
         """Return all lines with text, and the last one if it is a record that was cut off."""
-        *texts, last = self._bytes().split(b"\n")
+        check_regular(self.path)
+        content = self.path.read_bytes() if self.path.exists() else b""
+        *texts, last = content.split(b"\n")
         unfinished = last if _is_begun(last) else b""
         texts += [] if unfinished else [last]
-        lines = [_decoded(text, number) for number, text in enumerate(texts, 1) if text.strip()]
+        decoded = enumerate(map(_record_of, texts), 1)
+        lines = [_Decoded(i, *one) for i, one in decoded if one[0].strip()]
         if lines and not any(line.record for line in lines):
             raise ValueError(f"{self.path}, line {lines[0].number}: not a record ({lines[0].why})")
         return lines, unfinished
@@ -269,15 +291,29 @@ class RecordFile:
             begin = content.rfind(b"\n") + 1
             return begin, content[begin:]
 
-    def _replace(self, content: bytes) -> None:
+    def _replace(self, lines: Iterable[bytes]) -> None:
         beside = self.path.with_suffix(".new")
         check_regular(beside)
         try:
             with _naming(self.path), beside.open("wb", buffering=0) as file:
-                _write(file, content)
+                _write(file, b"".join(line + b"\n" for line in lines))
             beside.replace(self.path)
         finally:
             beside.unlink(missing_ok=True)
+
+
+def on_record(folder: Path, typed: bool = True) -> Reading:
+    """Return what a folder has on record; see `RecordFile.read`.
+
+    Raises:
+        ValueError: if that is nothing, or cannot be read.
+    """
+    check_folder(folder)
+    reading = RecordFile(folder).read(typed)
+    if not reading.records:
+        why = reading.warning or "run `plumbob bench` first"
+        raise ValueError(f"no records in {folder}: {why}")
+    return reading
 
 
 def _write(file: io.FileIO, content: bytes) -> None:
@@ -299,12 +335,12 @@ def _naming(path: Path) -> Iterator[None]:
 
 
 class _Decoded(NamedTuple):
-    """A line of a result file: its record, or why it is none."""
+    """A line of a result file: its record, and why it is none, or not of its type."""
 
     number: int
     text: bytes
     record: Record | None
-    why: str
+    why: str = ""
 
 
 def check_regular(path: Path) -> None:
@@ -318,7 +354,7 @@ def check_regular(path: Path) -> None:
     except (FileNotFoundError, NotADirectoryError):
         return
     if not stat.S_ISREG(mode):
-        raise ValueError(f"{path}: expected a file, got a {_kind(mode)}")
+        raise ValueError(f"{path}: expected a file, got a {_kind_of_file(mode)}")
     if size > LARGEST:
         raise ValueError(f"{path}: expected at most {LARGEST} bytes, got {size}")
 
@@ -330,10 +366,10 @@ def check_folder(path: Path) -> None:
         ValueError: if it is a file, a pipe or a device.
     """
     if path.exists() and not path.is_dir():
-        raise ValueError(f"{path}: expected a folder, got a {_kind(path.stat().st_mode)}")
+        raise ValueError(f"{path}: expected a folder, got a {_kind_of_file(path.stat().st_mode)}")
 
 
-def _kind(mode: int) -> str:
+def _kind_of_file(mode: int) -> str:
     kinds = {stat.S_IFDIR: "folder", stat.S_IFIFO: "pipe", stat.S_IFREG: "file"}
     kinds |= {stat.S_IFCHR: "device", stat.S_IFBLK: "device", stat.S_IFSOCK: "socket"}
     return kinds.get(stat.S_IFMT(mode), "special file")
@@ -341,24 +377,22 @@ def _kind(mode: int) -> str:
 
 def _is_begun(line: bytes) -> bool:
     """Return whether a line is the beginning of a record, and not a whole one."""
-    begins = [f'{{"format": {known}, "suite": '.encode() for known in _FORMATS]
-    if not line or not any(line.startswith(begin) or begin.startswith(line) for begin in begins):
-        return False
-    return _decoded(line, 0).record is None
-
-
-def _decoded(text: bytes, number: int) -> _Decoded:
-    return _Decoded(number, text, *_record_of(text))
+    begin = f'{{"format": {FORMAT}, "suite": '.encode()
+    is_ours = bool(line) and (line.startswith(begin) or begin.startswith(line))
+    return is_ours and _record_of(line)[1] is None
 
 
 # A run reads its file again and again: so many lines are decoded once.
 @functools.lru_cache(maxsize=4096)
-def _record_of(text: bytes) -> tuple[Record | None, str]:
-    """Return the record of a line, or None and why it is none."""
+def _record_of(text: bytes) -> tuple[bytes, Record | None, str]:
+    """Return a line, its record, or None and why it is none; or why it is not of its type."""
+    record = None
     try:
-        return decode(text), ""
+        record = untyped(text)
+        record.check()
     except ValueError as error:
-        return None, str(error)[:100]
+        return text, record, str(error)[:100]
+    return text, record, ""
 
 
 def _cut_off(path: Path) -> str:
@@ -371,15 +405,13 @@ def _cut_off(path: Path) -> str:
 def _no_records(path: Path, damaged: Sequence[_Decoded]) -> str:
     """Return a sentence that names lines that are no records, and why the first few are none."""
     numbers = [f"line {line.number} ({line.why})" for line in damaged[:NAMED]]
-    if more := len(damaged) - NAMED:
-        numbers += [f"{more} more"] if more > 0 else []
+    numbers += [f"{len(damaged) - NAMED} more"] * (len(damaged) > NAMED)
     return f"Left out of {path.name}, for they are no records: {'; '.join(numbers)}."
 
 
 def encode(record: Record) -> str:
     """Return the record as one line of standard JSON; NaN and infinities become words."""
-    content: dict[str, Any] = {"format": FORMAT}
-    content |= {name: getattr(record, name) for name in _FIELDS}
+    content = {"format": FORMAT} | {name: getattr(record, name) for name in _FIELDS}
     content["arrays"] = {name: _words(np.asarray(a)) for name, a in record.arrays.items()}
     content["notes"] = {name: _in_unicode(text) for name, text in record.notes.items()}
     return json.dumps(content, allow_nan=False)
@@ -390,25 +422,26 @@ def decode(line: bytes | str) -> Record:
 
     Raises:
         ValueError: if the line is not JSON, of another format, lacks a field, or has one of
-            another kind.
+            another type.
+    """
+    record = untyped(line)
+    record.check()
+    return record
+
+
+def untyped(line: bytes | str) -> Record:
+    """Return the record of a line, also of an experiment that had other fields.
+
+    Raises:
+        ValueError: if the line is not JSON, or no record of this format.
     """
     try:
         content = _DECODER.decode(line)
     except RecursionError:
         raise ValueError("nested too deeply") from None
-    except msgspec.ValidationError as error:
-        raise ValueError(_of_later_format(line) or str(error)) from None
     fields = {name: getattr(content, name) for name in _FIELDS}
     fields["arrays"] = {name: _numbers(name, values) for name, values in content.arrays.items()}
     return Record(**fields)
-
-
-def _of_later_format(line: bytes | str) -> str:
-    """Return what to say of a line of a format that is not known yet, "" if it is none."""
-    with contextlib.suppress(msgspec.MsgspecError, RecursionError):
-        if (found := msgspec.json.decode(line, type=_Head).format) > FORMAT:
-            return f"format {found} of a newer Plumbob; this one reads 1 to {FORMAT}"
-    return ""
 
 
 def _in_unicode(text: str) -> str:

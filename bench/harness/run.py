@@ -2,10 +2,10 @@
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,20 +17,9 @@ from .executor import HERE, Executor, NotMeasured
 from .experiment import blocks
 from .folder_lock import locked
 from .machine import conditions
-from .measure import block_key, measure, now
+from .measure import block_key, now
+from .measure import measure as measure  # by which a rerun measures any revision
 from .record import FINISHED, Key, Record, RecordFile
-
-__all__ = [
-    "Event",
-    "block_key",
-    "count",
-    "forget",
-    "keys",
-    "measure",
-    "missed_claims",
-    "now",
-    "run",
-]
 
 KEPT, MEASURING, MEASURED, FAILED = "kept", "measuring", "measured", "failed"
 NOT_RUN = "not run"
@@ -75,15 +64,13 @@ def run(
             executor.look_at(present.get(block_key(block)) for block in every if block.times)
             wanted = [block for block in every if choice.takes(block)]
             yield from _run_blocks(wanted, choice, file, present, executor)
-            file.arrange(block_key(block) for block in wanted)
+            file.arrange(map(block_key, wanted))
+            spent = time.perf_counter() - begin
             for suite in together:
-                spent = time.perf_counter() - begin
-                asked = [block for block in wanted if block.suite == suite]
-                if choice.is_partial:
-                    yield from _leave(suite, asked, file)
-                    continue
-                end = _finished(suite, choice.name, spent, executor.stamp())
-                yield from _finish(end, asked, file)
+                asked = {block_key(block) for block in wanted if block.suite == suite}
+                if not choice.is_partial:
+                    _finish(_finished(suite, choice.name, len(asked), spent, executor), asked, file)
+                yield from _not_asked_for(suite, asked, file, choice.is_partial)
 
 
 def _run_blocks(
@@ -97,47 +84,58 @@ def _run_blocks(
     again = {block_key(block): why_again(block, present, executor) for block in wanted}
     for block in wanted:
         if again[block_key(block)] is None:
-            yield Event(KEPT, block.suite, _what(block))
+            yield _event(KEPT, block)
     missing = [block for block in wanted if again[block_key(block)] is not None]
     for step in executor.measure(missing, choice.scale):
         match step:
             case Block():
-                yield Event(MEASURING, step.suite, _what(step), again[block_key(step)] or "")
+                yield _event(MEASURING, step, again[block_key(step)] or "")
             case NotMeasured(block, why):
-                yield Event(FAILED, block.suite, _what(block), why)
+                yield _event(FAILED, block, why)
             case Record():
                 file.append([step])
-                state = FAILED if step.failed else MEASURED
-                yield Event(state, step.suite, _what(step), step.failed)
+                yield _event(FAILED if step.failed else MEASURED, step, step.failed)
 
 
-def _what(named: Block | Record) -> str:
-    return f"{named.problem}, {named.solver}"
+def _event(state: str, of: Block | Record, message: str = "") -> Event:
+    return Event(state, of.suite, f"{of.problem}, {of.solver}", message)
 
 
-def _leave(suite: str, blocks: Sequence[Block], file: RecordFile) -> Iterator[Event]:
-    """Say how many records of a suite a choice did not ask for."""
-    asked = set(map(block_key, blocks))
-    others = [r for r in file.read().records if r.suite == suite and r.key not in asked]
-    if others:
-        yield Event(NOT_RUN, suite, "", f"{_records(len(others))} of what was not chosen kept")
+def _finished(suite: str, scale: str, count: int, seconds: float, executor: Executor) -> Record:
+    """Return the record that says that a suite was gone through to its end."""
+    return Record(
+        FINISHED, suite, "", size=count, notes={"scale": scale}, stamp=executor.stamp(),
+        when=now(), seconds=seconds, conditions=conditions(),
+    )  # fmt: skip
 
 
-def _finish(finished: Record, blocks: Sequence[Block], file: RecordFile) -> Iterator[Event]:
-    """Put on record that a suite was gone through, and say what it did not ask for."""
-    asked = set(map(block_key, blocks))
-    suite, finished = finished.problem, replace(finished, size=len(asked))
+def _finish(finished: Record, asked: Set[Key], file: RecordFile) -> None:
+    """Put on record that a suite was gone through, if it is new and all is on record."""
     records = {record.key: record for record in file.read().records}
-    if asked <= records.keys() and not _says_the_same(records.get(finished.key), finished):
+    before = records.get(finished.key)
+    is_said = before is not None and all(
+        getattr(before, name) == getattr(finished, name) for name in ("size", "notes", "stamp")
+    )
+    if asked <= records.keys() and not is_said:
         file.append([finished])
-    extra = [r for r in records.values() if r.suite == suite and r.key not in asked]
+
+
+def _not_asked_for(
+    suite: str, asked: Set[Key], file: RecordFile, is_partial: bool
+) -> Iterator[Event]:
+    """Say how many records of a suite were not asked for; mark those under settings of before."""
+    extra = [r for r in file.read().records if r.suite == suite and r.key not in asked]
+    if is_partial:
+        if extra:
+            yield Event(NOT_RUN, suite, "", f"{_records(len(extra))} of what was not chosen kept")
+        return
     old = [record for record in extra if _is_superseded(record, asked)]
     if newly := [record for record in old if not record.superseded]:
         file.append([replace(r, notes={**r.notes, "superseded": now()}) for r in newly])
     for solver, count in Counter(record.solver for record in old).items():
         why = f"{_records(count)} of {solver} under other settings kept, left out of tables"
         yield Event(NOT_RUN, suite, solver, why)
-    for solver, count in Counter(r.solver for r in extra if r not in old).items():
+    for solver, count in Counter(record.solver for record in extra if record not in old).items():
         yield Event(NOT_RUN, suite, solver, f"{_records(count)} of {solver} kept, not run")
 
 
@@ -145,20 +143,7 @@ def _records(count: int) -> str:
     return f"{count} record{'' if count == 1 else 's'}"
 
 
-def _finished(suite: str, scale: str, seconds: float, where: Mapping[str, Any]) -> Record:
-    """Return the record that says that a suite was gone through to its end."""
-    made: dict[str, Any] = {"stamp": where, "when": now(), "seconds": seconds}
-    made["conditions"] = conditions()
-    return Record(FINISHED, suite, "", notes={"scale": scale}, **made)
-
-
-def _says_the_same(record: Record | None, other: Record) -> bool:
-    return record is not None and (record.size, record.notes, record.stamp) == (
-        other.size, other.notes, other.stamp,
-    )  # fmt: skip
-
-
-def _is_superseded(record: Record, asked: set[Key]) -> bool:
+def _is_superseded(record: Record, asked: Set[Key]) -> bool:
     """Return whether a record that is not asked for belongs to what is, or to nothing measured.
 
     Its problem and solver are asked for under other settings, or it says only that something was
@@ -201,16 +186,13 @@ def count(suites: Sequence[str], scale: str | Choice) -> int:
 
 def keys(suite: str, scale: str | Choice) -> set[Key]:
     """Return the keys of all records of a suite that was gone through."""
-    return {block_key(block) for block in _asked_for(suite, chosen(scale))}
+    choice = chosen(scale)
+    return set(map(block_key, filter(choice.takes, blocks(suite, choice.scale))))
 
 
 def chosen(scale: str | Choice) -> Choice:
     """Return everything at a scale by its name; a choice is returned as it is."""
     return scale if isinstance(scale, Choice) else Choice(scale, SCALES[scale])
-
-
-def _asked_for(suite: str, choice: Choice) -> Iterator[Block]:
-    return (block for block in blocks(suite, choice.scale) if choice.takes(block))
 
 
 def why_again(block: Block, present: Mapping[Key, Record], executor: Executor) -> str | None:

@@ -18,13 +18,6 @@ def timed(call: Callable[[], T]) -> tuple[T, float]:
     return result, time.perf_counter() - begin
 
 
-def timed_twice(call: Callable[[], T]) -> tuple[T, float, float]:
-    """Return what a call returns, how long it took, and how long the processor worked [s]."""
-    begin = time.process_time()
-    result, seconds = timed(call)
-    return result, seconds, time.process_time() - begin
-
-
 class Budget:
     """A stretch of time from the moment it is made, without what doors cost."""
 

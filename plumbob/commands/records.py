@@ -48,13 +48,13 @@ def list_records(
 ) -> int:
     """Count what is on record, by suite and solver, and where it was measured."""
     from plumbob.bench.harness.record import FINISHED
-    from plumbob.bench.harness.results import plain
+    from plumbob.bench.tables.results import printable
 
     from ..terminal import print_aligned
 
     wanted = _selection(suites, solvers, problems, failed, superseded)
     measured = (record for record in _read(folder) if record.suite != FINISHED)
-    found = [plain(record) for record in measured if wanted(record)]
+    found = [printable(record) for record in measured if wanted(record)]
     print_aligned(_table(folder, found))
     return SUCCESS
 
@@ -81,7 +81,7 @@ def merge(
     check_folder(into)
     with locked(into):
         file = RecordFile(into)
-        present = {record.key: record for record in file.read().records}
+        present = {record.key: record for record in file.read(typed=False).records}
         added = _newer(present, given)
         if added:
             file.append(added.values())
@@ -121,13 +121,9 @@ def drop(
 
 
 def _read(folder: Path) -> "list[Record]":
-    from plumbob.bench.harness.record import RecordFile, check_folder
+    from plumbob.bench.harness.record import on_record
 
-    check_folder(folder)
-    found = RecordFile(folder).read().records
-    if not found:
-        raise ValueError(f"no records in {folder}: run `plumbob bench` first")
-    return found
+    return on_record(folder, typed=False).records
 
 
 def _selection(
@@ -164,7 +160,7 @@ def _rank(record: "Record") -> tuple[bool, str]:
 
 def _machines(records: "Iterable[Record]") -> set[str]:
     """Return the machines that records were measured on, in words."""
-    from plumbob.bench.harness.results import counted
+    from plumbob.bench.tables.results import counted
     from plumbob.bench.text import visible
 
     machines = (record.stamp.get("machine", {}) for record in records if record.stamp)

@@ -19,8 +19,8 @@ EXAMPLES = block(
     "plumbob report",
     "plumbob report --output results/laptop",
     "plumbob report --list",
-    "plumbob report --table cloth_stability --list",
-    "plumbob report --table cloth_stability --format tex --width column -o stable.tex",
+    "plumbob report --table cloth_dampers --list",
+    "plumbob report --table cloth_dampers --format tex --width column -o dampers.tex",
     "plumbob report --table accuracy --columns 'solver, within tolerance' --rows 'problem~circle'",
 )
 FORMATS = ("md", "tex", "csv", "html")
@@ -108,17 +108,11 @@ def _tables(folder: Path) -> list["Table"]:
     Raises:
         ValueError: if there are no records.
     """
-    from plumbob.bench.harness.record import RecordFile, check_folder
-    from plumbob.bench.harness.results import Results, check_any, plain, sift
     from plumbob.bench.report.sections import tables
+    from plumbob.bench.tables.results import results_of
 
-    check_folder(folder)
-    stored, _ = RecordFile(folder).read()
-    if not stored:
-        raise ValueError(f"no records in {folder}: run `plumbob bench` first")
-    records, left_out = sift(lambda results: tables(results), [plain(record) for record in stored])
-    check_any(folder, records, left_out)
-    return tables(Results(records))
+    results, _ = results_of(folder)
+    return tables(results)
 
 
 def _table(folder: Path, name: str) -> "Table":

@@ -16,7 +16,6 @@ from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_mo
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.isolation import Outcome, WorkerProcess
-from plumbob.bench.harness.results import Results
 from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
@@ -32,6 +31,7 @@ from plumbob.bench.problems.falling_cloth import (
     level_cloth,
 )
 from plumbob.bench.report.report import all_figures
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import best_cells
 from plumbob.reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
 from plumbob.reference.mass_spring import stiffness_matrix
@@ -631,19 +631,15 @@ def test_a_missing_engine_has_a_row_in_both_tables(make):
     for table in (tables.one_step(Results([missing])), tables.motion(Results([missing]))):
         (row,) = table.rows
         assert row[:2] == ("every cloth", "newton")
-        assert row[-1] == "not installed"
+        assert "not installed" in row
 
 
-def test_iterations_that_did_not_suffice_are_said_so(make):
-    table = tables.iterations(Results([make.needed("lbfgs", [1, 2, 3, 4] + [np.nan] * 4)]))
-    assert table.rows[0][2:10] == (1, 2, 3, 4, None, None, None, None)
-    assert table.summary.points == ("1,000 N/m: L-BFGS more than 100",)
-
-
-def test_a_limit_is_shown_in_units_of_the_theory(make):
-    table = tables.stability(Results([make.bounded("a", 0.02), make.bounded("b", np.nan)]))
-    assert column(table, "of 2 / ω") == [pytest.approx(1.0), None]
-    assert table.summary.points == ("a: 1.00 × 2 / ω",)
+def test_a_limit_of_stability_stands_beside_the_motions_in_units_of_the_theory(make):
+    records = [make.bounded("a", 0.02), make.bounded("b", np.nan), make.fell("a"), make.fell("b")]
+    table = tables.motion(Results(records))
+    assert column(table, "stable up to [2/ω]") == [pytest.approx(1.0)] * 3 + [None] * 3
+    assert column(table, "longest stable step [ms]")[0] == 20.0
+    assert table.summary.points[-1] == "longest stable step in units of 2 / ω: a 1.00"
 
 
 def test_the_published_times_stand_beside_ours(make):

@@ -16,7 +16,6 @@ from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, plain
 from plumbob.bench.peers import contestant, opening, registry
 from plumbob.bench.peers.entrant import CHAIN_TASK, Entrant
 from plumbob.bench.peers.protocol import OwnTime
@@ -26,6 +25,7 @@ from plumbob.bench.problems.chains import chain_targets
 from plumbob.bench.problems.evaluate import Evaluator
 from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.report.sections import tables
+from plumbob.bench.tables.results import Results, printable
 from plumbob.cli import run_command
 from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.solvers import open_contestant
@@ -58,7 +58,7 @@ def bench(*words):
 
 
 def records(solver=None):
-    found = [plain(one) for one in RecordFile("out").read().records if one.suite != "finished"]
+    found = [printable(one) for one in RecordFile("out").read().records if one.suite != "finished"]
     return [one for one in found if solver in (None, one.solver)]
 
 
@@ -95,13 +95,12 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
         assert record.arrays["seconds"].shape == record.arrays["solved"].shape == (2,), solver
         assert (record.arrays["seconds"] > 0.0).all()
     shown = made("ik")
-    for name in ("accuracy", "q1_beyond_reach", "published_fabrik", "entered_ik"):
+    for name in ("accuracy", "q1_beyond_reach", "published_ik", "entered"):
         assert "My FABRIK" in cells(shown[name]), name
-    for name in ("accuracy", "q1_beyond_reach", "published_fabrik"):  # nobody else counted them
+    for name in ("accuracy", "q1_beyond_reach", "published_ik"):  # nobody else counted them
         for row in shown[name].rows:
             claims = [cell for cell in row if str(cell).endswith("claimed")]
             assert bool(claims) == ("My FABRIK" in row), (name, row)
-    assert re.search(r"My FABRIK: .* iterations? claimed", str(shown["q1_beyond_reach"].summary))
     for draw in (chain_figures.ik_residuals, chain_figures.iterations):
         assert "My FABRIK" in drawn(draw(Results(records()))).svg
     shows = chain_figures.iterations(Results(records())).shows
@@ -113,7 +112,7 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
 def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
     one_step = ("--problem", "peers/one step/k1000")
     assert bench("cloth", "--quick", *one_step, "--with", "my_cloth.py", *EXPLICIT) == 0
-    for name in ("cloth_peers_step", "entered_cloth"):
+    for name in ("cloth_peers_step", "entered"):
         assert "My symplectic Euler" in cells(made("cloth")[name]), name
     assert "My symplectic Euler" in drawn(cloth_figures.one_step(Results(records()))).svg
     # The same method is the same to rounding, in every number but the times.
@@ -131,8 +130,7 @@ def test_a_cloth_solver_moves_on_and_has_the_limit_of_its_method(folder):
     assert bench("cloth", "--quick", *asked, "--with", "my_cloth.py") == 0
     limits = [one.arrays["limit"] for one in records() if one.problem == "peers/stability"]
     np.testing.assert_allclose(*limits, rtol=1e-3)
-    for name in ("cloth_peers_motion", "cloth_stability"):
-        assert "My symplectic Euler" in cells(made("cloth")[name])
+    assert "My symplectic Euler" in cells(made("cloth")["cloth_peers_motion"])
 
 
 def test_a_later_plain_run_keeps_what_was_entered(folder, capsys, monkeypatch):
@@ -396,7 +394,7 @@ def test_a_request_calls_the_tool_as_the_protocol_says(name):
         np.testing.assert_allclose(
             pose.positions[model.names.index("tool")], positions[0], atol=1e-12
         )
-        np.testing.assert_allclose(tool_pose(inputs, q).position, positions[0], atol=1e-12)
+        np.testing.assert_allclose(tool_pose(inputs, q).positions, positions[0], atol=1e-12)
 
 
 def test_the_door_is_closed_after_the_greeting(folder, monkeypatch):

@@ -11,8 +11,8 @@ import pytest
 from plumbob import cli, terminal
 from plumbob.bench.comparison.history import sparkline
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, plain
 from plumbob.bench.report import sections
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import is_blank, without_empty, words
 from plumbob.crosscheck.claims import CLAIMS
 from plumbob.crosscheck.verdict import Verdict
@@ -105,7 +105,7 @@ def test_check_prints_each_verdict_under_its_heading(capsys, verdicts, width):
 
 def test_every_table_of_a_suite_is_printed_as_it_is(capsys, tmp_path, records, width):
     RecordFile(tmp_path).append(records)
-    every = sections.tables(Results([plain(record) for record in records]))
+    every = sections.tables(Results(records))
     terminal.print_tables([record.suite for record in records], tmp_path)
     out = capsys.readouterr().out
     for table in every:
@@ -262,7 +262,7 @@ def test_the_list_of_tables_says_how_large_each_is(capsys, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     RecordFile(tmp_path / "report").append(records)
     code, out = plumbob(capsys, "report", "--list")
-    tables = sections.tables(Results([plain(record) for record in records]))
+    tables = sections.tables(Results(records))
     headings = ["table", "title", "rows", "columns"]
     rows = [[t.name, t.title, str(len(t.rows)), str(len(t.columns))] for t in tables]
     assert assert_printed(out.splitlines(), headings, rows, width) == headings

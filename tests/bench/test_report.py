@@ -7,11 +7,13 @@ import unicodedata
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
+import msgspec
+import numpy as np
 import pytest
 
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, plain
 from plumbob.bench.report import report
+from plumbob.bench.tables.results import Results, results_of
 
 VOID = {"meta", "link", "br", "img", "input", "hr"}
 
@@ -117,7 +119,7 @@ def test_tables_in_three_formats_and_figures_lie_beside_it(whole):
         for suffix in ("md", "tex", "csv"):
             assert (folder / "tables" / f"{table.name}.{suffix}").stat().st_size > 0
     drawn = {path.stem for path in (folder / "figures").iterdir()}
-    results = Results([plain(record) for record in RecordFile(folder).read().records])
+    results = Results(RecordFile(folder).read().records)
     assert drawn == {draw(results).name for draw in report.all_figures()}
     assert "<svg" in (folder / "figures" / "jitter.svg").read_text()
     for name in drawn:
@@ -145,7 +147,7 @@ def test_a_page_of_one_suite_says_what_was_not_measured(tmp_path, records):
     text = "".join(page.text)
     assert text.count("Not measured: ") == 4
     assert "Not measured: Forward kinematics. Inverse kinematics. A step of the cloth. What" in text
-    assert "Measured by plumbob bench timing cloth_scale first_call, at full length." in text
+    assert "Measured by plumbob bench timing cloth_scale, at full length." in text
 
 
 def test_that_nobody_entered_a_solver_is_nothing_missing(tmp_path, records):
@@ -249,8 +251,6 @@ def test_hostile_names_are_data_in_every_file(tmp_path, records, field):
     few = [r for i, r in enumerate(records) if field == "solver" or i % 3 == 0]
     result, page = hostile_report(tmp_path, few, field, HOSTILE)
     look_into_everything(tmp_path)
-    if field in ("solver", "stamp"):  # others tell tables what to do: "3 joints", "robots/..."
-        assert not [sentence for sentence in result.missing if sentence.startswith("The record")]
 
 
 @pytest.mark.slow
@@ -273,49 +273,42 @@ def test_a_name_stands_letter_by_letter_in_figures_and_tables(tmp_path, make):
 
 
 SPOILT = {
-    "no arrays": lambda r: replace(r, arrays={}),
-    "no notes": lambda r: replace(r, notes={}),
-    "no settings": lambda r: replace(r, settings={}),
-    "no facts": lambda r: replace(r, facts={}),
-    "facts of other kinds": lambda r: replace(r, facts={name: ["x"] for name in r.facts}),
-    "titles of other kinds": lambda r: replace(r, facts={**r.facts, "title": None}),
-    "settings of other kinds": lambda r: replace(r, settings=dict.fromkeys(r.settings, "x")),
+    "no arrays": lambda r: replace(r, arrays={"x": np.zeros(1)}),
+    "no settings, notes and facts": lambda r: replace(
+        r, settings={}, notes={}, facts={name: r.facts[name] for name in r.facts if name == "task"}
+    ),
     "arrays of other shapes": lambda r: replace(
-        r, arrays={name: values[..., None, None] for name, values in r.arrays.items()}
+        r, arrays={name: values[..., None, None, None] for name, values in r.arrays.items()}
     ),
-    "empty arrays": lambda r: replace(
-        r, arrays={name: values.ravel()[:0] for name, values in r.arrays.items()}
-    ),
-    "shorter arrays": lambda r: replace(
-        r, arrays={name: values.ravel()[:1] for name, values in r.arrays.items()}
-    ),
-    "no stamp": lambda r: replace(r, stamp={}),
+    "arrays of words": lambda r: replace(r, arrays=dict.fromkeys(r.arrays, np.array(True))),
 }
 
 
-@pytest.fixture(params=["tables", pytest.param("figures too", marks=pytest.mark.slow)])
-def drawn(request, monkeypatch):
-    """Without and with figures, which take long to draw."""
-    if request.param == "tables":
-        monkeypatch.setattr(report, "all_figures", list)
+def _needs_more(record):
+    """Whether a record has a detail that it needs, and a value that is no truth value."""
+    is_needed = any(field.required for field in msgspec.structs.fields(record.details))
+    return is_needed and any(array.dtype != bool for array in record.arrays.values())
 
 
 @pytest.mark.parametrize("how", SPOILT)
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
-@pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.usefixtures("drawn")
-def test_what_a_record_lacks_costs_that_record_alone(tmp_path, records, how):
-    """Every kind of record is spoilt, once: the tables of the others are as they were."""
-    kinds = {(r.suite, r.problem.split("/")[0], tuple(r.arrays)): r for r in records if r.arrays}
-    bad = [replace(SPOILT[how](r), solver="the spoilt one") for r in kinds.values()]
-    result, page = written(tmp_path, [*records, *bad])
-    look_into_everything(tmp_path)
-    spared = [s for s in result.missing if s.startswith("The record of")]
-    assert all("the spoilt one" in sentence for sentence in spared)
-    assert len(spared) <= len(bad)
-    assert all(table.rows for table in result.tables)
-    if how == "no arrays":
-        assert len(spared) > 5
+def test_a_record_that_is_not_of_its_type_costs_that_record_and_a_sentence(tmp_path, records, how):
+    """Every record of an experiment that declares its types is spoilt, and left out by its line."""
+    typed = [r for r in records if r.values is not None and _needs_more(r)]
+    bad = [SPOILT[how](replace(r, solver="the spoilt one")) for r in typed]
+    RecordFile(tmp_path).append([*records, *bad])
+    results, warning = results_of(tmp_path)
+    assert "the spoilt one" not in {record.solver for record in results.every}
+    assert f"line {len(records) + 1} (" in warning
+
+
+def test_a_fault_of_a_table_is_an_error_and_no_fault_of_a_record(tmp_path, records, monkeypatch):
+    def fails(_):
+        raise KeyError("a fault of ours")
+
+    monkeypatch.setattr(report, "answers", fails)
+    with pytest.raises(KeyError, match="a fault of ours"):
+        written(tmp_path, records)
+    assert len(RecordFile(tmp_path).read().records) == len(records)
 
 
 def test_without_records_there_is_no_report(tmp_path):

@@ -13,9 +13,9 @@ import pytest
 from plumbob import cli
 from plumbob.bench.harness.metrics import Share, share
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, plain
 from plumbob.bench.report import sections
 from plumbob.bench.tables.fragment import fragment
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.selection import column_numbers, selected
 from plumbob.bench.tables.table import (
     NO_SUMMARY,
@@ -202,7 +202,7 @@ def run(capsys, *arguments):
 
 def test_the_list_names_every_table_and_its_columns(capsys, folder, records):
     code, out, _ = run(capsys, "--list")
-    made = sections.tables(Results([plain(record) for record in records]))
+    made = sections.tables(Results(records))
     assert code == 0
     assert [line.split()[0] for line in out.splitlines()] == ["table", *(t.name for t in made)]
     code, out, _ = run(capsys, "--table", "accuracy", "--list")
@@ -285,7 +285,7 @@ def chosen(capsys, table, form, **options):
 @pytest.mark.parametrize("form", ["md", "tex", "csv", "html"])
 def test_every_table_can_be_exported_with_every_option(capsys, folder, records, monkeypatch, form):
     """Those with rows of absent engines, too, about which nothing was measured."""
-    every = sections.tables(Results([plain(record) for record in records]))
+    every = sections.tables(Results(records))
     monkeypatch.setattr("plumbob.commands.report._tables", lambda folder: every)
     assert any(not source.suite for table in every for source in table.sources)
     for table in every:

@@ -9,10 +9,10 @@ from plumbob.bench.experiments.chain import CHAIN
 from plumbob.bench.experiments.chain.measurement import Limits, solve_targets, solve_with_engine
 from plumbob.bench.experiments.chain.tables import beyond_reach
 from plumbob.bench.harness.record import Record
-from plumbob.bench.harness.results import Results
 from plumbob.bench.peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
 from plumbob.bench.peers.ik.reference_kinematics import ReferenceKinematics
 from plumbob.bench.problems.chains import BEYOND, chain_targets
+from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import Skeleton, forward_kinematics, rotation, solve_ik

@@ -2,7 +2,7 @@
 
 from ...figures.chart import GREATER, Axis, Chart, Panel, series
 from ...figures.sketch import Sketch, chart_sketch
-from ...harness.results import Results, by_problem
+from ...tables.results import Results, by_problem
 
 
 def energy(results: Results) -> Sketch | None:
@@ -13,7 +13,7 @@ def energy(results: Results) -> Sketch | None:
     panels = tuple(
         Panel(
             group[0].title,
-            tuple(series(r.solver, r.arrays["time"], r.arrays["left"]) for r in group),
+            tuple(series(r.solver, r.values.time, r.values.left) for r in group),
         )
         for group in by_problem(records).values()
     )

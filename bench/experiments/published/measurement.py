@@ -21,6 +21,7 @@ from ..chain.measurement import Limits, blocks_of_users
 from ..robots.measurement import SUITE, Run, solve
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published
+from .values import Iterations, Searches
 
 # Random targets, and seconds that a solver has for them, for those of a scale.
 _TARGETS = 5
@@ -63,10 +64,9 @@ def _toolbox() -> Iterator[tuple[Peer, Entry, float | None]]:
 
 
 def _solve(run: Run, count: int, middle: bool) -> Measured:
-    measured = solve(run, uniform_targets(run.robot, count, middle))
-    kept = ("solved", "claimed", "seconds", "setup")
-    arrays = {name: measured.arrays[name] for name in kept if name in measured.arrays}
-    return Measured(arrays, measured.notes, measured.facts)
+    solves, notes, facts = solve(run, uniform_targets(run.robot, count, middle))
+    names = Searches.__struct_fields__
+    return Measured(Searches(**{name: getattr(solves, name) for name in names}), notes, facts)
 
 
 def _fabrik(stratum: str, distance: float, scale: Scale) -> Iterator[Block]:
@@ -88,4 +88,4 @@ def iterations(problem: TargetsForSkeleton, solver: str) -> Measured:
     """Solve all targets with a solver of ours."""
     asked = (problem.skeleton, problem.starts, problem.targets, solver)
     solution = solve_ik(*asked, **_LIMITS._asdict())
-    return Measured({"iterations": solution.iterations, "residual": solution.residual})
+    return Measured(Iterations(np.asarray(solution.iterations), np.asarray(solution.residual)))

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from msgspec.structs import replace
 
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, raised
@@ -24,6 +25,7 @@ from ...problems.own import OwnProblem
 from ...problems.robot_targets import STRATA, least_distances, robot_targets, unreachable_targets
 from ...problems.robots import PACKAGE, ROBOTS, enter, is_installed, title
 from . import REACHABLE, UNREACHABLE
+from .values import RobotSolves
 
 SUITE = "ik"
 TOLERANCE = Tolerance(1e-3, 1e-3)
@@ -142,9 +144,10 @@ def _solve_strata(run: Run, count: int) -> Measured:
 def _solve_unreachable(run: Run, count: int) -> Measured:
     """Solve targets out of reach; keep beside them how near any pose may come."""
     targets = unreachable_targets(run.robot, count)
-    arrays, notes, facts = solve(run, targets)
-    bound = least_distances(run.robot, targets)[: len(arrays.get("solved", ()))]
-    return Measured({**arrays, "bound": bound} if len(bound) else arrays, notes, facts)
+    solves, notes, facts = solve(run, targets)
+    bound = least_distances(run.robot, targets)[: np.size(solves.solved)]
+    is_begun = solves.solved is not None
+    return Measured(replace(solves, bound=bound) if is_begun else solves, notes, facts)
 
 
 def solve(run: Run, targets: Targets) -> Measured:
@@ -156,7 +159,7 @@ def solve(run: Run, targets: Targets) -> Measured:
     robot, outcome = evaluator.robot, _performed(run, targets, Budget(run.budget))
     arrays = _evaluated(run, targets, outcome.solved) if outcome.solved else {}
     return Measured(
-        {**arrays, "setup": np.array(outcome.setup)},
+        RobotSolves(**arrays, setup=outcome.setup),
         {"remark": outcome.note},
         {
             "strata": list(STRATA),

@@ -28,15 +28,14 @@ _HERE = Path(__file__).parent
 # Without indents and comments, which a page need not carry.
 SCRIPT = motion.squeezed((_HERE / "page.js").read_text(encoding="utf-8"))
 # So many columns of a chapter's main table are unfolded.
-MOST_COLUMNS = 6
+MOST_COLUMNS = 7
 # Absent peers that the first screen names.
 MOST_NAMED = 5
 
 
 class Shown(NamedTuple):
-    """All that a report shows: its records, and what is made of them."""
+    """All that a report shows: what is made of its records."""
 
-    records: Sequence[Record]
     tables: Mapping[Layout, Table]
     drawings: Mapping[Figure, Drawing]
     answers: Answers
