@@ -45,7 +45,7 @@ class Job(NamedTuple):
         restarts: further attempts from random poses, made here for solvers that make one.
         budget: no further target is begun after so long [s].
         entrant: the name of a user's solver, whose first trouble is announced; "" of others.
-        repeats: whether quick solves are made again.
+        warms_up: whether the first target is solved, and quick solves are made again, uncounted.
     """
 
     module: str
@@ -56,15 +56,15 @@ class Job(NamedTuple):
     restarts: int
     budget: float
     entrant: str = ""
-    repeats: bool = True
+    warms_up: bool = True
 
     def perform(self) -> Iterator[Message]:
         """Yield what comes of it, each part as soon as it is there."""
         try:
             adapter = importlib.import_module(self.module)
             ask, setup = timed(lambda: self._prepared(adapter))
-            first = self._solved(ask(*self.targets.request(0)))  # may compile
-            if self.restarts and first.claimed < 0:
+            first = self._solved(ask(*self.targets.request(0))) if self.warms_up else None
+            if self.restarts and first is not None and first.claimed < 0:
                 raise UnableError("not started again, for it claims nothing of its answers")
         except Exception as error:  # whatever an engine raises is its result
             yield from unfit(error, self.entrant)
@@ -84,9 +84,8 @@ class Job(NamedTuple):
             if budget.is_spent:
                 return
             solve = ask(*self.targets.request(i))
-            if (
-                before is not None and self.repeats
-            ):  # so that caches are as in a loop of solves and nothing else
+            if before is not None and self.warms_up:
+                # So that caches are as in a loop of solves and nothing else.
                 for _ in range(AGAIN):
                     again = attempt(before)
                     budget.excuse(again.time.at_door if again.time else 0.0)

@@ -316,7 +316,7 @@ def test_two_of_one_name_are_refused_and_may_be_called_otherwise(folder):
         "\ud800",
         *(
             pytest.param(one, marks=pytest.mark.slow)
-            for one in ("$\\frac$ _x_ | \\begin", "\x1b[31m\n\u202e", "x" * 500)
+            for one in ("$\\frac$ _x_ | \\begin", "\x1b[31m\n\u202e", "x" * 100)
         ),
     ],
 )

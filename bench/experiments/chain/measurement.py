@@ -178,7 +178,7 @@ def _performed(
     settings, skeleton = {"method": peer.method, **peer.spec}, requests.problem.skeleton
     limits = (tolerance, settings, 0, budget)
     return worker_process().perform(
-        Job(peer.module, skeleton, requests, *limits, peer.entrant_name, repeats=False)
+        Job(peer.module, skeleton, requests, *limits, peer.entrant_name, warms_up=False)
     )
 
 
