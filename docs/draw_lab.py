@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 
 from plumbob.bench.experiments.pictures import ARM, figures, measurement
 from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness.record import Record
-from plumbob.bench.harness.results import Results
+from plumbob.bench.harness.block import SCALES
+from plumbob.bench.harness.measure import record_of
+from plumbob.bench.tables.results import Results
 from plumbob.reference import ImplicitEuler, scenes
 
 DOCS = Path(__file__).parent
@@ -42,9 +43,9 @@ def draw_heart_beside(name: str) -> None:
 def draw_plumb_bob(name: str) -> None:
     """Draw the custom curve as the report does, before and after resampling."""
     records = [
-        Record("pictures", "", "ccd", {"evened": evened}, arrays=arrays, facts={"task": ARM})
-        for evened in (False, True)
-        for arrays in [measurement.drawing("ccd", evened).arrays]
+        record_of(block, block.measure(), 0.0)
+        for block in measurement.blocks(SCALES["quick"])
+        if block.facts["task"] == ARM
     ]
     sketch = figures.arm_draws(Results(records))
     assert sketch

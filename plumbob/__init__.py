@@ -4,7 +4,12 @@ The names are imported when the first of them is used, so that the command line 
 terminal a line on stderr says what is compiled, once it takes more than a second.
 """
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+# Git on Windows may write the links to `reference`, `crosscheck` and `bench` as text files.
+if Path(__file__).with_name("reference").is_file():
+    __path__.append(str(Path(__file__).parents[1]))
 
 if TYPE_CHECKING:
     from .reference import *
@@ -31,7 +36,6 @@ __all__ = [
     "StepResult",
     "Target",
     "__version__",
-    "cores",
     "curves",
     "formats",
     "forward_kinematics",
@@ -47,7 +51,6 @@ __all__ = [
     "set_backend",
     "set_num_threads",
     "solve_ik",
-    "speed",
     "symplectic_euler",
     "track",
     "wind_forces",

@@ -4,6 +4,7 @@ import ast
 import importlib.metadata
 import os
 import runpy
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -72,3 +73,44 @@ def test_example_fits_a_screen_and_uses_the_front_door(path):
 def test_there_are_five_examples_and_each_is_checked():
     assert {path.stem for path in EXAMPLES} == set(SAYS)
     assert len(EXAMPLES) == 5
+
+
+SHADOW = 'raise SystemExit("the wrong one")'
+SOLVER = """
+def forward_kinematics(parents, offsets, local_rotations):
+    return offsets
+"""
+
+
+@pytest.mark.parametrize("name", ["bench.py", "reference/__init__.py", "crosscheck/__init__.py"])
+def test_a_module_of_the_same_name_where_one_works_is_left_alone(tmp_path, name):
+    """A user's own bench.py neither breaks the import nor stops the judge."""
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).write_text(SHADOW)
+    (tmp_path / "solver.py").write_text(SOLVER)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for arguments, code in ((["check", "--list"], 0), (["verify", "solver.py"], 1)):
+        run = subprocess.run(
+            [sys.executable, "-m", "plumbob", *arguments],
+            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert (run.returncode, "the wrong one" in run.stdout + run.stderr) == (code, False)
+    assert "forward_kinematics  WRONG" in run.stdout
+
+
+def test_a_checkout_without_links_works(tmp_path):
+    """Git on Windows may write a link as a text file that holds its target."""
+    (tmp_path / "plumbob").mkdir()
+    shutil.copy(ROOT / "plumbob" / "__init__.py", tmp_path / "plumbob")
+    shutil.copy(ROOT / "plumbob" / "compile_notice.py", tmp_path / "plumbob")
+    for folder in ("reference", "crosscheck", "bench"):
+        (tmp_path / "plumbob" / folder).write_text(f"../{folder}")
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    code = "import plumbob; print(plumbob.__file__, plumbob.solve_ik.__module__)"
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True,
+        text=True, check=True,
+    )  # fmt: skip
+    file = tmp_path / "plumbob" / "__init__.py"
+    assert run.stdout.split() == [str(file), "plumbob.reference.inverse_kinematics"]

@@ -18,7 +18,6 @@ from .rows import Pair, Row, RowKey, Verdict
 _USUAL = frozenset({"seconds", "setup"})
 _CLOCKED: Mapping[str, frozenset[str]] = {
     "cloth_scale": frozenset({"assembly", "factor", "refactor", "solve", "local", "step", "limit"}),
-    "first_call": frozenset({"cold wall", "cold processor", "warm wall", "warm processor"}),
 }
 # What depends on the system's state: bytes of memory.
 _INCIDENTAL = frozenset({("cloth_scale", "before"), ("cloth_scale", "memory")})

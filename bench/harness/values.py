@@ -54,7 +54,7 @@ def kind_of(suite: str, task: str) -> Kind | None:
     Raises:
         ValueError: if the suite has no such task.
     """
-    from ..experiments import EXPERIMENTS
+    from .experiment import EXPERIMENTS
 
     modules = [f"{made.package}.values" for made in EXPERIMENTS if made.suite == suite]
     declared = list(filter(importlib.util.find_spec, modules))

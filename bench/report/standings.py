@@ -7,14 +7,20 @@ import numpy as np
 
 from ..experiments import chain, cloth_peers
 from ..experiments.cloth_peers.readings import Point, points
-from ..experiments.robots.overall.readings import Overall, overall_on
-from ..experiments.robots.readings import KINDS, SHIFT, marked, measured, records_of
+from ..experiments.robots.readings import (
+    STARTS,
+    Score,
+    by_robot,
+    fields_of,
+    ratio_of_times,
+    together,
+)
 from ..figures.chart import is_ours
 from ..harness import metrics
 from ..harness.record import Record
-from ..harness.results import Results, counted, label, listed
 from ..peers import registry
 from ..tables.columns import words_in
+from ..tables.results import Results, counted, label, listed
 from ..tables.table import words
 
 # So many cloths have a sentence of their own.
@@ -22,14 +28,9 @@ CLOTHS = 3
 
 
 class Headline(NamedTuple):
-    """An answer in a line.
+    """An answer in a line, by how much it is so, and the table in which it can be read.
 
-    Attributes:
-        chapter: the section of the report that it belongs to; "" of a solver of the user's.
-        asked: what is asked, or the name and task of a solver of the user's.
-        answer: who, or the rank of a solver of the user's.
-        detail: by how much, over how many.
-        table: the name of the table that it can be read in.
+    A solver of the user's has no chapter; its name and task are asked, and its rank is the answer.
     """
 
     chapter: str
@@ -41,17 +42,10 @@ class Headline(NamedTuple):
 
 def standings(results: Results) -> list[Headline]:
     """Return where each solver of the user's stands, task by task, ranks before what went wrong."""
-    chains = measured(results.all("ik", task=chain.CHAIN))
-    fields = {"accuracy": marked([r for r in chains if r.facts["stratum"] != chain.BEYOND])}
-    tasks = {"accuracy": "chain of balls"}
-    for kind, name in KINDS.items():
-        fields[f"robots_overall_{name}"] = measured(records_of(results, kind))
-        tasks[f"robots_overall_{name}"] = f"robots, {kind}"
-    ranked = [
-        Headline("", f"{solver}, {tasks[table]}", *_on_targets(records, solver), table)
-        for table, records in fields.items()
-        for solver in dict.fromkeys(r.solver for r in records if r.facts.get("entrant"))
-    ]
+    chains = [r for r in results.all("ik", task=chain.CHAIN) if r.facts["stratum"] != chain.BEYOND]
+    ranked = [*_on_targets("chain of balls", "accuracy", by_robot(chains))]
+    for start in STARTS:
+        ranked += _on_targets(f"robots, {start}", "robots_overall", fields_of(results, start))
     steps = points(results, cloth_peers.ONE_STEP)
     motions = [point for point in points(results, cloth_peers.MOTION) if point.is_whole]
     ranked += _on_cloths("step", "error", "error {}", steps)
@@ -69,24 +63,31 @@ def _troubles(results: Results, suite: str) -> Iterator[Headline]:
         if sentences := [f"{r.problem}: {why}" for r in mine if (why := r.failed or r.trouble)]:
             asked = f"{min((record.solver for record in mine), key=len)}, suite {suite}"
             rank = f"trouble on {len(sentences)} of {counted(len(mine), 'problem')}"
-            yield Headline("", asked, rank, sentences[0], f"entered_{suite}")
+            yield Headline("", asked, rank, sentences[0], "entered")
 
 
-def _on_targets(records: Sequence[Record], solver: str) -> tuple[str, str]:
-    """Return the rank of a solver among those that finished all of its targets, and details."""
-    problems = {record.title for record in records if record.solver == solver}
-    rows = {row.solver: row for row in overall_on(problems, records)}
-    row, (order, first) = rows[solver], rows[solver].success
+def _on_targets(task: str, table: str, fields: dict[str, list[Score]]) -> Iterator[Headline]:
+    """Yield the ranks of solvers among those that finished all of their targets."""
+    scores = [score for field in fields.values() for score in field]
+    for solver in dict.fromkeys(s.solver for s in scores if s.records[0].facts.get("entrant")):
+        problems = {score.robots for score in scores if score.solver == solver}
+        rows = {row.solver: row for row in together(problems, fields)}
+        yield Headline("", f"{solver}, {task}", *_rank(rows[solver], rows), table)
+
+
+def _rank(row: Score, rows: Mapping[str, Score]) -> tuple[str, str]:
+    """Return the rank of a solver among others, and details."""
+    order, first = row.success
     details = [solved(row.share, "targets")]
     if not row.is_ranked or not row.share.hits:
-        return f"not ranked, {row.cut or 'solves nothing'}", details[0]
-    if solver not in first:
+        return f"not ranked, {row.limits or 'solves nothing'}", details[0]
+    if row.solver not in first:
         best = rows[order[0]].share
         details.append(f"{_written(order[0])}: {100 * best.hits / best.total:.3g} %")
     if len(order) > 1:
         details.append(_times(row, rows))
-    place = 1 if solver in first else order.index(solver) + 1
-    tie = " (tie)" if solver in first and len(first) > 1 else ""
+    place = 1 if row.solver in first else order.index(row.solver) + 1
+    tie = " (tie)" if row.solver in first and len(first) > 1 else ""
     return f"rank {place} {of_finishers(len(order), len(rows))}{tie}", "; ".join(details)
 
 
@@ -103,12 +104,11 @@ def solved(share: metrics.Share, noun: str) -> str:
     return f"{rate} of {words(share.total)} {noun} solved ({low}–{high})"
 
 
-def _times(row: Overall, rows: Mapping[str, Overall]) -> str:
+def _times(row: Score, rows: Mapping[str, Score]) -> str:
     """Return how much faster or slower a solver is than the fastest of the others and of ours."""
-    own = row.penalised + SHIFT
     rivals = _fastest([solver for solver in row.time.order if solver != row.solver])
-    ratios = [metrics.paired_ratio(rows[rival].penalised + SHIFT, own) for rival in rivals]
-    return f"{listed(list(map(speed, ratios, rivals)))}, misses penalised"
+    speeds = [speed(ratio_of_times(rows[rival], row), rival) for rival in rivals]
+    return f"{listed(speeds)}, misses penalised"
 
 
 def _fastest(rivals: Sequence[str]) -> list[str]:

@@ -8,21 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from plumbob.bench.entrants import opening, selection
 from plumbob.bench.experiments import SUITES, blocks
-from plumbob.bench.experiments.arm.tables import accuracy
 from plumbob.bench.experiments.chain import figures
-from plumbob.bench.experiments.chain.tables import beyond_reach
-from plumbob.bench.experiments.robots.tables import who
+from plumbob.bench.experiments.chain.tables import accuracy, beyond_reach
+from plumbob.bench.experiments.robots.participants import participants
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, printable
-from plumbob.bench.peers import registry
-from plumbob.bench.report.entered import remarks_of_entrants
+from plumbob.bench.peers import opening, registry
 from plumbob.bench.report.headlines import absent, not_asked
 from plumbob.bench.report.sections import tables
+from plumbob.bench.tables.entered import remarks_of_entrants
+from plumbob.bench.tables.results import Results, printable
 from plumbob.bench.tables.table import words
 from plumbob.cli import run_command
+from plumbob.commands import selection
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
 IK = re.search(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)[1]
@@ -68,8 +67,8 @@ def made(records):
 
 def test_iterations_that_nobody_counts_are_unsaid_and_no_number(printed, made):
     assert "not a number" not in printed
-    assert "iterations unsaid here" in made["published_fabrik"].summary.points[0]
-    for name in ("accuracy", "q1_beyond_reach", "published_fabrik"):
+    assert "iterations unsaid" in made["published_ik"].rows[0]
+    for name in ("accuracy", "q1_beyond_reach", "published_ik"):
         (row, *_) = made[name].rows
         said = {c.heading: words(v) for c, v in zip(made[name].columns, row, strict=True)}
         counts = [v for h, v in said.items() if h.startswith("iterations, ") or "here" in h]
@@ -85,7 +84,7 @@ def test_who_counts_nothing_has_no_curve_over_iterations(records):
 
 def test_peers_that_were_not_asked_are_not_said_to_be_missing(printed, records, made):
     assert "not installed" not in printed
-    assert made["robots_solvers"].rows == ()
+    assert made["participants"].rows == ()
     assert absent(Results(records)) == []
 
 
@@ -94,7 +93,7 @@ def test_peers_that_took_part_or_are_missing_are_told_from_those_that_nobody_ask
     mine.facts["entrant"] = True
     results = Results([make.raced("Plumbob LM", "one start"), mine,
                        make.lacking("mink", "one start", "mink is not installed")])  # fmt: skip
-    table = who(results)
+    table = participants(results)
     versions = {row[0]: row[2] for row in table.rows}
     assert versions == {"Plumbob LM": "1.2", "mink": "not installed", "My solver": "1.2"}
     assert table.summary.sentence.startswith("2 of 3 that were asked took part; not asked: Pinoc")
@@ -104,11 +103,11 @@ def test_peers_that_took_part_or_are_missing_are_told_from_those_that_nobody_ask
 
 def test_who_offers_no_robots_gets_a_sentence_and_no_table_of_dashes(printed, made):
     assert printed.count(NO_ROBOTS) == 1
-    assert "Robots, one start" not in printed
-    table = made["robots_success_one_start"]
-    (mark,) = [j for j, one in enumerate(table.columns) if one.title == "mark"]
-    assert not table.columns[mark].folded
-    assert table.rows[0][mark] == NO_ROBOTS.removeprefix("my_ik.py was ")
+    assert "Robots" not in printed
+    assert made["robots_by_robot"].rows == ()
+    table = made["entered"]
+    assert table.columns[-1].title == "remark"
+    assert NO_ROBOTS.removeprefix("my_ik.py was ").rstrip(".") in table.rows[0][-1]
 
 
 def test_who_offers_no_chains_has_no_row_of_numbers_there(make):

@@ -19,7 +19,7 @@ from plumbob.bench.harness import machine, run
 from plumbob.bench.harness.folder_lock import locked
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile, decode, encode
-from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.results import Results
 
 ROOT = Path(bench.__file__).resolve().parents[1]
 

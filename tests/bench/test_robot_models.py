@@ -4,10 +4,10 @@ import pytest
 
 from plumbob.bench.experiments.robot_models.measurement import compare
 from plumbob.bench.experiments.robot_models.peers import beside, differences
-from plumbob.bench.experiments.robot_models.tables import agreement, peers_kinematics
-from plumbob.bench.experiments.robots.problem import ALL, CHARACTER, is_installed
-from plumbob.bench.harness.results import Results
+from plumbob.bench.experiments.robot_models.tables import readers
 from plumbob.bench.peers.registry import DRAKE, KINEMATICS, SINGLE_PRECISION
+from plumbob.bench.problems.robots import ALL, CHARACTER, is_installed
+from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.engines import ROBOT_ENGINES
 from plumbob.crosscheck.robots.models import Model
 
@@ -46,26 +46,26 @@ def column(table, heading):
 
 
 def test_a_file_that_both_read_is_a_row_with_its_size_and_differences(compared):
-    table = agreement(Results(compared("arm.urdf", URDF.format(leader="shoulder"))))
-    assert table.rows[0][:4] == ("arm.urdf", 3, 2, 1)
+    table = readers(Results(compared("arm.urdf", URDF.format(leader="shoulder"))))
+    assert table.rows[0][:3] == ("arm.urdf", "Pinocchio and MuJoCo", 1)
+    assert table.rows[0][-3:] == ("", 3, 2)
     assert 0.0 < column(table, "Jacobians")[0] < 1e-14
-    assert table.rows[0][-2:] == ("Pinocchio and MuJoCo", "")
     assert table.summary.points == ("Pinocchio: 1 of 1 file read", "MuJoCo: 1 of 1 file read")
 
 
 def test_a_file_that_none_reads_says_why_and_no_path(compared, tmp_path):
-    table = agreement(Results(compared("cut.urdf", URDF[:100])))
+    table = readers(Results(compared("cut.urdf", URDF[:100])))
     assert column(table, "engines") == ["none"]
-    (why,) = column(table, "but")
+    (why,) = column(table, "remark")
     assert why.count("does not read it") == 2
     assert str(tmp_path) not in why
-    assert table.rows[0][1] is None
+    assert column(table, "links") == [None]
     assert table.summary.sentence == ""
 
 
 def test_mimic_joints_left_free_are_told(compared, tmp_path):
-    table = agreement(Results(compared("free.urdf", URDF.format(leader="nobody"))))
-    (why,) = column(table, "but")
+    table = readers(Results(compared("free.urdf", URDF.format(leader="nobody"))))
+    (why,) = column(table, "remark")
     assert why.count("with mimic joints left free") == 2
     assert str(tmp_path) not in why
     assert column(table, "freedoms") == [2]
@@ -75,10 +75,10 @@ def test_an_engine_with_a_known_cause_is_left_out_of_the_numbers(compared):
     pinocchio, mujoco = compared("arm.urdf", URDF.format(leader="shoulder"))
     pinocchio.notes["cause"] = "something is not read"
     pinocchio.arrays["positions"][...] = 0.25
-    table = agreement(Results([pinocchio, mujoco]))
+    table = readers(Results([pinocchio, mujoco]))
     assert column(table, "positions, of the extent")[0] < 1e-14
     assert column(table, "engines") == ["MuJoCo"]
-    assert column(table, "but") == ["Pinocchio is off by 0.250: something is not read"]
+    assert column(table, "remark") == ["Pinocchio is off by 0.250: something is not read"]
     assert table.summary.points[0].endswith("1 of them otherwise than MuJoCo's documentation says")
 
 
@@ -104,10 +104,13 @@ def test_what_an_engine_does_not_take_is_said_and_what_it_rounds_too(make):
     assert not measured.arrays
 
 
-def test_the_table_of_peers_shows_differences_and_why(make):
-    results = Results([make.read_by_a_peer("PyBullet"), make.compared("MuJoCo")])
-    table = peers_kinematics(results)
-    (row,) = table.rows
-    assert row == ("the arm", "PyBullet", "1.2", 3e-8, 2e-7, SINGLE_PRECISION["PyBullet"])
-    assert "PyBullet" in table.summary.points[0]
-    assert len(agreement(results).rows) == 1
+def test_robots_in_engines_of_peers_stand_beside_files(make):
+    table = readers(Results([make.read_by_a_peer("PyBullet"), make.compared("MuJoCo")]))
+    assert column(table, "robot") == ["arm", "the arm"]
+    assert table.rows[1][1:] == (
+        *("PyBullet 1.2", None, None, 3e-8, 2e-7, None, SINGLE_PRECISION["PyBullet"], None, None),
+    )
+    assert table.summary.points == (
+        "MuJoCo: 1 of 1 file read",
+        "PyBullet on the bench’s robots: effectors within 3.0e-8 m and 2.0e-7 in a rotation matrix",
+    )

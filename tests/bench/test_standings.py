@@ -11,13 +11,13 @@ import pytest
 from browser import CHROMIUM, Browser
 
 from plumbob import terminal
-from plumbob.bench.entrants import opening
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results
+from plumbob.bench.peers import opening
 from plumbob.bench.report import outcome, report
 from plumbob.bench.report.sections import tables
 from plumbob.bench.report.standings import CLOTHS, standings
+from plumbob.bench.tables.results import Results
 from plumbob.cli import run_command
 
 N = 200
@@ -25,7 +25,7 @@ N = 200
 
 def solving(make, solver, hits, seconds=1e-3, begun=N, kind="one start", mine=False, **facts):
     """A record of N targets of a robot, the first so many solved, each in these seconds."""
-    arrays = {"solved": np.arange(begun) < hits, "claimed": np.ones(begun)}
+    arrays = {"solved": np.arange(begun) < hits, "claimed": np.ones(begun, int)}
     arrays |= {"seconds": np.full(begun, seconds), "stratum": np.zeros(begun, int)}
     arrays |= dict.fromkeys(("position", "rotation", "beyond"), np.zeros(begun))
     made = replace(make.raced(solver, kind, **arrays), size=float(N))
@@ -54,7 +54,7 @@ def test_rank_share_and_times_are_those_of_the_records(make):
     assert [name for _, name in factors] == ["pink", "Plumbob LM"]
     assert float(factors[0][0]) > 4.0
     assert float(factors[1][0]) > 2.0
-    assert standing.table == "robots_overall_one_start"
+    assert standing.table == "robots_overall"
 
 
 def test_the_best_is_told_by_how_much_it_is_faster(make):
@@ -267,12 +267,12 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
     results = Results(RecordFile("out").read().records)
     made = {table.name: table for table in tables(results, ["ik"])}
     for name, title in (
-        ("robots_success_one_start", "mark"),
-        ("robots_overall_one_start", "mark"),
-        ("entered_ik", "remark"),
+        ("robots_by_robot", "mark"),
+        ("robots_overall", "mark"),
+        ("entered", "remark"),
     ):
         (j,) = [j for j, column in enumerate(made[name].columns) if column.title == title]
-        assert not made[name].columns[j].folded or name == "entered_ik"
+        assert not made[name].columns[j].folded or name == "entered"
         assert f"{why}, on 12 of 12 targets" in made[name].rows[0][j], name
 
 

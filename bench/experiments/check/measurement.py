@@ -6,6 +6,7 @@ from functools import partial
 from plumbob.crosscheck.claims import CLAIMS, run_claims
 
 from ...harness.block import Block, Measured, Scale
+from .values import ClaimValues
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -18,13 +19,6 @@ def verdict(name: str) -> Measured:
     """Evaluate a claim; keep its numbers and its words."""
     (verdict,) = run_claims([name])
     claim = verdict.claim
-    return Measured(
-        {
-            "cases": verdict.cases,
-            "difference": verdict.difference,
-            "tolerance": claim.tolerance.value,
-            "moved": verdict.displacement,
-            "held": verdict.holds,
-        },
-        {"ours": claim.ours, "reason": claim.tolerance.reason, "missed": verdict.failure},
-    )
+    numbers = (verdict.cases, verdict.difference, claim.tolerance.value, verdict.displacement)
+    notes = {"ours": claim.ours, "reason": claim.tolerance.reason, "missed": verdict.failure}
+    return Measured(ClaimValues(*numbers, verdict.holds), notes)

@@ -6,10 +6,10 @@ from plumbob.reference.arguments import distinct_texts
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import listed
 from ...peers.registry import MUJOCO, PINOCCHIO
 from ...tables.columns import folded, number, text
 from ...tables.layout import Layout
+from ...tables.results import listed
 from ...tables.table import Summary, in_unit, words
 
 # The claims that rest on one name it in the words of either side.
@@ -17,21 +17,20 @@ ENGINES = (PINOCCHIO, MUJOCO)
 
 
 def _verdict(record: Record) -> str:
-    if record.arrays["held"]:
+    if record.values.held:
         return "held"
-    difference, tolerance = float(record.arrays["difference"]), float(record.arrays["tolerance"])
+    difference, tolerance = record.values.difference, record.values.tolerance
     by = " by {}, more than {}".format(*distinct_texts(difference, tolerance, 2))
-    return f"MISSED: {record.notes['missed']}{by if difference > tolerance else ''}"
+    return f"MISSED: {record.details.missed}{by if difference > tolerance else ''}"
 
 
 def _summary(records: Sequence[Record]) -> Summary:
-    missed = [record.problem for record in records if not record.arrays["held"]]
-    cases = sum(int(record.arrays["cases"]) for record in records)
+    missed = [record.problem for record in records if not record.values.held]
+    cases = sum(record.values.cases for record in records)
     used = max(
-        metrics.ratio(float(record.arrays["difference"]), float(record.arrays["tolerance"]))
-        for record in records
+        metrics.ratio(record.values.difference, record.values.tolerance) for record in records
     )
-    engines = sum(any(e in r.notes["ours"] + r.solver for e in ENGINES) for r in records)
+    engines = sum(any(e in r.details.ours + r.solver for e in ENGINES) for r in records)
     return Summary(
         f"{len(records) - len(missed)} of {len(records)} claims held ({engines} against "
         f"{listed(ENGINES, 'or')}, {len(records) - engines} against closed forms and invariants), "
@@ -49,7 +48,7 @@ verdicts = Layout(
     columns=(
         text("claim", lambda record: record.problem),
         text("verdict", _verdict),
-        *folded([text("what we compute", lambda record: record.notes["ours"])]),
+        *folded([text("what we compute", lambda record: record.details.ours)]),
         text("held against", lambda record: record.solver),
         number("cases"),
         number("largest difference", "difference"),

@@ -3,8 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 from ...figures.sketch import Sketch
-from ...harness.results import Results
+from ...tables.results import Results
 from . import ARM, CLOTH
+from .values import ClothDrawing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,8 +23,10 @@ def arm_draws(results: Results) -> Sketch | None:
     records = results.all("pictures", task=ARM)
     if not records:
         return None
-    names = ("curve", "spacing", "ghosts")
-    data = [(bool(r.settings["evened"]), *(r.arrays[name] for name in names)) for r in records]
+    data = [
+        (record.details.evened, record.values.curve, record.values.spacing, record.values.ghosts)
+        for record in records
+    ]
     return Sketch(
         "arm_draws",
         "The lab’s arm draws the custom curve",
@@ -39,12 +42,12 @@ def falling_cloth(results: Results) -> Sketch | None:
     records = results.all("pictures", task=CLOTH)
     if not records:
         return None
-    arrays = records[0].arrays
+    cloth: ClothDrawing = records[0].values
     return Sketch(
         "falling_cloth",
         "The lab’s cloth swings from two corners",
         "Every step converged by Newton. The pinned corners are marked.",
-        tuple(arrays[name] for name in ("positions", "time", "pinned")),
+        (cloth.positions, cloth.time, cloth.pinned),
         _draw_cloths,
     )
 

@@ -10,10 +10,11 @@ from plumbob.reference import IK_SOLVERS, ImplicitEuler, scenes, track
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ..arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
+from ...problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
 from ..cloth.measurement import TOLERANCE, converged_motion, motion
 from ..cloth.problem import H, cloth_swing
 from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
+from .values import ArmDrawing, ArmMotion, ClothDrawing, ClothMotion
 
 GHOSTS = 9
 FRAMES = 6
@@ -63,13 +64,8 @@ def arm_motion(solver: str, coherent: bool) -> Measured:
     curve = evened_custom_curve()
     found = track(skeleton, curve, solver, rest, coherent=coherent)
     kept = slice(None, None, THINNED)
-    return Measured(
-        {
-            "positions": found.positions[kept].round(PLACES),
-            "curve": curve.round(PLACES),
-            "error": np.atleast_1d(found.residual)[kept],
-        }
-    )
+    positions, error = found.positions[kept].round(PLACES), np.atleast_1d(found.residual)[kept]
+    return Measured(ArmMotion(positions, curve.round(PLACES), error))
 
 
 def cloth_motion(solver: str, iterations: int) -> Measured:
@@ -82,13 +78,8 @@ def cloth_motion(solver: str, iterations: int) -> Measured:
     found = np.array([state.positions for state in motion(problem.start, SWUNG, integrator)])
     distance = np.linalg.norm(found - exact, axis=-1)
     kept = slice(None, None, EVERY)
-    return Measured(
-        {
-            "positions": found[kept].round(PLACES),
-            "distance": [[float(f"{d:.2e}") for d in row] for row in distance[kept]],
-            "pinned": problem.system.pinned,
-        }
-    )
+    digits = np.array([[float(f"{d:.2e}") for d in row] for row in distance[kept]])
+    return Measured(ClothMotion(found[kept].round(PLACES), digits, problem.system.pinned))
 
 
 def drawing(solver: str, evened: bool) -> Measured:
@@ -99,15 +90,15 @@ def drawing(solver: str, evened: bool) -> Measured:
     angles = metrics.rotation_angles(motion.local_rotations[:, :-1])
     ghosts = np.linspace(0, len(curve) - 1, GHOSTS).round().astype(int)
     return Measured(
-        {
-            "curve": curve,
-            "residual": motion.residual,
-            "iterations": motion.iterations,
-            "largest_angle": angles.max(axis=-1),
-            "mean_angle": angles.mean(axis=-1),
-            "spacing": np.linalg.norm(np.diff(curve, axis=0), axis=-1),
-            "ghosts": motion.positions[ghosts],
-        }
+        ArmDrawing(
+            curve,
+            np.atleast_1d(motion.residual),
+            np.atleast_1d(motion.iterations),
+            angles.max(axis=-1),
+            angles.mean(axis=-1),
+            np.linalg.norm(np.diff(curve, axis=0), axis=-1),
+            motion.positions[ghosts],
+        )
     )
 
 
@@ -116,10 +107,5 @@ def falling_cloth() -> Measured:
     problem = cloth_swing(1)
     states = converged_motion(problem)
     kept = np.linspace(0, len(states) - 1, FRAMES).round().astype(int)
-    return Measured(
-        {
-            "positions": [states[i].positions for i in kept],
-            "time": kept * problem.h,
-            "pinned": problem.system.pinned,
-        }
-    )
+    positions = np.array([states[i].positions for i in kept])
+    return Measured(ClothDrawing(positions, kept * problem.h, problem.system.pinned))

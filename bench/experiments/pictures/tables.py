@@ -4,33 +4,29 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import label, listed, settings, solvers
-from ...tables.columns import LARGEST, MEDIAN, spread, spread_of, text, words_in
+from ...tables.columns import text, words_in
 from ...tables.layout import Layout
+from ...tables.results import label, listed, settings, solvers
 from ...tables.table import Column, Summary, words
 from . import ARM, figures
+from .values import ArmDrawing
 
 
 def _curve(record: Record) -> str:
-    return "resampled" if record.settings["evened"] else "as drawn"
-
-
-def _least_gap(record: Record) -> float:
-    return metrics.extent(record.arrays["spacing"])[0]
-
-
-def _mean_angle(record: Record) -> float:
-    return metrics.mean(record.arrays["mean_angle"])
+    return "resampled" if record.details.evened else "as drawn"
 
 
 def _summary(records: Sequence[Record]) -> Summary:
-    points = [
-        f"{_curve(record)}: {words(len(record.arrays['curve']))} points, "
-        f"{words(_least_gap(record))} to {words(spread_of(record, 'spacing')[2])} m apart; a joint "
-        f"rotates by up to {words_in(spread_of(record, 'largest_angle')[2], '°')} between frames"
-        for record in records
-    ]
-    return Summary("How evenly the points lie, and how smoothly the arm follows:", tuple(points))
+    sentence = "How evenly the points lie, and how smoothly the arm follows:"
+    return Summary(sentence, tuple(f"{_curve(r)}: {_point(r.values)}" for r in records))
+
+
+def _point(drawing: ArmDrawing) -> str:
+    least, largest = map(words, metrics.extent(drawing.spacing))
+    return (
+        f"{words(len(drawing.curve))} points, {least} to {largest} m apart; a joint rotates by up "
+        f"to {words_in(float(drawing.largest_angle.max()), '°')} between frames"
+    )
 
 
 resampling = Layout(
@@ -40,13 +36,19 @@ resampling = Layout(
     subjects=lambda results: results.all("pictures", task=ARM),
     columns=(
         text("curve", _curve),
-        Column("points", read=lambda record: len(record.arrays["curve"])),
-        Column("gap, least", "m", read=_least_gap),
-        *spread("gap", "spacing", "m", (MEDIAN, LARGEST)),
-        Column("rotation of a joint, mean", "°", read=_mean_angle),
-        *spread("rotation of a joint", "largest_angle", "°", [LARGEST]),
-        *spread("iterations", "iterations", of=[LARGEST]),
-        *spread("residual", "residual", "m", [LARGEST]),
+        *(
+            Column(title, unit, group=title.partition(", ")[0], read=read)
+            for title, unit, read in (
+                ("points", "", lambda r: len(r.values.curve)),
+                ("gap, least", "m", lambda r: r.values.spacing.min()),
+                ("gap, median", "m", lambda r: metrics.spread(r.values.spacing).median),
+                ("gap, largest", "m", lambda r: r.values.spacing.max()),
+                ("rotation of a joint, mean", "°", lambda r: r.values.mean_angle.mean()),
+                ("rotation of a joint, largest", "°", lambda r: r.values.largest_angle.max()),
+                ("iterations, largest", "", lambda r: r.values.iterations.max()),
+                ("residual, largest", "m", lambda r: r.values.residual.max()),
+            )
+        ),
     ),
     shows="The gap is the distance between neighbouring points; rotations are geodesic angles "
     "between neighbouring frames, a frame a point.",

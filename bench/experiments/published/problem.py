@@ -65,6 +65,7 @@ TOOLBOX_HALF_SQUARE = 1e-6
 
 # Aristidou and Lasenby 2011, table 1: mean iterations over 20 runs, 10 joints, MATLAB, without
 # limits: reachable, unreachable. Secondary; chain, target and tolerance are not stated there.
+FABRIK_SOURCE = "Aristidou and Lasenby 2011, table 1"
 FABRIK = {
     "fabrik": (15.5, 67.6),
     "ccd": (26.3, 390.0),

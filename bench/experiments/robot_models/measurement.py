@@ -5,12 +5,12 @@ from functools import partial
 
 from plumbob.crosscheck.engines import ROBOT_ENGINES
 from plumbob.crosscheck.engines.robot_engine import UnreadableError
-from plumbob.crosscheck.robots.comparisons import differences
+from plumbob.crosscheck.robots.comparisons import CONFIGURATIONS, differences, sweep
 from plumbob.crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
-from plumbob.crosscheck.robots.sweep import CONFIGURATIONS, sweep
 
 from ...harness.block import Block, Measured, Scale
 from . import peers
+from .values import FileValues
 
 SUITE = "robot_models"
 
@@ -36,16 +36,13 @@ def compare(engine: str, model: Model) -> Measured:
     except ValueError as error:
         return _unread(f"{engine} reads it, the reference does not: {error}", model)
     articulation = swept.robot.articulation
+    joints = len(slots(swept.robot)) + len(articulation.mimics)
+    sizes = (len(swept.links), joints, articulation.freedom_count)
     return Measured(
-        {
-            "links": len(swept.links),
-            "joints": len(slots(swept.robot)) + len(articulation.mimics),
-            "freedoms": articulation.freedom_count,
-            **differences([swept])._asdict(),
-        },
+        FileValues(*sizes, **differences([swept])._asdict()),
         {"cause": CAUSES.get((engine, model.name), ""), "free mimics": swept.free_mimics},
     )
 
 
 def _unread(why: str, model: Model) -> Measured:
-    return Measured({}, {"unread": why.replace(str(model.path), model.path.name)})
+    return Measured(None, {"unread": why.replace(str(model.path), model.path.name)})

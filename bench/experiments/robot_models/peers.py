@@ -11,11 +11,12 @@ from plumbob.reference import forward_kinematics, rotation
 from plumbob.reference.formats import mjcf, urdf
 
 from ...harness.block import Block, Measured
+from ...harness.job import worker_process
 from ...harness.worker import Calculation
 from ...peers.registry import KINEMATICS, Peer
-from ..robots.measurement import worker_process
-from ..robots.problem import ALL, is_installed, robot, title
+from ...problems.robots import ALL, is_installed, robot, title
 from . import PEERS
+from .values import RobotValues
 
 CONFIGURATIONS = 100
 
@@ -34,7 +35,7 @@ def blocks(suite: str) -> Iterator[Block]:
 def beside(peer: Peer, name: str) -> Measured:
     """Compare in a process of the engine's own; keep what it says where it cannot."""
     outcome = worker_process().perform(Calculation(differences, (peer.module, name)))
-    return Measured(outcome.found or {}, {"remark": outcome.note})
+    return Measured(outcome.found and RobotValues(**outcome.found), {"remark": outcome.note})
 
 
 def differences(module: str, name: str) -> Mapping[str, float]:

@@ -6,6 +6,7 @@ from functools import partial
 from plumbob.crosscheck.verify.self_test import HONEST, Subject, attempt, subjects
 
 from ...harness.block import Block, Measured, Scale
+from .values import TrialValues
 
 # At less than full length every so manieth fault is tried, and all honest solvers.
 EVERY = 5
@@ -29,6 +30,6 @@ def judged(subject: Subject) -> Measured:
     """Judge a subject; keep whether it is caught and named, and by which laws."""
     trial = attempt(subject)
     return Measured(
-        {"caught": trial.caught, "named": trial.named, "passed": trial.passed},
+        TrialValues(trial.caught, trial.named, trial.passed),
         facts={"verdict": trial.verdict.name.replace("_", " "), "laws": sorted(trial.laws)},
     )

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from ...experiments import Block, Scale
+from ..block import Block, Scale
 from ..executor import Executor, NotMeasured, Step
 from ..machine import stamp
 from ..measure import block_key, failure, record_of

@@ -28,7 +28,7 @@ _HERE = Path(__file__).parent
 # Without indents and comments, which a page need not carry.
 SCRIPT = motion.squeezed((_HERE / "page.js").read_text(encoding="utf-8"))
 # So many columns of a chapter's main table are unfolded.
-MOST_COLUMNS = 6
+MOST_COLUMNS = 7
 # Absent peers that the first screen names.
 MOST_NAMED = 5
 

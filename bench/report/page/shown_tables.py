@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from ...figures.sketch import Drawing
 from ...harness.metrics import Share
-from ...harness.results import label
+from ...tables.results import label
 from ...tables.table import POWER, Cell, Column, Source, Summary, Table, best_cells, words
 
 
@@ -95,7 +95,7 @@ def shown_table(
     classes = _column_classes(table, most, solver)
     rows = _rows(table, classes, best)
     heads = [
-        Head(column, of, column.best, j in (0, solver))
+        Head(column, of, column.best, j < table.compared or j in (0, solver))
         for j, (column, of) in enumerate(zip(table.columns, classes, strict=True))
     ]
     return ShownTable(

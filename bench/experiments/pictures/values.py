@@ -1,0 +1,72 @@
+"""The records of what the report draws."""
+
+from ...harness.values import Details, Floats1, Floats2, Floats3, Integers1, Kind, Values
+from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION
+
+
+class ArmDrawing(Values, frozen=True):
+    """The arm on a curve, point by point [m], [rad], with the joints in a few frames."""
+
+    curve: Floats2
+    residual: Floats1
+    iterations: Integers1
+    largest_angle: Floats1
+    mean_angle: Floats1
+    spacing: Floats1
+    ghosts: Floats3
+
+
+class ArmDetails(Details, frozen=True):
+    """Whether the curve was resampled, and between which spacings [m]."""
+
+    evened: bool
+    min_spacing: float
+    max_spacing: float
+
+
+class ClothDrawing(Values, frozen=True):
+    """A cloth in a few frames: positions [m], (frame, particle, 3), their times [s], the pins."""
+
+    positions: Floats3
+    time: Floats1
+    pinned: Integers1
+
+
+class ArmMotion(Values, frozen=True):
+    """The arm's joints [m], (frame, joint, 3), the curve, and the error of each frame [m]."""
+
+    positions: Floats3
+    curve: Floats2
+    error: Floats1
+
+
+class ArmMotionDetails(Details, frozen=True):
+    """Whether the motion is coherent, and its place among those that are shown."""
+
+    coherent: bool
+    order: int
+
+
+class ClothMotion(Values, frozen=True):
+    """A cloth's particles [m], (frame, particle, 3), how far each is off [m], the pins."""
+
+    positions: Floats3
+    distance: Floats2
+    pinned: Integers1
+
+
+class ClothMotionDetails(Details, frozen=True):
+    """The step [s], every how many of them one is kept, iterations, and the place among others."""
+
+    h: float
+    every: int
+    iterations: int
+    order: int
+
+
+KINDS = {
+    ARM: Kind(ArmDrawing, ArmDetails),
+    CLOTH: Kind(ClothDrawing),
+    ARM_MOTION: Kind(ArmMotion, ArmMotionDetails),
+    CLOTH_MOTION: Kind(ClothMotion, ClothMotionDetails),
+}

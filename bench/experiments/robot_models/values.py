@@ -1,0 +1,48 @@
+"""The records of robots and characters in engines."""
+
+import msgspec
+
+from ...harness.values import Details, Kind, Values
+from . import PEERS
+
+
+class FileValues(Values, frozen=True):
+    """The size of a file in an engine, and its largest differences from the reference.
+
+    Positions are over the extent of the links, rotations between entries of matrices, Jacobians
+    over the extent and one radian.
+    """
+
+    links: int
+    joints: int
+    freedoms: int
+    positions: float
+    rotations: float
+    jacobians: float
+
+
+class FileDetails(Details, frozen=True):
+    """Why an engine reads a file otherwise or not at all, and which mimics it leaves free."""
+
+    configurations: int
+    cause: str = ""
+    free_mimics: str = msgspec.field(default="", name="free mimics")
+    unread: str = ""
+
+
+class RobotValues(Values, frozen=True):
+    """The largest differences of effectors: positions [m], and entries of rotation matrices."""
+
+    positions: float
+    rotations: float
+
+
+class RobotDetails(Details, frozen=True):
+    """The engine's version, and why it does not take the robot."""
+
+    configurations: int
+    version: str
+    remark: str = ""
+
+
+KINDS = {"": Kind(FileValues, FileDetails), PEERS: Kind(RobotValues, RobotDetails)}

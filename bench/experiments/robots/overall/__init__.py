@@ -1,1 +1,0 @@
-"""All robots at once: who solves how much in what time, and where."""

@@ -1,0 +1,62 @@
+"""The records of solvers on robots."""
+
+import msgspec
+import numpy as np
+
+from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
+from . import REACHABLE, UNREACHABLE
+
+
+class RobotSolves(Values, frozen=True, kw_only=True):
+    """What became of the targets that a solver began; only `setup` is there if it began none.
+
+    Attributes:
+        solved: whether the evaluation says so, (target,).
+        claimed: whether the solver says so: 1, 0, or -1 if it makes no claims, (target,).
+        seconds: how long each took [s], (target,).
+        position, rotation: how far the effectors are from it [m], [rad]; NaN without an answer.
+        beyond: by how much the answer oversteps limits [rad].
+        exception: whether the solver raised, or its process was lost.
+        stratum: the number of the stratum of each.
+        setup: how long the solver took before the first [s].
+        bound: how near any pose may come to a target out of reach [m].
+    """
+
+    solved: Booleans1 | None = None
+    claimed: Integers1 | None = None
+    seconds: Floats1 | None = None
+    position: Floats1 | None = None
+    rotation: Floats1 | None = None
+    beyond: Floats1 | None = None
+    exception: Booleans1 | None = None
+    stratum: Integers1 | None = None
+    setup: float
+    bound: Floats1 | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse records of which some arrays are missing, or of other lengths."""
+        names = ("solved", "claimed", "seconds", "position", "rotation", "beyond", "stratum")
+        if len({np.shape(getattr(self, name)) for name in names}) > 1:
+            raise ValueError("solved: expected as many entries in every array")
+
+
+class RobotDetails(Details, frozen=True):
+    """The solver's start and version, why it does not take a robot, and what the robot is.
+
+    Targets are solved within the tolerances [m], [rad]; tips are the effectors, of which a pose or
+    a position is wanted.
+    """
+
+    kind: str
+    version: str = ""
+    tolerance: float = 0.0
+    tolerance_rotation: float = 0.0
+    remark: str = ""
+    strata: list[str] = msgspec.field(default_factory=list)
+    tips: list[str] = msgspec.field(default_factory=list)
+    joints: int = 0
+    freedom: int = 0
+    wanted: str = ""
+
+
+KINDS = dict.fromkeys((REACHABLE, UNREACHABLE), Kind(RobotSolves, RobotDetails))
