@@ -18,6 +18,7 @@ from plumbob.bench.harness import run
 from plumbob.bench.harness.experiment import Experiment
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.harness.values import Values
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import ONE_START, Entry, Peer
 from plumbob.bench.report import report
@@ -29,6 +30,10 @@ from plumbob.reference import STEP_SOLVERS
 from plumbob.reference.implicit_euler.local_global import LocalGlobal
 
 TINY = Scale(targets=1, seconds=0.01)
+
+
+class Sum(Values, frozen=True):
+    sum: int
 
 
 class Damped(LocalGlobal):
@@ -126,7 +131,7 @@ FOLDER = {
 from plumbob.bench.harness.block import Block, Measured
 
 def blocks(scale):
-    yield Block("sums", "1 + 1", "Python", lambda: Measured({"sum": 2}), facts={"title": "One"})
+    yield Block("sums", "1 + 1", "Python", lambda: Measured(Sum(2)), facts={"title": "One"})
 """,
     "tables.py": """
 from plumbob.bench.tables.columns import number, titled
