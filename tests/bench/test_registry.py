@@ -18,7 +18,6 @@ from plumbob.bench.harness import run
 from plumbob.bench.harness.experiment import Experiment
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.values import Values
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.registry import ONE_START, Entry, Peer
 from plumbob.bench.report import report
@@ -30,10 +29,6 @@ from plumbob.reference import STEP_SOLVERS
 from plumbob.reference.implicit_euler.local_global import LocalGlobal
 
 TINY = Scale(targets=1, seconds=0.01)
-
-
-class Sum(Values, frozen=True):
-    sum: int
 
 
 class Damped(LocalGlobal):
@@ -127,8 +122,17 @@ def test_a_new_table_is_a_function_and_a_line_and_stands_in_the_page(
 
 FOLDER = {
     "__init__.py": "",
+    "values.py": """
+from plumbob.bench.harness.values import Kind, Values
+
+class Sum(Values, frozen=True):
+    sum: int
+
+KINDS = {"": Kind(Sum)}
+""",
     "measurement.py": """
 from plumbob.bench.harness.block import Block, Measured
+from .values import Sum
 
 def blocks(scale):
     yield Block("sums", "1 + 1", "Python", lambda: Measured(Sum(2)), facts={"title": "One"})

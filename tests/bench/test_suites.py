@@ -1,7 +1,6 @@
 """Suites: what they measure adds up."""
 
 import itertools
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -120,10 +119,9 @@ def test_one_step_of_the_cloth_starts_at_one_and_converges():
 def test_newtons_error_is_printed_as_it_is_in_fifty_digits(extended_precision):
     """Measured against Newton's own answer it was 1e-17, which no float64 can be."""
     swing, k = cloth_swing(1, size=4), 10
-    block = Block("cloth", "cloth", "newton", partial(cloth.one_step, swing, "newton", k))
-    record = measure(block)
-    record = replace(record, facts={"task": ONE_STEP}, settings={"step": 1, "h": swing.h})
-    table = convergence(Results([record]))
+    step, facts = partial(cloth.one_step, swing, "newton", k), {"task": ONE_STEP}
+    block = Block("cloth", "cloth", "newton", step, {"step": 1, "h": swing.h}, facts=facts)
+    table = convergence(Results([measure(block)]))
     lines = [line for line in markdown(table).splitlines() if line.startswith("|")]
     heading, _, *rows = ([cell.strip() for cell in line.split("|")] for line in lines)
     printed = float(rows[0][heading.index("error after 10")])
