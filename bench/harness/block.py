@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..peers.entrant import Entrant
-from .values import Values, stored
+from .values import stored
 
 if TYPE_CHECKING:
     from ..problems.own import OwnProblem
@@ -20,14 +20,14 @@ class Measured(NamedTuple):
         facts: what tables select and sort by, beside the facts of the block; see `Block`.
     """
 
-    values: Any  # Values, or a mapping until every experiment declares its own
+    values: Any  # `Values` of the type that the experiment declares, or None
     notes: Mapping[str, str] = {}
     facts: Mapping[str, Any] = {}
 
     @property
     def arrays(self) -> Mapping[str, Any]:
         """The values by the names they have on record."""
-        return stored(self.values) if isinstance(self.values, Values) else self.values or {}
+        return {} if self.values is None else stored(self.values)
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def not_installed(package: str) -> Measured:
 
 def not_asked(why: str) -> Measured:
     """Return a block without numbers that says why a solver is not asked."""
-    return Measured({}, {"remark": why})
+    return Measured(None, {"remark": why})
 
 
 def record_of(block: Block, measured: Measured, seconds: float) -> Record:

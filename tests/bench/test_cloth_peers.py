@@ -456,7 +456,8 @@ FALL = peers_cloth.Fall(peers_cloth.Level(SIZE, 5, 10.0), partial(falling_cloth,
 def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, lost, why):
     monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
     monkeypatch.setattr(peers_cloth, "motion_rungs", as_it_is)
-    arrays, _, facts = peers_cloth.motion(fake_peer(manner), [FALL])
+    measured = peers_cloth.motion(fake_peer(manner), [FALL])
+    arrays, facts = measured.arrays, measured.facts
     assert arrays["frames"].tolist() == [frames]
     assert arrays["diverged"].tolist() == [lost]
     assert np.isfinite(arrays["true"]).all() == (not lost)
@@ -486,7 +487,8 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})
-    arrays, _, facts = peers_cloth.motion(fake_peer("well"), [FALL, FALL])
+    measured = peers_cloth.motion(fake_peer("well"), [FALL, FALL])
+    arrays, facts = measured.arrays, measured.facts
     assert len(tried) == 1
     assert arrays["frames"].tolist() == [0, 0]
     assert np.isnan(arrays["true"]).all()
@@ -496,7 +498,8 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
 def test_a_ladder_ends_where_it_arrives(here):
     """Two iterations of Newton and three are asked for, and no more once 1e-9 is reached."""
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
-    arrays, _, facts = peers_cloth.one_step(newton, [FALL])
+    measured = peers_cloth.one_step(newton, [FALL])
+    arrays, facts = measured.arrays, measured.facts
     assert arrays["error"][0] > arrays["error"][-1] <= peers_cloth.NEAR_ENOUGH
     assert (arrays["error"][:-1] > peers_cloth.NEAR_ENOUGH).all()
     assert len(facts["rungs"]) == len(arrays["error"])
@@ -505,7 +508,7 @@ def test_a_ladder_ends_where_it_arrives(here):
 def test_a_ladder_whose_time_is_used_is_climbed_no_further(here):
     brief = FALL.level._replace(budget=1e-9)
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
-    arrays, _, _ = peers_cloth.one_step(newton, [FALL._replace(level=brief)])
+    arrays = peers_cloth.one_step(newton, [FALL._replace(level=brief)]).arrays
     assert len(arrays["error"]) == 1
 
 
@@ -520,7 +523,7 @@ def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
 
 
 def test_iterations_are_counted_to_each_power_of_ten():
-    arrays, *_ = peers_cloth.iterations_needed("newton", 100.0)
+    arrays = peers_cloth.iterations_needed("newton", 100.0).arrays
     counts = np.array(arrays["needed"])
     assert (np.diff(counts) >= 0).all()
     assert 1 <= counts[0] <= counts[-1] <= arrays["tried"] < 20
@@ -570,7 +573,8 @@ def test_the_limit_of_one_spring_is_known_exactly(title, monkeypatch, here):
 
 def test_a_solver_that_does_not_get_through_has_no_limit(monkeypatch, here):
     peer = fake_peer("unable")
-    arrays, notes, _ = peers_cloth.stability(peer, (STIFFNESS,))
+    measured = peers_cloth.stability(peer, (STIFFNESS,))
+    arrays, notes = measured.arrays, measured.notes
     assert np.isnan(arrays["limit"]).all()
     assert "TypeError" in notes["remark"] or "takes no cloths" in notes["remark"]
 

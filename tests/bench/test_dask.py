@@ -27,6 +27,7 @@ from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.measure import block_key, measure
 from plumbob.bench.harness.progress import Progress, listening
 from plumbob.bench.harness.record import RecordFile, encode
+from plumbob.bench.harness.values import Values
 from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.sources import digest_of
 from plumbob.bench.report.sections import tables
@@ -36,6 +37,10 @@ from plumbob.bench.tables.table import markdown
 TINY = Scale(targets=3, seconds=0.001)
 ROOT = Path(__file__).parents[2]
 INSTALLED = "the extra `cluster` is not installed"
+
+
+class Numbers(Values, frozen=True):
+    x: list
 
 
 def rows(folder):
@@ -207,7 +212,7 @@ HOSTS = {"w1": "h1", "w2": "h1", "w3": "h2", "w4": "h3"}
 ONE_KIND = {"w1": "h1/slide rule", "w2": "h1/slide rule", "w3": "h2/slide rule"}
 TWO_KINDS = ONE_KIND | {"w4": "h3/abacus"}
 PLANTED = [
-    Block(suite, problem, "s", lambda: Measured({"x": [1.0]}), times=times)
+    Block(suite, problem, "s", lambda: Measured(Numbers([1.0])), times=times)
     for suite, times in (("arm", False), ("ik", True), ("timing", True))
     for problem in ("a", "b", "c")
 ]

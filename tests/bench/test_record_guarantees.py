@@ -19,9 +19,14 @@ from plumbob.bench.harness import machine, run
 from plumbob.bench.harness.folder_lock import locked
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile, decode, encode
+from plumbob.bench.harness.values import Values
 from plumbob.bench.tables.results import Results
 
 ROOT = Path(bench.__file__).resolve().parents[1]
+
+
+class Numbers(Values, frozen=True):
+    x: list
 
 
 @pytest.fixture
@@ -31,7 +36,7 @@ def solvers(monkeypatch):
 
     def blocks(suite, scale):
         for solver, settings in asked.items():
-            yield Block(suite, "p", solver, lambda: Measured({"x": [1.0]}), settings, size=2)
+            yield Block(suite, "p", solver, lambda: Measured(Numbers([1.0])), settings, size=2)
 
     monkeypatch.setattr(run, "blocks", blocks)
     return asked
@@ -226,10 +231,14 @@ import sys, time
 import numpy as np
 from plumbob.bench.experiments import Block, Measured
 from plumbob.bench.harness import run
+from plumbob.bench.harness.values import Values
+
+class Numbers(Values, frozen=True):
+    x: list
 
 def measure(i):
     time.sleep(0.002)
-    return Measured({{"x": np.random.default_rng(i).random(20_000)}})
+    return Measured(Numbers(np.random.default_rng(i).random(20_000)))
 
 def blocks(suite, scale):
     for i in range({COUNT}):

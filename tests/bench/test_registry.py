@@ -122,11 +122,20 @@ def test_a_new_table_is_a_function_and_a_line_and_stands_in_the_page(
 
 FOLDER = {
     "__init__.py": "",
+    "values.py": """
+from plumbob.bench.harness.values import Kind, Values
+
+class Sum(Values, frozen=True):
+    sum: int
+
+KINDS = {"": Kind(Sum)}
+""",
     "measurement.py": """
 from plumbob.bench.harness.block import Block, Measured
+from .values import Sum
 
 def blocks(scale):
-    yield Block("sums", "1 + 1", "Python", lambda: Measured({"sum": 2}), facts={"title": "One"})
+    yield Block("sums", "1 + 1", "Python", lambda: Measured(Sum(2)), facts={"title": "One"})
 """,
     "tables.py": """
 from plumbob.bench.tables.columns import number, titled

@@ -13,6 +13,7 @@ from ...harness.block import Block, Measured, Scale
 from ...problems.curves import FollowedCurve, arm_beyond, arm_curves
 from ..chain.measurement import BEYOND_TOLERANCE, Limits, solve_targets
 from . import BEYOND, CURVE
+from .values import Followed
 
 LIMITS = Limits(tolerance=1e-4, max_iterations=100)
 BEYOND_LIMITS = Limits(BEYOND_TOLERANCE, max_iterations=1000)
@@ -45,13 +46,13 @@ def follow(
     pose = forward_kinematics(problem.model, motion.coordinates)
     angles = _joint_angles(problem, motion)[: None if closed else -1]
     return Measured(
-        {
-            "residual": np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
-            "iterations": motion.iterations,
-            "outcome": motion.outcome,
-            "largest_angle": angles.max(axis=-1),
-            "mean_angle": angles.mean(axis=-1),
-        }
+        Followed(
+            residual=np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
+            iterations=np.asarray(motion.iterations),
+            outcome=np.asarray(motion.outcome),
+            largest_angle=angles.max(axis=-1),
+            mean_angle=angles.mean(axis=-1),
+        )
     )
 
 

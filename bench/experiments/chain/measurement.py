@@ -25,6 +25,7 @@ from ...peers.protocol import NoAnswerError
 from ...peers.registry import ChainPeer
 from ...problems.chains import BEYOND, STRATA, ChainRequests, TargetsForSkeleton, chain_targets
 from . import CHAIN
+from .values import Reached
 
 SUITE = "ik"
 TOLERANCE = 1e-4
@@ -110,7 +111,7 @@ def solve_targets(
     if record:
         arrays |= _convergence(solution.history[:, : HISTORY + 1])
         arrays["seconds"] = _seconds(problem, solver, limits)
-    return Measured(arrays)
+    return Measured(Reached(**arrays))
 
 
 def _seconds(problem: TargetsForSkeleton, solver: str, limits: Limits) -> FloatArray:
@@ -135,7 +136,7 @@ def solve_with_engine(problem: TargetsForSkeleton, name: str, limits: Limits) ->
     rotations = np.array([answer.q[engine.columns] for answer, _ in results])
     positions = forward_kinematics(problem.skeleton, rotations).positions
     arrays = _evaluated(problem, limits, positions, [answer.iterations for answer, _ in results])
-    return Measured(arrays | {"seconds": np.array([seconds for _, seconds in results])})
+    return Measured(Reached(**arrays, seconds=np.array([seconds for _, seconds in results])))
 
 
 def solve_one_by_one(
@@ -169,7 +170,7 @@ def solve_one_by_one(
         arrays |= history
         remarks += [] if history else [NOT_FOLLOWED]
     facts = {"trouble": raised(outcome.solved)}
-    return Measured(arrays, {"remark": "; ".join(filter(None, remarks))}, facts)
+    return Measured(Reached(**arrays), {"remark": "; ".join(filter(None, remarks))}, facts)
 
 
 def _performed(
@@ -191,7 +192,7 @@ def _answers(requests: ChainRequests, outcome: Outcome) -> tuple[FloatArray, Flo
 
 def _evaluated(
     problem: TargetsForSkeleton, limits: Limits, positions: FloatArray, iterations: Any
-) -> dict[str, np.ndarray]:
+) -> dict[str, Any]:
     """Return what the joints' positions, (target, joint, 3), come to; no answer is NaN."""
     reach = problem.skeleton.reach()
     distance = np.linalg.norm(problem.targets - problem.skeleton.offsets[0], axis=-1)

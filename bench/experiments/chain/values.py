@@ -21,6 +21,7 @@ class Reached(Values, frozen=True):
     history_median: Floats1 | None = None
     history_high: Floats1 | None = None  # 90th percentile
     seconds: Floats1 | None = None  # for a target by itself
+    claimed: Integers1 | None = None  # what a user's solver says: 1, 0, or -1 for nothing
 
 
 class ReachedDetails(Details, frozen=True):

@@ -19,6 +19,7 @@ from ...problems.curves import (
 )
 from ..arm.measurement import LIMITS, follow, tracked
 from . import COHERENT, COLD, CURVE, DRIFT, WARM
+from .values import Drifted
 
 SUITE = "tracking"
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -62,4 +63,4 @@ def drift(problem: FollowedCurve, solver: str, mode: str) -> Measured:
     motion = tracked(problem, solver, OPTIONS[mode])
     later = (DRIFT_FRAMES * np.arange(1, 4)) % len(problem.curve)
     angles = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[later])
-    return Measured({"drift": angles.max(axis=-1), "residual": motion.residual})
+    return Measured(Drifted(angles.max(axis=-1), np.asarray(motion.residual)))

@@ -18,6 +18,7 @@ from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, WorkerProcess
 from ...harness.measure import not_installed
+from ...harness.values import Values
 from ...peers import registry
 from ...peers.registry import EXPLICIT, UNDECLARED, ClothPeer
 from ...problems.falling_cloth import (
@@ -35,6 +36,7 @@ from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
 from .job import ClothJob, Shape
 from .ladder import Rung, motion_rungs, step_rungs
 from .truth import ClothTruth, implicit_motion, truth_of
+from .values import Counted, MotionWork, Published, Stability, StepWork
 
 SUITE = "cloth"
 # One step is timed so often, but for no more than a twentieth of its ladder's time.
@@ -179,7 +181,7 @@ def one_step(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
             spent += float(seconds.sum())
             if error <= NEAR_ENOUGH or spent > level.budget:
                 break
-    return _columns(("particles", "seconds", "error"), rows, remarks)
+    return _columns(StepWork, ("particles", "seconds", "error"), rows, remarks)
 
 
 def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
@@ -197,7 +199,7 @@ def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
     names = ("particles", "frames", "wanted", "seconds", "setup", "implicit", "true", "diverged")
     truths = [fall.truth for fall in falls]
     known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
-    return _columns(names, rows, remarks, **known)
+    return _columns(MotionWork, names, rows, remarks, **known)
 
 
 def _tried(
@@ -265,13 +267,8 @@ def iterations_needed(solver: str, stiffness: float) -> Measured:
         if errors[-1] <= NEAR_ENOUGH:
             break
     needed = [metrics.first_below(np.array(errors), float(decade)) for decade in DECADES]
-    return Measured(
-        {
-            "needed": [np.nan if count is None else count for count in needed],
-            "tried": len(errors) - 1,
-            "least": min(errors),
-        }
-    )
+    counts = np.array([np.nan if count is None else count for count in needed])
+    return Measured(Counted(counts, tried=len(errors) - 1, least=min(errors)))
 
 
 def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
@@ -291,10 +288,8 @@ def stability(peer: ClothPeer, stiffnesses: tuple[float, ...]) -> Measured:
         except ArithmeticError as error:
             limits.append(np.nan)
             remarks.append(str(error))
-    return Measured(
-        {"stiffness": stiffnesses, "limit": limits, "frequency": frequencies},
-        {"remark": "; ".join(remarks)},
-    )
+    columns = map(np.array, (stiffnesses, limits, frequencies))
+    return Measured(Stability(*columns), {"remark": "; ".join(remarks)})
 
 
 def is_stable(
@@ -347,13 +342,9 @@ def liu_2013(solver: str) -> Measured:
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     inertial = x + published.LIU_2013_FRAME * np.where(cloth.system.free[:, None], v, 0.0)
-    return Measured(
-        {
-            "seconds": [one.seconds for one in outcome.solved],
-            "error": metrics.relative_error(outcome.solved[-1].q, exact, inertial),
-            "vertices": cloth.system.particle_count,
-        }
-    )
+    seconds = np.array([one.seconds for one in outcome.solved])
+    error = metrics.relative_error(outcome.solved[-1].q, exact, inertial)
+    return Measured(Published(seconds, error, cloth.system.particle_count))
 
 
 def job(
@@ -365,7 +356,11 @@ def job(
 
 
 def _columns(
-    names: tuple[str, ...], rows: list[Row], remarks: list[Remark], **more: list[float]
+    kind: type[Values],
+    names: tuple[str, ...],
+    rows: list[Row],
+    remarks: list[Remark],
+    **more: list[float],
 ) -> Measured:
     """Return rows, their labels last, as arrays and facts."""
     arrays = {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
@@ -376,7 +371,7 @@ def _columns(
         "remarks": [remark.sentence for remark in remarks],
         "trouble": troubles[0] if troubles else "",
     }
-    return Measured({**arrays, **more}, facts=facts)
+    return Measured(kind(**arrays, **more), facts=facts)
 
 
 @functools.cache
