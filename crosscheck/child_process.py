@@ -1,167 +1,435 @@
-"""Python in a process of its own: a call that crashes, hangs or talks nonsense costs no other."""
+"""A program in a process of its own: one that crashes, hangs or talks nonsense costs no other.
+
+Pipes are read and written as they allow, so that neither a program that does not read nor one that
+prints without end blocks anything. Memory is limited by watching what is resident: limits of the
+address space (RLIMIT_AS, RLIMIT_DATA) would forbid programs that reserve far more than they use,
+as Java, JavaScript, compiled Python and every program under a sanitizer do.
+"""
 
 import contextlib
+import math
 import os
-import queue
+import pickle
 import resource
+import selectors
 import signal
-import socket
+import struct
 import subprocess
 import sys
-import threading
-from collections.abc import Callable, Mapping
-from multiprocessing import Pipe
+import time
+import weakref
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from enum import Enum, auto
+from functools import partial
 from multiprocessing.connection import Connection
-from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
 from typing import Any, TypeVar
 
+from .process_tree import Process, carry, end_group, family, guard, new_marker
+
 Result = TypeVar("Result")
 
+# How often a process that lets one wait is looked at [s].
+TICK = 0.05
+# How much of standard error is kept [B].
+STDERR_KEPT = 4096
+# Below this share of a processor a program waits rather than computes.
+IDLE = 0.1
+# How long what closed one of its pipes may still take to answer, or to end [s].
+SHUT = 1.0
+_CHUNK = 1 << 18
 # A call may last so many times its limit of processor time: others may use the processor, too.
 _WALL = 10
-# A process whose connection has ended is given so long [s] to end by itself.
-_LEAVE = 1.0
+# What a process may take to load and compile before its first call [s].
+_START = 300.0
 # In safe-path mode (-P) nothing is imported from the working directory; our packages come from
 # where this file is, before any other that the path may lead to.
 _ROOT = Path(__file__).parents[2]
 _PATH = "import sys; sys.path.insert(0, sys.argv[1]); "
-_CALLS = "import plumbob.crosscheck.child_process as c; c.perform_calls({})"
+
+
+class Loss(Enum):
+    """Why a process is of no more use."""
+
+    ENDED = auto()
+    CUT = auto()  # it ended in the middle of a message
+    CLOSED = auto()  # it closed its output, but runs on
+    GARBLED = auto()  # what it sent is no message
+    TOO_LONG = auto()  # a message without an end
+    MEMORY = auto()
+    PROCESSOR = auto()  # it took too much time of a processor
+    # Nothing came in time:
+    DEAF = auto()  # it closed its input before it had read the request
+    UNFINISHED = auto()  # it sent a part of a message
+    UNREAD = auto()  # it did not read the whole request
+    COMPUTING = auto()
+    WAITING = auto()
+
+
+# No message came in time.
+SILENT = (Loss.DEAF, Loss.UNFINISHED, Loss.UNREAD, Loss.COMPUTING, Loss.WAITING)
 
 
 class LostError(Exception):
-    """A call crashed its process or took too long; the message says which."""
+    """A process is of no more use; `loss` says why, the message where there is one for people."""
+
+    def __init__(self, loss: Loss, message: str = "") -> None:
+        super().__init__(message or loss.name)
+        self.loss = loss
 
 
-class PipedProcess:
-    """A Python process in a group of its own, and threads that talk with it so that we never wait.
-
-    What it prints goes nowhere.
-
-    Attributes:
-        process: the process.
-    """
-
-    def __init__(self, program: str, environment: Mapping[str, str] | None = None) -> None:
-        """Start a program; `{}` in it stands for the descriptor of its end of the connection."""
-        self._outgoing: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._incoming: queue.SimpleQueue[tuple[Any, ...]] = queue.SimpleQueue()
-        self._connection, theirs = Pipe()
-        with theirs:
-            program = _PATH + program.format(theirs.fileno())
-            self.process = subprocess.Popen(
-                [sys.executable, "-P", "-c", program, str(_ROOT)],
-                pass_fds=[theirs.fileno()],
-                env=environment,
-                process_group=0,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-            )
-        self._threads = [threading.Thread(target=f, daemon=True) for f in (self._write, self._read)]
-        for thread in self._threads:
-            thread.start()
-
-    def send(self, message: object) -> None:
-        """Send a message; whether it arrives is known from what is received."""
-        self._outgoing.put(bytes(ForkingPickler.dumps(message)))
-
-    def receive(self, patience: float) -> Any:
-        """Return the next message.
-
-        Raises:
-            TimeoutError: if none came in time [s].
-            EOFError: if there will be none: the process ended, or sent what cannot be read.
-        """
-        try:
-            received = self._incoming.get(timeout=patience)
-        except queue.Empty:
-            raise TimeoutError from None
-        if not received:
-            raise EOFError
-        return received[0]
-
-    def ending(self) -> str:
-        """Return how the process ended, "with code 3" or "by SIGSEGV", "" if it still runs."""
-        try:
-            code = self.process.wait(timeout=_LEAVE)
-        except subprocess.TimeoutExpired:
-            return ""
-        names = {int(known): known.name for known in signal.Signals}
-        return f"with code {code}" if code >= 0 else f"by {names.get(-code, f'signal {-code}')}"
-
-    def end(self) -> None:
-        """End the process and all that it has started."""
-        kill_group(self.process)
-        self._outgoing.put(None)
-        with (
-            socket.socket(fileno=os.dup(self._connection.fileno())) as ours,
-            contextlib.suppress(OSError),
-        ):
-            ours.shutdown(socket.SHUT_RDWR)  # whoever else may hold the other end
-        for thread in self._threads:
-            thread.join()
-        self._connection.close()
-        assert self.process.stdin is not None
-        self.process.stdin.close()
-
-    def _write(self) -> None:
-        with contextlib.suppress(OSError):  # then reading ends too
-            while (message := self._outgoing.get()) is not None:
-                self._connection.send_bytes(message)
-
-    def _read(self) -> None:
-        """Pass on messages; an empty tuple is the end, whatever the process does or sends."""
-        with contextlib.suppress(Exception):
-            while True:
-                self._incoming.put((self._connection.recv(),))
-        self._incoming.put(())
+# Codecs take the first message from what was received, and return it, or () if there is none yet.
 
 
-def kill_group(process: "subprocess.Popen[Any]") -> None:
-    """Kill a process that leads a group, and all that it has started; return when it is gone."""
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.kill()
-    process.wait()
+def take_line(received: bytearray) -> tuple[bytes, ...]:
+    """Take the first line of bytes, without its end, which can only be in the last chunk."""
+    end = received.find(b"\n", max(0, len(received) - _CHUNK))
+    if end < 0:
+        return ()
+    line = bytes(received[:end])
+    del received[: end + 1]
+    return (line,)
 
 
-def attach(descriptor: int) -> Connection:
-    """Return the connection that this process was started with; its end is that of its parent."""
-    os.set_inheritable(descriptor, False)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    return Connection(descriptor)
+def take_pickle(received: bytearray) -> tuple[Any, ...]:
+    """Take the first object, as `multiprocessing.connection.Connection` sends it."""
+    if len(received) < 4:
+        return ()
+    size: int = struct.unpack_from("!i", received)[0]
+    if size < 0:
+        raise ValueError(f"expected a length, got {size}")
+    if len(received) < 4 + size:
+        return ()
+    data = bytes(received[4 : 4 + size])
+    del received[: 4 + size]
+    return (pickle.loads(data),)
 
 
-def _end_with_parent() -> None:
-    """Wait for the end of the input, which only the parent holds open, and leave."""
-    os.read(0, 1)
-    os._exit(1)
+def pickled(message: object) -> bytes:
+    """Return an object as `take_pickle` and a Connection read it."""
+    data = pickle.dumps(message)
+    return struct.pack("!i", len(data)) + data
 
 
 class ChildProcess:
-    """A process that performs calls one by one, started when one comes, and anew after a loss.
+    """A program in a session of its own, which is talked with by messages on its three pipes.
+
+    It ends with this object, and with this process, by whatever means that ends.
 
     Attributes:
-        prepare: called first in every process, to load and compile.
-        patience: how much processor time a call may take [s].
-        start_patience: how much `prepare` may take [s].
+        pid: its process.
+        partial: what was received after the last message.
+        sent: the length of the last message to it [B].
+        last_words: the end of its standard error.
     """
 
     def __init__(
-        self, prepare: Callable[[], object], patience: float = 60.0, start_patience: float = 300.0
+        self,
+        command: Sequence[str | Path],
+        take: Callable[[bytearray], tuple[Any, ...]] = take_line,
+        folder: Path | None = None,
+        environment: Mapping[str, str] | None = None,
+        memory: float = math.inf,
+        longest: float = math.inf,
     ) -> None:
-        self.prepare = prepare
-        self.patience = patience
-        self.start_patience = start_patience
-        self._child: PipedProcess | None = None
+        """Start a program.
 
-    def __enter__(self) -> "ChildProcess":
-        return self
+        Args:
+            command: the program and its arguments.
+            take: the codec; with pickled objects, what the program prints goes nowhere.
+            folder: where it works.
+            environment: ours if None.
+            memory: what it may take, with all that it starts [B]. Where there is a limit nothing
+                of the program is trusted: what leaves its group and session is ended with it.
+            longest: the longest message that it may send [B].
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        Raises:
+            OSError: if it cannot be started.
+            ValueError: if the command holds what no command can.
+        """
+        self._take, self._memory, self._longest = take, memory, longest
+        self._marker = new_marker() if memory < math.inf else 0
+        self._process: Any = subprocess.Popen(
+            command,
+            bufsize=0,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL if take is take_pickle else subprocess.PIPE,
+            cwd=folder,
+            env=environment,
+            start_new_session=True,
+            pipesize=_CHUNK,  # fewer changes of context for large messages
+            # A limit that is set later would miss what the program starts at once.
+            preexec_fn=partial(carry, self._marker) if self._marker else None,
+        )
+        self.pid: int = self._process.pid
+        self.partial, self.last_words = bytearray(), bytearray()
+        self._unsent, self.sent = bytearray(), 0
+        self._is_deaf = False
+        self._looks: list[tuple[float, list[Process]]] = []
+        self._selector = selectors.DefaultSelector()
+        for pipe in _pipes(self._process):
+            os.set_blocking(pipe.fileno(), False)
+            if pipe is not self._process.stdin:
+                self._selector.register(pipe, selectors.EVENT_READ)
+        watch = guard(self.pid, self._marker)
+        self._end = weakref.finalize(self, _end, self._process, watch, self._marker, self._selector)
+
+    @property
+    def code(self) -> int:
+        """The code that it ended with, or minus the signal; only of one that has ended."""
+        return int(self._process.returncode)
+
+    @property
+    def ending(self) -> str:
+        """How it ended: "with code 3" or "by SIGSEGV"."""
+        names = {-known: known.name for known in signal.Signals}
+        return (
+            f"with code {self.code}" if self.code >= 0 else f"by {names.get(self.code, -self.code)}"
+        )
+
+    def send(self, message: bytes) -> None:
+        """Let a message be written while the answer is awaited."""
+        self._unsent += message
+        self.sent = len(message)
+        if not self._is_deaf:
+            self._forget(self._process.stdin)
+            self._selector.register(self._process.stdin, selectors.EVENT_WRITE)
+
+    def receive(self, seconds: float = math.inf, processor: float = math.inf) -> Any:
+        """Return the next message.
+
+        Args:
+            seconds: how long to wait [s].
+            processor: how much time of processors the program may take for it [s].
+
+        Raises:
+            LostError: if none comes in time, the program ended, or takes too much.
+        """
+        start = time.monotonic()
+        looked = -math.inf if processor < math.inf else start
+        self._looks.clear()
+        while not (message := self._next_message()):
+            now = time.monotonic()
+            limit = start + (min(seconds, SHUT) if self._is_deaf else seconds)
+            if now - looked >= TICK or now >= limit:
+                looked = now
+                self._look(processor)
+                if message := self._next_message():  # an answer, and then its end
+                    break
+            if now >= limit:
+                raise LostError(self._silence())
+            self._exchange(max(min(TICK, limit - now), 0.0))
+        return message[0]
+
+    def leave(self, seconds: float) -> tuple[bool, int]:
+        """End its input, and after so long [s] all that still runs.
+
+        Returns:
+            Whether it ended in time, and how many processes it then left running.
+        """
+        self._forget(self._process.stdin)
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+        has_left = self._ends_within(seconds)
+        strays = len(family(self.pid, self._marker)) if has_left else 0
+        self.end()
+        return has_left, strays
+
+    def end(self) -> None:
+        """End it and whatever it has started."""
+        self._end()
+
+    def _next_message(self) -> tuple[Any, ...]:
+        try:
+            return self._take(self.partial)
+        except Exception:
+            raise LostError(Loss.GARBLED) from None
+
+    def _exchange(self, seconds: float) -> None:
+        """Write and read what the pipes allow; return after so many seconds if they allow none."""
+        if not self._pump(seconds):
+            raise self._ended()
+        if len(self.partial) > self._longest:
+            raise LostError(Loss.TOO_LONG)
+
+    def _pump(self, seconds: float) -> bool:
+        """Write and read what the pipes allow; return whether standard output is still open."""
+        is_open = True
+        for key, _ in self._selector.select(seconds):
+            if key.fileobj is self._process.stdin:
+                self._write()
+                continue
+            chunk = _read(key.fileobj)
+            if chunk == b"":
+                self._forget(key.fileobj)
+                is_open &= key.fileobj is not self._process.stdout
+            elif key.fileobj is self._process.stdout:
+                self.partial += chunk or b""
+            else:
+                self.last_words += chunk or b""
+                del self.last_words[:-STDERR_KEPT]
+        return is_open
+
+    def _write(self) -> None:
+        try:
+            with _no_signal_of_pipes():
+                written = os.write(self._process.stdin.fileno(), self._unsent[:_CHUNK])
+            del self._unsent[:written]
+        except BlockingIOError:
+            return
+        except OSError:  # it does not read, or is no more
+            self._is_deaf = True
+            self._unsent.clear()
+        if not self._unsent:
+            self._forget(self._process.stdin)
+
+    def _forget(self, pipe: Any) -> None:
+        with contextlib.suppress(KeyError):
+            self._selector.unregister(pipe)
+
+    def _ends_within(self, seconds: float) -> bool:
+        """Return whether it ends in time; throw away what it prints until then."""
+        deadline, length = time.monotonic() + seconds, len(self.partial)
+        while not (has_ended := self._has_ended()) and time.monotonic() < deadline:
+            self._pump(TICK / 10)
+            del self.partial[length:]
+        return has_ended
+
+    def _has_ended(self) -> bool:
+        """Return whether the program ended, leaving its number its own where that can be had."""
+        if not hasattr(os, "waitid") or self._process.returncode is not None:
+            return self._process.poll() is not None
+        options = os.WEXITED | os.WNOWAIT | os.WNOHANG
+        return os.waitid(os.P_PID, self.pid, options) is not None
+
+    def _look(self, processor: float) -> None:
+        """Raise if it ended or takes too much; note what it does."""
+        if self._has_ended():  # while something else holds its pipes
+            before = len(self.partial)
+            self._exchange(0.0)
+            if len(self.partial) == before:
+                raise self._ended()
+        if min(self._memory, processor) == math.inf:  # what is timed is not disturbed
+            return
+        members = family(self.pid, self._marker)
+        self._looks.append((time.monotonic(), members))
+        if sum(member.memory for member in members) > self._memory:
+            raise LostError(Loss.MEMORY)
+        if self._used() > processor:
+            raise LostError(Loss.PROCESSOR)
+
+    def _used(self) -> float:
+        """Return how much time of processors it has used since it was first looked at [s]."""
+        first, last = (sum(p.seconds for p in self._looks[i][1]) for i in (0, -1))
+        return last - first
+
+    def _ended(self) -> LostError:
+        """Return why nothing more will come."""
+        has_ended = self._ends_within(SHUT)
+        for _ in range(8):  # more than the pipe of its last words holds
+            self._pump(0.0)
+        self.end()
+        if not has_ended:
+            return LostError(Loss.CLOSED)
+        return LostError(Loss.CUT if self.partial else Loss.ENDED)
+
+    def _silence(self) -> Loss:
+        """Return why nothing came in time."""
+        if self._is_deaf:
+            return Loss.DEAF
+        if self.partial:
+            return Loss.UNFINISHED
+        if self._unsent:
+            return Loss.UNREAD
+        return Loss.COMPUTING if self._computes() else Loss.WAITING
+
+    def _computes(self) -> bool:
+        """Return whether it computed rather than waited, most times when it was looked at."""
+        if not self._looks:
+            return False
+        runs = [any(process.runs for process in members) for _, members in self._looks]
+        seconds = self._looks[-1][0] - self._looks[0][0]
+        return self._used() > IDLE * seconds or 2 * sum(runs) > len(runs)
+
+
+def _pipes(process: Any) -> list[Any]:
+    return [pipe for pipe in (process.stdin, process.stdout, process.stderr) if pipe]
+
+
+def _read(pipe: Any) -> bytes | None:
+    """Return what is there, b"" if there never will be anything more, None if there is nothing."""
+    try:
+        return os.read(pipe.fileno(), _CHUNK)
+    except BlockingIOError:
+        return None
+
+
+def _end(
+    process: Any, watch: subprocess.Popen[bytes], marker: int, selector: selectors.BaseSelector
+) -> None:
+    end_group(process.pid, marker)
+    with contextlib.suppress(subprocess.TimeoutExpired):  # what the system does not let go
+        process.wait(SHUT)
+    watch.kill()
+    watch.communicate()
+    selector.close()
+    for pipe in _pipes(process):
+        pipe.close()
+
+
+@contextlib.contextmanager
+def _no_signal_of_pipes() -> Iterator[None]:
+    """Let writing where nobody reads be an error only, whatever SIGPIPE is set to do."""
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGPIPE})
+    try:
+        yield
+    finally:
+        if signal.SIGPIPE not in blocked:
+            if signal.SIGPIPE in signal.sigpending():
+                signal.sigwait({signal.SIGPIPE})
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGPIPE})
+
+
+def python_process(statement: str) -> ChildProcess:
+    """Start a Python that finds our packages, on one thread; it gets and sends pickled objects."""
+    command = [sys.executable, "-P", "-c", _PATH + statement, str(_ROOT)]
+    return ChildProcess(command, take_pickle, environment=one_thread())
+
+
+def one_thread() -> dict[str, str]:
+    """Return an environment in which the linear algebra of NumPy and SciPy keeps to one core."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    return {**os.environ, **dict.fromkeys(names, "1")}
+
+
+def take_streams() -> tuple[int, int]:
+    """Return the descriptors of requests and answers, and keep solvers away from them.
+
+    These read nothing, and print to standard error.
+    """
+    requests, answers = os.dup(0), os.dup(1)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    os.dup2(2, 1)
+    return requests, answers
+
+
+def connect() -> tuple[Connection, Connection]:
+    """Return the connections of pickled requests and answers with the parent of this process."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    requests, answers = take_streams()
+    return Connection(requests, writable=False), Connection(answers, readable=False)
+
+
+class CallProcess:
+    """A process that performs calls one by one, started when one comes, and anew after a loss."""
+
+    def __init__(self, prepare: Callable[[], object], patience: float) -> None:
+        """Let each process begin with `prepare`, and a call take so much processor time [s]."""
+        self._prepare, self._patience = prepare, patience
+        self._child: ChildProcess | None = None
 
     def call(self, function: Callable[..., Result], *arguments: object) -> Result:
         """Return what a function of a module returns, which must not raise.
@@ -171,9 +439,9 @@ class ChildProcess:
         """
         try:
             if self._child is None:
-                self._child = PipedProcess(_CALLS, one_thread())
-                _perform(self._child, self.start_patience, self.prepare)
-            result: Result = _perform(self._child, self.patience, function, *arguments)
+                self._child = python_process(f"import {__name__} as c; c.perform_calls()")
+                _perform(self._child, _START, self._prepare)
+            result: Result = _perform(self._child, self._patience, function, *arguments)
             return result
         except BaseException:
             self.close()
@@ -186,34 +454,24 @@ class ChildProcess:
             child.end()
 
 
-def _perform(child: PipedProcess, patience: float, *call: object) -> Any:
-    child.send((patience, *call))
+def _perform(child: ChildProcess, patience: float, *call: object) -> Any:
+    child.send(pickled(call))
     try:
-        return child.receive(_WALL * patience)
-    except TimeoutError:
-        raise LostError(f"it gives no answer within {_WALL * patience:g} s") from None
-    except EOFError:
-        if (ending := child.ending()) == "by SIGPROF":
-            raise LostError(f"it takes more than {patience:g} s of processor time") from None
-        raise LostError(f"the process ends {ending or 'the connection'}") from None
+        return child.receive(_WALL * patience, patience)
+    except LostError as error:
+        loss = error.loss
+    if loss is Loss.PROCESSOR:
+        raise LostError(loss, f"it takes more than {patience:g} s of processor time")
+    if loss in SILENT:
+        raise LostError(loss, f"it gives no answer within {_WALL * patience:g} s")
+    ended = loss in (Loss.ENDED, Loss.CUT)
+    raise LostError(loss, f"the process ends {child.ending if ended else 'the connection'}")
 
 
-def perform_calls(descriptor: int) -> None:
-    """Perform calls in a process that was started for them until nobody listens."""
-    connection = attach(descriptor)
-    while True:
-        try:
-            patience, function, *arguments = connection.recv()
-        except EOFError:
-            return
-        # SIGPROF ends the process after so much processor time, whatever code it is in.
-        signal.setitimer(signal.ITIMER_PROF, patience)
-        result = function(*arguments)
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        connection.send(result)
-
-
-def one_thread() -> dict[str, str]:
-    """Return an environment in which the linear algebra of NumPy and SciPy keeps to one core."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    return {**os.environ, **dict.fromkeys(names, "1")}
+def perform_calls() -> None:
+    """Perform calls of the parent until there are no more."""
+    requests, answers = connect()
+    with contextlib.suppress(EOFError):
+        while True:
+            function, *arguments = requests.recv()
+            answers.send(function(*arguments))

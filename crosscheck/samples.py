@@ -105,21 +105,25 @@ def smooth(case: int) -> StepProblem:
 
     h omega is at most `RESOLVED`, where omega bounds the frequencies and decay rates.
     """
-    system, state, external, _ = _random_problem("smooth", case, _few(case))
-    return StepProblem(system, state, external, RESOLVED / highest_rate(system))
+    return _resolved("smooth", case)
 
 
 def unpinned(case: int) -> StepProblem:
     """Return a smooth problem of 5 to 23 particles, none of them pinned."""
-    system, state, external, _ = _random_problem("unpinned", case, _few(case), pins=0)
-    return StepProblem(system, state, external, RESOLVED / highest_rate(system))
+    return _resolved("unpinned", case, pins=0)
 
 
 def drifting(case: int) -> StepProblem:
     """Return a smooth problem without pins, gravity or external forces, and so without torque."""
-    system, state, _, _ = _random_problem("drifting", case, _few(case), pins=0, gravity=0.0)
-    none = np.zeros_like(state.positions)
-    return StepProblem(system, state, none, RESOLVED / highest_rate(system))
+    problem = _resolved("drifting", case, pins=0, gravity=0.0)
+    return problem._replace(external_forces=np.zeros_like(problem.external_forces))
+
+
+def _resolved(quantity: str, case: int, **options: Any) -> StepProblem:
+    """Return a problem of 5 or 23 particles with a step that resolves it."""
+    count = particles(arguments.integer("case", case, least=0) % 2)
+    problem = _random_problem(quantity, case, count, **options)
+    return problem._replace(h=RESOLVED / highest_rate(problem.system))
 
 
 class Oscillator(NamedTuple):
@@ -163,11 +167,6 @@ def particles(case: int) -> int:
     """Return the number of particles of a case, spread evenly on a logarithmic scale."""
     share = arguments.integer("case", case, least=0) * 3 % SIZES / (SIZES - 1)
     return round(LEAST_PARTICLES * (MOST_PARTICLES / LEAST_PARTICLES) ** share)
-
-
-def _few(case: int) -> int:
-    """Return 5 or 23 particles."""
-    return particles(arguments.integer("case", case, least=0) % 2)
 
 
 def highest_rate(system: MassSpring) -> float:

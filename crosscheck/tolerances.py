@@ -4,14 +4,9 @@ from typing import NamedTuple
 
 
 class Tolerance(NamedTuple):
-    """The largest difference allowed between two correct results, and the reason for it.
+    """The largest difference allowed between two correct results, and the reason for it."""
 
-    Attributes:
-        value: relative to the scale of the comparison.
-        reason: a sentence.
-    """
-
-    value: float
+    value: float  # relative to the scale of the comparison
     reason: str
 
 

@@ -17,59 +17,35 @@ LEAST_DISPLACEMENT = 1e-4
 
 
 class Comparison(NamedTuple):
-    """One case: a quantity computed by the reference and independently.
-
-    Attributes:
-        ours: the quantity by the reference, of any shape.
-        theirs: the same quantity, computed independently.
-        baseline: its value without motion and forces.
-        scale: the positive number to which differences are relative.
-    """
+    """One case: a quantity computed by the reference and independently, of any shape."""
 
     ours: FloatArray
     theirs: FloatArray
-    baseline: FloatArray
-    scale: float
+    baseline: FloatArray  # its value without motion and forces
+    scale: float  # the positive number to which differences are relative
 
 
 @dataclass(frozen=True)
 class Claim:
-    """Our quantity equals theirs, in every case, to a tolerance.
+    """Our quantity equals theirs, in every case, to a tolerance."""
 
-    Attributes:
-        name: unique, for tables and the command line.
-        ours: description of our quantity.
-        theirs: description of the independent one.
-        compare: yields the comparisons of the first n cases.
-        tolerance: the largest difference allowed, with its reason.
-        cases: number of cases in a full check.
-    """
-
-    name: str
-    ours: str
-    theirs: str
-    compare: Callable[[int], Iterable[Comparison]]
-    tolerance: Tolerance
-    cases: int
+    name: str  # unique, for tables and the command line
+    ours: str  # description of our quantity
+    theirs: str  # of the independent one
+    compare: Callable[[int], Iterable[Comparison]]  # yields those of the first n cases
+    tolerance: Tolerance  # the largest difference allowed, with its reason
+    cases: int  # number of cases in a full check
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """The result of checking a claim.
-
-    Attributes:
-        claim: the claim.
-        cases: the number of cases compared.
-        difference: the largest relative difference of a case; NaN if a value is not finite.
-        displacement: the least relative distance of a case from its baseline; NaN likewise.
-        failure: the reason why the claim does not hold; empty if it holds.
-    """
+    """The result of checking a claim; numbers are NaN if a value is not finite."""
 
     claim: Claim
-    cases: int
-    difference: float
-    displacement: float
-    failure: str
+    cases: int  # how many were compared
+    difference: float  # the largest relative one of a case
+    displacement: float  # the least relative distance of a case from its baseline
+    failure: str  # why the claim does not hold; empty if it holds
 
     @property
     def holds(self) -> bool:

@@ -14,7 +14,7 @@ from plumbob.bench.experiments.pictures import ARM, figures, measurement
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.block import SCALES
 from plumbob.bench.harness.measure import record_of
-from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.results import Results
 from plumbob.reference import ImplicitEuler, scenes
 
 DOCS = Path(__file__).parent

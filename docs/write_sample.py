@@ -10,10 +10,10 @@ import tempfile
 from pathlib import Path
 
 from plumbob.bench.harness.record import FILE_NAME, RecordFile
-from plumbob.bench.harness.results import listed
 from plumbob.bench.report.headlines import Headline
 from plumbob.bench.report.report import Written, write
 from plumbob.bench.tables.provenance import provenance
+from plumbob.bench.tables.results import listed
 from plumbob.bench.tables.table import words
 
 DOCS = Path(__file__).parent

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from plumbob.bench.harness.results import Results
     from plumbob.bench.report.report import Written
+    from plumbob.bench.tables.results import Results
     from plumbob.bench.tables.table import Table
     from plumbob.crosscheck.verdict import Verdict as ClaimVerdict
 
@@ -44,7 +44,7 @@ def print_ending(suites: Sequence[str], output: Path) -> None:
 
 def _results(suites: Sequence[str], output: Path) -> "Results":
     from plumbob.bench.harness.record import FINISHED, RecordFile
-    from plumbob.bench.harness.results import Results
+    from plumbob.bench.tables.results import Results
 
     records = RecordFile(output).read().records
     return Results(record for record in records if record.suite in (*suites, FINISHED))
@@ -74,16 +74,13 @@ def print_aligned(table: "Table", shown_by: str = "a wider terminal, or a pipe")
 def print_lines(table: "Table") -> list[str]:
     """Print the lines of a table; return the headings of the columns that had no place."""
     from rich.console import Console
-    from rich.text import Text
 
     from plumbob.bench.tables.aligned import aligned
 
     made = aligned(table, width())
     console = Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
     for line in made.lines:
-        text = Text.assemble(*((span.text, span.style) for span in line))
-        text.rstrip()
-        console.print(text)
+        console.print(line)
     return made.left_out
 
 

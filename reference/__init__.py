@@ -2,8 +2,8 @@
 
 from . import rotation, scenes
 from .articulation import Articulation, Mimic
-from .backend.compiled import set_backend, speed
-from .backend.threads import cores, set_num_threads
+from .backend.compiled import set_backend
+from .backend.threads import set_num_threads
 from .curve import curves, resample
 from .explicit import runge_kutta, symplectic_euler
 from .implicit_euler import STEP_SOLVERS, ImplicitEuler, StepResult
@@ -35,7 +35,6 @@ __all__ = [
     "StepJudgement",
     "StepResult",
     "Target",
-    "cores",
     "curves",
     "forward_kinematics",
     "judge_pose",
@@ -48,7 +47,6 @@ __all__ = [
     "set_backend",
     "set_num_threads",
     "solve_ik",
-    "speed",
     "symplectic_euler",
     "track",
     "wind_forces",

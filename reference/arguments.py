@@ -1,8 +1,9 @@
-"""What a caller passed, checked: the array asked for, or a ValueError that names the argument.
+"""What a caller passed, checked: the value asked for, or a ValueError that names the argument.
 
 One rule bounds all magnitudes: no number is beyond 1e75, and a size, which is a number that may not
 be negative, is 0 or at least 1e-75. `array`, `sizes` and `number` keep it; only what looks at the
-numbers itself, such as a kernel, may take them from `floats`.
+numbers itself, such as a kernel, may take them from `floats`. No copy that does not fit into memory
+is made; a boolean is no number and no integer.
 """
 
 import contextlib
@@ -41,10 +42,6 @@ def array(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
 
     An int in `trailing` is a length, a word stands for any length; a leading "..." allows batch
     axes. The value itself is returned where it already fits, and must then not be written to.
-
-    Raises:
-        ValueError: if it is not numeric, has another shape, or holds NaN, infinity or a number
-            beyond 1e75.
     """
     return _bounded("numbers", name, value, *trailing)
 
@@ -55,11 +52,7 @@ def coordinates(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray
 
 
 def sizes(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
-    """Return the same as `array`, of sizes: masses, lengths, stiffnesses.
-
-    Raises:
-        ValueError: as for `array`, or if one is negative, or not 0 but below 1e-75.
-    """
+    """Return the same as `array`, of sizes: masses, lengths, stiffnesses."""
     result = array(name, value, *trailing)
     wrong = np.flatnonzero((result < SMALLEST_POSITIVE) & (result != 0.0))
     if len(wrong):
@@ -70,11 +63,7 @@ def sizes(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
 
 
 def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
-    """Return the same as `array`, any number let through, for kernels that look themselves.
-
-    Raises:
-        ValueError: if it is not numeric or has another shape.
-    """
+    """Return the same as `array`, any number let through, for kernels that look themselves."""
     if type(value) is np.ndarray and value.dtype == FLOAT64 and value.flags.carray:
         if not _fits(value.shape, trailing):
             check_shape(name, value, *trailing)
@@ -91,13 +80,10 @@ def floats(name: str, value: ArrayLike, *trailing: int | str) -> FloatArray:
 def number(
     name: str, value: Any, *, least: float = -LARGEST_COORDINATE, above: float = -np.inf
 ) -> float:
-    """Return a float, at least `least`, greater than `above`, and at most 1e75.
+    """Return a finite float, at least `least`, greater than `above`, and at most 1e75.
 
     If the range has no negative numbers it is a size: 0, where that is in the range, or at least
     1e-75.
-
-    Raises:
-        ValueError: if it is not a finite number in that range.
     """
     is_size = max(least, above) >= 0.0
     lowest = max(least, SMALLEST_POSITIVE) if is_size else least  # of numbers other than 0
@@ -125,11 +111,7 @@ def number(
 
 
 def integer(name: str, value: Any, *, least: int, below: int = LARGEST_INTEGER + 1) -> int:
-    """Return an int, at least `least` and less than `below`.
-
-    Raises:
-        ValueError: if it is not an integer (a boolean is none) in that range.
-    """
+    """Return an int, at least `least` and less than `below`."""
     if type(value) is int and least <= value < below:
         return value
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | np.integer):
@@ -142,11 +124,7 @@ def integer(name: str, value: Any, *, least: int, below: int = LARGEST_INTEGER +
 
 
 def count(name: str, value: Any, *, least: int) -> int:
-    """Return an int, at least `least` and at most LARGEST_COUNT: of what arrays will be made.
-
-    Raises:
-        ValueError: if it is not an integer (a boolean is none) in that range.
-    """
+    """Return an int, at least `least` and at most LARGEST_COUNT: of what arrays will be made."""
     result = integer(name, value, least=least)
     if result > LARGEST_COUNT:
         raise ValueError(f"{name}: expected at most {LARGEST_COUNT:,}, got {shown(result)}")
@@ -154,11 +132,7 @@ def count(name: str, value: Any, *, least: int) -> int:
 
 
 def lengths(name: str, value: Sequence[Any], width: int) -> tuple[int, ...]:
-    """Return the leading axes of an array that will be made, its last axis so wide.
-
-    Raises:
-        ValueError: if one is not an integer of at least 0, or the array fits into no memory.
-    """
+    """Return leading axes, of 0 or more, of an array that will be made, its last axis so wide."""
     axes = tuple(integer(name, length, least=0) for length in value)
     if len(axes) > MOST_LENGTHS or math.prod(max(n, 1) for n in (*axes, width)) > LARGEST_ARRAY:
         raise ValueError(
@@ -171,11 +145,7 @@ def lengths(name: str, value: Sequence[Any], width: int) -> tuple[int, ...]:
 def indices(
     name: str, value: ArrayLike, *trailing: int | str, least: int, below: int
 ) -> IndexArray:
-    """Return a C-contiguous int64 array of indices, at least `least` and less than `below`.
-
-    Raises:
-        ValueError: if they are not integers (booleans are none), out of range, or of another shape.
-    """
+    """Return a C-contiguous int64 array of indices, at least `least` and less than `below`."""
     given = _converted(name, value)
     if given.dtype.kind not in ("iu" if given.size else "iuf"):  # no numbers at all are floats
         raise ValueError(f"{name}: expected integer indices, got {given.dtype} values")
@@ -190,11 +160,7 @@ def indices(
 
 
 def flags(name: str, value: ArrayLike, count: int) -> BoolArray:
-    """Return booleans, shape (count,), of which one may be given for all.
-
-    Raises:
-        ValueError: if they are not booleans, or of another shape.
-    """
+    """Return booleans, shape (count,), of which one may be given for all."""
     given = _converted(name, value)
     if given.dtype != bool:
         raise ValueError(f"{name}: expected booleans, got {given.dtype} values")
@@ -204,33 +170,21 @@ def flags(name: str, value: ArrayLike, count: int) -> BoolArray:
 
 
 def boolean(name: str, value: Any) -> bool:
-    """Return a boolean.
-
-    Raises:
-        ValueError: if it is none, such as a number.
-    """
+    """Return a boolean; a number is none."""
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{name}: expected True or False, got {shown(value)}")
     return bool(value)
 
 
 def text(name: str, value: Any) -> str:
-    """Return a string.
-
-    Raises:
-        ValueError: if it is none.
-    """
+    """Return a string."""
     if not isinstance(value, str):
         raise ValueError(f"{name}: expected text, got {shown(value)}")
     return value
 
 
 def sequence(name: str, value: Any, count: int, each: str) -> tuple[Any, ...]:
-    """Return a sequence of so many items, one for `each`, as a tuple.
-
-    Raises:
-        ValueError: if it is none, or has another length.
-    """
+    """Return a sequence of so many items, one for `each`, as a tuple."""
     listed = isinstance(value, Sequence) and not isinstance(value, str | bytes)
     if not (listed or (isinstance(value, np.ndarray) and value.ndim > 0)):
         raise ValueError(f"{name}: expected {count} {name}, one {each}, got {shown(value)}")
@@ -240,11 +194,7 @@ def sequence(name: str, value: Any, count: int, each: str) -> tuple[Any, ...]:
 
 
 def choice(name: str, value: Any, valid: Mapping[str, Any] | Sequence[str]) -> str:
-    """Return the value if it is one of the valid names.
-
-    Raises:
-        ValueError: if not, with the valid names.
-    """
+    """Return the value if it is one of the valid names."""
     if not isinstance(value, str) or value not in valid:
         raise ValueError(f"{name}: expected one of {name_list(valid)}, got {shown(value)}")
     return value
@@ -257,11 +207,7 @@ def name_list(names: Iterable[str]) -> str:
 
 
 def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
-    """Return the value if it is of a kind.
-
-    Raises:
-        ValueError: if it is of another, such as the pair that a scene returns.
-    """
+    """Return the value if it is of a kind."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
         raise ValueError(f"{name}: expected {article} {kind.__name__}, got {type(value).__name__}")
@@ -269,11 +215,7 @@ def instance(name: str, value: Any, kind: type[Kind]) -> Kind:
 
 
 def generator(name: str, value: Any) -> np.random.Generator:
-    """Return the value if it is a generator of random numbers.
-
-    Raises:
-        ValueError: if it is none; `numpy.random.default_rng(seed)` makes one.
-    """
+    """Return the value if it is a generator of random numbers."""
     return instance(name, value, np.random.Generator)
 
 
@@ -283,9 +225,6 @@ def broadcast(
     """Return two batches' common leading axes; `name` is the second's argument.
 
     `whose` names those of the first in the error.
-
-    Raises:
-        ValueError: if they do not broadcast with one another.
     """
     try:
         return np.broadcast_shapes(one, other)
@@ -295,11 +234,7 @@ def broadcast(
 
 
 def together(name: str, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return both with the same leading axes, all but the last; `name` is the second's argument.
-
-    Raises:
-        ValueError: if they do not broadcast with one another.
-    """
+    """Return both with the same leading axes but the last; `name` is the second's argument."""
     batch = broadcast(name, a.shape[:-1], b.shape[:-1])
     return spread(a, (*batch, a.shape[-1])), spread(b, (*batch, b.shape[-1]))
 
@@ -311,11 +246,7 @@ def check_shape(name: str, given: np.ndarray, *trailing: int | str) -> None:
 
 
 def copied(name: str, given: np.ndarray, dtype: Any) -> Any:
-    """Return a C-contiguous copy of another type; what overflows becomes infinite.
-
-    Raises:
-        ValueError: if there is no memory for it.
-    """
+    """Return a C-contiguous copy of another type; what overflows becomes infinite."""
     try:
         with np.errstate(over="ignore"):
             return np.array(given, dtype=dtype, order="C")
@@ -352,11 +283,7 @@ class KeepsReadOnly:
 
 
 def snapshot(name: str, value: Any) -> Any:
-    """Return a copy of an array or a list, which later changes do not reach; else the value.
-
-    Raises:
-        ValueError: if there is no memory for it.
-    """
+    """Return a copy of an array or a list, which later changes do not reach; else the value."""
     if isinstance(value, np.ndarray) and not np.ma.is_masked(value):
         return copied(name, value, value.dtype)
     with contextlib.suppress(Exception):  # what cannot be copied is refused where it is used

@@ -112,7 +112,9 @@ class Articulation(KeepsReadOnly):
     Its coordinates q, shape (..., coordinate), take the place of local rotations wherever a
     Skeleton's would be given. They hold, joint after joint, nothing for a fixed or mimic joint, an
     angle [rad] for a hinge, a displacement [m] for a slide, a unit quaternion, w first, for a ball,
-    and a position [m] and a quaternion for a free joint.
+    and a position [m] and a quaternion for a free joint. Methods raise a ValueError for a joint
+    that does not exist, and for q of another shape, not finite, or with a quaternion further than
+    1e-6 from unit length.
 
     Attributes:
         skeleton: the tree: parents, offsets [m], names.
@@ -210,27 +212,15 @@ class Articulation(KeepsReadOnly):
         return bool(np.isfinite([self.lower, self.upper, self.cones]).any())
 
     def index(self, joint: int | str, argument: str = "joint") -> int:
-        """Return the index of a joint given by name or index; negative ones count from the end.
-
-        Raises:
-            ValueError: if there is no such joint; it speaks of the argument named.
-        """
+        """Return the index of a joint, as `Skeleton.index` does."""
         return self.skeleton.index(joint, argument)
 
     def coordinates_of(self, joint: int | str) -> slice:
-        """Return where a joint's coordinates are in q, of a mimic joint its leader's.
-
-        Raises:
-            ValueError: if there is no such joint.
-        """
+        """Return where a joint's coordinates are in q, of a mimic joint its leader's."""
         return self._range("coordinate", WIDTHS, joint)
 
     def freedoms_of(self, joint: int | str) -> slice:
-        """Return where a joint's degrees of freedom are in a velocity, likewise.
-
-        Raises:
-            ValueError: if there is no such joint.
-        """
+        """Return where a joint's degrees of freedom are in a velocity, likewise."""
         return self._range("freedom", FREEDOMS, joint)
 
     def _range(self, field: str, counts: IndexArray, joint: int | str) -> slice:
@@ -250,14 +240,10 @@ class Articulation(KeepsReadOnly):
         return q
 
     def random(self, rng: np.random.Generator, *shape: int) -> FloatArray:
-        """Return coordinates drawn evenly within the limits, (..., coordinate).
+        """Return coordinates drawn evenly within the limits, (..., coordinate), by a generator.
 
         Without limits a hinge is drawn from all angles, a slide or a free joint from within a
         metre of zero, and rotations evenly among all; where a ball is limited swing and twist are.
-
-        Raises:
-            ValueError: if rng is no generator, a length is not an integer of at least 0, or they
-                fit into no memory.
         """
         arguments.generator("rng", rng)
         shape = arguments.lengths("shape", shape, self.coordinate_count)
@@ -268,44 +254,25 @@ class Articulation(KeepsReadOnly):
         return q.reshape(*shape, self.coordinate_count)
 
     def clamp(self, q: ArrayLike) -> FloatArray:
-        """Return the coordinates with each joint brought to the nearest that is within its limits.
-
-        Raises:
-            ValueError: if q has another shape, is not finite, or holds no unit quaternion where
-                one is expected.
-        """
+        """Return coordinates with each joint brought to the nearest within its limits."""
         given = self.checked("q", q)
         result = given.copy()
         _clamp(self.joints, one_batch(result))
         return result
 
     def within_limits(self, q: ArrayLike, tolerance: float = LIMIT_TOLERANCE) -> np.ndarray:
-        """Return whether each q keeps all limits to a tolerance [rad or m], shape (...).
-
-        Raises:
-            ValueError: as for `clamp`, or if the tolerance is no number of at least 0.
-        """
+        """Return whether each q keeps all limits to a tolerance [rad or m], shape (...)."""
         given = self.checked("q", q)
         excess = np.empty(given.shape[:-1])
         _excess(self.joints, one_batch(given), excess.reshape(-1))
         return excess <= arguments.number("tolerance", tolerance, least=0.0)
 
     def local_transforms(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return each joint's position [m] and rotation in its parent's frame.
-
-        The shapes are (..., joint, 3) and (..., joint, 4).
-
-        Raises:
-            ValueError: as for `clamp`.
-        """
+        """Return positions (..., joint, 3) [m] and rotations (..., joint, 4) in parents' frames."""
         return self._posed(_locals, q)
 
     def forward(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4).
-
-        Raises:
-            ValueError: as for `clamp`.
-        """
+        """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4)."""
         return self._posed(_forward, q)
 
     def _posed(self, kernel: Kernel, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -316,12 +283,7 @@ class Articulation(KeepsReadOnly):
         return positions, rotations
 
     def checked(self, name: str, q: ArrayLike) -> FloatArray:
-        """Return coordinates (..., coordinate), their quaternions made unit.
-
-        Raises:
-            ValueError: if the shape is another, they are not finite, or a quaternion is further
-                than 1e-6 from unit length.
-        """
+        """Return coordinates (..., coordinate), their quaternions made unit."""
         given = arguments.coordinates(name, q, "...", self.coordinate_count)
         if not self._quaternions:
             return given

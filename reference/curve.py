@@ -1,4 +1,8 @@
-"""Named curves for an effector to draw, and resampling to an even spacing."""
+"""Named curves for an effector to draw, and resampling to an even spacing.
+
+A named curve takes a count of samples, a positive integer, else it raises a ValueError. It lies in
+the plane y = 0 [m]; the closed ones do not repeat their first point.
+"""
 
 from collections.abc import Callable
 
@@ -12,70 +16,42 @@ from .backend.compiled import Kernel
 # A finer curve would not fit into memory.
 MOST_POINTS = 10_000_000
 
-# All named curves lie in the plane y = 0 [m]; the closed ones do not repeat their first point.
-
 
 def circle(count: int = 150) -> FloatArray:
-    """Return samples of a circle of radius 0.6, shape (frame, 3) [m].
-
-    Raises:
-        ValueError: if count is not a positive integer.
-    """
+    """Return samples of a circle of radius 0.6, shape (frame, 3) [m]."""
     t = _angles(count)
     return _in_plane(0.6 * np.cos(t), 0.6 * np.sin(t))
 
 
 def square(count: int = 150) -> FloatArray:
-    """Return samples of a square of side 0.4 about the origin, shape (frame, 3) [m].
-
-    Raises:
-        ValueError: if count is not a positive integer.
-    """
+    """Return samples of a square of side 0.4 about the origin, shape (frame, 3) [m]."""
     return _polygon([(0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)], count)
 
 
 def heart(count: int = 150) -> FloatArray:
-    """Return samples of the cardioid r = 0.5 (1 - sin t), shape (frame, 3) [m].
-
-    Raises:
-        ValueError: if count is not a positive integer.
-    """
+    """Return samples of the cardioid r = 0.5 (1 - sin t), shape (frame, 3) [m]."""
     t = _angles(count)
     r = 0.5 * (1.0 - np.sin(t))
     return _in_plane(r * np.cos(t), r * np.sin(t))
 
 
 def triangle(count: int = 150) -> FloatArray:
-    """Return samples of the triangle (0, 0, 0), (0.5, 0, 0), (0, 0, 0.5), shape (frame, 3) [m].
-
-    Raises:
-        ValueError: if count is not a positive integer.
-    """
+    """Return samples of the triangle (0, 0, 0), (0.5, 0, 0), (0, 0, 0.5), shape (frame, 3) [m]."""
     return _polygon([(0.0, 0.0), (0.5, 0.0), (0.0, 0.5)], count)
 
 
 def star(count: int = 400) -> FloatArray:
-    """Return samples of the pentagram of radius 0.4, which joins every second of five points.
-
-    Raises:
-        ValueError: if count is not a positive integer.
-    """
+    """Return samples of the pentagram of radius 0.4, which joins every second of five points."""
     t = 4.0 * np.pi * np.arange(5) / 5.0
     return _polygon(0.4 * np.column_stack([np.cos(t), np.sin(t)]), count)
 
 
 def plumb_bob(count: int = 1200) -> FloatArray:
-    """Return unevenly spaced samples of a drawing of a plumb bob.
+    """Return unevenly spaced samples of a drawing of a plumb bob, shape (frame, 3) [m].
 
     It consists of five strokes: line, eye, collar, body and plumb mark. Within a stroke the arc
     length is s = u + sin(2 pi n u) / (2 pi n) for evenly spaced u, so that samples are dense in
     some parts and sparse in others, as in hand-drawn input.
-
-    Returns:
-        Shape (frame, 3) [m].
-
-    Raises:
-        ValueError: if count is not a positive integer.
     """
     count = arguments.count("count", count, least=1)
     parts = np.array_split(np.arange(count), len(_BOB_STROKES))

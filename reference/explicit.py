@@ -23,17 +23,10 @@ def symplectic_euler(
 ) -> State:
     """Return the state a time h [s] later: v' = v + h M^-1 f(x, v), then x' = x + h v'.
 
-    Args:
-        system: masses and springs; stable for h below about 2 / (highest angular frequency).
-        state: positions and velocities at the start.
-        h: the step [s].
-        external_forces: [N], shape (particle, 3), besides gravity.
-        pin_positions: positions of the pinned particles, in ascending order, at the end of the
-            step [m], shape (pinned, 3); by default they do not move.
+    Arguments and errors are those of `ImplicitEuler.step`. It is stable for h below about 2 over
+    the highest angular frequency.
 
     Raises:
-        ValueError: if h is not positive, the state has another number of particles, or the
-            external forces or pin positions have another shape or are not finite.
         FloatingPointError: if a coordinate or velocity exceeds 1e75, as after many unstable steps.
     """
     h = number("h", h, above=0)

@@ -5,6 +5,10 @@ hinge [rad/s] or a slide [m/s]; of a ball the angular velocity in its own, moved
 joint the rate of its position coordinates, then the angular velocity in its own frame. So a step
 rotates a quaternion from the right: Q exp(v). A mimic joint has no velocity of its own: it adds to
 its leader's column.
+
+Coordinates q have the shape (..., coordinate), of a Skeleton (..., joint, 4); leading axes
+broadcast. Functions raise a ValueError if an argument has another shape, is not finite, or holds no
+unit quaternion where one is expected, and if there is no such joint.
 """
 
 import numpy as np
@@ -12,15 +16,7 @@ from numpy.typing import ArrayLike
 
 from . import arguments
 from .arguments import FloatArray
-from .articulation import (
-    BALL,
-    FIXED,
-    FREE,
-    FREEDOMS,
-    Articulation,
-    articulated_pose,
-    one_batch,
-)
+from .articulation import BALL, FIXED, FREE, FREEDOMS, Articulation, articulated_pose, one_batch
 from .backend.compiled import Kernel
 from .model import Model, checked_model, effector_of
 from .motion_subspace import accumulate, motion, velocity_at
@@ -41,16 +37,8 @@ def jacobian(articulation: Model, q: ArrayLike, effector: int | str | None = Non
     """Return the derivative of a joint's motion by the velocity, (..., 6, freedom).
 
     Three rows of linear velocity [m], three of angular velocity [rad], both of the joint's frame,
-    taken at its origin, along the axes of the world.
-
-    Args:
-        articulation: the tree; a Skeleton is an articulation of balls, a Robot has its own.
-        q: coordinates, (..., coordinate); of a Skeleton local rotations, (..., joint, 4).
-        effector: the joint, by name or index; by default as for `solve_ik`.
-
-    Raises:
-        ValueError: if q has another shape, is not finite, or holds no unit quaternion where one
-            is expected, if there is no such joint, or none is named of several tips.
+    taken at its origin, along the axes of the world. The effector is a joint by name or index; by
+    default as for `solve_ik`.
     """
     model, given = _coordinates("q", articulation, q)
     one = np.array([effector_of(checked_model(articulation), effector)])
@@ -58,13 +46,7 @@ def jacobian(articulation: Model, q: ArrayLike, effector: int | str | None = Non
 
 
 def jacobians(articulation: Model, q: ArrayLike, joints: ArrayLike | None = None) -> FloatArray:
-    """Return the Jacobians of all joints, (..., joint, 6, freedom), as `jacobian` does of one.
-
-    With `joints`, indices of shape (joint,), return only theirs.
-
-    Raises:
-        ValueError: as for `jacobian`, or if an index is out of range.
-    """
+    """Return the Jacobians of all joints, or those of `joints` only, (..., joint, 6, freedom)."""
     model, coordinates = _coordinates("q", articulation, q)
     count = model.joint_count
     effectors = np.arange(count) if joints is None else joints
@@ -75,16 +57,7 @@ def jacobians(articulation: Model, q: ArrayLike, joints: ArrayLike | None = None
 def integrate(articulation: Model, q: ArrayLike, v: ArrayLike) -> FloatArray:
     """Return the coordinates reached from q by moving with the velocity v for one second.
 
-    Args:
-        articulation: the tree.
-        q: coordinates, as for `jacobian`.
-        v: velocities, (..., freedom); leading axes broadcast with those of q.
-
-    Returns:
-        Coordinates shaped like those given, limits not regarded.
-
-    Raises:
-        ValueError: as for `jacobian`, or if v has another shape or is not finite.
+    They are shaped like q; limits are not regarded.
     """
     model, start = _coordinates("q", articulation, q)
     step = arguments.coordinates("v", v, "...", model.freedom_count)
@@ -98,9 +71,6 @@ def difference(articulation: Model, q1: ArrayLike, q0: ArrayLike) -> FloatArray:
     """Return the velocity that leads from q0 to q1 in one second, (..., freedom).
 
     It is the inverse of `integrate`: rotations go through the smaller angle, at most pi.
-
-    Raises:
-        ValueError: as for `jacobian`, or if the leading axes do not broadcast.
     """
     model, start = _coordinates("q0", articulation, q0)
     _, end = _coordinates("q1", articulation, q1)

@@ -29,7 +29,7 @@ THREAD_JOINTS = 100_000
 
 
 def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
-    """Return the global pose of every joint.
+    """Return the global pose of every joint, read-only: (..., joint, 3) [m] and (..., joint, 4).
 
     A joint with parent p has the rotation R = R_p Q and the position x = x_p + R_p offset. The
     offset is rotated by the *parent's* global rotation; a joint's own rotation moves only its
@@ -40,9 +40,6 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
         local_rotations: unit quaternions relative to the parent, w first, shape (..., joint, 4);
             leading axes are batch or frame. For an Articulation, its coordinates (...,
             coordinate).
-
-    Returns:
-        Pose with positions (..., joint, 3) [m] and rotations (..., joint, 4), read-only.
 
     Raises:
         ValueError: if the shape is another, or a quaternion is not finite or further than 1e-6
@@ -69,11 +66,9 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
 
 
 def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
-    """Return local rotations, (..., joint, 4), from global ones: Q = R_parent* R, the root's Q = R.
+    """Return local rotations, (..., joint, 4), from global ones: Q = R_parent* R.
 
-    Raises:
-        ValueError: if the shape is another, or a quaternion is not finite or further than 1e-6
-            from unit length.
+    The root's are R. Errors are those of `forward_kinematics`.
     """
     tree = checked_skeleton(skeleton).arrays
     poses = arguments.floats("rotations", rotations, "...", len(tree.parents), 4)

@@ -12,6 +12,9 @@ with r = 0 is never slack and equals a linear spring.
 Where the ends of a spring coincide, its direction is undefined and u is set to (1, 0, 0), as in
 MuJoCo. The order of its particles then decides which end is pushed in which direction; a slack
 spring and one with r = 0 exert no force there.
+
+Functions raise a ValueError that names the argument if it has another shape, holds numbers that are
+not finite, or is no system or state.
 """
 
 import functools
@@ -280,28 +283,17 @@ def rest_vectors(system: MassSpring, positions: ArrayLike) -> FloatArray:
 
     Of all vectors of length r_i, d_i is the nearest to the spring's own vector (Liu et al. 2013).
     For a slack tension-only spring, d_i is the spring's own vector.
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
     """
     return _rest_vectors(_positions(system, positions), system.arrays)
 
 
 def lengths(system: MassSpring, positions: ArrayLike) -> FloatArray:
-    """Return the length of each spring [m], shape (spring,).
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
-    """
+    """Return the length of each spring [m], shape (spring,)."""
     return _lengths(_positions(system, positions), system.arrays.springs)
 
 
 def stretches(system: MassSpring, positions: ArrayLike) -> FloatArray:
-    """Return l - r of each spring [m], shape (spring,), zero for a slack tension-only one.
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
-    """
+    """Return l - r of each spring [m], shape (spring,), zero for a slack tension-only one."""
     return _stretches(_positions(system, positions), system.arrays)
 
 
@@ -309,30 +301,19 @@ def potential_energy(system: MassSpring, positions: ArrayLike) -> float:
     """Return the energy of springs and gravity [J]: sum of k/2 (l - r)² - sum of m g·x.
 
     Slack springs store none.
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
     """
     x = _positions(system, positions)
     return spring_energy(system, x) - float(np.sum(system.weights * x))
 
 
 def spring_energy(system: MassSpring, positions: ArrayLike) -> float:
-    """Return the energy of the springs [J]: the sum of k/2 (l - r)² over those not slack.
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
-    """
+    """Return the energy of the springs [J]: the sum of k/2 (l - r)² over those not slack."""
     stretch = stretches(system, positions)
     return float(np.sum(0.5 * system.stiffnesses * stretch**2))
 
 
 def kinetic_energy(system: MassSpring, state: State) -> float:
-    """Return the sum of m/2 |v|² [J].
-
-    Raises:
-        ValueError: if the state has another number of particles.
-    """
+    """Return the sum of m/2 |v|² [J]."""
     _, v = checked_state(system, state)
     return float(np.sum(0.5 * system.masses[:, None] * v**2))
 
@@ -343,21 +324,13 @@ def forces(
     """Return the total force on each particle [N], shape (particle, 3), external forces included.
 
     At a pinned particle it is the load on the pin.
-
-    Raises:
-        ValueError: if the state has another number of particles, or the external forces [N] have
-            a shape other than (particle, 3) or are not finite.
     """
     x, v = checked_state(system, state)
     return constant_forces(system, external_forces) + pulls(x, v, system.arrays)
 
 
 def constant_forces(system: MassSpring, external_forces: ArrayLike | None = None) -> FloatArray:
-    """Return gravity and the external forces on each particle [N], shape (particle, 3).
-
-    Raises:
-        ValueError: if the external forces have another shape or are not finite.
-    """
+    """Return gravity and the external forces on each particle [N], shape (particle, 3)."""
     weights = _system(system).weights
     if external_forces is None:
         return weights.copy()
@@ -368,9 +341,6 @@ def spring_forces(system: MassSpring, positions: ArrayLike) -> FloatArray:
     """Return the sum over springs of -k (l - r) u at the first end, its opposite at the second [N].
 
     Shape (particle, 3). Slack springs exert none.
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
     """
     x = _positions(system, positions)
     return pulls(x, np.zeros_like(x), system.arrays)
@@ -382,9 +352,6 @@ def damper_forces(system: MassSpring, state: State) -> FloatArray:
     Dampers of slack springs act as well. A step of implicit Euler uses -(c/h) (l - l_n) u instead,
     which has an energy; l_n is the length before the step. At the end of a step the two forces
     differ by about c h/2 |w_t|² / l, where w_t is the part of v_i - v_j at a right angle to u.
-
-    Raises:
-        ValueError: if the state has another number of particles.
     """
     x, v = checked_state(system, state)
     return pulls(x, v, system.arrays._replace(stiffnesses=np.zeros(len(system.springs))))
@@ -395,9 +362,6 @@ def stiffness_matrix(system: MassSpring, positions: ArrayLike) -> Any:
 
     It is the sum of (A_i A_i') x (k u u' + k (1 - r/l) (I - u u')) over springs that are not slack;
     the second, geometric term is zero for a spring with a rest length whose ends coincide.
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
     """
     stiffness = spring_blocks(system, positions)
     return BlockSum(incidence(system)).matrix(stiffness)
@@ -407,9 +371,6 @@ def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
     """Return C, sparse (3 particle, 3 particle) [N s/m]: the dampers' forces are -C v.
 
     It is the sum of (A_i A_i') x c u u', slack springs included.
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
     """
     x, never_slack = _positions(system, positions), np.zeros(len(system.springs), dtype=bool)
     dampers = system.arrays._replace(stiffnesses=system.arrays.dampings, tension_only=never_slack)
@@ -419,11 +380,7 @@ def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
 def spring_blocks(
     system: MassSpring, positions: ArrayLike, *, geometric: bool = True
 ) -> FloatArray:
-    """Return each spring's 3 x 3 stiffness [N/m], the geometric term included or left out.
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
-    """
+    """Return each spring's 3 x 3 stiffness [N/m], the geometric term included or left out."""
     x, geometric = _positions(system, positions), boolean("geometric", geometric)
     return blocks(x, system.arrays, geometric)
 
@@ -445,11 +402,7 @@ def checked_state(system: MassSpring, state: State) -> tuple[FloatArray, FloatAr
 
 
 def pin_targets(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
-    """Return the checked positions of the pins at the end of a step, shape (pinned, 3) [m].
-
-    Raises:
-        ValueError: if they have another shape or are not finite.
-    """
+    """Return the checked positions of the pins at the end of a step, shape (pinned, 3) [m]."""
     return coordinates("pin_positions", pin_positions, len(system.pinned), 3)
 
 

@@ -14,8 +14,7 @@ Model: TypeAlias = "Skeleton | Articulation | Robot"
 def checked_model(model: Any, argument: str = "skeleton") -> Skeleton | Articulation:
     """Return the model, of a Robot its articulation.
 
-    Raises:
-        ValueError: if it is anything else; it speaks of the argument named.
+    Anything else is a ValueError that speaks of the argument named.
     """
     if isinstance(model, Skeleton) or isinstance(model, Articulation):  # noqa: SIM101, a union is slow
         return model
@@ -43,8 +42,7 @@ def tips(model: Skeleton | Articulation) -> list[int]:
 def effector_of(model: Skeleton | Articulation, effector: int | str | None) -> int:
     """Return the index of the effector named; None is a Skeleton's last joint, else the only tip.
 
-    Raises:
-        ValueError: if there is no such joint, or it is None where there are several tips.
+    A joint that does not exist, or None where there are several tips, is a ValueError.
     """
     if effector is not None:
         return model.index(effector, "effector")

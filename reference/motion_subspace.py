@@ -24,14 +24,10 @@ def frame_of(joints, j, rotations):
 
 
 def motion(joints, j, i, rotations, length):
-    """Return the angular velocity [rad] and the linear one [m] by the i-th freedom of a joint.
+    """Return the angular velocity [rad] and the linear one [m] by the i-th freedom of joint j.
 
-    Args:
-        joints: records JOINT.
-        j: the joint; of a mimic joint the freedom is its leader's.
-        i: which of its freedoms, of a free joint the translations first.
-        rotations: of all joints in the world, (joint, 4).
-        length: that a translation's unit stands for [m].
+    A mimic joint's freedom is its leader's; a free joint's translations come first. `rotations` are
+    those of all joints in the world, and a unit of a translation is `length` [m].
     """
     kind, R = joints["kind"][j], load_quaternion(rotations, j)
     if kind in (HINGE, SLIDE):

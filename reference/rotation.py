@@ -1,6 +1,8 @@
 """Arrays of unit quaternions, (..., 4), w first; leading axes broadcast.
 
 Hamilton product, active rotations: `rotate(q, v)` rotates v by q, `multiply(a, b)` by b first.
+Functions raise a ValueError that names an argument of another shape, with numbers that are not
+finite, or with lengths that fit into no memory.
 """
 
 import numpy as np
@@ -16,33 +18,23 @@ from .quaternion import logarithm as logarithm_of
 
 
 def identity(*shape: int) -> FloatArray:
-    """Return identity quaternions, (*shape, 4).
-
-    Raises:
-        ValueError: if a length is not an integer of at least 0, or they fit into no memory.
-    """
+    """Return identity quaternions, (*shape, 4)."""
     result = np.zeros((*arguments.lengths("shape", shape, 4), 4))
     result[..., 0] = 1.0
     return result
 
 
 def random(rng: np.random.Generator, *shape: int) -> FloatArray:
-    """Return uniformly random rotations, (*shape, 4): normalised Gaussian 4-vectors.
-
-    Raises:
-        ValueError: if rng is no generator, a length is not an integer of at least 0, or they fit
-            into no memory.
-    """
+    """Return uniformly random rotations, (*shape, 4): normalised Gaussian 4-vectors."""
     rng = arguments.generator("rng", rng)
     q = rng.standard_normal((*arguments.lengths("shape", shape, 4), 4))
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 def unit(name: str, q: ArrayLike) -> FloatArray:
-    """Return quaternions, (..., 4), normalised once; `name` is the argument's, for the error.
+    """Return quaternions within 1e-6 of unit length, (..., 4), normalised once.
 
-    Raises:
-        ValueError: if a quaternion is further than 1e-6 from unit length.
+    `name` is the argument's, for the error.
     """
     values = arguments.array(name, q, "...", 4)
     lengths = np.linalg.norm(values, axis=-1, keepdims=True)
@@ -80,11 +72,7 @@ def check_unit(name: str, lengths: FloatArray) -> None:
 
 
 def multiply(a: ArrayLike, b: ArrayLike) -> FloatArray:
-    """Return the products a b, (..., 4).
-
-    Raises:
-        ValueError: if an argument does not hold finite quaternions.
-    """
+    """Return the products a b, (..., 4)."""
     a, b = arguments.together(
         "b", arguments.array("a", a, "...", 4), arguments.array("b", b, "...", 4)
     )
@@ -92,20 +80,12 @@ def multiply(a: ArrayLike, b: ArrayLike) -> FloatArray:
 
 
 def conjugate(q: ArrayLike) -> FloatArray:
-    """Return the inverse rotations, (..., 4).
-
-    Raises:
-        ValueError: if q does not hold finite quaternions.
-    """
+    """Return the inverse rotations, (..., 4)."""
     return _joined(quaternion.conjugate(_parts(arguments.array("q", q, "...", 4))))
 
 
 def rotate(q: ArrayLike, v: ArrayLike) -> FloatArray:
-    """Return the vectors v, (..., 3), rotated by unit quaternions q, (..., 4).
-
-    Raises:
-        ValueError: if an argument does not hold finite quaternions or vectors.
-    """
+    """Return the vectors v, (..., 3), rotated by unit quaternions q, (..., 4)."""
     q, v = arguments.together(
         "v", arguments.array("q", q, "...", 4), arguments.array("v", v, "...", 3)
     )
@@ -117,9 +97,6 @@ def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
 
     Antiparallel directions are rotated by pi about a fixed axis perpendicular to a; a zero vector
     has no direction and gives the identity.
-
-    Raises:
-        ValueError: if an argument does not hold finite vectors.
     """
     a, b = arguments.together(
         "b", arguments.array("a", a, "...", 3), arguments.array("b", b, "...", 3)
@@ -131,11 +108,7 @@ def between(a: ArrayLike, b: ArrayLike) -> FloatArray:
 
 
 def exponential(v: ArrayLike) -> FloatArray:
-    """Return the rotations by |v| radians about v, (..., 3), as (..., 4).
-
-    Raises:
-        ValueError: if v does not hold finite vectors.
-    """
+    """Return the rotations by |v| radians about v, (..., 3), as (..., 4)."""
     v = arguments.array("v", v, "...", 3)
     result = np.empty((*v.shape[:-1], 4))
     _exponential(_rows(v), result.reshape(-1, 4))
@@ -143,11 +116,7 @@ def exponential(v: ArrayLike) -> FloatArray:
 
 
 def logarithm(q: ArrayLike) -> FloatArray:
-    """Return the rotation vectors [rad], (..., 3), at most pi long, of rotations (..., 4).
-
-    Raises:
-        ValueError: if q does not hold unit quaternions.
-    """
+    """Return the rotation vectors [rad], (..., 3), at most pi long, of rotations (..., 4)."""
     q = unit("q", q)
     result = np.empty((*q.shape[:-1], 3))
     _logarithm(_rows(q), result.reshape(-1, 3))
@@ -155,33 +124,22 @@ def logarithm(q: ArrayLike) -> FloatArray:
 
 
 def angle(a: ArrayLike, b: ArrayLike) -> FloatArray:
-    """Return the geodesic angles [rad] between rotations a and b, (..., 4) each: 0 to pi.
-
-    Raises:
-        ValueError: if an argument does not hold unit quaternions.
-    """
+    """Return the geodesic angles [rad] between rotations a and b, (..., 4) each: 0 to pi."""
     a, b = arguments.together("b", unit("a", a), unit("b", b))
     return np.linalg.norm(logarithm(multiply(conjugate(a), b)), axis=-1)
 
 
 def to_matrix(q: ArrayLike) -> FloatArray:
-    """Return the rotation matrices, (..., 3, 3), of unit quaternions (..., 4).
-
-    Raises:
-        ValueError: if q does not hold finite quaternions.
-    """
+    """Return the rotation matrices, (..., 3, 3), of unit quaternions (..., 4)."""
     q = arguments.array("q", q, "...", 4)
     return np.swapaxes(rotate(q[..., None, :], np.eye(3)), -1, -2)
 
 
 def from_matrix(matrix: ArrayLike) -> FloatArray:
-    """Return the unit quaternions, (..., 4), of rotation matrices (..., 3, 3), w >= 0.
+    """Return the unit quaternions, (..., 4), of matrices (..., 3, 3), rotations to 1e-6; w >= 0.
 
     The quaternion spans the top eigenspace of a symmetric 4 x 4 matrix linear in R
     (Bar-Itzhack 2000), which has no case of its own for any angle.
-
-    Raises:
-        ValueError: if a matrix is not a rotation to 1e-6.
     """
     R = arguments.array("matrix", matrix, "...", 3, 3)
     defect = np.abs(R @ np.swapaxes(R, -1, -2) - np.eye(3)).max(initial=0.0)

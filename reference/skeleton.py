@@ -23,6 +23,8 @@ class SkeletonArrays(NamedTuple):
 class Skeleton(KeepsReadOnly):
     """A tree of ball joints without limits; parents precede children.
 
+    Methods raise a ValueError for a joint that does not exist.
+
     Attributes:
         parents: each joint's parent, shape (joint,); -1 for the root, which is joint 0.
         offsets: each joint's position in its parent's frame [m], shape (joint, 3); the root's
@@ -86,11 +88,7 @@ class Skeleton(KeepsReadOnly):
         return {name: j for j, name in enumerate(self.names)}
 
     def path(self, effector: int | str = -1) -> IndexArray:
-        """Return the joints from the root to the effector, both included, shape (path,).
-
-        Raises:
-            ValueError: if there is no such joint.
-        """
+        """Return the joints from the root to the effector, both included, shape (path,)."""
         return frozen(self.path_array(self.index(effector, "effector")))
 
     def path_array(self, joint: int) -> IndexArray:
@@ -103,11 +101,7 @@ class Skeleton(KeepsReadOnly):
         return self._paths[joint]
 
     def reach(self, effector: int | str = -1) -> float:
-        """Return the greatest distance of the effector from the root [m]: its links' total length.
-
-        Raises:
-            ValueError: if there is no such joint.
-        """
+        """Return the greatest distance of the effector from the root [m]: its links' length."""
         return float(self.link_lengths[self.path(effector)].sum())
 
     def __repr__(self) -> str:
@@ -115,11 +109,7 @@ class Skeleton(KeepsReadOnly):
 
 
 def checked_skeleton(skeleton: Skeleton, name: str = "skeleton") -> Skeleton:
-    """Return the argument of that name if it is a Skeleton.
-
-    Raises:
-        ValueError: if it is anything else, such as the pair that a scene returns.
-    """
+    """Return the argument of that name if it is a Skeleton."""
     if type(skeleton) is Skeleton:
         return skeleton
     return arguments.instance(name, skeleton, Skeleton)

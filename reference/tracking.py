@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import arguments, rotation, trajectory
-from .arguments import LARGEST_COORDINATE, FloatArray, IndexArray
+from .arguments import LARGEST_COORDINATE, FloatArray
 from .articulation import Articulation
-from .inverse_kinematics.mechanism import Mechanism, gather
 from .inverse_kinematics.problem import (
     CheckedTarget,
     IKSolution,
@@ -22,12 +21,7 @@ from .inverse_kinematics.problem import (
 )
 from .inverse_kinematics.reduce import prepare
 from .inverse_kinematics.settings import Settings, checked_settings, default_solver
-from .inverse_kinematics.solve import (
-    balls,
-    batch_shape,
-    solve_checked,
-    target_rows,
-)
+from .inverse_kinematics.solve import balls, batch_shape, solve_checked, target_rows
 from .model import Model, checked_model
 from .outcome import Outcome
 from .skeleton import Skeleton
@@ -56,15 +50,13 @@ def track(
 
     A coherent motion is a smooth trajectory (`trajectory/`): solved frame by frame first, then in
     all frames together, until no small change lowers the sum of the squared displacements between
-    neighbouring frames, over angles of hinges [rad], rotation vectors of balls [rad] and lengths
-    over the reach, with every effector on its target and every joint within its limits. Frames
-    whose target is not reached come as near to it as a penalty draws them. The first pose is as
-    free as the others; `start` is where the search begins. In the end every frame that is not
+    neighbouring frames, over angles [rad], rotation vectors of balls [rad] and lengths over the
+    reach, with every effector on its target and every joint within its limits. Frames whose target
+    is not reached come as near to it as a penalty draws them. In the end every frame that is not
     within the tolerance yet is solved once more from there.
 
     Args:
-        skeleton: the tree; an Articulation for joints of other kinds and for limits, or a Robot
-            read from a file.
+        skeleton: as for `solve_ik`.
         curve: the effector's global position in each frame [m], shape (frame, 3); or a Target whose
             position is that, and its rotation (frame, 4), or several for several effectors.
         solver: a name in IK_SOLVERS; by default CCD for one position on a Skeleton, and else
@@ -74,12 +66,12 @@ def track(
         effector: the joint that follows, by index or name; by default as for `solve_ik`.
         warm: start each frame from the last one's solution, which keeps neighbouring frames alike;
             if False, each starts from `start`, and the joints may jump from frame to frame.
-        coherent: make the motion a smooth trajectory.
+        coherent: make the motion a smooth trajectory, its first pose as free as the others.
         closed: count the displacement from the last frame to the first as well, so that the motion
-            ends where it began and can be repeated without drift; needs coherent=True.
+            can be repeated without drift; needs coherent=True.
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that counts as reached [rad].
-        max_iterations: the most to make in a frame; by default as for `solve_ik`.
+        max_iterations: of a frame; by default as for `solve_ik`.
         record: keep the residuals of all iterations in `history`; not of those over all frames.
 
     Returns:
@@ -89,8 +81,7 @@ def track(
     Raises:
         ValueError: as `solve_ik` does, and if the curve is not of that shape or has no points, or a
             motion is to be closed but not coherent.
-        FloatingPointError: if a coordinate of the motion exceeds 1e75, as where links or targets
-            are as large.
+        FloatingPointError: if a coordinate of the motion exceeds 1e75.
     """
     if arguments.boolean("closed", closed) and not arguments.boolean("coherent", coherent):
         raise ValueError("closed: expected False where coherent is False, got True")
@@ -138,19 +129,17 @@ def _along(
     ]
 
 
-def _start(skeleton: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
-    if isinstance(skeleton, Articulation):
-        if start is None:
-            return skeleton.neutral()
-        given = arguments.floats("start", start, skeleton.coordinate_count)
-        skeleton.checked("start", given)
-        return given
-    count = skeleton.joint_count
-    if start is None:
-        return rotation.identity(count)
-    given = arguments.floats("start", start, count, 4)
-    rotation.unit("start", given)
-    return given
+def _start(model: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:
+    """Return the start, checked but not made unit, or the pose that stands for none."""
+    if isinstance(model, Articulation):
+        q = model.neutral() if start is None else start
+        q = arguments.floats("start", q, model.coordinate_count)
+        model.checked("start", q)
+        return q
+    local = rotation.identity(model.joint_count) if start is None else start
+    local = arguments.floats("start", local, model.joint_count, 4)
+    rotation.unit("start", local)
+    return local
 
 
 def _smoothed(
@@ -163,8 +152,8 @@ def _smoothed(
     articulation = skeleton if isinstance(skeleton, Articulation) else balls(skeleton)
     effectors = tuple(one.joint for one in targets)
     oriented = tuple(one.rotation is not None for one in targets)
-    mechanism = prepare(articulation, effectors, oriented).mechanism
-    columns = _columns(mechanism, articulation.coordinate_count)
+    prepared = prepare(articulation, effectors, oriented)
+    mechanism, columns = prepared.mechanism, prepared.columns
     near = np.asarray(motion.residual) <= MET * mechanism.reach
     met = near & (np.asarray(motion.residual_rotation) <= MET)
     reached, steps = met | (np.asarray(motion.outcome) == Outcome.CONVERGED), 0
@@ -179,13 +168,6 @@ def _smoothed(
             f"track: the smooth trajectory left the numbers up to {LARGEST_COORDINATE:g}"
         )
     return q.reshape(motion.coordinates.shape), reached, steps
-
-
-def _columns(mechanism: Mechanism, count: int) -> IndexArray:
-    """Return which of the articulation's coordinates are the mechanism's own."""
-    own = np.empty(mechanism.coordinates)
-    gather(mechanism, np.arange(count, dtype=np.float64), own)
-    return own.astype(np.int64)
 
 
 def _settled(

@@ -45,8 +45,7 @@ def wind_forces(
         lift: the coefficient of lift.
 
     Raises:
-        ValueError: if an argument has a wrong shape, is negative or not finite, or an index is out
-            of range.
+        ValueError: if an argument has a wrong shape, is negative or out of range.
         FloatingPointError: if a force overflows.
     """
     instance("state", state, State)
@@ -93,8 +92,7 @@ def plate_force(normal, w, drag, lift):
     pressure = 0.5 * twice_area * speed * speed
     perpendicular = subtract(n, scale(cosine, e))
     return add(
-        scale(drag * pressure * abs(cosine), e),
-        scale(lift * pressure * cosine, perpendicular),
+        scale(drag * pressure * abs(cosine), e), scale(lift * pressure * cosine, perpendicular)
     )
 
 

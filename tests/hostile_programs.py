@@ -8,7 +8,7 @@ import numpy as np
 
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.sentence import sentence
-from plumbob.crosscheck.verify.solvers.line_process import Limits
+from plumbob.crosscheck.verify.solvers import Limits
 from plumbob.crosscheck.verify.solvers.program import ProgramContestant
 
 # The first request may wait for a busy machine; the others come when the program is warm.

@@ -93,7 +93,6 @@ INTERNAL = {
     "reference.backend.compiled.Kernel": "for kernels",
     "reference.backend.compiled.compile_kernel": "for kernels",
     "reference.backend.compiled.bind": "for kernels",
-    "reference.backend.compiled.Slot": "for kernels",
     "reference.backend.compiled.compiled_in": "for kernels",
     "reference.backend.threads.in_slices": "for kernels",
     "crosscheck.verdict.Verdict": "made only by check_claim",
@@ -461,7 +460,6 @@ def _steps():
         ),
         o + ".residual": Call(g.residual, {"iterate": g.start}),
         o + ".hessian": Call(g.hessian, {"positions": x, "geometric": True}),
-        o + ".pin_gradient": Call(g.pin_gradient, {"positions": x, "geometric": False}),
         o + ".quadratic_form": Call(g.quadratic_form, {"positions": x, "d": g.rest_vectors(x)}),
         "reference.implicit_euler.certificate.certify": Call(
             certificate.certify, {"objective": g, "positions": x}),
@@ -668,7 +666,6 @@ def _systems_of_numbers():
             g.evaluate(x),
             residual,
             g.hessian(x),
-            g.pin_gradient(x),
             g.quadratic_form(x, g.rest_vectors(x)),
         ]
 
@@ -798,11 +795,9 @@ def _settings():
     compiled, threads = "reference.backend.compiled.", "reference.backend.threads."
     backends = {
         "set_backend": Call(within(reference.set_backend), {"name": "python"}, names="backend"),
-        "speed": Call(within(reference.speed), {"name": "plain"}, names="speed"),
     }
     counts = {
         "set_num_threads": Call(within(reference.set_num_threads), {"count": 1}),
-        "cores": Call(within(reference.cores), {"count": 1}),
     }
     return {compiled + name: call for name, call in backends.items()} | {
         threads + name: call for name, call in counts.items()

@@ -346,7 +346,7 @@ def robots(empty_folder, monkeypatch):
     from plumbob.crosscheck.robots import files
 
     monkeypatch.setattr(
-        child_process.ChildProcess, "call", lambda self, function, *given: function(*given)
+        child_process.CallProcess, "call", lambda self, function, *given: function(*given)
     )
     monkeypatch.setattr(files, "known_deviations", lambda path: [])
     folder = empty_folder / "robots"
@@ -461,7 +461,7 @@ def test_a_picture_of_a_scene_is_written_and_named(capsys, empty_folder):
 @pytest.mark.parametrize("coherent", [False, True])
 def test_a_motion_is_written_for_animation_programs(capsys, empty_folder, coherent):
     """Six decimals leave joint n of the arm off by (n + 1) 9e-7 + n 2.6 m 2.7e-8 at the most."""
-    from plumbob.bench.experiments.arm.problem import MAX_SPACING, MIN_SPACING
+    from plumbob.bench.problems.curves import MAX_SPACING, MIN_SPACING
     from plumbob.reference import curves, resample, scenes, track
     from plumbob.reference.formats import bvh
 

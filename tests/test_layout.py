@@ -9,6 +9,10 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = ["reference", "crosscheck", "bench", "plumbob"]  # each may import those before it
 FOLDERS = set(ROOMS) - {"plumbob"}  # linked into `plumbob`, and imported as its packages
+BENCH = [  # likewise
+    "text.py", "problems", "peers", "harness", "tables", "figures", "motion", "experiments",
+    "comparison", "report", "show",
+]  # fmt: skip
 LIBRARIES = {"numpy", "scipy", "numba", "llvmlite", "cholespy"}  # llvmlite is numba's own
 RUBBISH = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = {"pathlib", "os", "io", "shutil", "tempfile", "open", "fromfile", "tofile", "loadtxt"}
@@ -71,6 +75,23 @@ def arrows_against_the_direction(path, tree):
     return {name for name in imported(tree) if imported_room(name) in later}
 
 
+def imported_relatively(path, tree):
+    """The places in the room that a module imports from, as parts of their paths."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            above = path.parts[: len(path.parts) - node.level]
+            stem = (*above, *(node.module.split(".") if node.module else ()))
+            yield from ((*stem, alias.name) for alias in node.names)
+
+
+def arrows_against_the_direction_in_bench(path, tree):
+    """Packages of the bench import those before them; no two import each other."""
+    if room(path) != "bench" or len(path.parts) < 3:
+        return set()
+    later = BENCH[BENCH.index(path.parts[1]) + 1 :]
+    return {parts for parts in imported_relatively(path, tree) if parts[1] in later}
+
+
 def names_that_say_nothing(path, tree):
     return RUBBISH & {*path.parts, path.stem}
 
@@ -113,6 +134,7 @@ RULES = [
     clocks_in_reference,
     prints_in_reference,
     definitions_among_the_public_names,
+    arrows_against_the_direction_in_bench,
     bare_imports,
     relative_steps_out,
 ]
@@ -127,6 +149,9 @@ SLIPS = [
     (arrows_against_the_direction, "bench/a.py", "from plumbob import solve_ik"),
     (arrows_against_the_direction, "bench/a.py", "from plumbob.cli import main"),
     (arrows_against_the_direction, "reference/a.py", "import plumbob"),
+    (arrows_against_the_direction_in_bench, "bench/peers/ik/a.py", "from ...harness.run import a"),
+    (arrows_against_the_direction_in_bench, "bench/harness/a.py", "from .. import experiments"),
+    (arrows_against_the_direction_in_bench, "bench/experiments/b/a.py", "from ...report import a"),
     (bare_imports, "plumbob/a.py", "from reference import solve_ik"),
     (bare_imports, "bench/a.py", "import crosscheck.verdict"),
     (relative_steps_out, "bench/a.py", "from ..reference import solve_ik"),
@@ -155,6 +180,7 @@ FINE = [
     ("reference/a.py", "import math\nimport numpy as np\nfrom .compiled import Kernel"),
     ("reference/formats/a.py", "from pathlib import Path\nopen(Path('a'))"),
     ("crosscheck/a.py", "import mujoco\nfrom plumbob.reference import Skeleton\nfrom . import a"),
+    ("bench/experiments/arm/a.py", "from ...tables import a\nfrom ..chain import b"),
     ("plumbob/__init__.py", "from .reference import *\ndef __getattr__(name):\n    return 1"),
     ("plumbob/cli.py", "from plumbob.bench import text\ndef main():\n    return text"),
     ("bench/a.py", "import time\nfrom plumbob.crosscheck.verdict import a\nprint(time.time())"),
@@ -173,6 +199,11 @@ def test_room_keeps_the_rules(rule, name):
     for source in sources:
         path = source.relative_to(ROOT).as_posix()
         assert not broken(rule, path, source.read_text(encoding="utf-8")), path
+
+
+def test_the_order_names_every_package_of_the_bench():
+    packages = {path.parent.name for path in (ROOT / "bench").glob("*/__init__.py")}
+    assert packages | {"text.py"} == set(BENCH)
 
 
 @pytest.mark.parametrize(("rule", "path", "source"), SLIPS)

@@ -7,8 +7,21 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck.verify import catalogue
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Answer
+from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.crosscheck.verify.judgement import (
+    CaseJudgement,
+    Diagnosis,
+    Explanation,
+    Finding,
+    Report,
+    TaskReport,
+    Verdict,
+)
 from plumbob.crosscheck.verify.language import translator
 from plumbob.crosscheck.verify.output import json_file
+from plumbob.crosscheck.verify.sentence import sentence
 from plumbob.reference import Skeleton, forward_kinematics, rotation
 
 README = Path(__file__).parents[1] / "README.md"
@@ -129,10 +142,22 @@ def test_the_screen_that_a_page_shows_says_what_verify_says(page, language):
     assert re.sub(r"\s+", "", translator(language)(FAULT)) in text
 
 
+def keys(value):
+    """Every key of records within records."""
+    for inner in value if isinstance(value, list) else []:
+        yield from keys(inner)
+    for name, inner in value.items() if isinstance(value, dict) else []:
+        yield name
+        yield from keys(inner)
+
+
 def test_the_page_of_verify_describes_every_key_and_option():
     text = (README.parent / "docs" / "verify.md").read_text(encoding="utf-8")
-    for kind in (json_file.ReportRecord, json_file.TaskRecord, json_file.CaseRecord,
-                 json_file.FindingRecord, json_file.ExplanationRecord):  # fmt: skip
-        for name in kind.__struct_fields__:
-            assert f"`{name}`" in text or f"`{name}[]`" in text, name
+    finding = Finding("a law", Verdict.WRONG, 1.0, 0.0, "m", sentence("It is off."))
+    case = Case("one", "energy", {}, "x", sentence("It is all."))
+    judged = CaseJudgement(case, Answer({}, 1e-3), (finding,), {})
+    why = Diagnosis((Explanation(("a fault",), sentence("Mend it."), 1.0, 0.0),))
+    report = Report(Greeting(1, ("energy",)), [TaskReport("energy", "", [judged], why)], 0)
+    for name in keys(json_file.record(report, str)):
+        assert f"`{name}`" in text or f"`{name}[]`" in text, name
     assert {option for option in options() if option not in text} == {"--help", "--output"}

@@ -6,9 +6,8 @@ from typing import Any, NamedTuple
 from ..harness.metrics import adjusted
 from ..harness.record import Record
 from .answers import chance_by_clock, compare_answers, compare_cut_answers
-from .intervals import ERROR_RATE, Ratio
-from .rows import Pair, Row, RowKey, Verdict, by_row, come_and_gone, pairs, worst_first
-from .times import Drift, clocked, drift, has_rounds, judged, time_ratios
+from .rows import Pair, Ratio, Row, RowKey, Verdict, by_row, come_and_gone, pairs, worst_first
+from .times import ERROR_RATE, Drift, clocked, drift, has_rounds, judged, time_ratios
 
 ACCURACY, TIME, GONE = "accuracy", "time", "gone"
 

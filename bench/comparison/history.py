@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..harness.record import Record, on_record
-from ..harness.results import counted, printable
 from ..tables.columns import text
+from ..tables.results import counted, printable
 from ..tables.table import Column, Table, cells
 from ..text import visible
 from .rows import RowKey, by_row, distinguishing, is_meant

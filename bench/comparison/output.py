@@ -5,8 +5,8 @@ from collections import Counter
 from collections.abc import Sequence
 from textwrap import wrap
 
-from ..harness.results import counted
 from ..tables.columns import text
+from ..tables.results import counted
 from ..tables.table import Summary, Table, cells
 from ..text import visible
 from .compare import Comparison

@@ -18,16 +18,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.crosscheck.child_process import kill_group, one_thread
+from plumbob.crosscheck.child_process import ChildProcess, LostError, one_thread
 
 from ..harness.metrics import adjusted
 from ..harness.record import Record, untyped
 from . import revision_process
+from .answers import is_clocked
 from .compare import Comparison, decide
-from .intervals import ERROR_RATE, Deviation, Ratio, pairs_needed, ratio_of_pairs
-from .quantities import is_clocked
-from .rows import Pair, RowKey, by_row, come_and_gone, is_meant, pairs, row_key, worst_first
-from .times import FLOOR, UNKNOWN, Drift, known_drift
+from .rows import Pair, Ratio, RowKey, by_row, come_and_gone, is_meant, pairs, row_key, worst_first
+from .times import (
+    ERROR_RATE,
+    FLOOR,
+    UNKNOWN,
+    Deviation,
+    Drift,
+    known_drift,
+    pairs_needed,
+    ratio_of_pairs,
+)
 
 # Pairs of median times, old and new, of each time of each row.
 Taken = dict[tuple[RowKey, str], list[tuple[float, float]]]
@@ -119,13 +127,9 @@ class Revision:
     """A process that measures blocks of one revision, by the sources in a folder."""
 
     def __init__(self, folder: Path, suites: Sequence[str], scale: str) -> None:
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (open as long as the process)
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", revision_process.__file__, str(folder), scale, *suites],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, cwd=folder.parent,
-            env={**one_thread(), "PYTHONPATH": str(folder)}, text=True, encoding="utf-8",
-            process_group=0,
-        )  # fmt: skip
+        command = [sys.executable, "-P", revision_process.__file__, str(folder), scale, *suites]
+        environment = {**one_thread(), "PYTHONPATH": str(folder)}
+        self._process = ChildProcess(command, folder=folder.parent, environment=environment)
 
     def blocks(self) -> list[list[str]]:
         """Return the keys of what there is to be measured: suite, problem, solver, settings."""
@@ -133,26 +137,21 @@ class Revision:
 
     def measure(self, key: Sequence[str]) -> Record:
         """Return a fresh record of a block."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(BrokenPipeError):  # what ended it is said by the answer
-            print(json.dumps(key), file=self._process.stdin, flush=True)
+        self._process.send(f"{json.dumps(key)}\n".encode())
         return untyped(self._answer())
 
     def _answer(self) -> str:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            self._process.wait()
-            self._said.seek(0)
-            last = self._said.read().decode(errors="replace").strip().splitlines()[-1:]
-            raise ValueError(f"a process of the rerun ended: {' '.join(last) or 'without a word'}")
-        return line
+        try:
+            line: bytes = self._process.receive()
+        except LostError:
+            last = self._process.last_words.decode(errors="replace").strip().splitlines()[-1:]
+            why = " ".join(last) or "without a word"
+            raise ValueError(f"a process of the rerun ended: {why}") from None
+        return line.decode()
 
     def close(self) -> None:
         """End the process and what it has started."""
-        kill_group(self._process)
-        self._process.communicate()
-        self._said.close()
+        self._process.end()
 
 
 @contextlib.contextmanager

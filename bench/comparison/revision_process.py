@@ -7,16 +7,12 @@ and uses only what the bench had from its first records on.
 import importlib
 import json
 import os
-import select
-import signal
 import sys
-import threading
 from pathlib import Path
 
 
 def main(folder: str, scale: str, *suites: str) -> None:
     """Write the keys of all blocks, and then a record for each key that is read."""
-    threading.Thread(target=end_with_parent, daemon=True).start()
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what an engine prints is no answer
     bench = "plumbob.bench" if Path(folder, "plumbob", "bench").exists() else "bench"
@@ -35,14 +31,6 @@ def main(folder: str, scale: str, *suites: str) -> None:
     for line in sys.stdin:
         key = tuple(json.loads(line))
         print(record.encode(run.measure(blocks[key])), file=answers, flush=True)
-
-
-def end_with_parent() -> None:
-    """End our process group when the parent, which holds the other end of our input, has ended."""
-    hang_up = select.poll()
-    hang_up.register(0, 0)
-    hang_up.poll()
-    os.killpg(0, signal.SIGKILL)
 
 
 if __name__ == "__main__":

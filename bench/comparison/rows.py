@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 from ..harness import record as records
 from ..harness.record import FINISHED, Record
-from .intervals import Ratio
 
 RowKey = tuple[str, str, str, str]
 
@@ -30,6 +29,18 @@ class Verdict(StrEnum):
 ORDER = list(Verdict)
 # What may change between runs of one row: the version of what is measured.
 _MOVING = frozenset({"version"})
+
+
+class Ratio(NamedTuple):
+    """New time over old, its interval, and how likely as much is by chance.
+
+    The interval holds the ratio in 95 % of runs.
+    """
+
+    value: float
+    low: float
+    high: float
+    chance: float
 
 
 class Pair(NamedTuple):

@@ -1,16 +1,26 @@
-"""Compare times of two runs: intervals, and how far the machine drifts of itself."""
+"""Compare times of two runs: how sure a ratio is, and how far the machine drifts of itself.
+
+Times are compared by the logarithm of a ratio, so that twice and half are equally far from 1.
+"""
 
 import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
 
 from ..peers import registry
-from .intervals import ERROR_RATE, Deviation, Ratio, ratio_of_medians
-from .quantities import SOLVED, is_clocked
-from .rows import Pair, Row, RowKey, Verdict
+from .answers import SOLVED, is_clocked
+from .rows import Pair, Ratio, Row, RowKey, Verdict
 
+Floats = NDArray[np.float64]
+
+# The chance that any row at all is called faster or slower though none is.
+ERROR_RATE = 0.05
+CONFIDENCE = 0.95
+RESAMPLES = 200
 # Two runs are not told apart below this, however calm the machine seems; nor below that where
 # nothing says how calm it is.
 FLOOR, UNKNOWN = 0.01, 0.1
@@ -18,6 +28,86 @@ FLOOR, UNKNOWN = 0.01, 0.1
 MARGIN = 0.1
 # Of fewer rounds nothing is said.
 ROUNDS = 5
+
+
+class Deviation(NamedTuple):
+    """A standard deviation, and the degrees of freedom that it is known by."""
+
+    value: float
+    freedom: float
+
+    @property
+    def half_width(self) -> float:
+        """How far from 0 all but 5 % lie."""
+        return float(stats.t.ppf((1 + CONFIDENCE) / 2, self.freedom) * self.value)
+
+
+def ratio_of_medians(
+    old: Floats, new: Floats, drift: Deviation, paired: bool, rng: np.random.Generator
+) -> Ratio:
+    """Return the ratio of two medians by the block bootstrap, and by the drift [log] of a machine.
+
+    Rounds that follow each other are alike, so blocks of them are drawn (Künsch 1989). What a
+    machine drifts between two runs shows in neither of them, so its variance is added, by the
+    degrees of freedom of Welch (1947).
+    """
+    middle = math.log(np.median(new) / np.median(old))
+    picks = [_blocks(len(values), rng) for values in (old, new)]
+    draws = [np.median(old[picks[0]], axis=1), np.median(new[picks[0 if paired else 1]], axis=1)]
+    rounds = Deviation(
+        float(np.std(np.log(draws[1] / draws[0]), ddof=1)), min(len(old), len(new)) - 1
+    )
+    total = _sum(rounds, drift)
+    chance = 2 * stats.t.sf(abs(middle) / total.value, total.freedom)
+    return _of_logs(middle, middle - total.half_width, middle + total.half_width, float(chance))
+
+
+def _sum(a: Deviation, b: Deviation) -> Deviation:
+    """Return the deviation of a sum; one of the two is not zero."""
+    squares = a.value**2, b.value**2
+    freedom = sum(squares) ** 2 / (squares[0] ** 2 / a.freedom + squares[1] ** 2 / b.freedom)
+    return Deviation(math.sqrt(sum(squares)), freedom)
+
+
+def _blocks(size: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return indices of resamples, (resample, size), in runs of the root of the size."""
+    length = max(1, round(math.sqrt(size)))
+    starts = rng.integers(size, size=(RESAMPLES, -(-size // length), 1))
+    return ((starts + np.arange(length)) % size).reshape(RESAMPLES, -1)[:, :size]
+
+
+def ratio_of_pairs(old: Floats, new: Floats) -> Ratio:
+    """Return the ratio over pairs measured side by side, the order of each pair drawn by lot.
+
+    By that lot old and new may be exchanged if they are alike, whatever the machine does, so
+    the signed-rank test (Wilcoxon 1945) is exact. Estimate and interval are order
+    statistics of the means of all pairs of differences (Hodges & Lehmann 1963).
+    """
+    apart = np.log(new / old)
+    means = np.sort([(a + b) / 2 for i, a in enumerate(apart) for b in apart[i:]])
+    nonzero = apart[apart != 0]
+    chance = stats.wilcoxon(nonzero, method="exact").pvalue if len(nonzero) else 1.0
+    cut = _signed_rank_quantile(len(apart))
+    low, high = (means[cut], means[-1 - cut]) if cut >= 0 else (-math.inf, math.inf)
+    return _of_logs(float(np.median(means)), low, high, float(chance))
+
+
+def _of_logs(middle: float, low: float, high: float, chance: float) -> Ratio:
+    return Ratio(math.exp(middle), math.exp(low), math.exp(high), chance)
+
+
+def _signed_rank_quantile(count: int) -> int:
+    """Return how many of the sorted means lie below the interval, -1 if all pairs are too few."""
+    subsets = np.ones(1)
+    for rank in range(1, count + 1):
+        subsets = np.convolve(subsets, [1, *[0] * (rank - 1), 1])
+    below = np.cumsum(subsets) / subsets.sum()
+    return int(np.count_nonzero(below <= (1 - CONFIDENCE) / 2)) - 1
+
+
+def pairs_needed(rows: int) -> int:
+    """Return how many pairs let one of so many rows be called though some of them disagree."""
+    return math.ceil(math.log2(2 * max(rows, 1) / ERROR_RATE)) + 6
 
 
 class Drift(NamedTuple):
@@ -39,8 +129,7 @@ class Drift(NamedTuple):
 
 def known_drift(half_width: float, source: str) -> Drift:
     """Return a drift that is taken for granted."""
-    sure = 1e6
-    return Drift(Deviation(half_width / Deviation(1.0, sure).half_width, sure), source)
+    return Drift(Deviation(half_width / float(stats.norm.ppf((1 + CONFIDENCE) / 2)), 1e6), source)
 
 
 def drift(rows: Mapping[RowKey, Pair]) -> Drift:
@@ -57,8 +146,10 @@ def drift(rows: Mapping[RowKey, Pair]) -> Drift:
 
 
 def _by_controls(rows: Mapping[RowKey, Pair]) -> Iterator[Drift]:
-    apart = np.array([_apart(pair) for pair in rows.values() if _is_control(pair)])
-    if len(apart):
+    controls = [pair for pair in rows.values() if _is_control(pair)]
+    if controls:
+        medians = [[np.median(record.arrays["seconds"]) for record in pair] for pair in controls]
+        apart = np.diff(np.log(medians))
         deviation = Deviation(float(np.sqrt(np.mean(apart**2))), len(apart))
         yield Drift(deviation, f"{len(apart)} times of code that did not change")
 
@@ -135,8 +226,3 @@ def _is_control(pair: Pair) -> bool:
     engine = registry.find(pair.old.solver).engine
     is_foreign = pair.old.solver == registry.LIMIT.name or engine not in ("", registry.PLUMBOB)
     return is_foreign and not _why_not(pair, "seconds")
-
-
-def _apart(pair: Pair) -> float:
-    old, new = (float(np.median(record.arrays["seconds"])) for record in pair)
-    return math.log(new / old)

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..harness.results import label
 from ..peers import registry
+from ..tables.results import label
 
 Floats = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 
-from ..harness.results import label
+from ..tables.results import label
 from ..text import shortened
 from .chart import GREY, LINE, SPAN, Axis, Chart, Look, Panel, Series, looks
 from .style import COLOURS, written

@@ -6,6 +6,7 @@ stands in the files that were drawn, and files with the same digest serve again.
 
 import hashlib
 import inspect
+import re
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 # Drawings that are kept for as long as the process lives.
 _KEPT = 64
 _DIGEST = "plumbob figure"
+# What no drawing of ours has: a file from elsewhere brings no script and no address into the page.
+_FOREIGN = re.compile(r"<(script|foreignObject)|\son\w+=|href=\"(?!#|data:image/png)")
 
 
 class Drawing(NamedTuple):
@@ -93,7 +96,8 @@ def _on_file(name: str, folder: Path | None, digest: str) -> tuple[str, bytes] |
     except (OSError, ValueError):
         return None
     mark = f"{_DIGEST} {digest}"
-    return found if mark in found[0][-200:] and mark.encode() in found[1] else None
+    is_ours = mark in found[0][-200:] and mark.encode() in found[1]
+    return found if is_ours and not _FOREIGN.search(found[0]) else None
 
 
 def _files(sketch: Sketch, digest: str) -> tuple[str, bytes]:

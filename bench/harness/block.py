@@ -1,14 +1,14 @@
 """A block: one problem for one solver, measured in one go."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ..peers.entrant import Entrant
 from .values import Values, stored
 
 if TYPE_CHECKING:
-    from ..entrants.entrant import Entrant
-    from ..entrants.problems import OwnProblem
+    from ..problems.own import OwnProblem
 
 
 class Measured(NamedTuple):
@@ -43,7 +43,7 @@ class Scale:
 
     targets: int
     seconds: float
-    entrants: "tuple[Entrant, ...]" = ()
+    entrants: tuple[Entrant, ...] = ()
     problems: "tuple[OwnProblem, ...]" = ()
 
     def is_as_short_as(self, name: str) -> bool:
@@ -71,6 +71,7 @@ class Block:
             "title" is how the problem is written, "task" which of the suite's kinds it is.
         times: whether times are among the numbers, or end the work: see `Experiment`.
         conditions: what its solver is measured under, beside what every record has.
+        budget: the time that bounds the work [s]; 0 if none does.
     """
 
     suite: str
@@ -82,3 +83,19 @@ class Block:
     facts: Mapping[str, Any] = field(default_factory=dict)
     times: bool = True
     conditions: Mapping[str, Any] = field(default_factory=dict)
+    budget: float = 0.0
+
+    def of(self, entrant: Entrant | None) -> "Block":
+        """Return a block that says whose it is; what opens a user's solver changes no answer."""
+        if entrant is None:
+            return self
+        return replace(
+            self,
+            settings={**self.settings, "version": entrant.version},
+            facts={**self.facts, **entrant.facts},
+            conditions=entrant.conditions,
+        )
+
+    def on(self, problem: "OwnProblem") -> "Block":
+        """Return a block that is measured again once a user's problem is another."""
+        return replace(self, facts={**self.facts, "problem_digest": problem.digest})

@@ -1,7 +1,7 @@
 """Where blocks are measured: what a run asks of an executor, and the one that is this process."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from .block import Block, Scale
 from .machine import difference, stamp
@@ -19,55 +19,34 @@ class NotMeasured(NamedTuple):
 Step = Block | Record | NotMeasured
 
 
-class Executor(Protocol):
-    """Where blocks are measured.
+class Executor:
+    """Where blocks are measured: in this process, one after the other, but for subclasses.
 
     Attributes:
         takes_suites_together: whether the blocks of all suites are best given at once.
     """
 
-    takes_suites_together: bool
+    takes_suites_together = False
 
     def look_at(self, timed: Iterable[Record | None]) -> None:
         """Take note of what is on record of all blocks that take times, asked for or not."""
 
     def difference(self, block: Block, record: Record) -> str:
         """Return in what a record differs from what would be measured now, "" if in nothing."""
-
-    def measure(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
-        """Yield each block as it is begun, and what came of it, in any order."""
-
-    def stamp(self) -> Mapping[str, Any]:
-        """Return the machine that times are taken on, versions and sources."""
-
-    def close(self) -> None:
-        """Give up what is still to be measured, and whatever is held for it."""
-
-
-class Here:
-    """This process, which measures the blocks one after the other."""
-
-    takes_suites_together = False
-
-    def look_at(self, timed: Iterable[Record | None]) -> None:
-        """Need nothing of it."""
-
-    def difference(self, block: Block, record: Record) -> str:
-        """Return in what a record was made otherwise, "" if in nothing."""
         return difference(record.stamp, stamp())
 
     def measure(self, blocks: Sequence[Block], scale: Scale) -> Iterator[Step]:
-        """Yield each block, and then its record."""
+        """Yield each block as it is begun, and what came of it, in any order."""
         for block in blocks:
             yield block
             yield measure(block)
 
     def stamp(self) -> Mapping[str, Any]:
-        """Return this machine, versions and sources."""
+        """Return the machine that times are taken on, versions and sources."""
         return stamp()
 
     def close(self) -> None:
-        """Hold nothing."""
+        """Give up what is still to be measured, and whatever is held for it."""
 
 
-HERE = Here()
+HERE = Executor()

@@ -1,4 +1,7 @@
-"""An experiment: a folder that holds a problem, its measurement, its tables and its figures."""
+"""What is measured: an experiment is a folder, a suite is one experiment or several.
+
+A folder of `bench/experiments` holds a measurement, its tables and its figures.
+"""
 
 import importlib
 from collections.abc import Iterator
@@ -6,6 +9,22 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from .block import Block, Scale
+
+# What the command line calls the suites, and what each answers.
+SUITES = {
+    "check": "the reference against Pinocchio and MuJoCo, claim by claim",
+    "self_test": "planted faults and honest solvers, judged by plumbob verify",
+    "robot_models": "robots and characters from files of others, beside both engines",
+    "ik": "a chain of ten ball joints, robots and a character, beside every solver installed",
+    "tracking": "closed curves: frames from rest, from the last solution, and coherently",
+    "arm": "the lab's arm on every curve, and reaching for what is too far",
+    "pictures": "the poses and cloths that the report draws",
+    "cloth": "the lab's cloth at three stiffnesses: convergence; one cloth for every solver",
+    "newton": "one step of a heavy cloth by every solver: how far from a minimiser, proven",
+    "energy": "what integrators do to the energy of a cloth over 10,000 steps",
+    "timing": "forward kinematics, solves and steps beside both engines",
+    "cloth_scale": "cloths of a thousand particles and more: factors, solves, memory",
+}
 
 
 class Experiment(NamedTuple):
@@ -28,3 +47,43 @@ class Experiment(NamedTuple):
         """Yield what there is to be measured; engines are imported only now."""
         for block in importlib.import_module(f"{self.package}.measurement").blocks(scale):
             yield replace(block, times=self.times)
+
+
+# Whether times are among the numbers of an experiment.
+TIMED, UNTIMED = True, False
+
+_BENCH = __package__.rpartition(".")[0]
+# Folder, suite, and chapter of the report, in whose order they are measured and shown.
+EXPERIMENTS = [
+    Experiment(f"{_BENCH}.experiments.{folder}", suite, chapter, times)
+    for folder, suite, chapter, times in (
+        ("check", "check", "right", UNTIMED),
+        ("self_test", "self_test", "right", UNTIMED),
+        ("robot_models", "robot_models", "right", UNTIMED),
+        ("chain", "ik", "kinematics", TIMED),
+        ("closed_curves", "tracking", "kinematics", UNTIMED),
+        ("arm", "arm", "kinematics", UNTIMED),
+        ("pictures", "pictures", "kinematics", UNTIMED),
+        ("robots", "ik", "kinematics", TIMED),
+        ("published", "ik", "kinematics", TIMED),
+        ("cloth", "cloth", "cloth", UNTIMED),
+        ("newton", "newton", "cloth", UNTIMED),
+        ("cloth_peers", "cloth", "cloth", TIMED),
+        ("energy", "energy", "cloth", UNTIMED),
+        ("timing", "timing", "speed", TIMED),
+        ("cloth_scale", "cloth_scale", "speed", TIMED),
+    )
+]
+
+
+def blocks(suite: str, scale: Scale) -> Iterator[Block]:
+    """Yield the blocks of a suite; engines are imported only now.
+
+    Raises:
+        KeyError: if there is no such suite.
+    """
+    if suite not in SUITES:
+        raise KeyError(suite)
+    for experiment in EXPERIMENTS:
+        if experiment.suite == suite:
+            yield from experiment.blocks(scale)

@@ -1,12 +1,18 @@
 """Run jobs in a process of their own; kill it when it stays silent, keep what it sent before."""
 
-import atexit
 import contextlib
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from plumbob.crosscheck.child_process import PipedProcess, one_thread
+from plumbob.crosscheck.child_process import (
+    SILENT,
+    ChildProcess,
+    Loss,
+    LostError,
+    pickled,
+    python_process,
+)
 
 from .progress import Progress, announce
 from .worker import LAST, Begun, Calculation, Done, Found, Lost, Message, Ready, Solved, Unfit, Work
@@ -14,7 +20,7 @@ from .worker import LAST, Begun, Calculation, Done, Found, Lost, Message, Ready,
 # A worker that says nothing for so long [s] is ended: before it is ready it may compile.
 START_PATIENCE = 180.0
 TARGET_PATIENCE = 10.0
-_START = "import plumbob.bench.harness.worker as w; w.main({})"
+_START = "import plumbob.bench.harness.worker as w; w.main()"
 
 
 class Outcome(NamedTuple):
@@ -52,8 +58,7 @@ class WorkerProcess:
     ) -> None:
         # While it is being set up, and once it is ready.
         self._patience = start_patience, target_patience
-        self._worker: PipedProcess | None = None
-        atexit.register(self.close)
+        self._worker: ChildProcess | None = None
 
     @property
     def patience(self) -> float:
@@ -111,8 +116,8 @@ class WorkerProcess:
     def _once(self, job: Work) -> Iterator[Message]:
         ready = False
         try:
-            worker = self._worker = self._worker or PipedProcess(_START, one_thread())
-            worker.send(job)
+            worker = self._worker = self._worker or python_process(_START)
+            worker.send(pickled(job))
             message: Message | None = None
             while not isinstance(message, LAST):
                 message = _received(worker, self._patience[ready])
@@ -131,20 +136,20 @@ class WorkerProcess:
             worker.end()
 
 
-def _received(worker: PipedProcess, patience: float) -> Message:
+def _received(worker: ChildProcess, patience: float) -> Message:
     """Return the next message, Lost if there will be none or none came in time [s]."""
     try:
         message = worker.receive(patience)
-    except TimeoutError:
-        return Lost(f"ended after {patience:g} s of silence", silent=True)
-    except EOFError:
+    except LostError as error:
+        if error.loss in SILENT:
+            return Lost(f"ended after {patience:g} s of silence", silent=True)
+        if error.loss in (Loss.ENDED, Loss.CUT):
+            was = "was " if worker.code < 0 else ""
+            return Lost(f"its process {was}ended {worker.ending}")
         message = None
     if isinstance(message, Message):
         return message
-    how = worker.ending()
-    if not how:
-        return Lost("its process broke off the connection, or sent what is no message")
-    return Lost(f"its process {'was ' if how.startswith('by') else ''}ended {how}")
+    return Lost("its process broke off the connection, or sent what is no message")
 
 
 def in_a_fresh_process(

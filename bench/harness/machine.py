@@ -1,16 +1,20 @@
 """Where a record was measured: the machine, the versions, and a digest of the sources."""
 
+import contextlib
 import functools
 import hashlib
 import importlib.metadata
 import os
 import platform
+import re
 import statistics
-import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import psutil
+
+from ..peers.sources import git_commit
 from .stopwatch import timed
 
 PACKAGES = (
@@ -24,7 +28,6 @@ PACKAGES = (
     "example-robot-data",
     "gymnasium",
     "dm_control",
-    "pytest-benchmark",
     "matplotlib",
 )
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,7 +36,6 @@ _PACKAGES = ("reference", "crosscheck", "bench")
 PRESENTATION = (
     "bench/comparison",
     "bench/figures",
-    "bench/harness/results.py",
     "bench/motion",
     "bench/report",
     "bench/show",
@@ -41,7 +43,7 @@ PRESENTATION = (
     "crosscheck/verify/output",
 )
 # Likewise in every experiment.
-PRESENTATION_FILES = ("tables.py", "figures.py", "readings.py", "files.py")
+PRESENTATION_FILES = ("tables.py", "participants.py", "figures.py", "readings.py", "files.py")
 
 
 @functools.cache
@@ -55,7 +57,7 @@ def machine() -> dict[str, Any]:
     return {
         "processor": _processor(),
         "cores": os.cpu_count(),
-        "memory_gib": _memory_gib(),
+        "memory_gib": round(psutil.virtual_memory().total / 2**30, 1),
         "system": f"{platform.system()} {platform.machine()}",
     }
 
@@ -67,12 +69,10 @@ def conditions() -> dict[str, Any]:
     the system's over the last minute, "pace" how long a fixed piece of work takes [s]: the drift of
     a machine shows in it.
     """
-    found = {"commit": _our_commit(), "pace": pace()}
+    conditions = {"commit": _our_commit(), "pace": pace()}
     if hasattr(os, "sched_getaffinity"):
-        found["affinity"] = len(os.sched_getaffinity(0))
-    if hasattr(os, "getloadavg"):
-        found["load"] = round(os.getloadavg()[0], 2)
-    return found
+        conditions["affinity"] = len(os.sched_getaffinity(0))
+    return {**conditions, "load": round(psutil.getloadavg()[0], 2)}
 
 
 def pace() -> float:
@@ -88,18 +88,6 @@ def _our_commit() -> str:
 def commit_of(root: Path) -> str:
     """Return the commit of sources, and whether they were changed since; "" outside of git."""
     return git_commit(root, _PACKAGES) if (root / ".git").exists() else ""
-
-
-def git_commit(folder: Path, paths: Sequence[str]) -> str:
-    """Return the commit of a folder, and whether these paths differ from it; "" outside of git."""
-    git = ["git", "-C", str(folder)]
-    try:
-        head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, check=True)
-        status = [*git, "status", "--porcelain", "--", *paths]
-        changed = subprocess.run(status, capture_output=True, check=True).stdout
-    except (OSError, subprocess.CalledProcessError):  # no git, or no commit yet
-        return ""
-    return head.stdout.decode().strip() + (" with changes" if changed else "")
 
 
 def difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
@@ -146,16 +134,9 @@ def _is_left_out(parts: tuple[str, ...]) -> bool:
 
 
 def _processor() -> str:
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        for line in info.read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
+    """Return the model of the processor, which psutil does not tell."""
+    with contextlib.suppress(OSError):
+        info = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        if model := re.search(r"^model name\s*:(.*)", info, re.MULTILINE):
+            return model[1].strip()
     return platform.processor() or "unknown processor"
-
-
-def _memory_gib() -> float | None:
-    try:
-        return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1)
-    except (AttributeError, OSError, ValueError):
-        return None

@@ -5,10 +5,10 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from ..peers.protocol import describe
 from .block import Block, Measured
 from .machine import conditions, stamp
 from .record import Key, Record, key
-from .worker import describe
 
 
 def block_key(block: Block) -> Key:
@@ -26,11 +26,13 @@ def measure(block: Block) -> Record:
     begin = time.perf_counter()
     try:
         measured = block.measure()
+        record = record_of(block, measured, time.perf_counter() - begin)
+        record.check()
+        return record
     except Exception as error:  # whatever a solver raises is a result of that solver
         if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
             raise KeyboardInterrupt from None
-        measured = failure(describe(error))
-    return record_of(block, measured, time.perf_counter() - begin)
+        return record_of(block, failure(describe(error)), time.perf_counter() - begin)
 
 
 def failure(why: str) -> Measured:
@@ -41,6 +43,11 @@ def failure(why: str) -> Measured:
 def not_installed(package: str) -> Measured:
     """Return a block without numbers that says what is missing."""
     return Measured(None, {"remark": f"{package} is not installed"})
+
+
+def not_asked(why: str) -> Measured:
+    """Return a block without numbers that says why a solver is not asked."""
+    return Measured({}, {"remark": why})
 
 
 def record_of(block: Block, measured: Measured, seconds: float) -> Record:

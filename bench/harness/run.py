@@ -11,9 +11,10 @@ import numpy as np
 
 from plumbob.reference.arguments import distinct_texts
 
-from ..experiments import SCALES, Block, blocks
+from .block import SCALES, Block
 from .choice import Choice
 from .executor import HERE, Executor, NotMeasured
+from .experiment import blocks
 from .folder_lock import locked
 from .machine import conditions
 from .measure import block_key, now

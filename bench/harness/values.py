@@ -47,15 +47,22 @@ class Kind(NamedTuple):
 
 @functools.cache
 def kind_of(suite: str, task: str) -> Kind | None:
-    """Return the types of the records of a task ("" if they name none); None if none is known.
+    """Return the types of the records of a task ("" if they name none); None of other suites.
 
     No engine is imported.
+
+    Raises:
+        ValueError: if the suite has no such task.
     """
-    from ..experiments import EXPERIMENTS
+    from .experiment import EXPERIMENTS
 
     modules = [f"{made.package}.values" for made in EXPERIMENTS if made.suite == suite]
-    declared = [importlib.import_module(m).KINDS for m in modules if importlib.util.find_spec(m)]
-    return next((kinds[task] for kinds in declared if task in kinds), None)
+    declared = list(filter(importlib.util.find_spec, modules))
+    kinds = {name: kind for module in declared
+             for name, kind in importlib.import_module(module).KINDS.items()}  # fmt: skip
+    if modules == declared and modules and task not in kinds:
+        raise ValueError(f"task: expected one of {', '.join(map(repr, kinds))}, got {task[:40]!r}")
+    return kinds.get(task)
 
 
 Typed = TypeVar("Typed", bound=msgspec.Struct)
@@ -91,8 +98,10 @@ def _array(kind: Any, value: Any) -> np.ndarray:
     shape, dtype = get_args(kind)
     axes, wanted = len(get_args(shape)), np.dtype(get_args(dtype)[0])
     array = np.asarray(value)
+    if not array.size:
+        return np.empty((0,) * axes, wanted)
     if array.ndim != axes:
         raise ValueError(f"expected {axes} dimensions, got {array.ndim}")
-    if array.size and array.dtype.kind not in _TAKES[wanted.kind]:
+    if array.dtype.kind not in _TAKES[wanted.kind]:
         raise ValueError(f"expected {wanted.name}, got {array.dtype.name}")
     return array.astype(wanted, copy=False)

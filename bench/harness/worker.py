@@ -10,8 +10,9 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from plumbob.crosscheck.child_process import attach
+from plumbob.crosscheck.child_process import connect
 
+from ..peers.protocol import describe
 from .progress import Progress, listening
 
 
@@ -49,6 +50,11 @@ class Solved(NamedTuple):
     trouble: str
     round_trip: float = 0.0
     doubt: str = ""
+
+    @property
+    def at_door(self) -> float:
+        """What its door cost beside it [s]."""
+        return max(0.0, self.round_trip - self.seconds)
 
 
 class Unfit(NamedTuple):
@@ -101,32 +107,22 @@ class Calculation(NamedTuple):
             yield Unfit(describe(error))
 
 
-class NoAnswerError(Exception):
-    """A solver gave no answer; the message is a sentence that says why."""
-
-
-def describe(error: Exception) -> str:
-    """Return what an exception says, on one line; its type too unless it is a `NoAnswerError`."""
-    kind = "" if isinstance(error, NoAnswerError) else f"{type(error).__name__}: "
-    return " ".join(f"{kind}{error}".split())[:300]
-
-
-def serve(connection: Connection) -> None:
-    """Perform jobs until the other end is closed."""
-    with listening(connection.send):
+def serve(requests: Connection, answers: Connection) -> None:
+    """Perform jobs until there are no more."""
+    with listening(answers.send):
         while True:
             try:
-                job = connection.recv()
+                job = requests.recv()
             except EOFError:
                 return
             except Exception as error:  # a class that cannot be imported here, or is another
-                connection.send(Unfit(describe(error)))
+                answers.send(Unfit(describe(error)))
                 continue
-            connection.send(Begun())
+            answers.send(Begun())
             for message in job.perform():
-                connection.send(message)
+                answers.send(message)
 
 
-def main(descriptor: int) -> None:
-    """Serve at a connection that this process was started with, as long as its parent lives."""
-    serve(attach(descriptor))
+def main() -> None:
+    """Serve the process that started this one."""
+    serve(*connect())

@@ -2,19 +2,20 @@
 
 A solver of the reference takes part as soon as the reference lists it; a line here gives it a label
 and a style, and limits other than the usual ones. A peer is an adapter of its own and a line here.
-Nothing here imports an engine.
+A user's solver is a peer of the run that it was entered for. Nothing here imports an engine.
 """
 
 import functools
 import importlib.metadata
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from plumbob.reference import IK_SOLVERS, STEP_SOLVERS
 
 from . import environments
+from .entrant import CHAIN_TASK, ROBOT_TASK, Entrant
 
 PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton"
 BULLET = "PyBullet"
@@ -34,7 +35,7 @@ THIRD = Style("green", "-.", "^")
 FOURTH = Style("purple", (0, (1, 1)), "v")
 FIFTH = Style("brass", (0, (4, 1, 1, 1, 1, 1)), "D")
 OTHER = Style("faint", ":", "P")
-# Of which those of solvers that nobody knows are made: lines that no solver above has.
+# Styles of unknown solvers are made of these: lines that no solver above has.
 _COLOURS = ("ink", "blue", "orange", "green", "purple", "brass")
 _LINES: tuple[Any, ...] = ((0, (8, 2)), (0, (3, 1, 1, 1)), (0, (8, 2, 2, 2)))
 
@@ -105,9 +106,8 @@ _STEP = (
     StepSolver("gauss_newton", "Gauss-Newton", is_linear=True, **_ONE_SOLVE),
 )
 
-# One Levenberg-Marquardt loop on the kinematics of either engine.
+# One Levenberg-Marquardt loop on engines' kinematics; what is timed; libraries that factor.
 LOOPS = tuple(Solver(f"lm/{engine}", f"LM, {engine}", engine) for engine in (PINOCCHIO, MUJOCO))
-# Those that are timed.
 COMPILED = Solver("Plumbob, compiled", "Plumbob, compiled", style=Style("blue", "", "o"))
 PLAIN = Solver("Plumbob, plain Python", "Plumbob, plain Python", style=Style("orange", "", "D"))
 OUR_KINEMATICS = Solver(
@@ -123,7 +123,6 @@ TIMED = (
     Solver(MUJOCO, MUJOCO, MUJOCO, Style("purple", "", "^")),
     LIMIT,
 )
-# Libraries that factor matrices, ours first.
 SUPERNODAL = Solver("supernodal", "ours")
 CHOLMOD = Solver("cholespy", "CHOLMOD (cholespy)", "CHOLMOD")
 FACTORS = (SUPERNODAL, CHOLMOD)
@@ -132,10 +131,54 @@ FACTORS = (SUPERNODAL, CHOLMOD)
 @functools.cache
 def version(package: str) -> str:
     """Return the version of a package, "" if it is not installed."""
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return ""
+    distribution = environments.distribution("", package)
+    return distribution.version if distribution else ""
+
+
+@dataclass(frozen=True)
+class Adapter:
+    """A solver behind an adapter.
+
+    Attributes:
+        title: how it is written.
+        module: its adapter.
+        package: what must be installed.
+        environment: of its own, whose Python runs it; "" if it works in ours.
+        entrant: the user's solver, if it is one: it is always there.
+    """
+
+    title: str
+    module: str
+    package: str
+    environment: str = field(default="", kw_only=True)
+    entrant: Entrant | None = field(default=None, kw_only=True)
+
+    @property
+    def distribution(self) -> importlib.metadata.Distribution | None:
+        """The package where it is installed, None if it is not."""
+        return environments.distribution(self.environment, self.package)
+
+    @property
+    def version(self) -> str:
+        """The version that is installed, "" if none is; a user's solver says its own."""
+        if self.entrant:
+            return self.entrant.version
+        return self.distribution.version if self.distribution else ""
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether it can be asked."""
+        return bool(self.entrant or self.version)
+
+    @property
+    def spec(self) -> dict[str, Any]:
+        """What the adapter of a user's solver is prepared with beside settings."""
+        return {"spec": self.entrant.spec} if self.entrant else {}
+
+    @property
+    def entrant_name(self) -> str:
+        """The name of the user's solver, "" if it is none."""
+        return self.entrant.name if self.entrant else ""
 
 
 # Peers of inverse kinematics. A solver that makes one attempt from the start it is given and one
@@ -159,40 +202,27 @@ class Entry(NamedTuple):
     note: str = ""
 
 
-class Peer(NamedTuple):
+@dataclass(frozen=True)
+class Peer(Adapter):
     """A solver for robots.
 
     Attributes:
-        title: how it is written.
-        module: its adapter.
-        package: what must be installed.
         license: of the package.
         can: what it takes.
         entries: with which settings it takes part.
-        environment: of its own, whose Python runs it; "" if it works in ours.
     """
 
-    title: str
-    module: str
-    package: str
     license: str
     can: str
     entries: tuple[Entry, ...]
-    environment: str = ""
-
-    @property
-    def distribution(self) -> importlib.metadata.Distribution | None:
-        """The package where it is installed, None if it is not."""
-        return environments.distribution(self.environment, self.package)
-
-    @property
-    def version(self) -> str:
-        """The version that is installed, "" if none is."""
-        return self.distribution.version if self.distribution else ""
 
     def called(self, entry: Entry) -> str:
         """Return how an entry is written."""
         return f"{self.title}, {entry.note}" if entry.note else self.title
+
+    def entry(self, kind: str) -> Entry:
+        """Return the first entry of a kind."""
+        return next(entry for entry in self.entries if entry.kind == kind)
 
 
 # Attempts beside the first where the bench starts a solver again.
@@ -209,10 +239,16 @@ _CHAINS = "poses and limits of one chain of hinges"
 _TREES = "poses, positions and limits of several effectors, balls"
 _UNLIMITED = "poses and positions of several effectors, balls; looks at no limits"
 _SIX = "poses of six hinges or fewer, analytically; timed without the choice of a solution"
+_PULLED = (
+    "poses of one chain of hinges; limits only as a pull in the null space, with which it hardly "
+    "arrives and oversteps them all the same; makes no claims"
+)
 
 
-def _peer(title: str, adapter: str, package: str, license: str, can: str, *entries: Entry) -> Peer:
-    return Peer(title, f"plumbob.bench.peers.ik.{adapter}", package, license, can, entries)
+def _peer(
+    title: str, adapter: str, package: str, license: str, can: str, *entries: Entry, **more: Any
+) -> Peer:
+    return Peer(title, f"{__package__}.ik.{adapter}", package, license, can, entries, **more)
 
 
 OURS = _peer(
@@ -229,7 +265,6 @@ TRAC_IK = _peer(
     *("TRAC-IK", "trac_ik", "pytracik", "MIT", _CHAINS),
     *(Entry(RESTARTS, {"seconds": t}, note=f"{1e3 * t:g} ms") for t in (0.005, 0.05)),
 )
-_EVERY_SOLUTION = Entry(RESTARTS, note="all solutions, no start")
 DRAKE = _peer(
     *("Drake", "drake", "drake", "BSD-3-Clause", f"{_TREES}, these by three angles"),
     Entry(ONE_START, note="SNOPT"),
@@ -237,9 +272,7 @@ DRAKE = _peer(
     Entry(RESTARTS, {}, AGAIN, f"SNOPT, {AGAIN} restarts"),
 )
 PYBULLET = _peer(
-    *("PyBullet", "pybullet", "pybullet", "Zlib"),
-    "poses of one chain of hinges; limits only as a pull in the null space, with which it hardly "
-    "arrives and oversteps them all the same; makes no claims",
+    *("PyBullet", "pybullet", "pybullet", "Zlib", _PULLED),
     Entry(ONE_START, note="limits left out"),
     Entry(ONE_START, {"limits": True}, note="limits in the null space"),
     Entry(RESTARTS, {"check": True}, AGAIN, f"{AGAIN} restarts, its pose looked at"),
@@ -250,7 +283,7 @@ TORCH = _peer(
     Entry(RESTARTS, {"attempts": AGAIN + 1}, note=f"{AGAIN} restarts, all at once"),
 )
 DART = _peer("DART", "dart", "dartpy", "BSD-2-Clause", _CHAINS, *_either(100))
-PLACO = _peer("PlaCo", "placo", "placo", "MIT", _CHAINS, *_either(50))._replace(environment="placo")
+PLACO = _peer("PlaCo", "placo", "placo", "MIT", _CHAINS, *_either(50), environment="placo")
 PEERS = (
     OURS,
     _peer(
@@ -262,7 +295,10 @@ PEERS = (
     TOOLBOX,
     TRAC_IK,
     _peer("ikpy", "ikpy", "ikpy", "Apache-2.0", f"{_CHAINS}; makes no claims", Entry(ONE_START)),
-    _peer("EAIK", "eaik", "eaik", "BSD-3-Clause", _SIX, _EVERY_SOLUTION),
+    _peer(
+        *("EAIK", "eaik", "eaik", "BSD-3-Clause", _SIX),
+        Entry(RESTARTS, note="all solutions, no start"),
+    ),
     DRAKE,
     DART,
     PLACO,
@@ -277,21 +313,45 @@ SINGLE_PRECISION = {
 }
 
 
+def robot_peers(entrants: Iterable[Entrant] = ()) -> list[Peer]:
+    """Return the solvers for robots: those known, then those of a user that take robots."""
+    return [*PEERS, *(_entered_peer(e) for e in entrants if ROBOT_TASK in e.tasks)]
+
+
+def _entered_peer(entrant: Entrant) -> Peer:
+    return _peer(entrant.name, "entrant", "", "", "", *_either(), entrant=entrant)
+
+
+@dataclass(frozen=True)
+class ChainPeer(Adapter):
+    """A method of a user's solver for chains of balls."""
+
+    method: str
+
+
+def chain_peers(entrants: Iterable[Entrant]) -> list[ChainPeer]:
+    """Return the methods of the user's solvers that take chains of balls."""
+    return [
+        ChainPeer(title, f"{__package__}.ik.entrant_chain", "", method, entrant=entrant)
+        for entrant in entrants
+        if CHAIN_TASK in entrant.tasks
+        for method, title in entrant.titles.items()
+    ]
+
+
 # Peers for cloths: what distinguishes the settings that each is tried with.
 ITERATED, LINEARISED, EXPLICIT = "iterations", "one linear solve", "explicit"
 # An entrant that does not say which step it makes is tried with steps of all lengths.
 UNDECLARED = "undeclared"
+_EXPLICIT_METHODS = ("explicit", "symplectic")
 
 
 @dataclass(frozen=True)
-class ClothPeer:
+class ClothPeer(Adapter):
     """A solver for cloths.
 
     Attributes:
-        title: how it is written.
         engine: whose it is.
-        module: its adapter.
-        package: what must be installed.
         kind: what distinguishes its rungs.
         settings: with which its adapter is always prepared.
         ladder: iterations in one step, where it iterates.
@@ -299,91 +359,74 @@ class ClothPeer:
         converges: whether it goes on until a step is solved.
     """
 
-    title: str
     engine: str
-    module: str
-    package: str
     kind: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     ladder: tuple[int, ...] = ()
     motion: tuple[int, ...] = ()
     converges: bool = False
 
-    @property
-    def version(self) -> str:
-        """The version that is installed, "" if none is."""
-        return version(self.package)
+
+_CLOTH = f"{__package__}.cloth"
 
 
 def _of_ours(solver: StepSolver) -> ClothPeer:
     """Return a solver of the reference as a peer."""
-    settings = {"solver": solver.name, **({"iterations": 1} if solver.is_linear else {})}
+    known = (f"Plumbob {solver.label}", f"{_CLOTH}.plumbob", "plumbob", PLUMBOB)
+    if solver.is_linear:
+        return ClothPeer(*known, LINEARISED, {"solver": solver.name, "iterations": 1})
     iterated = (solver.ladder, solver.motion, solver.converges)
-    return ClothPeer(
-        f"Plumbob {solver.label}",
-        PLUMBOB,
-        "plumbob.bench.peers.cloth.step_solvers",
-        "plumbob",
-        LINEARISED if solver.is_linear else ITERATED,
-        settings,
-        *(() if solver.is_linear else iterated),
-    )
+    return ClothPeer(*known, ITERATED, {"solver": solver.name}, *iterated)
 
 
-def _explicit(title: str, integrator: str) -> ClothPeer:
-    adapter, settings = "plumbob.bench.peers.cloth.explicit", {"integrator": integrator}
-    return ClothPeer(f"Plumbob {title}", PLUMBOB, adapter, "plumbob", EXPLICIT, settings)
+def _explicit(title: str, solver: str) -> ClothPeer:
+    known = (f"Plumbob {title}", f"{_CLOTH}.plumbob", "plumbob", PLUMBOB)
+    return ClothPeer(*known, EXPLICIT, {"solver": solver})
 
 
 def _mujoco(title: str, kind: str, **settings: Any) -> ClothPeer:
-    """Return one of MuJoCo's integrators, with springs as tendons."""
-    adapter = "plumbob.bench.peers.cloth.mujoco_tendons"
-    return ClothPeer(f"MuJoCo {title}", MUJOCO, adapter, "mujoco", kind, settings)
+    known = (f"MuJoCo {title}", f"{_CLOTH}.mujoco", "mujoco", MUJOCO)
+    return ClothPeer(*known, kind, settings)
 
 
-def _newton(
-    title: str, adapter: str, kind: str, ladder: tuple[int, ...] = (), **settings: Any
-) -> ClothPeer:
-    """Return a solver of Newton, the engine."""
-    return ClothPeer(
-        f"Newton engine, {title}",
-        NEWTON,
-        f"plumbob.bench.peers.cloth.newton_{adapter}",
-        "newton",
-        kind,
-        settings,
-        ladder,
-        SOME if ladder else (),
-    )
+def _newton(title: str, kind: str, ladder: tuple[int, ...] = (), **settings: Any) -> ClothPeer:
+    known = (f"Newton engine, {title}", f"{_CLOTH}.newton", "newton", NEWTON)
+    return ClothPeer(*known, kind, settings, ladder, SOME if ladder else ())
 
 
 CLOTH_ENGINES = (
     _explicit("symplectic Euler", "symplectic_euler"),
     _explicit("Runge-Kutta", "runge_kutta"),
-    _mujoco("Euler", EXPLICIT, integrator="Euler"),
+    _mujoco("Euler", EXPLICIT),
     _mujoco("implicitfast", EXPLICIT, integrator="implicitfast"),
-    ClothPeer(
-        "MuJoCo flex, Euler", MUJOCO, "plumbob.bench.peers.cloth.mujoco_flex", "mujoco", EXPLICIT
-    ),
+    _mujoco("flex, Euler", EXPLICIT, flex=True),
     _mujoco("discrete", LINEARISED, integrator="discrete"),
     _mujoco(
         "discrete, to the end", LINEARISED, integrator="discrete", iterations=5000, tolerance=1e-15
     ),
-    _newton("semi-implicit", "semi_implicit", EXPLICIT),
-    _newton("VBD", "vbd", ITERATED, MANY),
-    _newton("VBD, its own colours", "vbd", ITERATED, SOME, own=1),
-    _newton("XPBD", "xpbd", ITERATED, SOME),
-    _newton("XPBD, substeps", "xpbd", EXPLICIT, iterations=1),
+    _newton("semi-implicit", EXPLICIT, solver="semi-implicit"),
+    _newton("VBD", ITERATED, MANY, solver="VBD"),
+    _newton("VBD, its own colours", ITERATED, SOME, solver="VBD", own=1),
+    _newton("XPBD", ITERATED, SOME, solver="XPBD"),
+    _newton("XPBD, substeps", EXPLICIT, solver="XPBD", iterations=1),
     ClothPeer(
-        *(
-            "PyBullet deformable, Euler",
-            BULLET,
-            "plumbob.bench.peers.cloth.pybullet_deformable",
-            "pybullet",
-        ),
+        *("PyBullet deformable, Euler", f"{_CLOTH}.pybullet_deformable", "pybullet", BULLET),
         EXPLICIT,
     ),
 )
+
+
+def cloth_peers(entrants: Iterable[Entrant] = ()) -> tuple[ClothPeer, ...]:
+    """Return the solvers for cloths: the reference's, those of engines, those of a user."""
+    ours = (_of_ours(solver) for solver in step_solvers().values())
+    return (*ours, *CLOTH_ENGINES, *(_entered_cloth(e) for e in entrants if e.offers("cloth")))
+
+
+def _entered_cloth(entrant: Entrant) -> ClothPeer:
+    """Return a user's solver as a peer for cloths, tried as its declared step asks for."""
+    kind = EXPLICIT if entrant.step in _EXPLICIT_METHODS else LINEARISED
+    known = (entrant.name, f"{_CLOTH}.entrant", "", entrant.name)
+    return ClothPeer(*known, kind if entrant.step else UNDECLARED, entrant=entrant)
 
 
 def ik_solvers() -> dict[str, Solver]:
@@ -400,15 +443,9 @@ def step_solvers() -> dict[str, StepSolver]:
 
 def followed_step_solvers() -> list[StepSolver]:
     """Return those whose convergence is followed: the known ones in order, then others."""
-    found = step_solvers()
-    order = [solver.name for solver in _STEP if solver.name in found]
-    order += [name for name in found if name not in order]
-    return [found[name] for name in order if found[name].followed]
-
-
-def cloth_peers() -> tuple[ClothPeer, ...]:
-    """Return the solvers for cloths: the reference's, then those of engines."""
-    return (*(_of_ours(solver) for solver in step_solvers().values()), *CLOTH_ENGINES)
+    solvers = step_solvers()
+    order = dict.fromkeys([*(solver.name for solver in _STEP), *solvers])
+    return [solvers[name] for name in order if name in solvers and solvers[name].followed]
 
 
 def find(name: str) -> Solver:
@@ -425,7 +462,7 @@ def _by_name(*of_reference: tuple[str, ...]) -> Mapping[str, Solver]:
 
 def names() -> set[str]:
     """Return what solvers of ours and of peers are called, in records and as they are written."""
-    return {one for solver in _solvers() for one in (solver.name, solver.label)}
+    return {name for solver in _solvers() for name in (solver.name, solver.label)}
 
 
 def _style(name: str) -> Style:
@@ -436,9 +473,7 @@ def _style(name: str) -> Style:
 
 
 def _solvers() -> Iterator[Solver]:
-    yield from ik_solvers().values()
-    yield from step_solvers().values()
-    yield from (*LOOPS, *TIMED, *FACTORS)
+    yield from (*ik_solvers().values(), *step_solvers().values(), *LOOPS, *TIMED, *FACTORS)
     yield from (Solver(peer.title, peer.title, peer.engine) for peer in cloth_peers())
     for peer in PEERS:
         names = [peer.called(entry) for entry in peer.entries]

@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from ..harness.results import Results, counted, listed
 from ..tables.aligned import filled
 from ..tables.entered import remarks_of_entrants
+from ..tables.results import Results, counted, listed
 from ..tables.table import is_blank, words
 from ..text import visible
 from .headlines import Answers, Verdict, answers

@@ -7,9 +7,9 @@ from typing import NamedTuple
 from ..experiments import SUITES
 from ..figures.sketch import Drawing, drawn
 from ..harness.record import FINISHED, Record, check_regular
-from ..harness.results import Results, listed, results_of
 from ..tables.latex import latex
 from ..tables.layout import Figure
+from ..tables.results import Results, listed, results_of
 from ..tables.table import Table, comma_separated, markdown
 from ..text import shortened, visible
 from .headlines import Answers, absent, answers, not_asked

@@ -1,15 +1,16 @@
 """The chapters of the report, in order: each is made of what some experiments offer."""
 
 import importlib
+import importlib.util
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from ..experiments import EXPERIMENTS
 from ..experiments.pictures.readings import arm_motion, cloth_motion
 from ..harness.experiment import Experiment
-from ..harness.results import Results
 from ..motion.motion import Scene
 from ..tables.layout import Layout
+from ..tables.results import Results
 from ..tables.table import Table
 
 
@@ -96,8 +97,11 @@ MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
 
 
 def offered(experiment: Experiment) -> tuple[Layout, ...]:
-    """Return the tables of an experiment; its tables and figures are imported only now."""
-    layouts: tuple[Layout, ...] = importlib.import_module(f"{experiment.package}.tables").LAYOUTS
+    """Return the tables of an experiment, imported only now; none where another shows it."""
+    name = f"{experiment.package}.tables"
+    layouts: tuple[Layout, ...] = ()
+    if importlib.util.find_spec(name) is not None:
+        layouts = importlib.import_module(name).LAYOUTS
     return layouts
 
 

@@ -18,9 +18,9 @@ from ..experiments.robots.readings import (
 from ..figures.chart import is_ours
 from ..harness import metrics
 from ..harness.record import Record
-from ..harness.results import Results, counted, label, listed
 from ..peers import registry
 from ..tables.columns import words_in
+from ..tables.results import Results, counted, label, listed
 from ..tables.table import words
 
 # So many cloths have a sentence of their own.

@@ -18,10 +18,10 @@ from plumbob.reference import (
 )
 from plumbob.reference.arguments import FloatArray
 
-from ..experiments.arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING
 from ..figures.view import ARM_VIEW, CLOTH_VIEW
-from ..harness.results import label
 from ..motion.motion import Moving, Scene
+from ..problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING
+from ..tables.results import label
 
 ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *curves)

@@ -8,9 +8,9 @@ from plumbob.reference import IK_SOLVERS, STEP_SOLVERS, scenes
 from plumbob.reference.arguments import choice
 from plumbob.reference.formats import bvh
 
-from ..harness.results import label
 from ..motion import motion
 from ..motion.motion import Scene
+from ..tables.results import label
 from .ours import CLOTH, EXACT, SCENES, SECONDS, arm_scene, cloth_scene, drawn, fallen
 from .yours import ARM_TASKS, CLOTH_TASKS, Yours
 

@@ -1,162 +1,141 @@
-"""A table as lines of a terminal: columns are dropped before a digit or a part of a name is.
-
-A cell that is wider than its column goes on in the next line. It is broken at spaces and dashes, in
-a narrow column between any two letters, and never within a number.
-"""
+"""A table as lines of a terminal: columns are dropped before a digit or a part of a name is."""
 
 import functools
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from rich.cells import cell_len
+from rich.console import Console
+from rich.table import Table as Grid
+from rich.text import Text
 
 from plumbob.reference.arguments import name_list
 
-from ..text import chunks
-from .fitting import Need, assigned, fits, fitting
-from .table import Table, best_cells, without_empty, words
+from .fitting import assigned
+from .table import Table, best_cells, naming, without_empty, words
 
 GAP = 2
-# Words are broken into pieces of so many letters where columns do not fit otherwise; where even
-# that does not suffice, into those of the next.
+# Longer words may be broken, into pieces of the next length where columns do not fit otherwise.
 _PIECES = (24, 10, 5)
-_NUMBER = re.compile(r"([-+−]?\d[\d.,]*(?:e-?\d+)?)")
 _BEST, _MISSED = "bold", "bold red"
 
 
-class Span(NamedTuple):
-    """A part of a line, and how it is set: plain, "bold", or red where something is missed."""
-
-    text: str
-    style: str = ""
-
-
 class Aligned(NamedTuple):
-    """A table as lines, and the headings of the columns that had no place in them."""
+    """A table as lines, and the headings of the columns that had no place in them.
 
-    lines: list[list[Span]]
+    Attributes:
+        lines: the lines, styled.
+        widths: how wide each column is, with `GAP` between them.
+        left_out: the headings of the columns that had no place.
+    """
+
+    lines: list[Text]
+    widths: list[int]
     left_out: list[str]
 
 
 def aligned(table: Table, width: int) -> Aligned:
     """Return a table in lines of at most so many letters, as long as its names and numbers are."""
     table = without_empty(table)
-    shown, widths = _columns(table, width)
+    columns, least = _fitting(table, width)
+    natural = [max(low, _natural(table, j)) for j, low in zip(columns, least, strict=True)]
+    room = width - GAP * (len(columns) - 1)
+    widths = [int(wide + 1e-9) for wide in assigned(least, natural, room)]
+    if (
+        sum(whole := [max(w, _heading(table, j)) for j, w in zip(columns, natural, strict=True)])
+        <= room
+    ):
+        widths = [int(wide) for wide in whole]
+    lines = _lines(_grid(table, columns, widths), sum(widths) + GAP * len(columns))
+    left_out = [column.heading for j, column in enumerate(table.columns) if j not in columns]
+    return Aligned(lines, widths, left_out)
+
+
+def _fitting(table: Table, width: int) -> tuple[list[int], list[float]]:
+    """Return the columns that are shown, and the least width of each.
+
+    Those that name a row always are, and one more; folded ones never are. The others are dropped
+    from the right, those in which something is best last.
+    """
+    names = naming(table)
+    for piece in _PIECES:
+        least = {j: _least(table, j, piece) for j in range(len(table.columns))}
+        columns = [j for j in least if j < names or not table.columns[j].folded]
+        for j in sorted(columns[names:], key=lambda j: (bool(table.columns[j].best), -j)):
+            if _fits([least[j] for j in columns], width) or len(columns) <= names + 1:
+                break
+            columns.remove(j)
+        if _fits([least[j] for j in columns], width):
+            break
+    return columns, [least[j] for j in columns]
+
+
+def _fits(widths: Sequence[float], width: int) -> bool:
+    return sum(widths) + GAP * (len(widths) - 1) <= width
+
+
+def _least(table: Table, j: int, piece: int) -> float:
+    """Return the least width of a column: a number is never broken, a word only if it is long."""
+    cells = [words(row[j]) for row in table.rows]
+    tokens = table.columns[j].heading.split()
+    if not table.columns[j].words and piece == _PIECES[0]:
+        return max(map(cell_len, [*cells, *tokens]), default=0)
+    tokens += [token for cell in cells for token in cell.split()]
+    return max((min(cell_len(token), piece) for token in tokens), default=0)
+
+
+def _natural(table: Table, j: int) -> int:
+    """Return the width of the cells in one line, with a heading over numbers in two."""
+    body = max((cell_len(words(row[j])) for row in table.rows), default=0)
+    if table.columns[j].words:
+        return body
+    tokens = table.columns[j].heading.split()
+    halves = [(" ".join(tokens[:i]), " ".join(tokens[i:])) for i in range(len(tokens))]
+    return max(body, min((max(map(cell_len, both)) for both in halves), default=0))
+
+
+def _heading(table: Table, j: int) -> int:
+    return cell_len(table.columns[j].heading)
+
+
+def _grid(table: Table, columns: Sequence[int], widths: Sequence[int]) -> Grid:
+    grid = Grid(box=None, pad_edge=False, padding=(0, GAP, 0, 0), header_style=_BEST)
+    for j, width in zip(columns, widths, strict=True):
+        column = table.columns[j]
+        grid.add_column(
+            Text(column.heading),
+            width=width,
+            overflow="fold",
+            justify="left" if column.words else "right",
+        )
     best = best_cells(table)
-    head = [filled(table.columns[j].heading, w) for j, w in zip(shown, widths, strict=True)]
-    above = max(map(len, head))
-    head = [[*[""] * (above - len(lines)), *lines] for lines in head]
-    lines = _side_by_side(table, shown, widths, head, [_BEST] * len(shown))
     for i, row in enumerate(table.rows):
         missed = any(str(cell).startswith("MISSED") for cell in row)
-        styles = [_MISSED if missed else _BEST if (i, j) in best else "" for j in shown]
-        cells = [filled(words(row[j]), w) for j, w in zip(shown, widths, strict=True)]
-        lines += _side_by_side(table, shown, widths, cells, styles)
-    left_out = [column.heading for j, column in enumerate(table.columns) if j not in shown]
-    return Aligned(lines, left_out)
+        styles = [_MISSED if missed else _BEST if (i, j) in best else "" for j in columns]
+        cells = zip(columns, styles, strict=True)
+        grid.add_row(*(Text(words(row[j]), style) for j, style in cells))
+    return grid
 
 
-def _columns(table: Table, width: int) -> tuple[list[int], list[int]]:
-    """Return the columns that are shown and how wide each is."""
-    for pieces in _PIECES:
-        needs = [_need(table, j, pieces) for j in range(len(table.columns))]
-        shown = fitting(table, needs, width, GAP)
-        if fits([needs[j] for j in shown], width, GAP):
-            break
-    else:
-        width = int(sum(needs[j].least for j in shown)) + GAP * (len(shown) - 1)
-    whole = [max(needs[j].natural, cell_len(table.columns[j].heading)) for j in shown]
-    if sum(whole) + GAP * (len(shown) - 1) <= width:
-        return shown, list(map(int, whole))
-    return shown, [int(w + 1e-6) for w in assigned([needs[j] for j in shown], width, GAP)]
-
-
-def _need(table: Table, j: int, pieces: int) -> Need:
-    """Return how wide a column is, its words broken into pieces of so many letters."""
-    texts = [words(row[j]) for row in table.rows]
-    heading = table.columns[j].heading
-    body = max(map(cell_len, texts), default=0)
-    in_pieces = [piece for text in (heading, *texts) for piece in _pieces(text, pieces)]
-    least = max((cell_len(piece.rstrip()) for piece in in_pieces), default=0)
-    is_words = table.columns[j].words
-    if not is_words and pieces == _PIECES[0]:
-        least = max(least, body)
-    return Need(least, max(least, body, _in_two(heading) if not is_words else 0), is_words)
-
-
-def _in_two(heading: str) -> int:
-    """Return how wide a heading is in at most two lines."""
-    of = heading.split()
-    halves = ((" ".join(of[:i]), " ".join(of[i:])) for i in range(1, len(of)))
-    return min((max(map(cell_len, both)) for both in halves), default=cell_len(heading))
-
-
-def _side_by_side(
-    table: Table,
-    shown: Sequence[int],
-    widths: Sequence[int],
-    cells: Sequence[Sequence[str]],
-    styles: Sequence[str],
-) -> list[list[Span]]:
-    """Return the lines of a row."""
+def _lines(grid: Grid, width: int) -> list[Text]:
+    console = _console(width)
     lines = []
-    for k in range(max(map(len, cells), default=0)):
-        line = []
-        for place, (j, wide) in enumerate(zip(shown, widths, strict=True)):
-            text = cells[place][k] if k < len(cells[place]) else ""
-            blank = " " * (wide - cell_len(text))
-            padded = text + blank if table.columns[j].words else blank + text
-            line.append(Span(padded + " " * GAP * (place < len(shown) - 1), styles[place]))
+    for segments in console.render_lines(grid, pad=False):
+        line = Text.assemble(*((segment.text, segment.style or "") for segment in segments))
+        line.rstrip()
         lines.append(line)
     return lines
 
 
-@functools.lru_cache(maxsize=10_000)
-def filled(text: str, width: int) -> Sequence[str]:
-    """Return a text in lines that are no wider, but for numbers that are."""
-    lines = [""]
-    for piece in _pieces(text, width):
-        if lines[-1] and cell_len((lines[-1] + piece).rstrip()) > width:
-            lines.append("")
-        lines[-1] += piece
-    return [line.rstrip() for line in lines]
+@functools.lru_cache(maxsize=100)
+def _console(width: int) -> Console:
+    return Console(width=width, color_system="standard", legacy_windows=False)
 
 
-@functools.lru_cache(maxsize=10_000)
-def _pieces(text: str, most: int) -> Sequence[str]:
-    """Return what a line may be made of: words with the space behind, parts of those too long."""
-    found: list[str] = []
-    for token in text.split():
-        parts = [token] if cell_len(token) <= most else _parts(token, most)
-        found += [*parts[:-1], f"{parts[-1]} "]
-    return found
-
-
-def _parts(token: str, most: int) -> list[str]:
-    return [
-        part
-        for chunk in chunks(token)
-        for part in ([chunk] if cell_len(chunk) <= most else _joined(_atoms(chunk), most))
-    ]
-
-
-def _atoms(chunk: str) -> list[str]:
-    """Return numbers as a whole and all else letter by letter."""
-    return [
-        atom
-        for part in _NUMBER.split(chunk)
-        for atom in ([part] if _NUMBER.fullmatch(part) else part)
-    ]
-
-
-def _joined(atoms: Iterable[str], most: int) -> list[str]:
-    parts = [""]
-    for atom in atoms:
-        if parts[-1] and cell_len(parts[-1] + atom) > most:
-            parts.append("")
-        parts[-1] += atom
-    return parts
+def filled(text: str, width: int) -> list[str]:
+    """Return a text in lines that are no wider."""
+    plain = Text(" ".join(text.split()))
+    return [line.plain.rstrip() for line in plain.wrap(_console(width), width)] or [""]
 
 
 def left_out(table: Table, missing: Sequence[str], shown_by: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..harness import metrics
 from ..harness.record import Record
-from ..harness.results import label
+from .results import label
 from .table import INTERVAL, Cell, Column, in_unit, words
 
 MEDIAN, P95, LARGEST = "median", "95 %", "largest"

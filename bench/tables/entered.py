@@ -4,9 +4,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from ..harness.record import Record
-from ..harness.results import Results, listed
 from .columns import text
 from .layout import Layout
+from .results import Results, listed
 from .table import Column, Summary
 
 NOT_ASKED = "not asked"

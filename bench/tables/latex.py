@@ -1,38 +1,39 @@
-"""A table as LaTeX for a paper: booktabs, siunitx and longtable, nothing below eight points.
+"""A table as LaTeX for a paper: booktabs, siunitx and tabularx, nothing below eight points.
 
-A table is set in the largest of 10, 9 and 8 points in which it fits the width. One that does not
-fit in 8 points loses its folded columns, then stands in several parts of the same rows: rotated, it
-would fit a page but no column, and could not be read beside the text. Nothing is scaled.
+A table is set in the largest of 10, 9 and 8 points in which it fits the width, by the number of its
+letters; columns of long words share what the others leave. One that does not fit in 8 points loses
+its folded columns, then stands in several parts of the same rows. Nothing is scaled.
 """
 
 import functools
 import math
 import re
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from ..harness.metrics import Share
-from ..text import chunks, shortened
-from .fitting import Need, assigned, fits, fitting, parts
+from ..text import shortened
+from .fitting import assigned
 from .table import Cell, Table, best_cells, naming, without_empty, words
-from .tex_text import NARROW, breakable, escaped, fragments, wide
+from .tex_text import breakable, escaped, pieces
 
 # A column and a page of most journals [pt], 84 and 177 mm.
 WIDTHS = {"column": 240.0, "page": 504.0}
 _UNITS = {"pt": 1.0, "mm": 72.27 / 25.4, "cm": 72.27 / 2.54, "in": 72.27}
-NARROWEST = 160.0
+NARROWEST, WIDEST = 160.0, 2000.0
 SIZES = (10, 9, 8)
-# More rows than these stand in a table that may break over pages, and so does what is higher [pt].
-MOST_ROWS = 40
-_HIGHEST = 545.0
+# Tables of more lines break over pages.
+MOST_LINES = 40
 # Letters of a name, of which a paper needs no more.
 _LONGEST = 200
-# Half of what is between two columns [pt].
-_BETWEEN = 4.0
-_LEAD = 1.2
-# Words are set in smaller letters before their column is narrower than this, in units of the size.
-_COMFORT = 9.0
-_PACKAGES = r"% needs \usepackage{booktabs,longtable} and siunitx of 2021 or newer (version 3)"
+# Words are broken into pieces of so many letters where columns do not fit otherwise.
+_PIECES = (12, 6)
+# The width of a letter, in units of the size: digits of Latin Modern take 0.53, bold ones 0.61.
+_LETTER, _BOLD = 0.56, 0.62
+# What is between two columns [pt].
+_GAP = 8.0
+_PACKAGES = r"% needs \usepackage{booktabs,xltabular} and siunitx of 2021 or newer (version 3)"
 # Room between a caption and what stands below it, of which the classes of LaTeX leave none.
 _SKIP = r"\setlength{\belowcaptionskip}{5pt}"
 _NUMBERS = (
@@ -40,7 +41,7 @@ _NUMBERS = (
     r"reset-text-shape=false, group-digits=integer, group-minimum-digits=4, group-separator={,}, "
     r"output-exponent-marker=e, table-align-exponent=false}"
 )
-
+_FLEXIBLE = r">{\raggedright\arraybackslash}X"
 _NUMBER = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e(-?)(\d+))?")
 
 
@@ -61,7 +62,7 @@ def paper(width: str) -> Paper:
         return Paper(WIDTHS[width], width == "page")
     match = re.fullmatch(r"(\d+(?:\.\d+)?) *(pt|mm|cm|in)", width)
     points = float(match[1]) * _UNITS[match[2]] if match else 0.0
-    if not NARROWEST <= points <= 2000.0:
+    if not NARROWEST <= points <= WIDEST:
         least = f"{NARROWEST / _UNITS['mm']:.0f}mm"
         raise ValueError(
             f"--width: expected column, page or a length of {least} or more such as 120mm, "
@@ -75,338 +76,279 @@ def latex(table: Table, width: str = "page") -> str:
     page, table = paper(width), without_empty(table)
     best = best_cells(table)
     columns = [_Typeset(table, j, best) for j in range(len(table.columns))]
-    size, numbers = _size(table, columns, page.width)
-    made = _parts(table, [columns[j] for j in numbers], page.width, size)
-    caption = _caption_height(table, page)
-    is_long = len(table.rows) > MOST_ROWS or caption + sum(p.height for p in made) > _HIGHEST
-    about = [_PACKAGES, *_comments(table, len(numbers))]
-    body = _long(table, made, page, size) if is_long else _float(table, made, page, size)
-    return "\n".join([*about, *body, ""])
+    size = next((size for size in SIZES if _fits(columns, page.width, size)), SIZES[-1])
+    if not _fits(columns, page.width, size):
+        columns = [column for column in columns if not column.column.folded]
+    parts = [_Part(table, part, page.width, size) for part in _parts(table, columns, page, size)]
+    is_long = len(table.rows) > MOST_LINES or sum(part.lines for part in parts) > MOST_LINES
+    body = _long(table, parts, page) if is_long else _float(table, parts, page)
+    return "\n".join([_PACKAGES, *_comments(table, len(columns)), *body, ""])
 
 
-def _size(table: Table, columns: Sequence["_Typeset"], width: float) -> tuple[int, list[int]]:
-    """Return the size of the text [pt] and the columns that are set in it."""
-    needs, every = [column.need for column in columns], list(range(len(columns)))
-    comfortable = [
-        Need(min(n.natural, max(n.least, _COMFORT)), n.natural, n.is_words) for n in needs
-    ]
-    for size in SIZES:
-        if fits(comfortable, width / size, 2 * _BETWEEN / size):
-            return size, every
-    if fits(needs, width / size, 2 * _BETWEEN / size):
-        return size, every
-    return size, fitting(table, needs, math.inf, 0.0)
-
-
-def _comments(table: Table, shown: int) -> Iterator[str]:
+def _comments(table: Table, count: int) -> Iterator[str]:
     if table.shows:
         yield f"% {' '.join(table.shows.split())}"
-    if left_out := len(table.columns) - shown:
+    if left_out := len(table.columns) - count:
         yield f"% {left_out} of {len(table.columns)} columns left out, for which there is no room"
 
 
 class _Typeset:
-    """A column as it is typeset; all widths are in units of the size of its text."""
+    """A column as it is typeset; widths are in units of the size of its text."""
 
     def __init__(self, table: Table, j: int, best: set[tuple[int, int]]) -> None:
         self.column = table.columns[j]
         self.bold = {row for row, column in best if column == j}
         self.cells = [row[j] for row in table.rows]
-        self.of_all = _common_total(self.cells)
+        self.total = _common_total(self.cells)
         self.numbers = [_is_number(cell) for cell in self.cells]
         self.is_number = any(self.numbers)
-        of_words = all(cell is None or isinstance(cell, str) for cell in self.cells)
-        self.is_words = not self.is_number and (self.column.words or of_words)
+        has_words = all(cell is None or isinstance(cell, str) for cell in self.cells)
+        self.is_words = not self.is_number and (self.column.words or has_words)
         self.texts = [self._text(cell) for cell in self.cells]
+        self.letter = _BOLD if self.bold else _LETTER
+        self.piece = _PIECES[0]
 
     def _text(self, cell: Cell) -> str:
         if isinstance(cell, Share):
             percent = words(cell).partition(" = ")[2].replace(" %", "")
-            return percent if self.of_all or not percent else f"{percent} of {cell.total:,}"
+            return percent if self.total or not percent else f"{percent} of {cell.total:,}"
         return shortened(words(cell), _LONGEST)
 
-    @property
-    def heading(self) -> str:
-        return self._headed(self.column.title)
-
-    @property
-    def below(self) -> str:
-        return self._headed(self.column.below)
-
-    def _headed(self, title: str) -> str:
+    def heading(self, title: str) -> str:
+        unit = "%" if self.total else self.column.unit
+        note = f"of {self.total:,}" if self.total else self.column.note
         title = shortened(title, _LONGEST // 3)
-        unit = "%" if self.of_all else self.column.unit
-        note = f"of {self.of_all:,}" if self.of_all else self.column.note
-        parts = (title, f"({note})" if note else "", f"[{unit}]" if unit else "")
-        return " ".join(filter(None, parts))
+        return " ".join(filter(None, (title, note and f"({note})", unit and f"[{unit}]")))
 
     @functools.cached_property
-    def format(self) -> "_Format":
-        """What siunitx's column is told of its numbers."""
-        of = zip(self.texts, self.numbers, strict=True)
-        return _Format.of([text for text, is_number in of if is_number])
+    def format(self) -> tuple[str, str]:
+        """The format of siunitx for its numbers, such as -3.4e-2, and a number that wide."""
+        texts = [
+            text.replace(",", "") for text, n in zip(self.texts, self.numbers, strict=True) if n
+        ]
+        parts = [match.groups("") for match in map(_NUMBER.fullmatch, texts) if match]
+        groups = zip(*parts, strict=True)
+        sign, whole, decimals, power_sign, power = (max(map(len, group)) for group in groups)
+        point = f".{decimals}" if decimals else ""
+        exponent = f"e{'-' * power_sign}{power}" if power else ""
+        widest = sign + whole + (whole - 1) // 3 + decimals + bool(point) + power_sign + power
+        return f"{'-' * sign}{whole}{point}{exponent}", "0" * (widest + bool(power))
 
     @functools.cached_property
-    def body(self) -> float:
+    def natural(self) -> float:
         """How wide the cells are, each in one line."""
-        widths = [wide(text, i in self.bold) for i, text in enumerate(self.texts)]
-        numbers = wide(self.format.widest, bool(self.bold)) if self.is_number else 0.0
-        return max([*widths, numbers])
-
-    @functools.cached_property
-    def need(self) -> Need:
-        """The widths at which it can be set, with head and texts broken into lines."""
-        two = _in_two(self.heading)
-        if not self.is_words:
-            return Need(max(self._head, self.body), max(two, self.body))
-        longest = max((wide(c) for text in self.texts for c in chunks(text)), default=0.0)
-        least = max(self._head, min(self.body, longest, 2 * NARROW))
-        return Need(least, max(least, two, self.body), True)
+        texts = [*self.texts, self.format[1]] if self.is_number else self.texts
+        return self.letter * max(map(len, texts), default=0)
 
     @property
-    def narrow(self) -> Need:
-        """The widths at which it can be set where words are broken between any two letters."""
-        least, natural, _ = self.need
-        if not self.is_words:
-            return Need(least, natural)
-        return Need(max(self._head, min(least, NARROW)), natural, True)
+    def least(self) -> float:
+        """How wide it is with its heading, and the words of its cells, broken into lines."""
+        title = self.heading(self.column.title).split()
+        parts = [part for word in title for part in pieces(word, self.piece)]
+        head = _LETTER * max(map(len, parts), default=0)
+        return max(
+            head, min(self.natural, self.letter * self.piece) if self.is_words else self.natural
+        )
 
-    @property
-    def _head(self) -> float:
-        """How wide the widest word of the head is."""
-        return max(map(wide, fragments(self.heading)), default=0.0)
+    def stacked(self, title: str, width: float) -> str:
+        """Return a heading in lines of at most this width."""
+        line = max(int(width / _LETTER), 1)
+        words = " ".join(
+            part for word in self.heading(title).split() for part in pieces(word, line)
+        )
+        lines = [escaped(line) for line in textwrap.wrap(words, line)]
+        align = "l" if self.is_words else "r"
+        return _stack(lines, align)
 
 
-class _Format(NamedTuple):
-    """How many digits the numbers of a column have, before and after the point and as powers."""
+def _stack(lines: Sequence[str], align: str) -> str:
+    if len(lines) < 2:
+        return "".join(lines)
+    inner = r"\\".join(lines)
+    return rf"\begin{{tabular}}[b]{{@{{}}{align}@{{}}}}{inner}\end{{tabular}}"
 
-    sign: str
-    whole: int
-    decimals: int
-    sign_of_power: str
-    power: int
 
-    @staticmethod
-    def of(texts: Iterable[str]) -> "_Format":
-        """Return what suffices for all of these."""
-        found = [_NUMBER.fullmatch(text.replace(",", "")) for text in texts]
-        parts = [match.groups("") for match in found if match]
-        signs = ["-" if any(part[i] for part in parts) else "" for i in (0, 3)]
-        digits = [max((len(part[i]) for part in parts), default=0) for i in (1, 2, 4)]
-        return _Format(signs[0], digits[0], digits[1], signs[1], digits[2])
+def _fits(columns: Sequence[_Typeset], width: float, size: int) -> bool:
+    """Return whether columns can stand side by side in letters of a size [pt]."""
+    return size * sum(c.least for c in columns) + _GAP * (len(columns) - 1) <= width
 
-    def __str__(self) -> str:
-        """As siunitx wants it: -3.4e-2."""
-        decimals = f".{self.decimals}" if self.decimals else ""
-        power = f"e{self.sign_of_power}{self.power}" if self.power else ""
-        return f"{self.sign}{self.whole}{decimals}{power}"
 
-    @property
-    def widest(self) -> str:
-        """A number with all these digits."""
-        whole = f"{10 ** (self.whole - 1):,}" if self.whole else ""
-        decimals = f".{'0' * self.decimals}" if self.decimals else ""
-        power = f"e{self.sign_of_power}{'0' * self.power}" if self.power else ""
-        return f"{self.sign}{whole}{decimals}{power}".replace("-", "−")
+def _parts(
+    table: Table, columns: Sequence[_Typeset], page: Paper, size: int
+) -> list[list[_Typeset]]:
+    """Return the columns in parts that fit, each begun by those that name a row.
+
+    Raises:
+        ValueError: if the width does not suffice for one column beside those that name a row.
+    """
+    count = min(naming(table), len(columns) - 1)
+    for piece in _PIECES:
+        for column in columns:
+            column.piece = piece
+        parts = _filled(columns, count, page.width, size)
+        if all(_fits(part, page.width, size) for part in parts):
+            return parts
+    raise ValueError(f"--width: expected more for a column of {table.name}, got {page.width:g}pt")
+
+
+def _filled(
+    columns: Sequence[_Typeset], count: int, width: float, size: int
+) -> list[list[_Typeset]]:
+    """Return parts that take all columns that fit, and at least one beside the names."""
+    parts = [list(columns[:count])]
+    for column in columns[count:]:
+        if len(parts[-1]) > count and not _fits([*parts[-1], column], width, size):
+            parts.append(list(columns[:count]))
+        parts[-1].append(column)
+    return parts
 
 
 class _Part:
-    """Some columns of a table side by side, as wide as they are set."""
+    """Some columns of a table side by side."""
 
-    def __init__(
-        self, table: Table, columns: Sequence[_Typeset], widths: Sequence[float], size: int
-    ) -> None:
-        self.table, self.columns, self.widths, self.size = table, columns, widths, size
+    def __init__(self, table: Table, columns: Sequence[_Typeset], width: float, size: int) -> None:
+        self.table, self.columns, self.width, self.size = table, columns, width, size
+        gaps = _GAP * (len(columns) - 1)
+        least, natural = zip(*((c.least, c.natural) for c in columns), strict=True)
+        self.widths = assigned(least, natural, (width - gaps) / size)
+        self.flexible = {j for j, wide in enumerate(self.widths) if wide < natural[j] - 1e-9}
+
+    @property
+    def environment(self) -> str:
+        return "tabularx" if self.flexible else "tabular"
 
     @property
     def preamble(self) -> str:
-        made = []
-        for column, width in zip(self.columns, self.widths, strict=True):
-            if column.is_number:
-                made.append(f"S[table-format={column.format}]")
-            elif not column.is_words:
-                made.append("r")
-            elif column.body <= width:
-                made.append("l")
-            else:
-                made.append(rf">{{\raggedright\arraybackslash}}p{{{self.size * width:.1f}pt}}")
-        return f"@{{}}{' '.join(made)}@{{}}"
+        """Width, where columns share it, and columns."""
+        kinds = [
+            _FLEXIBLE if j in self.flexible
+            else f"S[table-format={column.format[0]}]" if column.is_number
+            else "l" if column.is_words else "r"
+            for j, column in enumerate(self.columns)
+        ]  # fmt: skip
+        return f"{self.given_width}{{@{{}}{' '.join(kinds)}@{{}}}}"
 
     @property
-    def height(self) -> float:
-        """Roughly how high it is [pt]."""
-        lines = 4.0
-        for i in range(len(self.table.rows)):
-            high = [
-                1 + int(1.25 * wide(column.texts[i]) / width)
-                for column, width in zip(self.columns, self.widths, strict=True)
-                if column.is_words and column.body > width
-            ]
-            lines += max(high, default=1)
-        return _LEAD * self.size * lines
+    def given_width(self) -> str:
+        return f"{{{self.width:.1f}pt}}" if self.flexible else ""
+
+    @property
+    def lines(self) -> int:
+        """Roughly how many lines it has."""
+        places = [(self.columns[j], self.widths[j]) for j in self.flexible]
+        return sum(
+            max((math.ceil(1.2 * c.letter * len(c.texts[i]) / w) for c, w in places), default=1)
+            for i in range(len(self.table.rows))
+        )  # fmt: skip
 
     def head(self) -> list[str]:
         """Return the head: a row of groups where there are some, and one of titles."""
-        groups = self._groups()
-        titles = [
-            self._title(column, width, grouped)
-            for column, width, grouped in zip(
-                self.columns, self.widths, self._in_group(), strict=True
-            )
-        ]
-        last = " & ".join(titles) + r" \\"
-        return [*groups, last]
-
-    def _in_group(self) -> list[bool]:
-        return [count > 1 for _, count in self._runs() for _ in range(count)]
+        runs = self._runs()
+        grouped = [count > 1 for _, count in runs for _ in range(count)]
+        titles = []
+        for column, width, is_grouped in zip(self.columns, self.widths, grouped, strict=True):
+            title = column.column.below if is_grouped else column.column.title
+            titles.append(f"{{{column.stacked(title, width)}}}")
+        return [*(self._groups(runs) if any(grouped) else ()), " & ".join(titles) + r" \\"]
 
     def _runs(self) -> list[tuple[str, int]]:
         """Return neighbours of one group: its name and how many they are."""
         runs: list[tuple[str, int]] = []
-        for column in self.columns:
-            group = column.column.group
+        for group in (column.column.group for column in self.columns):
             if group and runs and runs[-1][0] == group:
                 runs[-1] = (group, runs[-1][1] + 1)
             else:
                 runs.append((group, 1))
         return runs
 
-    def _groups(self) -> list[str]:
-        if not any(self._in_group()):
-            return []
-        cells, rules, begin, gap = [], [], 0, 2 * _BETWEEN / self.size
-        for group, count in self._runs():
-            room = sum(self.widths[begin : begin + count]) + gap * (count - 1)
+    def _groups(self, runs: Sequence[tuple[str, int]]) -> list[str]:
+        cells, rules, begin = [], [], 0
+        for group, count in runs:
+            room = sum(self.widths[begin : begin + count])
+            lines = [escaped(line) for line in textwrap.wrap(group, max(int(room / _LETTER), 1))]
             if count > 1:
-                stacked = _stacked(_lines(group, room), "c")
-                cells.append(rf"\multicolumn{{{count}}}{{c}}{{{stacked}}}")
+                cells.append(rf"\multicolumn{{{count}}}{{c}}{{{_stack(lines, 'c')}}}")
                 rules.append(rf"\cmidrule(lr){{{begin + 1}-{begin + count}}}")
             else:
                 cells.append("")
             begin += count
         return [" & ".join(cells) + r" \\", " ".join(rules)]
 
-    def _title(self, column: _Typeset, width: float, grouped: bool) -> str:
-        heading = column.below if grouped else column.heading
-        align = "l" if column.is_words else "r"
-        stacked = _stacked(_lines(heading, width), align)
-        return f"{{{stacked}}}" if align == "l" or column.is_number else stacked
-
     def rows(self) -> list[str]:
         """Return the rows; a first cell that repeats the one above it is left empty."""
         lines: list[str] = []
-        previous: Cell = None
         firsts = [row[0] for row in self.table.rows]
         grouped = len(set(firsts)) < len(firsts)
         for i, first in enumerate(firsts):
-            repeats = bool(lines) and first == previous
-            if grouped and lines and not repeats:
+            repeats = i > 0 and first == firsts[i - 1]
+            if grouped and i and not repeats:
                 lines.append(r"\addlinespace")
-            cells = [
-                "" if k == 0 and repeats else self._cell(column, i, width)
-                for k, (column, width) in enumerate(zip(self.columns, self.widths, strict=True))
-            ]
-            lines.append(" & ".join(cells) + r" \\")
-            previous = first
+            cells = [_cell(column, i) for column in self.columns]
+            lines.append(" & ".join(["" if repeats else cells[0], *cells[1:]]) + r" \\")
         return lines or [rf"\multicolumn{{{len(self.columns)}}}{{c}}{{not measured}} \\"]
 
-    def _cell(self, column: _Typeset, i: int, width: float) -> str:
-        bold = r"\bfseries " if i in column.bold else ""
-        if column.numbers[i]:
-            return bold + column.texts[i].replace(",", "")
-        text = breakable(column.texts[i], width)
-        return f"{bold}{{{text}}}" if column.is_number else bold + text
+
+def _cell(column: _Typeset, i: int) -> str:
+    bold = r"\bfseries " if i in column.bold else ""
+    if column.numbers[i]:
+        return bold + column.texts[i].replace(",", "")
+    text = breakable(column.texts[i])
+    return f"{bold}{{{text}}}" if column.is_number else bold + text
 
 
-def _parts(table: Table, columns: Sequence[_Typeset], width: float, size: int) -> list[_Part]:
-    """Return the columns in as few parts as fit, names broken anywhere if they must be.
-
-    Raises:
-        ValueError: if the width does not suffice for one column beside those that name a row.
-    """
-    names, width, gap = min(naming(table), len(columns)), width / size, 2 * _BETWEEN / size
-    for needs in ([c.need for c in columns], [c.narrow for c in columns]):
-        groups = parts(names, needs, width, gap)
-        if all(fits([needs[j] for j in group], width, gap) for group in groups):
-            chosen = [[columns[j] for j in group] for group in groups]
-            fitted = [assigned([needs[j] for j in group], width, gap) for group in groups]
-            return [_Part(table, c, w, size) for c, w in zip(chosen, fitted, strict=True)]
-    raise ValueError(f"--width: expected more for a column of {table.name}, got {width * size:g}pt")
-
-
-def _float(table: Table, made: Sequence[_Part], page: Paper, size: int) -> list[str]:
+def _float(table: Table, parts: Sequence[_Part], page: Paper) -> list[str]:
     """Return a table that stands on one page, its parts below one another."""
     name = "table*" if page.is_page else "table"
-    body = [rf"\begin{{{name}}}", r"\centering", _SKIP, _NUMBERS, _caption(table, page)]
-    body += _setting(size)
-    for i, part in enumerate(made):
+    body = [rf"\begin{{{name}}}", r"\centering", _SKIP, _NUMBERS, _caption(table)]
+    body += _setting(parts[0].size)
+    for i, part in enumerate(parts):
         body += [r"\par\medskip"] if i else []
         body += [
-            rf"\begin{{tabular}}{{{part.preamble}}}",
+            rf"\begin{{{part.environment}}}{part.preamble}",
             *(r"\toprule", *part.head(), r"\midrule", *part.rows(), r"\bottomrule"),
-            r"\end{tabular}",
+            rf"\end{{{part.environment}}}",
         ]
     return [*body, rf"\end{{{name}}}"]
 
 
-def _long(table: Table, made: Sequence[_Part], page: Paper, size: int) -> list[str]:
+def _long(table: Table, parts: Sequence[_Part], page: Paper) -> list[str]:
     """Return a table that breaks over pages, which needs a document of one column."""
-    body = ["% a longtable: stands where there is one column of text", "{", _NUMBERS]
-    body += [*_setting(size), rf"\setlength{{\LTcapwidth}}{{{page.width:.1f}pt}}"]
-    for i, part in enumerate(made):
+    body = ["% breaks over pages: stands where there is one column of text", "{", _NUMBERS]
+    body += [*_setting(parts[0].size), rf"\setlength{{\LTcapwidth}}{{{page.width:.1f}pt}}"]
+    for i, part in enumerate(parts):
+        environment = "xltabular" if part.flexible else "longtable"
         head = [r"\toprule", *part.head(), r"\midrule"]
-        ordinal = f" (part {i + 1} of {len(made)})" if made[1:] else ""
-        body += [r"\addtocounter{table}{-1}"] if i else []
-        title = breakable(shortened(table.title, _LONGEST), _narrowest_line(page))
-        again = rf"\caption[]{{{title}{ordinal}}}"
-        caption = again if i else _caption(table, page, ordinal)
+        ordinal = f" (part {i + 1} of {len(parts)})" if parts[1:] else ""
+        again = rf"\caption[]{{{breakable(shortened(table.title, _LONGEST))}{ordinal}}}"
         body += [
-            *(rf"\begin{{longtable}}{{{part.preamble}}}", rf"{caption}\\", *head, r"\endfirsthead"),
+            *([r"\addtocounter{table}{-1}"] if i else []),
+            rf"\begin{{{environment}}}{part.preamble}",
+            *(rf"{again if i else _caption(table, ordinal)}\\", *head, r"\endfirsthead"),
             *(*head, r"\endhead", r"\bottomrule", r"\endfoot"),
-            *(*part.rows(), r"\end{longtable}"),
+            *(*part.rows(), rf"\end{{{environment}}}"),
         ]
     return [*body, "}"]
 
 
 def _setting(size: int) -> list[str]:
-    lead = f"{_LEAD * size:g}"
     return [
-        rf"\fontsize{{{size}}}{{{lead}}}\selectfont",
-        rf"\setlength{{\tabcolsep}}{{{_BETWEEN:g}pt}}",
+        rf"\fontsize{{{size}}}{{{1.2 * size:g}}}\selectfont",
+        rf"\setlength{{\tabcolsep}}{{{_GAP / 2:g}pt}}",
     ]
 
 
-def _caption(table: Table, page: Paper, ordinal: str = "") -> str:
+def _caption(table: Table, ordinal: str = "") -> str:
     """Return caption and label: set-up, samples, machine and versions."""
-    title = escaped(shortened(table.title, _LONGEST))
-    text = breakable(_said(table, ordinal), _narrowest_line(page))
-    return rf"\caption[{{{title}}}]{{{text}}}\label{{tab:{_label(table.name)}}}"
-
-
-def _said(table: Table, ordinal: str = "") -> str:
-    """Return what the caption says."""
+    title = shortened(table.title, _LONGEST)
     sentences = [
-        f"{shortened(table.title, _LONGEST)}{ordinal}.",
+        f"{title}{ordinal}.",
         shortened(table.measured, 6 * _LONGEST),
         "Best in bold, ties too." if best_cells(table) else "",
         f"{shortened(table.provenance, 3 * _LONGEST)}." if table.provenance else "",
     ]
-    return " ".join(filter(None, sentences))
-
-
-def _caption_height(table: Table, page: Paper) -> float:
-    """Return roughly how high the caption is [pt], in letters of the largest size."""
-    lines = 1 + 1.1 * SIZES[0] * wide(_said(table)) / page.width
-    return _LEAD * SIZES[0] * lines
-
-
-def _narrowest_line(page: Paper) -> float:
-    """Return how much of a line a word of a caption may take, in units of its size."""
-    return 0.8 * page.width / SIZES[0]
-
-
-def _label(name: str) -> str:
-    return re.sub(r"[^\w:.-]", "-", name, flags=re.ASCII)
+    text = breakable(" ".join(filter(None, sentences)))
+    label = re.sub(r"[^\w:.-]", "-", table.name, flags=re.ASCII)
+    return rf"\caption[{{{escaped(title)}}}]{{{text}}}\label{{tab:{label}}}"
 
 
 def _is_number(cell: Cell) -> bool:
@@ -417,28 +359,3 @@ def _common_total(cells: Iterable[Cell]) -> int:
     """Return the total that all shares of a column have in common, 0 if there is none."""
     totals = {cell.total for cell in cells if isinstance(cell, Share)}
     return totals.pop() if len(totals) == 1 else 0
-
-
-def _in_two(heading: str) -> float:
-    """Return how wide a heading is in at most two lines, as even as can be."""
-    of = fragments(heading)
-    lines = (("".join(of[:i]), "".join(of[i:])) for i in range(1, len(of)))
-    return min((max(map(wide, both)) for both in lines), default=wide(heading))
-
-
-def _lines(text: str, most: float) -> list[str]:
-    """Return a heading in lines that are no wider, but for words that are."""
-    lines: list[str] = []
-    for fragment in fragments(text):
-        if lines and wide(lines[-1] + fragment) <= most:
-            lines[-1] += fragment
-        else:
-            lines.append(fragment)
-    return lines
-
-
-def _stacked(lines: Sequence[str], align: str) -> str:
-    if len(lines) < 2:
-        return "".join(map(escaped, lines))
-    inner = r"\\".join(map(escaped, lines))
-    return rf"\begin{{tabular}}[b]{{@{{}}{align}@{{}}}}{inner}\end{{tabular}}"

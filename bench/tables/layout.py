@@ -2,17 +2,15 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..harness.record import Record
-from ..harness.results import Results
 from .provenance import provenance
+from .results import Results
 from .table import NO_SUMMARY, Column, Source, Summary, Table, cells
 
-if TYPE_CHECKING:
-    from ..figures.sketch import Sketch
-
-Figure = Callable[[Results], "Sketch | None"]
+# Makes a sketch of results, None of what is not on record.
+Figure = Callable[[Results], Any]
 # How the numbers of a table came about that has none.
 NOT_MEASURED = "Nothing of this is on record yet."
 

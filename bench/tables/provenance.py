@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..harness.record import Record
-from ..harness.results import settings
 from ..peers import registry
+from .results import settings
 
 # What is installed for an engine, by how the registry calls the engine.
 _PACKAGES = {

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from plumbob.reference.arguments import FloatArray, choice
 from plumbob.reference.mass_spring import MassSpring, State
 
-from .mujoco_bodies import add_point_mass
+from .mujoco_mass_spring import add_point_mass
 
 JOINTS = {"slide": mujoco.mjtJoint.mjJNT_SLIDE, "hinge": mujoco.mjtJoint.mjJNT_HINGE}
 ALONG_X = np.array([1.0, 0.0, 0.0])

@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike
 from plumbob.reference.arguments import FloatArray, choice
 from plumbob.reference.mass_spring import MassSpring, State
 
-from .mujoco_bodies import add_point_mass
-
 INTEGRATORS = {
     "Euler": mujoco.mjtIntegrator.mjINT_EULER,
     "RK4": mujoco.mjtIntegrator.mjINT_RK4,
@@ -55,14 +53,9 @@ class MujocoMassSpring:
         integrator: str = "Euler",
         iterations: int = 5000,
     ) -> None:
-        """Build the model.
+        """Build the model, with h [s], an integrator of `INTEGRATORS`, and conjugate gradients.
 
-        Args:
-            system: the particles and springs.
-            h: time step [s].
-            integrator: one of `INTEGRATORS`.
-            iterations: most conjugate gradient iterations of "discrete"; MuJoCo's default of 100
-                does not suffice for larger systems.
+        MuJoCo's default of 100 iterations of "discrete" does not suffice for larger systems.
 
         Raises:
             ValueError: if the integrator is unknown.
@@ -81,7 +74,23 @@ class MujocoMassSpring:
         self.columns = first[:, None] + np.arange(3)
 
     def _build(self, system: MassSpring) -> mujoco.MjModel:
-        return tendon_model(system)
+        """Return the model with the springs as tendons.
+
+        The direction of our springs is from the second particle to the first, that of a tendon from
+        the first site to the second: the sites are in reverse order. This matters only where they
+        coincide, because MuJoCo, too, then sets the direction to (1, 0, 0).
+        """
+        spec = particles_spec(system)
+        for i, j in system.springs:
+            tendon = spec.add_tendon()
+            tendon.wrap_site(particle_name(j))
+            tendon.wrap_site(particle_name(i))
+        model = spec.compile()
+        model.tendon_stiffness[:] = system.stiffnesses
+        model.tendon_damping[:] = system.dampings
+        model.tendon_lengthspring[:, 1] = system.rest_lengths
+        model.tendon_lengthspring[:, 0] = np.where(system.tension_only, 0.0, system.rest_lengths)
+        return model
 
     def set_integrator(self, integrator: str) -> None:
         """Set the integrator of the following steps.
@@ -157,26 +166,6 @@ class MujocoMassSpring:
         return np.array(self.data.ten_length)
 
 
-def tendon_model(system: MassSpring) -> mujoco.MjModel:
-    """Return the model with the springs as tendons.
-
-    The direction of our springs is from the second particle to the first, that of a tendon from the
-    first site to the second: the sites are in reverse order. This matters only where they coincide,
-    because MuJoCo, too, then sets the direction to (1, 0, 0).
-    """
-    spec = particles_spec(system)
-    for i, j in system.springs:
-        tendon = spec.add_tendon()
-        tendon.wrap_site(particle_name(j))
-        tendon.wrap_site(particle_name(i))
-    model = spec.compile()
-    model.tendon_stiffness[:] = system.stiffnesses
-    model.tendon_damping[:] = system.dampings
-    model.tendon_lengthspring[:, 1] = system.rest_lengths
-    model.tendon_lengthspring[:, 0] = np.where(system.tension_only, 0.0, system.rest_lengths)
-    return model
-
-
 def particles_spec(system: MassSpring) -> mujoco.MjSpec:
     """Return the bodies of the system, each with a site; energies are computed in forward passes.
 
@@ -194,6 +183,16 @@ def particles_spec(system: MassSpring) -> mujoco.MjSpec:
         for axis in np.eye(3) if free else ():
             body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     return spec
+
+
+def add_point_mass(
+    parent: mujoco.MjsBody, name: str, position: FloatArray, mass: float
+) -> mujoco.MjsBody:
+    """Return a new body at a position in its parent's frame, with its mass at its origin."""
+    body = parent.add_body(name=name, pos=position)
+    body.mass, body.ipos, body.inertia = mass, np.zeros(3), np.ones(3)
+    body.explicitinertial = True
+    return body
 
 
 def particle_name(i: int) -> str:

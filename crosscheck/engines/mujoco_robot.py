@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -12,10 +13,13 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 
 from .file_kind import URDF, file_kind, xml_root
-from .robot_engine import LinkPoses, UnreadableError, select_columns
+from .robot_engine import LinkPoses, RobotEngine
 
 # Elements of a URDF that kinematics does not need and that MuJoCo may refuse.
 LEFT_OUT = ("visual", "collision", "inertial")
+UNIT_INERTIA = """<inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>"""
+SETTINGS = '<mujoco><compiler fusestatic="false" balanceinertia="true"/></mujoco>'
 # Elements to remove from an MJCF file that MuJoCo refuses, those that refer to others first.
 SHAPES = (
     "keys", "sensors", "actuators", "tendons", "equalities", "pairs", "excludes", "skins",
@@ -33,46 +37,41 @@ class Follower(NamedTuple):
     multiplier: float
 
 
-class MujocoRobot:
+class MujocoRobot(RobotEngine):
     """The kinematics of a file as MuJoCo reads it.
 
     Its links are MuJoCo's bodies. A body without a name is called "body#3" by its index, a joint
-    without one "body#3/hinge1" by its body, its type and its index in the body. MuJoCo orders
-    bodies and joints depth first: all are found by name. A URDF's mimic joints become equality
-    constraints, which kinematics does not enforce: this class sets the coordinates of followers and
-    adds their columns of the Jacobian to those of their leaders.
+    without one "body#3/hinge1". MuJoCo orders bodies and joints depth first: all are found by name.
+    A URDF's mimic joints become equality constraints, which kinematics does not enforce: this class
+    sets the coordinates of followers and adds their columns of the Jacobian to those of their
+    leaders.
 
     Attributes:
         model: the mujoco.MjModel.
         data: its mujoco.MjData.
-        links: MuJoCo's index of each body.
         joints: MuJoCo's index of each joint.
         followers: the joints that follow others, each after its leader.
     """
 
-    def __init__(self, path: Path, *, mimic: bool = True) -> None:
-        try:
-            is_urdf = file_kind(path) == URDF
-            with silent():
-                self.model = (mujoco_urdf if is_urdf else mujoco_mjcf)(path)
-            self.followers = _followers(self.model) if is_urdf and mimic else []
-        except (ValueError, OSError, RecursionError) as error:
-            raise UnreadableError(" ".join(str(error).split())) from None
+    def _read(self, path: Path, mimic: bool) -> None:
+        is_urdf = file_kind(path) == URDF
+        with silent():
+            self.model = (mujoco_urdf if is_urdf else mujoco_mjcf)(path)
+        self.followers = _followers(self.model) if is_urdf and mimic else []
         self.data = mujoco.MjData(self.model)
         bodies = [self.model.body(i).name or f"body#{i}" for i in range(self.model.nbody)]
         self.links = {name: i for i, name in enumerate(bodies)}
         self.joints = {_joint_name(self.model, bodies, i): i for i in range(self.model.njnt)}
         at = self.model.jnt_dofadr
-        self._at = {name: int(at[joint]) for name, joint in self.joints.items()}
+        self.columns = {name: int(at[joint]) for name, joint in self.joints.items()}
 
     def update_kinematics(self, values: Mapping[str, FloatArray]) -> None:
-        """Set the coordinates of joints and compute the poses; our conventions are MuJoCo's."""
+        """Set the coordinates of joints, others being as in the file; compute poses, Jacobians."""
         q, q0, at = self.data.qpos, self.model.qpos0, self.model.jnt_qposadr
         q[:] = q0
-        for name, value in values.items():
-            if name in self.joints:
-                first = at[self.joints[name]]
-                q[first : first + len(value)] = value
+        for name in values.keys() & self.joints.keys():
+            first, value = at[self.joints[name]], values[name]
+            q[first : first + len(value)] = value
         for joint, leader, shift, multiplier in self.followers:
             displacement = q[at[leader]] - q0[at[leader]]
             q[at[joint]] = q0[at[joint]] + shift + multiplier * displacement
@@ -84,15 +83,14 @@ class MujocoRobot:
         bodies = [self.links[link] for link in links]
         return LinkPoses(self.data.xpos[bodies], self.data.xmat[bodies].reshape(-1, 3, 3))
 
-    def jacobians(self, links: list[str], freedoms: Mapping[str, int]) -> FloatArray:
-        """Return the Jacobians of links with respect to the named joints, (link, 6, freedom)."""
+    def _jacobians(self, links: list[str]) -> FloatArray:
         J = np.empty((len(links), 6, self.model.nv))
         for part, link in zip(J, links, strict=True):
             mujoco.mj_jacBody(self.model, self.data, part[:3], part[3:], self.links[link])
         at = self.model.jnt_dofadr
         for joint, leader, _, multiplier in reversed(self.followers):
             J[..., at[leader]] += multiplier * J[..., at[joint]]
-        return select_columns(J, self._at, freedoms)
+        return J
 
 
 def mujoco_urdf(path: Path) -> mujoco.MjModel:
@@ -108,15 +106,10 @@ def mujoco_urdf(path: Path) -> mujoco.MjModel:
     for link in root.findall("link"):
         for child in [child for child in link if child.tag in LEFT_OUT]:
             link.remove(child)
-        link.append(_unit_inertia())
+        link.append(ElementTree.fromstring(UNIT_INERTIA))
     for settings in root.findall("mujoco"):
         root.remove(settings)
-    ElementTree.SubElement(
-        ElementTree.SubElement(root, "mujoco"),
-        "compiler",
-        fusestatic="false",
-        balanceinertia="true",
-    )
+    root.append(ElementTree.fromstring(SETTINGS))
     return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
 
 
@@ -159,14 +152,6 @@ def silent() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-def _unit_inertia() -> ElementTree.Element:
-    inertial = ElementTree.Element("inertial")
-    ElementTree.SubElement(inertial, "mass", value="1")
-    moments = {"ixx": "1", "iyy": "1", "izz": "1", "ixy": "0", "ixz": "0", "iyz": "0"}
-    ElementTree.SubElement(inertial, "inertia", moments)
-    return inertial
-
-
 def _joint_name(model: mujoco.MjModel, bodies: list[str], joint: int) -> str:
     """Return a joint's name, or else one made of its body, its type and its index there."""
     body = model.jnt_bodyid[joint]
@@ -180,18 +165,17 @@ def _followers(model: mujoco.MjModel) -> list[Follower]:
     Raises:
         ValueError: if some follow each other in a ring.
     """
-    waiting = {
-        int(model.eq_obj1id[i]): Follower(
-            int(model.eq_obj1id[i]), int(model.eq_obj2id[i]), *map(float, model.eq_data[i, :2])
+    equalities = np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT)
+    followers = [
+        Follower(int(joint), int(leader), *map(float, data))
+        for joint, leader, data in zip(
+            model.eq_obj1id[equalities], model.eq_obj2id[equalities],
+            model.eq_data[equalities, :2], strict=True,
         )
-        for i in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT)
-    }
-    ordered: list[Follower] = []
-    while waiting:
-        ready = [follower for follower in waiting.values() if follower.leader not in waiting]
-        if not ready:
-            raise ValueError("its mimic joints follow each other in a ring")
-        ordered += ready
-        for follower in ready:
-            del waiting[follower.joint]
-    return ordered
+    ]  # fmt: skip
+    by_joint = {follower.joint: follower for follower in followers}
+    try:
+        order = TopologicalSorter({f.joint: [f.leader] for f in followers}).static_order()
+        return [by_joint[joint] for joint in order if joint in by_joint]
+    except CycleError:
+        raise ValueError("its mimic joints follow each other in a ring") from None

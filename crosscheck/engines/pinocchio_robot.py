@@ -12,7 +12,7 @@ from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
 
 from .file_kind import URDF, file_kind, xml_root
-from .robot_engine import LinkPoses, UnreadableError, select_columns
+from .robot_engine import LinkPoses, RobotEngine
 
 COMPOSITE = "JointModelComposite"
 # Its data hold eight tensors of n³ numbers for n freedoms: 4 GB for so many.
@@ -31,50 +31,41 @@ class JointIndices(NamedTuple):
     nv: int
 
 
-class PinocchioRobot:
+class PinocchioRobot(RobotEngine):
     """The kinematics of a file as Pinocchio reads it, with a root fixed to the world.
 
     Its links are Pinocchio's body frames. The coordinates of a hinge without limits in a URDF are
     cosine and sine, quaternions are (x, y, z, w), and the linear velocity of a free joint is in its
     own, moving frame. Several joints of one body in an MJCF file form one composite joint, whose
-    parts are found from the file. A joint without a name is called "trunk/hinge1" by its body, its
-    type and its index in the body.
+    parts are found from the file.
 
     Attributes:
         model: the pinocchio.Model.
         data: its pinocchio.Data.
-        links: Pinocchio's index of each link's frame.
         joints: the indices of each joint's coordinates and velocities.
     """
 
-    def __init__(self, path: Path, *, mimic: bool = True) -> None:
-        try:
-            root = xml_root(path)
-            _check_freedoms(root)
-            is_urdf = file_kind(path) == URDF
-            self.model = pinocchio_urdf(path, root, mimic) if is_urdf else _mjcf(path, root)
-        except (ValueError, RuntimeError, LookupError, OSError) as error:
-            said = str(error).rpartition("message:")[2]  # before it comes where in Pinocchio
-            if isinstance(error, LookupError):
-                said = f"it ends in an {type(error).__name__}: {said}"
-            raise UnreadableError(" ".join(said.split())) from None
+    def _read(self, path: Path, mimic: bool) -> None:
+        root = xml_root(path)
+        _check_freedoms(root)
+        is_urdf = file_kind(path) == URDF
+        self.model = pinocchio_urdf(path, root, mimic) if is_urdf else _mjcf(path, root)
         self.data = self.model.createData()
         frames = enumerate(self.model.frames)
         self.links = {f.name: i for i, f in frames if f.type == pinocchio.FrameType.BODY}
         self.joints = dict(_indices(self.model) if is_urdf else _indices_by_body(self.model, root))
-        self._at = {name: indices.v for name, indices in self.joints.items()}
+        self.columns = {name: indices.v for name, indices in self.joints.items()}
         self._free_rotations: dict[str, FloatArray] = {}
 
     def update_kinematics(self, values: Mapping[str, FloatArray]) -> None:
-        """Set the coordinates of joints and compute the poses and Jacobians.
+        """Set the coordinates of joints, others being as in the file; compute poses, Jacobians.
 
         `getFrameJacobian` requires a call of `computeJointJacobians`, in the plural.
         """
         q = pinocchio.neutral(self.model)
-        for name, value in values.items():
-            if name in self.joints:
-                indices = self.joints[name]
-                q[indices.q : indices.q + indices.nq] = _theirs(value, indices.nq)
+        for name in values.keys() & self.joints.keys():
+            indices = self.joints[name]
+            q[indices.q : indices.q + indices.nq] = _theirs(values[name], indices.nq)
         self._free_rotations = {
             name: rotation.to_matrix(value[3:])
             for name, value in values.items()
@@ -90,8 +81,8 @@ class PinocchioRobot:
             np.array([M.translation for M in frames]), np.array([M.rotation for M in frames])
         )
 
-    def jacobians(self, links: list[str], freedoms: Mapping[str, int]) -> FloatArray:
-        """Return the Jacobians of links with respect to the named joints, (link, 6, freedom).
+    def _jacobians(self, links: list[str]) -> FloatArray:
+        """Return the Jacobians of links with respect to all joints, (link, 6, column).
 
         The velocity of a free joint is v = R^T p' in its moving frame and p' in the fixed one.
         `getFrameJacobian` crashes for a model without freedoms and returns a single column as a
@@ -100,12 +91,12 @@ class PinocchioRobot:
         J = np.empty((len(links), 6, self.model.nv))
         frame = pinocchio.LOCAL_WORLD_ALIGNED
         for part, link in zip(J if self.model.nv else (), links, strict=False):
-            one = pinocchio.getFrameJacobian(self.model, self.data, self.links[link], frame)
-            part[:] = one.reshape(6, -1)
+            columns = pinocchio.getFrameJacobian(self.model, self.data, self.links[link], frame)
+            part[:] = columns.reshape(6, -1)
         for name, R in self._free_rotations.items():
             first = self.joints[name].v
             J[..., first : first + 3] = J[..., first : first + 3] @ R.T
-        return select_columns(J, self._at, freedoms)
+        return J
 
 
 def _check_freedoms(root: ElementTree.Element) -> None:

@@ -1,8 +1,9 @@
-"""The interface of a robot in an engine that reads files itself; links and joints have names."""
+"""A robot in an engine that reads files itself; links and joints have names."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,18 +15,13 @@ class UnreadableError(Exception):
 
 
 class LinkPoses(NamedTuple):
-    """Positions and rotations of links.
-
-    Attributes:
-        positions: of the links' origins [m], shape (link, 3).
-        matrices: their rotations, shape (link, 3, 3).
-    """
+    """Positions of links' origins [m], (link, 3), and their rotations, (link, 3, 3)."""
 
     positions: FloatArray
     matrices: FloatArray
 
 
-class RobotEngine(Protocol):
+class RobotEngine(ABC):
     """A robot or character as an engine reads it from its file.
 
     A joint without a name is called "arm/hinge1" by its body, its type and its index in the body.
@@ -34,15 +30,14 @@ class RobotEngine(Protocol):
     or slide [m], (w, x, y, z) for a ball, and for a free joint a position [m] and (w, x, y, z),
     both in the frame of its zero configuration. Velocities are the angular velocity of a ball in
     its own frame and, of a free joint, the rate of its position followed by its angular velocity.
+
+    Attributes:
+        links: the engine's index of each link or body, by name.
+        columns: the first column of the Jacobian of each movable joint, by name.
     """
 
-    @property
-    def links(self) -> Mapping[str, int]:
-        """The index of each link or body that the engine knows, by name."""
-
-    @property
-    def joints(self) -> Mapping[str, object]:
-        """The movable joints, by name."""
+    links: Mapping[str, int]
+    columns: Mapping[str, int]
 
     def __init__(self, path: Path, *, mimic: bool = True) -> None:
         """Read a URDF or MJCF file.
@@ -54,12 +49,29 @@ class RobotEngine(Protocol):
         Raises:
             UnreadableError: if the engine refuses.
         """
+        try:
+            self._read(path, mimic)
+        except (ValueError, RuntimeError, LookupError, OSError) as error:
+            why = str(error).rpartition("message:")[2]  # before it comes where in Pinocchio
+            if isinstance(error, LookupError):
+                why = f"it ends in an {type(error).__name__}: {why}"
+            raise UnreadableError(" ".join(why.split())) from None
 
+    @abstractmethod
+    def _read(self, path: Path, mimic: bool) -> None:
+        """Read a file into the model, the links and the columns."""
+
+    @abstractmethod
     def update_kinematics(self, values: Mapping[str, FloatArray]) -> None:
-        """Set the coordinates of joints, others being as in the file, and compute the poses."""
+        """Set the coordinates of joints, others being as in the file; compute poses, Jacobians."""
 
+    @abstractmethod
     def link_poses(self, links: list[str]) -> LinkPoses:
         """Return the current poses of some links."""
+
+    @abstractmethod
+    def _jacobians(self, links: list[str]) -> FloatArray:
+        """Return the Jacobians of links with respect to all joints, (link, 6, column)."""
 
     def jacobians(self, links: list[str], freedoms: Mapping[str, int]) -> FloatArray:
         """Return the Jacobians of links with respect to the named joints.
@@ -72,14 +84,11 @@ class RobotEngine(Protocol):
             (link, 6, freedom): linear [m], then angular velocity, of the links' origins, in the
             frame of the world.
         """
-
-
-def select_columns(J: FloatArray, at: Mapping[str, int], freedoms: Mapping[str, int]) -> FloatArray:
-    """Return the columns of named joints in their order, zero for joints that `at` lacks."""
-    result = np.zeros((*J.shape[:-1], sum(freedoms.values())))
-    first = 0
-    for name, width in freedoms.items():
-        if name in at:
-            result[..., first : first + width] = J[..., at[name] : at[name] + width]
-        first += width
-    return result
+        J = self._jacobians(links)
+        result, first = np.zeros((*J.shape[:-1], sum(freedoms.values()))), 0
+        for name, width in freedoms.items():
+            if name in self.columns:
+                start = self.columns[name]
+                result[..., first : first + width] = J[..., start : start + width]
+            first += width
+        return result

@@ -79,24 +79,20 @@ def forces_of_the_step(
     Returns:
         Forces on the free particles [N], shape (free, 3); sum of |force| over all springs [N].
     """
-    l_n = _engine_at(system, state).lengths()
     dampers = MassSpring(
-        system.masses, system.springs, l_n, system.dampings / h,
+        system.masses, system.springs, _engine_at(system, state).lengths(), system.dampings / h,
         pinned=system.pinned, gravity=(0.0, 0.0, 0.0),
     )  # fmt: skip
-    end = State(x, np.zeros_like(x))
-    springs_at_end, dampers_at_end = _engine_at(system, end), _engine_at(dampers, end)
-    forces = springs_at_end.spring_forces() + springs_at_end.gravity_forces()
-    pulls = _tensions(system, springs_at_end), _tensions(dampers, dampers_at_end)
-    return forces + dampers_at_end.spring_forces(), float(np.abs(pulls).sum())
+    forces, tensions = np.zeros((1, 3)), 0.0
+    for part in (system, dampers):
+        engine = _engine_at(part, State(x, np.zeros_like(x)))
+        forces = forces + engine.spring_forces() + engine.gravity_forces()
+        pulls = part.stiffnesses * (engine.lengths() - part.rest_lengths)
+        tensions += float(np.abs(pulls).sum())
+    return forces, tensions
 
 
 def _engine_at(system: MassSpring, state: State) -> MujocoMassSpring:
     engine = MujocoMassSpring(system)
     engine.update_forces(state)
     return engine
-
-
-def _tensions(system: MassSpring, engine: MujocoMassSpring) -> FloatArray:
-    """Return each spring's k (l - r) [N], by MuJoCo's lengths, shape (spring,)."""
-    return system.stiffnesses * (engine.lengths() - system.rest_lengths)

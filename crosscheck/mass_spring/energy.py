@@ -12,15 +12,10 @@ from .integrators import Simulation
 
 
 class EnergySeries(NamedTuple):
-    """The energy of a system over time.
+    """The energy of a system over time."""
 
-    Attributes:
-        times: [s], shape (sample,), from zero.
-        energies: kinetic and potential [J], shape (sample,).
-    """
-
-    times: FloatArray
-    energies: FloatArray
+    times: FloatArray  # [s], shape (sample,), from zero
+    energies: FloatArray  # kinetic and potential [J], shape (sample,)
 
 
 def energy_series(

@@ -18,41 +18,34 @@ from .comparison import states
 Simulation = Callable[[State, ArrayLike | None, int], State]
 
 
+def _repeated(step: Callable[[State, ArrayLike | None], State]) -> Simulation:
+    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
+        for _ in range(steps):
+            state = step(state, external_forces)
+        return state
+
+    return simulate
+
+
 def explicit(
     step: Callable[[MassSpring, State, float, ArrayLike | None], State],
     system: MassSpring,
     h: float,
 ) -> Simulation:
     """Return the simulation by one of our explicit integrators."""
-
-    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
-        for _ in range(steps):
-            state = step(system, state, h, external_forces)
-        return state
-
-    return simulate
+    return _repeated(lambda state, loads: step(system, state, h, loads))
 
 
 def implicit(solver: str, system: MassSpring, h: float, *, tolerance: float = 1e-13) -> Simulation:
     """Return the simulation by implicit Euler with one of its solvers."""
     integrator = ImplicitEuler(system, h=h, solver=solver, tolerance=tolerance)
-
-    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
-        for _ in range(steps):
-            state = integrator.step(state, external_forces).state
-        return state
-
-    return simulate
+    return _repeated(lambda state, loads: integrator.step(state, loads).state)
 
 
 def mujoco(integrator: str, system: MassSpring, h: float) -> Simulation:
     """Return the simulation by one of MuJoCo's integrators."""
     engine = MujocoMassSpring(system, h=h, integrator=integrator)
-
-    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
-        return engine.step(state, external_forces, steps=steps)
-
-    return simulate
+    return lambda state, loads, steps: engine.step(state, loads, steps=steps)
 
 
 SIMULATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
@@ -60,11 +53,10 @@ SIMULATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {
     "Runge-Kutta": partial(explicit, runge_kutta),
     "implicit Euler": partial(implicit, "newton"),
     "Gauss-Newton": partial(implicit, "gauss_newton"),
-    "MuJoCo Euler": partial(mujoco, "Euler"),
-    "MuJoCo RK4": partial(mujoco, "RK4"),
-    "MuJoCo implicit": partial(mujoco, "implicit"),
-    "MuJoCo implicitfast": partial(mujoco, "implicitfast"),
-    "MuJoCo discrete": partial(mujoco, "discrete"),
+    **{
+        f"MuJoCo {name}": partial(mujoco, name)
+        for name in ("Euler", "RK4", "implicit", "implicitfast", "discrete")
+    },
 }
 
 

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from plumbob.reference.implicit_euler import ImplicitEuler
-
 from .. import samples
 from ..engines.mujoco_joint_chain import JOINTS, MujocoJointChain
 from ..verdict import Comparison
+from .integrators import implicit
 
 STEPS = 100
 # Residual of a step: a few rounding errors.
@@ -19,16 +18,9 @@ def joint_chains(case: int) -> Comparison:
     Positions and velocities are relative to the largest of each.
     """
     system, state, external, h = samples.line(case)
-    integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE)
-    end = state
-    for _ in range(STEPS):
-        end = integrator.step(end, external).state
-    theirs = np.array(
-        [
-            MujocoJointChain(system, h=h, joint=joint).step(state, external, steps=STEPS)
-            for joint in JOINTS
-        ]
-    )
+    end = implicit("newton", system, h, tolerance=TOLERANCE)(state, external, STEPS)
+    chains = [MujocoJointChain(system, h=h, joint=joint) for joint in JOINTS]
+    theirs = np.array([chain.step(state, external, steps=STEPS) for chain in chains])
     scales = np.abs(theirs).max(axis=(0, 2))[:, None]
     ours, start = (
         np.tile([s.positions[:, 0], s.velocities[:, 0]], (len(JOINTS), 1, 1)) for s in (end, state)

@@ -16,20 +16,20 @@ def robot_claims(family: str, engine: str) -> list[Claim]:
     """Return the claims about one family of files against one engine."""
     poses = "forward_kinematics in random configurations"
     quantities = {
-        "positions": (poses, POSITION),
-        "rotations": (poses, ROTATION),
-        "Jacobians": ("jacobians.jacobians", JACOBIAN),
+        "positions": (comparisons.positions, poses, POSITION),
+        "rotations": (comparisons.rotations, poses, ROTATION),
+        "Jacobians": (comparisons.jacobians, "jacobians.jacobians", JACOBIAN),
     }
     return [
         Claim(
             f"{family[:-1]} {quantity}, {engine}",
             f"{READS[family]}, {ours}: all links",
             f"{FILES[family]} as {engine} reads them, links and joints matched by name",
-            partial(getattr(comparisons, quantity.lower()), family, engine),
+            partial(comparisons.compare, compared, family, engine),
             tolerance,
             cases=len(comparable(family, engine, moving=quantity == "positions")),
         )
-        for quantity, (ours, tolerance) in quantities.items()
+        for quantity, (compared, ours, tolerance) in quantities.items()
     ]
 
 

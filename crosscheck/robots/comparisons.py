@@ -1,53 +1,141 @@
-"""Comparisons of the poses and Jacobians of the links of robots and characters."""
+"""The poses and Jacobians of the links of robots and characters, beside an engine's."""
 
 import contextlib
-from collections.abc import Iterable, Iterator
+import functools
+import math
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from plumbob.reference import jacobians as jacobians_of
+from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
+from plumbob.reference.formats.robot import Robot
+from plumbob.reference.kinematics import forward_kinematics
 
-from ..engines.robot_engine import UnreadableError
+from .. import samples
+from ..engines import ROBOT_ENGINES
+from ..engines.robot_engine import RobotEngine, UnreadableError
 from ..verdict import Comparison
-from .models import comparable
-from .sweep import LinkKinematics, Sweep, reference_kinematics, sweep
+from .models import Model, comparable, random_coordinates, slots
+
+CONFIGURATIONS = 5
+# Jacobians are compared for so many links at a time that they hold at most this many numbers.
+PART = 2**22
 
 
-def positions(family: str, engine: str, cases: int) -> Iterator[Comparison]:
+class LinkKinematics(NamedTuple):
+    """Poses and Jacobians of links in each configuration."""
+
+    positions: FloatArray  # of the links' origins [m], (configuration, link, 3)
+    matrices: FloatArray  # their rotations, (configuration, link, 3, 3)
+    jacobians: FloatArray  # (configuration, link, 6, freedom)
+
+
+class Sweep(NamedTuple):
+    """A model in random configurations with the engine's kinematics of its links."""
+
+    robot: Robot  # as the reference reads it
+    q: FloatArray  # the configurations, (configuration, coordinate)
+    links: np.ndarray  # indices of our joints whose links the engine knows
+    theirs: LinkKinematics  # of those links
+    free_mimics: str  # why mimic joints move independently; empty if they follow their leaders
+
+
+def sweep_in_parts(engine: str, model: Model, part: float = PART) -> Iterator[Sweep]:
+    """Read a model and evaluate it by an engine in random configurations, some links at a time.
+
+    If the reference or the engine refuses the mimic joints, these move independently for both.
+
+    Raises:
+        UnreadableError: if the engine does not read the file.
+        ValueError: if only the reference does not read it.
+    """
+    try:
+        yield from _sweep(engine, model, part)
+    except (UnreadableError, ValueError) as error:
+        reason = str(error).replace(str(model.path), model.path.name)
+        yield from _sweep(engine, model, part, reason)
+
+
+@functools.cache  # because there are several claims about every model
+def sweep(engine: str, model: Model) -> Sweep:
+    """Return the sweep of all links; raise as `sweep_in_parts` does."""
+    return next(sweep_in_parts(engine, model, np.inf))
+
+
+def reference_kinematics(robot: Robot, q: FloatArray, links: np.ndarray) -> LinkKinematics:
+    """Return the kinematics of some links by the reference, from the indices of their joints."""
+    pose = forward_kinematics(robot.articulation, q)
+    return LinkKinematics(
+        pose.positions[:, links],
+        rotation.to_matrix(pose.rotations[:, links]),
+        jacobians_of.jacobians(robot.articulation, q, joints=links),
+    )
+
+
+def _sweep(engine: str, model: Model, part: float, free_mimics: str = "") -> Iterator[Sweep]:
+    theirs = ROBOT_ENGINES[engine](model.path, mimic=not free_mimics)
+    robot = model.read(mimic=not free_mimics)
+    articulation = robot.articulation
+    q = random_coordinates(articulation, samples.generator(model.name, 0), CONFIGURATIONS)
+    known = [j for j, name in enumerate(articulation.names) if name in theirs.links]
+    if not known:
+        raise UnreadableError("it gives none of the links its name")
+    numbers = len(known) * CONFIGURATIONS * 6 * articulation.freedom_count
+    for links in np.array_split(known, min(len(known), math.ceil(numbers / part) or 1)):
+        names = [articulation.names[j] for j in links]
+        yield Sweep(robot, q, links, _kinematics(theirs, robot, q, names), free_mimics)
+
+
+def _kinematics(
+    engine: RobotEngine, robot: Robot, q: FloatArray, links: list[str]
+) -> LinkKinematics:
+    joints = slots(robot)
+    freedoms = {slot.name: slot.freedoms.stop - slot.freedoms.start for slot in joints}
+    rows = []
+    for row in q:
+        engine.update_kinematics({slot.name: row[slot.coordinates] for slot in joints})
+        rows.append((*engine.link_poses(links), engine.jacobians(links, freedoms)))
+    return LinkKinematics(*map(np.array, zip(*rows, strict=True)))
+
+
+Quantity = Callable[[Sweep, LinkKinematics], Comparison]
+
+
+def positions(swept: Sweep, ours: LinkKinematics) -> Comparison:
     """Compare the positions of all links, relative to their extent."""
-    for swept, ours in _read(family, engine, cases, moving=True):
-        yield Comparison(
-            ours.positions, swept.theirs.positions, _at_zero(swept).positions, extent(ours)
-        )
+    at_zero = _at_zero(swept).positions
+    return Comparison(ours.positions, swept.theirs.positions, at_zero, extent(ours))
 
 
-def rotations(family: str, engine: str, cases: int) -> Iterator[Comparison]:
+def rotations(swept: Sweep, ours: LinkKinematics) -> Comparison:
     """Compare the rotation matrices of all links."""
-    for swept, ours in _read(family, engine, cases):
-        yield Comparison(ours.matrices, swept.theirs.matrices, _at_zero(swept).matrices, 1.0)
+    return Comparison(ours.matrices, swept.theirs.matrices, _at_zero(swept).matrices, 1.0)
 
 
-def jacobians(family: str, engine: str, cases: int) -> Iterator[Comparison]:
+def jacobians(swept: Sweep, ours: LinkKinematics) -> Comparison:
     """Compare the Jacobians of all links, linear velocities relative to the links' extent."""
-    for swept, ours in _read(family, engine, cases):
-        size: FloatArray = np.repeat([extent(ours) or 1.0, 1.0], 3)[:, None]  # of the rows, (6, 1)
-        theirs = swept.theirs.jacobians / size
-        yield Comparison(ours.jacobians / size, theirs, np.zeros_like(theirs), 1.0)
+    size: FloatArray = np.repeat([extent(ours) or 1.0, 1.0], 3)[:, None]  # of the rows, (6, 1)
+    theirs = swept.theirs.jacobians / size
+    return Comparison(ours.jacobians / size, theirs, np.zeros_like(theirs), 1.0)
+
+
+def compare(quantity: Quantity, family: str, engine: str, cases: int) -> Iterator[Comparison]:
+    """Yield the comparisons of the first few models, except those that the engine cannot read."""
+    for model in comparable(family, engine, moving=quantity is positions)[:cases]:
+        with contextlib.suppress(UnreadableError):
+            swept = sweep(engine, model)
+            yield quantity(swept, reference_kinematics(swept.robot, swept.q, swept.links))
 
 
 class Differences(NamedTuple):
-    """The largest differences in one model.
+    """The largest differences in one model."""
 
-    Attributes:
-        positions: relative to the extent of the links.
-        rotations: of matrices.
-        jacobians: of linear velocities relative to the extent, of angular ones to one radian.
-    """
-
-    positions: float
-    rotations: float
-    jacobians: float
+    positions: float  # relative to the extent of the links
+    rotations: float  # of matrices
+    jacobians: float  # of linear velocities relative to the extent, of angular ones to a radian
 
 
 def differences(parts: Iterable[Sweep]) -> Differences:
@@ -67,16 +155,6 @@ def differences(parts: Iterable[Sweep]) -> Differences:
 def extent(links: LinkKinematics) -> float:
     """Return the largest side of the box around all links in all configurations [m]."""
     return float(np.ptp(links.positions.reshape(-1, 3), axis=0).max())
-
-
-def _read(
-    family: str, engine: str, cases: int, *, moving: bool = False
-) -> Iterator[tuple[Sweep, LinkKinematics]]:
-    """Yield the first few models, except those that the engine cannot read."""
-    for model in comparable(family, engine, moving=moving)[:cases]:
-        with contextlib.suppress(UnreadableError):
-            swept = sweep(engine, model)
-            yield swept, reference_kinematics(swept.robot, swept.q, swept.links)
 
 
 def _at_zero(swept: Sweep) -> LinkKinematics:

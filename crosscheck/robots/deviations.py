@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element
 from ..engines.file_kind import MJCF, file_kind, xml_root
 
 JOINTS = ("joint", "freejoint")
+DEFAULTS = ".//default/joint"
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 
 OUTER_ROOT = "a first body without a joint is put at the world's origin"
@@ -43,37 +44,16 @@ def _rotated_root(root: Element) -> bool:
     )
 
 
-def _class_anchor(root: Element) -> bool:
-    return any(_has(joint, "pos") for joint in _defaults(root))
-
-
 def _shared_ref(root: Element) -> bool:
-    by_class = any(_has(joint, "ref") for joint in _defaults(root))
+    by_class = any(_has(joint, "ref") for joint in root.iterfind(DEFAULTS))
     return any(
         len(joints) > 1 and (by_class or any(_has(joint, "ref") for joint in joints))
         for joints in map(_joints, root.iter("body"))
     )
 
 
-def _frame(root: Element) -> bool:
-    inner = (element for frame in root.iter("frame") for element in frame.iter())
-    return any(element.tag in ("body", *JOINTS) for element in inner)
-
-
-def _include(root: Element) -> bool:
-    return root.find(".//include") is not None
-
-
-def _nameless(root: Element) -> bool:
-    return any(not body.get("name") for body in root.iter("body"))
-
-
 def _joints(body: Element) -> list[Element]:
     return [child for child in body if child.tag in JOINTS]
-
-
-def _defaults(root: Element) -> list[Element]:
-    return [joint for default in root.iter("default") for joint in default.findall("joint")]
 
 
 def _has(element: Element, *attributes: str) -> bool:
@@ -83,9 +63,13 @@ def _has(element: Element, *attributes: str) -> bool:
 DEVIATIONS: dict[str, Callable[[Element], bool]] = {
     OUTER_ROOT: _outer_root,
     ROTATED_ROOT: _rotated_root,
-    CLASS_ANCHOR: _class_anchor,
+    CLASS_ANCHOR: lambda root: any(_has(joint, "pos") for joint in root.iterfind(DEFAULTS)),
     SHARED_REF: _shared_ref,
-    FRAME: _frame,
-    INCLUDE: _include,
-    NAMELESS: _nameless,
+    FRAME: lambda root: any(
+        frame.find(f".//{tag}") is not None
+        for frame in root.iter("frame")
+        for tag in ("body", *JOINTS)
+    ),
+    INCLUDE: lambda root: root.find(".//include") is not None,
+    NAMELESS: lambda root: any(not body.get("name") for body in root.iter("body")),
 }

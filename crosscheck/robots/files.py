@@ -1,5 +1,6 @@
 """Compare the reference with other readers on all files in folders."""
 
+import contextlib
 import os
 import tempfile
 import warnings
@@ -14,16 +15,15 @@ from plumbob.reference import Articulation, Skeleton, forward_kinematics, jacobi
 from plumbob.reference.formats import bvh
 from plumbob.reference.formats.source import read_text
 
-from ..child_process import ChildProcess, LostError
+from ..child_process import CallProcess, LostError
 from ..engines import ROBOT_ENGINES
 from ..engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind, xml_root
 from ..engines.robot_engine import UnreadableError
 from ..tolerances import POSITION
-from .comparisons import differences
+from .comparisons import differences, sweep_in_parts
 from .deviations import known_deviations
 from .independent_bvh import global_poses
 from .models import Model
-from .sweep import sweep_in_parts
 
 SECOND_READER = "second reader"
 # Elements of an MJCF file whose attributes are some obsolete: MuJoCo refuses files for them.
@@ -36,22 +36,18 @@ UNREAD, REFUSED, NEITHER, LOST = "not read", "not read by us", "read by neither"
 class Reading(NamedTuple):
     """The comparison of the reference and an engine on one file.
 
-    Attributes:
-        engine: name of the engine.
-        outcome: AGREES or DIFFERS if both read it, DEVIATES if they differ for a known reason;
-            UNREAD if only the engine does not read it, REFUSED if only the reference does not,
-            NEITHER if both do not; LOST if the process crashed or took too long.
-        difference: the largest one of positions and linear velocities, relative to the extent of
-            the links, and of rotation matrices and angular velocities; None unless both read it.
-        why: the reason for the outcome, or "".
-        notes: the warnings of the reference.
+    The outcome is AGREES or DIFFERS if both read it, DEVIATES if they differ for a known reason;
+    UNREAD if only the engine does not read it, REFUSED if only the reference does not, NEITHER if
+    both do not; LOST if the process crashed or took too long. The difference is the largest one of
+    positions and linear velocities, relative to the extent of the links, and of rotation matrices
+    and angular velocities; None unless both read it.
     """
 
     engine: str
     outcome: str
     difference: float | None = None
-    why: str = ""
-    notes: tuple[str, ...] = ()
+    why: str = ""  # the reason for the outcome
+    notes: tuple[str, ...] = ()  # the warnings of the reference
 
 
 class File(NamedTuple):
@@ -87,11 +83,14 @@ def find(paths: Iterable[str | Path]) -> Found:
     for path in map(Path, paths):
         if not path.exists():
             raise ValueError(f"{path}: there is no such file or folder")
+        root = path if path.is_dir() else path.parent
         for name in _below(path):
-            kind = _kind(name)
+            kind = ""
+            with contextlib.suppress(ValueError):
+                kind = file_kind(name)
             others += not kind
             if kind:
-                files.setdefault(name.resolve(), File(name, kind, _root(path)))
+                files.setdefault(name.resolve(), File(name, kind, root))
     if not files:
         raise ValueError(
             f"{', '.join(map(str, paths))}: expected URDF, MJCF or BVH files, got none"
@@ -108,7 +107,7 @@ def check(files: Iterable[File], patience: float = 60.0) -> Iterator[Checked]:
     """
     files = tuple(files)
     included = {path for file in files for path in _includes(file)}
-    with ChildProcess(prepare, patience) as child:
+    with contextlib.closing(CallProcess(prepare, patience)) as child:
         for file in files:
             readings = [_read(child, engine, file) for engine in ENGINES.get(file.kind, ())]
             if file.path.resolve() in included and all(r.outcome == NEITHER for r in readings):
@@ -183,14 +182,14 @@ def _refusal(file: File) -> str:
     return ""
 
 
-def _read(child: ChildProcess, engine: str, file: File) -> Reading:
+def _read(child: CallProcess, engine: str, file: File) -> Reading:
     try:
         return child.call(compare, engine, file)
     except LostError as error:
         return Reading(engine, LOST, why=str(error))
 
 
-def _with_causes(child: ChildProcess, file: File, readings: list[Reading]) -> tuple[Reading, ...]:
+def _with_causes(child: CallProcess, file: File, readings: list[Reading]) -> tuple[Reading, ...]:
     """Explain a difference of Pinocchio by known causes if MuJoCo agrees with the reference.
 
     Where MuJoCo refuses the file, it reads a copy without settings, which kinematics does not need.
@@ -223,13 +222,6 @@ def _without_settings(file: File, folder: Path) -> File:
     return File(folder / main.relative_to(top), MJCF, folder)
 
 
-def _kind(path: Path) -> str:
-    try:
-        return file_kind(path)
-    except ValueError:
-        return ""
-
-
 def _below(path: Path) -> list[Path]:
     """Return the regular files with known suffixes at a path or below it, in order."""
     if not path.is_dir():
@@ -237,10 +229,6 @@ def _below(path: Path) -> list[Path]:
     found = [Path(folder) / name for folder, _, names in os.walk(path) for name in names]
     suffixes = (".urdf", ".bvh", ".xml", ".mjcf")
     return sorted(name for name in found if name.suffix.lower() in suffixes and name.is_file())
-
-
-def _root(path: Path) -> Path:
-    return path if path.is_dir() else path.parent
 
 
 def _includes(file: File) -> list[Path]:

@@ -21,36 +21,19 @@ PACKAGES = {ROBOTS: ("example-robot-data",), CHARACTERS: ("gymnasium", "dm_contr
 EXTRA = "robots"
 
 # Models with several bodies; those that only vary another are left out.
-_CHARACTERS = (
-    "envs/mujoco/assets/ant.xml",
-    "envs/mujoco/assets/half_cheetah.xml",
-    "envs/mujoco/assets/hopper.xml",
-    "envs/mujoco/assets/humanoid.xml",
-    "envs/mujoco/assets/pusher.xml",
-    "envs/mujoco/assets/reacher.xml",
-    "envs/mujoco/assets/swimmer.xml",
-    "envs/mujoco/assets/walker2d.xml",
-    "suite/humanoid.xml",
-    "suite/dog.xml",
-    "suite/humanoid_CMU.xml",
-    "suite/quadruped.xml",
-    "suite/walker.xml",
-    "suite/cheetah.xml",
-    "suite/hopper.xml",
-    "suite/fish.xml",
-    "suite/manipulator.xml",
-    "suite/stacker.xml",
-    "locomotion/walkers/assets/humanoid_CMU_V2019.xml",
-    "locomotion/walkers/assets/humanoid_CMU_V2020.xml",
-    "locomotion/walkers/assets/rodent.xml",
-    "locomotion/walkers/assets/dog_v2/dog.xml",
-    "locomotion/walkers/assets/fruitfly_v2/fruitfly.xml",
-    "locomotion/walkers/assets/jumping_ball/jumping_ball_with_head.xml",
-    "locomotion/soccer/assets/boxhead/boxhead.xml",
-    "third_party/ant/ant.xml",
-    "third_party/kinova/jaco_arm.xml",
-    "mujoco/testing/assets/model_with_ball_joints.xml",
-)
+_CHARACTERS = """
+    envs/mujoco/assets/ant.xml envs/mujoco/assets/half_cheetah.xml envs/mujoco/assets/hopper.xml
+    envs/mujoco/assets/humanoid.xml envs/mujoco/assets/pusher.xml envs/mujoco/assets/reacher.xml
+    envs/mujoco/assets/swimmer.xml envs/mujoco/assets/walker2d.xml suite/humanoid.xml
+    suite/dog.xml suite/humanoid_CMU.xml suite/quadruped.xml suite/walker.xml suite/cheetah.xml
+    suite/hopper.xml suite/fish.xml suite/manipulator.xml suite/stacker.xml
+    locomotion/walkers/assets/humanoid_CMU_V2019.xml
+    locomotion/walkers/assets/humanoid_CMU_V2020.xml locomotion/walkers/assets/rodent.xml
+    locomotion/walkers/assets/dog_v2/dog.xml locomotion/walkers/assets/fruitfly_v2/fruitfly.xml
+    locomotion/walkers/assets/jumping_ball/jumping_ball_with_head.xml
+    locomotion/soccer/assets/boxhead/boxhead.xml third_party/ant/ant.xml
+    third_party/kinova/jaco_arm.xml mujoco/testing/assets/model_with_ball_joints.xml
+"""
 # Models that an engine is known to read differently, and why; a test reproduces each cause.
 CAUSES = {
     ("Pinocchio", "suite/dog.xml"): CLASS_ANCHOR,
@@ -76,17 +59,11 @@ IMMOBILE = (
 
 @dataclass(frozen=True)
 class Model:
-    """A file with a robot or a character.
+    """A file with a robot or a character."""
 
-    Attributes:
-        name: its path below the folder of its package.
-        path: of the file.
-        root: the folder that must contain all included files; that of the file if None.
-    """
-
-    name: str
+    name: str  # its path below the folder of its package
     path: Path
-    root: Path | None = None
+    root: Path | None = None  # the folder that must contain all included files; None: the file's
 
     def read(self, *, mimic: bool = True) -> Robot:
         """Read the file with the reference.
@@ -108,7 +85,7 @@ def models(family: str) -> tuple[Model, ...]:
 
 def _names(family: str, root: Path) -> list[str]:
     if family == CHARACTERS:
-        return [name for name in _CHARACTERS if (root / name).exists()]
+        return [name for name in _CHARACTERS.split() if (root / name).exists()]
     return sorted(path.relative_to(root).as_posix() for path in root.rglob("*.urdf"))
 
 

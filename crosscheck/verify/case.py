@@ -13,25 +13,17 @@ from .sentence import Sentence
 class Case:
     """A request with a name.
 
-    Attributes:
-        name: unique among the cases of a task, the same in every run: "chain of 6 joints, pose 2".
-        task: a key of TASKS.
-        inputs: by the names of the task's inputs, as float64 and integer arrays, numbers and texts;
-            without those that the greeting does not ask for.
-        family: what it is a case of: "one joint", "beyond reach", "h changed".
-        about: what it tries, for the reader of a failure.
-        follows: the name of the case that must be asked just before it (a repeated request, a
-            changed h), or "".
-        facts: what its laws need besides the inputs.
+    The inputs are float64 and integer arrays, numbers and texts, by the names of the task's inputs,
+    without those that the greeting does not ask for.
     """
 
-    name: str
-    task: str
+    name: str  # unique among the cases of a task, the same in every run: "chain of 7 2"
+    task: str  # a key of TASKS
     inputs: Mapping[str, Any]
-    family: str
-    about: Sentence
-    follows: str = ""
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    family: str  # what it is a case of: "one joint", "beyond reach", "h changed"
+    about: Sentence  # what it tries, for the reader of a failure
+    follows: str = ""  # the case that must be asked just before it, if any
+    facts: Mapping[str, Any] = field(default_factory=dict)  # what its laws need besides the inputs
 
     @property
     def size(self) -> int:

@@ -6,11 +6,15 @@ file anew.
 """
 
 import ast
+import io
 import re
 import string
-import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+
+from babel.messages import Catalog
+from babel.messages.mofile import write_mo
+from babel.messages.pofile import read_po, write_po
 
 from .language import DOMAIN, LANGUAGES, LOCALES
 from .task import TASKS
@@ -18,9 +22,7 @@ from .task import TASKS
 ROOT = Path(__file__).resolve().parents[2]
 # Where sentences stand.
 SOURCES = ("crosscheck/verify", "plumbob/commands/verify.py")
-_ENTRY = re.compile(r'^msgid ((?:".*"\n)+)msgstr ((?:".*"\n?)+)', re.MULTILINE)
 _UNIT = re.compile(r"\[[^\]]*\]")
-_MAGIC, _HEAD = 0x950412DE, 28
 
 
 def templates() -> dict[str, str]:
@@ -84,65 +86,39 @@ def path_of(language: str, suffix: str) -> Path:
     return LOCALES / LANGUAGES[language] / "LC_MESSAGES" / f"{DOMAIN}{suffix}"
 
 
-def read(text: str) -> dict[str, str]:
-    """Return the translation of every template of a .po file, the head's template being ""."""
-    return {_unquoted(one[1]): _unquoted(one[2]) for one in _ENTRY.finditer(text)}
+def read(path: Path) -> Catalog:
+    """Return the catalogue in a .po file."""
+    with path.open("rb") as file:
+        return read_po(file)
 
 
-def _unquoted(lines: str) -> str:
-    return "".join(ast.literal_eval(line) for line in lines.splitlines())
+def renewed(catalogue: Catalog, places: Mapping[str, str]) -> Catalog:
+    """Return a catalogue of templates in order, with the translations of the one before."""
+    template = Catalog(creation_date=catalogue.creation_date)
+    for text, place in places.items():
+        template.add(text, locations=[(place, 0)])
+    catalogue.update(template, no_fuzzy_matching=True)
+    catalogue.obsolete.clear()
+    return catalogue
 
 
-def write(entries: dict[str, str], places: dict[str, str]) -> str:
-    """Return a .po file of a head, entry "", and of the templates in order of their places."""
-    blocks = [f'msgid ""\nmsgstr ""\n{_head(entries[""])}']
-    for template, place in places.items():
-        blocks.append(
-            f"#: {place}\nmsgid {_quoted(template)}\nmsgstr {_quoted(entries.get(template, ''))}\n"
-        )
-    return "\n".join(blocks)
-
-
-def _head(head: str) -> str:
-    return "".join(f"{_quoted(line)}\n" for line in head.splitlines(keepends=True))
-
-
-def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
-
-
-def compiled(entries: dict[str, str]) -> bytes:
-    """Return a .mo file: a head, two tables of lengths and offsets, and the texts, sorted."""
-    pairs = sorted(
-        (template.encode(), translation.encode())
-        for template, translation in entries.items()
-        if translation
-    )
-    count = len(pairs)
-    start = _HEAD + 16 * count
-    tables: list[bytes] = []
-    texts: list[bytes] = []
-    for side in zip(*pairs, strict=True):
-        for text in side:
-            tables.append(struct.pack("<II", len(text), start))
-            texts.append(text + b"\0")
-            start += len(text) + 1
-    head = struct.pack("<7I", _MAGIC, 0, count, _HEAD, _HEAD + 8 * count, 0, _HEAD + 16 * count)
-    return head + b"".join(tables) + b"".join(texts)
+def written(catalogue: Catalog) -> bytes:
+    """Return the .po file of a catalogue."""
+    file = io.BytesIO()
+    write_po(file, catalogue, width=0, include_lineno=False)
+    return file.getvalue()
 
 
 def renew() -> None:
     """Write both files of each language anew, and say what has no translation yet."""
-    places = templates()
     for language in filter(LANGUAGES.get, LANGUAGES):
         source = path_of(language, ".po")
-        entries = read(source.read_text(encoding="utf-8"))
-        source.write_text(write(entries, places), encoding="utf-8")
-        kept = {text: entries.get(text, "") for text in ("", *places)}
-        path_of(language, ".mo").write_bytes(compiled(kept))
-        missing = [template for template in places if not entries.get(template)]
-        print(f"{language}: {len(places) - len(missing)} translated, {len(missing)} not yet")
+        catalogue = renewed(read(source), templates())
+        source.write_bytes(written(catalogue))
+        with path_of(language, ".mo").open("wb") as file:
+            write_mo(file, catalogue)
+        missing = [message.id for message in catalogue if message.id and not message.string]
+        print(f"{language}: {len(catalogue) - len(missing)} translated, {len(missing)} not yet")
         print("".join(f"  {template}\n" for template in missing), end="")
 
 

@@ -14,18 +14,14 @@ from .sentence import Sentence
 class Answer:
     """What a solver answered.
 
-    Attributes:
-        values: by the names of the task's outputs, as float64 arrays, numbers and booleans, of the
-            task's shapes; NaN where it gave none.
-        seconds: the solver's own time; if `untimed`, of the round trip, or 0 of a file [s].
-        remarks: what was odd without voiding the answer: prints, changed inputs.
-        untimed: why the seconds are not the solver's own time, None if they are.
+    The values are float64 arrays, numbers and booleans of the task's shapes, by the names of its
+    outputs; NaN where it gave none.
     """
 
     values: Mapping[str, Any]
-    seconds: float
-    remarks: tuple[Sentence, ...] = ()
-    untimed: Sentence | None = None
+    seconds: float  # the solver's own time; if `untimed`, of the round trip, or 0 of a file [s]
+    remarks: tuple[Sentence, ...] = ()  # what was odd without voiding it: prints, changed inputs
+    untimed: Sentence | None = None  # why the seconds are not its own time, None if they are
 
 
 class FailureKind(StrEnum):

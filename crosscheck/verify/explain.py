@@ -22,15 +22,11 @@ MOST_TOLD = 3
 
 
 class Variant(NamedTuple):
-    """The reference with some faults.
+    """The reference with some faults."""
 
-    Attributes:
-        faults: their keys, in the order of the computation; () for an honest model.
-        predict: returns outputs by name for a case; those that are also answered are compared. An
-            exception of NumPy or a ValueError means that it has no answer.
-    """
-
-    faults: tuple[str, ...]
+    faults: tuple[str, ...]  # their keys, in the order of the computation; () for an honest model
+    # returns outputs by name for a case; those that are also answered are compared. An exception of
+    # NumPy or a ValueError means that it has no answer.
     predict: Callable[[Case], Mapping[str, Any]]
 
 
@@ -131,24 +127,21 @@ def _classes(
     matches: Sequence[Match], answered: Sequence[Asked], tolerance: Callable[[Case], float]
 ) -> list[list[Match]]:
     """Return matches grouped with those of as many faults that no answer tells apart."""
+
+    def alike(one: Match, other: Match) -> bool:
+        return len(one.variant.faults) == len(other.variant.faults) and all(
+            difference(a, b) <= tolerance(asked.case)
+            for a, b, asked in zip(one.predictions, other.predictions, answered, strict=True)
+        )
+
     classes: list[list[Match]] = []
     for match in matches:
-        for known in classes:
-            if _indistinguishable(known[0], match, answered, tolerance):
-                known.append(match)
-                break
-        else:
+        known = next((one for one in classes if alike(one[0], match)), None)
+        if known is None:
             classes.append([match])
+        else:
+            known.append(match)
     return classes
-
-
-def _indistinguishable(
-    one: Match, other: Match, answered: Sequence[Asked], tolerance: Callable[[Case], float]
-) -> bool:
-    return len(one.variant.faults) == len(other.variant.faults) and all(
-        difference(a, b) <= tolerance(asked.case)
-        for a, b, asked in zip(one.predictions, other.predictions, answered, strict=True)
-    )
 
 
 def _explanation(matches: Sequence[Match], describe: Callable[[Sequence[str]], Sentence]) -> Any:
@@ -160,14 +153,12 @@ def together(said: Sequence[Sentence]) -> Sentence:
     """Return the sentences of up to three mistakes that a solver has at once, as one."""
     if len(said) == 1:
         return said[0]
-    if len(said) == 2:
-        return sentence("Two mistakes at once: (1) {one} (2) {other}", one=said[0], other=said[1])
-    return sentence(
-        "Three mistakes at once: (1) {one} (2) {other} (3) {another}",
-        one=said[0],
-        other=said[1],
-        another=said[2],
+    template = (
+        sentence("Two mistakes at once: (1) {one} (2) {other}")
+        if len(said) == 2
+        else sentence("Three mistakes at once: (1) {one} (2) {other} (3) {another}")
     )
+    return _filled(template, said)
 
 
 def either(explanations: Sequence[Sequence[Sentence]]) -> Sentence:
@@ -180,23 +171,19 @@ def either(explanations: Sequence[Sequence[Sentence]]) -> Sentence:
     rests = [[one for one in mistakes if one not in shared] for mistakes in explanations]
     if not all(rests):
         return together(explanations[0])
-    return together([*shared, _alternatives(list(map(together, rests)))])
+    template = (
+        sentence("One of two explanations, which the answers do not tell apart: (a) {one} (b) "
+                 "{other}")
+        if len(rests) == 2
+        else sentence("One of several explanations, which the answers do not tell apart: (a) {one} "
+                      "(b) {other} (c) {another}")
+    )  # fmt: skip
+    return together([*shared, _filled(template, list(map(together, rests)))])
 
 
-def _alternatives(said: Sequence[Sentence]) -> Sentence:
-    if len(said) == 2:
-        return sentence(
-            "One of two explanations, which the answers do not tell apart: (a) {one} (b) {other}",
-            one=said[0],
-            other=said[1],
-        )
-    return sentence(
-        "One of several explanations, which the answers do not tell apart: (a) {one} (b) {other} "
-        "(c) {another}",
-        one=said[0],
-        other=said[1],
-        another=said[2],
-    )
+def _filled(template: Sentence, said: Sequence[Sentence]) -> Sentence:
+    values = dict(zip(("one", "other", "another"), said, strict=False))
+    return Sentence(template.template, values)
 
 
 def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -> Sentence | None:
@@ -209,9 +196,11 @@ def first_broken(judgements: Sequence[CaseJudgement], at_joints: bool = False) -
                     "{why}"
                     if at_joints and finding.where is not None
                     else "The first law to break is '{law}', in the case '{case}': {why}",
-                    law=finding.law, joint=finding.where, case=judgement.case.name,
+                    law=finding.law,
+                    joint=finding.where,
+                    case=judgement.case.name,
                     why=finding.sentence,
-                )  # fmt: skip
+                )
     return None
 
 

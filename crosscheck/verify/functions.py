@@ -1,5 +1,6 @@
 """Functions of Python as a contestant, and what they may return."""
 
+import contextlib
 import inspect
 import reprlib
 import traceback
@@ -53,8 +54,7 @@ def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) ->
 
     What it raises is a failure; what it changes is a remark.
     """
-    if missing := _asked_in_vain(function, inputs):
-        why = _what_it_may_take(missing, task, inputs)
+    if why := _missing_input(function, task, inputs):
         return Failure(FailureKind.GARBAGE, sentence("{why}", why=why))
     given = {
         name: np.array(value) if isinstance(value, np.ndarray) else value
@@ -74,35 +74,35 @@ def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) ->
     return Answer(values, seconds, _changed(inputs, given))
 
 
+def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter] | None:
+    """Return the parameters of a function, None of compiled code that does not say them."""
+    try:
+        return list(inspect.signature(function).parameters.values())
+    except (TypeError, ValueError):
+        return None
+
+
 def takes(function: Callable[..., Any], name: str) -> bool:
     """Return whether a function takes an argument, as those that do not say so are taken to do."""
-    try:
-        parameters = inspect.signature(function).parameters
-    except (TypeError, ValueError):  # of compiled code
-        return True
-    return name in parameters or any(
-        one.kind is inspect.Parameter.VAR_KEYWORD for one in parameters.values()
+    parameters = _parameters(function)
+    return parameters is None or any(
+        one.name == name or one.kind is inspect.Parameter.VAR_KEYWORD for one in parameters
     )
 
 
-def _asked_in_vain(function: Callable[..., Any], inputs: Mapping[str, Any]) -> list[str]:
-    """Return the arguments that a function cannot do without and that no input has the name of."""
-    try:
-        parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):  # of compiled code
-        return []
-    optional = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    return [
+def _missing_input(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) -> str:
+    """Return what is wrong with arguments that a function needs and no input has the name of."""
+    variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    missing = [
         one.name
-        for one in parameters
-        if one.kind not in optional and one.default is one.empty and one.name not in inputs
+        for one in _parameters(function) or ()
+        if one.kind not in variadic and one.default is one.empty and one.name not in inputs
     ]
-
-
-def _what_it_may_take(missing: list[str], task: Task, inputs: Mapping[str, Any]) -> str:
     optional = [name for name in missing if name in {field.name for field in task.inputs}]
     if optional:
         return f"{optional[0]} is not given in every request: give it a default"
+    if not missing:
+        return ""
     hint = did_you_mean(missing[0], inputs)
     return f"no input is called {', '.join(missing)}{hint or ':'} There are {', '.join(inputs)}"
 
@@ -114,16 +114,13 @@ def _file(function: Callable[..., Any]) -> str:
 def describe_exception(error: BaseException, file: str) -> Failure:
     """Return the failure of code that raised, with the last line in the folder of its file."""
     why = " ".join(str(error).split())[:200]
+    kind = type(error).__name__
     if isinstance(error, SyntaxError) and error.filename:
-        return raised(type(error).__name__, error.msg, Path(error.filename).name, error.lineno or 0)
-    frames = [
-        frame
-        for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename == file or is_beside(Path(frame.filename), Path(file))
-    ]
-    if not file or not frames:
-        return raised(type(error).__name__, why)
-    return raised(type(error).__name__, why, Path(frames[-1].filename).name, frames[-1].lineno or 0)
+        return raised(kind, error.msg, Path(error.filename).name, error.lineno or 0)
+    for frame in reversed(traceback.extract_tb(error.__traceback__) if file else []):
+        if frame.filename == file or is_beside(Path(frame.filename), Path(file)):
+            return raised(kind, why, Path(frame.filename).name, frame.lineno or 0)
+    return raised(kind, why)
 
 
 def is_beside(path: Path, file: Path) -> bool:
@@ -134,16 +131,12 @@ def is_beside(path: Path, file: Path) -> bool:
 
 def raised(kind: str, why: str, file: str = "", line: int = 0) -> Failure:
     """Return the failure of code that raised an exception, in a line of a file if that is known."""
-    if file and line:
-        words = sentence(
-            "It raised {kind} in line {line} of {file}: {why}",
-            kind=kind,
-            line=line,
-            file=file,
-            why=why,
-        )
-    else:
-        words = sentence("It raised {kind}: {why}", kind=kind, why=why)
+    words = sentence(
+        "It raised {kind} in line {line} of {file}: {why}"
+        if file and line
+        else "It raised {kind}: {why}",
+        kind=kind, line=line, file=file, why=why,
+    )  # fmt: skip
     return Failure(FailureKind.RAISED, words)
 
 
@@ -168,22 +161,16 @@ def understand(task: Task, inputs: Mapping[str, Any], returned: object) -> dict[
     """
     counts = task.counts(inputs)
     if isinstance(returned, Mapping):
-        known = [field for field in task.outputs if returned.get(field.name) is not None]
-        values = {one.name: checked(one, counts, returned[one.name]) for one in known}
-        found = f"the keys {', '.join(map(str, returned))}" if returned else "an empty dict"
+        fields = [field for field in task.outputs if returned.get(field.name) is not None]
+        values = {one.name: checked(one, counts, returned[one.name]) for one in fields}
+        came = f"the keys {', '.join(map(str, returned))}" if returned else "an empty dict"
     else:
         parts = list(returned) if isinstance(returned, tuple) else [returned]
         values = {} if returned is None else _by_shape(task, counts, parts)
-        found = "; ".join(_describe(part) for part in parts)
+        came = "; ".join(map(_describe, parts))
     if not values:
         names = ", ".join(f"{one.name} {_shape(one.shape)}" for one in task.outputs)
-        raise ValueError(f"{task.name}: expected some of {names}, got {found}")
-    _check_bounds(task, inputs, values)
-    return values
-
-
-def _check_bounds(task: Task, inputs: Mapping[str, Any], values: Mapping[str, Any]) -> None:
-    counts = task.counts(inputs)
+        raise ValueError(f"{task.name}: expected some of {names}, got {came}")
     for field in task.outputs:
         is_open = any(isinstance(n, str) and n not in counts for n in field.shape)
         if is_open and field.name in values and (size := len(values[field.name])) > MOST_POINTS:
@@ -191,25 +178,19 @@ def _check_bounds(task: Task, inputs: Mapping[str, Any], values: Mapping[str, An
     count, limit = values.get("iterations", 0), inputs.get("max_iterations", np.inf)
     if not 0 <= count <= limit:
         raise ValueError(f"iterations: expected 0 to {limit}, the max_iterations sent, got {count}")
+    return values
 
 
 def _by_shape(task: Task, counts: Mapping[str, int], parts: list[object]) -> dict[str, Any]:
+    """Return each part as the next output of its shape."""
     values: dict[str, Any] = {}
     fields = iter(task.outputs)
     for part in parts:
         for field in fields:
-            if _fits(field, counts, part):
+            with contextlib.suppress(ValueError):
                 values[field.name] = checked(field, counts, part)
                 break
     return values
-
-
-def _fits(field: Field, counts: Mapping[str, int], value: object) -> bool:
-    try:
-        checked(field, counts, value)
-    except ValueError:
-        return False
-    return True
 
 
 def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:

@@ -26,44 +26,27 @@ class Verdict(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """A law, and how an answer stands to it.
+    """A law, and how an answer stands to it."""
 
-    Attributes:
-        law: its name, the same for all cases: "link lengths".
-        verdict: what follows from it.
-        error: how far the answer is off, in the unit of the tolerance.
-        tolerance: what rounding or the solver's own promise allows.
-        unit: "m", "rad", "" for a ratio.
-        sentence: what was seen; for a law that holds, what was tried.
-        where: joint, spring or particle that is worst, if one is.
-    """
-
-    law: str
+    law: str  # its name, the same for all cases: "link lengths"
     verdict: Verdict
-    error: float
-    tolerance: float
-    unit: str
-    sentence: Sentence
-    where: int | None = None
+    error: float  # how far the answer is off
+    tolerance: float  # what rounding or the solver's own promise allows
+    unit: str  # of both: "m", "rad", "" for a ratio
+    sentence: Sentence  # what was seen; for a law that holds, what was tried
+    where: int | None = None  # joint, spring or particle that is worst, if one is
 
 
 @dataclass(frozen=True, eq=False)
 class CaseJudgement:
-    """A case, what was answered, and what was found.
-
-    Attributes:
-        expected: what the reference answers, by output, for a comparison side by side; {} if many
-            answers are right.
-        digits: correct significant digits, or None where that says nothing.
-        reference_seconds: what the reference takes for it, or None [s].
-    """
+    """A case, what was answered, and what was found."""
 
     case: Case
     answer: Answer | Failure
     findings: tuple[Finding, ...]
-    expected: Mapping[str, Any]
-    digits: float | None = None
-    reference_seconds: float | None = None
+    expected: Mapping[str, Any]  # the reference's answer by output, {} if many answers are right
+    digits: float | None = None  # correct significant digits, None where that says nothing
+    reference_seconds: float | None = None  # what the reference takes for it [s]
 
     @property
     def verdict(self) -> Verdict:
@@ -77,38 +60,25 @@ class CaseJudgement:
 class Explanation:
     """A fault, or several at once, that reproduces wrong answers.
 
-    Attributes:
-        faults: one key, or several joined by " + " in the order of the computation; more than one
-            entry where no answer tells them apart.
-        sentence: what is wrong in the solver, and what it should be.
-        share: of the answers that were compared, how many it reproduces, 0 to 1.
-        distance: the largest relative difference from the answers that it reproduces.
+    An entry of `faults` is one key, or several joined by " + " in the order of the computation;
+    there is more than one entry where no answer tells them apart.
     """
 
     faults: tuple[str, ...]
-    sentence: Sentence
-    share: float
-    distance: float
+    sentence: Sentence  # what is wrong in the solver, and what it should be
+    share: float  # of the answers that were compared, how many it reproduces, 0 to 1
+    distance: float  # the largest relative difference from the answers that it reproduces
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """Why answers are wrong.
+    """Why answers are wrong."""
 
-    Attributes:
-        explanations: nearest first; none if no variant reproduces the answers.
-        behaviour: what the solver behaves like, where it did not declare it; or None.
-        first_broken: the law that broke first along the computation, where nothing matches.
-        hints: what no variant explains: state left over, answers that differ between equal
-            requests.
-        tried: number of variants that were compared.
-    """
-
-    explanations: tuple[Explanation, ...] = ()
-    behaviour: Sentence | None = None
-    first_broken: Sentence | None = None
-    hints: tuple[Sentence, ...] = ()
-    tried: int = 0
+    explanations: tuple[Explanation, ...] = ()  # nearest first; () if nothing reproduces answers
+    behaviour: Sentence | None = None  # what the solver is like, where it did not declare it
+    first_broken: Sentence | None = None  # the first law along the computation, if unexplained
+    hints: tuple[Sentence, ...] = ()  # what no variant explains: state left over
+    tried: int = 0  # number of variants that were compared
 
     @property
     def explained(self) -> bool:
@@ -130,20 +100,13 @@ def smallest_failure(judgements: Sequence[CaseJudgement], explained: bool) -> Ca
 
 @dataclass(frozen=True, eq=False)
 class TaskReport:
-    """All about one task, or one method of inverse kinematics.
-
-    Attributes:
-        task: its name; method: of inverse kinematics, else "".
-        judgements: one a case.
-        diagnosis: of what is wrong or inferred.
-        precision: why it is judged by another precision than the greeting's, or None.
-    """
+    """All about one task, or one method of inverse kinematics."""
 
     task: str
-    method: str
-    judgements: Sequence[CaseJudgement]
+    method: str  # of inverse kinematics and tracking, else ""
+    judgements: Sequence[CaseJudgement]  # one a case
     diagnosis: Diagnosis
-    precision: Sentence | None = None
+    precision: Sentence | None = None  # why it is judged by another than the greeting's
 
     @property
     def smallest_failure(self) -> CaseJudgement | None:

@@ -101,19 +101,18 @@ def decode_object(line: bytes) -> dict[str, Any] | None:
             return None
         text = text[inside.start() :]
     try:
-        return msgspec.json.decode(text, type=dict[str, Any])
+        try:
+            return msgspec.json.decode(text, type=dict[str, Any])
+        except (msgspec.MsgspecError, ValueError):
+            return _decode_leniently(text)
     except RecursionError:
         raise ValueError("expected lists of numbers, got lists nested too deeply") from None
-    except (msgspec.MsgspecError, ValueError):
-        return _decode_leniently(text)
 
 
 def _decode_leniently(text: bytes) -> dict[str, Any]:
     """Understand words for what is no number, and numbers that no double holds."""
     try:
         return json.loads(_WORDS.sub(_word, text.decode()))
-    except RecursionError:
-        raise ValueError("expected lists of numbers, got lists nested too deeply") from None
     except UnicodeDecodeError as error:
         raise ValueError(f"expected UTF-8, got byte {text[error.start]:#x}") from None
     except ValueError as error:
@@ -259,8 +258,7 @@ def decode_greeting(fields: Mapping[str, Any], what: str = "greeting") -> Greeti
 def _check_fields(given: Mapping[str, Any], kind: type[msgspec.Struct], path: str) -> None:
     known = {field.name: field.type for field in msgspec.structs.fields(kind)}
     for name, value in given.items():
-        one_of(path, name, known)
-        wanted = known[name]
+        wanted = known[one_of(path, name, known)]
         if isinstance(wanted, type) and issubclass(wanted, msgspec.Struct):
             if not isinstance(value, dict):
                 raise ValueError(f"{path}: {name}: expected an object, got {excerpt(value)}")
@@ -269,9 +267,8 @@ def _check_fields(given: Mapping[str, Any], kind: type[msgspec.Struct], path: st
         try:
             number = msgspec.convert(value, wanted)
         except msgspec.ValidationError:
-            raise ValueError(
-                f"{path}: {name}: expected {_words(wanted)}, got {excerpt(value)}"
-            ) from None
+            words = f"expected {_words(wanted)}, got {excerpt(value)}"
+            raise ValueError(f"{path}: {name}: {words}") from None
         if isinstance(number, float) and not math.isfinite(number):
             raise ValueError(f"{path}: {name}: expected a finite number, got {value!r}")
 

@@ -54,13 +54,11 @@ def laws(
     def judged(task: str, method: str) -> TaskReport:
         return judge_cases(contestant, task, method, groups[task, method])
 
-    parameters = [
+    @pytest.mark.parametrize(("task", "method", "case"), [
         pytest.param(task, method, case.name, id=" ".join(filter(None, (task, method, case.name))))
         for (task, method), cases in groups.items()
         for case in cases
-    ]
-
-    @pytest.mark.parametrize(("task", "method", "case"), parameters)
+    ])  # fmt: skip
     def test_law(task: str, method: str, case: str) -> None:
         _check(judged(task, method), case)
 
@@ -69,12 +67,10 @@ def laws(
 
 def _check(report: TaskReport, name: str) -> None:
     """Fail if a case is not right; skip it if nobody can tell."""
-    found = {one.case.name: one for one in report.judgements}
-    if name not in found:
-        pytest.fail(
-            "it was not asked, since too many answers before were waited for", pytrace=False
-        )
-    one = found[name]
+    one = next((one for one in report.judgements if one.case.name == name), None)
+    if one is None:
+        words = "it was not asked, since too many answers before were waited for"
+        pytest.fail(words, pytrace=False)
     if one.verdict is Verdict.UNDECIDED:
         pytest.skip("; ".join(map(str, _words(one))) or "nobody can tell")
     if one.verdict > Verdict.UNDECIDED:

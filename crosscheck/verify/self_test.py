@@ -42,42 +42,30 @@ PINS: dict[str, Literal["overwritten", "penalty", "heavy"]] = {
     "heavy 1e8": "heavy",
 }
 PRECISIONS: dict[Precision, type] = {"double": np.float64, "single": np.float32}
+FK, IK, STEP = "forward_kinematics", "inverse_kinematics", "mass_spring_step"
 FAMILIES = {"forward": "forward kinematics", "ccd": "CCD", "fabrik": "FABRIK"}
 EVERYTHING = System(external_forces=True, tension_only=True)
 
 
 class Subject(NamedTuple):
-    """A solver of which is known what is wrong with it.
+    """A solver of which is known what is wrong with it."""
 
-    Attributes:
-        name: what it is.
-        family: what it is one of: "CCD", "steps", "honest solvers".
-        task: what it solves.
-        function: the solver.
-        greeting: what it says of itself.
-        fault: the key of what is wrong; "" if nothing is.
-    """
-
-    name: str
-    family: str
-    task: str
-    function: Callable[..., Any]
-    greeting: Greeting
-    fault: str = ""
+    name: str  # what it is
+    family: str  # what it is one of: "CCD", "steps", "honest solvers"
+    task: str  # what it solves
+    function: Callable[..., Any]  # the solver
+    greeting: Greeting  # what it says of itself
+    fault: str = ""  # the key of what is wrong; "" if nothing is
 
 
 class Trial(NamedTuple):
-    """What the judge said of a subject.
-
-    Attributes:
-        laws: those that were broken.
-        named: whether the first explanation names the fault, or a class of faults that it is in
-            and that no answer tells apart; for an honest one, whether nothing is named.
-    """
+    """What the judge said of a subject."""
 
     subject: Subject
     verdict: Verdict
-    laws: frozenset[str]
+    laws: frozenset[str]  # those that were broken
+    # whether the first explanation names the fault, or a class of faults that it is in and that no
+    # answer tells apart; for an honest one, whether nothing is named
     named: bool
 
     @property
@@ -112,40 +100,34 @@ def attempt(subject: Subject) -> Trial:
 
 def subjects() -> Iterator[Subject]:
     """Yield every fault on its own, then the honest solvers."""
-    yield from _kinematic_faults()
-    yield from _mass_spring_faults()
-    yield from _robot_faults()
-    yield from _right_kinematics()
-    yield from _right_robots()
-    yield from _right_steps()
+    for make in (_kinematic_faults, _mass_spring_faults, _robots, _right_kinematics, _right_steps):
+        yield from make()
+
+
+def _subjects(
+    family: str, task: str, functions: Mapping[str, Callable[..., Any]], **said: Any
+) -> Iterator[Subject]:
+    """Yield a subject for each function by its name, which is its fault if it is not honest."""
+    greeting = Greeting(PROTOCOL, (task,), **said)
+    for name, function in functions.items():
+        yield Subject(name, family, task, function, greeting, "" if family == HONEST else name)
 
 
 def _kinematic_faults() -> Iterator[Subject]:
-    for kind, task, method in (
-        ("forward", "forward_kinematics", ""),
-        ("ccd", "inverse_kinematics", "ccd"),
-        ("fabrik", "inverse_kinematics", "fabrik"),
-    ):
-        greeting = Greeting(PROTOCOL, (task,), methods=(method,))
-        for fault in FAULTS[kind]:
-            if not fault.honest:
-                function = partial(_textbook, method, switches([fault]))
-                yield Subject(fault.key, FAMILIES[kind], task, function, greeting, fault.key)
+    for kind, family in FAMILIES.items():
+        task, method = (FK, "") if kind == "forward" else (IK, kind)
+        faults = {fault.key: switches([fault]) for fault in FAULTS[kind] if not fault.honest}
+        functions = {key: partial(_textbook, method, one) for key, one in faults.items()}
+        yield from _subjects(family, task, functions, methods=(method,))
 
 
-def _robot_faults() -> Iterator[Subject]:
-    greeting = Greeting(PROTOCOL, (ROBOTS,))
-    for key, fault in ROBOT_FAULTS.items():
-        yield Subject(key, "robots", ROBOTS, partial(solve_wrongly, fault), greeting, key)
-
-
-def _right_robots() -> Iterator[Subject]:
-    greeting = Greeting(PROTOCOL, (ROBOTS,))
-    for name, function in (
-        ("damped least squares, robots", partial(solve_wrongly, None)),
-        ("reference, robots", solve_by_reference),
-    ):
-        yield Subject(name, HONEST, ROBOTS, function, greeting)
+def _robots() -> Iterator[Subject]:
+    faults = {key: partial(solve_wrongly, fault) for key, fault in ROBOT_FAULTS.items()}
+    yield from _subjects("robots", ROBOTS, faults)
+    yield from _subjects(HONEST, ROBOTS, {
+        "damped least squares, robots": partial(solve_wrongly, None),
+        "reference, robots": solve_by_reference,
+    })  # fmt: skip
 
 
 def _textbook(method: str, switched: Switches, /, **inputs: Any) -> Mapping[str, Any]:
@@ -167,17 +149,10 @@ SYMPLECTIC = Model(Integrator("symplectic"), 10, "explicit", velocity="separate"
 
 
 def _declared(model: Model, method: Method, iterations: int | None = None) -> Step:
-    said: Any = {"start": model.integrator.start, "damper": model.damper}
-    if method == "symplectic":
-        del said["start"]
-    return Step(
-        method,
-        iterations=iterations,
-        substeps=model.substeps,
-        pins="eliminated",
-        velocity="separate" if model.velocity == "separate" else "displacement",
-        **said,
-    )
+    velocity: Any = "separate" if model.velocity == "separate" else "displacement"
+    said: Any = {"start": model.integrator.start} if method != "symplectic" else {}
+    said |= {"damper": model.damper, "substeps": model.substeps, "iterations": iterations}
+    return Step(method, pins="eliminated", velocity=velocity, **said)
 
 
 DECLARED: dict[str, tuple[Model, Step]] = {
@@ -206,42 +181,42 @@ class Stepper:
     ) -> None:
         self.model, self.faults, self.precision = model, tuple(faults), precision
         self.first_h: dict[tuple[bytes, bytes], float] = {}
-        self.__signature__ = inspect.Signature(
-            [inspect.Parameter("inputs", inspect.Parameter.VAR_KEYWORD)]
-        )
+        every = inspect.Parameter("inputs", inspect.Parameter.VAR_KEYWORD)
+        self.__signature__ = inspect.Signature([every])
 
     def __call__(self, **inputs: Any) -> dict[str, Any]:
         """Return positions and velocities, rounded to the precision."""
-        rounded = {name: self._rounded(value) for name, value in inputs.items()}
         system = inputs["masses"].tobytes(), inputs["stiffnesses"].tobytes()
-        p = problem_of(rounded, self.first_h.setdefault(system, inputs["h"]))
+        p = problem_of(self._rounded(inputs), self.first_h.setdefault(system, inputs["h"]))
         p, model = apply(self.faults, p, self.model)
         with np.errstate(all="ignore"):
-            found = simulate(p, model)
-        return {name: self._rounded(value) for name, value in found.items()}
+            return self._rounded(simulate(p, model))
 
-    def _rounded(self, value: Any) -> Any:
-        if isinstance(value, np.ndarray) and value.dtype.kind == "f":
-            return value.astype(self.precision).astype(float)
-        return value
+    def _rounded(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        return {
+            name: value.astype(self.precision).astype(float)
+            if isinstance(value, np.ndarray) and value.dtype.kind == "f"
+            else value
+            for name, value in values.items()
+        }
 
 
 def _mass_spring_faults() -> Iterator[Subject]:
-    greeting = Greeting(PROTOCOL, ("mass_spring_forces",), system=EVERYTHING)
-    for option in _once(FORCE_FAULTS):
-        if option.key in NO_FORCES:
-            continue
-        function = partial(_evaluated, option)
-        yield Subject(option.key, "forces", greeting.tasks[0], function, greeting, option.key)
-    for option in _once(STEP_FAULTS):
-        model, step = DECLARED[_BASES.get(option.key, "linearised")]
-        greeting = Greeting(PROTOCOL, ("mass_spring_step",), system=EVERYTHING, step=step)
-        stepper = Stepper(model, [option])
-        yield Subject(option.key, "steps", greeting.tasks[0], stepper, greeting, option.key)
+    options = _by_key([one for one in FORCE_FAULTS if one.key not in NO_FORCES])
+    functions = {key: partial(_evaluated, option) for key, option in options.items()}
+    yield from _subjects("forces", "mass_spring_forces", functions, system=EVERYTHING)
+    for key, option in _by_key(STEP_FAULTS).items():
+        model, step = DECLARED[_BASES.get(key, "linearised")]
+        stepper = {key: Stepper(model, [option])}
+        yield from _subjects("steps", STEP, stepper, system=EVERYTHING, step=step)
 
 
-def _once(options: Sequence[Option]) -> list[Option]:
-    return list({option.key: option for option in reversed(options)}.values())[::-1]
+def _by_key(options: Sequence[Option]) -> dict[str, Option]:
+    """Return the first option of each key."""
+    first: dict[str, Option] = {}
+    for option in options:
+        first.setdefault(option.key, option)
+    return first
 
 
 def _evaluated(option: Option, /, **inputs: Any) -> Mapping[str, Any]:
@@ -250,44 +225,32 @@ def _evaluated(option: Option, /, **inputs: Any) -> Mapping[str, Any]:
 
 
 def _right_kinematics() -> Iterator[Subject]:
-    task = "forward_kinematics"
-    for precision in ("double", "single"):
-        greeting = Greeting(PROTOCOL, (task,), precision=precision)
-        yield Subject(
-            f"reference, {precision}", HONEST, task, partial(_placed, precision), greeting
-        )
-    for engine in SKELETON_ENGINES:
-        greeting = Greeting(PROTOCOL, (task,))
-        yield Subject(engine, HONEST, task, partial(_placed_by, engine), greeting)
-    task = "inverse_kinematics"
+    for precision, kind in PRECISIONS.items():
+        function = {f"reference, {precision}": partial(_placed, kind)}
+        yield from _subjects(HONEST, FK, function, precision=precision)
+    engines = {engine: partial(_placed_by, engine) for engine in SKELETON_ENGINES}
+    yield from _subjects(HONEST, FK, engines)
     for solver in ("ccd", "fabrik", "levenberg_marquardt"):
-        greeting = Greeting(PROTOCOL, (task,), methods=(solver,))
-        yield Subject(f"reference, {solver}", HONEST, task, partial(_solved, solver), greeting)
+        function = {f"reference, {solver}": partial(_solved, solver)}
+        yield from _subjects(HONEST, IK, function, methods=(solver,))
     for method in ("ccd", "fabrik"):
-        greeting = Greeting(PROTOCOL, ("track",), methods=(method,))
-        yield Subject(f"textbook, {method}", HONEST, "track", partial(_followed, method), greeting)
+        function = {f"textbook, {method}": partial(_followed, method)}
+        yield from _subjects(HONEST, "track", function, methods=(method,))
 
 
-def _placed(precision: Precision, parents: Any, offsets: Any, local_rotations: Any) -> Any:
+def _placed(kind: type, /, parents: Any, offsets: Any, local_rotations: Any) -> Any:
     pose = forward_kinematics(Skeleton(parents, offsets), local_rotations)
-    kind = PRECISIONS[precision]
     return pose.positions.astype(kind), pose.rotations.astype(kind)
 
 
-def _placed_by(engine: str, parents: Any, offsets: Any, local_rotations: Any) -> Any:
-    made = SKELETON_ENGINES[engine](Skeleton(parents, offsets))
-    return tuple(forward_kinematics_by(made, local_rotations))
+def _placed_by(engine: str, /, parents: Any, offsets: Any, local_rotations: Any) -> Any:
+    skeleton = SKELETON_ENGINES[engine](Skeleton(parents, offsets))
+    return tuple(forward_kinematics_by(skeleton, local_rotations))
 
 
-def _solved(
-    solver: str, parents: Any, offsets: Any, local_rotations: Any, target: Any, effector: int,
-    tolerance: float, max_iterations: int,
-) -> Any:  # fmt: skip
-    found = solve_ik(
-        Skeleton(parents, offsets), local_rotations, target, solver, effector=effector,
-        tolerance=tolerance, max_iterations=max_iterations,
-    )  # fmt: skip
-    return {"local_rotations": found.local_rotations, "positions": found.positions}
+def _solved(solver: str, /, parents: Any, offsets: Any, method: str, **inputs: Any) -> Any:
+    solution = solve_ik(Skeleton(parents, offsets), solver=solver, **inputs)
+    return {"local_rotations": solution.local_rotations, "positions": solution.positions}
 
 
 # Steps of the reference and of MuJoCo, and what they declare to be. The reference's damper is
@@ -295,43 +258,33 @@ def _solved(
 _REFERENCE: dict[str, tuple[Callable[..., Any], Step]] = {
     "implicit Euler by Newton": (
         lambda s, state, h: ImplicitEuler(s, h=h, solver="newton", tolerance=0.0).step(state).state,
-        Step("converged", damper="length_rate"),
-    ),
+        Step("converged", damper="length_rate")),
     "ten local/global iterations": (
         lambda s, state, h: ImplicitEuler(
-            s, h=h, solver="local_global", tolerance=0.0, max_iterations=10
-        ).step(state).state,
-        Step("local_global", "y", 10, damper="length_rate"),
-    ),
+            s, h=h, solver="local_global", tolerance=0.0, max_iterations=10).step(state).state,
+        Step("local_global", "y", 10, damper="length_rate")),
     "symplectic Euler": (
-        symplectic_euler, Step("symplectic", damper="explicit", velocity="separate"),
-    ),
+        symplectic_euler, Step("symplectic", damper="explicit", velocity="separate")),
     "MuJoCo Euler": (
         lambda s, state, h: MujocoMassSpring(s, h=h, integrator="Euler").step(state),
-        Step("symplectic"),
-    ),
+        Step("symplectic")),
     "MuJoCo discrete": (
         lambda s, state, h: MujocoMassSpring(s, h=h, integrator="discrete").step(state),
-        Step("linearised"),
-    ),
+        Step("linearised")),
 }  # fmt: skip
 
 
 def _right_steps() -> Iterator[Subject]:
-    task = "mass_spring_step"
-    silent = Greeting(PROTOCOL, (task,))
     for name, (model, step) in DECLARED.items():
         for precision, kind in PRECISIONS.items():
-            declared = Greeting(PROTOCOL, (task,), step=step, precision=precision)
-            yield Subject(f"{name}, {precision}", HONEST, task, Stepper(model, (), kind), declared)
-        yield Subject(f"{name}, undeclared", HONEST, task, Stepper(model), silent)
+            stepper = {f"{name}, {precision}": Stepper(model, (), kind)}
+            yield from _subjects(HONEST, STEP, stepper, step=step, precision=precision)
+        yield from _subjects(HONEST, STEP, {f"{name}, undeclared": Stepper(model)})
     for pins, said in PINS.items():
-        greeting = Greeting(PROTOCOL, (task,), step=Step(pins=said))
-        stepper = Stepper(LINEARISED._replace(pins=pins))
-        yield Subject(f"linearised, pins {pins}", HONEST, task, stepper, greeting)
+        stepper = {f"linearised, pins {pins}": Stepper(LINEARISED._replace(pins=pins))}
+        yield from _subjects(HONEST, STEP, stepper, step=Step(pins=said))
     for name, (function, step) in _REFERENCE.items():
-        greeting = Greeting(PROTOCOL, (task,), step=step)
-        yield Subject(name, HONEST, task, partial(_stepped, function), greeting)
+        yield from _subjects(HONEST, STEP, {name: partial(_stepped, function)}, step=step)
 
 
 def _stepped(function: Callable[..., Any], /, **inputs: Any) -> dict[str, Any]:

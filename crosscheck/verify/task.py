@@ -14,37 +14,22 @@ Kind = Literal["number", "integer", "boolean", "text"]
 
 
 class Field(NamedTuple):
-    """An array, a number or a text of a request or an answer.
-
-    Attributes:
-        name: its key.
-        shape: counts, as numbers or words; () for a single value.
-        kind: what the array holds.
-        optional: whether it may be left out.
-        about: what it is, with its unit.
-    """
+    """An array, a number or a text of a request or an answer."""
 
     name: str
-    shape: tuple[str | int, ...]
+    shape: tuple[str | int, ...]  # counts, as numbers or words; () for a single value
     kind: Kind = "number"
-    optional: bool = False
-    about: str = ""
+    optional: bool = False  # whether it may be left out
+    about: str = ""  # what it is, with its unit
 
 
 class Task(NamedTuple):
-    """What a solver is asked.
+    """What a solver is asked."""
 
-    Attributes:
-        name: as in a request and as the name of a Python function.
-        about: one sentence.
-        inputs: in the order in which `reference` names them.
-        outputs: all may be left out, but not all at once.
-    """
-
-    name: str
+    name: str  # as in a request and as the name of a Python function
     about: str
-    inputs: tuple[Field, ...]
-    outputs: tuple[Field, ...]
+    inputs: tuple[Field, ...]  # in the order in which `reference` names them
+    outputs: tuple[Field, ...]  # all may be left out, but not all at once
 
     def counts(self, inputs: Mapping[str, Any]) -> dict[str, int]:
         """Return what the words of the shapes stand for in this request."""
@@ -111,95 +96,76 @@ _ROBOT = (
     Field("urdf", (), "text", True, "the same robot as URDF, its tool the link `tool`"),
 )
 
-TASKS: dict[str, Task] = {
-    task.name: task
-    for task in (
-        Task(
-            "forward_kinematics",
-            "Return the global positions and rotations of all joints.",
-            _SKELETON,
-            (
-                Field("positions", ("joint", 3), about="global [m]"),
-                Field("rotations", ("joint", 4), about="global, unit quaternions wxyz"),
-            ),
+_TASKS = (
+    Task(
+        "forward_kinematics", "Return the global positions and rotations of all joints.", _SKELETON,
+        (
+            Field("positions", ("joint", 3), about="global [m]"),
+            Field("rotations", ("joint", 4), about="global, unit quaternions wxyz"),
         ),
-        Task(
-            "inverse_kinematics",
-            "Bring a joint to a target by rotating its ancestors; the root stays where it is.",
-            (*_SKELETON, Field("target", (3,), about="global position [m]"), *_EFFECTOR),
-            (
-                Field("local_rotations", ("joint", 4), about="of all joints"),
-                Field("positions", ("joint", 3), about="global, of all joints [m]"),
-                Field("residual", (), about="distance left, as the solver sees it [m]"),
-                Field("iterations", (), "integer", about="sweeps made"),
-                Field("converged", (), "boolean", about="whether it claims to have arrived"),
-            ),
+    ),
+    Task(
+        "inverse_kinematics",
+        "Bring a joint to a target by rotating its ancestors; the root stays where it is.",
+        (*_SKELETON, Field("target", (3,), about="global position [m]"), *_EFFECTOR),
+        (
+            Field("local_rotations", ("joint", 4), about="of all joints"),
+            Field("positions", ("joint", 3), about="global, of all joints [m]"),
+            Field("residual", (), about="distance left, as the solver sees it [m]"),
+            Field("iterations", (), "integer", about="sweeps made"),
+            Field("converged", (), "boolean", about="whether it claims to have arrived"),
         ),
-        Task(
-            "track",
-            "Follow a curve with a joint, each frame from the one before.",
-            (*_SKELETON, Field("curve", ("frame", 3), about="targets [m]"), *_EFFECTOR),
-            (
-                Field("local_rotations", ("frame", "joint", 4), about="of every frame"),
-                Field("positions", ("frame", "joint", 3), about="global, of every frame [m]"),
-            ),
+    ),
+    Task(
+        "track", "Follow a curve with a joint, each frame from the one before.",
+        (*_SKELETON, Field("curve", ("frame", 3), about="targets [m]"), *_EFFECTOR),
+        (
+            Field("local_rotations", ("frame", "joint", 4), about="of every frame"),
+            Field("positions", ("frame", "joint", 3), about="global, of every frame [m]"),
         ),
-        Task(
-            "resample",
-            "Return points evenly spaced along a polyline.",
-            (
-                Field("curve", ("point", 3), about="the polyline [m]"),
-                Field("strokes", ("stroke",), "integer", about="first point of each stroke"),
-                Field("closed", (), "boolean", about="whether the end joins the start"),
-                Field("count", (), "integer", True, "how many points, or"),
-                Field("spacing", (), "number", True, "how far apart they are at most [m]"),
-            ),
-            (Field("points", ("sample", 3), about="[m]"),),
+    ),
+    Task(
+        "resample", "Return points evenly spaced along a polyline.",
+        (
+            Field("curve", ("point", 3), about="the polyline [m]"),
+            Field("strokes", ("stroke",), "integer", about="first point of each stroke"),
+            Field("closed", (), "boolean", about="whether the end joins the start"),
+            Field("count", (), "integer", True, "how many points, or"),
+            Field("spacing", (), "number", True, "how far apart they are at most [m]"),
         ),
-        Task(
-            "mass_spring_forces",
-            "Return the forces of springs, dampers and gravity on each particle.",
-            (*_SYSTEM, *_STATE),
-            (Field("forces", ("particle", 3), about="[N]"),),
+        (Field("points", ("sample", 3), about="[m]"),),
+    ),
+    Task(
+        "mass_spring_forces",
+        "Return the forces of springs, dampers and gravity on each particle.", (*_SYSTEM, *_STATE),
+        (Field("forces", ("particle", 3), about="[N]"),),
+    ),
+    Task(
+        "energy", "Return the energies of a state.", (*_SYSTEM, *_STATE),
+        (
+            Field("total", (), about="[J]"),
+            Field("kinetic", (), about="[J]"),
+            Field("potential", (), about="elastic and gravitational [J]"),
+            Field("elastic", (), about="[J]"),
+            Field("gravitational", (), about="- sum of m gravity . x [J]"),
         ),
-        Task(
-            "energy",
-            "Return the energies of a state.",
-            (*_SYSTEM, *_STATE),
-            (
-                Field("total", (), about="[J]"),
-                Field("kinetic", (), about="[J]"),
-                Field("potential", (), about="elastic and gravitational [J]"),
-                Field("elastic", (), about="[J]"),
-                Field("gravitational", (), about="- sum of m gravity . x [J]"),
-            ),
+    ),
+    Task("mass_spring_step", "Return the state one time step later.", _STEP, _STATE),
+    Task(
+        "mass_spring_motion", "Return the states after each of several time steps.",
+        (*_STEP, Field("steps", (), "integer", about="how many")),
+        (
+            Field("positions", ("frame", "particle", 3), about="after each step [m]"),
+            Field("velocities", ("frame", "particle", 3), about="likewise [m/s]"),
         ),
-        Task(
-            "mass_spring_step",
-            "Return the state one time step later.",
-            _STEP,
-            (
-                Field("positions", ("particle", 3), about="[m]"),
-                Field("velocities", ("particle", 3), about="[m/s]"),
-            ),
+    ),
+    Task(
+        "robot_inverse_kinematics",
+        "Bring a robot's tool to a position and a rotation, each joint within its limits.", _ROBOT,
+        (
+            Field("q", ("joint",), about="coordinates [rad, m]"),
+            Field("converged", (), "boolean", about="whether it claims to have arrived"),
         ),
-        Task(
-            "mass_spring_motion",
-            "Return the states after each of several time steps.",
-            (*_STEP, Field("steps", (), "integer", about="how many")),
-            (
-                Field("positions", ("frame", "particle", 3), about="after each step [m]"),
-                Field("velocities", ("frame", "particle", 3), about="likewise [m/s]"),
-            ),
-        ),
-        Task(
-            "robot_inverse_kinematics",
-            "Bring a robot's tool to a position and a rotation, each joint within its limits.",
-            _ROBOT,
-            (
-                Field("q", ("joint",), about="coordinates [rad, m]"),
-                Field("converged", (), "boolean", about="whether it claims to have arrived"),
-            ),
-        ),
-    )
-}
+    ),
+)  # fmt: skip
+TASKS = {task.name: task for task in _TASKS}

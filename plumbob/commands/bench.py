@@ -145,7 +145,10 @@ def bench(  # noqa: PLR0913 -- one parameter an option
 
 def _choice(suites: Sequence[str], scale: str, asked: Asked) -> "Choice":
     """Return what is to be measured, after opening the solvers and problems that are entered."""
-    from plumbob.bench.entrants import opening, problem_files, selection
+    from plumbob.bench.peers import opening
+    from plumbob.bench.problems import files as problem_files
+
+    from . import selection
 
     entries = opening.named(asked.entered, asked.program)
     entrants = opening.opened(entries, suites)
@@ -161,7 +164,7 @@ def _choice(suites: Sequence[str], scale: str, asked: Asked) -> "Choice":
 
 
 def _look_ahead(suites: Sequence[str], choice: "Choice", output: Path, listing: bool) -> int:
-    from plumbob.bench.entrants.outlook import dry_run
+    from plumbob.commands.outlook import dry_run
 
     from .listing import listed
 

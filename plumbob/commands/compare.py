@@ -1,6 +1,7 @@
 """The commands `compare` and `history`."""
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,12 +9,10 @@ import typer
 
 from ..help_text import block
 from ..terminal import print_aligned, width
+from .options import MISSED, SUCCESS, known
 
 if TYPE_CHECKING:
     from plumbob.bench.comparison.compare import Comparison
-
-SUCCESS, STOPPED = 0, 1
-
 
 _File = Path | None
 _Words = list[str] | None
@@ -77,7 +76,7 @@ def compare(
         _write(markdown, tables.markdown(output.table(made, stopped, old, new)))
     if json:
         _write(json, output.as_json(made, stopped, old, new))
-    return STOPPED if stopped else SUCCESS
+    return MISSED if stopped else SUCCESS
 
 
 COMPARE_EXAMPLES = block(
@@ -99,15 +98,12 @@ def _side_by_side(revision: str, suites: list[str], words: list[str], pairs: int
     from plumbob.bench.comparison.rerun import Plan, clone_root, rerun
     from plumbob.bench.experiments import SUITES
 
-    for suite in suites:
-        if suite not in SUITES:
-            raise ValueError(f"unknown suite {suite!r}: expected one of {', '.join(SUITES)}")
-    root = clone_root(Path.cwd())
-
-    def tell(what: str) -> None:
-        print(f"plumbob: {what}", file=sys.stderr, flush=True)
-
-    return rerun(Plan(revision, tuple(suites), tuple(words), pairs), root, tell)
+    plan = Plan(
+        revision, tuple(known("suite", name, SUITES) for name in suites), tuple(words), pairs
+    )
+    return rerun(
+        plan, clone_root(Path.cwd()), partial(print, "plumbob:", file=sys.stderr, flush=True)
+    )
 
 
 def history(

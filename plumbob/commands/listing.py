@@ -7,13 +7,12 @@ from functools import partial
 from itertools import zip_longest
 from typing import Any
 
-from plumbob.bench.entrants.blocks import not_asked
 from plumbob.bench.experiments import SUITES, blocks
 from plumbob.bench.harness.block import Block
 from plumbob.bench.harness.choice import Choice
-from plumbob.bench.harness.measure import not_installed
-from plumbob.bench.harness.results import counted
+from plumbob.bench.harness.measure import not_asked, not_installed
 from plumbob.bench.peers import registry
+from plumbob.bench.tables.results import counted
 
 from ..terminal import width
 

@@ -48,7 +48,7 @@ def list_records(
 ) -> int:
     """Count what is on record, by suite and solver, and where it was measured."""
     from plumbob.bench.harness.record import FINISHED
-    from plumbob.bench.harness.results import printable
+    from plumbob.bench.tables.results import printable
 
     from ..terminal import print_aligned
 
@@ -160,7 +160,7 @@ def _rank(record: "Record") -> tuple[bool, str]:
 
 def _machines(records: "Iterable[Record]") -> set[str]:
     """Return the machines that records were measured on, in words."""
-    from plumbob.bench.harness.results import counted
+    from plumbob.bench.tables.results import counted
     from plumbob.bench.text import visible
 
     machines = (record.stamp.get("machine", {}) for record in records if record.stamp)

@@ -19,8 +19,8 @@ EXAMPLES = block(
     "plumbob report",
     "plumbob report --output results/laptop",
     "plumbob report --list",
-    "plumbob report --table cloth_stability --list",
-    "plumbob report --table cloth_stability --format tex --width column -o stable.tex",
+    "plumbob report --table cloth_dampers --list",
+    "plumbob report --table cloth_dampers --format tex --width column -o dampers.tex",
     "plumbob report --table accuracy --columns 'solver, within tolerance' --rows 'problem~circle'",
 )
 FORMATS = ("md", "tex", "csv", "html")
@@ -108,8 +108,8 @@ def _tables(folder: Path) -> list["Table"]:
     Raises:
         ValueError: if there are no records.
     """
-    from plumbob.bench.harness.results import results_of
     from plumbob.bench.report.sections import tables
+    from plumbob.bench.tables.results import results_of
 
     results, _ = results_of(folder)
     return tables(results)

@@ -108,20 +108,19 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     """
     _keep_to_one_thread()
     from plumbob.crosscheck.verify.language import language_of
-    from plumbob.crosscheck.verify.output import starter, tasks
+    from plumbob.crosscheck.verify.output import listings
     from plumbob.crosscheck.verify.output.files import Files
-    from plumbob.crosscheck.verify.output.question import Question
-    from plumbob.crosscheck.verify.output.solver import ANSWERS, exported, limits
+    from plumbob.crosscheck.verify.output.question import ANSWERS, Question, limits
     from plumbob.crosscheck.verify.output.words import speaker
 
     language = lang or language_of()
     say = speaker(language)
     if names:
-        return _print(tasks.described(task or (), say))
+        return _print(listings.described(task or (), say))
     if template:
-        return _print(starter.written(template, Path(), say))
+        return _print(listings.starter(template, Path(), say))
     if export:
-        return _print(exported(export, task or (), seed, thorough, say))
+        return _print(listings.exported(export, task or (), seed, thorough, say))
     if self_test:
         if task or solver or answers:
             raise ValueError("--self-test: expected no task or solver with it: it tries the judge")
@@ -149,22 +148,41 @@ def _judge(
 ) -> int:
     """Ask a solver, print the verdict, and write the files that are wanted."""
     from plumbob.crosscheck.verify.contestant import NoGreetingError
-    from plumbob.crosscheck.verify.output.question import ask, suited
-    from plumbob.crosscheck.verify.output.solver import opened
+    from plumbob.crosscheck.verify.output.question import ask, opened, suited
     from plumbob.crosscheck.verify.output.words import Presentation, speaker
     from plumbob.crosscheck.verify.sentence import sentence
 
+    from ..terminal import progress
+
     say = speaker(language)
-    files.check()
+    _check(files)
     contestant = opened(words, limits, say)
     question = suited(question, contestant)
     try:
-        report = ask(contestant, question)
+        with progress() as bar:
+            shown = bar.add_task("", total=None)
+            report = ask(contestant, question, lambda task, done, of: bar.update(
+                shown, description=task, completed=done, total=of))  # fmt: skip
     except NoGreetingError as error:
         raise ValueError(say(sentence(
             "solver: expected one that can be started: {why}", why=error.failure.sentence
         ))) from None  # fmt: skip
     return files.write(report, question, Presentation(say, language, words))
+
+
+def _check(files: "Files") -> None:
+    """Find out before anything is asked whether the files can be written.
+
+    Raises:
+        ValueError, OSError: naming the file or folder that cannot.
+    """
+    from plumbob.bench.harness.record import check_regular
+
+    from .options import writable
+
+    for path in filter(None, files.paths()):
+        check_regular(path)
+        writable(path.parent)
 
 
 def _print(lines: Iterable[str]) -> int:
@@ -177,12 +195,12 @@ def _self_test(say: "Say") -> int:
     from rich.console import Console
     from rich.progress import track
 
-    from plumbob.crosscheck.verify.output.self_test import lines
+    from plumbob.crosscheck.verify.output.listings import self_test
     from plumbob.crosscheck.verify.self_test import attempt, subjects
 
     console = Console(stderr=True)
     known = list(subjects())
     shown = track(known, "", console=console, transient=True, disable=not console.is_terminal)
     trials = [attempt(subject) for subject in shown]
-    _print(lines(trials, say))
+    _print(self_test(trials, say))
     return RIGHT if all(trial.passed for trial in trials) else WRONG

@@ -17,7 +17,6 @@ import importlib
 import types
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
 from contextvars import ContextVar
 from typing import Any
 
@@ -25,11 +24,9 @@ import numpy as np
 
 from .. import arguments
 from . import compilation
-from .digest import PythonKernel, callees, code_objects, digest, named_globals
+from .digest import PythonKernel, callees, code_objects, digest, kernels_in, named_globals
 
 BACKENDS = ("numba", "python")
-# What `speed` takes: the backends' former names.
-SPEEDS = {"compiled": "numba", "plain": "python"}
 # What a relaxed kernel's compiler may do; infinities and NaN keep their meaning.
 RELAXATIONS = {"reassoc", "contract", "nsz"}
 # What a kernel mentions if it makes arrays.
@@ -56,15 +53,6 @@ def set_backend(name: str) -> Iterator[None]:
         yield
     finally:
         _backend.reset(token)
-
-
-def speed(name: str) -> AbstractContextManager[None]:
-    """Do what `set_backend` does, by the names "compiled" and "plain"; goes with the next release.
-
-    Raises:
-        ValueError: if the name is neither.
-    """
-    return set_backend(SPEEDS[arguments.choice("speed", name, SPEEDS)])
 
 
 class Kernel:
@@ -108,58 +96,16 @@ def compile_kernel(
     return _entry(kernel, relaxed, label)
 
 
-class Slot:
-    """A name that a kernel calls and that `bind` gives a kernel: `update = Slot("update")`."""
-
-    def __init__(self, name: str):
-        self.name = name
-
-    def __call__(self, *arguments: Any) -> Any:
-        """Raise a ValueError, for nothing has been bound."""
-        raise ValueError(f"{self.name}: expected a kernel bound to this slot, got none")
-
-    def __repr__(self) -> str:
-        return f"Slot({self.name!r})"
-
-
-def bind(kernel: PythonKernel, **bound: PythonKernel) -> PythonKernel:
-    """Return a kernel that calls other kernels under these names, so that solvers share a loop.
-
-    A slot of a given name is filled wherever the kernel, or one that it calls, has it.
+def bind(kernel: PythonKernel, **bound: Any) -> PythonKernel:
+    """Return a kernel whose globals of these names have other values, such as other callees.
 
     Raises:
         ValueError: if the kernel names one of them nowhere, or has a closure.
     """
-    slots = _slots(kernel, set())
     for name in bound:
-        if name not in slots and name not in kernel.__code__.co_names:
-            raise ValueError(f"callees: expected names that {kernel.__name__} calls, got {name!r}")
-    filled = _fill_slots(kernel, bound, {})
-    return _rebuild(filled, filled.__globals__ | bound)
-
-
-def _slots(kernel: PythonKernel, seen: set[PythonKernel]) -> set[str]:
-    """Return the names of the slots of a kernel and of all that it calls."""
-    seen.add(kernel)
-    found = {name for name, value in named_globals(kernel) if isinstance(value, Slot)}
-    for _, callee in callees(kernel):
-        if callee not in seen:
-            found |= _slots(callee, seen)
-    return found
-
-
-def _fill_slots(
-    kernel: PythonKernel, bound: dict[str, PythonKernel], made: dict[PythonKernel, PythonKernel]
-) -> PythonKernel:
-    """Return a kernel rebuilt if it, or one that it calls, has slots of these names."""
-    if kernel not in made:
-        filled = {name: _fill_slots(callee, bound, made) for name, callee in callees(kernel)}
-        changed = {k: v for k, v in filled.items() if v is not kernel.__globals__[k]}
-        for name, value in named_globals(kernel):
-            if isinstance(value, Slot) and name in bound:
-                changed[name] = bound[name]
-        made[kernel] = _rebuild(kernel, kernel.__globals__ | changed) if changed else kernel
-    return made[kernel]
+        if name not in kernel.__code__.co_names:
+            raise ValueError(f"bound: expected names that {kernel.__name__} has, got {name!r}")
+    return _rebuild(kernel, kernel.__globals__ | bound)
 
 
 def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
@@ -187,9 +133,9 @@ def _entry(kernel: PythonKernel, relaxed: bool, label: str | None) -> PythonKern
     from . import disk_cache, linking
 
     compilation.watch_numba()
-    compiled = _jit(kernel, relaxed, pipeline_class=linking.KernelCompiler)
+    options = {"pipeline_class": linking.KernelCompiler} if linking.is_supported() else {}
+    compiled = _jit(kernel, relaxed, **options)
     compiled.label = label or kernel.__name__.strip("_").replace("_", " ")
-    linking.fix_flags(compiled)
     disk_cache.use_cache(compiled)
     return compiled
 
@@ -205,6 +151,8 @@ def _callee(kernel: PythonKernel, relaxed: bool, inline: bool) -> PythonKernel:
     options: dict[str, Any] = {"no_cpython_wrapper": True, "forceinline": inline}
     if not allocates(kernel):
         options["_nrt"] = False
+    if not linking.is_supported():
+        return _jit(kernel, relaxed, **options)
     compiled = _jit(kernel, relaxed, pipeline_class=linking.LinkedCompiler, **options)
     return linking.compile_directly(compiled)
 
@@ -212,18 +160,23 @@ def _callee(kernel: PythonKernel, relaxed: bool, inline: bool) -> PythonKernel:
 def _jit(kernel: PythonKernel, relaxed: bool, **options: Any) -> PythonKernel:
     import numba
 
-    for _, value in named_globals(kernel):
-        if isinstance(value, Slot):
-            value()
     calls = _calls(kernel)
-    compiled_callees = {
-        name: _callee(callee, relaxed, calls[name] == 1 or _inlined_size(callee) <= LARGE)
-        for name, callee in callees(kernel)
+    compiled_globals = {
+        name: _compiled_global(value, relaxed, calls[name] == 1)
+        for name, value in named_globals(kernel)
+        if kernels_in(value) and value is not kernel
     }
-    rebuilt = _rebuild(kernel, kernel.__globals__ | compiled_callees)
+    rebuilt = _rebuild(kernel, kernel.__globals__ | compiled_globals)
     rebuilt.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{'_relaxed' * relaxed}"
     options |= {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
     return numba.njit(fastmath=RELAXATIONS if relaxed else False, **options)(rebuilt)
+
+
+def _compiled_global(value: Any, relaxed: bool, inline: bool) -> Any:
+    """Return a callee compiled, or a NamedTuple of kernels with each compiled."""
+    if not isinstance(value, types.FunctionType):
+        return value._make(_compiled_global(kernel, relaxed, True) for kernel in value)
+    return _callee(value, relaxed, inline or _inlined_size(value) <= LARGE)
 
 
 def _calls(kernel: PythonKernel) -> Counter[str]:

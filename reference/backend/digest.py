@@ -27,12 +27,19 @@ def named_globals(kernel: PythonKernel) -> list[tuple[str, Any]]:
     return [(name, kernel.__globals__[name]) for name in names if name in kernel.__globals__]
 
 
+def kernels_in(value: Any) -> tuple[PythonKernel, ...]:
+    """Return a kernel, or those of a NamedTuple of kernels; none of any other value."""
+    kernels = value if isinstance(value, tuple) else (value,)
+    return tuple(kernel for kernel in kernels if isinstance(kernel, types.FunctionType))
+
+
 def callees(kernel: PythonKernel) -> list[tuple[str, PythonKernel]]:
     """Return the other kernels that a kernel calls, by the names under which it does."""
     return [
-        (name, value)
+        (name, callee)
         for name, value in named_globals(kernel)
-        if isinstance(value, types.FunctionType) and value is not kernel
+        for callee in kernels_in(value)
+        if callee is not kernel
     ]
 
 
@@ -54,9 +61,9 @@ def _collect(kernel: PythonKernel, parts: list[bytes], seen: set[Any]) -> None:
         parts.append(_module_fingerprint(kernel.compiled_in))
     for name, value in named_globals(kernel):
         parts.append(name.encode())
-        if isinstance(value, types.FunctionType):
-            _collect(value, parts, seen)
-        else:
+        for callee in kernels_in(value):
+            _collect(callee, parts, seen)
+        if not kernels_in(value):
             parts.append(_fingerprint(value))
 
 

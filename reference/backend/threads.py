@@ -7,7 +7,6 @@ import contextlib
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import AbstractContextManager
 from contextvars import ContextVar, copy_context
 from itertools import pairwise
 from typing import Any
@@ -41,15 +40,6 @@ def set_num_threads(count: int | None) -> Iterator[None]:
         yield
     finally:
         _num_threads.reset(token)
-
-
-def cores(count: int | None) -> AbstractContextManager[None]:
-    """Do what `set_num_threads` does, under its old name; goes with the next release.
-
-    Raises:
-        ValueError: if the count is not a positive integer.
-    """
-    return set_num_threads(count)
 
 
 def in_slices(

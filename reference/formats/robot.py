@@ -32,18 +32,10 @@ class Robot(NamedTuple):
 
 
 class Link(NamedTuple):
-    """One joint of an articulation, as read from a file.
+    """One joint of an articulation, as read from a file; see `Articulation` for the fields.
 
-    Attributes:
-        name: of the joint.
-        parent: index of its parent among the links, -1 for the root.
-        offset: its position in the parent's frame [m].
-        frame: its rotation in the parent's frame.
-        kind: of the joint.
-        axis: in its own frame.
-        lower: limit [rad or m].
-        upper: limit [rad or m].
-        cone: limit of a ball's tilt [rad].
+    Its offset [m] and frame are in the frame of its parent, an index among the links, -1 of the
+    root.
     """
 
     name: str
@@ -73,8 +65,7 @@ def assemble(
 ) -> Robot:
     """Return the robot of these links, with zero coordinates as its home.
 
-    Raises:
-        ValueError: if there are more than MOST_JOINTS, or one is invalid; names the origin.
+    More than MOST_JOINTS links, or an invalid one, are a ValueError that names the origin.
     """
     if len(links) > MOST_JOINTS:
         raise ValueError(f"{origin}: expected at most {MOST_JOINTS:,} joints, got {len(links):,}")

@@ -21,11 +21,8 @@ def warn(problem: str) -> None:
 def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST) -> str:
     r"""Return the text of a file with line ends \n and without a byte order mark.
 
-    Read at most `largest` + 1 bytes, whatever the size of the file.
-
     Raises:
-        ValueError: if the file does not exist, is not regular, cannot be read, is larger than
-            `largest` bytes, contains a NUL byte or is not UTF-8.
+        ValueError: as for `read_bytes`, or if it contains a NUL byte or is not UTF-8.
     """
     data = read_bytes(path, largest=largest)
     if b"\0" in data:
@@ -40,11 +37,7 @@ def read_text(path: str | os.PathLike[str], *, largest: int = LARGEST) -> str:
 
 
 def checked_path(path: str | os.PathLike[str]) -> str:
-    """Return the path of a file as a string.
-
-    Raises:
-        ValueError: if it is none, is empty or holds a NUL.
-    """
+    """Return the path of a file as a string; a ValueError if it is none, empty or has a NUL."""
     given = os.fspath(path) if isinstance(path, str | os.PathLike) else None
     if not isinstance(given, str) or not given or "\0" in given:
         raise ValueError(f"path: expected a path, got {shown(path)}")

@@ -61,11 +61,7 @@ def read(path: str | Path, *, mimic: bool = True, crossed_limits: str = "unlimit
 
 
 def parse(text: str, *, mimic: bool = True, crossed_limits: str = "unlimited") -> Robot:
-    """Return the robot that a text describes; see `read`.
-
-    Raises:
-        ValueError: as for `read`.
-    """
+    """Return the robot that a text describes; see `read`."""
     arguments.choice("crossed_limits", crossed_limits, CROSSED_LIMITS)
     return _robot(xml.parse(text, "URDF"), "URDF", mimic, crossed_limits)
 

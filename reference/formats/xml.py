@@ -26,19 +26,12 @@ Numbers = TypeVar("Numbers", bound=tuple[float, ...])
 
 
 class Element(NamedTuple):
-    """An element of a file.
+    """An element of a file; its methods raise a ValueError that says where it is."""
 
-    Attributes:
-        tag: its name.
-        attributes: their values, by name.
-        children: the elements in it, in the order of the file.
-        location: the file and the line where it begins.
-    """
-
-    tag: str
-    attributes: dict[str, str]
-    children: list["Element"]
-    location: str
+    tag: str  # its name
+    attributes: dict[str, str]  # their values, by name
+    children: list["Element"]  # the elements in it, in the order of the file
+    location: str  # the file and the line where it begins
 
     def walk(self) -> Iterator["Element"]:
         """Yield the element and all its descendants in the order of the file."""
@@ -53,22 +46,14 @@ class Element(NamedTuple):
         return [child for child in self.children if child.tag == tag]
 
     def single(self, tag: str) -> "Element | None":
-        """Return the child of that name, None if there is none.
-
-        Raises:
-            ValueError: if there are several.
-        """
+        """Return the only child of that name, None if there is none."""
         found = self.named(tag)
         if len(found) > 1:
             raise self.error(f"expected at most one <{tag}>, got {len(found)}")
         return found[0] if found else None
 
     def word(self, name: str, default: str | None = None) -> str:
-        """Return an attribute, or the default where it is missing.
-
-        Raises:
-            ValueError: if it is missing and has no default, is empty or too long.
-        """
+        """Return an attribute, or the default where it is missing."""
         value = self._short(name) if name in self.attributes else default
         if not value:
             got = "none" if value is None else "an empty one"
@@ -76,22 +61,14 @@ class Element(NamedTuple):
         return value
 
     def numbers(self, name: str, default: Numbers) -> Numbers:
-        """Return as many finite numbers as the default has, or the default itself.
-
-        Raises:
-            ValueError: if their count differs, or one is not a number or beyond 1e75.
-        """
+        """Return as many numbers of at most 1e75 as the default has, or the default itself."""
         values = self.limits(name, default)
         if not all(abs(value) <= LARGEST_COORDINATE for value in values):
             raise self._no_numbers(name, len(default), f"numbers of at most {LARGEST_COORDINATE:g}")
         return values
 
     def limits(self, name: str, default: Numbers) -> Numbers:
-        """Return the same, infinite numbers allowed.
-
-        Raises:
-            ValueError: if their count differs, or one is not a number.
-        """
+        """Return the same, infinite numbers allowed."""
         words = self._short(name).split()
         if not words:
             return default
@@ -118,11 +95,7 @@ class Element(NamedTuple):
 
 
 def read(path: str | Path) -> Element:
-    """Return the root element of a file.
-
-    Raises:
-        ValueError: as for `parse`, and if it cannot be read.
-    """
+    """Return the root element of a file; see `parse`."""
     return parse(read_text(path), str(path))
 
 

@@ -145,11 +145,7 @@ class ImplicitEuler:
         external_forces: ArrayLike | None = None,
         pin_positions: ArrayLike | None = None,
     ) -> Objective:
-        """Return g of the step from this state.
-
-        Raises:
-            ValueError: as for `step`.
-        """
+        """Return g of the step from this state; arguments and errors are those of `step`."""
         start = self.start or STARTS[0]
         return Objective(self.system, state, self.h, external_forces, pin_positions, start)
 
@@ -165,9 +161,6 @@ class ImplicitEuler:
         `result` is a `StepResult` or positions, shape (particle, 3) [m]; the other arguments are
         those of the step, which a result does not keep. It costs about as much as three iterations
         of Newton's method; `certificate` states the proof.
-
-        Raises:
-            ValueError: as for `step`, or if the positions have a wrong shape or are not finite.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             objective = self.objective(state, external_forces, pin_positions)
@@ -183,9 +176,6 @@ class ImplicitEuler:
         """Yield the solver's start and the iterate after each iteration, without end.
 
         `step` runs the same iterates and stops by tolerance and max_iterations.
-
-        Raises:
-            ValueError: as for `step`.
         """
         return self._solver.iterates(self.objective(state, external_forces, pin_positions))
 

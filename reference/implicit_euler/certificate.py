@@ -119,9 +119,6 @@ class Certificate:
 
         `apart` is the distance between the two results [m]. None means that neither is proven, as
         when one of the certificates has no bound.
-
-        Raises:
-            ValueError: if the other is no certificate, or the distance no number of at least 0.
         """
         instance("other", other, Certificate)
         return self.shares_minimiser_within(other, number("apart", apart, least=0.0))
@@ -140,10 +137,8 @@ class Certificate:
 def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     """Return the certificate of positions, shape (particle, 3) [m], as the result of a step.
 
-    It takes two or three Cholesky factorisations of the Hessian and 20 to 60 solves.
-
-    Raises:
-        ValueError: if the positions have a wrong shape or are not finite.
+    It takes two or three Cholesky factorisations of the Hessian and 20 to 60 solves. Positions of
+    another shape or not finite are a ValueError.
     """
     system = instance("objective", objective, Objective).system
     x = coordinates("positions", positions, system.particle_count, 3)

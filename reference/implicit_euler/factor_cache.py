@@ -53,11 +53,7 @@ def hessian_factor(system: MassSpring) -> Factor:
 
 
 def prefactored(matrix: Any) -> Factor:
-    """Return the factor of a sparse CSC matrix from the cache, or factorise it.
-
-    Raises:
-        NotPositiveDefiniteError: if the matrix is not positive definite.
-    """
+    """Return the factor of a sparse CSC matrix from the cache, or factorise it."""
     digest = hashlib.blake2b(matrix.indptr)
     digest.update(matrix.indices)
     pattern = digest.digest()

@@ -19,6 +19,7 @@ of the gradient are zero.
 import functools
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -53,39 +54,21 @@ from .terms import (
 STARTS = ("y", "x_n")
 
 
+@dataclass(eq=False)
 class Iterate:
-    """Positions with g and its gradient there.
+    """Positions with g and its gradient there."""
 
-    Attributes:
-        positions: x, shape (particle, 3) [m].
-        gradient: grad g(x), shape (particle, 3) [kg m], zero at the pins.
-        value: g(x) [kg m²].
-        gradient_norm: |grad g(x)|.
-        floor_bound: an upper bound of `floor` that is cheaper to compute.
-        is_convex: whether Newton's method found the Hessian positive definite on its way here.
-    """
-
-    def __init__(
-        self,
-        positions: FloatArray,
-        gradient: FloatArray,
-        value: float,
-        gradient_norm: float,
-        floor_bound: float,
-        rounding: Callable[[FloatArray], tuple[float, float]],
-    ) -> None:
-        """Store them, with the function that returns `floor` and `value_floor`."""
-        self.positions = positions
-        self.gradient = gradient
-        self.value = value
-        self.gradient_norm = gradient_norm
-        self.floor_bound = floor_bound
-        self.is_convex = False
-        self._compute_rounding = rounding
+    positions: FloatArray  # x, shape (particle, 3) [m]
+    gradient: FloatArray  # grad g(x), shape (particle, 3) [kg m], zero at the pins
+    value: float  # g(x) [kg m²]
+    gradient_norm: float  # |grad g(x)|
+    floor_bound: float  # an upper bound of `floor` that is cheaper to compute
+    rounding_of: Callable[[FloatArray], tuple[float, float]]  # of the norm and of g at x
+    is_convex: bool = False  # whether Newton found the Hessian positive definite on its way here
 
     @functools.cached_property
     def _rounding(self) -> tuple[float, float]:
-        return self._compute_rounding(self.positions)
+        return self.rounding_of(self.positions)
 
     @property
     def floor(self) -> float:
@@ -140,8 +123,8 @@ def _finite_result(method: Callable[..., Any]) -> Callable[..., Any]:
 class Objective:
     """g of one step, in SI units.
 
-    Its value, its derivatives and its quadratic form are a FloatingPointError where they overflow;
-    an iterate says so in `finite`.
+    Its value, its derivatives and its quadratic form are a FloatingPointError where they overflow,
+    and a ValueError at positions of another shape or not finite; an iterate says so in `finite`.
 
     Attributes:
         system: particles and springs.
@@ -200,11 +183,7 @@ class Objective:
         return self.iterate_at(np.where(self.system.free[:, None], self.x_n, self.y))
 
     def evaluate(self, positions: ArrayLike) -> Iterate:
-        """Return g and its gradient at positions of shape (particle, 3) [m].
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
-        """
+        """Return g and its gradient at positions of shape (particle, 3) [m]."""
         return self.iterate_at(self._positions(positions))
 
     def iterate_at(self, positions: FloatArray) -> Iterate:
@@ -224,11 +203,7 @@ class Objective:
         return _rounding_bounds(positions, y, external, h, *springs)
 
     def residual(self, iterate: Iterate) -> float:
-        """Return |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows at x or at y.
-
-        Raises:
-            ValueError: if it is no iterate, such as the positions of one.
-        """
+        """Return |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows at x or at y."""
         if instance("iterate", iterate, Iterate).gradient_norm == 0.0:
             return 0.0
         if not (iterate.finite and self.inertial.finite):
@@ -240,20 +215,12 @@ class Objective:
 
     @_finite_result
     def value(self, positions: ArrayLike) -> float:
-        """Return g(x) [kg m²], up to a constant that depends on the pins.
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
-        """
+        """Return g(x) [kg m²], up to a constant that depends on the pins."""
         return self.evaluate(positions).value
 
     @_finite_result
     def gradient(self, positions: ArrayLike) -> FloatArray:
-        """Return grad g(x) = M (x - y) - h² f(x) [kg m], shape (particle, 3), zero at the pins.
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
-        """
+        """Return grad g(x) = M (x - y) - h² f(x) [kg m], shape (particle, 3), zero at the pins."""
         return self.evaluate(positions).gradient
 
     @_finite_result
@@ -261,9 +228,6 @@ class Objective:
         """Return M + h² K [kg], sparse (3 particle, 3 particle); an identity at the pins.
 
         K is the stiffness matrix at x, exact, or without its geometric terms (Gauss-Newton).
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
         """
         geometric = boolean("geometric", geometric)
         return self.hessian_at(self._positions(positions), geometric=geometric)
@@ -275,21 +239,12 @@ class Objective:
         hessian.data[springs.diagonal] += np.repeat(self.system.free_masses, 3)
         return hessian
 
-    @_finite_result
-    def pin_gradient(self, positions: ArrayLike, *, geometric: bool = True) -> FloatArray:
+    def pin_gradient_at(self, x: FloatArray, *, geometric: bool) -> FloatArray:
         """Return h² K times the displacement of the pins from x_n to y, shape (particle, 3) [kg m].
 
         It is the contribution of the pins to the gradient at the free particles when the springs
-        are linearised at x; zero at the pins. K is as for `hessian`.
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
+        are linearised at x, which is not checked; zero at the pins. K is as for `hessian`.
         """
-        geometric = boolean("geometric", geometric)
-        return self.pin_gradient_at(self._positions(positions), geometric=geometric)
-
-    def pin_gradient_at(self, x: FloatArray, *, geometric: bool) -> FloatArray:
-        """Return `pin_gradient` at positions that are not checked."""
         displacement = np.where(self.system.free[:, None], 0.0, self.y - self.x_n)
         if not displacement.any():
             return displacement
@@ -305,9 +260,6 @@ class Objective:
         1/2 x' (M + h² L) x - h² x' J d - x' (M y + h² f_ext) + constant (Liu et al. 2013), with
         L and J of the effective springs. It equals g(x) for d = rest_vectors(x) and is larger for
         any other d of the effective rest lengths, or of shorter ones in tension-only springs.
-
-        Raises:
-            ValueError: if the positions or d have a wrong shape or are not finite.
         """
         x, y, hh = self._positions(positions), self.y, self.h * self.h
         d = coordinates("d", d, len(self.effective.springs), 3)
@@ -319,11 +271,7 @@ class Objective:
         return float(0.5 * np.sum(x * ((M + hh * L) @ x)) - np.sum(x * linear) + constant)
 
     def rest_vectors(self, positions: ArrayLike) -> FloatArray:
-        """Return the optimal d of the effective springs at x, shape (spring, 3) [m].
-
-        Raises:
-            ValueError: if the positions have a wrong shape or are not finite.
-        """
+        """Return the optimal d of the effective springs at x, shape (spring, 3) [m]."""
         return rest_vectors(self.effective, positions)
 
     def _positions(self, positions: ArrayLike) -> FloatArray:

@@ -1,9 +1,8 @@
 """Inverse kinematics: local rotations or coordinates that bring effectors to targets.
 
-The route of a call: `solve_ik` checks settings, model and targets; `solve.py`, or `single_solve.py`
-for one plain target, hands arrays to the kernel of a solver; that begins from each start
-(`solve_chain.py`, `solve_mechanism.py`) and runs the two loops of `restarts.py`, which call the
-solver's update in the file that bears its name.
+The route of a call: `solve_ik` checks settings, model and targets; `solve.py` hands arrays to the
+kernel of a solver; that begins from each start (`solve_chain.py`, `solve_mechanism.py`) and runs
+the two loops of `restarts.py`, which call the solver's update in the file that bears its name.
 """
 
 from collections.abc import Sequence
@@ -14,17 +13,9 @@ from ..model import Model, checked_model
 from ..outcome import Outcome
 from .problem import IKSolution, Target, checked_targets
 from .settings import IK_SOLVERS, RESTARTS, checked_settings, default_solver
-from .single_solve import solve_single
-from .solve import solve_checked
+from .solve import solve_checked, solve_plain
 
-__all__ = [
-    "IK_SOLVERS",
-    "RESTARTS",
-    "IKSolution",
-    "Outcome",
-    "Target",
-    "solve_ik",
-]
+__all__ = ["IK_SOLVERS", "RESTARTS", "IKSolution", "Outcome", "Target", "solve_ik"]
 
 
 def solve_ik(
@@ -49,13 +40,12 @@ def solve_ik(
     its own line, is first bent, always alike. Limits are kept; a start outside of them
     is brought within.
 
-    Restarts never make an answer worse: what is reached with fewer is reached with more, and where
-    none reaches the target the merit does not grow with their number. It is no greater either than
-    that of one attempt given (1 + restarts) `max_iterations` at once. Attempts within the
-    tolerances are equally good. To that end an attempt that was given up early is finished if no
-    other reaches the target, and the first goes on for as many iterations as all may make: up to
-    (1 + 2 restarts) `max_iterations` in all, for one position on a Skeleton (2 + 3 restarts).
-    Attempts at a target proven out of reach end as soon as one is as near as geometry allows.
+    Restarts never make an answer worse: what is reached with fewer is reached with more, else the
+    merit is no greater than with fewer, or than that of one attempt given (1 + restarts)
+    `max_iterations`. An attempt that was given up early is finished if no other reaches the target,
+    and the first goes on for as many iterations as all may make: up to (1 + 2 restarts)
+    `max_iterations` in all, for one position on a Skeleton (2 + 3 restarts). Attempts at a target
+    proven out of reach end as soon as one is as near as geometry allows.
 
     Args:
         skeleton: the tree; an Articulation for joints of other kinds and for limits, or a Robot
@@ -64,15 +54,14 @@ def solve_ik(
             coordinates q, (..., coordinate).
         target: global position [m], shape (..., 3), a Target, or several for several effectors.
             Leading axes broadcast with those of the start: a batch.
-        solver: a name in IK_SOLVERS. By default FABRIK for one position on a Skeleton, which it
-            reaches soonest, and else Levenberg-Marquardt.
+        solver: a name in IK_SOLVERS; by default FABRIK for one position on a Skeleton, else
+            Levenberg-Marquardt.
         effector: the joint that is to reach a position given without one, by index or name. By
             default the last joint of a Skeleton, and the only tip of an Articulation.
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that counts as reached [rad].
-        max_iterations: the most to make, of each attempt; by default 100, but 2,000 where geometry
-            proves the target out of reach, so that most solves settle: within the tolerance of
-            the nearest point, or with no more progress.
+        max_iterations: of each attempt; by default 100, but 2,000 where geometry proves the target
+            out of reach, so that most solves settle.
         restarts: how many further attempts to make from random poses, until one reaches the target.
             By default 20 where the solver is the default Levenberg-Marquardt, else 0.
         seed: of those poses.
@@ -90,7 +79,7 @@ def solve_ik(
         solver, tolerance, tolerance_rotation, max_iterations,
         0 if restarts is None else restarts, seed, record,
     )  # fmt: skip
-    plain = solve_single(skeleton, local_rotations, target, effector, settings)
+    plain = solve_plain(skeleton, local_rotations, target, effector, settings)
     if plain is not None:
         return plain
     model = checked_model(skeleton)

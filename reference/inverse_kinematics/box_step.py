@@ -25,23 +25,14 @@ FAR_DAMPING, LEAST_FAR_DAMPING, GROWTH, DECAY = 0.2, 0.001, 8.0, 1.3
 
 
 class TaskSystem(NamedTuple):
-    """The linear system of a task, and a step.
+    """The linear system of a task, and a step."""
 
-    Attributes:
-        e: errors [m], (equation,).
-        J: the Jacobian transposed, see `task_jacobian.py`, (freedom, equation).
-        A: J J' + damping and then its factors, (equation, equation).
-        z: A^-1 e, (equation,).
-        step: of the freedoms, lengths over the reach, (freedom,).
-        active: 1 where the upper limit stops a freedom, -1 where the lower does, else 0,
-            (freedom,).
-    """
-
-    e: FloatArray
-    J: FloatArray
-    A: FloatArray
-    z: FloatArray
-    step: FloatArray
+    e: FloatArray  # errors [m], (equation,)
+    J: FloatArray  # the Jacobian transposed, see `task_jacobian.py`, (freedom, equation)
+    A: FloatArray  # J J' + damping and then its factors, (equation, equation)
+    z: FloatArray  # A^-1 e, (equation,)
+    step: FloatArray  # of the freedoms, lengths over the reach, (freedom,)
+    # 1 where the upper limit stops a freedom, -1 where the lower does, else 0, (freedom,)
     active: FloatArray
 
 

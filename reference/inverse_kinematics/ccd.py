@@ -1,11 +1,7 @@
 """Cyclic coordinate descent (Wang & Chen 1991)."""
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-
-from ..arguments import FloatArray
 from ..articulation import BALL, FREE, HINGE, SLIDE
 from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
@@ -24,14 +20,7 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .box_step import (
-    TaskSystem,
-    freedom_scale,
-    inner,
-    linearise_task,
-    new_task_system,
-    squared,
-)
+from .box_step import freedom_scale, inner, linearise_task, squared
 from .chain import update_positions
 from .joint_updates import load_ball, move_by, rotate_to, store_ball, translate_free
 from .mechanism import (
@@ -48,23 +37,6 @@ from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, 
 
 # A step of a joint that others follow is halved at most so often.
 HALVINGS = 20
-
-
-class CCDWorkspace(NamedTuple):
-    """Arrays to write to.
-
-    Attributes:
-        system: where a joint that others follow finds its gradient.
-        eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
-    """
-
-    system: TaskSystem
-    eigen: FloatArray
-
-
-def new_ccd_workspace(mechanism):
-    """Return a workspace to be filled."""
-    return CCDWorkspace(new_task_system(mechanism), np.empty((2, 4, 4)))
 
 
 def ccd_sweep(chain, target):
@@ -102,12 +74,13 @@ def pointing(joint, effector, target):
     return between(arm, direction), add(joint, scale(length, direction))
 
 
-def ccd_update(mechanism, target, data, work):
+def ccd_update(state, target):
     """Move each joint, from the effectors to the root, to bring all effectors below it nearest.
 
     A joint rotates what is below it as one body: Wahba's problem, for a hinge about its axis. A
     hinge or slide stops at its limit; a ball whose limits leave only worse rotations stays.
     """
+    mechanism, data, work = state.mechanism, state.data, state.workspace
     joints = mechanism.joints
     for j in range(len(joints) - 1, -1, -1):
         if joints["followed"][j]:

@@ -33,25 +33,16 @@ POSITION_ROUNDING = 8 * 2.220446049250313e-16
 
 
 class Chain(NamedTuple):
-    """n links and n + 1 joints, the last the effector; link k joins joints k and k + 1.
+    """n links and n + 1 joints, the last the effector; link k joins joints k and k + 1."""
 
-    Attributes:
-        offsets: joint k's offset in the frame of joint k - 1 [m], (n + 1, 3).
-        lengths: link lengths [m], (n,).
-        positions: global joint positions [m], (n + 1, 3).
-        rotations: global joint rotations, (n + 1, 4).
-        deltas: where a sweep notes the rotation of each joint, (n, 4).
-        reach: total length [m].
-        longest: the longest link [m].
-    """
-
-    offsets: FloatArray
-    lengths: FloatArray
-    positions: FloatArray
-    rotations: FloatArray
-    deltas: FloatArray
-    reach: float
-    longest: float
+    offsets: FloatArray  # joint k's offset in the frame of joint k - 1 [m], (n + 1, 3)
+    lengths: FloatArray  # link lengths [m], (n,)
+    positions: FloatArray  # global joint positions [m], (n + 1, 3)
+    rotations: FloatArray  # global joint rotations, (n + 1, 4)
+    deltas: FloatArray  # where a sweep notes the rotation of each joint, (n, 4)
+    reach: float  # total length [m]
+    longest: float  # the longest link [m]
+    row: FloatArray  # positions and rotations, one number after the other
 
 
 def new_chain(offsets, path):
@@ -67,8 +58,9 @@ def new_chain(offsets, path):
         lengths[k] = norm(link)
         reach += lengths[k]
         longest = max(longest, lengths[k])
-    positions, rotations, deltas = np.empty((n + 1, 3)), np.empty((n + 1, 4)), np.empty((n, 4))
-    return Chain(along, lengths, positions, rotations, deltas, reach, longest)
+    row, deltas, split = np.empty(7 * (n + 1)), np.empty((n, 4)), 3 * (n + 1)
+    positions, rotations = row[:split].reshape(n + 1, 3), row[split:].reshape(n + 1, 4)
+    return Chain(along, lengths, positions, rotations, deltas, reach, longest, row)
 
 
 def pose_chain(chain, path, local):

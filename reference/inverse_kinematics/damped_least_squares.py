@@ -20,8 +20,9 @@ def damped_least_squares_sweep(chain, target):
     rotate_joints(chain, solve_damped(A, DAMPING * chain.reach * chain.reach, e))
 
 
-def damped_least_squares_update(mechanism, target, data, system):
+def damped_least_squares_update(state, target):
     """Change the coordinates by J' (J J' + (0.1 reach)^2 1)^-1 e, within their limits."""
+    mechanism, data, system = state.mechanism, state.data, state.workspace.system
     linearise_task(mechanism, target, data, system)
     damping = DAMPING * mechanism.reach * mechanism.reach
     damped_step(mechanism, data, system, far_damping(mechanism, target, data, system, damping))

@@ -6,11 +6,8 @@ their backward positions: a hinge about its axis, a ball within its limits, one 
 children of a branch, a free joint as one body. What that cannot meet remains as the residual.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ..arguments import FloatArray, RecordArray
 from ..articulation import BALL, FREE, HINGE, SLIDE, joint_transform
 from ..motion_subspace import axis_of, frame_of
 from ..quaternion import (
@@ -42,23 +39,6 @@ ZERO = (0.0, 0.0, 0.0)
 LEAST_ROTATION = 1e-6
 # Where the backward pass puts a joint [m], and the weight of that, 0 where it puts it nowhere.
 BACKWARD = np.dtype([("position", np.float64, 3), ("weight", np.float64)], align=True)
-
-
-class FabrikWorkspace(NamedTuple):
-    """Arrays to write to.
-
-    Attributes:
-        backward: backward positions, records BACKWARD, (joint,).
-        eigen: Davenport's matrix and its eigenvectors, (2, 4, 4).
-    """
-
-    backward: RecordArray
-    eigen: FloatArray
-
-
-def new_fabrik_workspace(mechanism):
-    """Return a workspace to be filled."""
-    return FabrikWorkspace(np.empty(len(mechanism.joints), BACKWARD), np.empty((2, 4, 4)))
 
 
 def fabrik_sweep(chain, target):
@@ -119,8 +99,9 @@ def point_towards(start, end, length):
     return add(start, scale(length / distance, direction))
 
 
-def fabrik_update(mechanism, target, data, work):
+def fabrik_update(state, target):
     """Find the backward positions, then move joint after joint towards them."""
+    mechanism, data, work = state.mechanism, state.data, state.workspace
     backward_pass(mechanism, target, data, work.backward)
     joints = mechanism.joints
     for j in range(len(joints)):

@@ -25,8 +25,9 @@ def jacobian_transpose_sweep(chain, target):
         rotate_joints(chain, scale(dot(e, move) / dot(move, move), e))
 
 
-def jacobian_transpose_update(mechanism, target, data, system):
+def jacobian_transpose_update(state, target):
     """Change the coordinates by a J' e with the same a, within their limits."""
+    mechanism, data, system = state.mechanism, state.data, state.workspace.system
     linearise_task(mechanism, target, data, system)
     transposed_step(mechanism, data, system)
     take_step(mechanism, data, system)

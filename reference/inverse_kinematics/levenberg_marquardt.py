@@ -26,8 +26,9 @@ def levenberg_marquardt_sweep(chain, target):
     rotate_joints(chain, solve_damped(A, damping, e))
 
 
-def levenberg_marquardt_update(mechanism, target, data, system):
+def levenberg_marquardt_update(state, target):
     """Change the coordinates by J' (J J' + mu 1)^-1 e, within their limits."""
+    mechanism, data, system = state.mechanism, state.data, state.workspace.system
     linearise_task(mechanism, target, data, system)
     positions = 3 * len(mechanism.effectors) == mechanism.equations
     share = DAMPING if positions else DAMPING_OF_POSES

@@ -51,49 +51,32 @@ TARGET = np.dtype(
 
 
 class Mechanism(NamedTuple):
-    """Joints, and effectors attached to them; parents precede children.
+    """Joints, and effectors attached to them; parents precede children."""
 
-    Attributes:
-        joints: those that move, fixed ones merged; coordinates are the mechanism's own, (joint,).
-        sources: where a joint's coordinates begin among the articulation's, (joint,).
-        effectors: (effector,).
-        moves: whether a joint moves an effector, (joint, effector).
-        adjacent: whether a joint moves a joint below it, or an effector, and no joint between them
-            does, (joint, joint + effector).
-        reach: the length of the longest path from the root to an effector, slides left out unless
-            there is nothing else [m].
-        coordinates: how many.
-        freedoms: how many.
-        equations: how many in all.
-    """
-
+    # those that move, fixed ones merged; coordinates are the mechanism's own, (joint,)
     joints: RecordArray
-    sources: IndexArray
-    effectors: RecordArray
-    moves: BoolArray
+    sources: IndexArray  # where a joint's coordinates begin among the articulation's, (joint,)
+    effectors: RecordArray  # (effector,)
+    moves: BoolArray  # whether a joint moves an effector, (joint, effector)
+    # whether a joint moves a joint below it, or an effector, and no joint between them does,
+    # (joint, joint + effector)
     adjacent: BoolArray
+    # the length of the longest path from the root to an effector, slides left out unless there is
+    # nothing else [m]
     reach: float
-    coordinates: int
-    freedoms: int
-    equations: int
+    coordinates: int  # how many
+    freedoms: int  # how many
+    equations: int  # how many in all
 
 
 class ConfigurationData(NamedTuple):
-    """A mechanism's coordinates with their forward kinematics; effectors come behind the joints.
+    """A mechanism's coordinates with their forward kinematics; effectors come behind the joints."""
 
-    Attributes:
-        state: what an attempt continues from, `q` and then `far_step`, (coordinate + 2,).
-        q: (coordinate,).
-        far_step: see `box_step.far_damping`, (2,); zero before the first step.
-        positions: in the world [m], (joint + effector, 3).
-        rotations: in the world, (joint + effector, 4).
-    """
-
-    state: FloatArray
-    q: FloatArray
-    far_step: FloatArray
-    positions: FloatArray
-    rotations: FloatArray
+    state: FloatArray  # what an attempt continues from, `q` and then `far_step`, (coordinate + 2,)
+    q: FloatArray  # (coordinate,)
+    far_step: FloatArray  # see `box_step.far_damping`, (2,); zero before the first step
+    positions: FloatArray  # in the world [m], (joint + effector, 3)
+    rotations: FloatArray  # in the world, (joint + effector, 4)
 
 
 def new_data(mechanism):

@@ -83,19 +83,12 @@ class IKSolution(NamedTuple):
 
 
 class CheckedTarget(NamedTuple):
-    """A target, checked but for its numbers, which the kernels check.
+    """A target, checked but for its numbers, which the kernels check."""
 
-    Attributes:
-        joint: the effector's index.
-        position: [m], (..., 3).
-        rotation: (..., 4), or None.
-        weight: greater than zero.
-    """
-
-    joint: int
-    position: FloatArray
-    rotation: FloatArray | None
-    weight: float
+    joint: int  # the effector's index
+    position: FloatArray  # [m], (..., 3)
+    rotation: FloatArray | None  # (..., 4), or None
+    weight: float  # greater than zero
 
     def mapped(self, change: Callable[[FloatArray], FloatArray]) -> "CheckedTarget":
         """Return the target with its position and its rotation, if it has one, changed."""
@@ -106,7 +99,7 @@ class CheckedTarget(NamedTuple):
 def checked_targets(
     model: Skeleton | Articulation, target: Any, effector: int | str | None
 ) -> list[CheckedTarget]:
-    """Return the targets of all effectors.
+    """Return the targets of all effectors, their numbers not yet checked.
 
     Raises:
         ValueError: if it is no position or target; if there is no such joint, two targets are for
@@ -149,11 +142,7 @@ def _checked(
 
 
 def check_numbers(targets: list[CheckedTarget]) -> list[CheckedTarget]:
-    """Return the targets with unit rotations, their numbers checked as well.
-
-    Raises:
-        ValueError: if a position is not finite or too large, or a rotation no unit quaternion.
-    """
+    """Return the targets with unit rotations; a ValueError if a number is not valid."""
     checked = []
     for one in targets:
         arguments.coordinates("target", one.position, "...", 3)

@@ -25,20 +25,17 @@ BLOCK = 16
 
 
 class Prepared(NamedTuple):
-    """What is made once for some effectors and restarts.
+    """What is made once for some effectors and restarts."""
 
-    Attributes:
-        mechanism: what moves the effectors.
-        restarts: the mechanism's coordinates in random poses, (restart, coordinate).
-        effector_frames: where these put the effectors, positions [m] and rotations, (restart,
-            effector, 7).
-        flat: joints of the articulation and mechanism, one array or number after the other, and
-            the two above.
-    """
-
-    mechanism: Mechanism
-    restarts: FloatArray
+    mechanism: Mechanism  # what moves the effectors
+    columns: (
+        IndexArray  # which of the articulation's coordinates are the mechanism's, (coordinate,)
+    )
+    restarts: FloatArray  # the mechanism's coordinates in random poses, (restart, coordinate)
+    # where these put the effectors, positions [m] and rotations, (restart, effector, 7)
     effector_frames: FloatArray
+    # joints of the articulation and mechanism, one array or number after the other, and the two
+    # above
     flat: tuple[Any, ...]
 
 
@@ -60,7 +57,7 @@ def prepare(
             effector_frames = np.concatenate([x, R], axis=-1)[:, list(effectors)]
         drawn = np.ascontiguousarray(poses[:, columns]), np.ascontiguousarray(effector_frames)
         flat = (articulation.joints, *mechanism, *drawn)
-        articulation.mechanisms[key] = Prepared(mechanism, *drawn, flat)
+        articulation.mechanisms[key] = Prepared(mechanism, columns, *drawn, flat)
     return articulation.mechanisms[key]
 
 

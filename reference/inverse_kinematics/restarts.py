@@ -1,11 +1,8 @@
 """The two loops of every solver: the iterations of one attempt, and attempts from further starts.
 
-A target is solved on a chain of unlimited balls (`solve_chain.py`) or a mechanism
-(`solve_mechanism.py`). What these do differently stands in slots, which one `bind` fills. Their
-`state` holds, beside what they work on:
-
-    saved: configurations, a row an attempt and in the last row the best end of one.
-    progress: (attempt + 1, 6), see the columns below; the last row is not used.
+They work on the state of a chain of unlimited balls (`solve_chain.py`) or of a mechanism
+(`solve_mechanism.py`), through its `Operations`. Both states have a `row` of numbers: what an
+attempt continues from.
 """
 
 import math
@@ -13,23 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..backend.compiled import Slot
-from .result import store_if_inside
-
-# One iteration of a solver: update(state, target).
-update = Slot("update")
-# error(state, target): the largest distance [m] and angle [rad] from effector to target, the sum of
-# all distances and levered angles [m], which shows progress, and the distance that has to be small.
-error = Slot("error")
-# merit(state, target): what says which attempt is better, the less the better [m].
-merit = Slot("merit")
-# perturb(state, target, criteria, first): move the first attempt if it is stuck, and return whether
-# it was; `first` is its row of progress.
-perturb = Slot("perturb")
-# save(state, k) and restore(state, k): the configuration to row k of `saved`, and back.
-save, restore = Slot("save"), Slot("restore")
-# draw(state, target, n): take the configuration of random restart n = 1, 2, ...
-draw = Slot("draw")
+from ..arguments import FloatArray
+from ..backend.digest import PythonKernel
 
 # An attempt that others may follow is given up once PATIENCE iterations have not brought the error
 # to this share of what it was. If no other reaches the target it goes on, MORE_PATIENT times as
@@ -38,47 +20,55 @@ PATIENCE, PROGRESS, MORE_PATIENT = 3, 0.5, 4
 # How an attempt ended: within the tolerances, or of the nearest point that geometry allows; with no
 # more progress; with its iterations used; given up early.
 REACHED, SETTLED, LIMITED, GIVEN_UP = range(4)
-# Columns of progress: iterations made, how the attempt ended, its merit [m], its patience, and how
-# far the configuration it starts from is from the target [m].
-MADE, STATE, COST, WAIT, RANK = range(5)
+# Columns of progress: iterations made, how the attempt ended, its merit [m], and its patience.
+MADE, STATE, COST, WAIT = range(4)
 INFINITY = math.inf
 
 
+class Operations(NamedTuple):
+    """What the loops do to a state, a kernel each."""
+
+    update: PythonKernel  # (state, target): make one iteration of a solver
+    # (state, target): return the largest distance [m] and angle [rad] from effector to target, the
+    # sum of all distances and levered angles [m], which shows progress, and the distance that has
+    # to be small
+    error: PythonKernel
+    # (state, target): return what says which attempt is better, the less the better [m]
+    merit: PythonKernel
+    # (state, target, criteria, first): move the first attempt, whose row of progress is `first`, if
+    # it is stuck, and return whether it was
+    perturb: PythonKernel
+    place: PythonKernel  # (state): bring the state to what has been copied to its row
+    draw: PythonKernel  # (state, target, n): take the configuration of random restart n = 1, 2 ...
+
+
 class Limits(NamedTuple):
-    """What a solve may leave and take.
+    """What a solve may leave and take."""
 
-    Attributes:
-        tolerance: distance that counts as reached [m].
-        tolerance_rotation: angle that does [rad].
-        max_iterations: of each attempt.
-        far_iterations: the same where geometry proves a target out of reach.
-        restarts: further attempts.
-        chained: whether each target but the first starts from the solution before it.
-    """
-
-    tolerance: float
-    tolerance_rotation: float
-    max_iterations: int
-    far_iterations: int
-    restarts: int
-    chained: bool
+    tolerance: float  # distance that counts as reached [m]
+    tolerance_rotation: float  # angle that does [rad]
+    max_iterations: int  # of each attempt
+    far_iterations: int  # the same where geometry proves a target out of reach
+    restarts: int  # further attempts
+    chained: bool  # whether each target but the first starts from the solution before it
 
 
 class Criteria(NamedTuple):
-    """When an attempt at one target ends.
+    """When an attempt at one target ends."""
 
-    Attributes:
-        distance: at most this far from the target counts as reached [m], some of it left for the
-            rounding of the final pose.
-        angle: the same for rotations [rad].
-        margin: an error that changes by no more has settled [m].
-        max_iterations: of each attempt.
-    """
-
+    # at most this far from the target counts as reached [m], some of it left for the rounding of
+    # the final pose
     distance: float
-    angle: float
-    margin: float
-    max_iterations: int
+    angle: float  # the same for rotations [rad]
+    margin: float  # an error that changes by no more has settled [m]
+    max_iterations: int  # of each attempt
+
+
+class Attempts(NamedTuple):
+    """How far the attempts at one target have come."""
+
+    saved: FloatArray  # rows of the state, one an attempt and in the last row the best end of one
+    progress: FloatArray  # see the columns above, (attempt + 1, 4); the last row is not used
 
 
 def limits_of(numbers):
@@ -88,66 +78,69 @@ def limits_of(numbers):
     )
 
 
-def solve_with_restarts(state, target, limits, criteria, history):
+def new_attempts(count, state):
+    """Return room for so many attempts, not filled."""
+    return Attempts(np.empty((count + 1, len(state.row))), np.empty((count + 1, WAIT + 1)))
+
+
+def solve_with_restarts(operations, state, attempts, target, limits, criteria, history):
     """Attempt from the start, then from random configurations, until one reaches the target.
 
-    While others may follow an attempt at a target in reach is given up early. If none reaches it,
+    While others may follow, an attempt at a target in reach is given up early. If none reaches it,
     all are finished, and the first makes as many iterations as all of them may: its ends after one
-    attempt's iterations, two and so on count as attempts too. So what restarts give is the best
-    of more than one start gives, or fewer restarts, and can be no worse.
+    attempt's iterations, two and so on count as attempts too. So the result is the best of more
+    than what one start gives, or fewer restarts, and can be no worse.
 
-    Saves the best attempt in the last row of `state.saved`.
+    Saves the best attempt in the last row of `attempts.saved`.
 
     Returns:
         The iterations of all attempts, and whether the best one settled.
     """
-    progress, random = state.progress, len(state.progress) - 2
+    saved, progress = attempts
+    random = len(progress) - 2
     reset(progress, PATIENCE if random > 0 and criteria.distance <= limits.tolerance else INFINITY)
-    distance, _, _, _ = error(state, target)
+    distance, _, _, _ = operations.error(state, target)
     store_if_inside(history, 0, distance)
-    perturbed = perturb(state, target, criteria, progress[0])
+    perturbed = operations.perturb(state, target, criteria, progress[0])
     best, ending, done, drawn, periods = INFINITY, LIMITED, 0, 0, 1
-    k, most = 0, criteria.max_iterations
+    k, limit = 0, criteria.max_iterations
     while k >= 0:
-        done += solve_once(state, target, criteria, progress[k], most, history, done)
-        if rate(state, target, progress[k], k, best):
+        done += solve_once(operations, state, target, criteria, progress[k], limit, history, done)
+        progress[k, COST] = operations.merit(state, target)
+        copy_row(state.row, saved[k])
+        if is_better(progress[k], best):
             best, ending = progress[k, COST], int(progress[k, STATE])
-            save(state, len(progress) - 1)
+            copy_row(state.row, saved[-1])
         if ending == REACHED:
             break
         if k == 0 and not perturbed:
-            perturbed = perturb(state, target, criteria, progress[0])
+            perturbed = operations.perturb(state, target, criteria, progress[0])
             if perturbed:
                 continue
         if drawn < random:
             drawn += 1
-            k, most = drawn, criteria.max_iterations
-            draw(state, target, drawn)
+            k, limit = drawn, criteria.max_iterations
+            operations.draw(state, target, drawn)
             continue
         k = most_promising(progress)
         if k < 0 and periods <= limits.restarts and progress[0, STATE] == LIMITED:
             k, periods = 0, periods + 1
         if k >= 0:
-            most = periods * criteria.max_iterations
-            restore(state, k)
+            limit = periods * criteria.max_iterations
+            copy_row(saved[k], state.row)
+            operations.place(state)
     return done, ending <= SETTLED
-
-
-def new_progress(attempts):
-    """Return rows for the progress of attempts, not filled."""
-    return np.empty((attempts + 1, RANK + 1))
 
 
 def reset(progress, patience):
     """Note that no attempt has been made."""
     for k in range(len(progress) - 1):
         row = progress[k]
-        row[MADE], row[STATE], row[COST] = 0.0, LIMITED, INFINITY
-        row[WAIT] = patience
+        row[MADE], row[STATE], row[COST], row[WAIT] = 0.0, LIMITED, INFINITY, patience
 
 
-def solve_once(state, target, criteria, attempt, most, history, done):
-    """Update until the target is reached, the error settles, or `most` iterations are made.
+def solve_once(operations, state, target, criteria, attempt, limit, history, done):
+    """Update until the target is reached, the error settles, or `limit` iterations are made.
 
     `attempt` is the row of progress, where it is noted how the attempt ends; `done` iterations
     have been made by all attempts.
@@ -155,20 +148,20 @@ def solve_once(state, target, criteria, attempt, most, history, done):
     Returns:
         The iterations made.
     """
-    _, angle, total, bound = error(state, target)
+    _, angle, total, bound = operations.error(state, target)
     milestone, since = total, 0
     first, ending = int(attempt[MADE]), LIMITED
-    made = first
+    count = first
     while ending == LIMITED:
         if bound <= criteria.distance and angle <= criteria.angle:
             ending = REACHED
-        if ending == REACHED or made >= most:
+        if ending == REACHED or count >= limit:
             break
         before = total
-        update(state, target)
-        made += 1
-        distance, angle, total, bound = error(state, target)
-        store_if_inside(history, done + made - first, distance)
+        operations.update(state, target)
+        count += 1
+        distance, angle, total, bound = operations.error(state, target)
+        store_if_inside(history, done + count - first, distance)
         since += 1
         if total < PROGRESS * milestone:
             milestone, since = total, 0
@@ -178,14 +171,12 @@ def solve_once(state, target, criteria, attempt, most, history, done):
             ending = GIVEN_UP
     if ending != LIMITED and bound <= criteria.distance and angle <= criteria.angle:
         ending = REACHED
-    attempt[MADE], attempt[STATE] = made, ending
-    return made - first
+    attempt[MADE], attempt[STATE] = count, ending
+    return count - first
 
 
-def rate(state, target, attempt, k, best):
-    """Save where attempt k is; return whether it is finished and better than the best [m]."""
-    attempt[COST] = merit(state, target)
-    save(state, k)
+def is_better(attempt, best):
+    """Return whether an attempt is finished and better than the best [m]; else it waits longer."""
     if attempt[STATE] == GIVEN_UP:
         attempt[WAIT] *= MORE_PATIENT
         return False
@@ -197,17 +188,23 @@ def most_promising(progress):
 
     The least patient come first, and among them the one of the least merit.
     """
-    found, row = -1, progress[-1]
+    best, row = -1, progress[-1]
     for k in range(len(progress) - 1):
-        other = progress[k]
-        if other[STATE] == GIVEN_UP:
-            sooner = found < 0 or other[WAIT] < row[WAIT]
-            if sooner or (other[WAIT] == row[WAIT] and other[COST] < row[COST]):
-                found, row = k, other
-    return found
+        attempt = progress[k]
+        if attempt[STATE] == GIVEN_UP:
+            sooner = best < 0 or attempt[WAIT] < row[WAIT]
+            if sooner or (attempt[WAIT] == row[WAIT] and attempt[COST] < row[COST]):
+                best, row = k, attempt
+    return best
 
 
 def copy_row(source, target):
     """Copy one row of numbers into another."""
     for k in range(len(source)):
         target[k] = source[k]
+
+
+def store_if_inside(row, i, value):
+    """Write entry i of a row that has one."""
+    if i < len(row):
+        row[i] = value

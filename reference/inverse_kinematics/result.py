@@ -12,22 +12,23 @@ RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME, MERIT, EXCESS = FIGURES = rang
 
 
 class Result(NamedTuple):
-    """Poses found and how good they are.
+    """Poses and how good they are."""
 
-    Attributes:
-        local: local rotations, (target, joint, 4).
-        positions: global positions [m], (target, joint, 3).
-        figures: (target, 6), see above.
-        history: distances before and after each iteration [m], (target, iteration); (1, 1) if they
-            are not to be recorded. Entries after the last iteration are not filled.
-        coordinates: of an articulation, (target, coordinate); of a skeleton its local rotations.
-    """
-
-    local: FloatArray
-    positions: FloatArray
-    figures: FloatArray
+    local: FloatArray  # local rotations, (target, joint, 4)
+    positions: FloatArray  # global positions [m], (target, joint, 3)
+    figures: FloatArray  # (target, 6), see above
+    # distances before and after each iteration [m], (target, iteration); (1, 1) if they are not to
+    # be recorded. Entries after the last iteration are not filled
     history: FloatArray
+    # of an articulation, (target, coordinate); of a skeleton its local rotations
     coordinates: FloatArray
+
+
+def fill_figures(figures, distance, angle, iterations, merit, least):
+    """Fill all figures but the outcome, where no pose is nearer than `least` [m]."""
+    figures[RESIDUAL], figures[RESIDUAL_ROTATION] = distance, angle
+    figures[ITERATIONS], figures[MERIT] = iterations, merit
+    figures[EXCESS] = max(0.0, distance - least)
 
 
 def outcome_of(reached, unreachable, settled):
@@ -37,9 +38,3 @@ def outcome_of(reached, unreachable, settled):
     if unreachable:
         return Outcome.UNREACHABLE if settled else Outcome.UNREACHABLE_UNSETTLED
     return Outcome.STALLED if settled else Outcome.ITERATION_LIMIT
-
-
-def store_if_inside(row, i, value):
-    """Write entry i of a row that has one."""
-    if i < len(row):
-        row[i] = value

@@ -10,30 +10,18 @@ from .. import arguments
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from ..skeleton import Skeleton
-from .box_step import new_task_system
-from .ccd import ccd_sweep, ccd_update, new_ccd_workspace
-from .damped_least_squares import damped_least_squares_sweep, damped_least_squares_update
-from .fabrik import fabrik_sweep, fabrik_update, new_fabrik_workspace
-from .jacobian_transpose import jacobian_transpose_sweep, jacobian_transpose_update
-from .levenberg_marquardt import levenberg_marquardt_sweep, levenberg_marquardt_update
 from .problem import Target, are_targets
 from .restarts import Limits
-from .solve_chain import on_chains
-from .solve_mechanism import on_mechanisms
+from .solve_chain import ON_CHAINS
+from .solve_mechanism import ON_MECHANISMS
 
 
 class IKSolver(NamedTuple):
-    """A solver's two kernels; its pickle holds the name.
+    """A solver's two kernels; its pickle holds the name."""
 
-    Attributes:
-        name: in IK_SOLVERS.
-        chain: for one position to reach by a chain of unlimited balls.
-        mechanism: for all else.
-    """
-
-    name: str
-    chain: Kernel
-    mechanism: Kernel
+    name: str  # in IK_SOLVERS
+    chain: Kernel  # for one position to reach by a chain of unlimited balls
+    mechanism: Kernel  # for all else
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _solver, (self.name,)
@@ -43,24 +31,7 @@ def _solver(name: str) -> IKSolver:
     return IK_SOLVERS[name]
 
 
-# A solver's sweep over a chain, and its update of a mechanism.
-_KERNELS = {
-    "ccd": (ccd_sweep, ccd_update),
-    "fabrik": (fabrik_sweep, fabrik_update),
-    "levenberg_marquardt": (levenberg_marquardt_sweep, levenberg_marquardt_update),
-    "damped_least_squares": (damped_least_squares_sweep, damped_least_squares_update),
-    "jacobian_transpose": (jacobian_transpose_sweep, jacobian_transpose_update),
-}
-# What makes the arrays that an update writes to, where it is no Jacobian method.
-_WORKSPACES = {"ccd": new_ccd_workspace, "fabrik": new_fabrik_workspace}
-IK_SOLVERS = {
-    name: IKSolver(
-        name,
-        on_chains(name, sweep),
-        on_mechanisms(name, update, _WORKSPACES.get(name, new_task_system)),
-    )
-    for name, (sweep, update) in _KERNELS.items()
-}
+IK_SOLVERS = {name: IKSolver(name, ON_CHAINS[name], ON_MECHANISMS[name]) for name in ON_CHAINS}
 
 # The defaults of `solve_ik`: iterations of an attempt, the same towards a target out of reach, and
 # restarts where the solver is left to us and is not FABRIK.
@@ -71,19 +42,12 @@ LARGEST_COUNT = 2**53
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a solve, checked.
+    """Settings of a solve, checked."""
 
-    Attributes:
-        solver: its kernels.
-        limits: what the solve may leave and take.
-        seed: of the restarts.
-        record: whether to keep the residuals of all iterations.
-    """
-
-    solver: IKSolver
-    limits: Limits
-    seed: int
-    record: bool
+    solver: IKSolver  # its kernels
+    limits: Limits  # what the solve may leave and take
+    seed: int  # of the restarts
+    record: bool  # whether to keep the residuals of all iterations
 
     @functools.cached_property
     def numbers(self) -> FloatArray:

@@ -1,4 +1,9 @@
-"""From checked arguments to the kernels of a solver, and from what they fill to a solution."""
+"""From arguments to the kernels of a solver, and from what they fill to a solution.
+
+`solve_checked` accepts anything. It takes as long as the kernel where there is one start and one
+target, a third of a call on a chain of ten balls; `solve_plain` does the same in fewer steps for
+float64 arrays of the right shape, and leaves all else to it.
+"""
 
 from typing import Any, NoReturn
 
@@ -6,16 +11,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
-from ..arguments import LARGEST_COORDINATE, FloatArray, IndexArray, RecordArray, frozen
+from ..arguments import (
+    FLOAT64,
+    LARGEST_COORDINATE,
+    SMALLEST_POSITIVE,
+    FloatArray,
+    IndexArray,
+    RecordArray,
+    frozen,
+)
 from ..articulation import Articulation, one_batch
 from ..backend.compiled import Kernel
 from ..backend.threads import in_slices
-from ..model import coordinates_name
+from ..model import coordinates_name, effector_of
 from ..outcome import Outcome
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
 from .mechanism import TARGET
-from .problem import CheckedTarget, IKSolution, check_numbers
+from .problem import CheckedTarget, IKSolution, Target, check_numbers
 from .reduce import prepare
 from .result import EXCESS, FIGURES, ITERATIONS, MERIT, OUTCOME, RESIDUAL, RESIDUAL_ROTATION, Result
 from .settings import Settings
@@ -23,9 +36,68 @@ from .settings import Settings
 # Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.
 LEAST_ON_CHAINS, LEAST = 128, 16
 OUTCOMES = {outcome.value: outcome for outcome in Outcome}
+# Outcomes after which a chain is not restarted.
+FINAL_OUTCOMES = [outcome for outcome in Outcome if outcome.unreachable or outcome.solved]
 LARGEST_HISTORY = 10**9  # residuals; more fit no memory
 NO_HISTORY = frozen(np.empty(0))
 UNRECORDED = np.empty((1, 1))  # where kernels may write a history that nobody reads
+NAMES = (int, str, type(None))
+
+
+def solve_plain(
+    model: Any, start: Any, target: Any, effector: Any, settings: Settings
+) -> IKSolution | None:
+    """Return the solution for one start and one target, or None.
+
+    None where the arguments are no float64 arrays of the right shape, or not valid.
+    """
+    position: Any = target
+    rotation: Any = None
+    if type(target) is Target:
+        if effector is not None:
+            return None
+        position, rotation, effector, weight = target
+        if type(weight) is not float or not SMALLEST_POSITIVE <= weight <= LARGEST_COORDINATE:
+            return None
+    if settings.record or type(effector) not in NAMES or not is_plain(position, (3,)):
+        return None
+    if type(model) is Skeleton and rotation is None and not settings.limits.restarts:
+        count = model.joint_count
+        if not is_plain(start, (count, 4)):
+            return None
+        joint = count - 1 if effector is None else model.index(effector, "effector")
+        arrays = (*model.arrays, model.path_array(joint))
+        filled = run(
+            settings.solver.chain, arrays, start[None], position[None], count, None, settings
+        )
+        return _single_solution(NO_HISTORY, *filled) if filled else None
+    if type(model) is not Articulation or not is_plain(start, (model.coordinate_count,)):
+        return None
+    if rotation is not None and not is_plain(rotation, (4,)):
+        return None
+    key = effector, rotation is not None, settings.limits.restarts, settings.seed
+    prepared = model.mechanisms.get(key)
+    if prepared is None:
+        prepared = prepare(model, (effector_of(model, effector),), (key[1],), *key[2:])
+        model.mechanisms[key] = prepared
+    targets = np.empty((1, 1), TARGET)
+    row = targets.view(FLOAT64)[0]  # of its fields one after the other
+    row[:3], row[3:7], row[7] = position, IDENTITY if rotation is None else rotation, 1.0
+    filled = run(
+        settings.solver.mechanism, prepared.flat, start[None], targets, model.joint_count,
+        model.coordinate_count, settings,
+    )  # fmt: skip
+    return _single_solution(NO_HISTORY, *filled) if filled else None
+
+
+def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
+    """Return whether values are a float64 array of a shape that kernels take as it is."""
+    return (
+        type(values) is np.ndarray
+        and values.dtype == FLOAT64
+        and values.shape == shape
+        and values.flags.carray
+    )
 
 
 def solve_checked(
@@ -37,92 +109,106 @@ def solve_checked(
     """Return what `solve_ik` does for targets that are checked but for their numbers.
 
     If the settings are chained, each solve starts from the one before.
+
+    Raises:
+        ValueError: that names a number which a kernel has refused.
+        FloatingPointError: if it is of a frame from which the next one starts.
     """
-    if isinstance(model, Articulation) or len(targets) > 1 or targets[0].rotation is not None:
-        return solve_on_mechanism(model, start, targets, settings)
-    found = solve_on_chain(model, start, targets[0], settings)
-    return _restarted(model, start, targets, found, settings) if settings.limits.restarts else found
-
-
-def solve_on_chain(
-    skeleton: Skeleton, start: ArrayLike, target: CheckedTarget, settings: Settings
-) -> IKSolution:
-    """Solve for one position on the chain of balls from the root to the effector."""
-    count, name = skeleton.joint_count, "local_rotations"
-    starts = arguments.floats(name, start, "...", count, 4)
-    batch = batch_shape(starts.shape[:-2], [target], name)
-    target_array = target.position[None]
-    if batch:
-        target_array = arguments.spread(target.position, (*batch, 3)).reshape(-1, 3)
-    n, figures = len(target_array), np.empty((len(target_array), len(FIGURES)))
-    local, positions = np.empty((n, count, 4)), np.empty((n, count, 3))
-    history = _new_history(n, settings.limits.restarts + 1, settings)
-    model = (*skeleton.arrays, skeleton.path_array(target.joint))
-    rows = _rows(starts, batch, 2), target_array, local, positions, figures, history
-    if not _run(settings.solver.chain, model, settings, rows, LEAST_ON_CHAINS):
-        _raise_invalid(skeleton, start, [target], settings)
-    return _solution(Result(local, positions, figures, history, local), batch, settings)
-
-
-def solve_on_mechanism(
-    model: Skeleton | Articulation,
-    start: ArrayLike,
-    targets: list[CheckedTarget],
-    settings: Settings,
-) -> IKSolution:
-    """Solve for any targets on the mechanism of the joints that move their effectors."""
-    name = coordinates_name(model)
-    if isinstance(model, Skeleton):
-        articulation = balls(model)
-        starts = arguments.floats(name, start, "...", model.joint_count, 4)
-        starts = starts.reshape(*starts.shape[:-2], 4 * model.joint_count)
+    is_skeleton, name = isinstance(model, Skeleton), coordinates_name(model)
+    shape = (model.joint_count, 4) if isinstance(model, Skeleton) else (model.coordinate_count,)
+    given = arguments.floats(name, start, "...", *shape)
+    batch = batch_shape(given.shape[: -len(shape)], targets, name)
+    starts = _rows(given, batch, len(shape))
+    on_chain = is_skeleton and len(targets) == 1 and targets[0].rotation is None
+    rows: np.ndarray
+    if on_chain:
+        rows = arguments.spread(targets[0].position, (*batch, 3)).reshape(-1, 3)
     else:
-        articulation = model
-        starts = arguments.floats(name, start, "...", model.coordinate_count)
-    effectors = tuple([one.joint for one in targets])
-    oriented = tuple([one.rotation is not None for one in targets])
-    restarts = settings.limits.restarts
-    prepared = prepare(articulation, effectors, oriented, restarts, settings.seed)
-    batch = batch_shape(starts.shape[:-1], targets, name)
-    target_array, count = target_rows(targets, batch), articulation.joint_count
-    n = len(target_array)
-    result = Result(
-        np.empty((n, count, 4)),
-        np.empty((n, count, 3)),
-        np.empty((n, len(FIGURES))),
-        _new_history(n, 2 * restarts + 1, settings),
-        np.empty((n, articulation.coordinate_count)),
-    )
-    rows = (_rows(starts, batch, 1), target_array, *result)
-    if not _run(settings.solver.mechanism, prepared.flat, settings, rows, LEAST):
+        rows = target_rows(targets, batch)
+    result = _run_checked(model, starts, targets, rows, settings)
+    if result is None:
         _raise_invalid(model, start, targets, settings)
-    if isinstance(model, Skeleton):
-        local = result.coordinates.reshape(result.local.shape)
-        result = result._replace(local=local, coordinates=local)
+    if on_chain and settings.limits.restarts:
+        rows = target_rows(targets, batch)
+        result = _restarted(model, starts, targets, rows, result, settings)
     return _solution(result, batch, settings)
 
 
-def _run(
-    kernel: Kernel,
-    model: tuple[Any, ...],
+def _run_checked(
+    model: Skeleton | Articulation,
+    starts: FloatArray,
+    targets: list[CheckedTarget],
+    rows: np.ndarray,
     settings: Settings,
-    rows: tuple[np.ndarray, ...],
-    least: int,
-) -> bool:
-    """Run a kernel on starts, targets and results; return whether all numbers were valid.
+) -> Result | None:
+    """Return what a kernel fills in for rows of starts and targets; None if some is not valid."""
+    count = model.joint_count
+    if isinstance(model, Skeleton) and rows.dtype == FLOAT64:
+        arrays = (*model.arrays, model.path_array(targets[0].joint))
+        filled = run(settings.solver.chain, arrays, starts, rows, count, None, settings)
+        return Result(*filled) if filled else None
+    articulation = balls(model) if isinstance(model, Skeleton) else model
+    effectors = tuple([target.joint for target in targets])
+    oriented = tuple([target.rotation is not None for target in targets])
+    restarts, seed = settings.limits.restarts, settings.seed
+    arrays = prepare(articulation, effectors, oriented, restarts, seed).flat
+    width = articulation.coordinate_count
+    starts = starts.reshape(len(starts), width)
+    filled = run(settings.solver.mechanism, arrays, starts, rows, count, width, settings)
+    if not filled:
+        return None
+    result = Result(*filled)
+    if articulation is model:
+        return result
+    local = result.coordinates.reshape(result.local.shape)
+    return result._replace(local=local, coordinates=local)
 
-    Solves that do not depend on one another are spread over the cores.
+
+def run(
+    kernel: Kernel,
+    arrays: tuple[Any, ...],
+    starts: FloatArray,
+    targets: np.ndarray,
+    joints: int,
+    coordinates: int | None,
+    settings: Settings,
+) -> tuple[FloatArray, ...]:
+    """Return the fields of Result as a kernel fills them; none if some number is not valid.
+
+    `arrays` are what the kernel reads of the model. The starts are rows, (target, ...), or one for
+    all targets; the targets are positions [m], (target, 3), or of a mechanism records TARGET,
+    (target, effector). `coordinates` is how many a solution on a mechanism has, None on a chain.
     """
+    n, history = len(targets), UNRECORDED
+    local, positions = np.empty((n, joints, 4)), np.empty((n, joints, 3))
+    figures = np.empty((n, len(FIGURES)))
+    if settings.record:
+        history = _new_history(n, 1 if coordinates is None else 2, settings)
+    rows: tuple[np.ndarray, ...] = (starts, targets, local, positions, figures, history)
+    q, least = local, LEAST_ON_CHAINS
+    if coordinates is not None:
+        q, least = np.empty((n, coordinates)), LEAST
+        rows = (*rows, q)
+    if n < 2 * least or settings.limits.chained:
+        valid = kernel(*arrays, settings.numbers, *rows)
+    else:
+        valid = _run_in_slices(kernel, (*arrays, settings.numbers), rows, least)
+    return (local, positions, figures, history, q) if valid else ()
+
+
+def _run_in_slices(
+    kernel: Kernel, model: tuple[Any, ...], rows: tuple[np.ndarray, ...], least: int
+) -> bool:
+    """Run a kernel on slices of its rows, spread over the threads; return whether all are valid."""
     count = len(rows[1])
-    if count < 2 * least or settings.limits.chained:
-        return kernel(*model, settings.numbers, *rows)
-    valid = in_slices(
-        kernel,
-        count,
-        lambda part: (*model, settings.numbers, *[_part(row, part) for row in rows]),
-        least=least,
+    return all(
+        in_slices(
+            kernel,
+            count,
+            lambda part: (*model, *[_part(values, part) for values in rows]),
+            least=least,
+        )
     )
-    return all(valid)
 
 
 def _part(rows: np.ndarray, part: slice) -> np.ndarray:
@@ -136,11 +222,7 @@ def _raise_invalid(
     targets: list[CheckedTarget],
     settings: Settings,
 ) -> NoReturn:
-    """Raise a ValueError that names the number which a kernel has refused.
-
-    Raises:
-        FloatingPointError: if it is of a frame from which the next one starts.
-    """
+    """Raise an error that names the number which a kernel has refused."""
     check_numbers(targets)
     name = coordinates_name(model)
     if isinstance(model, Articulation):
@@ -154,10 +236,10 @@ def _raise_invalid(
 
 def balls(skeleton: Skeleton) -> Articulation:
     """Return the skeleton as an Articulation of unlimited balls, made once and kept by it."""
-    kept = skeleton.__dict__
-    if "balls" not in kept:
-        kept["balls"] = Articulation(skeleton, "ball")
-    return kept["balls"]
+    cache = skeleton.__dict__
+    if "balls" not in cache:
+        cache["balls"] = Articulation(skeleton, "ball")
+    return cache["balls"]
 
 
 def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> RecordArray:
@@ -165,12 +247,12 @@ def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> RecordA
 
     Weights count beside one another, so that the largest may be one.
     """
-    count, heaviest = len(targets), max([one.weight for one in targets])
+    count, heaviest = len(targets), max([target.weight for target in targets])
     rows = np.empty((*batch, count), TARGET)
-    for e, one in enumerate(targets):
-        rows["position"][..., e, :] = one.position
-        rows["rotation"][..., e, :] = IDENTITY if one.rotation is None else one.rotation
-        rows["weight"][..., e] = one.weight / heaviest
+    for e, target in enumerate(targets):
+        rows["position"][..., e, :] = target.position
+        rows["rotation"][..., e, :] = IDENTITY if target.rotation is None else target.rotation
+        rows["weight"][..., e] = target.weight / heaviest
     return rows.reshape(-1, count)
 
 
@@ -182,8 +264,8 @@ def batch_shape(
     The name is that of the starts, for the error.
     """
     batch = starts
-    for one in targets:
-        for values in (one.position, one.rotation):
+    for target in targets:
+        for values in (target.position, target.rotation):
             if values is not None and values.ndim > 1:
                 batch = arguments.broadcast(
                     "target", batch, values.shape[:-1], f"those of {name}, "
@@ -198,67 +280,106 @@ def _rows(starts: FloatArray, batch: tuple[int, ...], axes: int) -> FloatArray:
     return one_batch(arguments.spread(starts, (*batch, *starts.shape[-axes:])), axes)
 
 
-def _new_history(targets: int, attempts: int, settings: Settings) -> FloatArray:
+def _new_history(targets: int, rounds: int, settings: Settings) -> FloatArray:
     """Return rows for the residuals of all iterations that attempts may make."""
-    if not settings.record:
-        return UNRECORDED
-    most = attempts * max(settings.limits.max_iterations, settings.limits.far_iterations)
-    if targets * most > LARGEST_HISTORY:
+    limits = settings.limits
+    columns = (rounds * limits.restarts + 1) * max(limits.max_iterations, limits.far_iterations)
+    if targets * columns > LARGEST_HISTORY:
         raise ValueError(
             f"max_iterations: expected at most {LARGEST_HISTORY:,} residuals to record, got "
-            f"{targets} times {most}"
+            f"{targets} times {columns}"
         )
-    return np.empty((targets, most + 1))
+    return np.empty((targets, columns + 1))
+
+
+def _restarted(
+    skeleton: Any,
+    starts: FloatArray,
+    targets: list[CheckedTarget],
+    rows: np.ndarray,
+    first: Result,
+    settings: Settings,
+) -> Result:
+    """Return the better of what one start and restarts give, where a target in reach is missed.
+
+    One start on a chain of unlimited balls has already had the iterations of all attempts. Towards
+    a target out of reach it has one nearest point to come to, and no start comes to another.
+    """
+    missed = np.flatnonzero(~np.isin(first.figures[:, OUTCOME], FINAL_OUTCOMES))
+    if not len(missed):
+        return first
+    starts = starts[missed] if len(starts) > 1 else starts
+    more = _run_checked(skeleton, starts, targets, rows[missed], settings)
+    assert more is not None, "both kernels accept the same starts and targets"
+    history = first.history
+    if settings.record:
+        history = _joined_history(first, more, missed)
+    iterations = first.figures[missed, ITERATIONS] + more.figures[:, ITERATIONS]
+    is_better = (more.figures[:, OUTCOME] == Outcome.CONVERGED) | (
+        more.figures[:, MERIT] < first.figures[missed, MERIT]
+    )
+    better = missed[is_better]
+    first.local[better] = more.local[is_better]
+    first.positions[better] = more.positions[is_better]
+    first.figures[better] = more.figures[is_better]
+    first.figures[missed, ITERATIONS] = iterations
+    return first._replace(history=history)
+
+
+def _joined_history(first: Result, more: Result, missed: IndexArray) -> FloatArray:
+    """Return the residuals of one start and then those of its restarts."""
+    columns = first.history.shape[1] + more.history.shape[1] - 1
+    history = np.empty((len(first.history), columns))
+    history[:, : first.history.shape[1]] = first.history
+    counts = first.figures[missed, ITERATIONS].astype(np.int64)
+    for row, count, residuals in zip(missed, counts, more.history, strict=True):
+        history[row, count + 1 : count + len(residuals)] = residuals[1:]
+    return history
 
 
 def _solution(result: Result, batch: tuple[int, ...], settings: Settings) -> IKSolution:
     """Return what the kernel filled in as a solution, in the shape of the batch."""
-    local, positions, figures, history, coordinates = result
+    local, positions, figures, history, q = result
     if settings.record:
         history = _repeated(history, figures[:, ITERATIONS].astype(np.int64))
-    if batch:
-        return _solutions(result._replace(history=history), batch, settings)
-    shown = frozen(history[0]) if settings.record else NO_HISTORY
-    return single_solution(local, positions, figures, shown, coordinates)
+    if not batch:
+        return _single_solution(frozen(history[0]) if settings.record else NO_HISTORY, *result)
+    figures = figures.T.copy()
+    return IKSolution(
+        _shaped(local, batch),
+        _shaped(positions, batch),
+        _shaped(figures[RESIDUAL], batch),
+        _shaped(figures[ITERATIONS].astype(np.int64), batch),
+        _shaped(figures[OUTCOME].astype(np.int64), batch),
+        _shaped(history, batch) if settings.record else NO_HISTORY,
+        _shaped(figures[RESIDUAL_ROTATION], batch),
+        _shaped(q, batch),
+        _shaped(figures[MERIT], batch),
+        _shaped(figures[EXCESS], batch),
+    )
 
 
-def single_solution(
+def _single_solution(
+    shown_history: FloatArray,
     local: FloatArray,
     positions: FloatArray,
     figures: FloatArray,
     history: FloatArray,
     coordinates: FloatArray,
 ) -> IKSolution:
-    """Return the solution of one target from the rows of one that a kernel has filled in."""
-    shown, shown_positions = local[0], positions[0]
-    shown.setflags(False)  # by its name it takes twice as long
-    shown_positions.setflags(False)
-    shown_coordinates = shown
+    """Return the solution of the only target, with the history that it is to show."""
+    pose, x = local[0], positions[0]
+    pose.setflags(False)  # by its name it takes twice as long
+    x.setflags(False)
+    q = pose
     if coordinates is not local:
-        shown_coordinates = coordinates[0]
-        shown_coordinates.setflags(False)
+        q = coordinates[0]
+        q.setflags(False)
     residual, angle, iterations, outcome, merit, excess = figures.tolist()[0]
     return IKSolution(
-        shown, shown_positions, residual, int(iterations), OUTCOMES[outcome], history, angle,
-        shown_coordinates, merit, excess,
+        pose, x, residual, int(iterations), OUTCOMES[outcome], shown_history, angle, q, merit,
+        excess,
     )  # fmt: skip
-
-
-def _solutions(result: Result, batch: tuple[int, ...], settings: Settings) -> IKSolution:
-    """Return the solutions of a batch."""
-    figures = result.figures.T.copy()
-    return IKSolution(
-        _shaped(result.local, batch),
-        _shaped(result.positions, batch),
-        _shaped(figures[RESIDUAL], batch),
-        _shaped(figures[ITERATIONS].astype(np.int64), batch),
-        _shaped(figures[OUTCOME].astype(np.int64), batch),
-        _shaped(result.history, batch) if settings.record else NO_HISTORY,
-        _shaped(figures[RESIDUAL_ROTATION], batch),
-        _shaped(result.coordinates, batch),
-        _shaped(figures[MERIT], batch),
-        _shaped(figures[EXCESS], batch),
-    )
 
 
 def _repeated(history: FloatArray, iterations: IndexArray) -> FloatArray:
@@ -269,57 +390,3 @@ def _repeated(history: FloatArray, iterations: IndexArray) -> FloatArray:
 
 def _shaped(values: Any, batch: tuple[int, ...]) -> Any:
     return frozen(values.reshape(batch + values.shape[1:]))
-
-
-def _restarted(
-    skeleton: Skeleton,
-    start: ArrayLike,
-    targets: list[CheckedTarget],
-    found: IKSolution,
-    settings: Settings,
-) -> IKSolution:
-    """Return the better of what one start and restarts find, where a target in reach is missed.
-
-    One start on a chain of unlimited balls has already had the iterations of all attempts. Towards
-    a target out of reach it has one nearest point to come to, and no start comes to another.
-    """
-    final_outcomes = [outcome for outcome in Outcome if outcome.unreachable or outcome.solved]
-    if np.isin(found.outcome, final_outcomes).all():
-        return found
-    more = solve_on_mechanism(skeleton, start, targets, settings)
-    open_ = ~np.isin(found.outcome, final_outcomes)
-    reached = np.asarray(more.outcome) == Outcome.CONVERGED
-    better = open_ & (reached | (np.asarray(more.merit) < found.merit))
-    iterations = found.iterations + np.where(open_, more.iterations, 0)
-    rows = [_chosen(better, a, b) for a, b in zip(found, more, strict=True)]
-    best = IKSolution(*rows)._replace(history=_joined(found, more, open_, settings))
-    if np.ndim(found.outcome) == 0:
-        return best._replace(
-            residual=float(best.residual), residual_rotation=float(best.residual_rotation),
-            merit=float(best.merit), excess=float(best.excess),
-            outcome=Outcome(int(best.outcome)), iterations=int(iterations),
-        )  # fmt: skip
-    return best._replace(iterations=frozen(iterations))
-
-
-def _chosen(better: np.ndarray, one: Any, other: Any) -> Any:
-    """Return rows of the other where it is better, read-only; a history is joined elsewhere."""
-    one, other = np.asarray(one), np.asarray(other)
-    if one.shape != other.shape or not one.size:
-        return one
-    where = better.reshape(better.shape + (1,) * (one.ndim - better.ndim))
-    return frozen(np.where(where, other, one))
-
-
-def _joined(
-    found: IKSolution, more: IKSolution, open_: np.ndarray, settings: Settings
-) -> FloatArray:
-    """Return the residuals of one start and then those of its restarts."""
-    if not settings.record:
-        return NO_HISTORY
-    made, further = np.asarray(found.iterations), np.where(open_, more.iterations, 0)
-    count = np.arange(int((made + further).max(initial=0)) + 1)
-    first = np.minimum(count, made[..., None])
-    second = np.clip(count - made[..., None], 0, further[..., None])
-    one = np.take_along_axis(found.history, first, axis=-1)
-    return frozen(np.where(second > 0, np.take_along_axis(more.history, second, axis=-1), one))

@@ -3,23 +3,14 @@
 The textbook forms of the solvers on a chain are four times faster than on a mechanism.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
-from ..arguments import LARGEST_COORDINATE, FloatArray
-from ..backend.compiled import Kernel, Slot, bind
+from ..arguments import LARGEST_COORDINATE
+from ..backend.compiled import Kernel, bind
 from ..kinematics import forward_pose, normalise
-from ..quaternion import (
-    load_quaternion,
-    load_vector,
-    norm,
-    store_quaternion,
-    store_vector,
-    subtract,
-)
+from ..quaternion import load_vector, norm, subtract
+from .ccd import ccd_sweep
 from .chain import (
-    Chain,
     bend,
     effector_error,
     is_beyond_reach,
@@ -32,33 +23,20 @@ from .chain import (
     rounding,
     store_local,
 )
-from .restarts import MADE, Criteria, limits_of, new_progress, solve_with_restarts
-from .result import (
-    EXCESS,
-    ITERATIONS,
-    MERIT,
-    OUTCOME,
-    RESIDUAL,
-    RESIDUAL_ROTATION,
-    outcome_of,
+from .damped_least_squares import damped_least_squares_sweep
+from .fabrik import fabrik_sweep
+from .jacobian_transpose import jacobian_transpose_sweep
+from .levenberg_marquardt import levenberg_marquardt_sweep
+from .restarts import (
+    MADE,
+    Criteria,
+    Operations,
+    copy_row,
+    limits_of,
+    new_attempts,
+    solve_with_restarts,
 )
-
-# One iteration of a solver: sweep(chain, target).
-sweep = Slot("sweep")
-
-
-class ChainState(NamedTuple):
-    """A chain and the ends of attempts on it.
-
-    Attributes:
-        chain: where it is.
-        saved: positions [m] and global rotations of its joints, (attempt + 1, joint, 7).
-        progress: see `restarts.py`.
-    """
-
-    chain: Chain
-    saved: FloatArray
-    progress: FloatArray
+from .result import OUTCOME, fill_figures, outcome_of
 
 
 def solve_chains(
@@ -73,7 +51,7 @@ def solve_chains(
     """
     limits = limits_of(numbers)
     chain = new_chain(offsets, path)
-    state = ChainState(chain, np.empty((2, len(path), 7)), new_progress(1))
+    attempts = new_attempts(1, chain)
     rotations = np.empty((len(parents), 4))
     for i in range(len(targets)):
         pose, target = local[i], load_vector(targets, i)
@@ -82,17 +60,21 @@ def solve_chains(
             return False
         pose_chain(chain, path, pose)
         d = root_distance(chain, target)
-        criteria = chain_criteria(chain, d, limits)
-        past = history[i % len(history)]
-        iterations, settled = solve_with_restarts(state, target, limits, criteria, past)
+        criteria, past = chain_criteria(chain, d, limits), history[i % len(history)]
+        iterations, settled = solve_with_restarts(
+            operations, chain, attempts, target, limits, criteria, past
+        )
         if iterations > 0:
-            restore_chain(state, len(state.saved) - 1)
+            copy_row(attempts.saved[-1], chain.row)
             rotate_links(chain)
             store_local(chain, path, pose)
         forward_pose(parents, offsets, pose, positions[i], rotations)
         distance = norm(subtract(load_vector(positions[i], path[-1]), target))
-        figures[i, ITERATIONS] = iterations
-        rate_pose(chain, d, limits, distance, settled, figures[i])
+        least = least_distance(chain, d)
+        fill_figures(figures[i], distance, 0.0, iterations, distance, least)
+        unreachable = least > limits.tolerance + rounding(chain, d)
+        outcome = outcome_of(distance <= limits.tolerance, unreachable, settled)
+        figures[i, OUTCOME] = outcome.value
     return True
 
 
@@ -111,72 +93,44 @@ def chain_criteria(chain, d, limits):
     return Criteria(least + limits.tolerance - slack, limits.tolerance_rotation, margin, count)
 
 
-def rate_pose(chain, d, limits, distance, settled, figures):
-    """Fill the figures of a pose with the effector at a distance from its target [m]."""
-    least = least_distance(chain, d)
-    unreachable = least > limits.tolerance + rounding(chain, d)
-    outcome = outcome_of(distance <= limits.tolerance, unreachable, settled)
-    figures[RESIDUAL], figures[RESIDUAL_ROTATION], figures[MERIT] = distance, 0.0, distance
-    figures[OUTCOME], figures[EXCESS] = outcome.value, max(0.0, distance - least)
-
-
-def update_chain(state, target):
-    """Make one iteration of a solver."""
-    sweep(state.chain, target)
-
-
-def chain_error(state, target):
+def chain_error(chain, target):
     """Return the distance from effector to target [m] as the loops want it."""
-    distance = effector_error(state.chain, target)
+    distance = effector_error(chain, target)
     return distance, 0.0, distance, distance
 
 
-def chain_merit(state, target):
-    """Return the distance from effector to target [m]."""
-    return effector_error(state.chain, target)
-
-
-def perturb_chain(state, target, criteria, first):
+def perturb_chain(chain, target, criteria, first):
     """Bend a chain that starts collinear with its target, which no solver would leave."""
-    chain, d = state.chain, root_distance(state.chain, target)
-    if (
-        first[MADE] > 0
-        or effector_error(chain, target) <= criteria.distance
-        or is_beyond_reach(chain, d)
-    ):
+    if first[MADE] > 0 or effector_error(chain, target) <= criteria.distance:
         return False
-    if not is_collinear(chain, target):
+    if is_beyond_reach(chain, root_distance(chain, target)) or not is_collinear(chain, target):
         return False
     bend(chain)
     return True
 
 
-def save_chain(state, k):
-    """Save where the chain is."""
-    for j in range(len(state.chain.positions)):
-        row = state.saved[k, j]
-        row[0], row[1], row[2] = load_vector(state.chain.positions, j)
-        row[3], row[4], row[5], row[6] = load_quaternion(state.chain.rotations, j)
+def place_chain(_chain):
+    """Leave a chain as it is: its row holds its positions and rotations themselves."""
 
 
-def restore_chain(state, k):
-    """Bring the chain back to where it was."""
-    for j in range(len(state.chain.positions)):
-        store_vector(state.chain.positions, j, load_vector(state.saved[k], j))
-        store_quaternion(state.chain.rotations, j, load_quaternion(state.saved[k], j, 3))
+def draw_chain(_chain, _target, _n):
+    """Leave a chain as it is: its random restarts are made on a mechanism."""
 
 
-def draw_chain(_state, _target, _n):
-    """Leave the chain where it is: its random restarts are made on a mechanism."""
-
-
-def on_chains(name, sweep):
-    """Return the kernel that solves chains by the sweep of a named solver."""
-    return Kernel(
-        bind(
-            solve_chains, update=bind(update_chain, sweep=sweep), error=chain_error,
-            merit=chain_merit, perturb=perturb_chain, save=save_chain, restore=restore_chain,
-            draw=draw_chain,
-        ),
-        label=f"{name} for chains",
-    )  # fmt: skip
+operations = Operations(
+    ccd_sweep, chain_error, effector_error, perturb_chain, place_chain, draw_chain
+)
+SWEEPS = {
+    "ccd": ccd_sweep,
+    "fabrik": fabrik_sweep,
+    "levenberg_marquardt": levenberg_marquardt_sweep,
+    "damped_least_squares": damped_least_squares_sweep,
+    "jacobian_transpose": jacobian_transpose_sweep,
+}
+# The kernel that solves chains by the sweep of each solver.
+ON_CHAINS = {
+    name: Kernel(
+        bind(solve_chains, operations=operations._replace(update=sweep)), label=f"{name} for chains"
+    )
+    for name, sweep in SWEEPS.items()
+}

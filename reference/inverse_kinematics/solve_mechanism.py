@@ -1,11 +1,11 @@
 """Any targets of any mechanism: what the loops of `restarts.py` work on."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ..arguments import LARGEST_COORDINATE, FloatArray
+from ..arguments import LARGEST_COORDINATE, FloatArray, RecordArray
 from ..articulation import (
     BALL,
     FREE,
@@ -15,7 +15,7 @@ from ..articulation import (
     joint_transform,
     normalise_start,
 )
-from ..backend.compiled import Kernel, Slot, bind
+from ..backend.compiled import Kernel, bind
 from ..quaternion import (
     angle_between,
     load_quaternion,
@@ -28,8 +28,14 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
+from .box_step import TaskSystem, new_task_system
+from .ccd import ccd_update
 from .chain import BEND, POSITION_ROUNDING
+from .damped_least_squares import damped_least_squares_update
+from .fabrik import BACKWARD, fabrik_update
+from .jacobian_transpose import jacobian_transpose_update
 from .joint_updates import load_ball, move_by, store_ball
+from .levenberg_marquardt import levenberg_marquardt_update
 from .mechanism import (
     LEVER,
     ConfigurationData,
@@ -47,30 +53,17 @@ from .restarts import (
     COST,
     INFINITY,
     MADE,
-    RANK,
     SETTLED,
     STATE,
     Criteria,
+    Operations,
     copy_row,
     limits_of,
-    new_progress,
+    new_attempts,
     solve_with_restarts,
 )
-from .result import (
-    EXCESS,
-    ITERATIONS,
-    MERIT,
-    OUTCOME,
-    RESIDUAL,
-    RESIDUAL_ROTATION,
-    outcome_of,
-)
+from .result import OUTCOME, fill_figures, outcome_of
 from .task_jacobian import clear
-
-# One iteration of a solver: step(mechanism, target, data, workspace).
-step = Slot("step")
-# new_workspace(mechanism): the arrays that its step writes to, in a NamedTuple.
-new_workspace = Slot("new_workspace")
 
 # A start that settles within so few iterations away from its target is stuck, such as a straight
 # chain, perhaps folded since, whose target lies on its own line.
@@ -81,27 +74,25 @@ FAR_MARGIN = 1e-8
 PERTURBATION_AXIS = (0.48, 0.6, 0.64)
 
 
+class Workspace(NamedTuple):
+    """Arrays that the solvers write to."""
+
+    system: TaskSystem  # of the Jacobian methods, and of CCD for joints that others follow
+    backward: RecordArray  # of FABRIK, records BACKWARD, (joint,)
+    eigen: FloatArray  # of CCD and FABRIK, Davenport's matrix and its eigenvectors, (2, 4, 4)
+
+
 class MechanismState(NamedTuple):
-    """A mechanism, where it is, and the ends of attempts on it.
+    """A mechanism, where it is, and where it may be restarted."""
 
-    Attributes:
-        mechanism: what moves.
-        data: its configuration.
-        workspace: of the solver, what `new_workspace` returns.
-        restarts: coordinates of the mechanism for further attempts, (restart, coordinate).
-        effector_frames: where they put the effectors, positions [m] and rotations, (restart,
-            effector, 7).
-        saved: states of its configuration, (attempt + 1, coordinate + 2).
-        progress: see `restarts.py`.
-    """
-
-    mechanism: Mechanism
-    data: ConfigurationData
-    workspace: Any
-    restarts: FloatArray
+    mechanism: Mechanism  # what moves
+    data: ConfigurationData  # its configuration
+    row: FloatArray  # what an attempt continues from, `data.state`
+    workspace: Workspace  # of the solver
+    restarts: FloatArray  # coordinates of the mechanism for further attempts, (restart, coordinate)
+    # where they put the effectors, positions [m] and rotations, (restart, effector, 7)
     effector_frames: FloatArray
-    saved: FloatArray
-    progress: FloatArray
+    ranks: FloatArray  # how far the restarts not yet taken are from the target [m], (restart,)
 
 
 def solve_mechanisms(
@@ -122,6 +113,7 @@ def solve_mechanisms(
         own_joints, sources, effectors, moves, adjacent, reach, width, freedoms, equations
     )
     state = new_state(mechanism, restarts, restart_frames)
+    attempts = new_attempts(len(restarts) + 1, state)
     rotations = np.empty((len(joints), 4))
     for i in range(len(targets)):
         q, target = coordinates[i], targets[i]
@@ -131,26 +123,34 @@ def solve_mechanisms(
             return False
         begin(state, q)
         least = least_residual(mechanism, target)
-        criteria = mechanism_criteria(mechanism, least, limits)
-        past = history[i % len(history)]
-        iterations, settled = solve_with_restarts(state, target, limits, criteria, past)
-        figures[i, ITERATIONS] = iterations
-        scatter(mechanism, state.saved[-1], q)
+        criteria, past = mechanism_criteria(mechanism, least, limits), history[i % len(history)]
+        iterations, settled = solve_with_restarts(
+            operations, state, attempts, target, limits, criteria, past
+        )
+        scatter(mechanism, attempts.saved[-1], q)
         articulated_pose(joints, q, positions[i], rotations)
         for j in range(len(joints)):
             _, Q = joint_transform(joints, j, q)
             store_quaternion(local[i], j, Q)
-        rate_pose(mechanism, target, limits, positions[i], rotations, least, settled, figures[i])
+        distance, angle, merit = errors_of_pose(mechanism, target, positions[i], rotations)
+        fill_figures(figures[i], distance, angle, iterations, merit, least)
+        reached = distance <= limits.tolerance and angle <= limits.tolerance_rotation
+        figures[i, OUTCOME] = outcome_of(reached, least > limits.tolerance, settled).value
     return True
 
 
 def new_state(mechanism, restarts, effector_frames):
     """Return a state to begin from."""
-    rows = len(restarts) + 2
-    return MechanismState(
-        mechanism, new_data(mechanism), new_workspace(mechanism), restarts, effector_frames,
-        np.empty((rows, mechanism.coordinates + 2)), new_progress(rows - 1),
-    )  # fmt: skip
+    data = new_data(mechanism)
+    workspace = new_workspace(mechanism)
+    ranks = np.empty(len(restarts))
+    return MechanismState(mechanism, data, data.state, workspace, restarts, effector_frames, ranks)
+
+
+def new_workspace(mechanism):
+    """Return a workspace, not filled."""
+    backward = np.empty(len(mechanism.joints), BACKWARD)
+    return Workspace(new_task_system(mechanism), backward, np.empty((2, 4, 4)))
 
 
 def normalise_target(target):
@@ -193,28 +193,19 @@ def mechanism_criteria(mechanism, least, limits):
     )
 
 
-def rate_pose(mechanism, target, limits, positions, rotations, least, settled, figures):
-    """Fill the figures of a pose of all joints."""
-    distance, angle, total = 0.0, 0.0, 0.0
+def errors_of_pose(mechanism, target, positions, rotations):
+    """Return the largest distance [m] and angle [rad] of a pose of all joints, and its merit."""
+    largest, largest_angle, total = 0.0, 0.0, 0.0
     for e in range(len(mechanism.effectors)):
-        j, apart, off = mechanism.effectors["source"][e], 0.0, 0.0
-        apart = norm(subtract(load_vector(target["position"], e), load_vector(positions, j)))
+        j, angle = mechanism.effectors["source"][e], 0.0
+        distance = norm(subtract(load_vector(target["position"], e), load_vector(positions, j)))
         if mechanism.effectors["oriented"][e]:
-            off = angle_between(
+            angle = angle_between(
                 load_quaternion(rotations, j), load_quaternion(target["rotation"], e)
             )
-        distance, angle = max(distance, apart), max(angle, off)
-        total += weighted_square(mechanism, target["weight"][e], apart, off)
-    reached = distance <= limits.tolerance and angle <= limits.tolerance_rotation
-    outcome = outcome_of(reached, least > limits.tolerance, settled)
-    figures[RESIDUAL], figures[RESIDUAL_ROTATION] = distance, angle
-    figures[OUTCOME], figures[MERIT] = outcome.value, math.sqrt(total)
-    figures[EXCESS] = max(0.0, distance - least)
-
-
-def update_mechanism(state, target):
-    """Make one iteration of a solver."""
-    step(state.mechanism, target, state.data, state.workspace)
+        largest, largest_angle = max(largest, distance), max(largest_angle, angle)
+        total += weighted_square(mechanism, target["weight"][e], distance, angle)
+    return largest, largest_angle, math.sqrt(total)
 
 
 def mechanism_error(state, target):
@@ -251,14 +242,8 @@ def perturb_joint(joints, q, j, angle):
         clamp_joint(joints, j, q)
 
 
-def save_mechanism(state, k):
-    """Save where the mechanism is."""
-    copy_row(state.data.state, state.saved[k])
-
-
-def restore_mechanism(state, k):
-    """Bring the mechanism back to where it was."""
-    copy_row(state.saved[k], state.data.state)
+def place_mechanism(state):
+    """Bring the mechanism to its coordinates."""
     update_forward_kinematics(state.mechanism, state.data)
 
 
@@ -284,7 +269,7 @@ def rank_restarts(state, target):
             if state.mechanism.effectors["oriented"][e]:
                 there = load_quaternion(state.effector_frames[r], e, 3)
                 angle = max(angle, rough_angle(there, load_quaternion(target["rotation"], e)))
-        state.progress[1 + r, RANK] = distance + lever * angle
+        state.ranks[r] = distance + lever * angle
 
 
 def rough_angle(a, b):
@@ -297,20 +282,28 @@ def take_nearest(state, q):
     """Copy the nearest of the random configurations that has not yet been taken."""
     nearest = 0
     for r in range(1, len(state.restarts)):
-        if state.progress[1 + r, RANK] < state.progress[1 + nearest, RANK]:
+        if state.ranks[r] < state.ranks[nearest]:
             nearest = r
-    state.progress[1 + nearest, RANK] = INFINITY
+    state.ranks[nearest] = INFINITY
     copy_row(state.restarts[nearest], q)
 
 
-def on_mechanisms(name, step, new_workspace):
-    """Return the kernel that solves mechanisms by the step of a named solver."""
-    return Kernel(
-        bind(
-            solve_mechanisms, new_workspace=new_workspace,
-            update=bind(update_mechanism, step=step), error=mechanism_error,
-            merit=mechanism_merit, perturb=perturb_mechanism, save=save_mechanism,
-            restore=restore_mechanism, draw=draw_mechanism,
-        ),
+operations = Operations(
+    ccd_update, mechanism_error, mechanism_merit, perturb_mechanism, place_mechanism,
+    draw_mechanism,
+)  # fmt: skip
+UPDATES = {
+    "ccd": ccd_update,
+    "fabrik": fabrik_update,
+    "levenberg_marquardt": levenberg_marquardt_update,
+    "damped_least_squares": damped_least_squares_update,
+    "jacobian_transpose": jacobian_transpose_update,
+}
+# The kernel that solves mechanisms by the update of each solver.
+ON_MECHANISMS = {
+    name: Kernel(
+        bind(solve_mechanisms, operations=operations._replace(update=update)),
         label=f"{name} for mechanisms",
-    )  # fmt: skip
+    )
+    for name, update in UPDATES.items()
+}

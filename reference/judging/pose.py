@@ -7,7 +7,6 @@ instead.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +17,7 @@ from ..articulation import Articulation, joint_excess
 from ..inverse_kinematics.problem import CheckedTarget, Target, check_numbers, checked_targets
 from ..kinematics import forward_kinematics
 from ..model import Model, checked_model, coordinates_name
-from ..skeleton import Skeleton
+from ..skeleton import Pose, Skeleton
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +32,13 @@ class PoseJudgement:
         angles: likewise [rad], (target,).
         norm_deviation: the largest difference of a quaternion's length from one, as given.
         limit_excess: how far each joint is beyond its limits [rad, of slides m], (joint,).
-        position_error: the largest distance between a joint's position as given and where the
-            rotations put it [m]; None if no positions were given.
-        length_error: the largest difference between a link's length by the positions given and as
-            the model has it [m]; None if none were given. Links that slide are left out.
-        positions: of all joints by forward kinematics of the normalised pose [m], (joint, 3).
+        position_errors: distance between each joint's position as given and where the rotations
+            put it [m], (joint,); None unless both were given.
+        length_errors: difference between each link's length by the positions given and as the
+            model has it [m], (joint,); 0 of the root and of links that slide; None if none were
+            given.
+        positions: of all joints by forward kinematics of the normalised pose, or as given [m],
+            (joint, 3).
         names: of the joints.
         tolerance: distance that counts as reached [m].
         tolerance_rotation: angle that does [rad].
@@ -49,8 +50,8 @@ class PoseJudgement:
     angles: FloatArray
     norm_deviation: float
     limit_excess: FloatArray
-    position_error: float | None
-    length_error: float | None
+    position_errors: FloatArray | None
+    length_errors: FloatArray | None
     positions: FloatArray
     names: tuple[str, ...]
     tolerance: float
@@ -60,6 +61,16 @@ class PoseJudgement:
     def reached(self) -> bool:
         """Whether every effector is on its target, within the tolerances."""
         return self.distance <= self.tolerance and self.angle <= self.tolerance_rotation
+
+    @property
+    def position_error(self) -> float | None:
+        """The largest of the position errors [m], None if there are none."""
+        return None if self.position_errors is None else float(self.position_errors.max())
+
+    @property
+    def length_error(self) -> float | None:
+        """The largest of the length errors [m], None if there are none."""
+        return None if self.length_errors is None else float(self.length_errors.max())
 
     @property
     def summary(self) -> str:
@@ -95,7 +106,7 @@ class PoseJudgement:
 
 def judge_pose(
     model: Model,
-    pose: ArrayLike,
+    pose: ArrayLike | None,
     target: ArrayLike | Target | Sequence[Target],
     effector: int | str | None = None,
     *,
@@ -105,34 +116,43 @@ def judge_pose(
 ) -> PoseJudgement:
     """Return how far a pose is from its targets, its limits, and the positions said to be its own.
 
-    Args:
-        model: a Skeleton, an Articulation, or a Robot read from a file.
-        pose: local rotations of a Skeleton, (joint, 4), w first, or coordinates q of an
-            Articulation, (coordinate,); quaternions of any length but zero.
-        target: as for `solve_ik`, of one pose.
-        effector: as for `solve_ik`.
-        positions: global positions of all joints that came with the pose [m], (joint, 3).
-        tolerance: distance that counts as reached [m].
-        tolerance_rotation: angle that counts as reached [rad].
+    `pose` holds the local rotations of a Skeleton, (joint, 4), w first, or the coordinates q of an
+    Articulation, (coordinate,), with quaternions of any length but zero; None judges `positions`
+    alone, the global ones of all joints that came with it [m], (joint, 3). The other arguments are
+    as for `solve_ik`.
 
     Raises:
         ValueError: if an argument has another shape or is not finite, a quaternion has no length,
-            or there is no such effector.
+            there is no such effector, or a pose is missing where it is needed.
     """
     model = checked_model(model, "model")
-    unit, deviation = _normalised(model, pose)
     targets = check_numbers(checked_targets(model, target, effector))
-    found = forward_kinematics(model, unit)
-    distances = [_distance(one, found.positions[one.joint]) for one in targets]
-    angles = [_angle(one, found.rotations[one.joint]) for one in targets]
     tree = model if isinstance(model, Skeleton) else model.skeleton
-    moved, stretched = _compared(model, tree, found.positions, positions)
+    x = None
+    if positions is not None:
+        x = arguments.coordinates("positions", positions, tree.joint_count, 3)
+    if pose is None:
+        placed, deviation, excess = _unrotated(x, targets), 0.0, np.zeros(tree.joint_count)
+    else:
+        unit, deviation = _normalised(model, pose)
+        placed, excess = forward_kinematics(model, unit), _limit_excess(model, unit)
+    distances = [_distance(one, placed.positions[one.joint]) for one in targets]
+    angles = [_angle(one, placed.rotations[one.joint]) for one in targets]
+    moved = None if x is None or pose is None else np.linalg.norm(x - placed.positions, axis=-1)
     return PoseJudgement(
         max(distances), max(angles), frozen(np.array(distances)), frozen(np.array(angles)),
-        deviation, frozen(_limit_excess(model, unit)), moved, stretched, found.positions,
+        deviation, frozen(excess), None if moved is None else frozen(moved),
+        None if x is None else frozen(_length_errors(model, tree, x)), placed.positions,
         tree.names, arguments.number("tolerance", tolerance, least=0.0),
         arguments.number("tolerance_rotation", tolerance_rotation, least=0.0),
     )  # fmt: skip
+
+
+def _unrotated(positions: FloatArray | None, targets: Sequence[CheckedTarget]) -> Pose:
+    """Return positions as a pose whose rotations are not known."""
+    if positions is None or any(one.rotation is not None for one in targets):
+        raise ValueError("pose: expected rotations or coordinates, got None")
+    return Pose(frozen(np.array(positions)), np.full((len(positions), 4), np.nan))
 
 
 def _normalised(model: Skeleton | Articulation, pose: ArrayLike) -> tuple[FloatArray, float]:
@@ -176,15 +196,11 @@ def _limit_excess(model: Skeleton | Articulation, q: FloatArray) -> FloatArray:
     return np.array([joint_excess(model.joints, j, q) for j in range(model.joint_count)])
 
 
-def _compared(
-    model: Skeleton | Articulation, tree: Skeleton, expected: FloatArray, given: Any
-) -> tuple[float | None, float | None]:
-    """Return how far positions given are off, and how much they change the links' lengths."""
-    if given is None:
-        return None, None
-    x = arguments.coordinates("positions", given, tree.joint_count, 3)
-    moved = np.linalg.norm(x - expected, axis=-1).max()
+def _length_errors(model: Skeleton | Articulation, tree: Skeleton, x: FloatArray) -> FloatArray:
+    """Return how much positions change the lengths of rigid links [m], (joint,)."""
     kinds = ("ball",) * tree.joint_count if isinstance(model, Skeleton) else model.kinds
     rigid = [j for j in range(1, tree.joint_count) if kinds[j] not in ("slide", "free")]
+    errors = np.zeros(tree.joint_count)
     lengths = np.linalg.norm(x[rigid] - x[tree.parents[rigid]], axis=-1)
-    return float(moved), float(np.abs(lengths - tree.link_lengths[rigid]).max(initial=0.0))
+    errors[rigid] = np.abs(lengths - tree.link_lengths[rigid])
+    return errors

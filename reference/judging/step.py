@@ -111,18 +111,9 @@ def judge_step(
 ) -> StepJudgement:
     """Return the errors of positions as the result of a step, with certificates.
 
-    Args:
-        system: particles and springs.
-        state: positions and velocities at the start of the step.
-        h: the step [s].
-        positions: the result to be judged [m], shape (particle, 3).
-        velocities: its velocities [m/s], shape (particle, 3), or None to judge positions only.
-        external_forces: [N], shape (particle, 3), besides gravity; constant during the step.
-        pin_positions: positions of the pinned particles, in ascending order, at the end of the
-            step [m], shape (pinned, 3); by default they do not move.
-
-    Raises:
-        ValueError: if an argument has a wrong shape or is not finite.
+    `positions` and `velocities` are the result to be judged, both of shape (particle, 3) [m, m/s];
+    without velocities only the positions are. The other arguments and the errors are those of
+    `ImplicitEuler.step`.
     """
     integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE, max_iterations=MOST_ITERATIONS)
     loads = external_forces, pin_positions

@@ -1,4 +1,10 @@
-"""Ropes, cloths, nets and lattices: particles on regular grids."""
+"""Ropes, cloths, nets and lattices: particles on regular grids.
+
+Arguments that scenes share: the spacing of neighbours [m]; the mass of each particle [kg];
+stiffness [N/m] and damping [N s/m] of each spring; gravity downwards [m/s²]; whether the springs go
+slack (tension_only). A scene raises a ValueError if a count is too small, a length or mass not
+positive, an index out of range, or a number negative or not finite.
+"""
 
 from collections.abc import Sequence
 
@@ -31,20 +37,7 @@ def lab_cloth(
 ) -> tuple[MassSpring, State]:
     """Return the lab's cloth: a square `grid_cloth`, the two corners at x = 0 pinned.
 
-    The lab's own cloth has a damping of 0.2.
-
-    Args:
-        size: particles along each side, 2 or more.
-        side: [m].
-        height: [m].
-        mass: of each particle [kg].
-        stiffness: of each spring [N/m].
-        damping: of each spring [N s/m].
-        gravity: downwards [m/s²].
-
-    Raises:
-        ValueError: if the size is less than 2, the side not positive, or a number is negative or
-            not finite.
+    `size` particles, 2 or more, along each side [m]. The lab's own cloth has a damping of 0.2.
     """
     size = count("size", size, least=2)
     count("size", size * size, least=1)
@@ -94,10 +87,6 @@ def grid_cloth(
         tension_only: whether the springs go slack.
         pinned: particles; by default the two corners at x = 0.
         gravity: downwards [m/s²].
-
-    Raises:
-        ValueError: if a count is less than 1, spacing or mass not positive, a pinned index out of
-            range, or a number negative or not finite.
     """
     rows, columns = _shape(rows, columns)
     stiffness = number("stiffness", stiffness, least=0)
@@ -124,9 +113,6 @@ def grid_triangles(rows: int, columns: int) -> IndexArray:
     """Return the triangles of a `grid_cloth`, two per square, shape (triangle, 3).
 
     They are counter-clockwise as seen from above.
-
-    Raises:
-        ValueError: if a count is less than 1.
     """
     rows, columns = _shape(rows, columns)
     corner = np.arange(rows * columns).reshape(rows, columns)
@@ -150,7 +136,7 @@ def net(
 ) -> tuple[MassSpring, State]:
     """Return a horizontal net of tension-only ropes, pinned at its four corners.
 
-    It is a `grid_cloth` without shear and bending springs, with the same arguments and errors.
+    It is a `grid_cloth` without shear and bending springs.
     """
     rows, columns = _shape(rows, columns)
     particles = rows * columns
@@ -181,20 +167,9 @@ def lattice(
 ) -> tuple[MassSpring, State]:
     """Return a block of tetrahedra with springs along their edges, clamped at its face x = 0.
 
-    The particles lie on a cubic grid that starts at the origin, numbered with z fastest and x
-    slowest; each cube consists of six tetrahedra around its diagonal.
-
-    Args:
-        counts: particles along x, y and z, 1 or more each.
-        spacing: of the grid [m].
-        mass: of each particle [kg].
-        stiffness: of each spring [N/m].
-        damping: of each spring [N s/m].
-        gravity: downwards [m/s²].
-
-    Raises:
-        ValueError: if there are not three counts of 1 or more, spacing or mass is not positive, or
-            a number is negative or not finite.
+    There are `counts` particles along x, y and z, 1 or more each. They lie on a cubic grid that
+    starts at the origin, numbered with z fastest and x slowest; each cube consists of six
+    tetrahedra around its diagonal.
     """
     along = sequence("counts", counts, 3, "an axis")
     nx, ny, nz = (count("counts", number_of, least=1) for number_of in along)
@@ -221,23 +196,10 @@ def hanging_rope(
     gravity: float = 9.81,
     tension_only: bool = False,
 ) -> tuple[MassSpring, State]:
-    """Return an unstretched rope that hangs vertically from a pin at the origin.
+    """Return an unstretched rope of a length [m] that hangs vertically from a pin at the origin.
 
-    In equilibrium spring i, counted from the top, carries the particles below it and is stretched
-    by (particles - 1 - i) mass gravity / stiffness.
-
-    Args:
-        particles: 2 or more, including the pinned one, number 0.
-        length: at rest [m].
-        mass: of each particle [kg].
-        stiffness: of each spring [N/m].
-        damping: of each spring [N s/m].
-        gravity: downwards [m/s²].
-        tension_only: whether the springs go slack.
-
-    Raises:
-        ValueError: if there are fewer than 2 particles, the length is not positive, or a number is
-            negative or not finite.
+    It has 2 or more particles, number 0 pinned. In equilibrium spring i, counted from the top,
+    carries the particles below it and is stretched by (particles - 1 - i) mass gravity / stiffness.
     """
     particles = count("particles", particles, least=2)
     positions = np.zeros((particles, 3))

@@ -26,25 +26,16 @@ def cloth_from_mesh(
     """Return the mesh as a cloth at rest: a particle at each vertex, a spring along each edge.
 
     A bending spring joins each pair of vertices opposite to a shared edge, unless an edge joins
-    them already.
-
-    Args:
-        vertices: [m], shape (particle, 3).
-        triangles: indices of vertices, shape (triangle, 3), in either orientation.
-        density: of the cloth [kg/m²]; the mass of a triangle is shared equally by its corners.
-        mass: of each particle [kg], instead of a density.
-        stiffness: of the springs along edges [N/m].
-        bending_stiffness: of the bending springs [N/m]; 0 leaves them out.
-        damping: of each spring [N s/m].
-        tension_only: whether the springs along edges go slack.
-        pinned: particles that do not move.
-        gravity: downwards [m/s²].
+    them already. The springs along edges may go slack; the mass of each particle is given, or the
+    density of the cloth [kg/m²], and the mass of a triangle is shared equally by its corners. The
+    vertices are positions [m], (particle, 3), the triangles indices of them, (triangle, 3), in
+    either orientation. Other arguments and errors are those of `grid_cloth`, with no pins by
+    default.
 
     Raises:
         ValueError: unless exactly one of density and mass is a number; if a triangle repeats a
-            vertex or another triangle, more than 16 triangles meet at an edge, a free vertex has
-            no mass because its triangles have no area, or an argument has a wrong shape or is out
-            of range.
+            vertex or another triangle, more than 16 triangles meet at an edge, or a free vertex has
+            no mass because its triangles have no area.
     """
     x = array("vertices", vertices, "particle", 3)
     corners = _triangles(triangles, len(x))

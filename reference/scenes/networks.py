@@ -16,20 +16,12 @@ def random_network(
 ) -> tuple[MassSpring, State]:
     """Return a random connected network in motion; no two particles or springs are alike.
 
-    Masses lie between 0.2 and 2 kg, stiffnesses between 10 and 1000 N/m. Positions and velocities
-    are normally distributed about zero, by 1 m and 1 m/s along each axis, and each spring is
-    stretched or compressed by up to a third: none is at its rest length. Gravity has a random
-    direction.
-
-    Args:
-        seed: 0 or more.
-        particles: 1 or more.
-        pinned: how many of them.
-        damping: upper bound of the springs' dampings [N s/m], a tenth of it being the lower one.
-        tension_only: the share of springs that go slack, from 0 to 1.
-
-    Raises:
-        ValueError: if a number is out of range.
+    Masses lie between 0.2 and 2 kg, stiffnesses between 10 and 1000 N/m, dampings between a tenth
+    of `damping` and all of it [N s/m]. Positions and velocities are normally distributed about
+    zero, by 1 m and 1 m/s along each axis, and each spring is stretched or compressed by up to a
+    third: none is at its rest length. Gravity has a random direction. So many particles are pinned,
+    and a share of the springs from 0 to 1, `tension_only`, goes slack. A number out of range is a
+    ValueError.
     """
     rng = np.random.default_rng(integer("seed", seed, least=0))
     n = count("particles", particles, least=1)

@@ -20,14 +20,10 @@ def lab_arm() -> tuple[Skeleton, FloatArray]:
 
 
 def ball_chain(*, links: int = 10, link_length: float = 0.1) -> tuple[Skeleton, FloatArray]:
-    """Return a straight chain of equal links along x from the origin, and its rest pose.
+    """Return a straight chain of equal links [m] along x from the origin, and its rest pose.
 
-    Args:
-        links: number of links; each starts at a ball joint, and the last ends at the effector.
-        link_length: of each [m].
-
-    Raises:
-        ValueError: if links is not a positive integer or link_length not a positive number.
+    Each link starts at a ball joint, and the last ends at the effector. No links, or a length that
+    is not positive, are a ValueError.
     """
     links = count("links", links, least=1)
     offsets = np.zeros((links + 1, 3))

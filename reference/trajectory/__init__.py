@@ -36,16 +36,10 @@ def smooth(
 ) -> tuple[FloatArray, int]:
     """Return a smooth trajectory near one that follows the targets, and the Newton steps taken.
 
-    Limits are kept to about 1e-10 rad.
-
-    Args:
-        mechanism: the joints.
-        targets: of each frame, records TARGET of `inverse_kinematics/mechanism.py`, (frame,
-            effector).
-        q: the mechanism's coordinates to start from, (frame, coordinate).
-        reached: in which frames q meets the targets: these keep to them, the others only approach
-            theirs as far as a penalty draws them, (frame,).
-        closed: whether the last frame leads back to the first.
+    The targets of each frame are records TARGET, (frame, effector); q holds the mechanism's
+    coordinates to start from, (frame, coordinate). Frames that have `reached` their targets keep to
+    them, the others only approach theirs as far as a penalty draws them. The last frame leads back
+    to the first if closed. Limits are kept to about 1e-10 rad.
     """
     problem = new_problem(mechanism, targets, reached, closed and len(q) > 2)
     projected, valid = project(problem, q)

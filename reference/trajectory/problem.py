@@ -34,23 +34,16 @@ _errors_and_jacobians = Kernel(fill_errors_and_jacobians)
 
 
 class TrajectoryProblem(NamedTuple):
-    """What a trajectory has to keep.
+    """What a trajectory has to keep."""
 
-    Attributes:
-        mechanism: the joints.
-        units: the displacement that counts as 1: 1 rad, or the reach [m], (freedom,).
-        limits: the joint and the bound of every finite limit, see `joint_limits`, (limit, 2).
-        targets: of each frame, records TARGET, (frame, effector).
-        constrained: which frames have to meet their targets; a penalty draws the others, (frame,).
-        closed: whether the first frame follows the last.
-    """
-
-    mechanism: Mechanism
-    units: FloatArray
+    mechanism: Mechanism  # the joints
+    units: FloatArray  # the displacement that counts as 1: 1 rad, or the reach [m], (freedom,)
+    # the joint and the bound of every finite limit, see `joint_limits`, (limit, 2)
     limits: IndexArray
-    targets: RecordArray
+    targets: RecordArray  # of each frame, records TARGET, (frame, effector)
+    # which frames have to meet their targets; a penalty draws the others, (frame,)
     constrained: np.ndarray
-    closed: bool
+    closed: bool  # whether the first frame follows the last
 
     def at(self, frames: IndexArray) -> "TrajectoryProblem":
         """Return the problem of some of the frames."""

@@ -50,22 +50,15 @@ _subtract_second_derivatives = Kernel(subtract_second_derivatives)
 
 
 class QuadraticModel(NamedTuple):
-    """The cost about a trajectory to second order, without the terms of the limits but for `cost`.
+    """The cost about a trajectory to second order; the terms of the limits are in `cost` only."""
 
-    Attributes:
-        cost: of the trajectory, limits included.
-        gradient: (frame, freedom).
-        diagonal: the Hessian's block of each frame, (frame, freedom, freedom).
-        coupling: its blocks with the frame after a displacement as rows and the one before it as
-            columns, within the null spaces, (displacement, freedom, freedom).
-        P: projections onto the null spaces, (frame, freedom, freedom).
-    """
-
-    cost: float
-    gradient: FloatArray
-    diagonal: FloatArray
+    cost: float  # of the trajectory, limits included
+    gradient: FloatArray  # (frame, freedom)
+    diagonal: FloatArray  # the Hessian's block of each frame, (frame, freedom, freedom)
+    # its blocks with the frame after a displacement as rows and the one before it as columns,
+    # within the null spaces, (displacement, freedom, freedom)
     coupling: FloatArray
-    P: FloatArray
+    P: FloatArray  # projections onto the null spaces, (frame, freedom, freedom)
 
 
 class AcceptedStep(NamedTuple):

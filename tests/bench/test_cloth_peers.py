@@ -2,6 +2,7 @@
 
 import importlib
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,7 +11,15 @@ from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.cloth_peers import measurement as peers_cloth
 from plumbob.bench.experiments.cloth_peers import tables
 from plumbob.bench.experiments.cloth_peers.job import ClothJob, Shape
-from plumbob.bench.experiments.cloth_peers.problem import (
+from plumbob.bench.experiments.cloth_peers.ladder import Rung, motion_rungs, step_rungs
+from plumbob.bench.experiments.cloth_peers.truth import implicit_motion, true_motion, truth_of
+from plumbob.bench.figures.sketch import drawn
+from plumbob.bench.harness import metrics
+from plumbob.bench.harness.isolation import Outcome, WorkerProcess
+from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
+from plumbob.bench.peers import registry
+from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
+from plumbob.bench.problems.falling_cloth import (
     FRAME,
     MASS,
     FallingCloth,
@@ -21,16 +30,8 @@ from plumbob.bench.experiments.cloth_peers.problem import (
     highest_mode,
     level_cloth,
 )
-from plumbob.bench.experiments.cloth_peers.truth import cloth_truth, implicit_motion, true_motion
-from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness import metrics
-from plumbob.bench.harness.isolation import Outcome, WorkerProcess
-from plumbob.bench.harness.results import Results
-from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
-from plumbob.bench.peers import registry
-from plumbob.bench.peers.cloth.ladder import Rung, motion_rungs, step_rungs
-from plumbob.bench.peers.registry import EXPLICIT, LINEARISED, ClothPeer
 from plumbob.bench.report.report import all_figures
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import best_cells
 from plumbob.reference import ImplicitEuler, MassSpring, State, rotation, symplectic_euler
 from plumbob.reference.mass_spring import stiffness_matrix
@@ -113,7 +114,7 @@ def test_explicit_steps_are_counted_from_the_limit():
 
 
 def test_the_truth_is_of_order_four_and_surer_than_any_error_measured():
-    truth = cloth_truth(SIZE, STIFFNESS, 2)
+    truth = truth_of(falling_cloth(SIZE, STIFFNESS), 2)
     assert truth.order == pytest.approx(4.0, abs=0.15)
     error = metrics.rms_distance(truth.implicit[-1], truth.true[-1])
     assert truth.unsure < 0.01 * error < 0.01
@@ -148,7 +149,7 @@ def test_newton_that_does_not_converge_is_no_answer(cloth, monkeypatch):
 
 
 def test_the_error_of_a_step_is_zero_at_the_answer_one_at_the_start_and_infinite_beyond():
-    truth = cloth_truth(SIZE, STIFFNESS, 1)
+    truth = truth_of(falling_cloth(SIZE, STIFFNESS), 1)
     assert peers_cloth.step_error(truth.first.positions, truth) < 1e-14
     assert peers_cloth.step_error(truth.inertial, truth) == 1.0
     half = 0.5 * (truth.implicit[0] + truth.inertial)
@@ -258,10 +259,8 @@ def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
 
 
 def test_colours_are_proper_and_few(cloth):
-    newton_model = pytest.importorskip(
-        "plumbob.bench.peers.cloth.newton_model", exc_type=ImportError
-    )
-    groups = newton_model.colours(cloth.system.springs, cloth.system.particle_count)
+    newton_adapter = pytest.importorskip("plumbob.bench.peers.cloth.newton", exc_type=ImportError)
+    groups = newton_adapter.colours(cloth.system.springs, cloth.system.particle_count)
     colour = np.full(cloth.system.particle_count, -1)
     for number, group in enumerate(groups):
         colour[group] = number
@@ -272,10 +271,8 @@ def test_colours_are_proper_and_few(cloth):
 
 
 def test_by_itself_newton_gives_springs_one_colour(cloth):
-    newton_model = pytest.importorskip(
-        "plumbob.bench.peers.cloth.newton_model", exc_type=ImportError
-    )
-    model = newton_model.model(cloth.system, own_colours=True)
+    newton_adapter = pytest.importorskip("plumbob.bench.peers.cloth.newton", exc_type=ImportError)
+    model = newton_adapter.model(cloth.system, own_colours=True)
     assert len(model.particle_color_groups) == 1
 
 
@@ -390,7 +387,7 @@ def fakes(tmp_path_factory):
 
 def job(cloth, manner, frames=5, repeats=1, budget=60.0):
     shape = Shape(frames, repeats, budget)
-    return peers_cloth.job("fake_cloth_solvers", cloth, {"manner": manner}, shape)
+    return peers_cloth.job(fake_peer(manner), cloth, {"manner": manner}, shape)
 
 
 def messages(*args, **more):
@@ -435,9 +432,8 @@ def worker(fakes):
 
 
 def fake_peer(manner, package="numpy"):
-    return ClothPeer(
-        manner, "Fake", "fake_cloth_solvers", package, LINEARISED, {"manner": manner}
-    )  # fmt: skip
+    settings = {"manner": manner}
+    return ClothPeer(manner, "fake_cloth_solvers", package, "Fake", LINEARISED, settings)
 
 
 def as_it_is(peer, frequency):
@@ -445,7 +441,7 @@ def as_it_is(peer, frequency):
     return [Rung("as it is", peer.settings)]
 
 
-LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
+FALL = peers_cloth.Fall(peers_cloth.Level(SIZE, 5, 10.0), partial(falling_cloth, SIZE, STIFFNESS))
 
 
 @pytest.mark.parametrize(
@@ -460,7 +456,7 @@ LEVEL = peers_cloth.Level(SIZE, 5, 10.0)
 def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, lost, why):
     monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
     monkeypatch.setattr(peers_cloth, "motion_rungs", as_it_is)
-    arrays, _, facts = peers_cloth.motion(fake_peer(manner), STIFFNESS, (LEVEL,))
+    arrays, _, facts = peers_cloth.motion(fake_peer(manner), [FALL])
     assert arrays["frames"].tolist() == [frames]
     assert arrays["diverged"].tolist() == [lost]
     assert np.isfinite(arrays["true"]).all() == (not lost)
@@ -468,14 +464,11 @@ def test_every_manner_becomes_one_point(worker, monkeypatch, manner, frames, los
     assert facts == {"rungs": ["as it is"], "remarks": remarks, "trouble": why}
 
 
-class InThisProcess:
-    """A worker process without a process of its own."""
+class InThisProcess(WorkerProcess):
+    """A worker process that is none."""
 
-    def perform(self, job):
-        said = list(job.perform())
-        solved = [message for message in said if isinstance(message, Solved)]
-        trouble = said[-1].why if isinstance(said[-1], Unfit) else ""
-        return Outcome(0.0, solved, trouble)
+    def stream(self, job):
+        return job.perform()
 
 
 @pytest.fixture
@@ -493,7 +486,7 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
 
     monkeypatch.setattr(peers_cloth, "worker_process", Silent)
     monkeypatch.setattr(peers_cloth, "_given_up", {})
-    arrays, _, facts = peers_cloth.motion(fake_peer("well"), STIFFNESS, (LEVEL, LEVEL))
+    arrays, _, facts = peers_cloth.motion(fake_peer("well"), [FALL, FALL])
     assert len(tried) == 1
     assert arrays["frames"].tolist() == [0, 0]
     assert np.isnan(arrays["true"]).all()
@@ -503,21 +496,22 @@ def test_what_could_not_be_set_up_in_time_is_not_set_up_again(cloth, monkeypatch
 def test_a_ladder_ends_where_it_arrives(here):
     """Two iterations of Newton and three are asked for, and no more once 1e-9 is reached."""
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
-    arrays, _, facts = peers_cloth.one_step(newton, STIFFNESS, (LEVEL,))
+    arrays, _, facts = peers_cloth.one_step(newton, [FALL])
     assert arrays["error"][0] > arrays["error"][-1] <= peers_cloth.NEAR_ENOUGH
     assert (arrays["error"][:-1] > peers_cloth.NEAR_ENOUGH).all()
     assert len(facts["rungs"]) == len(arrays["error"])
 
 
 def test_a_ladder_whose_time_is_used_is_climbed_no_further(here):
+    brief = FALL.level._replace(budget=1e-9)
     newton = next(peer for peer in registry.cloth_peers() if peer.title == "Plumbob Newton")
-    arrays, _, _ = peers_cloth.one_step(newton, STIFFNESS, (LEVEL._replace(budget=1e-9),))
+    arrays, _, _ = peers_cloth.one_step(newton, [FALL._replace(level=brief)])
     assert len(arrays["error"]) == 1
 
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):
     gone = [fake_peer(name, "a-package-that-nobody-has") for name in ("one", "two")]
-    monkeypatch.setattr(registry, "cloth_peers", lambda: gone)
+    monkeypatch.setattr(registry, "cloth_peers", lambda entrants: gone)
     missing = [b for b in peers_cloth.blocks(Scale(1, 0.1)) if b.problem == "peers/all"]
     (block,) = missing
     arrays, notes, _ = block.measure()
@@ -637,19 +631,15 @@ def test_a_missing_engine_has_a_row_in_both_tables(make):
     for table in (tables.one_step(Results([missing])), tables.motion(Results([missing]))):
         (row,) = table.rows
         assert row[:2] == ("every cloth", "newton")
-        assert row[-1] == "not installed"
+        assert "not installed" in row
 
 
-def test_iterations_that_did_not_suffice_are_said_so(make):
-    table = tables.iterations(Results([make.needed("lbfgs", [1, 2, 3, 4] + [np.nan] * 4)]))
-    assert table.rows[0][2:10] == (1, 2, 3, 4, None, None, None, None)
-    assert table.summary.points == ("1,000 N/m: L-BFGS more than 100",)
-
-
-def test_a_limit_is_shown_in_units_of_the_theory(make):
-    table = tables.stability(Results([make.bounded("a", 0.02), make.bounded("b", np.nan)]))
-    assert column(table, "of 2 / ω") == [pytest.approx(1.0), None]
-    assert table.summary.points == ("a: 1.00 × 2 / ω",)
+def test_a_limit_of_stability_stands_beside_the_motions_in_units_of_the_theory(make):
+    records = [make.bounded("a", 0.02), make.bounded("b", np.nan), make.fell("a"), make.fell("b")]
+    table = tables.motion(Results(records))
+    assert column(table, "stable up to [2/ω]") == [pytest.approx(1.0)] * 3 + [None] * 3
+    assert column(table, "longest stable step [ms]")[0] == 20.0
+    assert table.summary.points[-1] == "longest stable step in units of 2 / ω: a 1.00"
 
 
 def test_the_published_times_stand_beside_ours(make):
@@ -687,7 +677,7 @@ def test_a_job_of_a_worker_is_known_by_its_arrays(cloth):
     """What travels between processes is rebuilt there: the same system, to the last bit."""
     import pickle
 
-    sent = peers_cloth.job("m", cloth, {}, Shape(1, 1, 1.0))
+    sent = peers_cloth.job(fake_peer("m"), cloth, {}, Shape(1, 1, 1.0))
     got = pickle.loads(pickle.dumps(sent))
     assert isinstance(got, ClothJob)
     system = MassSpring(**got.system._asdict())

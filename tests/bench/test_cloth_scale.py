@@ -11,16 +11,16 @@ from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.cloth_scale import measurement as suite
 from plumbob.bench.experiments.cloth_scale import tables as cloth_scale
 from plumbob.bench.harness.progress import listening
-from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.results import Results
 from plumbob.reference.implicit_euler.objective import Objective
 
 SMALL = min(suite.SIZES)
 SETTINGS = {"particles": 10_000, "h": 1 / 60, "stiffness": 1e4, "iterations": 10}
 OURS = {
-    "entries": 500_000, "residual": 1e-3, "factor": 2.0, "refactor": 0.5, "memory": 2**31,
-    "solve": [0.01], "local": [0.02], "step": [0.3, 0.3, 0.5], "limit": [0.015],
+    "before": 2**20, "entries": 500_000, "residual": 1e-3, "factor": 2.0, "refactor": 0.5,
+    "memory": 2**31, "solve": [0.01], "local": [0.02], "step": [0.3, 0.3, 0.5], "limit": [0.015],
 }  # fmt: skip
-THEIRS = {"factor": 4.0, "solve": [0.02, 0.02], "memory": 2**30}
+THEIRS = {"before": 2**20, "factor": 4.0, "solve": [0.02, 0.02], "memory": 2**30}
 
 
 def measured(make, solver, arrays, **notes):
@@ -83,7 +83,7 @@ def test_a_failure_in_its_process_is_told():
 def test_a_library_that_is_missing_is_told(make):
     notes = suite.in_its_own_process(SMALL, "no_such_library").notes
     assert notes == {"missing": "no_such_library is not installed"}
-    table = cloth_scale.factors(Results([measured(make, "cholespy", {}, missing="is away")]))
+    table = cloth_scale.scale(Results([measured(make, "cholespy", {}, missing="is away")]))
     assert table.rows[0][:3] == (10_000, "CHOLMOD (cholespy): is away", None)
 
 
@@ -102,28 +102,18 @@ def test_the_quick_scale_stops_at_ten_thousand():
     assert max(sizes["full"]) == 1_000_000
 
 
-def test_iterations_are_told_by_particle_and_nonzero(make):
-    table = cloth_scale.iterations(Results([measured(make, "supernodal", OURS)]))
+def test_our_parts_stand_beside_cholmods(make):
+    records = [measured(make, "supernodal", OURS), measured(make, "cholespy", THEIRS)]
+    table = cloth_scale.scale(Results(records))
+    ours, theirs = table.rows
+    assert (ours[1], theirs[1]) == ("ours", "CHOLMOD (cholespy)")
     np.testing.assert_allclose(
-        table.rows[0], [10_000, 50, 20, 1000, 2000, 3000, 30, 2, 1e-3], rtol=1e-12
+        ours[2:], [2.0, 0.5, 10.0, 2.0, 3000, 2, 1e-3, 30, 2000, 1000, 20, 50], rtol=1e-12
     )
+    assert theirs[2:] == (4.0, None, 20.0, 1.0, *[None] * 5, 2000.0, None, None)
     assert table.summary.sentence == (
         "With 10,000 particles 10 iterations take 0.300 s, as long as 30.0 solves, and leave a "
         "residual of 0.00100."
     )
-
-
-def test_factors_stand_beside_cholmods(make):
-    records = [measured(make, "supernodal", OURS), measured(make, "cholespy", THEIRS)]
-    table = cloth_scale.factors(Results(records))
-    assert table.rows == (
-        (10_000, "ours", 2.0, 0.5, 10.0, 2.0),
-        (10_000, "CHOLMOD (cholespy)", 4.0, None, 20.0, 1.0),
-    )
-    assert table.summary.points == ("10,000 particles: factor 0.500, solve 0.500, memory 2.00",)
-
-
-def test_nothing_measured_is_nothing_said():
-    for table in (cloth_scale.iterations(Results([])), cloth_scale.factors(Results([]))):
-        assert table.rows == ()
-        assert table.summary.sentence == ""
+    (point,) = table.summary.points
+    assert point.endswith("as a multiple of CHOLMOD’s: factor 0.500, solve 0.500, memory 2.00")

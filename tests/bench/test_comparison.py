@@ -9,9 +9,9 @@ import pytest
 
 from plumbob import cli
 from plumbob.bench.comparison import compare as comparing
-from plumbob.bench.comparison import intervals, output, times
+from plumbob.bench.comparison import output, times
 from plumbob.bench.comparison.compare import Limits, compare, limits, stops_at
-from plumbob.bench.comparison.rows import ORDER, Verdict, by_row
+from plumbob.bench.comparison.rows import ORDER, Ratio, Verdict, by_row
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import RecordFile
 
@@ -170,7 +170,7 @@ def two_runs(make, rng, *, rows=12, drift=0.05, factor=1.0):
     return runs
 
 
-def false_calls(make, repetitions, rate=lambda chances: intervals.adjusted(chances)):
+def false_calls(make, repetitions, rate=lambda chances: metrics.adjusted(chances)):
     rng, count = np.random.default_rng(5), 0
     for _ in range(repetitions):
         rows = compare(*two_runs(make, rng)).rows
@@ -225,30 +225,30 @@ def test_times_of_two_machines_are_not_compared(make):
 def test_pairs_by_lot_call_nothing_by_chance_and_find_a_fifth():
     """The machine drifts by half in the course of the pairs, and is at times three times slower."""
     rng, called, found = np.random.default_rng(7), 0, 0
-    rows, count = 15, intervals.pairs_needed(15)
+    rows, count = 15, times.pairs_needed(15)
     for _ in range(20):
         pace = np.exp(np.linspace(0, 0.4, count))[:, None, None]
         noise = 0.03 * rng.standard_t(3, size=(count, rows, 2))
-        times = pace * np.exp(noise)
-        times[..., 1][rng.random((count, rows)) < 0.02] *= 3.0
+        seconds = pace * np.exp(noise)
+        seconds[..., 1][rng.random((count, rows)) < 0.02] *= 3.0
         order = rng.random((count, rows)) < 0.5
-        times[order] = times[order][:, ::-1]
-        times[:, 0, 1] *= 1.2
+        seconds[order] = seconds[order][:, ::-1]
+        seconds[:, 0, 1] *= 1.2
         chances = metrics.adjusted(
-            [intervals.ratio_of_pairs(*times[:, row].T).chance for row in range(rows)]
+            [times.ratio_of_pairs(*seconds[:, row].T).chance for row in range(rows)]
         )
-        found += chances[0] <= intervals.ERROR_RATE
-        called += (chances[1:] <= intervals.ERROR_RATE).any()
+        found += chances[0] <= times.ERROR_RATE
+        called += (chances[1:] <= times.ERROR_RATE).any()
     assert called <= 2  # of 20 at 5 %: 1, and as many again by chance
     assert found >= 15
 
 
 def test_the_interval_of_pairs_is_that_of_the_tables():
     """Of ten pairs the 95 % interval leaves out the eight least means of two (Wilcoxon's table)."""
-    assert intervals._signed_rank_quantile(10) == 8
-    assert intervals._signed_rank_quantile(5) == -1
+    assert times._signed_rank_quantile(10) == 8
+    assert times._signed_rank_quantile(5) == -1
     new = np.exp(np.arange(1.0, 11.0))
-    ratio = intervals.ratio_of_pairs(np.ones(10), new)
+    ratio = times.ratio_of_pairs(np.ones(10), new)
     means = sorted((i + j) / 2 for i in range(1, 11) for j in range(i, 11))
     assert np.log([ratio.low, ratio.high]) == pytest.approx([means[8], means[-9]])
     assert ratio.chance == pytest.approx(2 / 2**10)
@@ -318,16 +318,16 @@ def test_answers_are_less_right_where_half_of_those_that_differ_are_worse(make, 
         (0.92, 1.09, 1.0, Verdict.SAME),
         (0.90, 1.09, 1.0, Verdict.UNDECIDED),  # it may be 1.1 times as fast
         (0.92, 1.11, 1.0, Verdict.UNDECIDED),
-        (1.01, 1.05, intervals.ERROR_RATE, Verdict.SLOWER),
-        (1.01, 1.05, 1.01 * intervals.ERROR_RATE, Verdict.SAME),
+        (1.01, 1.05, times.ERROR_RATE, Verdict.SLOWER),
+        (1.01, 1.05, 1.01 * times.ERROR_RATE, Verdict.SAME),
     ],
 )
 def test_times_are_the_same_where_both_ends_of_the_interval_are_within_a_tenth(
     low, high, chance, verdict
 ):
-    ratio = intervals.Ratio(math.sqrt(low * high), low, high, chance)
+    ratio = Ratio(math.sqrt(low * high), low, high, chance)
     assert times.judged(KEY, "seconds", ratio, chance).verdict is verdict
-    inverse = intervals.Ratio(1.0 / ratio.value, 1.0 / high, 1.0 / low, chance)
+    inverse = Ratio(1.0 / ratio.value, 1.0 / high, 1.0 / low, chance)
     mirrored = Verdict.FASTER if verdict is Verdict.SLOWER else verdict
     assert times.judged(KEY, "seconds", inverse, chance).verdict is mirrored
 

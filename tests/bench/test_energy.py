@@ -7,7 +7,7 @@ from plumbob.bench.experiments import Scale, blocks
 from plumbob.bench.experiments.energy import figures, tables
 from plumbob.bench.experiments.energy import measurement as suite
 from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.results import Results
 
 STEPS = 100
 

@@ -8,10 +8,10 @@ import pytest
 from plumbob.bench.experiments.timing import tables as timing
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import FINISHED
-from plumbob.bench.harness.results import Results
 from plumbob.bench.peers import registry
 from plumbob.bench.report import headlines
 from plumbob.bench.tables.layout import source
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import words
 
 N = 200

@@ -15,10 +15,13 @@ import numpy as np
 import pytest
 from hostile_programs import LIMITS, running
 
-from plumbob.bench.entrants import chain
+from plumbob.bench.experiments.chain import measurement as chain
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.progress import TROUBLE, listening
-from plumbob.bench.harness.worker import NoAnswerError
+from plumbob.bench.peers import registry
+from plumbob.bench.peers.entrant import Entrant
+from plumbob.bench.peers.protocol import NoAnswerError
+from plumbob.bench.problems.chains import TargetsForSkeleton
 from plumbob.crosscheck.verify.case import Case
 from plumbob.crosscheck.verify.contestant import Answer
 from plumbob.crosscheck.verify.greeting import Greeting
@@ -221,34 +224,32 @@ def opened(folder, way, row):
     return open_contestant(spec, limits)
 
 
-def misbehaved(folder, way, name):
+PYTHON_QUICK = ("replaces the clock", "exits", "changes its inputs", "floods its output")
+
+
+def check_sentence(folder, way, name):
     """What a hostile solver gets; the next request is answered, and nothing stays."""
-    solver = opened(folder, way, BEHAVIOURS[name])
+    solver, words = opened(folder, way, BEHAVIOURS[name]), getattr(BEHAVIOURS[name], way)
     try:
-        answers = [solver.answer(case(n)) for n in (RIGHT, HOSTILE, RIGHT)]
+        before, answer, after = (solver.answer(case(n)) for n in (RIGHT, HOSTILE, RIGHT))
     finally:
         solver.close()
-    assert [outcome(answer) for answer in answers[::2]] == ["answer", "answer"]
+    assert outcome(before) == outcome(after) == "answer"
     assert not running(folder)
-    return answers[1], [str(remark) for remark in solver.remarks]
-
-
-PYTHON_QUICK = ("replaces the clock", "exits", "changes its inputs", "floods its output")
+    assert re.search(words, outcome(answer)), outcome(answer)
+    remarks = map(str, solver.remarks)
+    assert any("left processes running" in remark for remark in remarks) == ("child" in name)
+    assert way == "program" or not isinstance(answer, Answer) or answer.seconds > 0.0
 
 
 @pytest.mark.parametrize("name", rows("python", *PYTHON_QUICK))
 def test_a_hostile_python_file_gets_its_sentence(tmp_path, name):
-    answer, remarks = misbehaved(tmp_path, "python", name)
-    assert re.search(BEHAVIOURS[name].python, outcome(answer)), outcome(answer)
-    assert any("left processes running" in one for one in remarks) == ("child" in name)
-    assert not isinstance(answer, Answer) or answer.seconds > 0.0
+    check_sentence(tmp_path, "python", name)
 
 
 @pytest.mark.parametrize("name", rows("program"))
 def test_a_hostile_program_gets_its_sentence(tmp_path, name):
-    answer, remarks = misbehaved(tmp_path, "program", name)
-    assert re.search(BEHAVIOURS[name].program, outcome(answer)), outcome(answer)
-    assert any("left processes running" in one for one in remarks) == ("child" in name)
+    check_sentence(tmp_path, "program", name)
 
 
 @pytest.mark.parametrize("name", rows("files"))
@@ -269,16 +270,21 @@ def worker():
     impatient.close()
 
 
+def solved(spec, targets):
+    """What the bench measures of an entrant that is asked for targets."""
+    (peer,) = registry.chain_peers([Entrant("hostile", "", spec, tasks=(TASK,))])
+    skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
+    problem = TargetsForSkeleton("", "", skeleton, SKELETON["local_rotations"], targets)
+    return chain.solve_one_by_one(problem, peer, chain.Limits(1e-4, HOSTILE), budget=60.0)
+
+
 @pytest.mark.parametrize("name", rows("bench", "claims -5 iterations"))
 def test_a_hostile_entrant_of_the_bench_reaches_nothing_by_it(tmp_path, monkeypatch, worker, name):
     """What is wrong with an answer costs the target; its time is never what it claims."""
     row = BEHAVIOURS[name]
     monkeypatch.setattr(chain, "worker_process", lambda: worker)
     (tmp_path / "solver.py").write_text(source(row.does, PYTHON))
-    skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
-    problem = chain.ChainProblem(skeleton, SKELETON["local_rotations"], TARGETS)
-    spec, limits = str(tmp_path / "solver.py"), chain.Limits(1e-4, HOSTILE)
-    measure = partial(chain.solve_chain, spec, "", problem, limits, budget=60.0)
+    measure = partial(solved, str(tmp_path / "solver.py"), TARGETS)
     if row.bench == SILENT:
         with pytest.raises(NoAnswerError, match=SILENT):
             measure()
@@ -313,14 +319,10 @@ def test_times_far_below_what_was_computed_are_not_ranked(tmp_path, monkeypatch,
     """Those of the first targets neither, which were claimed before it was seen."""
     monkeypatch.setattr(chain, "worker_process", lambda: worker)
     (tmp_path / "liar.py").write_text(HEAD + "    pass\n" + LIAR)
-    skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
     targets = np.array([[6.0 + i % 3, 1.0, 1.0] for i in range(12)])
-    problem = chain.ChainProblem(skeleton, SKELETON["local_rotations"], targets)
     announced = []
     with listening(announced.append):
-        found = chain.solve_chain(
-            (sys.executable, str(tmp_path / "liar.py")), "", problem, chain.Limits(1e-4, 9), 60.0
-        )
+        found = solved((sys.executable, str(tmp_path / "liar.py")), targets)
     worker.close()
     assert not running(tmp_path)
     (message,) = [one.message for one in announced if one.state == TROUBLE]

@@ -2,8 +2,6 @@
 
 import importlib
 import sys
-import threading
-from multiprocessing import Pipe
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,19 +9,19 @@ import pytest
 
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.robots import measurement as robots
-from plumbob.bench.experiments.robots.evaluate import Targets, Tolerance, evaluator_of
-from plumbob.bench.experiments.robots.job import AGAIN, Job
-from plumbob.bench.experiments.robots.problem import robot
 from plumbob.bench.experiments.robots.tables import outcomes
 from plumbob.bench.harness import stopwatch
 from plumbob.bench.harness.isolation import WorkerProcess, raised
+from plumbob.bench.harness.job import AGAIN, Job
 from plumbob.bench.harness.measure import record_of
-from plumbob.bench.harness.results import Results
-from plumbob.bench.harness.worker import Begun, Done, Ready, Solved, Unfit, serve
+from plumbob.bench.harness.worker import Done, Ready, Solved, Unfit
 from plumbob.bench.peers import registry
 from plumbob.bench.peers.ik.protocol import SolverOutput
 from plumbob.bench.peers.ik.restarts import restarted
 from plumbob.bench.peers.registry import ONE_START, Entry, Peer
+from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
+from plumbob.bench.problems.robots import robot
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import markdown
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
@@ -111,9 +109,7 @@ def targets(rng):
 
 def job(targets, manner, restarts=0, budget=60.0, **settings):
     settings = {"manner": manner, **settings}
-    return Job(
-        "fake_solvers", robot("iiwa14"), targets, TOLERANCE, settings, restarts, budget
-    )  # fmt: skip
+    return Job("fake_solvers", robot("iiwa14"), targets, TOLERANCE, settings, restarts, budget)
 
 
 def verdict(targets, solved):
@@ -145,7 +141,7 @@ def test_one_that_is_lost_keeps_what_it_finished_and_costs_no_other(worker, targ
 
 def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monkeypatch):
     """What is timed is timed as in a loop of solves and nothing else."""
-    monkeypatch.setattr("plumbob.bench.experiments.robots.job.QUICK", 0.1)
+    monkeypatch.setattr("plumbob.bench.harness.job.QUICK", 0.1)
     counts, called = [], 0
 
     def timed(call):
@@ -154,7 +150,7 @@ def test_a_quick_solve_follows_others_and_a_slow_one_is_made_once(targets, monke
         called = 0
         return stopwatch.timed(call)
 
-    monkeypatch.setattr("plumbob.bench.experiments.robots.job.timed", timed)
+    monkeypatch.setattr("plumbob.bench.harness.job.timed", timed)
     fake = importlib.import_module("fake_solvers")
     prepare = fake.prepare
 
@@ -188,8 +184,8 @@ def test_the_answers_are_the_same_however_often_a_quick_solve_is_made_again(
     """On a quick machine solves are warmed up and on a slow one not: no answer may depend on it."""
 
     def answers(quick, again):
-        monkeypatch.setattr("plumbob.bench.experiments.robots.job.QUICK", quick)
-        monkeypatch.setattr("plumbob.bench.experiments.robots.job.AGAIN", again)
+        monkeypatch.setattr("plumbob.bench.harness.job.QUICK", quick)
+        monkeypatch.setattr("plumbob.bench.harness.job.AGAIN", again)
         said = messages(targets, manner, restarts=restarts)
         return np.array([one.q for one in said if isinstance(one, Solved)])
 
@@ -278,65 +274,37 @@ class Attempts:
         return solve
 
 
-@pytest.mark.parametrize("end", [SolverOutput(np.zeros(7), True), SolverOutput(np.zeros(7), None)])
-def test_restarts_end_with_the_first_claim_within_the_limits(end):
-    """Neither an answer that is not claimed nor one that is beyond the limits ends them."""
-    beyond, nothing = SolverOutput(np.full(7, 9.0), True), SolverOutput(None, False)
-    attempts = Attempts(beyond, nothing, end, SolverOutput(np.ones(7), True))
-    answer = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))()
-    assert (answer.q == (0.0 if end.claimed else 1.0)).all()
-    assert len(attempts.starts) == (3 if end.claimed else 4)
-    assert (attempts.starts[0] == 0.5).all()
-    assert len({tuple(start) for start in attempts.starts}) == len(attempts.starts)
+GOOD, SILENT = SolverOutput(np.zeros(7), True), SolverOutput(np.zeros(7), None)
+BEYOND, MISSED = SolverOutput(np.full(7, 9.0), True), SolverOutput(np.ones(7), False)
+NOTHING, LATER = SolverOutput(None, False), SolverOutput(np.ones(7), True)
 
 
-def test_an_attempt_that_raises_is_followed_by_the_next_restart():
-    """An exception once ended the target: a solver that solves all of them had 84 %."""
-    good = SolverOutput(np.zeros(7), True)
-    attempts = Attempts(ArithmeticError("once"), ArithmeticError("twice"), good)
-    answer = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))()
-    assert answer.claimed
-    assert (answer.q == 0.0).all()
-    assert answer.error == "ArithmeticError: once"
-    assert len(attempts.starts) == 3
-
-
-def test_an_exception_in_the_last_attempt_does_not_hide_the_answers_before():
-    missed = SolverOutput(np.ones(7), False)
-    attempts = Attempts(SolverOutput(None, False), missed, ArithmeticError("in the end"))
-    answer = restarted(attempts, robot("iiwa14"), 2)(None, None, np.full(7, 0.5))()
-    assert (answer.q == 1.0).all()
-    assert answer.claimed is False
-
-
-def test_targets_are_converted_for_every_restart_before_the_clock_runs():
-    attempts = Attempts(*[SolverOutput(None, False)] * 4)
+@pytest.mark.parametrize(
+    ("answers", "count", "q", "claimed", "error"),
+    [
+        ([BEYOND, NOTHING, GOOD, LATER], 3, 0.0, True, ""),
+        ([BEYOND, NOTHING, SILENT, LATER], 4, 1.0, True, ""),
+        # An exception once ended the target: a solver that solves all of them had 84 %.
+        ([ArithmeticError("once"), ArithmeticError("twice"), GOOD], 3, 0.0, True, "once"),
+        ([NOTHING, MISSED, NOTHING, ArithmeticError("in the end")], 4, 1.0, False, "in the end"),
+        ([BEYOND] * 4, 4, None, False, ""),
+    ],
+    ids=["claimed", "silent", "raises", "raises in the end", "beyond"],
+)
+def test_restarts_end_with_the_first_claim_within_the_limits(answers, count, q, claimed, error):
+    """Targets are converted for every restart before the clock runs, each from its own start."""
+    attempts = Attempts(*answers)
     solve = restarted(attempts, robot("iiwa14"), 3)(None, None, np.full(7, 0.5))
     assert len(attempts.asked) == 4
     assert not attempts.starts
-    solve()
+    answer = solve()
+    assert (q is None) or (answer.q == q).all()
+    assert answer.claimed is claimed
+    assert answer.error == (f"ArithmeticError: {error}" if error else "")
     assert len(attempts.asked) == 4
-
-
-def test_restarts_that_all_fail_claim_nothing():
-    attempts = Attempts(*[SolverOutput(np.full(7, 9.0), True)] * 3)
-    assert restarted(attempts, robot("iiwa14"), 2)(None, None, np.zeros(7))().claimed is False
-
-
-def test_a_worker_serves_job_after_job(targets):
-    ours, theirs = Pipe()
-    with ours, theirs:
-        serving = threading.Thread(target=serve, args=(theirs,))
-        serving.start()
-        kinds = []
-        for manner in ("perfect", "unable"):
-            ours.send(job(targets, manner))
-            kinds.append(type(ours.recv()))
-            while kinds[-1] not in (Done, Unfit):
-                kinds.append(type(ours.recv()))
-        ours.close()
-        serving.join()
-    assert kinds == [Begun, Ready, *[Solved] * COUNT, Done, Begun, Unfit]
+    assert len(attempts.starts) == count
+    assert (attempts.starts[0] == 0.5).all()
+    assert len({tuple(start) for start in attempts.starts}) == count
 
 
 @pytest.fixture

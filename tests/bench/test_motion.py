@@ -11,10 +11,10 @@ from browser import CHROMIUM, Browser
 
 from plumbob.bench.experiments.pictures.readings import arm_motion, cloth_motion
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results
 from plumbob.bench.motion import motion
 from plumbob.bench.motion.motion import Moving, Scene, data_of
 from plumbob.bench.report import report
+from plumbob.bench.tables.results import Results
 
 KILOBYTE = 1024
 

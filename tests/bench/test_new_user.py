@@ -8,21 +8,20 @@ from pathlib import Path
 
 import pytest
 
-from plumbob.bench.entrants import opening, selection
 from plumbob.bench.experiments import SUITES, blocks
-from plumbob.bench.experiments.arm.tables import accuracy
 from plumbob.bench.experiments.chain import figures
-from plumbob.bench.experiments.chain.tables import beyond_reach
+from plumbob.bench.experiments.chain.tables import accuracy, beyond_reach
 from plumbob.bench.experiments.robots.participants import participants
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results, printable
-from plumbob.bench.peers import registry
+from plumbob.bench.peers import opening, registry
 from plumbob.bench.report.headlines import absent, not_asked
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.entered import remarks_of_entrants
+from plumbob.bench.tables.results import Results, printable
 from plumbob.bench.tables.table import words
 from plumbob.cli import run_command
+from plumbob.commands import selection
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
 IK = re.search(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)[1]

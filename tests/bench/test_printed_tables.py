@@ -11,8 +11,8 @@ import pytest
 from plumbob import cli, terminal
 from plumbob.bench.comparison.history import sparkline
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results
 from plumbob.bench.report import sections
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import is_blank, without_empty, words
 from plumbob.crosscheck.claims import CLAIMS
 from plumbob.crosscheck.verdict import Verdict

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.arm.problem import MAX_SPACING, MIN_SPACING, arm_beyond, arm_curves
-from plumbob.bench.experiments.chain.problem import STRATA, chain_targets
 from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.problems.chains import STRATA, chain_targets, unit
+from plumbob.bench.problems.curves import MAX_SPACING, MIN_SPACING, arm_beyond, arm_curves
 
 
 @pytest.mark.parametrize("stratum", STRATA)
@@ -19,13 +19,9 @@ def test_targets_lie_in_their_stratum_and_are_the_same_every_time(stratum):
     np.testing.assert_array_equal(problem.starts, again.starts)
 
 
-def test_strata_have_targets_of_their_own():
-    near, far = chain_targets("near", 5).targets, chain_targets("far", 5).targets
-    directions = [x / np.linalg.norm(x, axis=-1, keepdims=True) for x in (near, far)]
-    assert np.abs(directions[0] - directions[1]).max() > 0.1
-
-
-def test_an_unknown_stratum_is_named():
+def test_strata_have_targets_of_their_own_and_an_unknown_one_is_named():
+    near, far = (unit(chain_targets(stratum, 5).targets) for stratum in ("near", "far"))
+    assert np.abs(near - far).max() > 0.1
     with pytest.raises(ValueError, match="stratum: expected one of near"):
         chain_targets("middle", 1)
 

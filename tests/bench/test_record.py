@@ -17,7 +17,7 @@ ANY_FLOATS = arrays.arrays(
 
 
 def block(solver="ccd", value=1.0, **settings):
-    return Record("arm", "arm/circle", solver, settings, arrays={"residual": np.array([value])})
+    return Record("made up", "arm/circle", solver, settings, arrays={"residual": np.array([value])})
 
 
 def same(a, b):

@@ -19,7 +19,7 @@ from plumbob.bench.harness import machine, run
 from plumbob.bench.harness.folder_lock import locked
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile, decode, encode
-from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.results import Results
 
 ROOT = Path(bench.__file__).resolve().parents[1]
 
@@ -38,15 +38,15 @@ def solvers(monkeypatch):
 
 
 def go(folder):
-    return list(run.run(["arm"], "quick", folder))
+    return list(run.run(["made up"], "quick", folder))
 
 
 def stored(folder):
-    return [r for r in RecordFile(folder).read().records if r.suite == "arm"]
+    return [r for r in RecordFile(folder).read().records if r.suite == "made up"]
 
 
 def test_records_of_a_solver_that_is_not_asked_for_stay_and_are_counted(solvers, tmp_path, make):
-    theirs = [make.record("arm", f"p{i}", "My solver", arrays={"x": [i]}) for i in range(20)]
+    theirs = [make.record("made up", f"p{i}", "My solver", arrays={"x": [i]}) for i in range(20)]
     RecordFile(tmp_path).append(theirs)
     events = [event for event in go(tmp_path) if event.state == run.NOT_RUN]
     assert [event.message for event in events] == ["20 records of My solver kept, not run"]
@@ -71,7 +71,7 @@ def test_records_under_settings_of_before_stay_on_record_but_leave_the_tables(so
 
 
 def test_what_says_only_that_something_was_missing_leaves_when_it_is_there(solvers, tmp_path, make):
-    RecordFile(tmp_path).append([make.record("arm", "all", "a", notes={"remark": "missing"})])
+    RecordFile(tmp_path).append([make.record("made up", "all", "a", notes={"remark": "missing"})])
     go(tmp_path)
     assert {r.problem for r in Results(stored(tmp_path)).records} == {"p"}
 
@@ -92,7 +92,7 @@ OTHER = {
 @pytest.mark.parametrize(("other", "more", "reason"), OTHER.values(), ids=OTHER)
 def test_why_something_is_measured_again_is_said(solvers, tmp_path, make, other, more, reason):
     fields = {"size": 2, "stamp": {**stamp(), **other}} | more
-    RecordFile(tmp_path).append([make.record("arm", "p", "a", **fields)])
+    RecordFile(tmp_path).append([make.record("made up", "p", "a", **fields)])
     said = [event.message for event in go(tmp_path) if event.state == run.MEASURING]
     values = {"source": stamp()["source"], **stamp()["versions"], **stamp()["machine"]}
     assert said == [reason.format(**values), ""]
@@ -136,7 +136,7 @@ def test_the_commit_of_the_sources_is_on_record_and_whether_they_were_changed(tm
 
 @pytest.mark.parametrize("other", [2, 4])
 def test_a_record_of_another_format_is_refused_by_its_number(make, other):
-    content = json.loads(encode(make.record("arm", "p", "a")))
+    content = json.loads(encode(make.record("made up", "p", "a")))
     with pytest.raises(ValueError, match=rf"Invalid enum value {other} - at `\$.format`"):
         decode(json.dumps({**content, "format": other}))
 
@@ -185,7 +185,7 @@ def test_a_lock_is_free_once_its_process_was_killed(tmp_path):
 
 def test_a_full_disk_costs_one_sentence_and_nothing_on_record(tmp_path, monkeypatch, make):
     file = RecordFile(tmp_path)
-    file.append([make.record("arm", "p", "a")])
+    file.append([make.record("made up", "p", "a")])
     whole = file.path.read_bytes()
 
     def full(descriptor):
@@ -194,7 +194,7 @@ def test_a_full_disk_costs_one_sentence_and_nothing_on_record(tmp_path, monkeypa
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full)
         with pytest.raises(OSError, match="No space left on device; what was finished") as caught:
-            file.append([make.record("arm", "p", "b")])
+            file.append([make.record("made up", "p", "b")])
         assert caught.value.filename == str(file.path)
         with pytest.raises(OSError, match="No space left"):
             file.drop(lambda record: True)
@@ -205,17 +205,17 @@ def test_a_full_disk_costs_one_sentence_and_nothing_on_record(tmp_path, monkeypa
 def test_a_write_that_ends_in_its_middle_leaves_no_part_of_it(tmp_path, make):
     """The limit on the size of files lets a part be written, as a disk does that fills up."""
     file = RecordFile(tmp_path)
-    file.append([make.record("arm", "p", "a")])
+    file.append([make.record("made up", "p", "a")])
     whole = file.path.read_bytes()
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (len(whole) + 100, hard))
     try:
         with pytest.raises(OSError, match="File too large; what was finished"):
-            file.append([make.record("arm", "p", "b")])
+            file.append([make.record("made up", "p", "b")])
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert file.path.read_bytes() == whole
-    file.append([make.record("arm", "p", "b")])
+    file.append([make.record("made up", "p", "b")])
     assert file.path.read_bytes().startswith(whole)
 
 
@@ -237,7 +237,7 @@ def blocks(suite, scale):
 
 run.blocks = blocks
 print("begun", flush=True)
-for event in run.run(["arm"], "quick", sys.argv[1]):
+for event in run.run(["made up"], "quick", sys.argv[1]):
     if event.state == run.MEASURED:
         print(event.what, flush=True)
 """

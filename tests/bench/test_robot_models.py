@@ -5,9 +5,9 @@ import pytest
 from plumbob.bench.experiments.robot_models.measurement import compare
 from plumbob.bench.experiments.robot_models.peers import beside, differences
 from plumbob.bench.experiments.robot_models.tables import readers
-from plumbob.bench.experiments.robots.problem import ALL, CHARACTER, is_installed
-from plumbob.bench.harness.results import Results
 from plumbob.bench.peers.registry import DRAKE, KINEMATICS, SINGLE_PRECISION
+from plumbob.bench.problems.robots import ALL, CHARACTER, is_installed
+from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.engines import ROBOT_ENGINES
 from plumbob.crosscheck.robots.models import Model
 

@@ -17,7 +17,7 @@ from plumbob.bench.experiments.robots.tables import (
     unreachable,
 )
 from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness.results import Results
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import best_cells, markdown
 
 ONE, AGAIN = "one start", "restarts"

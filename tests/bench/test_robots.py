@@ -5,22 +5,10 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import SCALES
-from plumbob.bench.experiments.robots import LIMIT_TOLERANCE, UNREACHABLE, measurement
-from plumbob.bench.experiments.robots.evaluate import (
-    Targets,
-    Tolerance,
-    angle_between,
-    evaluator_of,
-)
-from plumbob.bench.experiments.robots.problem import (
-    ALL,
-    CHARACTER,
-    AbsentError,
-    is_installed,
-    links,
-    robot,
-)
-from plumbob.bench.experiments.robots.targets import (
+from plumbob.bench.experiments.robots import UNREACHABLE, measurement
+from plumbob.bench.peers import registry
+from plumbob.bench.problems.evaluate import Targets, Tolerance, angle_between, evaluator_of
+from plumbob.bench.problems.robot_targets import (
     STRATA,
     farthest,
     least_distances,
@@ -32,7 +20,15 @@ from plumbob.bench.experiments.robots.targets import (
     uniform_targets,
     unreachable_targets,
 )
-from plumbob.bench.peers import registry
+from plumbob.bench.problems.robots import (
+    ALL,
+    CHARACTER,
+    LIMIT_TOLERANCE,
+    AbsentError,
+    is_installed,
+    links,
+    robot,
+)
 from plumbob.reference import rotation
 
 COUNT = 8

@@ -32,11 +32,13 @@ def suite(monkeypatch):
 
 
 def go(folder):
-    return [event for event in run.run(["arm"], "quick", folder) if event.state != run.MEASURING]
+    return [
+        event for event in run.run(["made up"], "quick", folder) if event.state != run.MEASURING
+    ]
 
 
 def stored(folder):
-    return [r.solver for r in RecordFile(folder).read().records if r.suite == "arm"]
+    return [r.solver for r in RecordFile(folder).read().records if r.suite == "made up"]
 
 
 def test_a_second_run_measures_nothing(suite, tmp_path):
@@ -85,14 +87,19 @@ def test_a_block_that_fails_costs_no_other_and_is_tried_again(suite, tmp_path):
 
 
 def test_other_sources_are_measured_again_and_what_nothing_asks_for_stays(suite, tmp_path, make):
-    old = make.record("arm", "p", "a", stamp={**stamp(), "source": "old"})
-    gone = make.record("arm", "renamed since", "a", stamp={**stamp(), "source": "old"})
+    old = make.record("made up", "p", "a", stamp={**stamp(), "source": "old"})
+    gone = make.record("made up", "renamed since", "a", stamp={**stamp(), "source": "old"})
     elsewhere = make.record("ik", "p", "a", stamp={**stamp(), "source": "old"})
     RecordFile(tmp_path).append([old, gone, elsewhere])
     go(tmp_path)
     assert suite.measured == ["a", "b", "c"]
     kept = {(r.suite, r.problem) for r in RecordFile(tmp_path).read().records}
-    assert kept == {("arm", "p"), ("arm", "renamed since"), ("ik", "p"), ("finished", "arm")}
+    assert kept == {
+        ("made up", "p"),
+        ("made up", "renamed since"),
+        ("ik", "p"),
+        ("finished", "made up"),
+    }
 
 
 @pytest.mark.parametrize(("before", "after", "again"), [(200, 2000, True), (2000, 200, False)])
@@ -108,12 +115,12 @@ def test_a_larger_block_stands_for_a_smaller_one_but_not_the_reverse(
 
 def test_forget_leaves_other_suites_and_what_nothing_asks_for(suite, tmp_path, make):
     go(tmp_path)
-    theirs = make.record("arm", "p", "My solver", arrays={"x": [1.0]})
+    theirs = make.record("made up", "p", "My solver", arrays={"x": [1.0]})
     others = [make.record("ik", "p", "a"), make.record("finished", "ik", ""), theirs]
     RecordFile(tmp_path).append(others)
-    run.forget(["arm"], "quick", tmp_path)
+    run.forget(["made up"], "quick", tmp_path)
     left = {(r.suite, r.solver) for r in RecordFile(tmp_path).read().records}
-    assert left == {("ik", "a"), ("finished", ""), ("arm", "My solver")}
+    assert left == {("ik", "a"), ("finished", ""), ("made up", "My solver")}
 
 
 def test_a_suite_is_finished_only_when_it_went_through(suite, tmp_path):

@@ -13,9 +13,9 @@ import pytest
 from plumbob import cli
 from plumbob.bench.harness.metrics import Share, share
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results
 from plumbob.bench.report import sections
 from plumbob.bench.tables.fragment import fragment
+from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.selection import column_numbers, selected
 from plumbob.bench.tables.table import (
     NO_SUMMARY,

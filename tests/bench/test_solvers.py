@@ -1,16 +1,18 @@
 """Levenberg-Marquardt, the same on everyone's kinematics."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.chain import BEYOND, CHAIN
+from plumbob.bench.experiments.chain import CHAIN
 from plumbob.bench.experiments.chain.measurement import Limits, solve_targets, solve_with_engine
-from plumbob.bench.experiments.chain.problem import chain_targets
 from plumbob.bench.experiments.chain.tables import beyond_reach
 from plumbob.bench.harness.record import Record
-from plumbob.bench.harness.results import Results
 from plumbob.bench.peers.ik.levenberg_marquardt import levenberg_marquardt, within_reach
 from plumbob.bench.peers.ik.reference_kinematics import ReferenceKinematics
+from plumbob.bench.problems.chains import BEYOND, chain_targets
+from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.engines import SKELETON_ENGINES
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.reference import Skeleton, forward_kinematics, rotation, solve_ik
@@ -41,45 +43,40 @@ def test_the_jacobian_is_the_derivative_of_the_position(tree, rng):
     assert np.abs(J).max() > 0.1
 
 
+def solved(kind, problem, **limits):
+    """The answers of the loop to some targets, and where they put the effector."""
+    kinematics, effector = kind(problem.skeleton), problem.skeleton.joint_count - 1
+    answers = [
+        levenberg_marquardt(kinematics, q, target, effector, **limits)
+        for q, target in zip(coordinates(kinematics, problem.starts), problem.targets, strict=True)
+    ]
+    rotations = np.array([answer.q[kinematics.columns] for answer in answers])
+    return answers, forward_kinematics(problem.skeleton, rotations).positions[:, -1]
+
+
 @pytest.mark.parametrize("name", KINEMATICS)
 def test_every_kinematics_takes_the_same_way_to_the_target(name):
-    problem = chain_targets("far", 3)
-    effector = problem.skeleton.joint_count - 1
-    outcomes = []
+    problem, iterations = chain_targets("far", 3), []
     for kind in (ReferenceKinematics, KINEMATICS[name]):
-        kinematics = kind(problem.skeleton)
-        starts = coordinates(kinematics, problem.starts)
-        answers = [
-            levenberg_marquardt(kinematics, q, target, effector, tolerance=1e-9, max_iterations=100)
-            for q, target in zip(starts, problem.targets, strict=True)
-        ]
-        found = np.array([answer.q[kinematics.columns] for answer in answers])
-        effectors = forward_kinematics(problem.skeleton, found).positions[:, -1]
+        answers, effectors = solved(kind, problem, tolerance=1e-9, max_iterations=100)
         assert np.linalg.norm(effectors - problem.targets, axis=-1).max() < 1.1e-9
-        outcomes.append(([answer.iterations for answer in answers], effectors))
-    assert outcomes[0][0] == outcomes[1][0]
-    assert min(outcomes[0][0]) > 1
+        iterations.append([answer.iterations for answer in answers])
+    assert iterations[0] == iterations[1]
+    assert min(iterations[0]) > 1
 
 
-def test_a_start_at_the_target_takes_no_iteration():
+def test_a_start_at_the_target_takes_no_iteration_and_what_is_out_of_reach_takes_all():
     problem = chain_targets("far", 1)
-    kinematics = ReferenceKinematics(problem.skeleton)
-    q = coordinates(kinematics, problem.starts)[0]
-    effector = problem.skeleton.joint_count - 1
-    target = forward_kinematics(problem.skeleton, problem.starts[0]).positions[effector]
-    answer = levenberg_marquardt(kinematics, q, target, effector, tolerance=1e-6, max_iterations=9)
-    assert answer.iterations == 0
-    np.testing.assert_array_equal(answer.q, q)
-
-
-def test_what_cannot_be_reached_takes_all_iterations():
-    problem = chain_targets("far", 1)
-    kinematics = ReferenceKinematics(problem.skeleton)
-    q = coordinates(kinematics, problem.starts)[0]
-    effector, target = problem.skeleton.joint_count - 1, 9.0 * problem.targets[0]
-    answer = levenberg_marquardt(kinematics, q, target, effector, tolerance=1e-6, max_iterations=3)
-    assert answer.iterations == 3
-    assert answer.residual > 0
+    start = forward_kinematics(problem.skeleton, problem.starts).positions[:, -1]
+    for targets, iterations in ((start, 0), (9.0 * problem.targets, 3)):
+        moved = replace(problem, targets=targets)
+        (answer,), _ = solved(ReferenceKinematics, moved, tolerance=1e-6, max_iterations=3)
+        assert answer.iterations == iterations
+        assert (
+            (answer.q == problem.starts.ravel()).all()
+            == (answer.residual < 1e-6)
+            == (not iterations)
+        )
 
 
 @pytest.mark.parametrize("engine", SKELETON_ENGINES)
@@ -109,17 +106,8 @@ def test_targets_within_reach_stay_where_they_are(rng):
 
 def test_the_loop_and_the_reference_s_solver_are_one_method():
     """Rotations in the world from the left are tangents in the joints' frames from the right."""
-    problem = chain_targets("far", 20)
-    kinematics = ReferenceKinematics(problem.skeleton)
-    effector = problem.skeleton.joint_count - 1
-    limits = {"tolerance": 1e-6, "max_iterations": 100}
-    ours = solve_ik(
-        problem.skeleton, problem.starts, problem.targets, "levenberg_marquardt", **limits
-    )
-    starts = coordinates(kinematics, problem.starts)
-    answers = [
-        levenberg_marquardt(kinematics, q, target, effector, **limits)
-        for q, target in zip(starts, problem.targets, strict=True)
-    ]
+    problem, limits = chain_targets("far", 20), {"tolerance": 1e-6, "max_iterations": 100}
+    asked = (problem.skeleton, problem.starts, problem.targets, "levenberg_marquardt")
+    ours, (answers, _) = solve_ik(*asked, **limits), solved(ReferenceKinematics, problem, **limits)
     assert [answer.iterations for answer in answers] == ours.iterations.tolist()
     np.testing.assert_allclose([answer.residual for answer in answers], ours.residual, atol=1e-12)

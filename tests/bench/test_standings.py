@@ -11,13 +11,13 @@ import pytest
 from browser import CHROMIUM, Browser
 
 from plumbob import terminal
-from plumbob.bench.entrants import opening
 from plumbob.bench.harness import metrics
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.results import Results
+from plumbob.bench.peers import opening
 from plumbob.bench.report import outcome, report
 from plumbob.bench.report.sections import tables
 from plumbob.bench.report.standings import CLOTHS, standings
+from plumbob.bench.tables.results import Results
 from plumbob.cli import run_command
 
 N = 200

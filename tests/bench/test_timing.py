@@ -1,4 +1,4 @@
-"""Timing, for real but in a blink: pytest-benchmark, in a process of its own."""
+"""Timing, for real but in a blink, in a process of its own."""
 
 import itertools
 from types import SimpleNamespace
@@ -10,7 +10,7 @@ import pytest
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments.cloth.problem import cloth_swing
 from plumbob.bench.experiments.timing import case as timing_case
-from plumbob.bench.experiments.timing import cloth, job, kinematics, measurement
+from plumbob.bench.experiments.timing import cloth, kinematics, measurement
 from plumbob.bench.experiments.timing.case import (
     COMPILED,
     LIMIT,
@@ -20,12 +20,10 @@ from plumbob.bench.experiments.timing.case import (
     stream,
     streaming,
 )
-from plumbob.bench.experiments.timing.cases import cases
-from plumbob.bench.experiments.timing.job import ROUNDS, SWEEPS, Timed, TimingJob
+from plumbob.bench.experiments.timing.measurement import ROUNDS, SWEEPS, cases
 from plumbob.bench.harness import run
 from plumbob.bench.harness.machine import stamp
 from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.worker import Done, Found, Unfit
 from plumbob.crosscheck.engines import MujocoMassSpring
 from plumbob.reference import forward_kinematics, set_num_threads
 
@@ -51,7 +49,8 @@ def is_wanted(case):
 
 
 def test_every_case_is_kept_with_rounds_of_one_operation_each(folder):
-    records = [r for r in RecordFile(folder).read().records if r.suite == "timing"]
+    *records, finished = RecordFile(folder).read().records
+    assert (finished.suite, finished.problem) == ("finished", "timing")
     assert {record.settings["operations"] for record in records} == {1, 10_000, 50_000}
     for record in records:
         assert not record.failed
@@ -65,96 +64,60 @@ def test_every_case_is_kept_with_rounds_of_one_operation_each(folder):
     assert len({record.facts["together"] for record in records}) == 1
 
 
-def test_a_suite_of_the_timing_is_finished_as_any_other(folder):
-    finished = [r.problem for r in RecordFile(folder).read().records if r.suite == "finished"]
-    assert finished == ["timing"]
-
-
 def fails():
     raise OSError("no engine")
 
 
-@pytest.mark.parametrize(
-    ("prepare", "options", "why"),
-    [(fails, (), "OSError: no engine"), (int, ("--no-such-option",), "no-such-option")],
-)
-def test_a_case_that_fails_says_why(monkeypatch, prepare, options, why):
-    """Neither what a case raises nor what pytest complains of is lost."""
-    case = Case(WORK, "me", prepare)
-    given = job.arguments
-    monkeypatch.setattr(job, "cases", lambda: (case,))
-    monkeypatch.setattr(job, "arguments", lambda *args: [*given(*args), *options])
-    (message,) = TimingJob((case.key,), 0.001).perform()
-    assert isinstance(message, Unfit)
-    assert why in message.why
-
-
 @pytest.fixture
-def said(monkeypatch):
-    """What a job says of three cases, one of which fails, and which was called when."""
+def compared(monkeypatch):
+    """The names of two cases as they are called, compared with a third that fails."""
     called = []
-
-    def preparing(name):
-        return lambda: lambda: called.append(name)
-
-    made = [Case(WORK, name, preparing(name)) for name in "ab"] + [Case(WORK, "c", fails)]
-    monkeypatch.setattr(job, "cases", lambda: made)
-    messages = list(TimingJob(tuple(case.key for case in made), 0.001).perform())
-    return messages, called
+    made = [Case(WORK, name, lambda name=name: lambda: called.append(name)) for name in "ab"]
+    made.append(Case(WORK, "c", fails))
+    monkeypatch.setattr(measurement, "cases", lambda: tuple(made))
+    here = lambda patience, function, *arguments: function(*arguments)  # noqa: E731
+    monkeypatch.setattr(measurement, "in_a_fresh_process", here)
+    return called
 
 
-def test_cases_that_are_compared_alternate_in_an_order_by_lot(said):
-    (found, done), called = said
-    assert isinstance(found, Found)
-    assert isinstance(done, Done)
-    changes = sum(a != b for a, b in itertools.pairwise(called))
-    assert changes >= SWEEPS - 1
-    assert [np.shape(rounds)[0] for rounds in found.values["rounds"][:2]] == [SWEEPS] * 2
-    assert all(np.ndim(rounds) == 2 for rounds in found.values["rounds"][:2])
+def test_cases_that_are_compared_alternate_in_an_order_by_seed(compared):
+    called = compared
+    orders = []
+    for _ in range(2):
+        called.clear()
+        result = measurement.sweep("s", "g", 0.001)
+        orders.append([name for name, _ in itertools.groupby(called)])
+        assert all(np.shape(rounds)[0] == SWEEPS for rounds in result["rounds"][:2])
+    assert orders[0] == orders[1]
+    assert len(orders[0]) >= SWEEPS
+    assert len(result["paces"]) == 3 * SWEEPS
 
 
-def test_a_case_that_fails_costs_none_that_it_is_compared_with(said):
-    (found, _), _ = said
-    assert found.values["rounds"][2] == []
-    assert found.values["troubles"] == ["", "", "OSError: no engine"]
+@pytest.mark.usefixtures("compared")
+def test_a_case_that_fails_costs_none_that_it_is_compared_with():
+    results = measurement.sweep("s", "g", 0.001)
+    assert results["rounds"][2] == []
+    assert results["troubles"] == ["", "", "OSError: no engine"]
+    first, *_, last = measurement.blocks(Scale(1, 0.001))
+    assert first.measure().arrays["seconds"].shape[0] == SWEEPS
+    with pytest.raises(RuntimeError, match="OSError: no engine"):
+        last.measure()
 
 
-def test_every_sweep_has_every_case_once_and_the_order_is_seeded():
-    case = [Case(WORK, name, int) for name in "abcde"]
-    order = np.reshape(Timed(case).order, (SWEEPS, 5))
-    assert (np.sort(order, axis=1) == np.arange(5)).all()
-    assert len(np.unique(order, axis=0)) > SWEEPS / 2
-    assert Timed(case).order == order.ravel().tolist()
+@pytest.mark.usefixtures("compared")
+def test_a_group_is_timed_once_in_a_run_and_again_in_the_next():
+    runs = []
+    for _ in range(2):
+        a, b, _ = measurement.blocks(Scale(1, 0.001))
+        runs.append({block.measure().facts["together"] for block in (a, b, a)})
+    assert [len(words) for words in runs] == [1, 1]
+    assert runs[0] != runs[1]
 
 
-def test_a_group_is_timed_once_and_what_is_left_of_another_run_is_not_used(monkeypatch):
-    made = [Case(WORK, name, int) for name in "ab"]
-    asked = []
-
-    def find(job):
-        asked.append(job)
-        return {"rounds": [[[1.0 + len(asked)]], []], "paces": [1.0], "troubles": ["", "broken"]}
-
-    monkeypatch.setattr(measurement, "cases", lambda: made)
-    monkeypatch.setattr(measurement, "worker_process", lambda: SimpleNamespace(find=find))
-    blocks = list(measurement.blocks(Scale(1, 0.1)))
-    assert blocks[0].measure().arrays["seconds"].tolist() == [[2.0]]
-    with pytest.raises(RuntimeError, match="broken"):
-        blocks[1].measure()
-    assert len(asked) == 1
-    assert blocks[0].measure().arrays["seconds"].tolist() == [[3.0]]  # measured, not remembered
-    again = list(measurement.blocks(Scale(1, 0.1)))
-    with pytest.raises(RuntimeError, match="broken"):
-        again[1].measure()
-    assert len(asked) == 3
-    assert again[0].measure().arrays["seconds"].tolist() == [[4.0]]
-    with pytest.raises(RuntimeError, match="broken"):
-        again[1].measure()
-    monkeypatch.setattr(measurement, "FRESH", -1.0)  # as if found long ago
-    with pytest.raises(RuntimeError, match="broken"):
-        again[1].measure()
-    assert again[0].measure().arrays["seconds"].tolist() == [[7.0]]
-    assert len(asked) == 6
+@pytest.mark.parametrize(("single", "expected"), [(1.0, (1, 1)), (1e-5, (100, 22)), (0.01, (1, 2))])
+def test_rounds_are_as_long_and_as_many_as_the_time_allows(single, expected):
+    timer = SimpleNamespace(timeit=lambda n: n * single, repeat=lambda n, loops: [loops * single])
+    assert measurement.shape(timer, 0.2) == expected
 
 
 def test_the_limit_moves_as_many_bytes_as_it_says(monkeypatch):

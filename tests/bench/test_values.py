@@ -1,13 +1,14 @@
 """Typed fields of records: what is not of its type is refused as it is read."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from plumbob.bench.experiments.energy.values import Swing, SwingDetails
 from plumbob.bench.harness.block import Block, Measured
-from plumbob.bench.harness.measure import record_of
+from plumbob.bench.harness.measure import measure, record_of
 from plumbob.bench.harness.record import Record, RecordFile, decode, encode
 
 SETTINGS = {"h": 0.1, "steps": 2, "every": 1, "tolerance": 1e-10}
@@ -51,6 +52,12 @@ def test_a_line_that_is_not_of_its_type_is_refused_by_its_number(
     assert [r.suite for r in records] == ["other"]
     assert "line 2 (" in sentence
     assert why in sentence
+
+
+def test_a_measurement_of_another_type_is_a_failure(record):
+    wrong = replace(BLOCK, measure=lambda: Measured(Swing(TIMES, 1.0)))
+    assert measure(wrong).failed == "ValueError: expected 1 dimensions, got 0 - at `left`"
+    assert not measure(replace(BLOCK, measure=lambda: Measured(Swing(TIMES, LEFT)))).failed
 
 
 @pytest.mark.parametrize("notes", [{"failed": "no memory"}, {"remark": "not installed"}])

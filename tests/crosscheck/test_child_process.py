@@ -1,62 +1,78 @@
-"""A process of one's own: it answers, stays silent or ends, and takes all its children with it."""
+"""A process of one's own: it answers, stays silent or ends, and its losses have names."""
 
-import os
-import subprocess
 import sys
-import time
-from pathlib import Path
 
 import pytest
 
-from plumbob.crosscheck.child_process import PipedProcess, kill_group
+from plumbob.crosscheck.child_process import ChildProcess, Loss, LostError, pickled, python_process
 
 ECHO = (
-    "import plumbob.crosscheck.child_process as c; p = c.attach({}); "
-    "p.send((p.recv(), None)); p.recv()"
+    "import plumbob.crosscheck.child_process as c\nrequests, answers = c.connect()\n"
+    "print('noise'); answers.send((requests.recv(), None)); requests.recv()"
 )
 
 
 @pytest.fixture
-def child(request):
-    child = PipedProcess(request.param)
-    yield child
-    child.end()
+def start():
+    children = []
+
+    def begin(statement, **limits):
+        if limits:
+            children.append(ChildProcess([sys.executable, "-c", statement], **limits))
+        else:
+            children.append(python_process(statement))
+        return children[-1]
+
+    yield begin
+    for child in children:
+        child.end()
 
 
-@pytest.mark.parametrize("child", [ECHO], indirect=True)
-def test_a_message_comes_back_and_silence_is_none(child):
-    child.send(bytes(2**20))
+def test_a_message_comes_back_and_silence_is_none(start):
+    child = start(ECHO)
+    child.send(pickled(bytes(2**20)))
     assert child.receive(60.0) == (bytes(2**20), None)
-    with pytest.raises(TimeoutError):
+    with pytest.raises(LostError) as caught:
         child.receive(0.05)
+    assert caught.value.loss is Loss.WAITING
 
 
 @pytest.mark.parametrize(
-    ("child", "how"),
-    [("raise SystemExit(3)", "with code 3"), ("import os; os.kill(os.getpid(), 9)", "by SIGKILL")],
-    indirect=["child"],
+    ("statement", "loss", "ending"),
+    [
+        ("raise SystemExit(3)", Loss.ENDED, "with code 3"),
+        ("import os; os.kill(os.getpid(), 9)", Loss.ENDED, "by SIGKILL"),
+        ("import os; os.write(1, b'abc'); os._exit(0)", Loss.CUT, "with code 0"),
+        ("import os, time; os.close(1); time.sleep(99)", Loss.CLOSED, "by SIGKILL"),
+        ("import os, time; os.write(1, bytes(4) * 9); time.sleep(99)", Loss.GARBLED, None),
+    ],
 )
-def test_a_process_that_ended_sends_nothing_and_its_ending_has_a_name(child, how):
-    child.send("anything")
-    with pytest.raises(EOFError):
+def test_a_process_that_sends_nothing_any_more_has_a_loss_and_an_ending(
+    start, statement, loss, ending
+):
+    child = start(statement)
+    child.send(b"anything")
+    with pytest.raises(LostError) as caught:
         child.receive(60.0)
-    assert child.ending() == how
+    assert caught.value.loss is loss
+    assert ending is None or child.ending == ending
 
 
-def test_a_group_is_killed_with_all_that_it_has_started():
-    start = "import subprocess as s, time; print(s.Popen(['sleep', '600']).pid); time.sleep(600)"
-    process = subprocess.Popen(
-        [sys.executable, "-u", "-c", start], stdout=subprocess.PIPE, process_group=0
-    )
-    with process:
-        grandchild = int(process.stdout.readline())
-        os.kill(grandchild, 0)
-        kill_group(process)
-    status = Path(f"/proc/{grandchild}/status")
-    deadline = time.monotonic() + 5.0
-    while (alive := status.exists() and "State:\tZ" not in status.read_text()) and (
-        time.monotonic() < deadline
-    ):
-        time.sleep(0.01)
-    assert not alive
-    assert process.returncode is not None
+@pytest.mark.parametrize(
+    ("statement", "limits", "loss"),
+    [
+        ("kept = b'x' * (200 << 20)\nwhile True: pass", {"memory": 100 << 20}, Loss.MEMORY),
+        ("while True: print('x', end='')", {"longest": 1000}, Loss.TOO_LONG),
+    ],
+)
+def test_what_takes_too_much_is_lost(start, statement, limits, loss):
+    with pytest.raises(LostError) as caught:
+        start(statement, **limits).receive(60.0)
+    assert caught.value.loss is loss
+
+
+def test_processor_time_of_all_that_it_starts_is_limited(start):
+    child = start("import os\nos.fork()\nwhile True: pass", memory=1 << 40)
+    with pytest.raises(LostError) as caught:
+        child.receive(60.0, processor=0.5)
+    assert caught.value.loss is Loss.PROCESSOR

@@ -4,14 +4,16 @@ import os
 import signal
 import time
 import tracemalloc
+from contextlib import closing
 from functools import partial
 
 import numpy as np
 import pytest
 
-from plumbob.crosscheck.child_process import ChildProcess, LostError
+from plumbob.crosscheck.child_process import CallProcess, LostError
 from plumbob.crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
 from plumbob.crosscheck.robots import comparisons, files, independent_bvh
+from plumbob.crosscheck.robots.comparisons import sweep_in_parts
 from plumbob.crosscheck.robots.deviations import FRAME, INCLUDE
 from plumbob.crosscheck.robots.files import (
     AGREES,
@@ -27,7 +29,6 @@ from plumbob.crosscheck.robots.files import (
     compare,
     find,
 )
-from plumbob.crosscheck.robots.sweep import sweep_in_parts
 from plumbob.crosscheck.tolerances import POSITION
 from plumbob.reference import Skeleton, rotation
 from plumbob.reference.formats import bvh, mjcf
@@ -71,10 +72,7 @@ class Here:
     def __init__(self, prepare, patience):
         pass
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
+    def close(self):
         pass
 
     def call(self, function, *arguments):
@@ -84,7 +82,7 @@ class Here:
 @pytest.fixture
 def here(monkeypatch):
     """Let files be read in this process."""
-    monkeypatch.setattr(files, "ChildProcess", Here)
+    monkeypatch.setattr(files, "CallProcess", Here)
 
 
 def outcomes(folder, **options):
@@ -359,11 +357,23 @@ def test_white_space_before_the_declaration_keeps_no_engine_from_reading(folder,
         assert "white space before" in reading.notes[0]
 
 
-@pytest.mark.parametrize("difference", [np.nan, np.inf, 2 * POSITION.value])
-def test_a_difference_above_the_tolerance_or_nan_differs(difference, folder, monkeypatch):
-    monkeypatch.setattr(files, "_largest_difference", lambda *_: difference)
-    file = find([folder(a_urdf=ARM(-1))]).files[0]
-    assert compare("MuJoCo", file).outcome == DIFFERS
+def raising(*_):
+    raise KeyError("a")
+
+
+@pytest.mark.parametrize(
+    ("largest", "outcome", "why"),
+    [
+        *((lambda *_, x=x: x, DIFFERS, "") for x in (np.nan, np.inf, 2 * POSITION.value)),
+        (raising, LOST, "it ends in KeyError: 'a'"),
+    ],
+)
+def test_a_difference_above_the_tolerance_differs_and_an_exception_is_lost(
+    largest, outcome, why, folder, monkeypatch
+):
+    monkeypatch.setattr(files, "_largest_difference", largest)
+    reading = compare("MuJoCo", find([folder(a_urdf=ARM(-1))]).files[0])
+    assert (reading.outcome, reading.why) == (outcome, why)
 
 
 def test_a_joint_that_the_second_reader_misses_differs(folder, monkeypatch):
@@ -372,15 +382,6 @@ def test_a_joint_that_the_second_reader_misses_differs(folder, monkeypatch):
         files, "global_poses", lambda text: list(independent_bvh.global_poses(text))[:-2]
     )
     assert compare(SECOND_READER, file).outcome == DIFFERS
-
-
-def test_an_exception_is_reported_for_its_file(folder, monkeypatch):
-    def broken(*_):
-        raise KeyError("a")
-
-    monkeypatch.setattr(files, "_largest_difference", broken)
-    reading = compare("MuJoCo", find([folder(a_urdf=ARM(-1))]).files[0])
-    assert (reading.outcome, reading.why) == (LOST, "it ends in KeyError: 'a'")
 
 
 def test_a_file_that_crashes_an_engine_loses_only_that_reading(folder):
@@ -428,7 +429,7 @@ def loud():
 
 
 def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
-    with ChildProcess(nothing, patience=0.5) as child:
+    with closing(CallProcess(nothing, patience=0.5)) as child:
         first = child.call(loud)
         assert child.call(loud) == first != os.getpid()
         with pytest.raises(LostError, match="ends by SIGSEGV"):
@@ -440,14 +441,14 @@ def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
         with pytest.raises(LostError, match="gives no answer within 5 s"):
             child.call(time.sleep, 60)
         assert child.call(loud) not in (first, os.getpid())
-        process = child._child.process
+        process = child._child._process
     assert process.returncode is not None
     assert capfd.readouterr() == ("", "")
 
 
 def test_a_call_that_waits_for_the_processor_is_not_lost():
     """Only its own processor time counts: no waiting, no start, nothing between two calls."""
-    with ChildProcess(partial(spin, 1.0), patience=0.5) as child:
+    with closing(CallProcess(partial(spin, 1.0), patience=0.5)) as child:
         process = child.call(os.getpid)
         for _ in range(3):
             child.call(time.sleep, 1.0)

@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck.kinematics import full_reach
-from plumbob.crosscheck.robots.comparisons import Differences, differences
-from plumbob.crosscheck.robots.sweep import LinkKinematics, Sweep, reference_kinematics
+from plumbob.crosscheck.robots.comparisons import (
+    Differences,
+    LinkKinematics,
+    Sweep,
+    differences,
+    reference_kinematics,
+)
 from plumbob.reference import Skeleton
 from plumbob.reference.formats import urdf
 

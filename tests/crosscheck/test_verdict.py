@@ -26,38 +26,36 @@ def test_equal_values_away_from_the_baseline_hold():
     assert verdict.displacement == 1.0
 
 
-def test_no_cases_is_missed():
-    assert verdict_of().failure == "no cases"
+FAILURES = {
+    "no cases": ([], "no cases", 0.0),
+    "one bad case among many": (
+        [comparison(), comparison(theirs=(1.0, 2.1)), comparison()], "they differ", 0.05
+    ),
+    "one case at its baseline among many": (
+        [comparison(), comparison(baseline=(1.0, 2.0 + 1e-5))], "nothing moved", 0.0
+    ),
+    "the same infinity": (
+        [comparison(ours=(1.0, np.inf), theirs=(1.0, np.inf))], "not a number", np.nan
+    ),
+    **{
+        f"{bad} in {field}": ([comparison(**{field: (1.0, bad)})], "not a number", np.nan)
+        for field in ("ours", "theirs", "baseline")
+        for bad in (np.nan, np.inf)
+    },
+    **{
+        f"a scale of {scale}": ([comparison(scale=scale)], "not a number", np.nan)
+        for scale in (0.0, -1.0, np.nan, np.inf)
+    },
+}  # fmt: skip
 
 
-def test_one_bad_case_among_many_is_missed():
-    verdict = verdict_of(comparison(), comparison(theirs=(1.0, 2.1)), comparison())
-    assert verdict.failure == "they differ"
-    assert verdict.difference == pytest.approx(0.05)
-
-
-def test_one_case_at_its_baseline_among_many_is_missed():
-    verdict = verdict_of(comparison(), comparison(baseline=(1.0, 2.0 + 1e-5)))
-    assert verdict.failure == "nothing moved"
-    assert verdict.displacement == pytest.approx(5e-6)
-
-
-@pytest.mark.parametrize("field", ["ours", "theirs", "baseline"])
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_what_is_not_a_number_is_missed(field, bad):
-    verdict = verdict_of(comparison(), comparison(**{field: (1.0, bad)}))
-    assert verdict.failure == "not a number"
-
-
-def test_the_same_infinity_is_missed():
-    verdict = verdict_of(comparison(ours=(1.0, np.inf), theirs=(1.0, np.inf)))
-    assert verdict.failure == "not a number"
-    assert np.isnan(verdict.difference)
-
-
-@pytest.mark.parametrize("scale", [0.0, -1.0, np.nan, np.inf])
-def test_a_scale_that_measures_nothing_is_missed(scale):
-    assert verdict_of(comparison(scale=scale)).failure == "not a number"
+@pytest.mark.parametrize("name", FAILURES)
+def test_a_claim_is_missed(name):
+    comparisons, failure, difference = FAILURES[name]
+    verdict = verdict_of(*comparisons)
+    assert verdict.failure == failure
+    if "baseline" not in name:
+        assert verdict.difference == pytest.approx(difference, nan_ok=True)
 
 
 @pytest.mark.parametrize(("ours", "theirs"), [((1.0, 2.0), (1.0,)), ((), ())])

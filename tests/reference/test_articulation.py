@@ -101,40 +101,6 @@ def test_global_poses_are_products_of_local_transforms(articulated, backend, kin
         np.testing.assert_allclose(pose.rotations[j], rotation.multiply(R, local[j]))
 
 
-def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, backend):
-    balls = forward_kinematics(Articulation(skeleton), local.ravel())
-    pose = forward_kinematics(skeleton, local)
-    np.testing.assert_allclose(balls.positions, pose.positions, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(balls.rotations, pose.rotations, rtol=0, atol=ROUNDING)
-
-
-def test_a_hinge_is_a_ball_that_rotates_about_its_axis(skeleton, rng, backend):
-    axes = rng.standard_normal((6, 3))
-    q = rng.uniform(-7.0, 7.0, 6)
-    rotations = rotation.exponential(
-        q[:, None] * axes / np.linalg.norm(axes, axis=1, keepdims=True)
-    )
-    hinges = forward_kinematics(Articulation(skeleton, "hinge", axes), q)
-    balls = forward_kinematics(skeleton, rotations)
-    np.testing.assert_allclose(hinges.positions, balls.positions, rtol=0, atol=ROUNDING)
-    np.testing.assert_allclose(hinges.rotations, balls.rotations, rtol=0, atol=ROUNDING)
-
-
-def test_a_slide_shifts_along_its_axis_in_its_frame_and_does_not_rotate(backend):
-    Q = rotation.exponential([0.0, 0.0, np.pi / 2])
-    slide = one("slide", axis=(2.0, 0.0, 0.0), offset=(1.0, 2.0, 3.0), frames=Q)
-    pose = forward_kinematics(slide, [0.5])
-    np.testing.assert_allclose(pose.positions, [[1.0, 2.5, 3.0]], rtol=0, atol=1e-15)
-    np.testing.assert_allclose(pose.rotations, [Q], rtol=0, atol=1e-15)
-
-
-def test_a_free_joint_is_where_its_coordinates_say(rng, backend):
-    Q = rotation.random(rng)
-    pose = forward_kinematics(one("free", offset=(1.0, 2.0, 3.0)), [4.0, 5.0, 6.0, *Q])
-    assert (pose.positions == [[5.0, 7.0, 9.0]]).all()
-    np.testing.assert_allclose(pose.rotations, [Q], rtol=0, atol=1e-15)
-
-
 def test_fixed_joints_have_no_coordinates(skeleton, backend):
     fixed = Articulation(skeleton, "fixed")
     assert fixed.coordinate_count == fixed.freedom_count == 0

@@ -88,9 +88,7 @@ def test_the_plumb_bob_is_very_unevenly_sampled_and_in_strokes():
 
 
 clouds = arrays.arrays(
-    float,
-    st.tuples(st.integers(1, 12), st.just(3)),
-    elements=st.floats(-2.0, 2.0, width=32),
+    float, st.tuples(st.integers(1, 12), st.just(3)), elements=st.floats(-2.0, 2.0, width=32)
 )
 spacings = st.floats(0.05, 1.0)
 factors = st.floats(2.0, 4.0)

@@ -33,7 +33,6 @@ from plumbob.reference.inverse_kinematics.restarts import (
     WAIT,
     Limits,
     most_promising,
-    new_progress,
 )
 from plumbob.reference.inverse_kinematics.solve_mechanism import mechanism_criteria
 from plumbob.reference.judging import judge_pose
@@ -62,7 +61,7 @@ def test_a_hinge_that_another_follows_stops_at_its_limit_though_it_covers_the_ci
 
 
 def test_of_attempts_given_up_the_least_patient_goes_on_and_then_the_nearest():
-    progress = new_progress(5)
+    progress = np.empty((6, WAIT + 1))
     progress[:, STATE] = GIVEN_UP, GIVEN_UP, GIVEN_UP, SETTLED, GIVEN_UP, GIVEN_UP
     progress[:, WAIT] = 12.0, 3.0, 3.0, 3.0, 3.0, 0.0
     progress[:, COST] = 0.1, 0.5, 0.3, 0.2, 0.4, 0.0

@@ -16,7 +16,6 @@ from plumbob.reference.implicit_euler.objective import Objective, global_matrix
 from plumbob.reference.mass_spring import (
     MassSpring,
     State,
-    damping_matrix,
     derivation,
     forces,
     kinetic_energy,
@@ -196,7 +195,7 @@ class TestObjective:
         with pytest.raises(ValueError, match=r"^d: expected shape"):
             problem[0].quadratic_form(problem[1], np.zeros((2, 3)))
 
-    METHODS = ("evaluate", "value", "gradient", "hessian", "pin_gradient", "rest_vectors")
+    METHODS = ("evaluate", "value", "gradient", "hessian", "rest_vectors")
 
     @pytest.mark.parametrize("method", METHODS)
     @pytest.mark.parametrize("shape", [(6, 3), (8, 3), (7, 2), (3, 7), (21,), (7, 3, 1), (0, 3)])
@@ -256,13 +255,8 @@ class TestStep:
         after = stepped(*network, solver, max_iterations=2).state
         displacement = after.positions - network[1].positions
         np.testing.assert_array_equal(after.velocities, displacement / h)
+        assert (displacement[2] == 0).all()  # the pin's
         assert np.abs(displacement).max() > 0.01
-
-    def test_pins_hold_exactly(self, network, solver, backend):
-        system, state = network
-        after = stepped(system, state, solver, max_iterations=2).state
-        np.testing.assert_array_equal(after.positions[2], state.positions[2])
-        np.testing.assert_array_equal(after.velocities[2], np.zeros(3))
 
     @pytest.mark.parametrize("name", CONVERGING)
     def test_the_pin_is_felt_within_the_solve(self, altered, backend, name):
@@ -288,46 +282,6 @@ class TestStep:
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-13)
         undamped = converged(altered(system, dampings=0.0), state, name).positions
         assert np.abs(one - undamped).max() > 1e-3
-
-    def test_gauss_newton_is_one_linearised_step(self, network, rng, backend):
-        """(M + h C + h² J'kJ) dv = h (f - h J'kJ v), J the Jacobian of the lengths."""
-        system, state = network
-        given = outer(rng)
-        i, j = system.springs.T
-        u = state.positions[i] - state.positions[j]
-        u /= np.linalg.norm(u, axis=1)[:, None]
-        J = np.einsum("ps,sc->spc", derivation(system).A.toarray(), u).reshape(-1, 21)
-        slack = system.tension_only & (lengths(system, state.positions) < system.rest_lengths)
-        K = J.T @ (np.where(slack, 0, system.stiffnesses)[:, None] * J)
-        C = damping_matrix(system, state.positions).toarray()
-        v = np.where(system.free[:, None], state.velocities, 0).ravel()
-        matrix = np.diag(np.repeat(system.masses, 3)) + h * C + h * h * K
-        right = h * (forces(system, state, given).ravel() - h * K @ v)
-        moving = np.repeat(system.free, 3)
-        dv = np.zeros(21)
-        dv[moving] = np.linalg.solve(matrix[np.ix_(moving, moving)], right[moving])
-        after = stepped(system, state, "gauss_newton", given).state
-        assert np.abs(dv).max() > 0.1
-        # Positions of about 1 m round to 1e-16, and velocities are differences of them over h.
-        expected = (v + dv).reshape(7, 3)
-        np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-13)
-
-    def test_one_local_global_iteration_is_the_labs_linear_solve(self, network, rng, backend):
-        """(M + h² L) x = h² J d + M y + h² f_ext over the free particles, d fitted to y."""
-        system, state = network
-        integrator = ImplicitEuler(system, h=h, solver="local_global", max_iterations=1)
-        given = outer(rng)
-        objective = integrator.objective(state, given)
-        _, _, L, J = (matrix.toarray() for matrix in derivation(objective.effective))
-        Q = np.diag(system.masses) + h * h * L
-        b = h * h * (J @ objective.rest_vectors(objective.y) + objective.external)
-        b += system.masses[:, None] * objective.y
-        free, pins = system.free, ~system.free
-        x = state.positions.copy()
-        b -= Q[:, pins] @ x[pins]
-        x[free] = np.linalg.solve(Q[np.ix_(free, free)], b[free])
-        after = integrator.step(state, given).state
-        np.testing.assert_allclose(after.positions, x, rtol=0, atol=1e-14)
 
     @pytest.mark.parametrize("name", ["local_global", "chebyshev", "lbfgs", "newton_cg"])
     def test_every_solver_meets_newton(self, network, cloth, name):
@@ -362,10 +316,6 @@ class TestStep:
             assert after.value <= before.value + after.value_floor
         assert iterates[-1].value < iterates[0].value - 1e-4
         assert iterates[-1].value_floor < 1e-12
-
-    def test_newton_does_not_let_g_grow(self, cloth):
-        values = stepped(*cloth).objectives
-        assert (np.diff(values) <= 1e-13).all()
 
     def test_the_line_search_shortens_a_step_that_is_too_long(self, cloth, backend):
         objective = ImplicitEuler(cloth[0], h=h).objective(cloth[1])
@@ -462,16 +412,19 @@ class TestStep:
         assert np.isfinite(objective.hessian(state.positions).data).all()
 
     @pytest.mark.parametrize("name", ["local_global", "chebyshev"])
-    def test_an_iteration_from_x_n_is_that_of_liu_et_al(self, network, rng, backend, name):
-        """(M + h² L) x = h² J d + M y + h² f_ext with d from x_n, the pins eliminated."""
+    def test_an_iteration_is_that_of_liu_et_al(self, network, rng, backend, name):
+        """(M + h² L) x = h² J d + M y + h² f_ext with d from x_n or y, the pins eliminated."""
         system, state = network
         given = outer(rng)
         x = stepped(system, state, name, given, start="x_n", tolerance=0, max_iterations=1).state
-        expected = published_iteration(system, state, given)
+        expected = published_iteration(system, state, given, state.positions)
         # Two solves of seven unknowns, whose matrices have condition numbers of about 3.
         np.testing.assert_allclose(x.positions, expected, rtol=0, atol=2e-15)
         from_y = stepped(system, state, name, given, tolerance=0, max_iterations=1).state
         assert np.abs(from_y.positions - expected).max() > 1e-4
+        y = ImplicitEuler(system, h=h).objective(state).y
+        expected = published_iteration(system, state, given, y)
+        np.testing.assert_allclose(from_y.positions, expected, rtol=0, atol=1e-14)
 
     @pytest.mark.parametrize("name", CONVERGING)
     def test_from_x_n_every_solver_comes_to_the_same_minimiser(self, cloth, name):
@@ -504,12 +457,12 @@ class TestStep:
         assert stiffness < 1e19 or result.outcome == Outcome.STALLED
 
 
-def published_iteration(system, state, given):
-    """Return one iteration of Liu et al. 2013 from x_n, dense, springs and dampers apart."""
+def published_iteration(system, state, given, start):
+    """Return one iteration of Liu et al. 2013 from a start, dense, springs and dampers apart."""
     ends, k, r, rope = beside(system, state.positions)
     x_n, free, A = state.positions, system.free, np.zeros((len(system.masses), len(ends)))
     A[ends[:, 0], range(len(ends))], A[ends[:, 1], range(len(ends))] = 1.0, -1.0
-    p = A.T @ x_n
+    p = A.T @ start
     length = np.linalg.norm(p, axis=1)
     d = np.where(rope & (length < r), length, r)[:, None] * p / length[:, None]
     M, L, J = np.diag(system.masses), A @ np.diag(k) @ A.T, A @ np.diag(k)
@@ -958,11 +911,7 @@ class TestInputs:
             ("h", np.nan, "finite"),
             ("h", 1e200, "expected a number of at most 1e.75"),
             ("h", "fast", "a number, got 'fast'"),
-            (
-                "solver",
-                "simplex",
-                f"one of {', '.join(STEP_SOLVERS)}, got 'simplex'",
-            ),
+            ("solver", "simplex", f"one of {', '.join(STEP_SOLVERS)}, got 'simplex'"),
             ("tolerance", -1e-3, "at least 0"),
             ("tolerance", np.inf, "finite"),
             ("max_iterations", -1, "at least 0"),
@@ -997,15 +946,12 @@ class TestInputs:
         with pytest.raises(dataclasses.FrozenInstanceError):
             integrator.h = 1.0
 
-    def test_the_initial_state_is_not_changed(self, network, solver):
-        system, state = network
+    def test_the_initial_state_is_not_changed_and_the_result_read_only(self, network, solver):
+        _, state = network
         x, v = state.positions.copy(), state.velocities.copy()
-        stepped(system, state, solver, max_iterations=2)
+        result = stepped(*network, solver)
         np.testing.assert_array_equal(state.positions, x)
         np.testing.assert_array_equal(state.velocities, v)
-
-    def test_the_result_is_read_only(self, network, solver):
-        result = stepped(*network, solver)
         for array in (result.state.positions, result.history, result.objectives):
             with pytest.raises(ValueError, match="read-only"):
                 array[0] = 0
@@ -1018,14 +964,6 @@ class TestUnusualSystems:
         after = stepped(system, state, solver).state
         expected = [[1.0, -0.5, 0], [0, -0.5, 0]]
         np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-15)
-
-    def test_a_single_particle_falls(self, solver, backend):
-        system = MassSpring([2.0], [], 1.0, 1.0, gravity=(0, -10, 0))
-        result = stepped(system, State([[1.0, 0, 0]], [[1.0, 0, 0]]), solver)
-        assert result.outcome == Outcome.CONVERGED
-        # Differences of positions of about 1 m, over h.
-        expected = [[1.0, -0.5, 0]]
-        np.testing.assert_allclose(result.state.velocities, expected, rtol=0, atol=1e-14)
 
     def test_a_system_that_is_all_pins_stays(self, solver, backend):
         system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
@@ -1052,11 +990,3 @@ class TestUnusualSystems:
         linear = altered(system, rest_lengths=0.0, dampings=0.0, tension_only=tension_only)
         result = stepped(linear, state, name, tolerance=1e-12)
         assert (result.outcome, result.iterations) == (Outcome.CONVERGED, 1)
-
-    def test_the_damper_of_a_slack_spring_is_a_spring_at_the_last_length(self, backend):
-        system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 0.0, 2.0, gravity=(0, 0, 0))
-        state = State([[0, 0, 0], [3.0, 0, 0]], [[0, 0, 0], [1.0, 0, 0]])
-        after = stepped(system, state, tolerance=1e-14).state
-        # The relative velocity w' = 1 - h c w' (1/m + 1/m).
-        gap = after.velocities[1, 0] - after.velocities[0, 0]
-        assert gap == pytest.approx(1 / (1 + h * 2.0 * 2), rel=1e-13)

@@ -100,16 +100,6 @@ def test_steps_rotate_a_ball_in_its_own_frame_and_shift_a_free_joint_in_its_unmo
     np.testing.assert_allclose(J[:, 3], [0, 0, 0, 0, 1, 0], rtol=0, atol=1e-15)
 
 
-def test_a_hinge_moves_a_point_across_its_arm_along_the_axes_of_the_world(backend):
-    quarter = rotation.exponential([0.0, 0.0, np.pi / 2])
-    model = Articulation(
-        Skeleton([-1, 0], [[0, 0, 5.0], [2.0, 0, 0]]), ["hinge", "fixed"], frames=quarter
-    )
-    np.testing.assert_allclose(
-        jacobian(model, [np.pi / 2])[:, 0], [0, -2, 0, 0, 0, 1], rtol=0, atol=1e-15
-    )
-
-
 def test_the_jacobian_of_a_joint_is_its_row_of_all(arm, q, backend):
     everything = jacobians(arm, q)
     for j, name in enumerate(arm.names):

@@ -60,10 +60,6 @@ PAIR = np.array([[0.0, 2.0, 0.0], [0.0, 0.0, 0.0]])
 
 
 class TestByHand:
-    def test_a_stretched_spring_pulls_its_ends_together(self, backend):
-        expected = [[0.0, -2.0, 0.0], [0.0, 2.0, 0.0]]
-        np.testing.assert_array_equal(spring_forces(pair(), PAIR), expected)
-
     def test_energy_is_half_the_stiffness_times_the_stretch_squared(self, backend):
         assert spring_energy(pair(), PAIR) == 0.5
 
@@ -75,11 +71,6 @@ class TestByHand:
     def test_kinetic_energy_weighs_with_the_masses(self):
         state = State(PAIR, [[2.0, 0, 0], [0, 0, 1.0]])
         assert kinetic_energy(pair(), state) == 0.5 * 1 * 4 + 0.5 * 3 * 1
-
-    def test_a_damper_resists_only_the_rate_of_its_length(self, backend):
-        state = State(PAIR, [[5.0, 3.0, 0.0], [0.0, 1.0, 7.0]])
-        expected = [[0.0, -0.5 * 2.0, 0.0], [0.0, 0.5 * 2.0, 0.0]]
-        np.testing.assert_array_equal(damper_forces(pair(dampings=0.5), state), expected)
 
     def test_all_forces_together(self, backend):
         state = State(PAIR, [[0.0, 3.0, 0.0], [0.0, 1.0, 0.0]])
@@ -347,13 +338,6 @@ class TestInputs:
             kept = array.copy()
             array[...] = 7
             np.testing.assert_array_equal(getattr(system, name), kept)
-
-    def test_the_state_owns_its_arrays(self):
-        x, v = PAIR.copy(), PAIR.copy()
-        state = State(x, v)
-        x[:], v[:] = 7.0, 7.0
-        np.testing.assert_array_equal(state.positions, PAIR)
-        np.testing.assert_array_equal(state.velocities, PAIR)
 
     @pytest.mark.parametrize("name", [f.name for f in dataclasses.fields(MassSpring)])
     def test_the_model_cannot_be_changed(self, network, name):

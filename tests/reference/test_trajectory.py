@@ -168,12 +168,6 @@ def test_a_closed_motion_does_not_depend_on_where_it_begins():
     np.testing.assert_allclose(later.positions, np.roll(whole, -17, axis=0), rtol=0, atol=1e-6)
 
 
-def test_two_rounds_at_once_are_one_round_twice():
-    one, two = drawn("heart", closed=True), drawn("heart", closed=True, rounds=2)
-    np.testing.assert_allclose(two.positions[:FRAMES], one.positions, rtol=0, atol=1e-5)
-    np.testing.assert_allclose(two.positions[FRAMES:], one.positions, rtol=0, atol=1e-5)
-
-
 def test_a_rotated_world_gives_the_rotated_trajectory(rng):
     R = rotation.random(rng)
     offsets = ARM.offsets.copy()

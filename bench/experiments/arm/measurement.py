@@ -2,14 +2,17 @@
 
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
-from plumbob.reference import IK_SOLVERS, scenes, track
+import numpy as np
 
-from ...harness import metrics
+from plumbob.reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rotation, track
+from plumbob.reference.arguments import FloatArray
+
 from ...harness.block import Block, Measured, Scale
-from ..chain.measurement import BEYOND_TOLERANCE, Limits, residuals, solve_targets
+from ...problems.curves import FollowedCurve, arm_beyond, arm_curves
+from ..chain.measurement import BEYOND_TOLERANCE, Limits, solve_targets
 from . import BEYOND, CURVE
-from .problem import FollowedCurve, arm_beyond, arm_curves
 
 LIMITS = Limits(tolerance=1e-4, max_iterations=100)
 BEYOND_LIMITS = Limits(BEYOND_TOLERANCE, max_iterations=1000)
@@ -18,11 +21,11 @@ BEYOND_LIMITS = Limits(BEYOND_TOLERANCE, max_iterations=1000)
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every curve for every solver, from rest and from the last solution (warm), then Q1."""
     for curve in arm_curves():
+        facts = {"task": CURVE, "title": f"arm, {curve.title}", "curve": curve.title}
         for solver in IK_SOLVERS:
             for warm in (False, True):
                 settings = {**LIMITS._asdict(), "warm": warm}
-                facts = {"task": CURVE, "title": f"arm, {curve.title}", "curve": curve.title}
-                measure = partial(draw, curve, solver, warm)
+                measure = partial(follow, curve, solver, {"warm": warm})
                 yield Block("arm", curve.name, solver, measure, settings, facts=facts)
     far = arm_beyond(scale.targets)
     facts = {"task": BEYOND, "title": far.title}
@@ -31,18 +34,41 @@ def blocks(scale: Scale) -> Iterator[Block]:
         yield Block("arm", far.name, solver, measure, BEYOND_LIMITS._asdict(), scale.targets, facts)
 
 
-def draw(problem: FollowedCurve, solver: str, warm: bool) -> Measured:
-    """Follow the curve; residuals are recomputed by forward kinematics of the answers."""
-    skeleton, rest = scenes.lab_arm()
-    motion = track(skeleton, problem.curve, solver, rest, warm=warm, **LIMITS._asdict())
-    # The effector keeps its rotation and would only dilute the mean.
-    angles = metrics.rotation_angles(motion.local_rotations[:, :-1])
+def follow(
+    problem: FollowedCurve, solver: str, options: dict[str, Any], closed: bool = False
+) -> Measured:
+    """Follow a curve once; residuals are recomputed by forward kinematics of the answers.
+
+    The last angle of a closed curve is that from the last frame back to the first.
+    """
+    motion = tracked(problem, solver, options)
+    pose = forward_kinematics(problem.model, motion.coordinates)
+    angles = _joint_angles(problem, motion)[: None if closed else -1]
     return Measured(
         {
-            "residual": residuals(skeleton, motion.local_rotations, problem.curve),
+            "residual": np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
             "iterations": motion.iterations,
             "outcome": motion.outcome,
             "largest_angle": angles.max(axis=-1),
             "mean_angle": angles.mean(axis=-1),
         }
     )
+
+
+def tracked(problem: FollowedCurve, solver: str, options: dict[str, Any]) -> IKSolution:
+    """Return the solutions of all frames of a curve."""
+    limits: dict[str, Any] = {**LIMITS._asdict(), **options}
+    return track(problem.model, problem.curve, solver, problem.start, **limits)
+
+
+def _joint_angles(problem: FollowedCurve, motion: IKSolution) -> FloatArray:
+    """Return the angle by which each joint rotates to the following frame [rad], (frame, joint).
+
+    After the last frame follows the first. A hinge's angle is not reduced to half a revolution,
+    though its link looks the same.
+    """
+    if isinstance(problem.model, Skeleton):
+        # The effector keeps its rotation and would only dilute the mean.
+        R = motion.local_rotations[:, :-1]
+        return rotation.angle(R, np.roll(R, -1, axis=0))
+    return np.abs(np.roll(motion.coordinates, -1, axis=0) - motion.coordinates)

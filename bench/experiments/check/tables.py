@@ -6,10 +6,10 @@ from plumbob.reference.arguments import distinct_texts
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import listed
 from ...peers.registry import MUJOCO, PINOCCHIO
 from ...tables.columns import folded, number, text
 from ...tables.layout import Layout
+from ...tables.results import listed
 from ...tables.table import Summary, in_unit, words
 
 # The claims that rest on one name it in the words of either side.

@@ -7,72 +7,49 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rotation, track
-from plumbob.reference.arguments import FloatArray
+from plumbob.reference import IK_SOLVERS, rotation
 
 from ...harness.block import Block, Measured, Scale
-from ..arm.problem import FollowedCurve
-from . import COHERENT, COLD, CURVE, DRIFT, WARM
-from .problem import (
+from ...problems.curves import (
     DRIFT_FRAMES,
+    FollowedCurve,
     arm_closed_curves,
     heart_three_times,
     robot_closed_curves,
 )
+from ..arm.measurement import LIMITS, follow, tracked
+from . import COHERENT, COLD, CURVE, DRIFT, WARM
 
 SUITE = "tracking"
-TOLERANCE, ITERATIONS = 1e-4, 100
-LIMITS: dict[str, Any] = {"tolerance": TOLERANCE, "max_iterations": ITERATIONS}
-OPTIONS = {COLD: {"warm": False}, WARM: {}, COHERENT: {"coherent": True, "closed": True}}
+OPTIONS: dict[str, dict[str, Any]] = {
+    COLD: {"warm": False},
+    WARM: {},
+    COHERENT: {"coherent": True, "closed": True},
+}
 # On a robot the other solvers take long to compile: a quick run leaves them out.
 ROBOT_SOLVER = "levenberg_marquardt"
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every curve for every solver in each mode, and the heart three times."""
-    for problem in arm_closed_curves():
-        yield from _modes(problem, list(IK_SOLVERS))
     some = [ROBOT_SOLVER] if scale.is_as_short_as("quick") else list(IK_SOLVERS)
-    for problem in robot_closed_curves():
-        yield from _modes(problem, some)
+    for problems, solvers in ((arm_closed_curves(), IK_SOLVERS), (robot_closed_curves(), some)):
+        for problem in problems:
+            for solver in solvers:
+                for mode, options in OPTIONS.items():
+                    measure = partial(follow, problem, solver, options, closed=True)
+                    yield _block(problem, solver, mode, measure, CURVE)
+    heart = heart_three_times()
     for solver in IK_SOLVERS:
         for mode in (WARM, COHERENT):
-            measure = partial(drift, heart_three_times(), solver, mode)
-            facts = {"task": DRIFT, "title": heart_three_times().title}
-            yield Block(
-                SUITE, heart_three_times().name, solver, measure, _settings(mode), facts=facts
-            )
+            yield _block(heart, solver, mode, partial(drift, heart, solver, mode), DRIFT)
 
 
-def _modes(problem: FollowedCurve, solvers: list[str]) -> Iterator[Block]:
-    for solver in solvers:
-        for mode in OPTIONS:
-            measure = partial(follow, problem, solver, mode)
-            facts = {"task": CURVE, "title": problem.title}
-            yield Block(SUITE, problem.name, solver, measure, _settings(mode), facts=facts)
-
-
-def _settings(mode: str) -> dict[str, Any]:
-    return {"mode": mode, **LIMITS}
-
-
-def follow(problem: FollowedCurve, solver: str, mode: str) -> Measured:
-    """Follow the curve once; residuals are recomputed by forward kinematics of the answers.
-
-    The last angle is that from the last frame back to the first.
-    """
-    motion = _tracked(problem, solver, mode)
-    pose = forward_kinematics(problem.model, motion.coordinates)
-    angles = _joint_angles(problem, motion, np.arange(len(problem.curve)) - len(problem.curve) + 1)
-    return Measured(
-        {
-            "residual": np.linalg.norm(pose.positions[:, -1] - problem.curve, axis=-1),
-            "iterations": motion.iterations,
-            "outcome": motion.outcome,
-            "largest_angle": angles.max(axis=-1),
-            "mean_angle": angles.mean(axis=-1),
-        }
-    )
+def _block(
+    problem: FollowedCurve, solver: str, mode: str, measure: partial[Measured], task: str
+) -> Block:
+    settings, facts = {"mode": mode, **LIMITS._asdict()}, {"task": task, "title": problem.title}
+    return Block(SUITE, problem.name, solver, measure, settings, facts=facts)
 
 
 def drift(problem: FollowedCurve, solver: str, mode: str) -> Measured:
@@ -80,31 +57,9 @@ def drift(problem: FollowedCurve, solver: str, mode: str) -> Measured:
 
     A coherent motion is closed: after its last frame comes its first.
     """
-    again = (
-        problem.curve if mode == COHERENT else np.append(problem.curve, problem.curve[:1], axis=0)
-    )
-    motion = _tracked(replace(problem, curve=again), solver, mode)
-    later = (DRIFT_FRAMES * np.arange(1, 4)) % len(again)
+    if mode != COHERENT:
+        problem = replace(problem, curve=np.append(problem.curve, problem.curve[:1], axis=0))
+    motion = tracked(problem, solver, OPTIONS[mode])
+    later = (DRIFT_FRAMES * np.arange(1, 4)) % len(problem.curve)
     angles = rotation.angle(motion.local_rotations[[0, 0, 0]], motion.local_rotations[later])
     return Measured({"drift": angles.max(axis=-1), "residual": motion.residual})
-
-
-def _tracked(problem: FollowedCurve, solver: str, mode: str) -> IKSolution:
-    options: dict[str, Any] = {
-        "tolerance": TOLERANCE,
-        "max_iterations": ITERATIONS,
-        **OPTIONS[mode],
-    }
-    return track(problem.model, problem.curve, solver, problem.start, **options)
-
-
-def _joint_angles(problem: FollowedCurve, motion: IKSolution, following: np.ndarray) -> FloatArray:
-    """Return the angle by which each joint rotates to the following frame [rad], (frame, joint).
-
-    A hinge's angle is not reduced to half a revolution, though its link looks the same.
-    """
-    if isinstance(problem.model, Skeleton):
-        # The effector keeps its rotation and would only dilute the mean.
-        R = motion.local_rotations[:, :-1]
-        return rotation.angle(R, R[following])
-    return np.abs(motion.coordinates[following] - motion.coordinates)

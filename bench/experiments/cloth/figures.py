@@ -5,7 +5,7 @@ import numpy as np
 from ...figures.chart import Axis, Chart, Panel, Series, series
 from ...figures.sketch import Sketch, chart_sketch
 from ...harness.record import Record
-from ...harness.results import Results, by_problem
+from ...tables.results import Results, by_problem
 from . import ONE_STEP
 
 
@@ -40,5 +40,5 @@ def cloth_convergence(results: Results) -> Sketch | None:
 
 
 def _iterated(record: Record, quantity: str) -> Series:
-    values = record.arrays[quantity][1:]
+    values = getattr(record.values, quantity)[1:]
     return series(record.solver, np.arange(1, 1 + len(values)), values)

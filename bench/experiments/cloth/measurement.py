@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ...harness.block import Block, Measured, Scale
 from ...peers import registry
 from . import DAMPERS, FEW, ONE_STEP, SWING
 from .problem import DAMPING, FACTORS, ClothSwing, H, cloth_swing
+from .values import Converged, Dampers, FewIterations, Iterated
 
 # The cloth falls for three seconds; the steps of the next second are looked at.
 FALLING = 180
@@ -42,62 +43,50 @@ def blocks(scale: Scale) -> Iterator[Block]:
             yield Block("cloth", f"{problem.name}{name}", solver, measure, settings, facts=facts)
 
 
-class _Measurement(NamedTuple):
-    """What is measured of a cloth: its task, name, solver, how, and with which settings."""
-
-    task: str
-    name: str
-    solver: str
-    measure: Callable[[], Measured]
-    settings: dict[str, Any]
+# Its task, name and solver, how it is measured, and with which settings.
+_Measurement = tuple[str, str, str, Callable[[], Measured], dict[str, Any]]
 
 
 def _measurements(problem: ClothSwing, factor: float) -> Iterator[_Measurement]:
     swinging = {"h": H, "first": FALLING, "steps": STEPS}
     settings = {**swinging, "tolerance": TOLERANCE}
-    yield _Measurement(SWING, "", "newton", partial(newton_steps, problem), settings)
+    yield (SWING, "", "newton", partial(newton_steps, problem), settings)
     for solver in registry.followed_step_solvers():
         measure = partial(one_step, problem, solver.name, solver.followed)
         settings = {"h": H, "step": MIDDLE, "iterations": solver.followed}
-        yield _Measurement(ONE_STEP, "/one step", solver.name, measure, settings)
+        yield (ONE_STEP, "/one step", solver.name, measure, settings)
     for count in FEW_ITERATIONS:
         measure = partial(few_iterations, problem, count)
         settings = {**swinging, "iterations": count}
-        yield _Measurement(FEW, "/few iterations", "local_global", measure, settings)
+        yield (FEW, "/few iterations", "local_global", measure, settings)
     measure = partial(two_dampers, cloth_swing(factor, damping=DAMPING))
     settings = {"first": MIDDLE, "damping": DAMPING}
     settings |= {"longest": HALVED[0], "halvings": len(HALVED) - 1}
-    yield _Measurement(DAMPERS, "/dampers", "newton", measure, settings)
+    yield (DAMPERS, "/dampers", "newton", measure, settings)
 
 
 def newton_steps(problem: ClothSwing) -> Measured:
     """Take consecutive swinging steps by Newton; keep iterations and residual of each."""
-    integrator = converging(problem)
-    states = converged_motion(problem)[FALLING:-1]
-    results = [integrator.step(state) for state in states]
-    return Measured(
-        {
-            "iterations": [result.iterations for result in results],
-            "residual": [result.residual for result in results],
-            "outcome": [result.outcome for result in results],
-            "at_floor": [result.at_floor for result in results],
-        }
+    integrator = integrator_of(problem)
+    results = [integrator.step(state) for state in converged_motion(problem)[FALLING:-1]]
+    columns = zip(
+        *((r.iterations, r.residual, r.outcome, r.at_floor) for r in results), strict=True
     )
+    return Measured(Converged(*map(np.array, columns)))
 
 
 def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:
     """Iterate one step from mid-swing; keep residual and error after each iteration."""
-    integrator = converging(problem)
     state = converged_motion(problem)[MIDDLE]
-    newton = converging(problem, tolerance=0.0, max_iterations=50).step(state).state.positions
+    newton = integrator_of(problem, tolerance=0.0, max_iterations=50).step(state).state.positions
     exact = exact_step(problem.system, state, problem.h, newton)
-    objective = integrator.objective(state)
+    objective = integrator_of(problem).objective(state)
     iterates = ImplicitEuler(problem.system, h=problem.h, solver=solver).iterates(state)
-    residual, error = [], []
-    for _, iterate in zip(range(iterations + 1), iterates, strict=False):
-        residual.append(objective.residual(iterate))
-        error.append(exact.error(iterate.positions, objective.y))
-    return Measured({"residual": residual, "error": error})
+    pairs = [
+        (objective.residual(iterate), exact.error(iterate.positions, objective.y))
+        for _, iterate in zip(range(iterations + 1), iterates, strict=False)
+    ]
+    return Measured(Iterated(*np.array(pairs).T))
 
 
 def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
@@ -107,38 +96,31 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
     the distance between the converged motion and one that takes all its steps so; the path, that
     of the converged motion from where both began.
     """
-    converged = converging(problem)
-    few = _integrator(problem, "local_global", 0.0, iterations)
-    true = converged_motion(problem)[FALLING:]
-    own = motion(true[0], STEPS, few)
+    few = integrator_of(problem, "local_global", 0.0, iterations)
+    start, *exact = true = converged_motion(problem)[FALLING:]
     after = [few.step(state).state for state in true[:-1]]
-    inertial = [converged.objective(state).y for state in true[:-1]]
-    positions = [state.positions for state in true[1:]]
+    inertial = [integrator_of(problem).objective(state).y for state in true[:-1]]
     errors = [
-        metrics.relative_error(state.positions, exact, y)
-        for state, exact, y in zip(after, positions, inertial, strict=True)
+        metrics.relative_error(state.positions, x.positions, y)
+        for state, x, y in zip(after, exact, inertial, strict=True)
     ]
-    distances = [
-        metrics.rms_distance(state.positions, exact)
-        for state, exact in zip(after, positions, strict=True)
-    ]
-    drift = [
-        metrics.rms_distance(state.positions, exact)
-        for state, exact in zip(own[1:], positions, strict=True)
-    ]
-    path = [metrics.rms_distance(exact, true[0].positions) for exact in positions]
-    return Measured({"error": errors, "distance": distances, "drift": drift, "path": path})
+    pairs = after, motion(start, STEPS, few)[1:], [start] * STEPS
+    distances = (
+        [metrics.rms_distance(a.positions, b.positions) for a, b in zip(states, exact, strict=True)]
+        for states in pairs
+    )
+    return Measured(FewIterations(*map(np.array, (errors, *distances))))
 
 
 def two_dampers(problem: ClothSwing, first: int = MIDDLE) -> Measured:
     """Take one step of each length after the first ones; compare the two laws at its end."""
-    state, apart = motion(problem.start, first, converging(problem))[-1], []
+    state, apart = motion(problem.start, first, integrator_of(problem))[-1], []
     for h in HALVED:
         end = ImplicitEuler(problem.system, h=h).step(state).state
         rates = damper_forces(problem.system, end)
         differences = step_damper_forces(problem.system, state, end, h)
         apart.append(np.linalg.norm(differences - rates) / np.linalg.norm(rates))
-    return Measured({"h": HALVED, "apart": apart})
+    return Measured(Dampers(np.array(HALVED), np.array(apart)))
 
 
 def step_damper_forces(system: MassSpring, before: State, after: State, h: float) -> FloatArray:
@@ -152,16 +134,13 @@ def step_damper_forces(system: MassSpring, before: State, after: State, h: float
     return spring_forces(dampers, after.positions)
 
 
-def converging(
-    problem: ClothSwing, tolerance: float = TOLERANCE, max_iterations: int = 100
+def integrator_of(
+    problem: ClothSwing,
+    solver: str = "newton",
+    tolerance: float = TOLERANCE,
+    max_iterations: int = 100,
 ) -> ImplicitEuler:
-    """Return the integrator that solves every step to the end."""
-    return _integrator(problem, "newton", tolerance, max_iterations)
-
-
-def _integrator(
-    problem: ClothSwing, solver: str, tolerance: float, max_iterations: int
-) -> ImplicitEuler:
+    """Return an integrator of a cloth, as it is one that solves every step to the end."""
     limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations}
     return ImplicitEuler(problem.system, h=problem.h, solver=solver, **limits)
 
@@ -169,7 +148,7 @@ def _integrator(
 @functools.cache
 def converged_motion(problem: ClothSwing) -> tuple[State, ...]:
     """Return the states of the four seconds by converged steps, the start first."""
-    return tuple(motion(problem.start, FALLING + STEPS, converging(problem)))
+    return tuple(motion(problem.start, FALLING + STEPS, integrator_of(problem)))
 
 
 def motion(start: State, steps: int, integrator: ImplicitEuler) -> list[State]:

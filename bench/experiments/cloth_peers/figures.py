@@ -2,8 +2,8 @@
 
 from ...figures.chart import Axis, Chart, Panel, Series, series
 from ...figures.sketch import Sketch, chart_sketch
-from ...harness.results import Results
 from ...tables.layout import Figure
+from ...tables.results import Results
 from . import MOTION, ONE_STEP
 from .readings import Point, points
 

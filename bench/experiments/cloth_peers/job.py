@@ -7,13 +7,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plumbob.reference import MassSpring, State, scenes
+from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import SystemArrays
 
-from ...harness.stopwatch import Budget, round_trips, timed
-from ...harness.worker import Done, Message, Ready, Solved, Unfit, describe
+from ...harness.job import announced, solved_in, unfit
+from ...harness.stopwatch import Budget, timed
+from ...harness.worker import Done, Message, Ready, Solved
 from ...peers.cloth.protocol import Mover
-from ...peers.ik.protocol import remark_of
-from .problem import FRAME
+from ...peers.protocol import OwnTime, remark_of
+from ...problems.falling_cloth import FRAME
 
 # Moved once before anything is timed, in so short a frame [s] that any solver is stable: what has
 # to be compiled is compiled then.
@@ -46,6 +48,7 @@ class ClothJob(NamedTuple):
         start: where the particles are at first.
         settings: what the adapter is prepared with.
         shape: how far and how often it is moved.
+        entrant: the name of a user's solver, whose first trouble is announced; "" of others.
     """
 
     module: str
@@ -53,18 +56,20 @@ class ClothJob(NamedTuple):
     start: State
     settings: Mapping[str, Any]
     shape: Shape
+    entrant: str = ""
 
     def perform(self) -> Iterator[Message]:
         """Yield the positions after each frame and how long it took, as soon as they are there."""
         try:
-            mover, setup = self._prepared()
-            yield Ready(setup, remark_of(importlib.import_module(self.module)))
-            yield from self._moved(mover)
+            adapter = importlib.import_module(self.module)
+            mover, setup = self._prepared(adapter)
+            yield Ready(setup, remark_of(adapter))
+            yield from announced(self._moved(mover), self.entrant)
+            yield Done()
         except Exception as error:  # whatever an engine raises is its result
-            yield Unfit(describe(error))
+            yield from unfit(error, self.entrant)
 
-    def _prepared(self) -> tuple[Mover, float]:
-        adapter = importlib.import_module(self.module)
+    def _prepared(self, adapter: Any) -> tuple[Mover, float]:
         small, state = scenes.grid_cloth(_SMALL, _SMALL)
         trial = adapter.prepare(small, _SHORT, **self.settings)
         trial.begin(state)
@@ -72,25 +77,28 @@ class ClothJob(NamedTuple):
         system = MassSpring(**self.system._asdict())
         return timed(lambda: adapter.prepare(system, self.shape.frame, **self.settings))
 
-    def _moved(self, mover: Mover) -> Iterator[Message]:
+    def _moved(self, mover: Mover) -> Iterator[Solved]:
         budget, nowhere = Budget(self.shape.budget), np.full_like(self.start.positions, np.nan)
         for _ in range(self.shape.repeats):
             mover.begin(self.start)
             for _ in range(self.shape.frames):
-                stays_finite, seconds = timed(lambda: advanced(mover))
-                where = mover.positions() if stays_finite else nowhere
-                yield Solved(where, UNKNOWN, seconds, "", *round_trips())
-                if budget.is_spent or not np.isfinite(where).all():
-                    yield Done()
+                frame = advanced(mover, nowhere)
+                yield frame
+                budget.excuse(frame.at_door)
+                if budget.is_spent or not np.isfinite(frame.q).all():
                     return
-        yield Done()
 
 
-def advanced(mover: Mover) -> bool:
-    """Move on by one frame; return whether the solver says nothing of having blown up."""
+def advanced(mover: Mover, nowhere: FloatArray) -> Solved:
+    """Move on by one frame; the particles are nowhere if the solver says that it blew up."""
+    (stays_finite, own), seconds = timed(lambda: _advance(mover))
+    q = mover.positions() if stays_finite else nowhere
+    return solved_in(own or OwnTime(seconds), q, UNKNOWN)
+
+
+def _advance(mover: Mover) -> tuple[bool, OwnTime | None]:
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            mover.advance()
+            return True, mover.advance()
     except FloatingPointError:
-        return False
-    return True
+        return False, None

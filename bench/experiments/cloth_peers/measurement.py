@@ -6,8 +6,9 @@ and against the motion itself.
 
 import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,12 +19,8 @@ from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import Outcome, WorkerProcess
 from ...harness.measure import not_installed
 from ...peers import registry
-from ...peers.cloth.ladder import Rung, motion_rungs, step_rungs
 from ...peers.registry import EXPLICIT, UNDECLARED, ClothPeer
-from ..published import problem as published
-from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
-from .job import ClothJob, Shape
-from .problem import (
+from ...problems.falling_cloth import (
     FRAME,
     SIDE,
     STIFFNESSES,
@@ -31,11 +28,13 @@ from .problem import (
     falling_cloth,
     hanging_cloth,
     highest_mode,
+    own_cloth,
 )
-from .truth import ClothTruth, cloth_truth, implicit_motion, truth_of
-
-if TYPE_CHECKING:
-    from ...entrants.problems import OwnProblem
+from ..published import problem as published
+from . import DECADES, LIU, MISSING, MOTION, NEEDED, ONE_STEP, STABILITY
+from .job import ClothJob, Shape
+from .ladder import Rung, motion_rungs, step_rungs
+from .truth import ClothTruth, implicit_motion, truth_of
 
 SUITE = "cloth"
 # One step is timed so often, but for no more than a twentieth of its ladder's time.
@@ -58,6 +57,8 @@ _FAR = 8.0
 
 # Numbers, and a label in the end.
 Row = tuple[Any, ...]
+# Parts of a cloth's ladder that use its whole budget.
+_LADDER = 2.0
 
 
 class Level(NamedTuple):
@@ -80,14 +81,25 @@ def levels(scale: Scale) -> tuple[Level, ...]:
     return FULL if scale.seconds >= _FULL else QUICK
 
 
+class Fall(NamedTuple):
+    """A cloth that falls: how far, and what makes it."""
+
+    level: Level
+    make: Callable[[], FallingCloth]
+
+    @property
+    def truth(self) -> ClothTruth:
+        """Its answers."""
+        return truth_of(self.make(), self.level.frames)
+
+
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield one step, a motion and the limit of every solver; what is missing makes one block.
 
     Larger cloths, the published one among them, are for the full scale.
     """
-    sizes = levels(scale)
-    peers = registry.cloth_peers()
-    for package in dict.fromkeys(peer.package for peer in peers if not peer.version):
+    peers = registry.cloth_peers(scale.entrants)
+    for package in dict.fromkeys(peer.package for peer in peers if not peer.is_installed):
         absent = partial(not_installed, package)
         yield Block(SUITE, "peers/all", package, absent, facts={"task": MISSING})
     for stiffness in STIFFNESSES:
@@ -96,65 +108,69 @@ def blocks(scale: Scale) -> Iterator[Block]:
         for solver in registry.step_solvers():
             measure = partial(iterations_needed, solver, stiffness)
             yield Block(SUITE, name, solver, measure, settings, facts=facts)
-    for peer in (peer for peer in peers if peer.version):
-        yield from blocks_of(peer, sizes)
+    for peer in (peer for peer in peers if peer.is_installed):
+        yield from blocks_of(peer, scale)
     settings = {"size": published.LIU_2013_SIZE, "frame": published.LIU_2013_FRAME}
-    for solver in published.LIU_2013 if sizes == FULL else ():
+    for solver in published.LIU_2013 if levels(scale) == FULL else ():
         measure, facts = partial(liu_2013, solver), {"task": LIU}
         yield Block(SUITE, "peers/liu2013", solver, measure, settings, facts=facts)
 
 
-def blocks_of(peer: ClothPeer, sizes: tuple[Level, ...]) -> Iterator[Block]:
+def blocks_of(peer: ClothPeer, scale: Scale) -> Iterator[Block]:
     """Yield one step, a motion and, if it is explicit, the limit of a solver."""
-    most = sum(level.size for level in sizes)
-    for stiffness in STIFFNESSES:
-        settings = {"stiffness": stiffness, "frame": FRAME, "version": peer.version}
-        for name, task, measure in (("one step", ONE_STEP, one_step), ("motion", MOTION, motion)):
-            call = partial(measure, peer, stiffness, sizes)
-            problem, facts = f"peers/{name}/k{stiffness:g}", {"task": task}
-            yield Block(SUITE, problem, peer.title, call, settings, most, facts)
+    sizes = levels(scale)
+    for k in STIFFNESSES:
+        falls = [Fall(level, partial(falling_cloth, level.size, k)) for level in sizes]
+        yield from _falling(peer, f"k{k:g}", {"stiffness": k, "frame": FRAME}, falls)
+    for own in scale.problems:
+        if own.cloth is not None:
+            system, _ = own.cloth
+            settings: dict[str, Any] = {"stiffness": float(system.stiffnesses.mean())}
+            settings |= {"frame": own.h}
+            fall = Fall(sizes[0]._replace(size=system.particle_count), partial(own_cloth, own))
+            for block in _falling(peer, own.name, settings, [fall]):
+                yield replace(block, facts={**block.facts, "cloth": own.name}).on(own)
     if peer.kind in (EXPLICIT, UNDECLARED) and not peer.settings.get("iterations"):
         hung = STIFFNESSES if sizes == FULL else QUICK_STIFFNESS
         settings = {"size": STABILITY_SIZE, "version": peer.version}
-        found, facts = partial(stability, peer, hung), {"task": STABILITY}
-        yield Block(SUITE, "peers/stability", peer.title, found, settings, len(hung), facts)
+        measure, facts = partial(stability, peer, hung), {"task": STABILITY}
+        block = Block(SUITE, "peers/stability", peer.title, measure, settings, len(hung), facts)
+        yield block.of(peer.entrant)
 
 
-def own_blocks(
-    peer: ClothPeer, problem: "OwnProblem", cloth: Callable[[], FallingCloth], scale: Scale
+def _falling(
+    peer: ClothPeer, cloth: str, settings: dict[str, Any], falls: list[Fall]
 ) -> Iterator[Block]:
-    """Yield one step and a motion of a user's cloth."""
-    assert problem.cloth is not None
-    system, _ = problem.cloth
-    level = levels(scale)[0]._replace(size=system.particle_count)
-    stiffness = float(system.stiffnesses.mean())
-    settings = {"stiffness": stiffness, "frame": problem.h, "version": peer.version}
-    calls = ((ONE_STEP, one_step_on), (MOTION, motion_on))
-    for name, (task, measure) in zip(problem.recorded, calls, strict=True):
-        facts = {"task": task, "cloth": problem.name}
-        call = partial(measure, peer, [Fall(level, cloth)])
-        yield Block(SUITE, name, peer.title, call, settings, level.size, facts)
+    """Yield one step and a motion of a cloth at some sizes."""
+    size, budget = (sum(fall.level[i] for fall in falls) for i in (0, 2))
+    settings = settings | {"version": peer.version}
+    for words, task, measure in (("one step", ONE_STEP, one_step), ("motion", MOTION, motion)):
+        known = (SUITE, f"peers/{words}/{cloth}", peer.title, partial(measure, peer, falls))
+        block = Block(*known, settings, size, {"task": task}, budget=_LADDER * budget)
+        yield block.of(peer.entrant)
 
 
-def one_step(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measured:
+class Remark(NamedTuple):
+    """A sentence on what happened on a cloth of so many particles a side."""
+
+    particles: int
+    sentence: str
+    is_trouble: bool
+
+
+def one_step(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
     """Take the same step with ever more work; keep time and what is left of the error.
 
     A ladder that has used its time, or has arrived, is climbed no further.
     """
-    return one_step_on(peer, [Fall(level, stiffness) for level in sizes])
-
-
-def one_step_on(peer: ClothPeer, falls: Sequence["Fall"]) -> Measured:
-    """Take the same step of some cloths with ever more work; see `one_step`."""
     rows: list[Row] = []
     remarks: list[Remark] = []
     for fall in falls:
-        level, cloth, truth = fall.level, fall.cloth, fall.truth
+        level, cloth, truth = fall.level, fall.make(), fall.truth
         spent = 0.0
         for rung in step_rungs(peer, cloth.beat):
             shape = Shape(1, REPEATS, _REPEATING * level.budget, cloth.frame)
-            outcome = _tried(job(peer.module, cloth, rung.settings, shape))
-            remarks += _remarks(level, rung, outcome)
+            outcome = _tried(peer, cloth, rung, shape, remarks)
             if not outcome.solved:
                 break
             seconds = np.array([one.seconds for one in outcome.solved])
@@ -166,31 +182,45 @@ def one_step_on(peer: ClothPeer, falls: Sequence["Fall"]) -> Measured:
     return _columns(("particles", "seconds", "error"), rows, remarks)
 
 
-def _tried(job: ClothJob) -> Outcome:
-    """Return what came of a job; one that could not be set up in time is not set up again."""
-    what = job.module, job.settings.get("spec"), len(job.start.positions)
-    if what in _given_up:
-        return Outcome(0.0, [], _given_up[what])
-    outcome = worker_process().perform(job)
+def motion(peer: ClothPeer, falls: Sequence[Fall]) -> Measured:
+    """Move on frame after frame; keep the distances from implicit Euler and from the truth."""
+    rows: list[Row] = []
+    remarks: list[Remark] = []
+    for fall in falls:
+        level, cloth, truth = fall.level, fall.make(), fall.truth
+        for rung in motion_rungs(peer, cloth.beat):
+            shape = Shape(level.frames, 1, level.budget, cloth.frame)
+            outcome = _tried(peer, cloth, rung, shape, remarks)
+            rows.append((*_moved(outcome, level, truth, cloth.extent), rung.label))
+            if not outcome.solved:
+                break
+    names = ("particles", "frames", "wanted", "seconds", "setup", "implicit", "true", "diverged")
+    truths = [fall.truth for fall in falls]
+    known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
+    return _columns(names, rows, remarks, **known)
+
+
+def _tried(
+    peer: ClothPeer, cloth: FallingCloth, rung: Rung, shape: Shape, remarks: list[Remark]
+) -> Outcome:
+    """Return what came of a rung, and add a remark on it if there is something to say.
+
+    What could not be set up in time is not set up again.
+    """
+    task = peer.module, peer.entrant_name, len(cloth.start.positions)
+    if task in _given_up:
+        outcome = Outcome(0.0, [], _given_up[task])
+    else:
+        outcome = worker_process().perform(job(peer, cloth, rung.settings, shape))
     if outcome.silent and not outcome.lost:
-        _given_up[what] = outcome.note
+        _given_up[task] = outcome.note
+    if outcome.note:
+        sentence = f"{cloth.size} × {cloth.size}, {rung.label}: {outcome.note}"
+        remarks.append(Remark(cloth.size, sentence, bool(outcome.trouble)))
     return outcome
 
 
-_given_up: dict[tuple[str, Any, int], str] = {}
-
-
-class Remark(NamedTuple):
-    """A sentence on what happened on a cloth of so many particles a side."""
-
-    particles: int
-    sentence: str
-    is_trouble: bool
-
-
-def _remarks(level: Level, rung: Rung, outcome: Outcome) -> list[Remark]:
-    sentence = f"{level.size} × {level.size}, {rung.label}: {outcome.note}"
-    return [Remark(level.size, sentence, bool(outcome.trouble))] if outcome.note else []
+_given_up: dict[tuple[str, str, int], str] = {}
 
 
 def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
@@ -201,55 +231,6 @@ def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
     if not np.isfinite(positions).all() or np.abs(positions).max() > 1e100:
         return np.inf
     return truth.first.error(positions, truth.inertial)
-
-
-def motion(peer: ClothPeer, stiffness: float, sizes: tuple[Level, ...]) -> Measured:
-    """Move on frame after frame; keep the distances from implicit Euler and from the truth."""
-    return motion_on(peer, [Fall(level, stiffness) for level in sizes])
-
-
-def motion_on(peer: ClothPeer, falls: Sequence["Fall"]) -> Measured:
-    """Move some cloths on frame after frame; see `motion`."""
-    rows: list[Row] = []
-    remarks: list[Remark] = []
-    for fall in falls:
-        level, cloth, truth = fall.level, fall.cloth, fall.truth
-        for rung in motion_rungs(peer, cloth.beat):
-            shape = Shape(level.frames, 1, level.budget, cloth.frame)
-            outcome = _tried(job(peer.module, cloth, rung.settings, shape))
-            remarks += _remarks(level, rung, outcome)
-            rows.append((*_moved(outcome, level, truth, cloth.extent), rung.label))
-            if not outcome.solved:
-                break
-    names = ("particles", "frames", "wanted", "seconds", "setup", "implicit", "true", "diverged")
-    measured = _columns(names, rows, remarks)
-    truths = [fall.truth for fall in falls]
-    known = {"order": [t.order for t in truths], "unsure": [t.unsure for t in truths]}
-    return measured._replace(values={**measured.arrays, **known})
-
-
-class Fall:
-    """A cloth that falls for so many frames, with its answers, made when they are asked for.
-
-    Attributes:
-        level: how far, and for how long.
-    """
-
-    def __init__(self, level: Level, of: float | Callable[[], FallingCloth]) -> None:
-        """Take a stiffness of ours [N/m], or what makes a user's cloth."""
-        self.level, self._of = level, of
-
-    @property
-    def cloth(self) -> FallingCloth:
-        """The cloth."""
-        return self._of() if callable(self._of) else falling_cloth(self.level.size, self._of)
-
-    @property
-    def truth(self) -> ClothTruth:
-        """Its answers."""
-        if callable(self._of):
-            return truth_of(self._of(), self.level.frames)
-        return cloth_truth(self.level.size, self._of, self.level.frames)
 
 
 def _moved(outcome: Outcome, level: Level, truth: ClothTruth, extent: float) -> tuple[float, ...]:
@@ -275,7 +256,7 @@ def diverged(positions: np.ndarray, true: np.ndarray, extent: float = SIDE) -> b
 def iterations_needed(solver: str, stiffness: float) -> Measured:
     """Count the iterations of one step to errors of a tenth, a hundredth and so on."""
     cloth = falling_cloth(NEEDED_SIZE, stiffness)
-    truth = cloth_truth(NEEDED_SIZE, stiffness, 1)
+    truth = truth_of(cloth, 1)
     iterates = ImplicitEuler(cloth.system, h=FRAME, solver=solver).iterates(cloth.start)
     errors = []
     limit = registry.step_solvers()[solver].counted
@@ -324,9 +305,9 @@ def is_stable(
     Raises:
         ArithmeticError: if the solver does not get through.
     """
-    settings = {**peer.settings, "substeps": STABILITY_STEPS}
-    shape = Shape(1, 1, np.inf, h * STABILITY_STEPS)
-    outcome = worker_process().perform(ClothJob(peer.module, system.arrays, start, settings, shape))
+    settings = {**peer.settings, **peer.spec, "substeps": STABILITY_STEPS}
+    job = (system.arrays, start, settings, Shape(1, 1, np.inf, h * STABILITY_STEPS))
+    outcome = worker_process().perform(ClothJob(peer.module, *job, peer.entrant_name))
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     away = np.abs(outcome.solved[-1].q - rest)
@@ -361,10 +342,8 @@ def liu_2013(solver: str) -> Measured:
     exact = implicit_motion(cloth, 1, published.LIU_2013_FRAME)[0]
     x, v = cloth.start.positions, cloth.start.velocities
     settings = {"solver": solver, **published.LIU_2013[solver].settings}
-    shape = Shape(1, REPEATS, 5.0, published.LIU_2013_FRAME)
-    outcome = worker_process().perform(
-        job("plumbob.bench.peers.cloth.step_solvers", cloth, settings, shape)
-    )
+    shape, peer = Shape(1, REPEATS, 5.0, published.LIU_2013_FRAME), registry.cloth_peers()[0]
+    outcome = worker_process().perform(job(peer, cloth, settings, shape))
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     inertial = x + published.LIU_2013_FRAME * np.where(cloth.system.free[:, None], v, 0.0)
@@ -377,19 +356,27 @@ def liu_2013(solver: str) -> Measured:
     )
 
 
-def job(module: str, cloth: FallingCloth, settings: Mapping[str, Any], shape: Shape) -> ClothJob:
+def job(
+    peer: ClothPeer, cloth: FallingCloth, settings: Mapping[str, Any], shape: Shape
+) -> ClothJob:
     """Return the job of moving a cloth from its start."""
-    return ClothJob(module, cloth.system.arrays, cloth.start, settings, shape)
+    known = (cloth.system.arrays, cloth.start, settings, shape)
+    return ClothJob(peer.module, *known, peer.entrant_name)
 
 
-def _columns(names: tuple[str, ...], rows: list[Row], remarks: list[Remark]) -> Measured:
+def _columns(
+    names: tuple[str, ...], rows: list[Row], remarks: list[Remark], **more: list[float]
+) -> Measured:
     """Return rows, their labels last, as arrays and facts."""
     arrays = {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
     arrays["remark_particles"] = np.array([remark.particles for remark in remarks])
-    sentences = [remark.sentence for remark in remarks]
-    facts: dict[str, Any] = {"rungs": [row[-1] for row in rows], "remarks": sentences}
-    facts["trouble"] = next((remark.sentence for remark in remarks if remark.is_trouble), "")
-    return Measured(arrays, facts=facts)
+    troubles = [remark.sentence for remark in remarks if remark.is_trouble]
+    facts = {
+        "rungs": [row[-1] for row in rows],
+        "remarks": [remark.sentence for remark in remarks],
+        "trouble": troubles[0] if troubles else "",
+    }
+    return Measured({**arrays, **more}, facts=facts)
 
 
 @functools.cache

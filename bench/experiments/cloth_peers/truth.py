@@ -16,7 +16,7 @@ from plumbob.reference import ImplicitEuler, State, runge_kutta
 from plumbob.reference.arguments import FloatArray
 
 from ...harness import metrics
-from .problem import FRAME, FallingCloth, explicit_substeps, falling_cloth
+from ...problems.falling_cloth import FRAME, FallingCloth, explicit_substeps
 
 # Newton goes on to the rounding floor, which is above this, so that errors of 1e-8 can be measured.
 TOLERANCE = 1e-14
@@ -48,12 +48,6 @@ class ClothTruth(NamedTuple):
 
 
 @functools.cache
-def cloth_truth(size: int, stiffness: float, frames: int) -> ClothTruth:
-    """Return the answers for a falling cloth."""
-    return truth_of(falling_cloth(size, stiffness), frames)
-
-
-@functools.lru_cache(maxsize=4)
 def truth_of(cloth: FallingCloth, frames: int) -> ClothTruth:
     """Return the answers for a cloth."""
     substeps = explicit_substeps(cloth.beat, _COARSE)

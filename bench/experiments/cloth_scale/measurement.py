@@ -26,7 +26,9 @@ from ...harness.block import Block, Measured, Scale
 from ...harness.isolation import in_a_fresh_process
 from ...harness.progress import announce
 from ...harness.stopwatch import timed
+from ...harness.values import read
 from ...peers import registry
+from .values import Scaled
 
 H = 1 / 60
 STIFFNESS = 1e4
@@ -58,8 +60,9 @@ def blocks(scale: Scale) -> Iterator[Block]:
 def in_its_own_process(size: int, library: str) -> Measured:
     """Measure one cloth in a process that does nothing else; say so if there is no such library."""
     if library != OURS and importlib.util.find_spec(library) is None:
-        return Measured({}, {"missing": f"{library} is not installed"})
-    return Measured(in_a_fresh_process(PATIENCE, compiled_and_measured, size, library))
+        return Measured(None, {"missing": f"{library} is not installed"})
+    numbers = in_a_fresh_process(PATIENCE, compiled_and_measured, size, library)
+    return Measured(read(Scaled, numbers))
 
 
 def compiled_and_measured(size: int, library: str) -> dict[str, Any]:

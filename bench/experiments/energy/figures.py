@@ -2,7 +2,7 @@
 
 from ...figures.chart import GREATER, Axis, Chart, Panel, series
 from ...figures.sketch import Sketch, chart_sketch
-from ...harness.results import Results, by_problem
+from ...tables.results import Results, by_problem
 
 
 def energy(results: Results) -> Sketch | None:

@@ -3,27 +3,14 @@
 from collections.abc import Sequence
 from functools import partial
 
-from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import label, settings
-from ...tables.columns import lengths_of_steps, text, titled
+from ...tables.columns import at, lengths_of_steps, text, titled
 from ...tables.layout import Layout
+from ...tables.results import label, settings
 from ...tables.table import Column, Summary, in_unit, words
-from . import figures
-from .problem import DAMPINGS, SIZE
-from .values import Swing
+from . import DAMPINGS, SIZE, figures, readings
 
 LISTED = (100, 1_000, 10_000)
-
-
-def _extent(record: Record) -> tuple[float, float]:
-    return metrics.extent(record.values.left)
-
-
-def _left(record: Record, steps: int) -> float | None:
-    swing: Swing = record.values
-    k = steps // record.details.every
-    return float(swing.left[k]) if k < swing.left.size else None
 
 
 def _summary(records: Sequence[Record]) -> Summary:
@@ -38,7 +25,7 @@ def _summary(records: Sequence[Record]) -> Summary:
 
 
 def _range(record: Record) -> str:
-    shares = (float(record.values.left[-1]), *_extent(record))
+    shares = float(record.values.left[-1]), *readings.extent(record)
     last, low, high = (words(in_unit(share, "%")) for share in shares)
     return f"{last}, never less than {low} nor more than {high}"
 
@@ -55,13 +42,13 @@ energy = Layout(
             Column(
                 f"left after {words(k)} steps",
                 "%",
-                read=partial(_left, steps=k),
+                read=partial(readings.left_after, steps=k),
                 group="left after",
             )
             for k in LISTED
         ),
-        Column("most ever", "%", read=lambda record: _extent(record)[1]),
-        Column("least ever", "%", read=lambda record: _extent(record)[0]),
+        Column("greatest", "%", read=at(1, readings.extent)),
+        Column("least", "%", read=at(0, readings.extent)),
     ),
     shows="Energy of motion, springs and gravity above that of the cloth at rest, in percent "
     "of the start. Without dampers all of it should stay. implicit, implicitfast, discrete "

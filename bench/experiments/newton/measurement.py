@@ -10,17 +10,18 @@ import numpy as np
 
 from plumbob.crosscheck.mass_spring import balance_residual
 from plumbob.crosscheck.mass_spring.exact_step import ExactStep, exact_step
-from plumbob.reference import STEP_SOLVERS, ImplicitEuler
+from plumbob.reference import STEP_SOLVERS
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.implicit_euler.certificate import Certificate, certify
 from plumbob.reference.implicit_euler.objective import Objective
 
 from ...harness.block import Block, Measured, Scale
 from ...peers import registry
-from .problem import STIFFNESSES, H, MidSwing, mid_swing
+from ..cloth.measurement import TOLERANCE, integrator_of
+from ..cloth.problem import FRAME, HEAVY_STIFFNESSES, ClothSwing, mid_swing
+from .values import Certified
 
 SUITE = "newton"
-TOLERANCE = 1e-10
 # Iterations that are usual where steps have to be quick, and more than those of a quick solver.
 USUAL, SLOW = 10, 1000
 # From this stiffness on [N/m] the slow solvers also start beside Newton's answer, every coordinate
@@ -34,7 +35,7 @@ QUICK, FULL, _FULL = 10, 30, 2000
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield, for each stiffness, every solver's limit and ten local/global iterations."""
     size = FULL if scale.targets >= _FULL else QUICK
-    for stiffness in STIFFNESSES:
+    for stiffness in HEAVY_STIFFNESSES:
         for solver, known in registry.step_solvers().items():
             limit = known.certified
             yield _block(size, stiffness, solver, FROM_Y, limit)
@@ -44,7 +45,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def _block(size: int, stiffness: float, solver: str, start: str, limit: int) -> Block:
-    settings = {"h": H, "start": start, "iterations": limit, "tolerance": TOLERANCE}
+    settings = {"h": FRAME, "start": start, "iterations": limit, "tolerance": TOLERANCE}
     measure = partial(certified_step, size, stiffness, solver, start, limit)
     facts = {"stiffness": stiffness}
     return Block(SUITE, f"swing/k{stiffness:g}", solver, measure, settings, size, facts)
@@ -53,7 +54,7 @@ def _block(size: int, stiffness: float, solver: str, start: str, limit: int) -> 
 def certified_step(size: int, stiffness: float, solver: str, start: str, limit: int) -> Measured:
     """Solve the step; keep what is known of the answer, and how far it is from Newton's."""
     problem = mid_swing(stiffness, size)
-    newton, objective = newtons_answer(problem), _objective(problem)
+    newton, objective = newtons_answer(problem), Objective(problem.system, problem.start, problem.h)
     x, iterations = (
         _solved(problem, solver, limit)
         if start == FROM_Y
@@ -62,23 +63,23 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
     known, here, apart = certify(objective, x), objective.evaluate(x), np.linalg.norm(x - newton.x)
     same = known.shares_minimiser(newton.certificate, float(apart))
     return Measured(
-        {
-            "size": size,
-            "iterations": iterations,
-            "residual": known.residual,
-            "at_floor": here.at_floor,
-            "balance": balance_residual(problem.system, problem.state, x, problem.h),
-            "distance": known.distance,
-            "curvature": known.curvature,
-            "lipschitz": known.lipschitz,
-            "newton_step": known.newton_step,
-            "apart": apart,
-            "error": newton.exact.error(x, objective.y),
-            "above": here.value - newton.value,
-            "covered": known.covered,
-            "same": same is True,
-            "different": same is False,
-        },
+        Certified(
+            size=size,
+            iterations=iterations,
+            residual=known.residual,
+            at_floor=here.at_floor,
+            balance=balance_residual(problem.system, problem.start, x, problem.h),
+            distance=known.distance,
+            curvature=known.curvature,
+            lipschitz=known.lipschitz,
+            newton_step=known.newton_step,
+            apart=float(apart),
+            error=newton.exact.error(x, objective.y),
+            above=here.value - newton.value,
+            covered=known.covered,
+            same=same is True,
+            different=same is False,
+        ),
         {"coverage": known.coverage.name, "why": known.coverage.sentence},
     )
 
@@ -93,31 +94,28 @@ class Converged(NamedTuple):
 
 
 @functools.cache
-def newtons_answer(problem: MidSwing) -> Converged:
+def newtons_answer(problem: ClothSwing) -> Converged:
     """Return what Newton's method comes to, iterated far beyond the rounding floor."""
-    integrator = ImplicitEuler(problem.system, h=problem.h, tolerance=0.0, max_iterations=50)
-    x, objective = integrator.step(problem.state).state.positions, _objective(problem)
-    exact = exact_step(problem.system, problem.state, problem.h, x)
+    integrator = integrator_of(problem, tolerance=0.0, max_iterations=50)
+    x, objective = (
+        integrator.step(problem.start).state.positions,
+        Objective(problem.system, problem.start, problem.h),
+    )
+    exact = exact_step(problem.system, problem.start, problem.h, x)
     return Converged(x, exact, certify(objective, x), objective.value(x))
 
 
-def _objective(problem: MidSwing) -> Objective:
-    return Objective(problem.system, problem.state, problem.h)
-
-
-def _solved(problem: MidSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
-    result = ImplicitEuler(
-        problem.system, h=problem.h, solver=solver, tolerance=TOLERANCE, max_iterations=limit
-    ).step(problem.state)
+def _solved(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
+    result = integrator_of(problem, solver, TOLERANCE, limit).step(problem.start)
     return result.state.positions, result.iterations
 
 
-def _solved_from_beside(problem: MidSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
+def _solved_from_beside(problem: ClothSwing, solver: str, limit: int) -> tuple[FloatArray, int]:
     """Return what the solver comes to, and after how many iterations, from beside the answer.
 
     Solvers start where the objective starts; the residual stays that of the step from y.
     """
-    objective = _objective(problem)
+    objective = Objective(problem.system, problem.start, problem.h)
     moved = copy.copy(objective)
     noise = np.random.default_rng(20130).standard_normal(objective.y.shape)
     noise[problem.system.pinned] = 0.0

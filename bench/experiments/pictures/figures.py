@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from ...figures.sketch import Sketch
-from ...harness.results import Results
+from ...tables.results import Results
 from . import ARM, CLOTH
 from .values import ClothDrawing
 

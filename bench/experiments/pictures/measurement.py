@@ -10,7 +10,7 @@ from plumbob.reference import IK_SOLVERS, ImplicitEuler, scenes, track
 
 from ...harness import metrics
 from ...harness.block import Block, Measured, Scale
-from ..arm.problem import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
+from ...problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
 from ..cloth.measurement import TOLERANCE, converged_motion, motion
 from ..cloth.problem import H, cloth_swing
 from . import ARM, ARM_MOTION, CLOTH, CLOTH_MOTION

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...figures.view import ARM_VIEW, CLOTH_VIEW
 from ...harness.record import Record
-from ...harness.results import Results, counted, label
 from ...motion.motion import Moving, Scene
+from ...tables.results import Results, counted, label
 from . import ARM_MOTION, CLOTH_MOTION
 from .values import ClothMotion
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import label, listed, settings, solvers
 from ...tables.columns import text, words_in
 from ...tables.layout import Layout
+from ...tables.results import label, listed, settings, solvers
 from ...tables.table import Column, Summary, words
 from . import ARM, figures
 from .values import ArmDrawing

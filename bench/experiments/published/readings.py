@@ -8,8 +8,8 @@ import numpy as np
 from ...harness import metrics
 from ...harness.metrics import Interval, Share
 from ...harness.record import Record
-from ...harness.results import Results, label
 from ...peers import registry
+from ...tables.results import Results, label
 from ..robots.readings import Score
 from . import FABRIK, TOOLBOX, TRAC_IK
 from . import problem as published

@@ -5,9 +5,8 @@ from functools import partial
 
 from plumbob.crosscheck.engines import ROBOT_ENGINES
 from plumbob.crosscheck.engines.robot_engine import UnreadableError
-from plumbob.crosscheck.robots.comparisons import differences
+from plumbob.crosscheck.robots.comparisons import CONFIGURATIONS, differences, sweep
 from plumbob.crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
-from plumbob.crosscheck.robots.sweep import CONFIGURATIONS, sweep
 
 from ...harness.block import Block, Measured, Scale
 from . import peers

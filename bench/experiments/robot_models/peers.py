@@ -11,10 +11,10 @@ from plumbob.reference import forward_kinematics, rotation
 from plumbob.reference.formats import mjcf, urdf
 
 from ...harness.block import Block, Measured
+from ...harness.job import worker_process
 from ...harness.worker import Calculation
 from ...peers.registry import KINEMATICS, Peer
-from ..robots.measurement import worker_process
-from ..robots.problem import ALL, is_installed, robot, title
+from ...problems.robots import ALL, is_installed, robot, title
 from . import PEERS
 from .values import RobotValues
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...harness.record import Record
-from ...harness.results import Results, by_problem, listed
 from ...peers import registry
+from ...tables.results import Results, by_problem, listed
 from ...tables.table import words
 from . import PEERS
 from .values import FileDetails

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from operator import methodcaller
 
-from ...harness.results import counted, settings
 from ...tables.columns import folded, text
 from ...tables.layout import Layout
+from ...tables.results import counted, settings
 from ...tables.table import Column, Summary, words
 from .readings import QUANTITIES, Comparison, comparisons, largest
 

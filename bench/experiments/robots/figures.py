@@ -11,8 +11,8 @@ from ...figures.sketch import Sketch, chart_sketch
 from ...figures.style import COLOURS, written
 from ...harness import metrics
 from ...harness.metrics import Floats
-from ...harness.results import Results
 from ...tables.layout import Figure
+from ...tables.results import Results
 from .readings import STARTS, Score, fields_of, profiles, within_budgets
 
 if TYPE_CHECKING:

@@ -3,7 +3,6 @@
 Each solver works in a process of its own. Its answers are evaluated here, by MuJoCo's kinematics.
 """
 
-import functools
 import zlib
 from collections.abc import Iterable, Iterator
 from functools import partial
@@ -13,17 +12,19 @@ import numpy as np
 from msgspec.structs import replace
 
 from ...harness.block import Block, Measured, Scale
-from ...harness.isolation import Outcome, WorkerProcess, raised
-from ...harness.measure import not_installed
+from ...harness.isolation import Outcome, raised
+from ...harness.job import Job, worker_process
+from ...harness.measure import not_asked, not_installed
 from ...harness.stopwatch import Budget
 from ...harness.worker import Solved
 from ...peers import registry
+from ...peers.entrant import ROBOT_TASK
 from ...peers.registry import Entry, Peer
+from ...problems.evaluate import Targets, Tolerance, evaluator_of
+from ...problems.own import OwnProblem
+from ...problems.robot_targets import STRATA, least_distances, robot_targets, unreachable_targets
+from ...problems.robots import PACKAGE, ROBOTS, enter, is_installed, title
 from . import REACHABLE, UNREACHABLE
-from .evaluate import Targets, Tolerance, evaluator_of
-from .job import Job
-from .problem import PACKAGE, ROBOTS, is_installed, title
-from .targets import STRATA, least_distances, robot_targets, unreachable_targets
 from .values import RobotSolves
 
 SUITE = "ik"
@@ -37,6 +38,8 @@ OUT_OF_REACH = 100
 EVERY_SOLVER = "all solvers"
 # Digits kept of times and residuals: more would fill the disk with noise.
 _DIGITS = 5
+ANY = {"kind": "any"}
+NO_ROBOTS = "not asked for robots: it offers no robot_inverse_kinematics"
 
 
 class Run(NamedTuple):
@@ -48,6 +51,13 @@ class Run(NamedTuple):
     tolerance: Tolerance
     budget: float
 
+    def block(self, problem: str, measure: Any, size: float, facts: dict[str, Any]) -> Block:
+        """Return the block of a problem for this solver."""
+        solver = self.peer.called(self.entry)
+        settings = settings_of(self.peer, self.entry, self.tolerance)
+        block = Block(SUITE, problem, solver, measure, settings, size, facts, budget=self.budget)
+        return block.of(self.peer.entrant)
+
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield each solver on each robot; one block for a solver or a robot that is not installed.
@@ -55,21 +65,49 @@ def blocks(scale: Scale) -> Iterator[Block]:
     The solvers of a robot follow each other in an order drawn by lot, so that a machine that gets
     slower or faster does so to all of them.
     """
+    own: dict[str, OwnProblem] = {}
+    for problem in scale.problems:
+        if problem.robot is not None:
+            enter(problem.robot)
+            own[problem.name] = problem
     here = [name for name in ROBOTS if is_installed(name)]
     for name in ROBOTS:
         if name not in here:
-            absent = partial(not_installed, PACKAGE)
-            facts = {"task": REACHABLE, "title": title(name)}
-            yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, {"kind": "any"}, 0, facts)
-    made = [block for peer in registry.PEERS for block in blocks_of(peer, here, scale)]
-    yield from by_lot(made)
+            absent, facts = partial(not_installed, PACKAGE), _facts(REACHABLE, title(name))
+            yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, ANY, 0, facts)
+    peers = registry.robot_peers(scale.entrants)
+    made = by_lot(block for peer in peers for block in blocks_of(peer, [*here, *own], scale))
+    for block in made:
+        name = block.problem.rpartition("/")[2]
+        yield block.on(own[name]) if name in own else block
+    for entrant in scale.entrants:
+        if entrant.offers(SUITE) and ROBOT_TASK not in entrant.tasks:
+            measure, facts = partial(not_asked, NO_ROBOTS), _facts(REACHABLE, "every robot")
+            yield Block(SUITE, "robots/all", entrant.name, measure, ANY, 0, facts).of(entrant)
+
+
+def _facts(task: str, title: str) -> dict[str, Any]:
+    return {"task": task, "title": title}
 
 
 def blocks_of(peer: Peer, robots: list[str], scale: Scale) -> Iterator[Block]:
     """Yield a solver on robots that are installed, by each of its entries."""
     count = max(1, round(_TARGETS * scale.targets))
+    beyond = max(OUT_OF_REACH, count)
     for entry in peer.entries:
-        yield from _entry_blocks(peer, entry, robots, count, scale.seconds)
+        if not peer.is_installed:
+            run = Run("", peer, entry, TOLERANCE, 0.0)
+            absent = partial(not_installed, peer.package)
+            yield run.block("robots/all", absent, 0, _facts(REACHABLE, "every robot"))
+            continue
+        for name in robots:
+            run = Run(name, peer, entry, TOLERANCE, _BUDGET * scale.seconds)
+            measure, size = partial(_solve_strata, run, count), count * len(STRATA)
+            yield run.block(f"robots/{name}", measure, size, _facts(REACHABLE, title(name)))
+            run = run._replace(budget=_BUDGET_BEYOND * scale.seconds)
+            measure = partial(_solve_unreachable, run, beyond)
+            facts = _facts(UNREACHABLE, title(name))
+            yield run.block(f"unreachable/{name}", measure, beyond, facts)
 
 
 def by_lot(blocks: Iterable[Block]) -> list[Block]:
@@ -85,28 +123,6 @@ def by_lot(blocks: Iterable[Block]) -> list[Block]:
 
 def _lot(block: Block) -> int:
     return zlib.crc32(f"{block.problem}, {block.solver}".encode())
-
-
-def _entry_blocks(
-    peer: Peer, entry: Entry, robots: list[str], count: int, seconds: float
-) -> Iterator[Block]:
-    solver = peer.called(entry)
-    settings = settings_of(peer, entry, TOLERANCE)
-    if not peer.version:
-        absent = partial(not_installed, peer.package)
-        facts = {"task": REACHABLE, "title": "every robot"}
-        yield Block(SUITE, "robots/all", solver, absent, settings, 0, facts)
-        return
-    beyond = max(OUT_OF_REACH, count)
-    for name in robots:
-        run = Run(name, peer, entry, TOLERANCE, _BUDGET * seconds)
-        measure = partial(_solve_strata, run, count)
-        facts = {"task": REACHABLE, "title": title(name)}
-        yield Block(SUITE, f"robots/{name}", solver, measure, settings, count * len(STRATA), facts)
-        run = run._replace(budget=_BUDGET_BEYOND * seconds)
-        measure = partial(_solve_unreachable, run, beyond)
-        facts = {"task": UNREACHABLE, "title": title(name)}
-        yield Block(SUITE, f"unreachable/{name}", solver, measure, settings, beyond, facts)
 
 
 def settings_of(peer: Peer, entry: Entry, tolerance: Tolerance) -> dict[str, Any]:
@@ -139,10 +155,8 @@ def solve(run: Run, targets: Targets) -> Measured:
 
     Of targets never begun there is nothing, and tables count them as not solved.
     """
-    robot = evaluator_of(run.robot).robot
-    asked, entry = (run.peer.module, robot, targets, run.tolerance), run.entry
-    job = Job(*asked, entry.settings, entry.restarts, run.budget)
-    outcome = _performed(job, Budget(run.budget))
+    evaluator = evaluator_of(run.robot)
+    robot, outcome = evaluator.robot, _performed(run, targets, Budget(run.budget))
     arrays = _evaluated(run, targets, outcome.solved) if outcome.solved else {}
     return Measured(
         RobotSolves(**arrays, setup=outcome.setup),
@@ -151,24 +165,26 @@ def solve(run: Run, targets: Targets) -> Measured:
             "strata": list(STRATA),
             "tips": list(robot.effectors),  # as the file of records calls them
             "joints": len(robot.joints),
-            "freedom": int(evaluator_of(run.robot).model.nv),
+            "freedom": int(evaluator.model.nv),
             "wanted": "pose" if robot.posed else "position",
             "trouble": raised(outcome.solved),
         },
     )
 
 
-def _performed(job: Job, budget: Budget) -> Outcome:
-    """Return what came of a job; where a target costs the process, a new one goes on behind it."""
-    outcome, starts = worker_process().perform(job), job.targets.starts
-    if not outcome.lost or len(outcome.solved) == len(starts):
+def _performed(run: Run, targets: Targets, budget: Budget) -> Outcome:
+    """Return what came of targets; where one costs the process, a new one goes on behind it."""
+    peer, entry, robot = run.peer, run.entry, evaluator_of(run.robot).robot
+    asked = (peer.module, robot, targets, run.tolerance, {**entry.settings, **peer.spec})
+    outcome = worker_process().perform(Job(*asked, entry.restarts, run.budget, peer.entrant_name))
+    count, size = targets.shape
+    if not outcome.lost or len(outcome.solved) == count:
         return outcome
-    lost = Solved(np.full_like(starts[0], np.nan), 0, worker_process().patience, outcome.trouble)
+    lost = Solved(np.full(size, np.nan), 0, worker_process().patience, outcome.trouble)
     done = [*outcome.solved, lost]
-    remaining = Targets(*(values[len(done) :] for values in job.targets))
-    if budget.is_spent or not len(remaining.starts):
+    if budget.is_spent or len(done) == count:
         return outcome._replace(solved=done)
-    following = _performed(job._replace(targets=remaining), budget)
+    following = _performed(run, targets.after(len(done)), budget)
     done += following.solved
     return following._replace(setup=outcome.setup, solved=done, trouble=raised(done))
 
@@ -186,12 +202,6 @@ def _evaluated(run: Run, targets: Targets, done: list[Solved]) -> dict[str, np.n
         "exception": np.array([bool(one.trouble) for one in done]),
         "stratum": targets.strata[: len(done)],
     }
-
-
-@functools.cache
-def worker_process() -> WorkerProcess:
-    """Return the one process in which all solvers work, one after the other."""
-    return WorkerProcess()
 
 
 def _short(values: np.ndarray) -> np.ndarray:

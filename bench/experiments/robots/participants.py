@@ -5,11 +5,11 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from ...harness.record import Record
-from ...harness.results import Results, counted, listed
 from ...peers import registry
 from ...peers.registry import Entry, Peer
 from ...tables.columns import text
 from ...tables.layout import Layout
+from ...tables.results import Results, counted, listed
 from ...tables.table import Summary
 from . import REACHABLE
 from .readings import STARTS, title_of

@@ -14,11 +14,12 @@ import numpy as np
 from ...harness import metrics
 from ...harness.metrics import Floats, Interval, Ranking, Share, Spread
 from ...harness.record import Record
-from ...harness.results import Results, listed
 from ...peers import registry
 from ...peers.registry import ONE_START, RESTARTS
+from ...problems.robots import LIMIT_TOLERANCE
+from ...tables.results import Results, listed
 from ...tables.table import words
-from . import LIMIT_TOLERANCE, REACHABLE, UNREACHABLE
+from . import REACHABLE, UNREACHABLE
 
 STARTS = (ONE_START, RESTARTS)
 # What a target that is not solved counts for in a mean of times [s], if it did not take longer.

@@ -8,12 +8,13 @@ from functools import partial
 from operator import attrgetter
 
 from ...harness import metrics
-from ...harness.results import leaders, listed, settings, steadiness
+from ...problems.robots import LIMIT_TOLERANCE
 from ...tables.columns import folded, text, words_in
 from ...tables.entered import entered
 from ...tables.layout import Layout
+from ...tables.results import leaders, listed, settings, steadiness
 from ...tables.table import INTERVAL, Cell, Column, Summary, in_unit, listing, words
-from . import LIMIT_TOLERANCE, figures
+from . import figures
 from .participants import participants
 from .readings import (
     OUTCOMES,

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from ...harness.record import Record
-from ...harness.results import listed
 from ...tables.columns import text, titled
 from ...tables.layout import Layout
+from ...tables.results import listed
 from ...tables.table import Cell, Column, Summary
 
 

@@ -1,1 +1,1 @@
-"""Timing by pytest-benchmark: forward kinematics, solves and steps, in one file a subject."""
+"""Timing of forward kinematics, solves and steps, in one file a subject."""

@@ -11,10 +11,8 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.backend.compiled import Kernel
 from plumbob.reference.backend.threads import in_slices
 
-from ...harness.record import Key, key
 from ...peers import registry
 
-TIMING = "timing"
 COMPILED, PLAIN, LIMIT = registry.COMPILED.name, registry.PLAIN.name, registry.LIMIT.name
 OURS = registry.OUR_KINEMATICS.name
 
@@ -33,6 +31,12 @@ class Work(NamedTuple):
     subject: str
     group: str
     title: str
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What the names say, as values."""
+        written = f"{self.group}, {self.title}"
+        return {"subject": self.subject, "group": self.group, "work": self.title, "title": written}
 
 
 @dataclass(frozen=True)
@@ -61,23 +65,6 @@ class Case:
     def name(self) -> str:
         """Problem and solver in one."""
         return f"{self.work.problem}, {self.solver}"
-
-    @property
-    def key(self) -> Key:
-        """The key of its record."""
-        return key(TIMING, self.work.problem, self.solver, self.settings)
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What distinguishes it from another case of the same problem and solver."""
-        return {"operations": self.operations}
-
-    @property
-    def facts(self) -> dict[str, str]:
-        """What the names say, as values."""
-        _, subject, group, title = self.work
-        written = f"{group}, {title}"
-        return {"subject": subject, "group": group, "work": title, "title": written}
 
 
 def copying(work: Work, size: int, *, passes: int = 1, operations: int = 1) -> Case:

@@ -25,6 +25,9 @@ LARGE = 50
 MANY = 1000
 MUJOCO = "MuJoCo"
 
+# Sets a problem up and returns the call to be timed.
+Starter = Callable[[ClothSwing], Callable[[], Any]]
+
 
 def cases() -> Iterator[Case]:
     """Yield one frame of 1/60 s by four methods, at two stiffnesses, and of a larger cloth."""
@@ -46,28 +49,23 @@ def cases() -> Iterator[Case]:
     yield solving(work, large)
 
 
-def local_global(problem: ClothSwing) -> Callable[[], Any]:
-    """Return one step of a fixed number of local/global iterations, factorised beforehand."""
-    limits: dict[str, Any] = {"tolerance": 0.0, "max_iterations": ITERATIONS}
-    integrator = ImplicitEuler(problem.system, h=problem.h, solver="local_global", **limits)
-    return partial(integrator.step, moving(problem))
-
-
-def newton(problem: ClothSwing) -> Callable[[], Any]:
-    """Return one step converged by Newton."""
-    return partial(ImplicitEuler(problem.system, h=problem.h).step, moving(problem))
-
-
-def gauss_newton(problem: ClothSwing) -> Callable[[], Any]:
-    """Return one linearised step."""
-    integrator = ImplicitEuler(problem.system, h=problem.h, solver="gauss_newton")
+def stepping(problem: ClothSwing, **settings: Any) -> Callable[[], Any]:
+    """Return one step of implicit Euler, factorised beforehand."""
+    integrator = ImplicitEuler(problem.system, h=problem.h, **settings)
     return partial(integrator.step, moving(problem))
 
 
 def substeps(problem: ClothSwing) -> Callable[[], Any]:
     """Return one frame of explicit substeps."""
-    step = partial(symplectic_euler, problem.system, h=problem.h / SUBSTEPS)
-    return partial(_repeat, lambda state: step(state=state), moving(problem))
+
+    def run() -> State:
+        state = start
+        for _ in range(SUBSTEPS):
+            state = symplectic_euler(problem.system, state, h=problem.h / SUBSTEPS)
+        return state
+
+    start = moving(problem)
+    return run
 
 
 def mujoco_steps(problem: ClothSwing, integrator: str, count: int) -> Callable[[], Any]:
@@ -109,18 +107,16 @@ def factor_bytes(problem: ClothSwing) -> int:
     return 8 * factor.entries
 
 
-def _repeat(step: Callable[[State], State], state: State) -> State:
-    for _ in range(SUBSTEPS):
-        state = step(state)
-    return state
-
-
 LOCAL_GLOBAL = f"implicit Euler, {ITERATIONS} local-global iterations"
-WORKS = {
+# A fixed number of local/global iterations.
+local_global: Starter = partial(
+    stepping, solver="local_global", tolerance=0.0, max_iterations=ITERATIONS
+)
+WORKS: dict[str, tuple[Starter, Starter | None]] = {
     LOCAL_GLOBAL: (local_global, None),
-    "implicit Euler, Newton to 1e-10": (newton, None),
+    "implicit Euler, Newton to 1e-10": (stepping, None),
     "implicit Euler, linearised once": (
-        gauss_newton,
+        partial(stepping, solver="gauss_newton"),
         partial(mujoco_steps, integrator="discrete", count=1),
     ),
     f"symplectic Euler, {SUBSTEPS} substeps": (

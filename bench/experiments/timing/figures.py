@@ -6,8 +6,8 @@ from ...figures.chart import MARKS, Axis, Chart, Panel, Series, series
 from ...figures.sketch import Sketch, chart_sketch
 from ...harness import metrics
 from ...harness.record import Record
-from ...harness.results import Results, by_problem, solvers
 from ...tables.layout import Figure
+from ...tables.results import Results, by_problem, solvers
 
 
 def timing(subject: str, unit: str, scale: float, title: str) -> Figure:
@@ -39,7 +39,7 @@ def timing(subject: str, unit: str, scale: float, title: str) -> Figure:
 
 def _marks(records: list[Record], solver: str, works: list[str], scale: float) -> Series:
     mine = [record for record in records if record.solver == solver]
-    times = np.array([metrics.timing(record.arrays["seconds"])[:3] for record in mine])
+    times = np.array([metrics.timing(record.values.seconds)[:3] for record in mine])
     median, low, high = scale * times.T
     y = [works.index(record.problem) for record in mine]
     return series(solver, median, y, (low, high), form=MARKS)

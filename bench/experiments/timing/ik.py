@@ -11,8 +11,8 @@ from plumbob.reference import IK_SOLVERS, solve_ik
 from ...peers import registry
 from ...peers.ik.levenberg_marquardt import levenberg_marquardt
 from ...peers.ik.reference_kinematics import ReferenceKinematics
+from ...problems.chains import chain_targets
 from ..chain.measurement import MAX_ITERATIONS, TOLERANCE, Limits
-from ..chain.problem import chain_targets
 from .case import COMPILED, OURS, PLAIN, Case, Work
 
 STRATA = ("near", "far")

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,13 +19,6 @@ READ, WRITTEN = 8 * 4, 8 * (3 + 4)
 LONGER = 5
 # The joints of a body's limbs, each from a joint that is there already: spine, legs, arms.
 LIMBS = ((0, 5), (0, 5), (0, 5), (4, 7), (4, 7))
-
-
-class Model(NamedTuple):
-    """A skeleton, and how many poses make a batch that no near cache holds."""
-
-    skeleton: Skeleton
-    batch: int
 
 
 def cases() -> Iterator[Case]:
@@ -53,12 +46,12 @@ def _work(name: str, title: str) -> Work:
     return Work(f"kinematics/{name}/{title}", "kinematics", name, title)
 
 
-def models() -> dict[str, Model]:
-    """Return the skeletons by name."""
+def models() -> dict[str, tuple[Skeleton, int]]:
+    """Return the skeletons by name, and how many poses make a batch that no near cache holds."""
     return {
-        "10 balls": Model(scenes.ball_chain(links=10)[0], 10_000),
-        "100 balls": Model(scenes.ball_chain(links=100)[0], 1_000),
-        "30-joint tree": Model(body(), 3_000),
+        "10 balls": (scenes.ball_chain(links=10)[0], 10_000),
+        "100 balls": (scenes.ball_chain(links=100)[0], 1_000),
+        "30-joint tree": (body(), 3_000),
     }
 
 

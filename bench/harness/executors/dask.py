@@ -17,8 +17,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from ...experiments import Block, Scale
-from ..executor import NotMeasured, Step
+from ..block import Block, Scale
+from ..executor import Executor, NotMeasured, Step
 from ..machine import stamp
 from ..measure import block_key, failure, record_of
 from ..progress import Progress, announce
@@ -75,7 +75,7 @@ class _Line:
     future: Any = None
 
 
-class DaskExecutor:
+class DaskExecutor(Executor):
     """The workers of a cluster.
 
     Attributes:

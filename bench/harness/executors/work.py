@@ -17,20 +17,31 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...entrants.entrant import Entrant
-from ...entrants.sources import digest_of
-from ...experiments import Block, Scale, blocks
+from ...peers.entrant import Entrant
+from ...peers.protocol import describe
+from ...peers.sources import digest_of
+from ..block import Block, Scale
+from ..experiment import blocks
 from ..folder_lock import open_lock
 from ..isolation import WorkerProcess
 from ..machine import difference, stamp
 from ..measure import block_key, measure
 from ..progress import Progress, listening
 from ..record import Key, encode
-from ..worker import Calculation, describe
+from ..worker import Calculation
 
 # A block that says nothing for so long [s] is given up.
 PATIENCE = 24 * 3600.0
-_own = threading.local()
+
+
+class _Own(threading.local):
+    """The process of a thread."""
+
+    def __init__(self) -> None:
+        self.process = WorkerProcess(PATIENCE, PATIENCE)
+
+
+_own = _Own()
 
 
 class Task(NamedTuple):
@@ -67,7 +78,7 @@ def perform(task: Task) -> Reply:
         return Reply(refused=refused)
     try:
         with _machine_to_itself(task.times), listening(partial(_tell, task.topic)):
-            found = _process().find(Calculation(measured, (task.suite, task.scale, task.key)))
+            found = _own.process.find(Calculation(measured, (task.suite, task.scale, task.key)))
     except RuntimeError as error:
         return Reply(failed=str(error))
     return Reply(**found)
@@ -113,14 +124,6 @@ def _check_files(entrant: Entrant) -> None:
     if (digest := digest_of(entrant.spec)) != entrant.digest:
         found = f"other ones ({digest}, there {entrant.digest})" if digest else "none"
         raise ValueError(f"with: expected the files of {entrant.door}, got {found}")
-
-
-def _process() -> WorkerProcess:
-    """Return the process of this thread."""
-    if not hasattr(_own, "process"):
-        _own.process = WorkerProcess(PATIENCE, PATIENCE)
-    process: WorkerProcess = _own.process
-    return process
 
 
 @contextlib.contextmanager

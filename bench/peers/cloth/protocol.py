@@ -11,6 +11,8 @@ from typing import Protocol
 from plumbob.reference import State
 from plumbob.reference.arguments import FloatArray
 
+from ..protocol import OwnTime
+
 
 class Mover(Protocol):
     """A solver that is set up for a system and the length of a frame."""
@@ -18,8 +20,8 @@ class Mover(Protocol):
     def begin(self, state: State) -> None:
         """Put the particles into a state; what the solver remembers of others is forgotten."""
 
-    def advance(self) -> None:
-        """Move on by one frame.
+    def advance(self) -> OwnTime | None:
+        """Move on by one frame; return the time that it counted, None if the call is timed.
 
         Raises:
             FloatingPointError: if the motion leaves the finite numbers.

@@ -32,11 +32,7 @@ _ROUNDING = 1e-9
 
 
 def prepare(system: MassSpring, frame: float, substeps: int = 1) -> Mover:
-    """Return PyBullet, stepping so many times a frame.
-
-    Raises:
-        ValueError: if the system is no square cloth of equal masses and undamped springs, or large.
-    """
+    """Return PyBullet, stepping so many times a frame; `mesh` says which cloths it takes."""
     return _Steps(system, frame / substeps, substeps)
 
 
@@ -91,22 +87,15 @@ class _Body:
     ) -> None:
         self._client: Any = pybullet.connect(pybullet.DIRECT)
         pybullet.resetSimulation(pybullet.RESET_USE_DEFORMABLE_WORLD, physicsClientId=self._client)
+        springs = {"useMassSpring": 1, "springElasticStiffness": stiffness}
+        springs |= {"springDampingStiffness": 0.0, "springBendingStiffness": 0.0}
+        client = {"physicsClientId": self._client}
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "cloth.obj"
             file.write_text(text, encoding="utf-8")
-            self._number = pybullet.loadSoftBody(
-                str(file),
-                mass=mass,
-                useMassSpring=1,
-                springElasticStiffness=stiffness,
-                springDampingStiffness=0.0,
-                springBendingStiffness=0.0,
-                physicsClientId=self._client,
-            )
+            self._number = pybullet.loadSoftBody(str(file), mass=mass, **springs, **client)
         for particle in pins:
-            pybullet.createSoftBodyAnchor(
-                self._number, particle, -1, -1, physicsClientId=self._client
-            )
+            pybullet.createSoftBodyAnchor(self._number, particle, -1, -1, **client)
         self.write(flat)  # the file was read in single precision
         self.set(np.zeros(3), _INSTANT)
         self.step()
@@ -115,11 +104,8 @@ class _Body:
         pybullet.disconnect(self._client)
 
     def positions(self) -> FloatArray:
-        flags = pybullet.MESH_DATA_SIMULATION_MESH
-        _, vertices = pybullet.getMeshData(
-            self._number, -1, flags=flags, physicsClientId=self._client
-        )
-        return np.array(vertices)
+        shown = {"flags": pybullet.MESH_DATA_SIMULATION_MESH, "physicsClientId": self._client}
+        return np.array(pybullet.getMeshData(self._number, -1, **shown)[1])
 
     def write(self, positions: FloatArray) -> None:
         """Put the particles elsewhere; they keep their velocities."""

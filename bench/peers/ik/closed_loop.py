@@ -9,12 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
 from .pinocchio_model import from_pinocchio, pinocchio_model, to_pinocchio
-from .protocol import Ask, Solve, SolverOutput
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance
 
 STEP = 0.1
 DAMPING = 1e-12

@@ -7,11 +7,7 @@ the joints' limits. DART's own restarts draw from a generator without a seed, so
 import dartpy
 import numpy as np
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
-from .protocol import Ask, Forward, Solve, SolverOutput, needs_a_chain
+from .protocol import Ask, FloatArray, Forward, Robot, Solve, SolverOutput, Tolerance, needs_a_chain
 
 
 def prepare(robot: Robot, tolerance: Tolerance, iterations: int = 200) -> Ask:

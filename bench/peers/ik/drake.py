@@ -19,11 +19,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame
 from pydrake.solvers import IpoptSolver, SnoptSolver, SolverOptions
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
-from .protocol import Ask, Forward, Solve, SolverOutput
+from .protocol import Ask, FloatArray, Forward, Robot, Solve, SolverOutput, Tolerance
 
 # The part of the tolerance that is asked for.
 INSIDE = 0.5

@@ -5,16 +5,24 @@ are left out, and so are solutions beyond the limits, after whole revolutions ar
 start. Its time is that of `calculate_IK`: which of all solutions to take is for its user to choose.
 """
 
+from time import perf_counter
+
 import numpy as np
 from eaik.pybindings import EAIK
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots import LIMIT_TOLERANCE
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot, links
-from ...harness.stopwatch import timed
-from .protocol import Ask, Solve, SolverOutput, UnableError, needs_a_chain
+from ...problems.robots import LIMIT_TOLERANCE, links
+from ..protocol import OwnTime
+from .protocol import (
+    Ask,
+    FloatArray,
+    Robot,
+    Solve,
+    SolverOutput,
+    Tolerance,
+    UnableError,
+    needs_a_chain,
+    pose_matrix,
+)
 
 REVOLUTION = 2.0 * np.pi
 MOST = 6
@@ -35,17 +43,18 @@ def prepare(robot: Robot, tolerance: Tolerance) -> Ask:
         raise UnableError("knows no decomposition of this arm")
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        target = np.eye(4)
-        target[:3, :3], target[:3, 3] = rotations[0], positions[0]
+        target = pose_matrix(positions[0], rotations[0])
 
         def solve() -> SolverOutput:
-            found, seconds = timed(lambda: engine.calculate_IK(target))
+            begin = perf_counter()
+            found = engine.calculate_IK(target)
+            time = OwnTime(perf_counter() - begin)
             exact = [q for q, nearest in zip(found.Q, found.is_LS, strict=True) if not nearest]
             for q in exact:
                 q = within(robot, np.asarray(q))
                 if ((q >= robot.lower) & (q <= robot.upper)).all():
-                    return SolverOutput(q, True, seconds)
-            return SolverOutput(None, False, seconds)
+                    return SolverOutput(q, True, time)
+            return SolverOutput(None, False, time)
 
         return solve
 

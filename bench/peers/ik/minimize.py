@@ -8,11 +8,8 @@ import mujoco
 import numpy as np
 from mujoco import minimize
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.evaluate import Tolerance, mujoco_model
-from ...experiments.robots.problem import Robot
-from .protocol import Ask, Solve, SolverOutput, needs_a_chain
+from ...problems.evaluate import mujoco_model
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, needs_a_chain
 
 SILENT = minimize.Verbosity.SILENT
 

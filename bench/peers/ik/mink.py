@@ -5,13 +5,9 @@ of the task must not be zero: full steps then jump about.
 """
 
 import mink
-import numpy as np
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.evaluate import Tolerance, mujoco_model
-from ...experiments.robots.problem import Robot
-from .protocol import Ask, Solve, SolverOutput
+from ...problems.evaluate import mujoco_model
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
 
 
 def prepare(
@@ -19,18 +15,18 @@ def prepare(
 ) -> Ask:
     """Return the solver, set up for a robot."""
     configuration = mink.Configuration(mujoco_model(robot))
-    limits = [mink.ConfigurationLimit(configuration.model)]
-    cost = 1.0 if robot.posed else 0.0
+    limits, cost = [mink.ConfigurationLimit(configuration.model)], float(robot.posed)
     tasks = [
         mink.FrameTask(effector, "body", 1.0, cost, lm_damping=lm_damping)
         for effector in robot.effectors
     ]
 
-    def solved() -> bool:
-        errors = np.array([task.compute_error(configuration) for task in tasks])
-        sizes = np.linalg.norm(errors.reshape(len(tasks), 2, 3), axis=-1)
-        limit = (tolerance.position, tolerance.rotation if robot.posed else np.inf)
-        return bool((sizes <= limit).all())
+    def step() -> None:
+        velocity = mink.solve_ik(configuration, tasks, 1.0, solver="daqp", limits=limits)
+        configuration.integrate_inplace(velocity, 1.0)
+
+    def is_done() -> bool:
+        return arrived([task.compute_error(configuration) for task in tasks], robot, tolerance)
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
         targets = [
@@ -42,12 +38,8 @@ def prepare(
             for task, target in zip(tasks, targets, strict=True):
                 task.set_target(target)
             configuration.update(start)
-            for _ in range(iterations):
-                if solved():
-                    break
-                velocity = mink.solve_ik(configuration, tasks, 1.0, solver="daqp", limits=limits)
-                configuration.integrate_inplace(velocity, 1.0)
-            return SolverOutput(configuration.q.copy(), solved())
+            done = iterate(step, is_done, iterations)
+            return SolverOutput(configuration.q.copy(), done)
 
         return solve
 

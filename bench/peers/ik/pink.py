@@ -6,15 +6,10 @@ With pink's own damping of 1e-12 the quadratic program is infeasible, and pink r
 `NoSolutionFound`, once a step leaves a joint 1e-7 beyond its limit; with 1e-6 it never is here.
 """
 
-import numpy as np
 import pink
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
 from .pinocchio_model import from_pinocchio, pinocchio_model, to_pinocchio
-from .protocol import Ask, Solve, SolverOutput
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, arrived, iterate
 
 
 def prepare(
@@ -22,19 +17,9 @@ def prepare(
 ) -> Ask:
     """Return the solver, set up for a robot."""
     model = pinocchio_model(robot)
-    data = model.createData()
-    limits = [pink.limits.ConfigurationLimit(model)]
-    tasks = [
-        pink.FrameTask(effector, 1.0, 1.0 if robot.posed else 0.0) for effector in robot.effectors
-    ]
-
+    data, limits = model.createData(), [pink.limits.ConfigurationLimit(model)]
+    tasks = [pink.FrameTask(effector, 1.0, float(robot.posed)) for effector in robot.effectors]
     options = {"solver": "daqp", "damping": damping, "limits": limits, "safety_break": False}
-
-    def solved(configuration: pink.Configuration) -> bool:
-        errors = np.array([task.compute_error(configuration) for task in tasks])
-        sizes = np.linalg.norm(errors.reshape(len(tasks), 2, 3), axis=-1)
-        limit = (tolerance.position, tolerance.rotation if robot.posed else np.inf)
-        return bool((sizes <= limit).all())
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
         targets = [
@@ -46,12 +31,17 @@ def prepare(
             for task, target in zip(tasks, targets, strict=True):
                 task.set_target(target)
             configuration = pink.Configuration(model, data, q0)
-            for _ in range(iterations):
-                if solved(configuration):
-                    break
+
+            def step() -> None:
                 velocity = pink.solve_ik(configuration, tasks, 1.0, **options)
                 configuration.integrate_inplace(velocity, 1.0)
-            return SolverOutput(from_pinocchio(robot, configuration.q), solved(configuration))
+
+            def is_done() -> bool:
+                errors = [task.compute_error(configuration) for task in tasks]
+                return arrived(errors, robot, tolerance)
+
+            done = iterate(step, is_done, iterations)
+            return SolverOutput(from_pinocchio(robot, configuration.q), done)
 
         return solve
 

@@ -1,15 +1,14 @@
 """PlaCo as a program that answers targets, run by the Python of PlaCo's own environment.
 
-    python placo_program.py EFFECTOR ITERATIONS TOLERANCE TOLERANCE_ROTATION JOINT...
-
-First comes a URDF, its length ahead in eight bytes, and is answered by "+". A question is the
-target's position, rotation matrix and a start in double precision; the answer is whether it has
-arrived, the time [s], and the coordinates.
+Its input and output are lines of JSON. The first is {"text": a URDF, "effector", "joints",
+"iterations", "limits": [m] and [rad]} and is answered by true. A question is {"target": a
+transform, "start"}; the answer is whether it has arrived, the time [s], and the coordinates.
 """
 
+import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from time import perf_counter
 
 import numpy as np
@@ -66,28 +65,21 @@ class Reacher:
         )
 
 
-def questions(size: int) -> Iterator[np.ndarray]:
-    """Yield questions of so many numbers until the input ends."""
-    while len(question := sys.stdin.buffer.read(8 * size)) == 8 * size:
-        yield np.frombuffer(question)
-
-
-def main(effector: str, iterations: str, position: str, rotation: str, *joints: str) -> None:
+def main() -> None:
     """Answer questions; what PlaCo prints goes to standard error."""
-    answers = os.fdopen(os.dup(1), "wb")
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    text = sys.stdin.buffer.read(int.from_bytes(sys.stdin.buffer.read(8), "little"))
-    reacher, limits = Reacher(text.decode(), effector, joints), (float(position), float(rotation))
-    answers.write(b"+")
-    answers.flush()
-    for question in questions(12 + len(joints)):
-        target = np.eye(4)
-        target[:3, 3], target[:3, :3] = question[:3], question[3:12].reshape(3, 3)
+    task = json.loads(sys.stdin.readline())
+    reacher = Reacher(task["text"], task["effector"], task["joints"])
+    print("true", file=answers, flush=True)
+    for line in sys.stdin:
+        question = json.loads(line)
+        target, start = np.array(question["target"]), np.array(question["start"])
         before = perf_counter()
-        done, q = reacher.solve(target, question[12:], int(iterations), limits)
-        answers.write(np.concatenate([[done, perf_counter() - before], q]).tobytes())
-        answers.flush()
+        done, q = reacher.solve(target, start, task["iterations"], task["limits"])
+        seconds = perf_counter() - before
+        print(json.dumps([bool(done), seconds, q.tolist()]), file=answers, flush=True)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

@@ -3,12 +3,9 @@
 from typing import Any
 
 from plumbob.reference import Outcome, Target, rotation, solve_ik
-from plumbob.reference.arguments import FloatArray
 from plumbob.reference.formats import mjcf, urdf
 
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
-from .protocol import Ask, Solve, SolverOutput
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance
 
 
 def prepare(
@@ -21,24 +18,13 @@ def prepare(
     """Return the solver, set up for a robot."""
     read = urdf.parse if robot.is_chain else mjcf.parse
     articulation = read(robot.text).articulation
-    settings: dict[str, Any] = {
-        "solver": solver,
-        "restarts": restarts,
-        "max_iterations": iterations,
-        "tolerance": tolerance.position,
-        "tolerance_rotation": tolerance.rotation,
-    }
+    settings: dict[str, Any] = {"solver": solver, "restarts": restarts}
+    settings |= {"max_iterations": iterations, "tolerance": tolerance.position}
+    settings |= {"tolerance_rotation": tolerance.rotation}
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        quaternions = (
-            rotation.from_matrix(rotations) if robot.posed else [None] * len(robot.effectors)
-        )
-        targets = [
-            Target(position, quaternion, effector)
-            for position, quaternion, effector in zip(
-                positions, quaternions, robot.effectors, strict=True
-            )
-        ]
+        quaternions = rotation.from_matrix(rotations) if robot.posed else [None] * len(positions)
+        targets = [*map(Target, positions, quaternions, robot.effectors)]
 
         def solve() -> SolverOutput:
             solution = solve_ik(articulation, start, targets, **settings)

@@ -10,13 +10,21 @@ An adapter of an engine whose kinematics is compared as well has a function `kin
 which returns a `Forward`.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+import contextlib
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 
-from ...experiments.robots.problem import Robot
-from ...harness.worker import describe
+from ...problems.evaluate import Tolerance
+from ...problems.robots import Robot
+from ..protocol import OwnTime, UnableError, describe
+
+__all__ = ["FloatArray", "Robot", "Tolerance", "UnableError"]
 
 
 class SolverOutput(NamedTuple):
@@ -25,13 +33,13 @@ class SolverOutput(NamedTuple):
     Attributes:
         q: the coordinates, in the robot's order; None if it returns none.
         claimed: whether it says that they solve the target; None if it does not say.
-        seconds: what the adapter or its process has measured [s]; None where the call is timed.
+        time: what the adapter or its process has measured; None where the call is timed.
         error: what the solver raised, else "".
     """
 
     q: FloatArray | None
     claimed: bool | None
-    seconds: float | None = None
+    time: OwnTime | None = None
     error: str = ""
 
 
@@ -63,15 +71,6 @@ class Ask(Protocol):
 Forward = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
-def remark_of(adapter: Any) -> str:
-    """Return what an adapter has to say of its numbers, by a function `remark`, else ""."""
-    return str(adapter.remark()) if hasattr(adapter, "remark") else ""
-
-
-class UnableError(ValueError):
-    """What a solver cannot do by its making; the message says what."""
-
-
 def needs_a_chain(robot: Robot) -> None:
     """Raise unless the robot is a chain of hinges with one effector.
 
@@ -80,3 +79,35 @@ def needs_a_chain(robot: Robot) -> None:
     """
     if not robot.is_chain:
         raise UnableError("takes one chain of hinges only")
+
+
+def pose_matrix(position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return a pose as a matrix, (4, 4)."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation, position
+    return T
+
+
+@contextlib.contextmanager
+def robot_file(robot: Robot) -> Iterator[str]:
+    """Yield the path of a file with the robot's text, for engines that read files only."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "robot.urdf" if robot.is_chain else "robot.xml")
+        file.write_text(robot.text, encoding="utf-8")
+        yield str(file)
+
+
+def arrived(errors: Sequence[FloatArray], robot: Robot, tolerance: Tolerance) -> bool:
+    """Return whether the effectors' errors, (6,) each, position first, are within the tolerance."""
+    sizes = np.linalg.norm(np.reshape(errors, (-1, 2, 3)), axis=-1)
+    limits = (tolerance.position, tolerance.rotation if robot.posed else np.inf)
+    return bool((sizes <= limits).all())
+
+
+def iterate(step: Callable[[], object], is_done: Callable[[], bool], iterations: int) -> bool:
+    """Step until that is done, so often at most; return whether it is."""
+    for _ in range(iterations):
+        if is_done():
+            return True
+        step()
+    return is_done()

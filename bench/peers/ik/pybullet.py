@@ -8,19 +8,23 @@ and is left out.
 """
 
 import functools
-import tempfile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pybullet
+from scipy.spatial.transform import Rotation
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
-from .protocol import Ask, Forward, Solve, SolverOutput, needs_a_chain
-from .trac_ik import quaternion_with_w_last
+from .protocol import (
+    Ask,
+    FloatArray,
+    Forward,
+    Robot,
+    Solve,
+    SolverOutput,
+    Tolerance,
+    needs_a_chain,
+    robot_file,
+)
 
 # It stops within this part of the tolerance, which bounds a distance; angles come along.
 INSIDE = 0.1
@@ -45,16 +49,13 @@ def prepare(
     }
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        target = positions[0].tolist(), quaternion_with_w_last(rotations[0]).tolist()
-        first = start.tolist()
-        more = {"restPoses": first} if limits else {}
+        quaternion = Rotation.from_matrix(rotations[0]).as_quat().tolist()
+        target = body.number, body.effector, positions[0].tolist(), quaternion
+        more = {"currentPositions": start.tolist()}
+        more |= {"restPoses": start.tolist()} if limits else {}
 
         def solve() -> SolverOutput:
-            q = np.array(
-                pybullet.calculateInverseKinematics(
-                    body.number, body.effector, *target, currentPositions=first, **more, **shared
-                )
-            )
+            q = np.array(pybullet.calculateInverseKinematics(*target, **more, **shared))
             done = body.is_at(q, positions[0], rotations[0], tolerance) if check else None
             return SolverOutput(q, done)
 
@@ -87,17 +88,10 @@ class BulletBody:
     def __init__(self, robot: Robot) -> None:
         """Load the robot; fixed joints have links of their own."""
         self.client = _client()
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "robot.urdf"
-            file.write_text(robot.text, encoding="utf-8")
-            self.number = pybullet.loadURDF(
-                str(file), useFixedBase=True, physicsClientId=self.client
-            )
-        count = pybullet.getNumJoints(self.number, physicsClientId=self.client)
-        facts = [
-            pybullet.getJointInfo(self.number, joint, physicsClientId=self.client)
-            for joint in range(count)
-        ]
+        with robot_file(robot) as file:
+            self.number = pybullet.loadURDF(file, useFixedBase=True, physicsClientId=self.client)
+        joints = range(pybullet.getNumJoints(self.number, physicsClientId=self.client))
+        facts = [pybullet.getJointInfo(self.number, joint, self.client) for joint in joints]
         self._joints = [fact[0] for fact in facts if fact[2] == pybullet.JOINT_REVOLUTE]
         self.effector = next(f[0] for f in facts if f[12].decode() == robot.effectors[0])
 

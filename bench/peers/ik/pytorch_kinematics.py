@@ -9,11 +9,7 @@ import numpy as np
 import pytorch_kinematics
 import torch
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot
-from .protocol import Ask, Forward, Solve, SolverOutput, needs_a_chain
+from .protocol import Ask, FloatArray, Forward, Robot, Solve, SolverOutput, Tolerance, needs_a_chain
 from .restarts import generator_of
 
 

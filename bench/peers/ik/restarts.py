@@ -4,10 +4,8 @@ import zlib
 
 import numpy as np
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.problem import Robot
-from .protocol import Ask, Solve, SolverOutput, attempt
+from ..protocol import total
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, attempt
 
 _SEED = 1986
 
@@ -31,16 +29,14 @@ def restarted(ask: Ask, robot: Robot, restarts: int) -> Ask:
 
         def solve() -> SolverOutput:
             outputs: list[SolverOutput] = []
-            while len(outputs) < len(attempts) and not (outputs and is_success(outputs[-1])):
-                outputs.append(attempt(attempts[len(outputs)]))
+            for solve_once in attempts:
+                outputs.append(attempt(solve_once))
+                if is_success(outputs[-1]):
+                    break
             last = next((o for o in reversed(outputs) if o.q is not None), outputs[-1])
-            times = [o.seconds for o in outputs if o.seconds is not None]
-            return SolverOutput(
-                last.q,
-                None if last.claimed is None else is_success(last),
-                sum(times) if times else None,
-                next((o.error for o in outputs if o.error), ""),
-            )
+            claimed = None if last.claimed is None else is_success(last)
+            error = next((o.error for o in outputs if o.error), "")
+            return SolverOutput(last.q, claimed, total(o.time for o in outputs), error)
 
         return solve
 

@@ -9,11 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference.arguments import FloatArray
-
-from ...experiments.robots.evaluate import Tolerance
-from ...experiments.robots.problem import Robot, links
-from .protocol import Ask, Solve, SolverOutput, needs_a_chain
+from ...problems.robots import links
+from .protocol import (
+    Ask,
+    FloatArray,
+    Robot,
+    Solve,
+    SolverOutput,
+    Tolerance,
+    needs_a_chain,
+    pose_matrix,
+)
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -51,8 +57,7 @@ def prepare(
         shared |= {"method": damping, "k": factor}
 
     def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
-        target = np.eye(4)
-        target[:3, :3], target[:3, 3] = rotations[0], positions[0]
+        target = pose_matrix(positions[0], rotations[0])
 
         def solve() -> SolverOutput:
             solution = run(target, q0=start, **shared)

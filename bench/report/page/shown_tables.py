@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from ...figures.sketch import Drawing
 from ...harness.metrics import Share
-from ...harness.results import label
+from ...tables.results import label
 from ...tables.table import POWER, Cell, Column, Source, Summary, Table, best_cells, words
 
 

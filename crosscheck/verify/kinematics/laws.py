@@ -1,43 +1,46 @@
-"""Findings that several tasks share."""
+"""Findings that several tasks share, and the judgement of an answer from them."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray, distinct_texts
 
-from ..contestant import Answer, Asked, Failure
+from ..contestant import Answer, Asked
 from ..greeting import Greeting
-from ..judgement import Finding, Verdict
+from ..judgement import CaseJudgement, Finding, Verdict
 from ..sentence import Sentence, sentence
+from ..timing import timed
 
 HOLDS = sentence("It holds.")
 
 
-class Findings:
-    """What was found about one answer."""
+def judged(
+    asked: Asked,
+    greeting: Greeting,
+    laws: Callable[[Mapping[str, Any]], Iterable[Finding]],
+    reference: Callable[[], Any] | None = None,
+    expected: Mapping[str, Any] | None = None,
+    digits: float | None = None,
+) -> CaseJudgement:
+    """Return the judgement of an answer: the laws of its task, then those of every answer.
 
-    def __init__(self, greeting: Greeting) -> None:
-        self.greeting = greeting
-        self._found: list[Finding] = []
-
-    def add(self, finding: Finding) -> None:
-        """Note one."""
-        self._found.append(finding)
-
-    def extend(self, findings: Iterable[Finding]) -> None:
-        """Note several."""
-        self._found.extend(findings)
-
-    @property
-    def broken(self) -> bool:
-        """Whether what was found leaves nothing more to judge."""
-        return any(one.verdict is Verdict.BROKEN for one in self._found)
-
-    @property
-    def all(self) -> tuple[Finding, ...]:
-        """All of them."""
-        return tuple(self._found)
+    Args:
+        asked: the case with its answers.
+        greeting: of the solver.
+        laws: the findings from the answer's values.
+        reference: what is timed beside the solver.
+        expected: what the reference answers, by output.
+        digits: correct significant digits.
+    """
+    case, answer = asked.case, asked.answer
+    seconds = timed(reference)[1] if reference else None
+    findings: list[Finding] = []
+    if isinstance(answer, Answer):
+        repeats = _repeated(answer, asked.again, case.facts["size"], greeting)
+        findings = [*laws(answer.values), repeats, *map(_remark, answer.remarks)]
+    return CaseJudgement(case, answer, tuple(findings), expected or {}, digits, seconds)
 
 
 def bounded(
@@ -45,43 +48,65 @@ def bounded(
     error: float,
     tolerance: float,
     unit: str,
-    told: Sentence,
+    message: Sentence,
     *,
     verdict: Verdict = Verdict.WRONG,
     where: int | None = None,
 ) -> Finding:
-    """Return the finding that an error is within its tolerance, or the verdict if it is not."""
+    """Return the finding that an error is within its tolerance, or the verdict if it is not.
+
+    The sentence is given the error and the joint where it is, unless it has them.
+    """
     if error <= tolerance:
         return Finding(law, Verdict.RIGHT, float(error), tolerance, unit, HOLDS, where)
-    return Finding(law, verdict, float(error), tolerance, unit, told, where)
+    words = Sentence(message.template, {"error": error, "joint": where, **message.values})
+    return Finding(law, verdict, float(error), tolerance, unit, words, where)
+
+
+def of_joints(
+    law: str,
+    errors: FloatArray,
+    tolerance: float,
+    unit: str,
+    message: Sentence,
+    verdict: Verdict = Verdict.WRONG,
+) -> Finding:
+    """Return the finding of the worst joint, at the first that is off: there the fault begins."""
+    worst, wrong = int(np.argmax(errors)), errors > tolerance
+    words = Sentence(message.template, {"joint": worst, **message.values})
+    where = int(np.argmax(wrong)) if wrong.any() else worst
+    return bounded(law, errors[worst], tolerance, unit, words, verdict=verdict, where=where)
+
+
+def missing(message: Sentence) -> Finding:
+    """Return the finding that an answer lacks what is to be judged."""
+    return Finding("numbers", Verdict.BROKEN, np.inf, 0.0, "", message)
 
 
 def no_numbers(law: str, values: FloatArray, tolerance: float) -> Finding:
     """Return the finding that some values of joints are NaN or infinite."""
     joint = int(np.argmin(np.isfinite(values)))
-    told = sentence("The answer of joint {joint} is not a number.", joint=joint)
-    return Finding(law, Verdict.BROKEN, np.inf, tolerance, "", told, joint)
+    message = sentence("The answer of joint {joint} is not a number.", joint=joint)
+    return Finding(law, Verdict.BROKEN, np.inf, tolerance, "", message, joint)
 
 
 def unit(lengths: FloatArray, tolerance: float) -> Finding:
     """Return how far quaternions are off unit length; they are normalised after that."""
-    off = np.abs(lengths - 1.0)
-    joint = int(np.argmax(off))
-    told = sentence(
+    errors = np.abs(lengths - 1.0)
+    joint = int(np.argmax(errors))
+    message = sentence(
         "The quaternion of joint {joint} has the length {length}, not 1; normalise after each "
         "product.",
-        joint=joint,
         length=distinct_texts(lengths[joint], 1.0)[0],
     )
-    return bounded(
-        "unit quaternions", off[joint], tolerance, "", told, verdict=Verdict.RIGHT_BUT, where=joint
-    )
+    law, verdict = "unit quaternions", Verdict.RIGHT_BUT
+    return bounded(law, errors[joint], tolerance, "", message, verdict=verdict, where=joint)
 
 
 def angles(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the angles [rad] between unit quaternions, q and -q being one rotation."""
-    apart = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
-    return 4.0 * np.arcsin(np.minimum(0.5 * apart, 1.0))
+    chords = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    return 4.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))
 
 
 def digits(error: float, size: float) -> float:
@@ -91,45 +116,32 @@ def digits(error: float, size: float) -> float:
     return float(np.clip(-np.log10(max(error, 1e-300) / size), 0.0, 16.0))
 
 
-def repeated(one: Asked, size: float, greeting: Greeting) -> list[Finding]:
+def _repeated(answer: Answer, again: object, size: float, greeting: Greeting) -> Finding:
     """Return whether the same request got the same answer again."""
-    if isinstance(one.again, Failure) or not isinstance(one.answer, Answer):
-        if isinstance(one.answer, Answer):
-            told = sentence("Asked again, it gave no answer.")
-            return [Finding("equal answers", Verdict.BROKEN, np.inf, 0.0, "", told)]
-        return []
-    apart = max(
-        (_apart(value, one.again.values.get(name)) for name, value in one.answer.values.items()),
+    if not isinstance(again, Answer):
+        message = sentence("Asked again, it gave no answer.")
+        return Finding("equal answers", Verdict.BROKEN, np.inf, 0.0, "", message)
+    error = max(
+        (_difference(value, again.values.get(name)) for name, value in answer.values.items()),
         default=0.0,
     )
     tolerance = 16.0 * greeting.epsilon * max(size, 1.0)  # threads may add up in another order
-    told = sentence(
+    message = sentence(
         "Asked the same again, it answers something else, {error:.2g} away: state left over, or "
-        "memory that nobody has filled.",
-        error=apart,
+        "memory that nobody has filled."
     )
-    return [bounded("equal answers", apart, tolerance, "", told)]
+    return bounded("equal answers", error, tolerance, "", message)
 
 
-def _apart(one: object, other: object) -> float:
-    a, b = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
+def _difference(value: object, other: object) -> float:
+    a, b = np.asarray(value, dtype=float), np.asarray(other, dtype=float)
     if a.shape != b.shape or (np.isnan(a) != np.isnan(b)).any():
         return np.inf
     return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
 
 
-def remarks(answer: Answer) -> list[Finding]:
-    """Return what was odd about an answer; a changed model spoils every later request."""
-    return [
-        Finding(
-            "untouched inputs",
-            Verdict.WRONG if spoils(told) else Verdict.RIGHT_BUT,
-            1.0, 0.0, "", told,
-        )
-        for told in answer.remarks
-    ]  # fmt: skip
-
-
-def spoils(remark: Sentence) -> bool:
-    """Return whether a remark says that the skeleton itself was changed."""
-    return remark.values.get("name") in ("offsets", "parents")
+def _remark(remark: Sentence) -> Finding:
+    """Return what was odd about an answer; a changed skeleton spoils every later request."""
+    spoils = remark.values.get("name") in ("offsets", "parents")
+    verdict = Verdict.WRONG if spoils else Verdict.RIGHT_BUT
+    return Finding("untouched inputs", verdict, 1.0, 0.0, "", remark)

@@ -35,19 +35,13 @@ class Line:
         return float(distance[k]), float(along[k])
 
     def _to_segments(self, point: FloatArray) -> tuple[FloatArray, FloatArray]:
-        start, step = self.points[:-1], np.diff(self.points, axis=0)
-        square = np.maximum((step * step).sum(-1), 1e-300)
-        share = np.clip(((point - start) * step).sum(-1) / square, 0.0, 1.0)
-        distance = np.linalg.norm(start + share[:, None] * step - point, axis=-1)
+        distance, share = _to_chords(self.points[:-1], self.points[1:], point)
         return distance, self.at[:-1] + share * self.lengths
 
     def is_on_chord(self, point: FloatArray, bound: float) -> bool:
         """Return whether a point lies between two of the line's points, a corner cut off."""
         i, j = np.triu_indices(len(self.points), 1)
-        start, step = self.points[i], self.points[j] - self.points[i]
-        square = np.maximum((step * step).sum(-1), 1e-300)
-        share = np.clip(((point - start) * step).sum(-1) / square, 0.0, 1.0)
-        distance = np.linalg.norm(start + share[:, None] * step - point, axis=-1)
+        distance, _ = _to_chords(self.points[i], self.points[j], point)
         return bool(distance.min(initial=np.inf) <= bound)
 
     def parameters(self, points: FloatArray, bound: float) -> FloatArray:
@@ -56,14 +50,14 @@ class Line:
         Where a line crosses itself a point is in several places. The last point of a closed line
         may be its first one again.
         """
-        found, before = np.empty(len(points)), 0.0
+        parameters, before = np.empty(len(points)), 0.0
         for i, point in enumerate(points):
             distance, along = self._to_segments(point)
             places = along[distance <= 2.0 * bound]
             later = places[places >= before - 4.0 * bound]
-            found[i] = later.min() if len(later) else places.max(initial=0.0)
-            before = found[i]
-        return found
+            parameters[i] = later.min() if len(later) else places.max(initial=0.0)
+            before = parameters[i]
+        return parameters
 
     def without_bridges(self, at: FloatArray) -> FloatArray:
         """Return lengths along the line that do not count its bridges [m]."""
@@ -73,6 +67,16 @@ class Line:
     def point_at(self, at: FloatArray) -> FloatArray:
         """Return the points at lengths along the line [m]."""
         return np.stack([np.interp(at, self.at, self.points[:, k]) for k in range(3)], axis=-1)
+
+
+def _to_chords(
+    start: FloatArray, end: FloatArray, point: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the distances from a point to chords, and at what share of each it is nearest."""
+    step = end - start
+    square = np.maximum((step * step).sum(-1), 1e-300)
+    share = np.clip(((point - start) * step).sum(-1) / square, 0.0, 1.0)
+    return np.linalg.norm(start + share[:, None] * step - point, axis=-1), share
 
 
 def even_by_count(line: Line, count: int, closed: bool) -> FloatArray:

@@ -11,10 +11,9 @@ from plumbob.reference.arguments import FloatArray, IndexArray
 
 from ..case import Case
 from ..explain import Variant
-from .faults import Switches, combinations, switches
-from .textbook import Chain, Damping, Ending, Pose, ccd_all, fabrik_all, place_all
+from .faults import combinations, switches
+from .textbook import SOLVERS, Chain, Ending, Pose, Switches, place_all
 
-UNDAMPED = Damping()
 RIGHT = Switches()
 
 
@@ -26,14 +25,11 @@ def path_to(parents: IndexArray, effector: int) -> IndexArray:
     return np.array(path[::-1], dtype=np.int64)
 
 
-def forward(
-    inputs: Mapping[str, Any], switched: Switches = RIGHT, local: FloatArray | None = None
-) -> tuple[FloatArray, FloatArray]:
+def forward(inputs: Mapping[str, Any], switched: Switches = RIGHT) -> tuple[FloatArray, FloatArray]:
     """Return positions and global rotations of all joints."""
-    local = _read(inputs["local_rotations"], switched) if local is None else local
-    pose = _unplaced(local)
+    pose = _unplaced(_read(inputs["local_rotations"], switched))
     chain = Chain(inputs["parents"], inputs["offsets"], np.zeros(0, dtype=np.int64))
-    place_all(chain, switched.forward, pose)
+    place_all(chain, switched, pose)
     return pose.positions, pose.rotations
 
 
@@ -42,44 +38,34 @@ def _unplaced(local: FloatArray) -> Pose:
 
 
 def solve(
-    method: str,
-    inputs: Mapping[str, Any],
-    switched: Switches = RIGHT,
-    damping: Damping = UNDAMPED,
+    method: str, inputs: Mapping[str, Any], switched: Switches = RIGHT
 ) -> tuple[FloatArray, FloatArray, int]:
     """Return local rotations, positions as the solver has them, and the number of sweeps."""
     parents = inputs["parents"]
     pose = _unplaced(np.array(_read(inputs["local_rotations"], switched)))
-    last = switched.ccd.effector == 1 or switched.fabrik.effector == 1
-    path = path_to(parents, len(parents) - 1 if last else inputs["effector"])
-    chain = Chain(parents, inputs["offsets"], path)
+    effector = len(parents) - 1 if switched.effector == 1 else inputs["effector"]
+    chain = Chain(parents, inputs["offsets"], path_to(parents, effector))
     target = tuple(inputs["target"].tolist())
-    ending = Ending(float(inputs["tolerance"]), int(inputs["max_iterations"]), switched.stop)
-    if method == "ccd":
-        made = ccd_all(chain, target, ending, switched.forward, switched.ccd, damping, pose)
-    else:
-        made = fabrik_all(chain, target, ending, switched.forward, switched.fabrik, pose)
+    ending = Ending(float(inputs["tolerance"]), int(inputs["max_iterations"]))
+    made = SOLVERS[method](chain, target, ending, switched, pose)
     return _written(pose.local, switched), pose.positions, made
 
 
 def _read(local: FloatArray, switched: Switches) -> FloatArray:
     """Return quaternions as a solver of another order understands them."""
-    return np.roll(local, 1, axis=-1) if switched.order.numbers in (1, 2) else local
+    return np.roll(local, 1, axis=-1) if switched.numbers in (1, 2) else local
 
 
 def _written(local: FloatArray, switched: Switches) -> FloatArray:
-    return np.roll(local, -1, axis=-1) if switched.order.numbers in (2, 3) else local
+    return np.roll(local, -1, axis=-1) if switched.numbers in (2, 3) else local
 
 
 def variants(method: str, most_faults: int = 3) -> Iterator[Variant]:
     """Yield the textbook's method with all combinations of its faults, the fewest first."""
-    predict: Callable[[Switches, Case], Mapping[str, Any]]
-    if method == "forward":
-        predict = predict_forward
-    elif method.startswith("track "):
-        predict = partial(predict_track, method.removeprefix("track "))
-    else:
-        predict = partial(predict_inverse, method)
+    task, _, solver = method.rpartition(" ")
+    predict: Callable[[Switches, Case], Mapping[str, Any]] = predict_forward
+    if method != "forward":
+        predict = partial(predict_track if task else predict_inverse, solver)
     for faults in combinations(method):
         if len(faults) > most_faults:
             return
@@ -93,41 +79,40 @@ def predict_forward(switched: Switches, case: Case) -> Mapping[str, Any]:
     return {"positions": positions, "rotations": _written(rotations, switched)}
 
 
-def predict_inverse(
-    method: str, switched: Switches, case: Case, damping: Damping = UNDAMPED
-) -> Mapping[str, Any]:
+def predict_inverse(method: str, switched: Switches, case: Case) -> Mapping[str, Any]:
     """Return what a solver answers, with `placed`: where its local rotations put the joints.
 
     The rotations that FABRIK's positions stand for are not unique: each link may twist.
     """
-    inputs = case.inputs
-    local, positions, _ = solve(method, inputs, switched, damping)
+    return _predicted(method, switched, case.inputs)[0]
+
+
+def _predicted(
+    method: str, switched: Switches, inputs: Mapping[str, Any]
+) -> tuple[dict[str, Any], FloatArray]:
+    """Return what a solver answers, and its local rotations."""
+    local, positions, _ = solve(method, inputs, switched)
     local = with_effector_of(local, inputs)
     if method == "ccd":
-        return {"positions": positions, "local_rotations": local}
-    return {"positions": positions, "placed": forward(inputs, local=local)[0]}
+        return {"positions": positions, "local_rotations": local}, local
+    placed, _ = forward({**inputs, "local_rotations": local})
+    return {"positions": positions, "placed": placed}, local
 
 
 def predict_track(method: str, switched: Switches, case: Case) -> Mapping[str, Any]:
     """Return what a solver answers that follows a curve frame by frame."""
-    first = case.inputs["local_rotations"]
-    inputs = {key: value for key, value in case.inputs.items() if key != "curve"}
-    curve, follow, start = case.inputs["curve"], switched.follow, first
-    frames = []
+    first, curve = case.inputs["local_rotations"], case.inputs["curve"]
+    start, shift, frames = first, (0, -1, 1)[switched.frame_target], []
     for i in range(len(curve)):
-        shift = (0, -1, 1)[follow.aim]
-        inputs["target"] = curve[np.clip(i + shift, 0, len(curve) - 1)]
-        inputs["local_rotations"] = start
-        frames.append(predict_inverse(method, switched, Case("", "", inputs, "", case.about)))
-        if follow.start == 0:
-            local, _, _ = solve(method, inputs, switched)
-            start = with_effector_of(local, inputs)
-        elif follow.start == 2:
-            start = rotation.identity(len(first))
-    found = {name: np.array([frame[name] for frame in frames]) for name in frames[0]}
-    for local in found.get("local_rotations", ()):
+        target = curve[np.clip(i + shift, 0, len(curve) - 1)]
+        inputs = {**case.inputs, "target": target, "local_rotations": start}
+        frame, local = _predicted(method, switched, inputs)
+        frames.append(frame)
+        start = (local, first, rotation.identity(len(first)))[switched.frame_start]
+    answer = {name: np.array([frame[name] for frame in frames]) for name in frames[0]}
+    for local in answer.get("local_rotations", ()):
         with_effector_of(local, case.inputs)
-    return found
+    return answer
 
 
 def with_effector_of(local: FloatArray, inputs: Mapping[str, Any]) -> FloatArray:

@@ -5,7 +5,9 @@ spare, so that an honest solver does; those of single sweeps such that no rotati
 close to 0 or pi, where honest computations of it differ.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,12 +17,11 @@ from plumbob.reference.arguments import FloatArray
 
 from ..case import Case
 from ..greeting import Greeting
-from ..sentence import Sentence, sentence
+from ..sentence import sentence
 from . import skeletons
-from .faults import Switches
 from .predictions import forward, path_to, solve
-from .skeletons import Posed
-from .textbook import Stop
+from .skeletons import Family, Make, Posed, chains, trees
+from .textbook import SOLVERS, Switches
 
 TASK = "inverse_kinematics"
 # Rotations of single sweeps are at least so far from 0 and pi [rad].
@@ -28,7 +29,7 @@ LEAST_ANGLE = 0.1
 # A sweep that enlarges small changes of its start by more than this tells little.
 MOST_AMPLIFICATION = 30.0
 # A target counts as easy if both textbook solvers reach it in so many sweeps, of how many allowed.
-EASY, ALLOWED = 12, 60
+EASY, ALLOWED = 12, Family._field_defaults["sweeps"]
 # Sweeps allowed where a solver may use up all of them.
 FEW = 25
 DRAWS = 1000
@@ -43,15 +44,7 @@ class Problem(NamedTuple):
     target: FloatArray
 
 
-class Family(NamedTuple):
-    """Problems of a kind: what they try, how one is made, and what is asked for."""
-
-    name: str
-    about: Sentence
-    make: Callable[[np.random.Generator], Problem]
-    copies: int = 1
-    tolerance: float = 1e-4
-    sweeps: int = ALLOWED
+Draw = Callable[[np.random.Generator], Any]
 
 
 def request(problem: Problem, tolerance: float, sweeps: int, method: str) -> dict[str, Any]:
@@ -79,38 +72,44 @@ def facts(inputs: Mapping[str, Any], posed: Posed) -> dict[str, Any]:
         "reach": reach,
         "least": max(0.0, d - reach, 2.0 * longest - reach - d),
         "before": float(np.linalg.norm(x[path[-1]] - inputs["target"])),
-        "start": x,
     }
 
 
-def point_at(problem: Problem, distance: float, rng: np.random.Generator) -> FloatArray:
-    """Return a point at a distance from the root, in a random direction."""
-    direction = rotation.rotate(rotation.random(rng), [1.0, 0.0, 0.0])
-    return problem.posed.offsets[0] + distance * direction
+def accepted(draw: Draw, accept: Callable[[Any], bool]) -> Draw:
+    """Return how to draw until a problem is accepted."""
 
-
-def anywhere(posed: Posed, effector: int, rng: np.random.Generator) -> Problem:
-    """Return a target that the effector can reach, well inside."""
-    moved = posed._replace(local_rotations=rotation.random(rng, len(posed.parents)))
-    target = forward(moved._asdict())[0][effector]
-    return Problem(posed, effector, target)
-
-
-def _sweep_of(
-    make: Callable[[np.random.Generator], Posed], effector: int = -1, sweeps: int = 1
-) -> Any:
-    def problem(rng: np.random.Generator) -> Problem:
-        for _ in range(DRAWS):
-            posed = make(rng)
-            found = anywhere(posed, effector % len(posed.parents), rng)
-            if is_telling(found, sweeps):
-                return found
-        raise AssertionError("no telling problem found")
+    def problem(rng: np.random.Generator) -> Any:
+        drawn = (draw(rng) for _ in range(DRAWS))
+        return next(filter(accept, drawn))
 
     return problem
 
 
-def is_telling(problem: Problem, sweeps: int) -> bool:
+def _within_reach(make: Make, effector: int = -1) -> Draw:
+    """Return how to draw a target that the effector can reach, well inside."""
+
+    def problem(rng: np.random.Generator) -> Problem:
+        posed = make(rng)
+        joint = effector % len(posed.parents)
+        moved = posed._replace(local_rotations=rotation.random(rng, len(posed.parents)))
+        return Problem(posed, joint, forward(moved._asdict())[0][joint])
+
+    return problem
+
+
+def _sweep_of(make: Make, effector: int = -1, sweeps: int = 1) -> Draw:
+    return accepted(_within_reach(make, effector), partial(is_telling, sweeps))
+
+
+def _easy(make: Make, effector: int = -1, tolerance: float = 1e-4) -> Draw:
+    return accepted(_within_reach(make, effector), partial(is_easy, tolerance))
+
+
+def _loose(make: Make, test: int) -> Draw:
+    return accepted(_within_reach(make), partial(shows_stop, test))
+
+
+def is_telling(sweeps: int, problem: Problem) -> bool:
     """Return whether sweeps are well-conditioned and none of their rotations close to 0 or pi."""
     inputs = request(problem, 0.0, sweeps, "ccd")
     path = path_to(problem.posed.parents, problem.effector)
@@ -122,15 +121,15 @@ def is_telling(problem: Problem, sweeps: int) -> bool:
             return False
         before = after
     x, _ = forward(inputs)
-    away = np.linalg.norm(x[path[:-1]] - problem.target, axis=-1).min()
-    return bool(away > 0.2) and amplification(inputs) < MOST_AMPLIFICATION
+    least = np.linalg.norm(x[path[:-1]] - problem.target, axis=-1).min()
+    return bool(least > 0.2) and amplification(inputs) < MOST_AMPLIFICATION
 
 
 def amplification(inputs: Mapping[str, Any]) -> float:
     """Return by how much sweeps of either solver enlarge small changes of the start."""
     rng, step, worst = np.random.default_rng(0), 1e-7, 0.0
     local, target = inputs["local_rotations"], inputs["target"]
-    for method in ("ccd", "fabrik"):
+    for method in SOLVERS:
         _, x, _ = solve(method, inputs)
         for _ in range(3):
             v = step * rng.standard_normal((len(local), 3))
@@ -143,66 +142,56 @@ def amplification(inputs: Mapping[str, Any]) -> float:
     return worst
 
 
-def _easy(
-    make: Callable[[np.random.Generator], Posed], effector: int = -1, tolerance: float = 1e-4
-) -> Any:
-    return _drawn(make, effector, lambda found: is_easy(found, tolerance))
-
-
-def _drawn(
-    make: Callable[[np.random.Generator], Posed],
-    effector: int,
-    accept: Callable[[Problem], bool],
-) -> Any:
-    def problem(rng: np.random.Generator) -> Problem:
-        for _ in range(DRAWS):
-            posed = make(rng)
-            found = anywhere(posed, effector % len(posed.parents), rng)
-            if accept(found):
-                return found
-        raise AssertionError("no such problem found")
-
-    return problem
-
-
-def is_easy(problem: Problem, tolerance: float) -> bool:
+def is_easy(tolerance: float, problem: Problem) -> bool:
     """Return whether both textbook solvers reach the target soon."""
     inputs = request(problem, 0.5 * tolerance, EASY + 1, "")
-    return all(solve(method, inputs)[2] <= EASY for method in ("ccd", "fabrik"))
+    return all(solve(method, inputs)[2] <= EASY for method in SOLVERS)
 
 
-def shows_stop(problem: Problem, tolerance: float, stop: Stop) -> bool:
+def shows_stop(test: int, problem: Problem) -> bool:
     """Return whether both solvers reach the target, but end elsewhere with a faulty test."""
-    inputs = request(problem, tolerance, ALLOWED, "")
-    for method in ("ccd", "fabrik"):
+    inputs = request(problem, LOOSE, ALLOWED, "")
+    for method in SOLVERS:
         _, x, made = solve(method, inputs)
-        _, y, other = solve(method, inputs, Switches(stop=stop))
-        moved = float(np.abs(x - y).max())
-        missed = np.linalg.norm(y[problem.effector] - problem.target) > 1.5 * tolerance
-        if made > ALLOWED // 2 or other == made or (stop.test == 3 and not missed):
+        _, y, other = solve(method, inputs, Switches(test=test))
+        missed = np.linalg.norm(y[problem.effector] - problem.target) > 1.5 * LOOSE
+        if made > ALLOWED // 2 or other == made or (test == 3 and not missed):
             return False
-        if moved < 1e-3:
+        if np.abs(x - y).max() < 1e-3:
             return False
     return True
 
 
+def _of_arm(target: Any, make: Make = lambda rng: skeletons.arm()) -> Draw:
+    """Return a target for the lab's arm, by default straight down."""
+    return lambda rng: Problem(make(rng), 4, np.array(target))
+
+
 def _on_circle(rng: np.random.Generator) -> Problem:
-    for _ in range(DRAWS):
-        target = curves["circle"](150)[rng.integers(150)]
-        found = Problem(skeletons.moved_arm(rng), 4, target)
-        if is_easy(found, 1e-4):
-            return found
-    raise AssertionError("no easy problem found")
+    target = curves["circle"](150)[rng.integers(150)]
+    return Problem(skeletons.moved_arm(rng), 4, target)
 
 
-def _from_rest(rng: np.random.Generator) -> Problem:
-    return Problem(skeletons.arm(), 4, np.array([0.6, 0.0, 0.3]))
+def _at_distance(make: Make, share: float) -> Draw:
+    """Return a target in a random direction, at a share of the reach from the root."""
+
+    def problem(rng: np.random.Generator) -> Problem:
+        posed = make(rng)
+        reach = float(np.linalg.norm(posed.offsets[1:], axis=-1).sum())
+        direction = rotation.rotate(rotation.random(rng), [1.0, 0.0, 0.0])
+        return Problem(posed, len(posed.parents) - 1, posed.offsets[0] + share * reach * direction)
+
+    return problem
 
 
-def _one_link(rng: np.random.Generator) -> Problem:
-    problem = Problem(skeletons.chain(rng, 2), 1, np.zeros(3))
-    length = float(np.linalg.norm(problem.posed.offsets[1]))
-    return problem._replace(target=point_at(problem, length, rng))
+def _at_joint(joint: int, make: Make) -> Draw:
+    """Return a target where a joint is."""
+
+    def problem(rng: np.random.Generator) -> Problem:
+        posed = make(rng)
+        return Problem(posed, len(posed.parents) - 1, forward(posed._asdict())[0][joint])
+
+    return problem
 
 
 def _two_links(rng: np.random.Generator) -> Problem:
@@ -213,143 +202,70 @@ def _two_links(rng: np.random.Generator) -> Problem:
     return Problem(posed, 2, offsets[0] + np.array([5.0, 0.0, 0.0]))
 
 
-def _beyond(rng: np.random.Generator) -> Problem:
-    problem = Problem(skeletons.chain(rng, 4), 3, np.zeros(3))
-    reach = float(np.linalg.norm(problem.posed.offsets[1:], axis=-1).sum())
-    return problem._replace(target=point_at(problem, 1.5 * reach, rng))
+def _links(*lengths: float) -> Make:
+    """Return how to make a chain of links of given lengths [m]."""
 
+    def posed(rng: np.random.Generator) -> Posed:
+        drawn = skeletons.chain(rng, len(lengths) + 1)
+        links = drawn.offsets[1:]
+        links *= np.array(lengths)[:, None] / np.linalg.norm(links, axis=-1, keepdims=True)
+        return drawn
 
-def _arm_beyond(rng: np.random.Generator) -> Problem:
-    return Problem(skeletons.moved_arm(rng), 4, np.array([3.0, 0.5, 2.0]))
-
-
-def _inside(rng: np.random.Generator) -> Problem:
-    posed = skeletons.chain(rng, 4)
-    lengths = np.array([[1.5], [0.4], [0.3]])
-    posed.offsets[1:] *= lengths / np.linalg.norm(posed.offsets[1:], axis=-1, keepdims=True)
-    problem = Problem(posed, 3, np.zeros(3))
-    return problem._replace(target=point_at(problem, 0.3, rng))
-
-
-def _collinear(rng: np.random.Generator) -> Problem:
-    return Problem(skeletons.arm(), 4, np.array([0.0, 0.4, 0.0]))
-
-
-def _backwards(rng: np.random.Generator) -> Problem:
-    return Problem(skeletons.arm(), 4, np.array([0.0, 3.1, 0.0]))
-
-
-def _straight_beyond(rng: np.random.Generator) -> Problem:
-    return Problem(skeletons.arm(), 4, np.array([0.0, -2.0, 0.0]))
-
-
-def _folding(rng: np.random.Generator) -> Posed:
-    """Return a chain that can fold back to its root."""
-    posed = skeletons.chain(rng, 5)
-    lengths = np.array([[0.7], [0.5], [0.6], [0.8]])
-    posed.offsets[1:] *= lengths / np.linalg.norm(posed.offsets[1:], axis=-1, keepdims=True)
     return posed
-
-
-def _at_root(rng: np.random.Generator) -> Problem:
-    posed = _folding(rng)
-    return Problem(posed, 4, posed.offsets[0].copy())
-
-
-def _at_joint(rng: np.random.Generator) -> Problem:
-    posed = _folding(rng)
-    return Problem(posed, 4, forward(posed._asdict())[0][2])
-
-
-def _arrived(rng: np.random.Generator) -> Problem:
-    posed = skeletons.chain(rng, 4)
-    return Problem(posed, 3, forward(posed._asdict())[0][3])
-
-
-def _trees(joints: int) -> Callable[[np.random.Generator], Posed]:
-    return lambda rng: skeletons.tree(rng, joints)
-
-
-def _chains(joints: int) -> Callable[[np.random.Generator], Posed]:
-    return lambda rng: skeletons.chain(rng, joints)
 
 
 _ONE = sentence("A single sweep: one iteration, tolerance 0.")
 _TWO = sentence("Two sweeps, tolerance 0.")
+_REACHABLE = sentence("A target within reach.")
+_FOLDING = _links(0.7, 0.5, 0.6, 0.8)  # can fold back to its root
+# How many copies, the tolerance [m] and the sweeps allowed follow what is drawn.
 FAMILIES = (
-    Family("one sweep, two links", _ONE, _sweep_of(_chains(3)), 2, 0.0, 1),
-    Family("one sweep, three links", _ONE, _sweep_of(_chains(4)), 2, 0.0, 1),
-    Family("one sweep, four links", _ONE, _sweep_of(_chains(5)), 2, 0.0, 1),
+    Family("one sweep, two links", _ONE, _sweep_of(chains(3)), 2, 0.0, 1),
+    Family("one sweep, three links", _ONE, _sweep_of(chains(4)), 2, 0.0, 1),
+    Family("one sweep, four links", _ONE, _sweep_of(chains(5)), 2, 0.0, 1),
     Family("one sweep, arm", _ONE, _sweep_of(skeletons.moved_arm), 1, 0.0, 1),
-    Family(
-        "one sweep, joint in the middle",
-        sentence("A single sweep that moves a joint with others below it."),
-        _sweep_of(_chains(5), 3), 2, 0.0, 1,
-    ),
-    Family("one sweep, tree", _ONE, _sweep_of(_trees(6)), 2, 0.0, 1),
-    Family("two sweeps, two links", _TWO, _sweep_of(_chains(3), -1, 2), 1, 0.0, 2),
-    Family("two sweeps, four links", _TWO, _sweep_of(_chains(5), -1, 2), 1, 0.0, 2),
-    Family(
-        "one link",
-        sentence("One link, its target on the sphere that it can reach."),
-        _one_link,
-    ),
+    Family("one sweep, joint in the middle",
+           sentence("A single sweep that moves a joint with others below it."),
+           _sweep_of(chains(5), 3), 2, 0.0, 1),
+    Family("one sweep, tree", _ONE, _sweep_of(trees(6)), 2, 0.0, 1),
+    Family("two sweeps, two links", _TWO, _sweep_of(chains(3), -1, 2), 1, 0.0, 2),
+    Family("two sweeps, four links", _TWO, _sweep_of(chains(5), -1, 2), 1, 0.0, 2),
+    Family("one link", sentence("One link, its target on the sphere that it can reach."),
+           _at_distance(chains(2), 1.0)),
     Family("two links", sentence("Links of 3 and 4, a target at 5: a right angle."), _two_links),
-    Family("arm", sentence("The lab's arm, a target on its circle."), _on_circle, 2),
-    Family(
-        "arm from rest", sentence("The lab's arm, straight down, a target aside."), _from_rest
-    ),
-    Family("chain of 4", sentence("A target within reach."), _easy(_chains(4)), 2),
-    Family("chain of 7", sentence("A target within reach."), _easy(_chains(7)), 2),
-    Family("tree", sentence("A target within reach of a branch."), _easy(_trees(8)), 1),
-    Family(
-        "joint in the middle",
-        sentence("A target for a joint with others below it."),
-        _easy(_chains(6), 4),
-    ),
-    Family(
-        "loose",
-        sentence("A loose tolerance, which a solver keeps without arriving exactly."),
-        _drawn(_chains(5), -1, lambda found: shows_stop(found, LOOSE, Stop(test=2))), 2, LOOSE,
-    ),
-    Family(
-        "slow approach",
-        sentence("A target that is approached slowly: small steps are not arrival."),
-        _drawn(_chains(5), -1, lambda found: shows_stop(found, LOOSE, Stop(test=3))), 1, LOOSE,
-    ),
-    Family(
-        "tight",
-        sentence("A tight tolerance."),
-        _easy(_chains(5), tolerance=1e-6), 1, 1e-6,
-    ),
-    Family("arrived", sentence("The effector is on its target already."), _arrived),
-    Family("beyond reach", sentence("A target beyond reach."), _beyond, 2, 1e-4, FEW),
-    Family("arm beyond reach", sentence("A target beyond the arm's reach."), _arm_beyond, 1,
+    Family("arm", sentence("The lab's arm, a target on its circle."),
+           accepted(_on_circle, partial(is_easy, 1e-4)), 2),
+    Family("arm from rest", sentence("The lab's arm, straight down, a target aside."),
+           _of_arm([0.6, 0.0, 0.3])),
+    Family("chain of 4", _REACHABLE, _easy(chains(4)), 2),
+    Family("chain of 7", _REACHABLE, _easy(chains(7)), 2),
+    Family("tree", sentence("A target within reach of a branch."), _easy(trees(8))),
+    Family("joint in the middle", sentence("A target for a joint with others below it."),
+           _easy(chains(6), 4)),
+    Family("loose", sentence("A loose tolerance, which a solver keeps without arriving exactly."),
+           _loose(chains(5), 2), 2, LOOSE),
+    Family("slow approach",
+           sentence("A target that is approached slowly: small steps are not arrival."),
+           _loose(chains(5), 3), 1, LOOSE),
+    Family("tight", sentence("A tight tolerance."), _easy(chains(5), tolerance=1e-6), 1, 1e-6),
+    Family("arrived", sentence("The effector is on its target already."), _at_joint(3, chains(4))),
+    Family("beyond reach", sentence("A target beyond reach."), _at_distance(chains(4), 1.5), 2,
            1e-4, FEW),
-    Family(
-        "inner radius",
-        sentence("A target nearer to the root than the longest link allows."),
-        _inside, 1, 1e-4, FEW,
-    ),
-    Family(
-        "at the root", sentence("A target at the root itself."), _at_root, 1, 1e-3, FEW
-    ),
-    Family("at a joint", sentence("A target where a joint is."), _at_joint, 1, 1e-3),
-    Family(
-        "collinear",
-        sentence("A straight arm, its target on the same line: there is no plane to bend in."),
-        _collinear, 1, 1e-4, FEW,
-    ),
-    Family(
-        "opposite",
-        sentence("A straight arm, its target on the same line on the root's other side."),
-        _backwards, 1, 1e-4, FEW,
-    ),
-    Family(
-        "straight beyond",
-        sentence("A straight arm, its target farther out on the same line."),
-        _straight_beyond, 1, 1e-4, FEW,
-    ),
+    Family("arm beyond reach", sentence("A target beyond the arm's reach."),
+           _of_arm([3.0, 0.5, 2.0], skeletons.moved_arm), 1, 1e-4, FEW),
+    Family("inner radius", sentence("A target nearer to the root than the longest link allows."),
+           _at_distance(_links(1.5, 0.4, 0.3), 0.3 / 2.2), 1, 1e-4, FEW),
+    Family("at the root", sentence("A target at the root itself."), _at_joint(0, _FOLDING), 1, 1e-3,
+           FEW),
+    Family("at a joint", sentence("A target where a joint is."), _at_joint(2, _FOLDING), 1, 1e-3),
+    Family("collinear",
+           sentence("A straight arm, its target on the same line: there is no plane to bend in."),
+           _of_arm([0.0, 0.4, 0.0]), 1, 1e-4, FEW),
+    Family("opposite",
+           sentence("A straight arm, its target on the same line on the root's other side."),
+           _of_arm([0.0, 3.1, 0.0]), 1, 1e-4, FEW),
+    Family("straight beyond", sentence("A straight arm, its target farther out on the same line."),
+           _of_arm([0.0, -2.0, 0.0]), 1, 1e-4, FEW),
 )  # fmt: skip
 # Families in which a start or a target leaves a direction undefined.
 DEGENERATE = ("collinear", "opposite", "straight beyond", "at the root", "at a joint", "arrived")
@@ -357,14 +273,13 @@ DEGENERATE = ("collinear", "opposite", "straight beyond", "at the root", "at a j
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return single sweeps, then closed forms, whole solves and hostile targets."""
-    found = []
-    for family in FAMILIES:
-        for i in range(family.copies * (5 if thorough else 1)):
-            name = f"{family.name} {i + 1}"
-            problem = family.make(skeletons.generator(seed, name))
-            if skeletons.suits(problem.posed, greeting):
-                found.append(_case(name, family, problem, greeting, method))
-    return found + _elsewhere(found)
+    drawn = skeletons.drawn(FAMILIES, seed, 5 if thorough else 1)
+    problems = [
+        _case(name, family, problem, greeting, method)
+        for name, family, problem in drawn
+        if skeletons.suits(problem.posed.parents, greeting)
+    ]
+    return [*problems, *_elsewhere(problems)]
 
 
 def _case(name: str, family: Family, problem: Problem, greeting: Greeting, method: str) -> Case:
@@ -372,32 +287,28 @@ def _case(name: str, family: Family, problem: Problem, greeting: Greeting, metho
     if greeting.precision == "single" and family.name == "tight":
         tolerance = 3e-5
     inputs = request(problem, tolerance, family.sweeps, method)
-    known = facts(inputs, problem.posed)
+    facts_of_case = facts(inputs, problem.posed)
     if tolerance == 0.0:
-        known["amplification"] = amplification(inputs)
-        known["sweeps"] = family.sweeps
-    return Case(name, TASK, inputs, family.name, family.about, facts=known)
+        facts_of_case |= {"amplification": amplification(inputs), "sweeps": family.sweeps}
+    return Case(name, TASK, inputs, family.name, family.about, facts=facts_of_case)
 
 
-def _elsewhere(found: list[Case]) -> list[Case]:
-    """Return the first sweeps again in a rotated, scaled and shifted world."""
+def _elsewhere(cases: list[Case]) -> Iterator[Case]:
+    """Yield the first sweeps but two again in a rotated, scaled and shifted world."""
     worlds = (
         ("rotated", rotation.exponential([0.5, -0.8, 1.1]), 1.0, np.zeros(3)),
         ("in other units", rotation.identity(), 1000.0, np.zeros(3)),
         ("shifted", rotation.identity(), 1.0, np.array([2.0, -1.0, 0.5])),
     )
-    again = []
-    for case, (name, Q, scale, shift) in zip(found[2:], worlds, strict=False):
-        if "sweeps" not in case.facts:
-            break
+    swept = [case for case in islice(cases, 2, 2 + len(worlds)) if "sweeps" in case.facts]
+    for case, (name, Q, scale, shift) in zip(swept, worlds, strict=False):
         posed = Posed(*(case.inputs[key] for key in Posed._fields))
         moved = skeletons.in_world(posed, Q, scale, shift)
         target = scale * rotation.rotate(Q, case.inputs["target"]) + shift
         inputs = {**case.inputs, **moved._asdict(), "target": target}
-        known = {
+        facts_of_case = {
+            **case.facts,
             **facts(inputs, moved),
-            "amplification": case.facts["amplification"],
-            "sweeps": case.facts["sweeps"],
             "like": case.name,
             "world": (Q, scale, shift),
         }
@@ -406,7 +317,6 @@ def _elsewhere(found: list[Case]) -> list[Case]:
             case=case.name,
             how=name,
         )
-        again.append(
-            Case(f"{case.name}, {name}", TASK, inputs, "another world", about, facts=known)
+        yield Case(
+            f"{case.name}, {name}", TASK, inputs, "another world", about, facts=facts_of_case
         )
-    return again

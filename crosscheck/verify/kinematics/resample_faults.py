@@ -26,6 +26,14 @@ def _count(case: Case) -> int:
     return pieces if inputs["closed"] else pieces + 1
 
 
+def _even(
+    case: Case, line: Line | None = None, *, more: int = 0, closed: bool | None = None
+) -> FloatArray:
+    """Return evenly spaced points, by default the right ones."""
+    closed = bool(case.inputs["closed"]) if closed is None else closed
+    return even_by_count(line or case.facts["line"], _count(case) + more, closed)
+
+
 def _by_index(case: Case) -> FloatArray:
     """Space points by the number of samples instead of the length along the curve."""
     points, closed = case.facts["line"].points, bool(case.inputs["closed"])
@@ -33,34 +41,15 @@ def _by_index(case: Case) -> FloatArray:
     return np.stack([np.interp(at, np.arange(len(points)), x) for x in points.T], axis=-1)
 
 
-def _without_end(case: Case) -> FloatArray:
-    return even_by_count(case.facts["line"], _count(case), True)
-
-
-def _one_less(case: Case) -> FloatArray:
-    return even_by_count(case.facts["line"], _count(case) - 1, bool(case.inputs["closed"]))
-
-
-def _one_more(case: Case) -> FloatArray:
-    return even_by_count(case.facts["line"], _count(case) + 1, bool(case.inputs["closed"]))
-
-
 def _left_open(case: Case) -> FloatArray:
     """Forget the segment from the end of a closed curve to its start."""
-    curve, closed = case.inputs["curve"], bool(case.inputs["closed"])
-    line = Line(curve, case.facts["line"].strokes, False)
-    return even_by_count(line, _count(case), False) if closed else _right(case)
+    if not case.inputs["closed"]:
+        return _even(case)
+    line = Line(case.inputs["curve"], case.facts["line"].strokes, False)
+    return _even(case, line, closed=False)
 
 
-def _reversed(case: Case) -> FloatArray:
-    return _right(case)[::-1]
-
-
-def _right(case: Case) -> FloatArray:
-    return even_by_count(case.facts["line"], _count(case), bool(case.inputs["closed"]))
-
-
-def _nearest_sample(case: Case) -> FloatArray:
+def _samples_before(case: Case) -> FloatArray:
     """Take the samples at or before the even lengths, without interpolating between them."""
     line, closed = case.facts["line"], bool(case.inputs["closed"])
     at = np.linspace(0.0, line.length, _count(case), endpoint=not closed)
@@ -69,59 +58,42 @@ def _nearest_sample(case: Case) -> FloatArray:
 
 
 FAULTS: dict[str, tuple[Callable[[Case], FloatArray], Sentence]] = {
-    "by index": (
-        _by_index,
-        sentence(
-            "Points are spaced by the number of samples, not by the length along the curve: they "
-            "are as uneven as the samples. Add up the lengths of the segments and divide those."
-        ),
-    ),
-    "end left out": (
-        _without_end,
-        sentence(
-            "The last point is left out on open curves: divide the length by count - 1, so that "
-            "the end is kept."
-        ),
-    ),
-    "one point less": (
-        _one_less,
-        sentence("There is one point less than asked for: the loop ends too early."),
-    ),
-    "one point more": (
-        _one_more,
-        sentence("There is one point more than asked for: count points, not gaps."),
-    ),
-    "left open": (
-        _left_open,
-        sentence("The segment from the end of a closed curve back to its start is missing."),
-    ),
-    "reversed": (
-        _reversed,
-        sentence("The points come in the reverse order of the curve."),
-    ),
-    "samples only": (
-        _nearest_sample,
-        sentence(
-            "Points are taken from the samples. Interpolate between two samples where the even "
-            "length falls between them."
-        ),
-    ),
-}
+    "by index": (_by_index, sentence(
+        "Points are spaced by the number of samples, not by the length along the curve: they are "
+        "as uneven as the samples. Add up the lengths of the segments and divide those.")),
+    "end left out": (partial(_even, closed=True), sentence(
+        "The last point is left out on open curves: divide the length by count - 1, so that the "
+        "end is kept.")),
+    "one point less": (partial(_even, more=-1), sentence(
+        "There is one point less than asked for: the loop ends too early.")),
+    "one point more": (partial(_even, more=1), sentence(
+        "There is one point more than asked for: count points, not gaps.")),
+    "left open": (_left_open, sentence(
+        "The segment from the end of a closed curve back to its start is missing.")),
+    "reversed": (lambda case: _even(case)[::-1], sentence(
+        "The points come in the reverse order of the curve.")),
+    "samples only": (_samples_before, sentence(
+        "Points are taken from the samples. Interpolate between two samples where the even length "
+        "falls between them.")),
+}  # fmt: skip
 
 
 def _predict(make: Callable[[Case], FloatArray], case: Case) -> Mapping[str, Any]:
     return {"points": make(case)}
 
 
-def diagnosis(asked: Sequence[Asked], wrong: Sequence[Asked], greeting: Greeting) -> Diagnosis:
+def diagnosis(
+    asked: Sequence[Asked], wrong: Sequence[Asked], greeting: Greeting, behaviour: Sentence | None
+) -> Diagnosis:
     """Return the faults that reproduce the answers."""
     if not any(isinstance(one.answer, Answer) for one in wrong):
-        return Diagnosis()
-    variants = [Variant((), partial(_predict, _right))]
+        return Diagnosis(behaviour=behaviour)
+    variants = [Variant((), partial(_predict, _even))]
     variants += [Variant((key,), partial(_predict, make)) for key, (make, _) in FAULTS.items()]
     compared = [*wrong, *(one for one in asked if one not in wrong)]
-    found, tried = explain(variants, compared, partial(_likeness, greeting), _describe)
-    return Diagnosis(tuple(one for one in found if one.faults != ("",)), tried=tried)
+    explanations, tried = explain(variants, compared, partial(_likeness, greeting), _describe)
+    named = tuple(one for one in explanations if one.faults != ("",))
+    return Diagnosis(named, behaviour, tried=tried)
 
 
 def _likeness(greeting: Greeting, case: Case) -> float:

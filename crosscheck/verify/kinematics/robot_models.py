@@ -1,17 +1,27 @@
-"""Robots of joints with limits: their kinematics from the formulas, as URDF, and as cases."""
+"""Robots of joints with limits: as the reference's articulations, as URDF, and as cases."""
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
-from plumbob.reference import rotation
+from plumbob.reference import (
+    Articulation,
+    Skeleton,
+    Target,
+    forward_kinematics,
+    judge_pose,
+    rotation,
+)
 from plumbob.reference.arguments import FloatArray
+from plumbob.reference.judging import PoseJudgement
+from plumbob.reference.skeleton import Pose
 
 from ..case import Case
 from ..greeting import Greeting
 from ..sentence import sentence
+from .skeletons import suits
 
 TASK = "robot_inverse_kinematics"
 ITERATIONS = 200
@@ -20,99 +30,68 @@ TOLERANCES = {"double": 1e-5, "single": 1e-3}
 NEAR = 0.1
 # Starts at the answer, near it, anywhere; targets that nothing reaches.
 AT, CLOSE, ANYWHERE, BEYOND = "start at the target", "near start", "any start", "beyond reach"
+# Coordinates beyond this count as there: the reference takes none beyond 1e75.
+FARTHEST = 1e74
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 _SEED = 1955
 
 
-class Pose(NamedTuple):
-    """Where a tool is: a position [m] and a unit quaternion, w first."""
-
-    position: FloatArray
-    rotation: FloatArray
-
-
-class Reading(NamedTuple):
-    """How a solver reads a request; what a faulty one does otherwise is False or another number.
-
-    Attributes:
-        scale: of hinges' coordinates, in radians.
-        relative: whether coordinates count from the start.
-        tool: whether there is a tool.
-        orientations: whether frames are rotated in their parents.
-        own_axes: whether axes are in the joint's own frame rather than in its parent's.
-    """
-
-    scale: float = 1.0
-    relative: bool = False
-    tool: bool = True
-    orientations: bool = True
-    own_axes: bool = True
+def mechanism(inputs: Mapping[str, Any]) -> Articulation:
+    """Return the robot of a request: a fixed base, its joints in their order, the tool."""
+    Z = [0.0, 0.0, 1.0]
+    parents = [-1, *(inputs["parents"] + 1), inputs["effector"] + 1]
+    offsets = [np.zeros(3), *inputs["origins"], inputs["tool_position"]]
+    return Articulation(
+        Skeleton(parents, offsets),
+        ["fixed", *("slide" if slides else "hinge" for slides in inputs["slides"]), "fixed"],
+        [Z, *inputs["axes"], Z],
+        frames=[IDENTITY, *inputs["orientations"], inputs["tool_rotation"]],
+        lower=[-np.inf, *inputs["lower"], -np.inf],
+        upper=[np.inf, *inputs["upper"], np.inf],
+    )
 
 
-RIGHT = Reading()
+def tool_pose(inputs: Mapping[str, Any], q: FloatArray) -> Pose:
+    """Return the tool's position [m], (3,), and rotation, (4,), at coordinates q."""
+    pose = forward_kinematics(mechanism(inputs), q)
+    return Pose(pose.positions[-1], pose.rotations[-1])
 
 
-def tool_pose(inputs: Mapping[str, Any], q: FloatArray, reading: Reading = RIGHT) -> Pose:
-    """Return where the tool is at coordinates q, each joint's frame placed in its parent's."""
-    if reading.relative:
-        q = inputs["start"] + q
-    poses: list[Pose] = []
-    for j in range(len(q)):
-        parent = int(inputs["parents"][j])
-        below = poses[parent] if parent >= 0 else Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
-        poses.append(_moved(below, inputs, j, float(q[j]), reading))
-    carrier = poses[int(inputs["effector"])]
-    if not reading.tool:
-        return carrier
-    return _placed(carrier, inputs["tool_position"], inputs["tool_rotation"])
+def target_of(inputs: Mapping[str, Any]) -> Target:
+    """Return the target of a request's tool."""
+    return Target(inputs["target_position"], inputs["target_rotation"], -1)
 
 
-def _moved(below: Pose, inputs: Mapping[str, Any], j: int, q: float, reading: Reading) -> Pose:
-    orientation = inputs["orientations"][j] if reading.orientations else np.array([1.0, 0, 0, 0])
-    axis = inputs["axes"][j]
-    if inputs["slides"][j]:
-        motion, by = axis * q, np.array([1.0, 0.0, 0.0, 0.0])
-    else:
-        half = 0.5 * q * reading.scale
-        motion, by = np.zeros(3), np.array([math.cos(half), *(math.sin(half) * axis)])
-    if reading.own_axes:
-        return _placed(_placed(below, inputs["origins"][j], orientation), motion, by)
-    moved = _placed(_placed(below, inputs["origins"][j]), motion, by)
-    return _placed(moved, np.zeros(3), orientation)
-
-
-def _placed(below: Pose, position: FloatArray, by: FloatArray | None = None) -> Pose:
-    x = below.position + rotation.rotate(below.rotation, position)
-    return Pose(x, below.rotation if by is None else rotation.multiply(below.rotation, by))
-
-
-def apart(pose: Pose, inputs: Mapping[str, Any]) -> tuple[float, float]:
-    """Return a tool's distance [m] and angle [rad] from its target."""
-    target = inputs["target_rotation"]
-    distance = float(np.linalg.norm(pose.position - inputs["target_position"]))
-    chord = min(np.linalg.norm(pose.rotation - target), np.linalg.norm(pose.rotation + target))
-    return distance, 4.0 * math.asin(min(0.5 * float(chord), 1.0))
+def judgement_of(inputs: Mapping[str, Any], q: FloatArray) -> PoseJudgement:
+    """Return how far the tool is from its target at coordinates q, and these from their limits."""
+    q = np.clip(q, -FARTHEST, FARTHEST)
+    tolerances = {name: inputs[name] for name in ("tolerance", "tolerance_rotation")}
+    return judge_pose(mechanism(inputs), q, target_of(inputs), **tolerances)
 
 
 def urdf(inputs: Mapping[str, Any]) -> str:
     """Return a robot as URDF: links base, link_0 and so on, and the tool."""
-    links = ["base", *(f"link_{j}" for j in range(len(inputs["parents"]))), "tool"]
-    joints = [_urdf_joint(inputs, j) for j in range(len(inputs["parents"]))]
+    count = len(inputs["parents"])
+    named = [f'<link name="{link}"/>' for link in ("base", *map(_link, range(count)), "tool")]
+    joints = [_urdf_joint(inputs, j) for j in range(count)]
     placed = _urdf_origin(inputs["tool_position"], inputs["tool_rotation"])
-    ends = f'<parent link="link_{inputs["effector"]}"/><child link="tool"/>'
+    ends = f'<parent link="{_link(inputs["effector"])}"/><child link="tool"/>'
     joints.append(f'<joint name="to_tool" type="fixed">{placed}{ends}</joint>')
-    named = "".join(f'<link name="{link}"/>' for link in links)
-    return f'<robot name="robot">{named}{"".join(joints)}</robot>'
+    return f'<robot name="robot">{"".join(named + joints)}</robot>'
+
+
+def _link(j: int) -> str:
+    return f"link_{j}" if j >= 0 else "base"
 
 
 def _urdf_joint(inputs: Mapping[str, Any], j: int) -> str:
-    parent = int(inputs["parents"][j])
     kind = "prismatic" if inputs["slides"][j] else "revolute"
     lower, upper = (float(inputs[name][j]) for name in ("lower", "upper"))
     return (
         f'<joint name="joint_{j}" type="{kind}">'
         + _urdf_origin(inputs["origins"][j], inputs["orientations"][j])
-        + f'<parent link="{f"link_{parent}" if parent >= 0 else "base"}"/>'
-        + f'<child link="link_{j}"/><axis xyz="{_numbers(inputs["axes"][j])}"/>'
+        + f'<parent link="{_link(int(inputs["parents"][j]))}"/><child link="{_link(j)}"/>'
+        + f'<axis xyz="{_numbers(inputs["axes"][j])}"/>'
         + f'<limit lower="{lower!r}" upper="{upper!r}" effort="100" velocity="10"/></joint>'
     )
 
@@ -122,26 +101,23 @@ def _urdf_origin(position: FloatArray, quaternion: FloatArray) -> str:
     R = rotation.to_matrix(quaternion)
     pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
     angles = (math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0]))
-    return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(np.array(angles))}"/>'
+    return f'<origin xyz="{_numbers(position)}" rpy="{_numbers(angles)}"/>'
 
 
-def _numbers(values: FloatArray) -> str:
+def _numbers(values: Iterable[float]) -> str:
     return " ".join(repr(float(x)) for x in values)
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return robots of one joint to seven, each from starts at, near and far from the target."""
     rng = np.random.default_rng([_SEED, seed])
-    found = []
-    for name, robot in _robots(rng).items():
-        joints = len(robot["parents"])
-        if greeting.max_joints is not None and joints > greeting.max_joints:
-            continue
-        if greeting.chains_only and (robot["parents"] != np.arange(joints) - 1).any():
-            continue
-        for number in range(3 if thorough else 1):
-            found += list(_of_robot(f"{name}, pose {number + 1}", robot, rng, greeting))
-    return found
+    return [
+        case
+        for name, robot in _robots(rng).items()
+        if suits(robot["parents"], greeting)
+        for number in range(3 if thorough else 1)
+        for case in _of_robot(f"{name}, pose {number + 1}", robot, rng, greeting)
+    ]
 
 
 def _of_robot(
@@ -153,29 +129,24 @@ def _of_robot(
     anywhere = rng.uniform(lower, upper)
     reach = float(sum(np.linalg.norm(x) for x in (*robot["origins"], robot["tool_position"])))
     size = reach + float(np.abs(np.where(robot["slides"], upper - lower, 0.0)).sum())
-    for family, start in ((AT, answer), (CLOSE, close), (ANYWHERE, anywhere)):
-        yield _case(name, family, robot, start, tool_pose(robot, answer), size, greeting)
-    far = Pose(np.array([0.6, 0.0, 0.8]) * 1.5 * size, tool_pose(robot, answer).rotation)
-    yield _case(name, BEYOND, robot, anywhere, far, size, greeting)
-
-
-def _case(
-    name: str, family: str, robot: dict[str, Any], start: FloatArray, target: Pose, size: float,
-    greeting: Greeting,
-) -> Case:  # fmt: skip
+    near = tool_pose(robot, answer)
+    far = near._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * size)
     tolerance = TOLERANCES[greeting.precision]
-    inputs = {
-        **robot,
-        "start": start,
-        "target_position": target.position,
-        "target_rotation": target.rotation,
-        "tolerance": tolerance * max(size, 1.0),
-        "tolerance_rotation": tolerance,
-        "max_iterations": ITERATIONS,
-        "urdf": urdf(robot),
-    }
-    about = sentence("A robot of {joints} joints.", joints=len(start))
-    return Case(f"{name}, {family}", TASK, inputs, family, about, facts={"size": size})
+    starts = ((AT, answer, near), (CLOSE, close, near), (ANYWHERE, anywhere, near),
+              (BEYOND, anywhere, far))  # fmt: skip
+    for family, start, target in starts:
+        inputs = {
+            **robot,
+            "start": start,
+            "target_position": target.positions,
+            "target_rotation": target.rotations,
+            "tolerance": tolerance * max(size, 1.0),
+            "tolerance_rotation": tolerance,
+            "max_iterations": ITERATIONS,
+            "urdf": urdf(robot),
+        }
+        about = sentence("A robot of {joints} joints.", joints=len(start))
+        yield Case(f"{name}, {family}", TASK, inputs, family, about, facts={"size": size})
 
 
 def _robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
@@ -212,11 +183,10 @@ def _robot(
 ) -> dict[str, Any]:  # fmt: skip
     count = len(axes)
     slides = np.zeros(count, dtype=bool) if slides is None else slides
-    still = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
     return {
         "parents": np.array(np.arange(count) - 1 if parents is None else parents),
         "origins": np.array(origins, dtype=float),
-        "orientations": still if orientations is None else orientations,
+        "orientations": rotation.identity(count) if orientations is None else orientations,
         "axes": np.array(axes, dtype=float),
         "slides": slides,
         "lower": np.where(slides, -0.2, -2.2),

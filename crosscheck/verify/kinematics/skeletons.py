@@ -1,10 +1,11 @@
-"""Skeletons and poses for cases: closed forms, the lab's arm, random chains and trees.
+"""Families of cases, and their skeletons and poses: the lab's arm, random chains and trees.
 
 Poses are moved ones: at rest, with all rotations the identity, most faults of forward kinematics
 do not show. No two links are equally long, or a wrong link's length would not show.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,26 @@ from plumbob.reference import rotation, scenes
 from plumbob.reference.arguments import FloatArray, IndexArray
 
 from ..greeting import Greeting
+from ..sentence import Sentence
+
+
+class Family(NamedTuple):
+    """Cases of a kind: what they try, how one is drawn, how many, and what is asked for."""
+
+    name: str
+    about: Sentence
+    draw: Callable[[np.random.Generator], Any]
+    copies: int = 1
+    tolerance: float = 1e-4
+    sweeps: int = 60
+
+
+def drawn(families: Sequence[Family], seed: int, repeats: int) -> Iterator[tuple[str, Family, Any]]:
+    """Yield the name of each case, its family and what is drawn for it."""
+    for family in families:
+        for i in range(family.copies * repeats):
+            name = f"{family.name} {i + 1}"
+            yield name, family, family.draw(generator(seed, name))
 
 
 class Posed(NamedTuple):
@@ -28,6 +49,9 @@ class Posed(NamedTuple):
         return float(np.abs(self.offsets[0]).max() + lengths[1:].sum())
 
 
+Make = Callable[[np.random.Generator], Posed]
+
+
 def generator(seed: int, name: str) -> np.random.Generator:
     """Return the random numbers of a case, independent of those of all others."""
     return np.random.default_rng([seed, *name.encode()])
@@ -35,7 +59,8 @@ def generator(seed: int, name: str) -> np.random.Generator:
 
 def chain(rng: np.random.Generator, joints: int, place: float = 1.0) -> Posed:
     """Return a chain with unequal links in a random pose, its root about `place` metres away."""
-    return Posed(np.arange(-1, joints - 1), _offsets(rng, joints, place), _moved(rng, joints))
+    offsets = _offsets(rng, joints, place)
+    return Posed(np.arange(-1, joints - 1), offsets, rotation.random(rng, joints))
 
 
 def tree(rng: np.random.Generator, joints: int) -> Posed:
@@ -44,7 +69,17 @@ def tree(rng: np.random.Generator, joints: int) -> Posed:
     for j in range(2, joints):
         if rng.uniform() < 0.5 or j == joints - 1:
             parents[j] = rng.integers(max(0, j - 4), j - 1)
-    return Posed(parents, _offsets(rng, joints, 1.0), _moved(rng, joints))
+    return Posed(parents, _offsets(rng, joints, 1.0), rotation.random(rng, joints))
+
+
+def chains(joints: int, place: float = 1.0) -> Make:
+    """Return how to draw chains of so many joints."""
+    return lambda rng: chain(rng, joints, place)
+
+
+def trees(joints: int) -> Make:
+    """Return how to draw trees of so many joints."""
+    return lambda rng: tree(rng, joints)
 
 
 def arm() -> Posed:
@@ -80,10 +115,10 @@ def in_world(posed: Posed, Q: FloatArray, scale: float, shift: FloatArray) -> Po
     return Posed(posed.parents, offsets, local)
 
 
-def suits(posed: Posed, greeting: Greeting) -> bool:
-    """Return whether a solver takes the skeleton."""
-    joints = len(posed.parents)
-    is_chain = bool((posed.parents == np.arange(-1, joints - 1)).all())
+def suits(parents: IndexArray, greeting: Greeting) -> bool:
+    """Return whether a solver takes joints with these parents."""
+    joints = len(parents)
+    is_chain = bool((parents == np.arange(-1, joints - 1)).all())
     return (is_chain or not greeting.chains_only) and joints <= (greeting.max_joints or joints)
 
 
@@ -92,7 +127,3 @@ def _offsets(rng: np.random.Generator, joints: int, place: float) -> FloatArray:
     offsets *= rng.uniform(0.3, 1.2, (joints, 1))
     offsets[0] = place * rng.uniform(0.3, 1.0, 3) * rng.choice([-1.0, 1.0], 3)
     return offsets
-
-
-def _moved(rng: np.random.Generator, joints: int) -> FloatArray:
-    return rotation.random(rng, joints)

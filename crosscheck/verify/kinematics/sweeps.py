@@ -4,7 +4,8 @@ A sweep tells apart what whole solves do not: six of the wrong CCDs that were fo
 programs still reach 999 of 1,000 targets.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -14,14 +15,12 @@ from ..case import Case
 from ..contestant import Answer, Asked
 from ..explain import difference
 from ..greeting import Greeting
-from ..judgement import Diagnosis, Finding, Verdict
+from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
 from ..sentence import Sentence, sentence
 from . import laws, pose_laws, rounding
-from .faults import FAULTS, Fault, Switches, by_key, describe, switches
-from .pose_laws import Posed
+from .faults import FAULTS, Switches, by_key, describe, switches
 from .predictions import predict_inverse, solve
 from .report import diagnosed
-from .textbook import Damping
 
 NAMES = {"ccd": "CCD", "fabrik": "FABRIK"}
 # A textbook's sweeps are those of a solver if so many of them are.
@@ -33,82 +32,102 @@ SEEN_FAULTS = 2
 LAW = "one sweep"
 
 
-class Swept(NamedTuple):
-    """The answer to a request of one or two sweeps."""
+class Trial:
+    """A case, its answer as the laws see it, and the judgement, which grows.
 
-    case: Case
-    posed: Posed
+    Attributes:
+        asked: the case with its answers.
+        posed: the pose answered.
+        judgement: at first without findings.
+    """
+
+    def __init__(self, asked: Asked) -> None:
+        values = asked.answer.values if isinstance(asked.answer, Answer) else {}
+        self.asked, self.case = asked, asked.case
+        self.posed = pose_laws.understood(values, self.case.inputs, self.case.facts)
+        self.judgement = CaseJudgement(asked.case, asked.answer, (), {})
 
     @property
-    def asked(self) -> Asked:
+    def is_sweep(self) -> bool:
+        """Whether one or two sweeps were asked for."""
+        return "sweeps" in self.case.facts
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether a law is broken."""
+        return self.judgement.verdict >= Verdict.WRONG
+
+    @property
+    def seen(self) -> Asked:
         """The answer as variants predict it."""
         answer = Answer(self.posed.comparable, 0.0)
         return Asked(self.case, answer, answer)
 
+    def add(self, findings: Sequence[Finding]) -> None:
+        """Add findings to the judgement."""
+        self.judgement = replace(self.judgement, findings=(*self.judgement.findings, *findings))
+
+    def correct(self, correction: Callable[[Finding], Finding]) -> None:
+        """Let each finding be what a function returns for it."""
+        findings = tuple(map(correction, self.judgement.findings))
+        self.judgement = replace(self.judgement, findings=findings)
+
 
 class Comparison(NamedTuple):
-    """What the sweeps say.
+    """What the sweeps say."""
 
-    Attributes:
-        method: "ccd", "fabrik" or "", as declared or inferred.
-        declared: as declared.
-        behaviour: what was inferred, in words.
-        off: names of the cases whose sweeps are not the textbook's.
-        findings: by the names of cases.
-        honest: whether they are another honest solver's, which may be slower.
-        damped: how its rotations are made smaller on purpose, if they are.
-    """
-
-    method: str
-    declared: str
-    behaviour: Sentence | None
-    off: Sequence[str]
-    findings: Mapping[str, Sequence[Finding]]
-    honest: bool = False
-    damped: Sentence | None = None
+    method: str  # "ccd", "fabrik" or "", as declared or inferred
+    behaviour: Sentence | None = None  # what was inferred, in words
+    wrong: Sequence[str] = ()  # names of the cases whose sweeps are not the textbook's
+    findings: Mapping[str, Sequence[Finding]] = {}  # by the names of cases
+    honest: bool = False  # whether they are another honest solver's, which may be slower
+    damped: Sentence | None = None  # how its rotations are made smaller on purpose, if they are
 
 
-def likeness(case: Case, greeting: Greeting) -> float:
+def likeness(greeting: Greeting, case: Case) -> float:
     """Return the relative difference that still counts as a variant's answer."""
-    joints, known = len(case.inputs["parents"]), case.facts
-    amplification = known.get("amplification", 10.0)
-    bound = rounding.sweep(greeting.epsilon, joints, known["size"], amplification)
-    return max(1e-9, 4.0 * bound / known["size"])
+    joints, size = len(case.inputs["parents"]), case.facts["size"]
+    amplification = case.facts.get("amplification", 10.0)
+    bound = rounding.sweep(greeting.epsilon, joints, size, amplification)
+    return max(1e-9, 4.0 * bound / size)
 
 
 def compare(
-    swept: Sequence[Swept], method: str, declared: str, others_hold: bool, greeting: Greeting
+    swept: Sequence[Trial], method: str, declared: str, others_hold: bool, greeting: Greeting
 ) -> Comparison:
     """Return the findings of the sweeps of a method that is declared, or seen."""
     if not method:
-        return Comparison("", "", None, (), {})
+        return Comparison("")
     errors = {one.case.name: _error(one, method, greeting) for one in swept}
-    off = [name for name, (error, bound) in errors.items() if not error <= bound]
+    wrong = [name for name, (error, bound) in errors.items() if not error <= bound]
     behaviour = None
     if not declared:
         behaviour = sentence(
             "Its sweeps resemble those of {method}, with which it is compared."
-            if off
+            if wrong
             else "Its sweeps are those of {method}.",
             method=NAMES[method],
         )
-    verdict, told, damped = Verdict.RIGHT, laws.HOLDS, None
-    if off:
-        verdict, told = _verdict(swept, method, others_hold, greeting)
-        if method == "ccd" and honest_variant(swept, method, greeting) is None:
-            damped = damping_of(swept, greeting)
-        if damped is not None:
-            verdict, told = Verdict.RIGHT_BUT, damped
-    findings = {
-        name: [Finding(LAW, verdict if name in off else Verdict.RIGHT, error, bound, "m",
-                       told if name in off else laws.HOLDS)]
-        for name, (error, bound) in errors.items()
-    }  # fmt: skip
-    honest = verdict is Verdict.RIGHT_BUT
-    return Comparison(method, declared, behaviour, off, findings, honest, damped)
+    holds = verdict, message = Verdict.RIGHT, laws.HOLDS
+    damped = None
+    if wrong:
+        honest = honest_variant(swept, method, greeting)
+        damped = damping_of(swept, greeting) if method == "ccd" and honest is None else None
+        choice = honest or damped
+        verdict, message = (
+            (Verdict.RIGHT_BUT, choice)
+            if choice
+            else _verdict(swept, method, others_hold, greeting)
+        )
+    findings = {}
+    for name, (error, bound) in errors.items():
+        outcome, words = (verdict, message) if name in wrong else holds
+        findings[name] = [Finding(LAW, outcome, error, bound, "m", words)]
+    is_honest = verdict is Verdict.RIGHT_BUT
+    return Comparison(method, behaviour, wrong, findings, is_honest, damped)
 
 
-def seen(swept: Sequence[Swept], greeting: Greeting) -> str:
+def seen(swept: Sequence[Trial], greeting: Greeting) -> str:
     """Return the method whose sweeps most of the answers are, right or with a fault, or ""."""
     for method in NAMES:
         errors = [_error(one, method, greeting) for one in swept]
@@ -124,40 +143,36 @@ def seen(swept: Sequence[Swept], greeting: Greeting) -> str:
     return best if fits[best][0] >= MOST else ""
 
 
-def _is_another_solver(greeting: Greeting, one: Swept) -> bool:
+def _is_another_solver(greeting: Greeting, one: Trial) -> bool:
     """Return whether a pose keeps all laws and has arrived, whatever was asked for."""
-    found = pose_laws.all_of(one.posed, one.case, greeting)
-    keeps = all(finding.verdict < Verdict.WRONG for finding in found)
+    findings = pose_laws.all_of(one.posed, one.case, greeting)
+    keeps = all(finding.verdict < Verdict.WRONG for finding in findings)
     return keeps and _goes_on(one, greeting)
 
 
-def _best_fit(swept: Sequence[Swept], method: str, greeting: Greeting) -> tuple[float, int]:
+def _best_fit(swept: Sequence[Trial], method: str, greeting: Greeting) -> tuple[float, int]:
     """Return what share of the sweeps a faulty textbook reproduces, and minus its faults."""
-    asked = [one.asked for one in swept]
-    found = diagnosed(
-        method, asked, asked, lambda case: likeness(case, greeting), most_faults=SEEN_FAULTS
-    ).explanations
-    if not found:
-        return 0.0, 0
-    return found[0].share, -len(found[0].faults[0].split(" + "))
+    asked = [one.seen for one in swept]
+    alike = partial(likeness, greeting)
+    explanations = diagnosed(method, asked, asked, alike, most_faults=SEEN_FAULTS).explanations
+    return (
+        (explanations[0].share, -len(explanations[0].faults[0].split(" + ")))
+        if explanations
+        else (0.0, 0)
+    )
 
 
-def _error(one: Swept, method: str, greeting: Greeting) -> tuple[float, float]:
+def _error(one: Trial, method: str, greeting: Greeting) -> tuple[float, float]:
     """Return how far the path's joints are from the textbook's, and what rounding allows [m]."""
     _, x, _ = solve(method, one.case.inputs)
-    path, known = one.posed.path, one.case.facts
-    error = float(np.abs(one.posed.positions[path] - x[path]).max())
-    joints, size = len(one.posed.start), known["size"]
-    return error, rounding.sweep(greeting.epsilon, joints, size, known["amplification"])
+    size, amplification = one.case.facts["size"], one.case.facts["amplification"]
+    return one.posed.distance_to(x), rounding.sweep(greeting.epsilon, len(x), size, amplification)
 
 
 def _verdict(
-    swept: Sequence[Swept], method: str, others_hold: bool, greeting: Greeting
+    swept: Sequence[Trial], method: str, others_hold: bool, greeting: Greeting
 ) -> tuple[Verdict, Sentence]:
     """Return what follows from sweeps that are not the textbook's."""
-    honest = honest_variant(swept, method, greeting)
-    if honest is not None:
-        return Verdict.RIGHT_BUT, honest
     if others_hold and all(_goes_on(one, greeting) for one in swept):
         return Verdict.RIGHT_BUT, sentence(
             "It goes on to the target although one sweep was asked for (max_iterations 1, "
@@ -178,13 +193,13 @@ def _verdict(
     )
 
 
-def _goes_on(one: Swept, greeting: Greeting) -> bool:
-    return one.posed.distance(one.case) <= rounding.STALL[greeting.precision] * max(
-        one.case.facts["reach"], 1e-300
-    )
+def _goes_on(one: Trial, greeting: Greeting) -> bool:
+    """Return whether the effector has arrived, or as near as helpers let it."""
+    stall = rounding.STALL[greeting.precision] * max(one.case.facts["reach"], 1e-300)
+    return one.posed.distance <= stall
 
 
-def _ends_well(one: Swept) -> bool:
+def _ends_well(one: Trial) -> bool:
     """Return whether the last joint of a sweep has brought the effector onto its line."""
     x, target = one.posed.positions, one.case.inputs["target"]
     return any(
@@ -197,24 +212,24 @@ def _angle(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
 
-def honest_variant(swept: Sequence[Swept], method: str, greeting: Greeting) -> Sentence | None:
+def honest_variant(swept: Sequence[Trial], method: str, greeting: Greeting) -> Sentence | None:
     """Return what an honest solver does otherwise than the textbook, if it explains all sweeps."""
     for fault in (one for one in FAULTS[method] if one.honest and one.key != "tolerance squared"):
-        if _explains(swept, method, greeting, (fault,), Damping()):
+        if _explains(swept, method, greeting, switches([fault])):
             return describe(method, [fault.key])
     return None
 
 
-def damping_of(swept: Sequence[Swept], greeting: Greeting) -> Sentence | None:
+def damping_of(swept: Sequence[Trial], greeting: Greeting) -> Sentence | None:
     """Return by how much a CCD scales or caps its rotations, if that explains all sweeps."""
-    for faults in ((), *(((one,)) for one in FAULTS["ccd"] if one.key == "root to tip")):
-        gain, most = _damping(swept, switches(faults))
-        scaled, capped = Damping(gain=gain), Damping(most=most)
-        if SMALLEST < gain < 0.999 and _explains(swept, "ccd", greeting, faults, scaled):
+    for switched in (Switches(), switches([by_key("ccd")["root to tip"]])):
+        gain, most = _damping(swept, switched)
+        scaled, capped = switched._replace(gain=gain), switched._replace(most=most)
+        if SMALLEST < gain < 0.999 and _explains(swept, "ccd", greeting, scaled):
             return sentence(
                 "It is CCD with each rotation scaled by {gain:.4g}, which is slower.", gain=gain
             )
-        if most > SMALLEST and _explains(swept, "ccd", greeting, faults, capped):
+        if most > SMALLEST and _explains(swept, "ccd", greeting, capped):
             return sentence(
                 "It is CCD with each rotation capped at {angle:.4g} rad, which is slower.",
                 angle=most,
@@ -222,7 +237,7 @@ def damping_of(swept: Sequence[Swept], greeting: Greeting) -> Sentence | None:
     return None
 
 
-def _damping(swept: Sequence[Swept], switched: Switches) -> tuple[float, float]:
+def _damping(swept: Sequence[Trial], switched: Switches) -> tuple[float, float]:
     """Return by what share the first joint of a sweep was rotated, and the largest angle."""
     gain, most = 1.0, 0.0
     for one in swept:
@@ -231,48 +246,42 @@ def _damping(swept: Sequence[Swept], switched: Switches) -> tuple[float, float]:
         start = one.case.inputs["local_rotations"]
         local, _, _ = solve("ccd", one.case.inputs, switched)
         path = one.posed.path
-        first = path[0] if switched.ccd.order == 1 else path[-2]
+        first = path[0] if switched.order == 1 else path[-2]
         theirs = laws.angles(one.posed.local, start)
-        ours = laws.angles(local, start)
-        gain = float(theirs[first] / ours[first])
+        gain = float(theirs[first] / laws.angles(local, start)[first])
         most = max(most, float(theirs[path].max()))
     return gain, most
 
 
-def _explains(
-    swept: Sequence[Swept],
-    method: str,
-    greeting: Greeting,
-    faults: Sequence[Fault],
-    damping: Damping,
-) -> bool:
+def _explains(swept: Sequence[Trial], method: str, greeting: Greeting, switched: Switches) -> bool:
     return all(
-        difference(
-            predict_inverse(method, switches(faults), one.case, damping), one.posed.comparable
-        )
-        <= likeness(one.case, greeting)
+        difference(predict_inverse(method, switched, one.case), one.posed.comparable)
+        <= likeness(greeting, one.case)
         for one in swept
     )
 
 
 def explained(
-    found: Comparison, all_sweeps: Sequence[Asked], off: Sequence[Asked], greeting: Greeting
+    comparison: Comparison, all_sweeps: Sequence[Trial], wrong: Sequence[Trial], greeting: Greeting
 ) -> Diagnosis:
     """Return the faults that reproduce the sweeps."""
-    if not found.method:
+    if not comparison.method:
         return Diagnosis()
-    if found.damped is not None:
-        return Diagnosis(behaviour=found.damped)
+    if comparison.damped is not None:
+        return Diagnosis(behaviour=comparison.damped)
+    alike = partial(likeness, greeting)
+    seen = {one.case.name: one.seen for one in all_sweeps}
+    trials_seen = [seen[one.case.name] for one in wrong]
     return diagnosed(
-        found.method, all_sweeps, off, lambda case: likeness(case, greeting), found.behaviour
+        comparison.method, list(seen.values()), trials_seen, alike, comparison.behaviour
     )
 
 
 def is_grave(method: str, diagnosis: Diagnosis) -> bool:
     """Return whether a fault that nobody makes on purpose reproduces every sweep."""
-    by_keys = by_key(method)
+    faults = by_key(method)
     return any(
         one.share == 1.0
-        and not any(by_keys[key].honest for name in one.faults for key in name.split(" + "))
+        and not any(faults[key].honest for name in one.faults for key in name.split(" + "))
         for one in diagnosis.explanations
     )

@@ -1,17 +1,19 @@
 """Forward kinematics, CCD and FABRIK as textbooks have them, with a switch for each known fault.
 
-With every switch at 0 they are right. The switches of one tuple are independent of one another, so
-that faults combine; each number of a switch is a fault of the catalogue in `faults.py`.
+With every switch at 0 they are right. Switches are independent of one another, so that faults
+combine; `faults.py` says what each number of a switch does. Where faults are other choices of one
+quantity, the code lists them in the order of their numbers, the right one first.
 
 The solvers keep the local rotations of the whole skeleton and place all joints anew after each
-rotation, as a student's program does, not the reference's chain of global rotations.
+rotation, as a student's program does, not the reference's chain of global rotations. In CCD, d is
+the world rotation of a joint, R its global and Q its local rotation.
 """
 
 import math
 from typing import Any, NamedTuple
 
 from plumbob.reference.arguments import FloatArray, IndexArray
-from plumbob.reference.backend.compiled import Kernel
+from plumbob.reference.backend.compiled import Kernel, bind
 from plumbob.reference.quaternion import (
     IDENTITY,
     add,
@@ -32,94 +34,41 @@ from plumbob.reference.quaternion import (
 )
 
 ORIGIN = (0.0, 0.0, 0.0)
+# Numbers of `applied` from this one on rotate the child on the path.
+GIVEN_TO_CHILD = 10
 
 
-class Forward(NamedTuple):
-    """Switches of forward kinematics: x = x_p + R_p offset, R = R_p Q, with p the parent.
-
-    Attributes:
-        frame: what rotates an offset: 1 nothing, 2 the joint's own R, 3 the parent's inverse, 4 the
-            grandparent's R, 5 the parent's local Q, 6 the joint's own Q.
-        product: R is 1 Q R_p, 2 R_p Q*, 3 Q only, 4 R_p only.
-        base: what an offset is added to: 1 the parent's place at rest, 2 the root.
-        root: the root's 1 offset is dropped, 2 rotation is dropped, 3 offset is rotated by it.
-        parent: 1 the joint before in the list.
-    """
-
-    frame: int = 0
-    product: int = 0
-    base: int = 0
-    root: int = 0
-    parent: int = 0
+UNCAPPED = 10.0  # an angle that no rotation has [rad]
 
 
-class Ccd(NamedTuple):
-    """Switches of CCD, where d is the world rotation of joint j, R its global rotation.
+class Switches(NamedTuple):
+    """The number of the fault in each rule of a solver; 0 is right."""
 
-    Attributes:
-        applied: Q becomes, instead of R_p* d R_p Q: 1 d Q, 2 Q d, 3 R_p d R_p* Q, 4 R* d R Q,
-            5 R d R* Q, 6 d R, 7 R_p* d Q, 8 d, 9 Q R_p* d R_p; that of the child on the path
-            becomes 10 d Q, 11 R* d R Q.
-        angle: of d: 1 negative, 2 doubled, 3 halved.
-        order: 1 root to tip.
-        joints: 1 without the root, 2 without the effector's parent.
-        update: 1 the joints are not placed anew until the end of a sweep.
-        aim: the two directions: 1 the target from the origin, 2 the effector from the origin, 3 the
-            target counted from the root, 4 the gap between effector and target.
-        start: 1 the rest pose.
-        effector: 1 the last joint.
-    """
-
-    applied: int = 0
-    angle: int = 0
-    order: int = 0
-    joints: int = 0
-    update: int = 0
-    aim: int = 0
-    start: int = 0
-    effector: int = 0
-
-
-class Damping(NamedTuple):
-    """What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad]."""
-
+    numbers: int = 0  # the order of a quaternion's numbers
+    frame: int = 0  # forward kinematics: what rotates an offset
+    product: int = 0  # R of R_parent and Q
+    base: int = 0  # what an offset is added to
+    root: int = 0  # the root's pose
+    parent: int = 0  # which joint is the parent
+    applied: int = 0  # CCD: what Q becomes
+    angle: int = 0  # of d
+    order: int = 0  # of joints in a sweep
+    joints: int = 0  # which joints a sweep leaves out
+    update: int = 0  # when joints are placed anew
+    aim: int = 0  # the two directions that d joins
+    passes: int = 0  # FABRIK: which passes there are
+    base_joint: int = 0  # where the root goes back to
+    lengths: int = 0  # of links
+    rotations: int = 0  # that positions stand for
+    start: int = 0  # of either: from the rest pose
+    effector: int = 0  # the last joint
+    test: int = 0  # the end of a solve: what is compared with the tolerance
+    budget: int = 0  # how many sweeps are allowed
+    frame_start: int = 0  # following a curve: where a frame starts
+    frame_target: int = 0  # which target a frame has
+    # What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad].
     gain: float = 1.0
-    most: float = 10.0
-
-
-class Fabrik(NamedTuple):
-    """Switches of FABRIK.
-
-    Attributes:
-        passes: 1 no backward pass.
-        root: 1 not put back, so that the forward pass finds nothing to do, 2 put to the origin.
-        lengths: of a link: 1 the next one's, 2 the one's before, 3 as after the joint has moved.
-        rotations: 1 from the offset to the global direction, without the parents, 2 a global arc
-            multiplied onto the local rotation on its left, 3 given to the child, 4 with the parents
-            as they were at the start.
-        start: 1 the rest pose.
-        effector: 1 the last joint.
-    """
-
-    passes: int = 0
-    root: int = 0
-    lengths: int = 0
-    rotations: int = 0
-    start: int = 0
-    effector: int = 0
-
-
-class Stop(NamedTuple):
-    """Switches of the end of a solve.
-
-    Attributes:
-        test: 1 the squared distance is held against the tolerance, 2 the distance against its
-            square, 3 the change of distance against it, 4 it grows with every sweep.
-        budget: 1 one sweep more, 2 one less, 3 a joint counts as a sweep.
-    """
-
-    test: int = 0
-    budget: int = 0
+    most: float = UNCAPPED
 
 
 class Chain(NamedTuple):
@@ -139,64 +88,54 @@ class Pose(NamedTuple):
 
 
 class Ending(NamedTuple):
-    """When a solve ends: at a distance [m], after so many sweeps, with the faults of `stop`."""
+    """When a solve ends: at a distance [m], or after so many sweeps."""
 
     tolerance: float
     sweeps: int
-    stop: Stop
 
 
-def place(chain: Chain, faults: Forward, pose: Pose) -> None:
+def place(chain: Chain, faults: Switches, pose: Pose) -> None:
     """Fill positions and global rotations of all joints."""
     for j in range(len(chain.parents)):
-        Q, offset = load_quaternion(pose.local, j), load_vector(chain.offsets, j)
         p = j - 1 if faults.parent == 1 else chain.parents[j]
         if p < 0:
-            if faults.product == 2:
-                Q = conjugate(Q)
-            R = IDENTITY if faults.root == 2 else Q
-            x = ORIGIN if faults.root == 1 else rotate(R, offset) if faults.root == 3 else offset
+            x, R = root_pose(chain, faults, pose, j)
         else:
-            R = global_rotation(load_quaternion(pose.rotations, p), Q, faults.product)
-            frame = frame_of_offset(chain, pose, p, R, Q, faults.frame)
-            x = add(base_of(chain, pose, p, faults.base), rotate(frame, offset))
+            x, R = joint_pose(chain, faults, pose, j, p)
         store_vector(pose.positions, j, x)
         store_quaternion(pose.rotations, j, R)
 
 
-def global_rotation(R_parent: Any, Q: Any, fault: int) -> Any:
-    """Return R from R_p and Q."""
-    if fault == 1:
-        return multiply(Q, R_parent)
-    if fault == 2:
-        return multiply(R_parent, conjugate(Q))
-    if fault == 3:
-        return Q
-    if fault == 4:
-        return R_parent
-    return multiply(R_parent, Q)
+def root_pose(chain: Chain, faults: Switches, pose: Pose, j: int) -> Any:
+    """Return the position and the global rotation of the root."""
+    Q, offset = load_quaternion(pose.local, j), load_vector(chain.offsets, j)
+    if faults.product == 2:
+        Q = conjugate(Q)
+    rotations = (Q, Q, IDENTITY, Q)
+    R = rotations[faults.root]
+    places = (offset, ORIGIN, offset, rotate(R, offset))
+    return places[faults.root], R
 
 
-def frame_of_offset(chain: Chain, pose: Pose, p: int, R: Any, Q: Any, fault: int) -> Any:
-    """Return what rotates an offset into the world."""
-    grandparent = chain.parents[p]
-    if fault == 1:
-        return IDENTITY
-    if fault == 2:
-        return R
-    if fault == 3:
-        return conjugate(load_quaternion(pose.rotations, p))
-    if fault == 4:
-        return load_quaternion(pose.rotations, grandparent) if grandparent >= 0 else IDENTITY
-    if fault == 5:
-        return load_quaternion(pose.local, p)
-    if fault == 6:
-        return Q
-    return load_quaternion(pose.rotations, p)
+def joint_pose(chain: Chain, faults: Switches, pose: Pose, j: int, p: int) -> Any:
+    """Return the position and the global rotation of joint j, the parent p placed before it."""
+    Q, R_parent = load_quaternion(pose.local, j), load_quaternion(pose.rotations, p)
+    products = (
+        (R_parent, Q), (Q, R_parent), (R_parent, conjugate(Q)), (IDENTITY, Q), (R_parent, IDENTITY),
+    )  # fmt: skip
+    left, right = products[faults.product]
+    R = multiply(left, right)
+    above = chain.parents[p]
+    R_above = load_quaternion(pose.rotations, above) if above >= 0 else IDENTITY
+    frames = (
+        R_parent, IDENTITY, R, conjugate(R_parent), R_above, load_quaternion(pose.local, p), Q,
+    )  # fmt: skip
+    offset = rotate(frames[faults.frame], load_vector(chain.offsets, j))
+    return add(base_of(chain, pose, p, faults.base), offset), R
 
 
 def base_of(chain: Chain, pose: Pose, p: int, fault: int) -> Any:
-    """Return what a rotated offset is added to."""
+    """Return what a rotated offset is added to: the parent's position, at rest (1), the root's."""
     if fault == 1:
         x = load_vector(chain.offsets, p)
         while chain.parents[p] >= 0:
@@ -206,215 +145,146 @@ def base_of(chain: Chain, pose: Pose, p: int, fault: int) -> Any:
     return load_vector(pose.positions, 0 if fault == 2 else p)
 
 
-def begin(chain: Chain, forward: Forward, from_rest: bool, pose: Pose) -> None:
-    """Place all joints at the start, or at rest."""
-    if from_rest:
-        for j in range(len(chain.parents)):
-            store_quaternion(pose.local, j, IDENTITY)
-    place(chain, forward, pose)
-
-
-def solve_ccd(
-    chain: Chain, target: Any, ending: Ending, forward: Forward, ccd: Ccd, damping: Damping,
-    pose: Pose,
-) -> int:  # fmt: skip
+def solve(chain: Chain, target: Any, ending: Ending, faults: Switches, pose: Pose) -> int:
     """Sweep until the end of the solve; `pose.local` is the start and becomes the result.
 
     Returns the number of sweeps made.
     """
-    begin(chain, forward, ccd.start == 1, pose)
-    links, stop = len(chain.path) - 1, ending.stop
+    if faults.start == 1:
+        for j in range(len(chain.parents)):
+            store_quaternion(pose.local, j, IDENTITY)
+    place(chain, faults, pose)
+    allowed = (ending.sweeps, ending.sweeps + 1, ending.sweeps - 1, ending.sweeps)
     before, i = math.inf, 0
-    while i < allowed(ending.sweeps, stop.budget):
+    while i < allowed[faults.budget]:
         distance = norm(subtract(load_vector(pose.positions, chain.path[-1]), target))
-        if is_reached(distance, before, ending.tolerance, i, stop.test):
+        if is_reached(distance, before, ending.tolerance, i, faults.test):
             break
         before = distance
-        if stop.budget == 3:
-            k = links - 1 - i % links
-            rotate_joint(chain, k, target, forward, ccd, damping, pose)
-        else:
-            sweep_ccd(chain, target, forward, ccd, damping, pose)
+        method.sweep(chain, target, i, faults, pose)
         i += 1
+    method.finish(chain, i, faults, pose)
     return i
-
-
-def allowed(sweeps: int, fault: int) -> int:
-    """Return how many sweeps a solve may make."""
-    if fault == 1:
-        return sweeps + 1
-    if fault == 2:
-        return sweeps - 1
-    return sweeps
 
 
 def is_reached(distance: float, before: float, tolerance: float, made: int, fault: int) -> bool:
     """Return whether the solve ends before its next sweep."""
-    if fault == 1:
-        return distance * distance <= tolerance
-    if fault == 2:
-        return distance <= tolerance * tolerance
-    if fault == 3:
-        return abs(before - distance) <= tolerance
-    if fault == 4:
-        return distance <= tolerance * (made + 1)
-    return distance <= tolerance
+    tests = (
+        (distance, tolerance),
+        (distance * distance, tolerance),
+        (distance, tolerance * tolerance),
+        (abs(before - distance), tolerance),
+        (distance, tolerance * (made + 1)),
+    )
+    error, bound = tests[fault]
+    return error <= bound
 
 
-def sweep_ccd(
-    chain: Chain, target: Any, forward: Forward, ccd: Ccd, damping: Damping, pose: Pose
-) -> None:
-    """Rotate each joint from the effector's parent to the root."""
+def sweep_ccd(chain: Chain, target: Any, i: int, faults: Switches, pose: Pose) -> None:
+    """Rotate each joint from the effector's parent to the root; or only one of them, the i-th."""
     links = len(chain.path) - 1
-    for i in range(links):
-        k = i if ccd.order == 1 else links - 1 - i
-        if (ccd.joints == 1 and k == 0) or (ccd.joints == 2 and k == links - 1):
-            continue
-        rotate_joint(chain, k, target, forward, ccd, damping, pose)
-    place(chain, forward, pose)
+    if faults.budget == 3:
+        rotate_joint(chain, links - 1 - i % links, target, faults, pose)
+        return
+    for link in range(links):
+        k = link if faults.order == 1 else links - 1 - link
+        left_out = (-1, 0, links - 1)
+        if k != left_out[faults.joints]:
+            rotate_joint(chain, k, target, faults, pose)
+    place(chain, faults, pose)
 
 
-def rotate_joint(
-    chain: Chain, k: int, target: Any, forward: Forward, ccd: Ccd, damping: Damping, pose: Pose
-) -> None:
+def rotate_joint(chain: Chain, k: int, target: Any, faults: Switches, pose: Pose) -> None:
     """Rotate joint k of the path so that the effector comes nearest to the target."""
     joint = load_vector(pose.positions, chain.path[k])
     effector = load_vector(pose.positions, chain.path[-1])
     arm, direction = subtract(effector, joint), subtract(target, joint)
-    if ccd.aim == 1:
-        direction = target
-    elif ccd.aim == 2:
-        arm = effector
-    elif ccd.aim == 3:
-        direction = add(direction, load_vector(pose.positions, 0))
-    elif ccd.aim == 4:
-        direction = subtract(target, effector)
-    d = damped(between(arm, direction), ccd.angle, damping)
-    apply_rotation(chain, k, d, ccd.applied, pose)
-    if ccd.update == 0:
-        place(chain, forward, pose)
+    directions = (
+        (arm, direction),
+        (arm, target),
+        (effector, direction),
+        (arm, add(direction, load_vector(pose.positions, 0))),
+        (arm, subtract(target, effector)),
+    )
+    a, b = directions[faults.aim]
+    apply_rotation(chain, k, damped(between(a, b), faults), faults.applied, pose)
+    if faults.update == 0:
+        place(chain, faults, pose)
 
 
-def damped(d: Any, fault: int, damping: Damping) -> Any:
-    """Return the rotation with another angle."""
-    if fault == 1:
+def damped(d: Any, faults: Switches) -> Any:
+    """Return the rotation with another angle: negative (1), doubled (2), halved (3), damped."""
+    if faults.angle == 1:
         return conjugate(d)
-    if fault == 2:
+    if faults.angle == 2:
         return multiply(d, d)
-    factor = 0.5 * damping.gain if fault == 3 else damping.gain
-    if factor == 1.0 and damping.most >= 10.0:
+    factor = 0.5 * faults.gain if faults.angle == 3 else faults.gain
+    if factor == 1.0 and faults.most >= UNCAPPED:
         return d
     v = logarithm(d)
     angle = norm(v)
     if angle == 0.0:
         return d
-    return rotation_about(scale(1.0 / angle, v), min(factor * angle, damping.most))
+    return rotation_about(scale(1.0 / angle, v), min(factor * angle, faults.most))
 
 
 def apply_rotation(chain: Chain, k: int, d: Any, fault: int, pose: Pose) -> None:
-    """Give a joint the world rotation d."""
+    """Give joint k of the path, or its child, the world rotation d."""
     j = chain.path[k]
     p = chain.parents[j]
-    R = load_quaternion(pose.rotations, j)
-    R_parent = load_quaternion(pose.rotations, p) if p >= 0 else IDENTITY
-    if fault >= 10:
+    R, P = load_quaternion(pose.rotations, j), IDENTITY
+    if p >= 0:
+        P = load_quaternion(pose.rotations, p)
+    if fault >= GIVEN_TO_CHILD:
         j = chain.path[k + 1]
-    Q = load_quaternion(pose.local, j)
-    store_quaternion(pose.local, j, renormalised(rotated(R_parent, R, d, Q, fault)))
+    Q, none = load_quaternion(pose.local, j), IDENTITY
+    P_inverse, R_inverse = conjugate(P), conjugate(R)
+    products = (
+        (P_inverse, d, P, Q),
+        (none, none, d, Q),
+        (none, none, Q, d),
+        (P, d, P_inverse, Q),
+        (R_inverse, d, R, Q),
+        (R, d, R_inverse, Q),
+        (none, none, d, R),
+        (none, P_inverse, d, Q),
+        (none, none, none, d),
+        (Q, P_inverse, d, P),
+        (none, none, d, Q),
+        (R_inverse, d, R, Q),
+    )
+    a, b, c, e = products[fault]
+    store_quaternion(pose.local, j, renormalised(multiply(multiply(multiply(a, b), c), e)))
 
 
-def rotated(R_parent: Any, R: Any, d: Any, Q: Any, fault: int) -> Any:
-    """Return a local rotation after the world rotation d."""
-    if fault == 1 or fault == 10:
-        return multiply(d, Q)
-    if fault == 2:
-        return multiply(Q, d)
-    if fault == 3:
-        return multiply(turned(R_parent, d), Q)
-    if fault == 4 or fault == 11:
-        return multiply(turned(conjugate(R), d), Q)
-    if fault == 5:
-        return multiply(turned(R, d), Q)
-    if fault == 6:
-        return multiply(d, R)
-    if fault == 7:
-        return multiply(multiply(conjugate(R_parent), d), Q)
-    if fault == 8:
-        return d
-    if fault == 9:
-        return multiply(Q, turned(conjugate(R_parent), d))
-    return multiply(turned(conjugate(R_parent), d), Q)
+def keep(chain: Chain, made: int, faults: Switches, pose: Pose) -> None:
+    """Leave a pose of CCD as it is: its sweeps keep rotations and positions together."""
 
 
-def turned(R: Any, d: Any) -> Any:
-    """Return R d R*."""
-    return multiply(multiply(R, d), conjugate(R))
-
-
-def solve_fabrik(
-    chain: Chain, target: Any, ending: Ending, forward: Forward, fabrik: Fabrik, pose: Pose
-) -> int:
-    """Move the joints of the path, then find their rotations; `pose.local` as for CCD.
-
-    The positions are those that the passes leave on the path, and below it what the rotations give.
-    """
-    begin(chain, forward, fabrik.start == 1, pose)
-    before, i = math.inf, 0
-    while i < allowed(ending.sweeps, ending.stop.budget):
-        distance = norm(subtract(load_vector(pose.positions, chain.path[-1]), target))
-        if is_reached(distance, before, ending.tolerance, i, ending.stop.test):
-            break
-        before = distance
-        sweep_fabrik(chain, target, fabrik, pose.positions)
-        i += 1
-    moved = pose.positions.copy()
-    if i > 0:
-        follow(chain, moved, forward, fabrik.rotations, pose)
-    place(chain, forward, pose)
-    for j in chain.path:
-        store_vector(pose.positions, j, load_vector(moved, j))
-    return i
-
-
-def sweep_fabrik(chain: Chain, target: Any, fabrik: Fabrik, positions: FloatArray) -> None:
+def sweep_fabrik(chain: Chain, target: Any, i: int, faults: Switches, pose: Pose) -> None:
     """Pull the joints to the target, then back to the root."""
-    if fabrik.passes == 0:
-        pull_backward(chain, target, fabrik, positions)
-    pull_forward(chain, fabrik, positions)
-
-
-def pull_backward(chain: Chain, target: Any, fabrik: Fabrik, positions: FloatArray) -> None:
-    """Put the effector on the target and the others after it."""
-    last = len(chain.path) - 1
-    store_vector(positions, chain.path[last], target)
-    for k in range(last - 1, -1, -1):
-        length = link_length(chain, k, fabrik.lengths, positions)
-        pull(positions, chain.path[k + 1], chain.path[k], length)
-
-
-def pull_forward(chain: Chain, fabrik: Fabrik, positions: FloatArray) -> None:
-    """Put the root back and the others after it."""
+    last, positions = len(chain.path) - 1, pose.positions
+    if faults.passes == 0:
+        store_vector(positions, chain.path[last], target)
+        for k in range(last - 1, -1, -1):
+            length = link_length(chain, k, faults.lengths, positions)
+            pull(positions, chain.path[k + 1], chain.path[k], length)
     root = chain.path[0]
-    if fabrik.root == 0:
-        store_vector(positions, root, load_vector(chain.offsets, root))
-    elif fabrik.root == 2:
-        store_vector(positions, root, ORIGIN)
-    for k in range(len(chain.path) - 1):
-        length = link_length(chain, k, fabrik.lengths, positions)
+    places = (load_vector(chain.offsets, root), load_vector(positions, root), ORIGIN)
+    store_vector(positions, root, places[faults.base_joint])
+    for k in range(last):
+        length = link_length(chain, k, faults.lengths, positions)
         pull(positions, chain.path[k], chain.path[k + 1], length)
 
 
 def link_length(chain: Chain, k: int, fault: int, positions: FloatArray) -> float:
-    """Return the length of link k, from joint k of the path to the next."""
+    """Return the length of link k, from joint k of the path to the next; or (3) as it is now."""
     last = len(chain.path) - 2
+    links = (k, min(k + 1, last), max(k - 1, 0), k)
     if fault == 3:
         start = load_vector(positions, chain.path[k])
         return norm(subtract(load_vector(positions, chain.path[k + 1]), start))
-    if fault == 1:
-        k = min(k + 1, last)
-    elif fault == 2:
-        k = max(k - 1, 0)
-    return norm(load_vector(chain.offsets, chain.path[k + 1]))
+    return norm(load_vector(chain.offsets, chain.path[links[fault] + 1]))
 
 
 def pull(positions: FloatArray, fixed: int, moved: int, length: float) -> None:
@@ -426,28 +296,53 @@ def pull(positions: FloatArray, fixed: int, moved: int, length: float) -> None:
         store_vector(positions, moved, add(start, scale(length / distance, direction)))
 
 
-def follow(chain: Chain, moved: FloatArray, forward: Forward, fault: int, pose: Pose) -> None:
-    """Rotate each joint of the path so that its link points to where the next one has moved."""
-    start = pose.rotations.copy()
-    for k in range(len(chain.path) - 1):
-        place(chain, forward, pose)
-        j, child = chain.path[k], chain.path[k + 1]
-        p = chain.parents[j]
-        seen = start if fault == 4 else pose.rotations
-        offset, Q = load_vector(chain.offsets, child), load_quaternion(pose.local, j)
-        R = load_quaternion(seen, j)
-        R_parent = load_quaternion(seen, p) if p >= 0 else IDENTITY
-        link = subtract(load_vector(moved, child), load_vector(moved, j))
-        arc = between(rotate(R, offset), link)
-        if fault == 1:
-            Q = between(offset, link)
-        elif fault == 2:
-            Q = multiply(arc, Q)
-        else:
-            Q = multiply(turned(conjugate(R_parent), arc), Q)
-        store_quaternion(pose.local, child if fault == 3 else j, renormalised(Q))
+def follow(chain: Chain, made: int, faults: Switches, pose: Pose) -> None:
+    """Rotate each joint of the path so that its link points to where the next one has moved.
+
+    The positions on the path stay those that the passes leave; below it they are what the rotations
+    give.
+    """
+    moved, start = pose.positions.copy(), pose.rotations.copy()
+    for k in range(len(chain.path) - 1 if made > 0 else 0):
+        place(chain, faults, pose)
+        parents_of = start if faults.rotations == 4 else pose.rotations
+        point_link(chain, k, moved, faults.rotations, parents_of, pose)
+    place(chain, faults, pose)
+    for j in chain.path:
+        store_vector(pose.positions, j, load_vector(moved, j))
 
 
+def point_link(
+    chain: Chain, k: int, moved: FloatArray, fault: int, rotations: FloatArray, pose: Pose
+) -> None:
+    """Rotate joint k of the path, or its child (3), by global rotations as they are thought."""
+    j, child = chain.path[k], chain.path[k + 1]
+    p = chain.parents[j]
+    offset, Q = load_vector(chain.offsets, child), load_quaternion(pose.local, j)
+    R, P = load_quaternion(rotations, j), IDENTITY
+    if p >= 0:
+        P = load_quaternion(rotations, p)
+    link = subtract(load_vector(moved, child), load_vector(moved, j))
+    arc = between(rotate(R, offset), link)
+    if fault == 1:
+        Q = between(offset, link)
+    elif fault == 2:
+        Q = multiply(arc, Q)
+    else:
+        Q = multiply(multiply(multiply(conjugate(P), arc), P), Q)
+    store_quaternion(pose.local, child if fault == 3 else j, renormalised(Q))
+
+
+class Method(NamedTuple):
+    """The kernels of a solver: one sweep, and what makes rotations of its last positions."""
+
+    sweep: Any
+    finish: Any
+
+
+method = Method(sweep_ccd, keep)
 place_all = Kernel(place, label="forward kinematics with faults")
-ccd_all = Kernel(solve_ccd, label="CCD with faults")
-fabrik_all = Kernel(solve_fabrik, label="FABRIK with faults")
+SOLVERS = {
+    "ccd": Kernel(solve, label="CCD with faults"),
+    "fabrik": Kernel(bind(solve, method=Method(sweep_fabrik, follow)), label="FABRIK with faults"),
+}

@@ -4,7 +4,7 @@ A probe is a small case in which one more aspect of a step matters than in those
 a spring, a damper, a pin, a changed h. Faults are sought along the probes.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -25,15 +25,7 @@ MOTION_STEPS = 6
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A system, its state and a step.
-
-    Attributes:
-        needs: attributes of `System` without which it makes no sense: "pinned" and so on.
-        tasks: those that it suits; () for all.
-        follows: the name of the scene that is asked just before it.
-        probe: whether faults are sought in it.
-        facts: passed on to the laws.
-    """
+    """A system, its state and a step."""
 
     name: str
     family: str
@@ -49,75 +41,61 @@ class Scene:
     h: float
     pinned: tuple[int, ...] = ()
     rest_lengths: FloatArray | None = None
-    external_forces: FloatArray | None = None
-    tension_only: Any = None
+    external_forces: FloatArray | float = 0.0
+    tension_only: bool = False
+    # attributes of `System` without which it makes no sense: "pinned" and so on
     needs: tuple[str, ...] = ()
-    tasks: tuple[str, ...] = ()
-    follows: str = ""
-    probe: bool = False
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    tasks: tuple[str, ...] = ()  # those that it suits; () for all
+    follows: str = ""  # the name of the scene that is asked just before it
+    probe: bool = False  # whether faults are sought in it
+    facts: Mapping[str, Any] = field(default_factory=dict)  # passed on to the laws
 
 
 def task_cases(task: str, greeting: Greeting, seed: int, thorough: bool) -> list[Case]:
     """Return the cases of a task that suit the solver."""
     system = greeting.system
-    found = [
+    suitable = [
         _case(task, scene, system)
         for scene in scenes(seed, thorough)
         if task in (scene.tasks or TASKS) and all(_has(system, need) for need in scene.needs)
     ]
-    return [case for case in found if not case.follows or any(
-        other.name == case.follows for other in found)]  # fmt: skip
+    names = {"", *(case.name for case in suitable)}
+    return [case for case in suitable if case.follows in names]
 
 
 def _has(system: System, need: str) -> bool:
-    if need == "gravity":
-        return system.gravity == "vector"
-    return bool(getattr(system, need))
+    return system.gravity == "vector" if need == "gravity" else bool(getattr(system, need))
 
 
 def _case(task: str, scene: Scene, system: System) -> Case:
     """Return the scene as a request, with one value for all where the solver has but one."""
-    masses = np.full(len(scene.masses), ONE_MASS) if system.masses == "one" else scene.masses
-    gravity = scene.gravity
-    if system.gravity == "number":
-        gravity = np.array([0.0, -np.linalg.norm(gravity), 0.0])
-    measured = system.rest_lengths == "measured" or scene.rest_lengths is None
     springs = np.asarray(scene.springs, dtype=np.int64).reshape(-1, 2)
+    x, v, g = scene.positions, scene.velocities, scene.gravity
+    measured = system.rest_lengths == "measured" or scene.rest_lengths is None
     values: dict[str, Any] = {
-        "masses": masses,
+        "masses": np.full(len(x), ONE_MASS) if system.masses == "one" else scene.masses,
         "springs": springs,
         "rest_lengths": _lengths(scene.rest, springs) if measured else scene.rest_lengths,
         "stiffnesses": _shared(scene.stiffnesses, system.stiffnesses),
         "dampings": _shared(scene.dampings, system.dampings),
         "pinned": np.array(scene.pinned if system.pinned else (), dtype=np.int64),
-        "gravity": gravity,
-        "positions": scene.positions,
-        "velocities": scene.velocities,
+        "gravity": g if system.gravity == "vector" else np.array([0.0, -np.linalg.norm(g), 0.0]),
+        "positions": x,
+        "velocities": v,
         "h": scene.h,
         "steps": MOTION_STEPS,
     }
-    values |= _asked_for(scene, system)
-    names = [one.name for one in TASKS[task].inputs]
-    inputs = {name: values[name] for name in names if name in values}
-    facts = dict(scene.facts) | {"probe": scene.probe}
-    return Case(scene.name, task, inputs, scene.family, scene.about, scene.follows, facts)
-
-
-def _asked_for(scene: Scene, system: System) -> dict[str, Any]:
-    """Return the optional inputs that the solver takes."""
-    values: dict[str, Any] = {}
     if system.rest_lengths == "measured":
         values["rest_positions"] = scene.rest
     if system.state == "previous_positions":
-        values["previous_positions"] = scene.positions - scene.h * scene.velocities
+        values["previous_positions"] = x - scene.h * v
     if system.external_forces:
-        none = np.zeros_like(scene.positions)
-        values["external_forces"] = none if scene.external_forces is None else scene.external_forces
+        values["external_forces"] = np.zeros_like(x) + scene.external_forces
     if system.tension_only:
-        flags = scene.tension_only
-        values["tension_only"] = np.zeros(len(scene.springs), bool) if flags is None else flags
-    return values
+        values["tension_only"] = np.full(len(springs), scene.tension_only)
+    inputs = {one.name: values[one.name] for one in TASKS[task].inputs if one.name in values}
+    facts = {**scene.facts, "probe": scene.probe}
+    return Case(scene.name, task, inputs, scene.family, scene.about, scene.follows, facts)
 
 
 def _shared(values: FloatArray, how: str) -> FloatArray:
@@ -157,39 +135,24 @@ def _pair(name: str, family: str, about: Sentence, **changes: Any) -> Scene:
 
 def _particles() -> list[Scene]:
     """Return the scenes of one spring."""
+    hanging = {"velocities": PAIR_VELOCITIES * [[0.0], [1.0]], "pinned": (0,), "needs": ("pinned",)}
+    damped = {"dampings": np.array([1.5])}
     return [
-        _pair(
-            "two particles in flight", "flight",
-            sentence("Two particles fly freely: the spring between them has no stiffness."),
-            stiffnesses=np.array([0.0]),
-        ),
+        _pair("two particles in flight", "flight", sentence(
+            "Two particles fly freely: the spring between them has no stiffness."),
+            stiffnesses=np.array([0.0])),
         _pair("one spring", "springs", sentence("One stretched spring, both ends moving.")),
-        _pair(
-            "one spring at rest", "rest",
-            sentence("One spring at its rest length, without gravity: nothing moves."),
-            positions=PAIR_AT_REST, velocities=np.zeros((2, 3)), gravity=np.zeros(3), probe=False,
-        ),
-        _pair(
-            "one spring, compressed", "springs",
-            sentence("One spring a third shorter than at rest."),
-            positions=PAIR_COMPRESSED,
-        ),
-        _pair(
-            "one damped spring", "dampers",
-            sentence("One stretched spring with a damper, both ends moving."),
-            dampings=np.array([1.5]),
-        ),
-        _pair(
-            "pendulum", "pins",
-            sentence("One particle hangs from a pinned one by a spring."),
-            velocities=PAIR_VELOCITIES * [[0.0], [1.0]], pinned=(0,), needs=("pinned",),
-        ),
-        _pair(
-            "damped pendulum", "pins",
-            sentence("One particle hangs from a pinned one by a damped spring."),
-            velocities=PAIR_VELOCITIES * [[0.0], [1.0]], dampings=np.array([1.5]), pinned=(0,),
-            needs=("pinned",),
-        ),
+        _pair("one spring at rest", "rest", sentence(
+            "One spring at its rest length, without gravity: nothing moves."),
+            positions=PAIR_AT_REST, velocities=np.zeros((2, 3)), gravity=np.zeros(3), probe=False),
+        _pair("one spring, compressed", "springs", sentence(
+            "One spring a third shorter than at rest."), positions=PAIR_COMPRESSED),
+        _pair("one damped spring", "dampers", sentence(
+            "One stretched spring with a damper, both ends moving."), **damped),
+        _pair("pendulum", "pins", sentence(
+            "One particle hangs from a pinned one by a spring."), **hanging),
+        _pair("damped pendulum", "pins", sentence(
+            "One particle hangs from a pinned one by a damped spring."), **hanging, **damped),
     ]  # fmt: skip
 
 
@@ -215,40 +178,27 @@ def _pins_still(scene: Scene) -> Scene:
 
 
 def _small(seed: int) -> list[Scene]:
+    slack = np.array([[0, 1, 0], [0.2, 0.9, 0.1], [0.7, 0.7, 0.2], [0.8, 0.6, 0.5]])
+    loads = np.array([[1.0, 2.0, -3.0], [-4.0, 1.0, 2.0], [3.0, -1.0, 1.0]])
     return [
-        _random(
-            "three particles", "dampers",
-            sentence("Three damped springs between three particles, all different."), seed, 3,
-        ),
-        _random(
-            "three particles, two pinned", "pins",
-            sentence("Three damped springs, the first and the last particle pinned."), seed, 3,
-            pinned=(0, 2), needs=("pinned",),
-        ),
-        _random(
-            "oblique gravity", "gravity",
-            sentence("Gravity in a direction of its own."), seed, 3,
-            gravity=np.array([2.0, -5.0, 3.0]), needs=("gravity",),
-        ),
-        _random(
-            "external forces", "external forces",
-            sentence("A force of its own on each particle."), seed, 3,
-            external_forces=np.array([[1.0, 2.0, -3.0], [-4.0, 1.0, 2.0], [3.0, -1.0, 1.0]]),
-            needs=("external_forces",), tasks=STEPS,
-        ),
-        _random(
-            "slack springs", "tension only",
-            sentence("Springs that resist no compression, some of them slack."), seed, 4,
-            tension_only=np.ones(5, dtype=bool),
-            positions=np.array([[0, 1, 0], [0.2, 0.9, 0.1], [0.7, 0.7, 0.2], [0.8, 0.6, 0.5]]),
-            needs=("tension_only",), tasks=STEPS,
-        ),
-        _random(
-            "rope of five", "pins",
-            sentence("Five particles on a string, the first one pinned, undamped."), seed, 5,
+        _random("three particles", "dampers", sentence(
+            "Three damped springs between three particles, all different."), seed, 3),
+        _random("three particles, two pinned", "pins", sentence(
+            "Three damped springs, the first and the last particle pinned."), seed, 3,
+            pinned=(0, 2), needs=("pinned",)),
+        _random("oblique gravity", "gravity", sentence(
+            "Gravity in a direction of its own."), seed, 3,
+            gravity=np.array([2.0, -5.0, 3.0]), needs=("gravity",)),
+        _random("external forces", "external forces", sentence(
+            "A force of its own on each particle."), seed, 3,
+            external_forces=loads, needs=("external_forces",), tasks=STEPS),
+        _random("slack springs", "tension only", sentence(
+            "Springs that resist no compression, some of them slack."), seed, 4,
+            tension_only=True, positions=slack, needs=("tension_only",), tasks=STEPS),
+        _random("rope of five", "pins", sentence(
+            "Five particles on a string, the first one pinned, undamped."), seed, 5,
             springs=[(0, 1), (1, 2), (2, 3), (3, 4)], stiffnesses=np.full(4, 300.0),
-            dampings=np.zeros(4), rest_lengths=None, pinned=(0,), needs=("pinned",), h=1 / 60,
-        ),
+            dampings=np.zeros(4), rest_lengths=None, pinned=(0,), needs=("pinned",), h=1 / 60),
     ]  # fmt: skip
 
 
@@ -276,7 +226,9 @@ def _changes(seed: int) -> list[Scene]:
     return [before, after, again, small]
 
 
-def _cloth_scene(name: str, seed: int, n: int, **changes: Any) -> Scene:
+def _cloth_scene(
+    name: str, seed: int, n: int, stiffness: float = 100.0, damping: float = 0.2, **changes: Any
+) -> Scene:
     """Return a moved cloth of n x n particles."""
     rng = np.random.default_rng([12, seed, n])
     system, state = grid_cloth(n, n)
@@ -286,87 +238,63 @@ def _cloth_scene(name: str, seed: int, n: int, **changes: Any) -> Scene:
         state.positions, system.springs,
         state.positions + 0.02 * rng.standard_normal((n * n, 3)),
         0.5 * rng.standard_normal((n * n, 3)), rng.uniform(0.5, 1.5, n * n),
-        np.full(s, 100.0), np.full(s, 0.2), G, 1 / 60,
+        np.full(s, stiffness), np.full(s, damping), G, 1 / 60,
         pinned=tuple(int(i) for i in system.pinned),
     )  # fmt: skip
     return _pins_still(replace(scene, **changes))
 
 
 def _cloths(seed: int) -> list[Scene]:
-    base = _cloth_scene("cloth 3 x 3", seed, 3)
-    free = replace(
-        _cloth_scene("free net", seed, 4, pinned=()), family="momentum",
-        about=sentence("A net of 4 x 4 particles that nothing holds."),
-        dampings=np.zeros(_spring_count(4)),
-    )  # fmt: skip
-    lab = _cloth_scene(
-        "the lab's cloth, small", seed, 5, gravity=np.array([0.0, -0.3, 0.0]),
-        masses=np.ones(25),
-    )  # fmt: skip
-    stiff = _cloth_scene(
-        "stiff cloth", seed, 5, stiffnesses=np.full(_spring_count(5), 1e4),
-        dampings=np.zeros(_spring_count(5)),
-    )  # fmt: skip
-    damped = _cloth_scene("damped cloth", seed, 4, dampings=np.full(_spring_count(4), 2.0))
-    crumpled = _crumpled(_cloth_scene("crumpled cloth", seed, 3))
-    return [base, *_symmetries(base), free, damped, crumpled, lab, stiff]
-
-
-def _spring_count(n: int) -> int:
-    return len(grid_cloth(n, n)[0].springs)
-
-
-def _crumpled(scene: Scene) -> Scene:
-    squeezed = scene.rest.mean(0) + 0.6 * (scene.positions - scene.rest.mean(0))
-    return replace(
-        scene, family="compression", positions=squeezed,
-        stiffnesses=np.full(len(scene.springs), 1e3),
-        about=sentence("A cloth squeezed to 0.6 of its size, stiff enough to buckle."),
-    )  # fmt: skip
+    base, crumpled = (_cloth_scene(name, seed, 3) for name in ("cloth 3 x 3", "crumpled cloth"))
+    middle = crumpled.rest.mean(0)
+    return [
+        base,
+        *_symmetries(base),
+        _cloth_scene("free net", seed, 4, damping=0.0, pinned=(), family="momentum", about=sentence(
+            "A net of 4 x 4 particles that nothing holds.")),
+        _cloth_scene("damped cloth", seed, 4, damping=2.0),
+        replace(crumpled, family="compression", stiffnesses=10.0 * crumpled.stiffnesses,
+                positions=middle + 0.6 * (crumpled.positions - middle), about=sentence(
+                    "A cloth squeezed to 0.6 of its size, stiff enough to buckle.")),
+        _cloth_scene("the lab's cloth, small", seed, 5, gravity=np.array([0.0, -0.3, 0.0]),
+                     masses=np.ones(25)),
+        _cloth_scene("stiff cloth", seed, 5, stiffness=1e4, damping=0.0),
+    ]  # fmt: skip
 
 
 def _symmetries(base: Scene) -> list[Scene]:
     """Return the scene moved, mirrored, rotated about the vertical, and with other numbers."""
-    n = len(base.masses)
     c, s = 0.6, 0.8
-    identity, every = np.eye(3), np.arange(n)
     mirror = np.diag([1.0, 1.0, -1.0])
     rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    shift = np.array([0.5, -0.25, 0.75])
-    order = np.random.default_rng(5).permutation(n)
+    order = np.random.default_rng(5).permutation(len(base.masses))
     return [
         _transformed(base, "shifted", sentence("The same cloth elsewhere."),
-                     identity, shift, every),
-        _transformed(base, "mirrored", sentence("The same cloth in a mirror."),
-                     mirror, 0.0 * shift, every),
+                     shift=np.array([0.5, -0.25, 0.75])),
+        _transformed(base, "mirrored", sentence("The same cloth in a mirror."), matrix=mirror),
         _transformed(base, "rotated", sentence("The same cloth, rotated about the vertical."),
-                     rotation, 0.0 * shift, every),
+                     matrix=rotation),
         _transformed(base, "renumbered", sentence("The same cloth, its particles renumbered."),
-                     identity, 0.0 * shift, order),
+                     order=order),
     ]  # fmt: skip
 
 
-def _transformed(
-    base: Scene, name: str, about: Sentence, matrix: FloatArray, shift: FloatArray, order: Any
-) -> Scene:
+def _transformed(base: Scene, name: str, about: Sentence, **changes: Any) -> Scene:
     """Return the scene with x -> matrix x + shift; particle i becomes number order[i]."""
+    unchanged = {"matrix": np.eye(3), "shift": np.zeros(3), "order": np.arange(len(base.masses))}
+    facts = {"of": base.name, **unchanged, **changes}
+    matrix, shift, order = (facts[key] for key in unchanged)
     place = np.argsort(order)
-    moved: Callable[[FloatArray], FloatArray] = lambda x: (x @ matrix.T)[place]  # noqa: E731
     return replace(
         base,
         name=name,
         family="symmetry",
         about=about,
-        rest=moved(base.rest) + shift,
-        positions=moved(base.positions) + shift,
-        velocities=moved(base.velocities),
+        rest=(base.rest @ matrix.T)[place] + shift,
+        positions=(base.positions @ matrix.T)[place] + shift,
+        velocities=(base.velocities @ matrix.T)[place],
         masses=base.masses[place],
         springs=order[np.asarray(base.springs)],
         pinned=tuple(int(order[i]) for i in base.pinned),
-        facts={"of": base.name, "matrix": matrix, "shift": shift, "order": order},
+        facts=facts,
     )
-
-
-def by_name(cases: Sequence[Case]) -> dict[str, Case]:
-    """Return the cases by their names."""
-    return {case.name: case for case in cases}

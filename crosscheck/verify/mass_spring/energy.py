@@ -4,10 +4,10 @@ Zero of the gravitational energy is where the solver has it: the states of a cas
 several places, and only differences to the first of them count.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
-from typing import Any, NamedTuple
+from itertools import groupby
+from typing import Any
 
 import numpy as np
 
@@ -18,11 +18,11 @@ from ..contestant import Answer, Asked
 from ..explain import either, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
-from ..sentence import Sentence, sentence
+from ..sentence import sentence
 from ..timing import timed
 from . import laws
 from .cases import task_cases
-from .faults import GRAVITY, SPRINGS, Option
+from .faults import GRAVITY, SPRINGS, Option, combined, faults_of
 from .problem import (
     Problem,
     all_forces,
@@ -31,9 +31,12 @@ from .problem import (
     state_of,
     system_of,
 )
+from .rounding import correct_digits
 
 TASK = "energy"
 PARTS = ("total", "kinetic", "potential", "elastic", "gravitational")
+# Those of which each has a formula of its own.
+FORMULAS = ("kinetic", "elastic")
 ROUNDINGS = 16.0
 # Gauss points that integrate the force along a displacement of a tenth of a spring to rounding.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -41,23 +44,21 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return cases that suit the solver, most of them followed by a displaced one."""
-    found = []
-    for case in task_cases(TASK, greeting, seed, thorough):
-        found.append(case)
-        if "of" not in case.facts:
-            found.append(_displaced(case, seed))
-    return found
+    return [
+        one
+        for case in task_cases(TASK, greeting, seed, thorough)
+        for one in ((case,) if "of" in case.facts else (case, _displaced(case, seed)))
+    ]
 
 
 def _displaced(case: Case, seed: int) -> Case:
     """Return the same system a little elsewhere."""
     x = case.inputs["positions"]
     rng = np.random.default_rng([13, seed, len(x)])
-    inputs = dict(case.inputs) | {"positions": x + 0.02 * rng.standard_normal(x.shape)}
     return replace(
         case,
         name=case.name + ", displaced",
-        inputs=inputs,
+        inputs=dict(case.inputs) | {"positions": x + 0.02 * rng.standard_normal(x.shape)},
         about=sentence("The case before, its particles displaced."),
         facts=dict(case.facts) | {"from": case.name},
     )
@@ -98,47 +99,35 @@ def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJ
     _, seconds = timed(
         lambda: potential_energy(system, state.positions) + kinetic_energy(system, state)
     )
-    expected = right(p)
+    expected, allowed = right(p), tolerance(p, greeting.epsilon)
     if not isinstance(one.answer, Answer):
         return CaseJudgement(one.case, one.answer, (), expected, None, seconds)
     given = one.answer.values
-    allowed = tolerance(p, greeting.epsilon)
-    findings = _findings(one, asked, p, allowed)
-    errors = [abs(given[name] - expected[name]) for name in ("kinetic", "elastic") if name in given]
-    size, worst = max(expected["kinetic"], expected["elastic"]), max(errors, default=np.nan)
-    digits = None
-    if size > allowed and worst >= 0.0:
-        digits = float(min(16.0, max(0.0, -np.log10(max(worst / size, 1e-16)))))
-    return CaseJudgement(one.case, one.answer, tuple(findings), expected, digits, seconds)
+    findings = tuple(_findings(one, one.answer, asked, p, allowed))
+    errors = [abs(given[name] - expected[name]) for name in FORMULAS if name in given]
+    size, worst = max(expected[name] for name in FORMULAS), max(errors, default=np.nan)
+    digits = correct_digits(worst, size) if size > allowed and worst >= 0.0 else None
+    return CaseJudgement(one.case, one.answer, findings, expected, digits, seconds)
 
 
-def _findings(one: Asked, asked: Sequence[Asked], p: Problem, allowed: float) -> list[Finding]:
-    assert isinstance(one.answer, Answer)
-    given, expected = one.answer.values, right(p)
+def _findings(
+    one: Asked, answer: Answer, asked: Sequence[Asked], p: Problem, allowed: float
+) -> list[Finding]:
+    given, expected = answer.values, right(p)
     if not np.isfinite(list(given.values())).all():
-        said = sentence("Energies hold NaN or infinity.")
-        return [Finding("finite numbers", Verdict.BROKEN, np.inf, 0.0, "", said)]
+        return [laws.no_numbers(sentence("Energies hold NaN or infinity."))]
+    gaps = {name: abs(given[name] - expected[name]) for name in FORMULAS if name in given}
     found = [
-        _finding(name, abs(given[name] - expected[name]), allowed,
-                 sentence("The {name} energy is {gap:.2g} J off its formula.",
-                          name=name, gap=abs(given[name] - expected[name])))
-        for name in ("kinetic", "elastic") if name in given
+        laws.bounded(name, gap, allowed, "J", sentence(
+            "The {name} energy is {gap:.2g} J off its formula.", name=name, gap=gap))
+        for name, gap in gaps.items()
     ]  # fmt: skip
     found += [] if p.h else _sum_laws(given, allowed)
-    before = [other for other in asked if other.case.name == one.case.facts.get("from")]
-    if before and isinstance(before[0].answer, Answer):
-        found += _work(
-            problem_of(before[0].case.inputs), p, before[0].answer.values, given, allowed
-        )
-    found.append(laws.equal_requests(one, PARTS, dict.fromkeys(PARTS, allowed)))
-    return found + [
-        Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", said) for said in one.answer.remarks
-    ]
-
-
-def _finding(law: str, gap: float, allowed: float, said: Sentence) -> Finding:
-    verdict = Verdict.RIGHT if gap <= allowed else Verdict.WRONG
-    return Finding(law, verdict, gap, allowed, "J", said)
+    before = next((o for o in asked if o.case.name == one.case.facts.get("from")), None)
+    if before is not None and isinstance(before.answer, Answer):
+        found += _work(problem_of(before.case.inputs), p, before.answer.values, given, allowed)
+    found.append(laws.equal_requests(one, dict.fromkeys(PARTS, allowed)))
+    return found + laws.remarks(answer)
 
 
 def _sum_laws(given: Mapping[str, Any], allowed: float) -> list[Finding]:
@@ -150,9 +139,10 @@ def _sum_laws(given: Mapping[str, Any], allowed: float) -> list[Finding]:
     ):
         if all(name in given for name in (whole, *parts)):
             gap = abs(given[whole] - sum(given[name] for name in parts))
-            said = sentence("The {whole} energy is {gap:.2g} J off the sum of its parts.",
-                            whole=whole, gap=gap)  # fmt: skip
-            found.append(_finding("sum of energies", gap, 4.0 * allowed, said))
+            said = sentence(
+                "The {whole} energy is {gap:.2g} J off the sum of its parts.", whole=whole, gap=gap
+            )
+            found.append(laws.bounded("sum of energies", gap, 4.0 * allowed, "J", said))
     return found
 
 
@@ -168,9 +158,10 @@ def _work(
         said = sentence(
             "From one place to another the {name} energy changes by {gap:.2g} J other than by the "
             "work of the forces.",
-            name=name, gap=gap,
-        )  # fmt: skip
-        found.append(_finding("energy and work", gap, 4.0 * allowed, said))
+            name=name,
+            gap=gap,
+        )
+        found.append(laws.bounded("energy and work", gap, 4.0 * allowed, "J", said))
     return found
 
 
@@ -194,50 +185,37 @@ def works(p: Problem, q: Problem) -> dict[str, float]:
     }
 
 
-class Fault(NamedTuple):
-    """A fault of an energy: a change of the problem, or of the three parts."""
-
-    key: str
-    aspect: str
-    sentence: Sentence
-    change: Callable[[Problem], Problem] | None = None
-    parts: tuple[float, float, float] = (1.0, 1.0, 1.0)
-
-
-def _from_option(option: Option) -> Fault:
-    return Fault(option.key, option.aspect, option.sentence, option.change)
-
-
 _OF_FORCES = ("first end only", "second end only", "both ends alike",
               "last spring of a particle only", "direction not normalised",
               "springs push", "springs twice", "tension only ignored")  # fmt: skip
 FAULTS = (
-    Fault("kinetic without 1/2", "kinetic",
-         sentence("The kinetic energy lacks its 1/2: it is m/2 v²."), None, (2.0, 1.0, 1.0)),
-    Fault("kinetic missing", "kinetic",
-         sentence("The kinetic energy is missing."), None, (0.0, 1.0, 1.0)),
-    Fault("kinetic without mass", "kinetic",
-         sentence("The kinetic energy lacks the mass: it is m/2 v²."),
-         lambda p: p.changed(masses=np.ones(p.count), weighing=p.masses)),
-    Fault("kinetic subtracted", "kinetic",
-         sentence("The kinetic energy is subtracted."), None, (-1.0, 1.0, 1.0)),
-    Fault("elastic without 1/2", "elastic",
-         sentence("The elastic energy lacks its 1/2: it is k/2 (l - r)²."), None,
-         (1.0, 2.0, 1.0)),
-    Fault("elastic missing", "elastic",
-         sentence("The elastic energy is missing."), None, (1.0, 0.0, 1.0)),
-    Fault("elastic subtracted", "elastic",
-         sentence("The elastic energy is subtracted."), None, (1.0, -1.0, 1.0)),
-    *(_from_option(one) for one in SPRINGS if one.key not in _OF_FORCES),
-    *(_from_option(one) for one in GRAVITY[:-3]),
+    *faults_of("kinetic", {
+        "kinetic without 1/2": ({"parts": (2.0, 1.0, 1.0)}, sentence(
+            "The kinetic energy lacks its 1/2: it is m/2 v².")),
+        "kinetic missing": ({"parts": (0.0, 1.0, 1.0)}, sentence("The kinetic energy is missing.")),
+        "kinetic without mass": (
+            lambda p: p.changed(masses=np.ones(p.count), weighing=p.masses), sentence(
+            "The kinetic energy lacks the mass: it is m/2 v².")),
+        "kinetic subtracted": ({"parts": (-1.0, 1.0, 1.0)}, sentence(
+            "The kinetic energy is subtracted.")),
+    }),
+    *faults_of("elastic", {
+        "elastic without 1/2": ({"parts": (1.0, 2.0, 1.0)}, sentence(
+            "The elastic energy lacks its 1/2: it is k/2 (l - r)².")),
+        "elastic missing": ({"parts": (1.0, 0.0, 1.0)}, sentence("The elastic energy is missing.")),
+        "elastic subtracted": ({"parts": (1.0, -1.0, 1.0)}, sentence(
+            "The elastic energy is subtracted.")),
+    }),
+    *(one for one in SPRINGS if one.key not in _OF_FORCES),
+    *GRAVITY[:-3],
 )  # fmt: skip
 
 
-def predict(faults: Sequence[Fault], p: Problem) -> dict[str, float]:
+def predict(faults: Sequence[Option], p: Problem) -> dict[str, float]:
     """Return the energies that a solver with these faults answers."""
     factors = np.ones(3)
     for fault in faults:
-        factors = factors * fault.parts
+        factors = factors * fault.fields.get("parts", 1.0)
         p = fault.change(p) if fault.change is not None else p
     values = right(p)
     parts = (values["kinetic"], values["elastic"], values["gravitational"])
@@ -247,35 +225,30 @@ def predict(faults: Sequence[Fault], p: Problem) -> dict[str, float]:
 def _diagnose(
     asked: Sequence[Asked], judgements: Sequence[CaseJudgement], greeting: Greeting
 ) -> Diagnosis:
-    wrong = any(one.verdict >= Verdict.WRONG for one in judgements)
     answered = [
         (problem_of(one.case.inputs), one.answer.values)
         for one in asked
         if isinstance(one.answer, Answer)
     ]
-    if not wrong or not answered:
+    if not answered or all(one.verdict < Verdict.WRONG for one in judgements):
         return Diagnosis()
     tried = 0
-    for count in (1, 2, 3):
+    for _, same_size in groupby(combined(FAULTS), key=len):
         matches = []
-        for faults in combinations(FAULTS, count):
-            if len({one.aspect for one in faults}) < count:
-                continue
+        for faults in same_size:
             tried += 1
             if all(_matches(faults, *one, greeting.epsilon) for one in answered):
                 matches.append(faults)
         if matches:
-            return Diagnosis((_explanation(matches),), tried=tried)
+            keys = tuple(" + ".join(one.key for one in faults) for faults in matches)[:3]
+            said = either([[one.sentence for one in faults] for faults in matches])
+            return Diagnosis((Explanation(keys, said, 1.0, 0.0),), tried=tried)
     return Diagnosis(first_broken=first_broken(judgements), tried=tried)
 
 
-def _matches(faults: Sequence[Fault], p: Problem, given: Mapping[str, Any], epsilon: float) -> bool:
+def _matches(
+    faults: Sequence[Option], p: Problem, given: Mapping[str, Any], epsilon: float
+) -> bool:
     expected = predict(faults, p)
     limit = 8.0 * tolerance(p, epsilon)
     return all(abs(given[name] - expected[name]) <= limit for name in PARTS if name in given)
-
-
-def _explanation(matches: Sequence[Sequence[Fault]]) -> Explanation:
-    keys = tuple(" + ".join(one.key for one in faults) for faults in matches)[:3]
-    said = either([[one.sentence for one in faults] for faults in matches])
-    return Explanation(keys, said, 1.0, 0.0)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,8 @@ from ..sentence import Sentence, sentence
 from ..timing import timed
 from . import laws
 from .cases import task_cases
-from .faults import FORCE_FAULTS, Option
+from .faults import FORCE_FAULTS, Option, apply, combined
+from .model import Model
 from .problem import (
     Problem,
     all_forces,
@@ -28,9 +28,9 @@ from .problem import (
     state_of,
     system_of,
 )
+from .rounding import correct_digits
 
 TASK = "mass_spring_forces"
-MOST_FAULTS = 3
 # Rounding of a length by the coordinates' epsilon, times the stiffness, and of some ten terms.
 ROUNDINGS = 8.0
 
@@ -58,36 +58,32 @@ def tolerance(p: Problem, epsilon: float) -> float:
 def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJudgement:
     p = problem_of(one.case.inputs)
     system, state = system_of(p), state_of(p)
-    expected, seconds = timed(lambda: reference_forces(system, state))
+    forces, seconds = timed(lambda: reference_forces(system, state))
+    expected = {"forces": forces}
     if not isinstance(one.answer, Answer):
-        return CaseJudgement(one.case, one.answer, (), {"forces": expected}, None, seconds)
+        return CaseJudgement(one.case, one.answer, (), expected, None, seconds)
     given, allowed = one.answer.values["forces"], tolerance(p, greeting.epsilon)
-    findings = _findings(one, asked, p, expected, allowed)
-    size, gap = float(np.abs(expected).max()), float(np.abs(given - expected).max())
-    digits = None
-    if size > allowed and np.isfinite(gap):
-        digits = float(min(16.0, max(0.0, -np.log10(max(gap / size, 1e-16)))))
-    return CaseJudgement(
-        one.case, one.answer, tuple(findings), {"forces": expected}, digits, seconds
-    )
+    findings = tuple(_findings(one, one.answer, asked, p, forces, allowed))
+    size, gap = float(np.abs(forces).max()), float(np.abs(given - forces).max())
+    digits = correct_digits(gap, size) if size > allowed and np.isfinite(gap) else None
+    return CaseJudgement(one.case, one.answer, findings, expected, digits, seconds)
 
 
 def _findings(
-    one: Asked, asked: Sequence[Asked], p: Problem, expected: Any, allowed: float
+    one: Asked, answer: Answer, asked: Sequence[Asked], p: Problem, expected: Any, allowed: float
 ) -> list[Finding]:
-    assert isinstance(one.answer, Answer)
-    given = one.answer.values["forces"]
+    given = answer.values["forces"]
     if not np.isfinite(given).all():
-        said = sentence("Forces hold NaN or infinity.")
-        return [Finding("finite numbers", Verdict.BROKEN, np.inf, 0.0, "", said)]
-    found = [_formula(p, given, expected, allowed), _balance(p, given, allowed)]
+        return [laws.no_numbers(sentence("Forces hold NaN or infinity."))]
     limits = {"forces": 2.0 * allowed}
-    bases = [other.answer for other in asked if other.case.name == one.case.facts.get("of")]
-    if bases and isinstance(bases[0], Answer):
-        found.append(laws.symmetry(one, bases[0], limits))
-    found.append(laws.equal_requests(one, ("forces",), limits))
-    found += [Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", said) for said in one.answer.remarks]
-    return found
+    symmetry = laws.symmetry(one, asked, limits)
+    return [
+        _formula(p, given, expected, allowed),
+        _balance(p, given, allowed),
+        *([symmetry] if symmetry else []),
+        laws.equal_requests(one, limits),
+        *laws.remarks(answer),
+    ]
 
 
 def _formula(p: Problem, given: Any, expected: Any, allowed: float) -> Finding:
@@ -95,10 +91,11 @@ def _formula(p: Problem, given: Any, expected: Any, allowed: float) -> Finding:
     where, worst = int(gap.argmax()), float(gap.max())
     said = sentence(
         "The force on particle {where} is {gap:.2g} N off {term}.",
-        where=where, gap=worst, term=_term(p, given - expected),
-    )  # fmt: skip
-    verdict = Verdict.RIGHT if worst <= allowed else Verdict.WRONG
-    return Finding("force formula", verdict, worst, allowed, "N", said, where)
+        where=where,
+        gap=worst,
+        term=_term(p, given - expected),
+    )
+    return laws.bounded("force formula", worst, allowed, "N", said, where)
 
 
 def _term(p: Problem, error: Any) -> Sentence:
@@ -121,27 +118,18 @@ def _term(p: Problem, error: Any) -> Sentence:
 def _balance(p: Problem, given: Any, allowed: float) -> Finding:
     """Springs and dampers pull both ends alike: the sum of forces is the weight."""
     gap = float(np.abs(given.sum(0) - p.constant.sum(0)).max())
-    limit = allowed * np.sqrt(p.count) * 2.0
     said = sentence("The sum of all forces is {gap:.2g} N off the weight.", gap=gap)
-    verdict = Verdict.RIGHT if gap <= limit else Verdict.WRONG
-    return Finding("momentum balance", verdict, gap, limit, "N", said)
+    return laws.bounded("momentum balance", gap, allowed * np.sqrt(p.count) * 2.0, "N", said)
 
 
 def _predict(faults: tuple[Option, ...], case: Case) -> Mapping[str, Any]:
-    p = problem_of(case.inputs)
-    for fault in faults:
-        assert fault.change is not None
-        p = fault.change(p)
-    return {"forces": all_forces(p)}
+    return {"forces": all_forces(apply(faults, problem_of(case.inputs), Model())[0])}
 
 
 def variants() -> Iterator[Variant]:
     """Yield the right formula's faults, up to three of different aspects."""
-    for count in range(1, MOST_FAULTS + 1):
-        for faults in combinations(FORCE_FAULTS, count):
-            if len({one.aspect for one in faults}) == count:
-                keys = tuple(one.key for one in faults)
-                yield Variant(keys, partial(_predict, faults))
+    for faults in combined(FORCE_FAULTS):
+        yield Variant(tuple(one.key for one in faults), partial(_predict, faults))
 
 
 _BY_KEY = {one.key: one.sentence for one in FORCE_FAULTS}

@@ -1,22 +1,37 @@
 """The choices that an honest solver may make, and which of them a greeting leaves open."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from ..greeting import Step
 from ..sentence import Sentence, sentence
-from .faults import ASPECTS, STEP_FAULTS, Option
+from .faults import ASPECTS, STEP_FAULTS, Option, choices_of
 from .model import PIN_STRENGTHS, Integrator
 
 EXPLICIT_SUBSTEPS = (1, 2, 3, 4, 5, 8, 10, 16, 20, 30, 50, 100, 1000)
 SOLVER_ITERATIONS = (1, 2, 3, 4, 5, 8, 10, 15, 20, 30, 50, 100)
 NEWTON_ITERATIONS = (2, 3, 4, 5, 10)
-HESSIANS = ("exact", "gauss", "projected")
 SCALINGS = (0.9, 0.95, 0.98, 0.99, 0.995, 0.999)
 EXPLICIT_METHODS = ("explicit", "symplectic", "taylor", "runge_kutta", "in_place")
 EXPLICIT_DAMPERS = ("none", "explicit", "diagonal", "blocks", "matrix")
 IMPLICIT_DAMPERS = ("length_rate", "end_velocity", "explicit", "none")
 
 
-def _integrator(said: Sentence, *values: object) -> Option:
-    how = Integrator(*values)  # type: ignore[arg-type]
+_KINDS = {
+    "exact": (sentence("one linearised implicit step from {start}"),
+              sentence("{n} iterations of Newton's method from {start}")),
+    "gauss": (sentence("one linearised implicit step from {start} without the geometric term of "
+                       "the Hessian"),
+              sentence("{n} Newton iterations from {start} without the geometric term")),
+    "projected": (sentence("one linearised implicit step from {start} with the geometric term "
+                           "only where springs are stretched"),
+                  sentence("{n} Newton iterations from {start} with the geometric term only where "
+                           "springs are stretched")),
+}  # fmt: skip
+
+
+def _integrator(said: Sentence, *values: Any) -> Option:
+    how = Integrator(*values)
     return Option(" ".join(map(str, how)), "integrator", said, fields={"integrator": how})
 
 
@@ -28,34 +43,19 @@ def integrators(step: Step) -> list[Option]:
         _integrator(sentence("converged implicit Euler"), "converged", "y"),
         _integrator(sentence("symplectic Euler"), "symplectic"),
         _integrator(sentence("explicit Euler"), "explicit"),
-        *(_linearised(start, kind) for start in ("x_n", "y") for kind in HESSIANS),
+        *(_newton(start, 1, kind) for start in ("x_n", "y") for kind in _KINDS),
         *(_local_global(start, n) for n in locals_ for start in ("x_n", "y")),
-        *(
-            _newton(start, n, kind)
-            for n in newtons
-            if n > 1
-            for start in ("x_n", "y")
-            for kind in HESSIANS
-        ),
+        *(_newton(start, n, kind)
+          for n in newtons if n > 1 for start in ("x_n", "y") for kind in _KINDS),
         _integrator(sentence("x + h v + h²/2 a"), "taylor"),
         _integrator(sentence("the classical Runge-Kutta method"), "runge_kutta"),
-    ]
+    ]  # fmt: skip
 
 
-def _linearised(start: str, kind: str) -> Option:
-    said = {
-        "exact": sentence("one linearised implicit step from {start}", start=start),
-        "gauss": sentence(
-            "one linearised implicit step from {start} without the geometric term of the Hessian",
-            start=start,
-        ),
-        "projected": sentence(
-            "one linearised implicit step from {start} with the geometric term only where springs "
-            "are stretched",
-            start=start,
-        ),
-    }[kind]
-    return _integrator(said, "newton", start, 1, kind)
+def _newton(start: str, n: int, kind: str) -> Option:
+    words = {"start": start} if n == 1 else {"n": n, "start": start}
+    said = _KINDS[kind][n > 1]
+    return _integrator(Sentence(said.template, words), "newton", start, n, kind)
 
 
 def _local_global(start: str, n: int) -> Option:
@@ -63,93 +63,51 @@ def _local_global(start: str, n: int) -> Option:
     return _integrator(said, "local_global", start, n)
 
 
-def _newton(start: str, n: int, kind: str) -> Option:
-    said = {
-        "exact": sentence("{n} iterations of Newton's method from {start}", n=n, start=start),
-        "gauss": sentence(
-            "{n} Newton iterations from {start} without the geometric term", n=n, start=start
-        ),
-        "projected": sentence(
-            "{n} Newton iterations from {start} with the geometric term only where springs are "
-            "stretched",
-            n=n,
-            start=start,
-        ),
-    }[kind]
-    return _integrator(said, "newton", start, n, kind)
+DAMPERS = choices_of("damper", {
+    "length_rate": sentence("dampers by the rate of their length"),
+    "explicit": sentence("explicit damping"),
+    "none": sentence("no damping"),
+    "end_velocity": sentence("dampers at the end velocity"),
+    "diagonal": sentence("damping implicit in the diagonal of its matrix"),
+    "blocks": sentence("damping implicit in the 3 x 3 blocks of its matrix"),
+    "matrix": sentence("implicit damping beside explicit springs"),
+})  # fmt: skip
+_PINS = {
+    "penalty": sentence("pins held by a penalty of {strength}"),
+    "springs": sentence("pins held by springs of {strength} N/m"),
+    "heavy": sentence("pins of {strength} kg"),
+    "falling": sentence("pins of {strength} kg that fall"),
+}
+HONEST_PINS = choices_of("pins", {
+    "eliminated": sentence("pins held inside the solve"),
+    "overwritten": sentence("pins put back after each solve"),
+    **{key: Sentence(_PINS[key.split()[0]].template, {"strength": key.split()[1]})
+       for key in PIN_STRENGTHS if key != "one kilogram"},
+})  # fmt: skip
+HONEST_VELOCITIES = choices_of("velocity", {
+    "displacement": sentence("velocities (x' - x) / h"),
+    "separate": sentence("velocities integrated beside"),
+})  # fmt: skip
 
 
-DAMPERS = (
-    Option("damper length_rate", "damper",
-           sentence("dampers by the rate of their length"), fields={"damper": "length_rate"}),
-    Option("damper explicit", "damper",
-           sentence("explicit damping"), fields={"damper": "explicit"}),
-    Option("damper none", "damper", sentence("no damping"), fields={"damper": "none"}),
-    Option("damper end_velocity", "damper",
-           sentence("dampers at the end velocity"), fields={"damper": "end_velocity"}),
-    Option("damper diagonal", "damper",
-           sentence("damping implicit in the diagonal of its matrix"),
-           fields={"damper": "diagonal"}),
-    Option("damper blocks", "damper",
-           sentence("damping implicit in the 3 x 3 blocks of its matrix"),
-           fields={"damper": "blocks"}),
-    Option("damper matrix", "damper",
-           sentence("implicit damping beside explicit springs"), fields={"damper": "matrix"}),
-)  # fmt: skip
-
-
-def _pins(key: str) -> Option:
-    kind, strength = key.split()
-    said = {
-        "penalty": sentence("pins held by a penalty of {strength}", strength=strength),
-        "springs": sentence("pins held by springs of {strength} N/m", strength=strength),
-        "heavy": sentence("pins of {strength} kg", strength=strength),
-        "falling": sentence("pins of {strength} kg that fall", strength=strength),
-    }[kind]
-    return Option("pins " + key, "pins", said, fields={"pins": key})
-
-
-HONEST_PINS = (
-    Option("pins eliminated", "pins", sentence("pins held inside the solve"),
-           fields={"pins": "eliminated"}),
-    Option("pins overwritten", "pins", sentence("pins put back after each solve"),
-           fields={"pins": "overwritten"}),
-    *(_pins(key) for key in PIN_STRENGTHS if key != "one kilogram"),
-)  # fmt: skip
-HONEST_VELOCITIES = (
-    Option("velocity displacement", "velocity", sentence("velocities (x' - x) / h"),
-           fields={"velocity": "displacement"}),
-    Option("velocity separate", "velocity", sentence("velocities integrated beside"),
-           fields={"velocity": "separate"}),
-)  # fmt: skip
-
-
-def _substeps(n: int) -> Option:
-    said = sentence("one step") if n == 1 else sentence("{n} substeps", n=n)
-    return Option(f"substeps {n}", "substeps", said, fields={"substeps": n})
-
-
-def _scaling(factor: float) -> Option:
-    said = (
-        sentence("velocities as they come")
-        if factor == 1.0
-        else sentence("velocities times {factor}", factor=factor)
-    )
-    return Option(f"scaling {factor}", "scaling", said, fields={"scaling": factor})
-
-
-def honest(step: Step) -> dict[str, list[Option]]:
+def honest(step: Step) -> dict[str, tuple[Option, ...]]:
     """Return, for each aspect, the choices that are no faults, the usual one first."""
     counts = sorted({*EXPLICIT_SUBSTEPS, step.substeps or 1})
     factors = [step.damping_factor] if step.damping_factor else []
     return {
-        "integrator": integrators(step),
-        "substeps": [_substeps(n) for n in counts],
-        "damper": list(DAMPERS),
-        "pins": list(HONEST_PINS),
-        "velocity": list(HONEST_VELOCITIES),
-        "scaling": [_scaling(factor) for factor in dict.fromkeys((1.0, *factors, *SCALINGS))],
-    }
+        "integrator": tuple(integrators(step)),
+        "substeps": choices_of("substeps", {
+            n: sentence("one step") if n == 1 else sentence("{n} substeps", n=n) for n in counts
+        }),
+        "damper": DAMPERS,
+        "pins": HONEST_PINS,
+        "velocity": HONEST_VELOCITIES,
+        "scaling": choices_of("scaling", {
+            1.0: sentence("velocities as they come"),
+            **{factor: sentence("velocities times {factor}", factor=factor)
+               for factor in (*factors, *SCALINGS)},
+        }),
+    }  # fmt: skip
 
 
 def declared(option: Option, step: Step) -> bool:
@@ -179,26 +137,21 @@ def _pins_of(kind: str) -> tuple[str, ...]:
 
 
 def _declared_scaling(factor: float, step: Step) -> bool:
-    if step.damper is None:
-        return True
-    if step.damper != "global_factor":
+    if step.damper not in (None, "global_factor"):
         return factor == 1.0
-    return step.damping_factor is None or factor == step.damping_factor
+    return step.damper is None or step.damping_factor in (None, factor)
 
 
 def _declared_integrator(how: Integrator, step: Step) -> bool:
-    if step.method is None:
-        method = True
-    elif step.method == "linearised":
-        method = how.method == "newton" and how.iterations == 1
-    else:
-        method = how.method == step.method
-        if step.iterations is None and step.method in ("newton", "local_global"):
-            method = method or how.method == "converged"
-    if how.method not in ("newton", "local_global"):
-        return method
-    counted = step.method == "linearised" or step.iterations in (None, how.iterations)
-    return method and counted and step.start in (None, how.start)
+    iterative = how.method in ("newton", "local_global")
+    if iterative and step.start not in (None, how.start):
+        return False
+    if step.method == "linearised":
+        return how.method == "newton" and how.iterations == 1
+    if iterative and step.iterations not in (None, how.iterations):
+        return False
+    unlimited = step.iterations is None and step.method in ("newton", "local_global")
+    return step.method in (None, how.method) or (unlimited and how.method == "converged")
 
 
 def domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
@@ -216,41 +169,35 @@ def domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
 
 def compatible(chosen: dict[str, Option]) -> bool:
     """Return whether choices make sense together, as far as they are made."""
-    option = chosen.get("integrator", chosen.get("class"))
-    how = option.fields["integrator"] if option else None
-    substeps = chosen["substeps"].fields["substeps"] if "substeps" in chosen else None
-    if how is not None:
-        explicit = how.method in EXPLICIT_METHODS
-        if explicit and chosen.get("matrix", _NONE).key:
-            return False
-        if explicit and chosen.get("time", _NONE).fields.get("time") == "before":
-            return False
-        damper = chosen.get("damper", _NONE).fields.get("damper")
-        if damper in ("diagonal", "blocks", "matrix") and how.method != "symplectic":
-            return False
-        if damper and damper not in (EXPLICIT_DAMPERS if explicit else IMPLICIT_DAMPERS):
-            return False
-        if substeps and not _countable(chosen, how.method, substeps):
-            return False
-        own = explicit and how.method not in ("symplectic", "in_place")
-        if own and chosen.get("velocity", _NONE).key == "velocity displacement":
-            return False
-    several = chosen.get("pins", _NONE).fields.get("pins") == "at_the_end"
-    several |= chosen.get("time", _NONE).fields.get("time") == "undivided"
-    several |= chosen.get("velocity", _NONE).fields.get("velocity") == "over the whole h"
-    return not (several and substeps == 1)
+    fields = {k: value for option in chosen.values() for k, value in option.fields.items()}
+    how, damper, velocity = (fields.get(name) for name in ("integrator", "damper", "velocity"))
+    needs_several = (
+        fields.get("pins") == "at_the_end"
+        or fields.get("time") == "undivided"
+        or velocity == "over the whole h"
+    )
+    if needs_several and fields.get("substeps") == 1:
+        return False
+    if how is None:
+        return True
+    explicit = how.method in EXPLICIT_METHODS
+    if explicit and ("matrix" in fields or fields.get("time") == "before"):
+        return False
+    if damper in ("diagonal", "blocks", "matrix") and how.method != "symplectic":
+        return False
+    if damper and damper not in (EXPLICIT_DAMPERS if explicit else IMPLICIT_DAMPERS):
+        return False
+    own = explicit and how.method not in ("symplectic", "in_place")
+    if own and velocity == "displacement":
+        return False
+    return _countable(fields, how.method)
 
 
-def _countable(chosen: dict[str, Option], method: str, substeps: int) -> bool:
+def _countable(fields: Mapping[str, Any], method: str) -> bool:
     """Return whether so many substeps are worth their time."""
+    substeps = fields.get("substeps", 1)
     if method not in ("explicit", "symplectic"):
         return substeps <= (30 if method in EXPLICIT_METHODS else 20)
-    plain = all(not chosen.get(one, _NONE).key for one in ("time", "inertia")) and chosen.get(
-        "velocity", _NONE
-    ).key in ("", "velocity separate")
-    return substeps <= 30 or (
-        plain and chosen.get("scaling", _NONE).fields.get("scaling", 1.0) == 1.0
-    )
-
-
-_NONE = Option("", "", sentence(""))
+    plain = "time" not in fields and "inertia" not in fields
+    plain &= fields.get("velocity", "separate") == "separate"
+    return substeps <= 30 or (plain and fields.get("scaling", 1.0) == 1.0)

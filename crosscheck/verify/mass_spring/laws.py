@@ -1,18 +1,20 @@
 """Laws that a step keeps whatever its solver is, and the laws of what it declares."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
-from plumbob.reference.judging.step import judge_step
+from plumbob.reference.judging import StepJudgement, judge_step
 
 from ..contestant import Answer, Asked
 from ..judgement import Finding, Verdict
 from ..sentence import Sentence, sentence
-from .model import Model, simulate
-from .problem import Problem, accelerations, damper_forces, state_of, system_of
+from .model import Model
+from .problem import Problem, accelerations, damper_forces, frames, state_of, system_of
 from .rounding import SOLVED, Rounding, apart, difference
 
 # Up to this share of what a step changes, an answer is called imprecise; beyond it is another step.
@@ -23,80 +25,112 @@ ROUNDED = 30.0
 CONSISTENT = 0.1
 
 
-class Context(NamedTuple):
-    """What the laws of one answer need.
-
-    Attributes:
-        answered: by the names of the outputs.
-        model: the step that is declared, completed by what was inferred.
-        known: whether that model is declared or was recognised.
-        says: the model in words.
-        expected: its prediction, or {} if it has none.
-        pins_declared: whether the greeting says how pins are held.
-    """
+@dataclass(frozen=True, eq=False)
+class Context:
+    """What the laws of one answer need."""
 
     problem: Problem
-    answered: Mapping[str, Any]
+    answered: Mapping[str, Any]  # by the names of the outputs
     allowed: Rounding
-    model: Model
-    known: bool
-    says: Sentence
-    expected: Mapping[str, Any]
-    pins_declared: bool
+    model: Model  # the step that is declared, completed by what was inferred
+    known: bool  # whether that model is declared or was recognised
+    says: Sentence  # the model in words
+    expected: Mapping[str, Any]  # its prediction, or {} if it has none
+    pins_declared: bool  # whether the greeting says how pins are held
+
+    @cached_property
+    def judgement(self) -> StepJudgement | None:
+        """The positions judged as a converged implicit step, None where its damper is no energy."""
+        p, damper = self.problem, self.model.damper
+        external = p.external
+        if p.steps or (p.damped and damper not in ("explicit", "length_rate")):
+            return None
+        if damper == "explicit":
+            external = external + damper_forces(p, p.positions, p.velocities)
+        if damper != "length_rate":
+            p = p.changed(dampings=np.zeros_like(p.dampings))
+        x = self.answered["positions"]
+        return judge_step(system_of(p), state_of(p), p.h, x, external_forces=external)
+
+    def displacement(self, name: str = "positions") -> float:
+        """Return by how much positions or velocities are expected to change, at most."""
+        before = self.problem.positions if name == "positions" else 0.0
+        return float(np.abs(np.asarray(self.expected[name]) - before).max(initial=0.0))
+
+
+def bounded(
+    law: str, error: float, tolerance: float, unit: str, said: Sentence, where: int | None = None
+) -> Finding:
+    """Return the finding that an error is within its tolerance, or wrong."""
+    verdict = Verdict.RIGHT if error <= tolerance else Verdict.WRONG
+    return Finding(law, verdict, error, tolerance, unit, said, where)
+
+
+def unsure(law: str, error: float, said: Sentence) -> Finding:
+    """Return the finding that nobody can tell whether a law holds."""
+    return Finding(law, Verdict.UNDECIDED, error, SOLVED, "", said)
+
+
+def no_numbers(said: Sentence) -> Finding:
+    """Return the finding that an answer holds NaN or infinity."""
+    return Finding("finite numbers", Verdict.BROKEN, np.inf, 0.0, "", said)
+
+
+def remarks(answer: Answer) -> list[Finding]:
+    """Return what was odd about an answer."""
+    return [Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", said) for said in answer.remarks]
 
 
 def finite(one: Context) -> Finding | None:
     """Return a finding if an answer holds NaN or infinity."""
     bad = [name for name, value in one.answered.items() if not np.isfinite(value).all()]
-    if not bad:
-        return None
-    said = sentence("{name} hold NaN or infinity.", name=", ".join(bad))
-    return Finding("finite numbers", Verdict.BROKEN, np.inf, 0.0, "", said)
+    return (
+        no_numbers(sentence("{name} hold NaN or infinity.", name=", ".join(bad))) if bad else None
+    )
 
 
 def pins(one: Context) -> Finding | None:
     """Return how far pins are from where they were."""
-    p = one.problem
-    if len(p.pinned) == 0 or "positions" not in one.answered:
+    p, x = one.problem, one.answered.get("positions")
+    if len(p.pinned) == 0 or x is None:
         return None
-    moved = np.linalg.norm(one.answered["positions"] - p.positions, axis=-1)[..., p.pinned]
-    moved = moved.reshape(-1, len(p.pinned)).max(axis=0)
-    worst = float(moved.max())
+    moved = np.linalg.norm(x - p.positions, axis=-1)[..., p.pinned].reshape(-1, len(p.pinned))
+    worst, tolerance = float(moved.max()), one.allowed.positions
     held = one.model.pins in ("eliminated", "overwritten") and one.pins_declared
-    verdict = Verdict.RIGHT if worst <= one.allowed.positions else Verdict.WRONG
-    tolerance = one.allowed.positions
+    verdict = Verdict.RIGHT if worst <= tolerance else Verdict.WRONG
     if not held and verdict is Verdict.WRONG:
-        tolerance += IMPRECISE * float(np.abs(one.answered["positions"] - p.positions).max())
+        tolerance += IMPRECISE * float(np.abs(x - p.positions).max())
         if one.expected:
             there = np.asarray(one.expected["positions"]) - p.positions
             tolerance += 2.0 * float(np.abs(there[..., p.pinned, :]).max())
         verdict = Verdict.RIGHT_BUT if worst <= tolerance else Verdict.WRONG
     said = sentence("A pinned particle moves by {error:.2g} m.", error=worst)
-    where = int(p.pinned[moved.argmax()])
+    where = int(p.pinned[moved.max(axis=0).argmax()])
     return Finding("pins", verdict, worst, tolerance, "m", said, where)
 
 
 def declared_step(one: Context) -> Finding | None:
     """Return how far positions are from those of the declared or recognised step."""
+    law = "declared step"
     if "positions" not in one.answered:
         return None
-    law = "declared step"
     if not one.known:
-        said = sentence("The step is none of those that are known; none was declared.")
-        return Finding(law, Verdict.UNDECIDED, np.inf, SOLVED, "", said)
+        return unsure(
+            law, np.inf, sentence("The step is none of those that are known; none was declared.")
+        )
     if not one.expected or not np.isfinite(one.expected["positions"]).all():
-        said = sentence("The declared step has no finite result here.")
-        return Finding(law, Verdict.UNDECIDED, np.inf, SOLVED, "", said)
+        return unsure(law, np.inf, sentence("The declared step has no finite result here."))
     answered = {"positions": one.answered["positions"]}
     error = apart(one.problem, one.expected, answered, one.allowed)
     gap = np.linalg.norm(one.expected["positions"] - answered["positions"], axis=-1)
     where = int(gap.reshape(-1, one.problem.count).max(axis=0).argmax())
     said = sentence(
         "Positions are up to {gap:.2g} m from those of {model}, at particle {where}.",
-        gap=float(gap.max()), model=one.says, where=where,
-    )  # fmt: skip
-    moved = float(np.abs(one.expected["positions"] - one.problem.positions).max())
-    verdict = _graded(error, moved, one.allowed.positions)
+        gap=float(gap.max()),
+        model=one.says,
+        where=where,
+    )
+    verdict = _graded(error, one.displacement(), one.allowed.positions)
     if verdict is Verdict.WRONG and not one.problem.steps:
         verdict = _excused(one)
     return Finding(law, verdict, error, SOLVED, "", said, where)
@@ -112,16 +146,13 @@ def _graded(error: float, size: float, allowed: float) -> Verdict:
 
 def _excused(one: Context) -> Verdict:
     """Return whether a step that differs is another minimum, or rests on a safeguard."""
-    p, how = one.problem, one.model.integrator
-    moved = float(np.abs(np.asarray(one.expected["positions"]) - p.positions).max())
-    if one.allowed.positions > moved:
+    method, model = one.model.integrator.method, one.model
+    if one.allowed.positions > one.displacement() or (method == "newton" and _indefinite(one)):
         return Verdict.UNDECIDED
-    if how.method == "newton" and _indefinite(one):
-        return Verdict.UNDECIDED
-    if how.method == "converged" and one.model.substeps == 1 and one.model.scaling == 1.0:
-        found = minimum(one)
-        if found is not None and found.certificate.covered:
-            near = found.certificate.distance <= IMPRECISE * found.displacement
+    if method == "converged" and model.substeps == 1 and model.scaling == 1.0:
+        judgement = one.judgement
+        if judgement is not None and judgement.certificate.covered:
+            near = judgement.certificate.distance <= IMPRECISE * judgement.displacement
             return Verdict.RIGHT if near else Verdict.WRONG
     return Verdict.WRONG
 
@@ -129,75 +160,61 @@ def _excused(one: Context) -> Verdict:
 def _indefinite(one: Context) -> bool:
     """Return whether Newton's method may meet a Hessian that no two programs mend alike."""
     p = one.problem
-    length = np.linalg.norm(p.positions[p.springs[:, 0]] - p.positions[p.springs[:, 1]], axis=1)
+    length, _ = frames(p, p.positions)
     lost = p.stiffnesses * np.maximum(p.rest_lengths / length - 1.0, 0.0) * p.h**2
     return bool((np.abs(p.incidence).T @ lost > 0.1 * p.masses).any())
 
 
-def minimum(one: Context) -> Any:
-    """Return the judgement of positions as a converged implicit step; None if none applies."""
-    p, model = one.problem, one.model
-    external = p.external
-    if model.damper == "explicit":
-        external = external + damper_forces(p, p.positions, p.velocities)
-    elif model.damper != "length_rate" and p.damped:
-        return None
-    if model.damper != "length_rate":
-        p = p.changed(dampings=np.zeros_like(p.dampings))
-    if p.steps:
-        return None
-    return judge_step(system_of(p), state_of(p), p.h, one.answered["positions"], None, external)
-
-
 def minimiser(one: Context) -> Finding | None:
     """Return how far positions are from converged implicit Euler, relative to how far y is."""
-    if "positions" not in one.answered or one.problem.steps:
+    law = "minimiser"
+    if "positions" not in one.answered:
         return None
-    found = minimum(one)
-    if found is None or not found.outcome.solved:
+    judgement = one.judgement
+    if judgement is None or not judgement.outcome.solved:
         return None
-    rounded = found.distance <= one.allowed.positions * np.sqrt(3.0 * one.problem.count)
-    if found.error <= SOLVED or rounded or found.same_minimiser is False:
+    error = judgement.error
+    rounded = judgement.distance <= one.allowed.positions * np.sqrt(3.0 * one.problem.count)
+    if error <= SOLVED or rounded or judgement.same_minimiser is False:
         said = sentence("The step is the converged one of implicit Euler.")
-        return Finding("minimiser", Verdict.RIGHT, found.error, SOLVED, "", said)
+        return Finding(law, Verdict.RIGHT, error, SOLVED, "", said)
     if not one.known:
-        said = sentence("It is {distance:.2g} m from the minimiser of implicit Euler.",
-                        distance=found.distance)  # fmt: skip
-        return Finding("minimiser", Verdict.UNDECIDED, found.error, SOLVED, "", said)
+        return unsure(law, error, sentence(
+            "It is {distance:.2g} m from the minimiser of implicit Euler.",
+            distance=judgement.distance))  # fmt: skip
     said = sentence(
         "Not converged implicit Euler: the positions miss its minimiser x* by {error:.2g} of "
         "|y - x*|, what springs move in a step.",
-        error=found.error,
-    )  # fmt: skip
-    return Finding("minimiser", Verdict.RIGHT_BUT, found.error, SOLVED, "", said)
+        error=error,
+    )
+    return Finding(law, Verdict.RIGHT_BUT, error, SOLVED, "", said)
 
 
 def velocities(one: Context) -> Finding | None:
     """Return how far velocities are from what the declared making gives."""
     if "velocities" not in one.answered or not one.known or not one.expected:
         return None
-    wanted = np.asarray(one.expected["velocities"])
+    wanted, model = np.asarray(one.expected["velocities"]), one.model
     p, x = one.problem, one.answered.get("positions")
-    by_displacement = one.model.velocity == "displacement" and not one.model.integrator.explicit
-    if by_displacement and one.model.substeps == 1 and x is not None and not p.steps:
-        wanted = (x - p.positions) / p.h * one.model.scaling
+    by_displacement = model.velocity == "displacement" and not model.integrator.explicit
+    if by_displacement and model.substeps == 1 and x is not None and not p.steps:
+        wanted = (x - p.positions) / p.h * model.scaling
     gap = difference(p, "velocities", wanted, one.answered["velocities"])
     size = float(np.abs(wanted).max(initial=0.0))
     error = gap / (size + one.allowed.velocities / SOLVED)
     said = sentence("Velocities are up to {gap:.2g} m/s from what the step makes them.", gap=gap)
-    verdict = Verdict.UNDECIDED
-    if np.isfinite(gap):
-        verdict = _graded(error, size, one.allowed.velocities)
+    finite = np.isfinite(gap)
+    verdict = _graded(error, size, one.allowed.velocities) if finite else Verdict.UNDECIDED
     return Finding("velocities", verdict, error, SOLVED, "", said)
 
 
 def momentum(one: Context) -> Finding | None:
     """Return how far the centre of mass is from where gravity takes it, without pins."""
-    p, x = one.problem, one.answered.get("positions")
-    how = one.model.integrator.method
-    if x is None or len(p.pinned) or p.steps or how == "descent" or one.model.scaling != 1.0:
+    p, x, model = one.problem, one.answered.get("positions"), one.model
+    method = model.integrator.method
+    if x is None or len(p.pinned) or p.steps or method == "descent" or model.scaling != 1.0:
         return None
-    if one.model.damper in ("diagonal", "blocks"):
+    if model.damper in ("diagonal", "blocks"):
         return None  # each end has its own share of a damper there
     share = p.masses / p.masses.sum()
     fall = p.h**2 * (p.constant.sum(0) / p.masses.sum())
@@ -206,50 +223,49 @@ def momentum(one: Context) -> Finding | None:
     part = float(np.clip(drift @ fall / size, 0.0, 1.0)) if size else 0.0
     gap = float(np.linalg.norm(drift - part * fall))
     tolerance = 4.0 * one.allowed.positions
-    if one.model.integrator.method == "converged":
+    if method == "converged":
         tolerance += 1e-4 * float(np.abs(x - p.positions).max())
     said = sentence("Springs move the centre of mass by {gap:.2g} m; they cannot.", gap=gap)
-    verdict = Verdict.RIGHT if gap <= tolerance else Verdict.WRONG
-    return Finding("momentum", verdict, gap, tolerance, "m", said)
+    return bounded("momentum", gap, tolerance, "m", said)
 
 
 def consistency(one: Context) -> Finding | None:
     """Return how far the mean acceleration of a small step is from f / m."""
-    p = one.problem
-    v = one.answered.get("velocities")
+    p, v = one.problem, one.answered.get("velocities")
     if v is None or one.model.damper == "none" or one.model.scaling != 1.0:
         return None  # without velocities explicit and implicit steps part at the first order
-    a = (v - p.velocities) / p.h
     wanted = accelerations(p, p.positions, p.velocities)
     free = np.setdiff1d(np.arange(p.count), p.pinned)
-    gap = float(np.abs(a - wanted)[free].max())
+    gap = float(np.abs((v - p.velocities) / p.h - wanted)[free].max())
     scale = float(np.abs(wanted[free]).max())
-    tolerance = CONSISTENT * scale + 2.0 * one.allowed.velocities / p.h
     said = sentence(
         "In a small step the acceleration is {gap:.2g} m/s² off f / m, of {scale:.2g} m/s².",
-        gap=gap, scale=scale,
-    )  # fmt: skip
-    verdict = Verdict.RIGHT if gap <= tolerance else Verdict.WRONG
-    return Finding("consistency", verdict, gap, tolerance, "m/s²", said)
+        gap=gap,
+        scale=scale,
+    )
+    tolerance = CONSISTENT * scale + 2.0 * one.allowed.velocities / p.h
+    return bounded("consistency", gap, tolerance, "m/s²", said)
 
 
-def equal_requests(asked: Asked, names: tuple[str, ...], allowed: Mapping[str, float]) -> Finding:
-    """Return how far two answers to one request are apart."""
-    again = asked.again
-    if not isinstance(asked.answer, Answer) or not isinstance(again, Answer):
+def equal_requests(asked: Asked, allowed: Mapping[str, float]) -> Finding:
+    """Return how far two answers to one request are apart, in the outputs that are named."""
+    answer, again = asked.answer, asked.again
+    if not isinstance(answer, Answer) or not isinstance(again, Answer):
         said = sentence("Asked a second time, it gave no answer.")
         return Finding("equal requests", Verdict.BROKEN, np.inf, 0.0, "", said)
-    shared = [name for name in names if name in asked.answer.values and name in again.values]
-    gaps = {name: _gap(asked.answer.values[name], again.values[name]) for name in shared}
-    worst = max(shared, key=lambda name: gaps[name] / max(allowed[name], 1e-300), default="")
+    gaps = {
+        name: _gap(answer.values[name], again.values[name])
+        for name in allowed
+        if name in answer.values and name in again.values
+    }
+    worst = max(gaps, key=lambda name: gaps[name] / max(allowed[name], 1e-300), default="")
     gap, tolerance = gaps.get(worst, 0.0), allowed.get(worst, 0.0)
     said = sentence(
         "Two answers to the same request differ by {gap:.2g} in {name}: it starts from noise, "
         "keeps state, or reads memory that was never written.",
         gap=gap, name=worst,
     ) if gap else sentence("Equal requests have equal answers.")  # fmt: skip
-    verdict = Verdict.RIGHT if gap <= tolerance else Verdict.WRONG
-    return Finding("equal requests", verdict, gap, tolerance, "", said)
+    return bounded("equal requests", gap, tolerance, "", said)
 
 
 def _gap(one: Any, other: Any) -> float:
@@ -259,12 +275,14 @@ def _gap(one: Any, other: Any) -> float:
     return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
 
 
-def symmetry(asked: Asked, base: Answer, allowed: Mapping[str, float]) -> Finding:
+def symmetry(asked: Asked, every: Sequence[Asked], allowed: Mapping[str, float]) -> Finding | None:
     """Return how far the answer is from the transformed answer to the untransformed case."""
     facts = asked.case.facts
-    assert isinstance(asked.answer, Answer)
+    base = next((one.answer for one in every if one.case.name == facts.get("of")), None)
+    if not isinstance(base, Answer) or not isinstance(asked.answer, Answer):
+        return None
     worst, where, name = 0.0, None, ""
-    for key in ("positions", "velocities", "forces"):
+    for key in allowed:
         if key not in asked.answer.values or key not in base.values:
             continue
         wanted = _transformed(base.values[key], facts, key == "positions")
@@ -278,19 +296,9 @@ def symmetry(asked: Asked, base: Answer, allowed: Mapping[str, float]) -> Findin
         "most at particle {where}.",
         name=name, where=where,
     ) if worst > 1.0 else sentence("Space and numbering make no difference.")  # fmt: skip
-    verdict = Verdict.RIGHT if worst <= 1.0 else Verdict.WRONG
-    return Finding("symmetry", verdict, worst, 1.0, "", said, where)
+    return bounded("symmetry", worst, 1.0, "", said, where)
 
 
 def _transformed(values: FloatArray, facts: Mapping[str, Any], place: bool) -> FloatArray:
     moved = values @ facts["matrix"].T + (facts["shift"] if place else 0.0)
     return moved[..., np.argsort(facts["order"]), :]
-
-
-def predicted(p: Problem, model: Model) -> Mapping[str, Any]:
-    """Return the model's result, {} if its matrix is singular."""
-    with np.errstate(all="ignore"):
-        try:
-            return simulate(p, model)
-        except np.linalg.LinAlgError:
-            return {}

@@ -26,41 +26,29 @@ from .problem import (
 MOST_ITERATIONS = 200
 # Stiffness of springs to the pins, weight of a penalty, and mass of heavy pins.
 PIN_STRENGTHS: Mapping[str, float] = {
-    "penalty 1e10": 1e10,
-    "penalty 1e8": 1e8,
-    "penalty 1e6": 1e6,
-    "springs 1e6": 1e6,
-    "springs 5e5": 5e5,
-    "springs 1e5": 1e5,
-    "heavy 1e10": 1e10,
-    "heavy 1e8": 1e8,
-    "heavy 1e6": 1e6,
-    "falling 1e10": 1e10,
-    "falling 1e8": 1e8,
-    "falling 1e6": 1e6,
-    "one kilogram": 1.0,
-}
+    f"{kind} {strength}": float(strength)
+    for kind, strengths in {
+        "penalty": ("1e10", "1e8", "1e6"),
+        "springs": ("1e6", "5e5", "1e5"),
+        "heavy": ("1e10", "1e8", "1e6"),
+        "falling": ("1e10", "1e8", "1e6"),
+    }.items()
+    for strength in strengths
+} | {"one kilogram": 1.0}
 
 
 class Integrator(NamedTuple):
-    """How positions follow from the state at the start of a step.
+    """How positions follow from the state at the start of a step."""
 
-    Attributes:
-        method: explicit, symplectic, taylor (x + h v + h²/2 a), runge_kutta; newton, local_global,
-            descent (along the gradient), converged.
-        start: of the iterations, "x_n" or "y".
-        iterations: how many.
-        hessian: of Newton's method: exact; gauss: without geometric term; projected: that term
-            only where it pulls; flipped: its sign turned; transverse: nothing but that term;
-            frozen: exact at x_n.
-        rate: by what the step of Newton's method or the gradient is multiplied.
-    """
-
+    # explicit, symplectic, taylor (x + h v + h²/2 a), runge_kutta; newton, local_global, descent
+    # (along the gradient), converged
     method: str
-    start: str = "x_n"
-    iterations: int = 1
+    start: str = "x_n"  # of the iterations, "x_n" or "y"
+    iterations: int = 1  # how many
+    # of Newton's method: exact; gauss: without geometric term; projected: that term only where it
+    # pulls; flipped: its sign turned; transverse: nothing but that term; frozen: exact at x_n
     hessian: str = "exact"
-    rate: float = 1.0
+    rate: float = 1.0  # by what the step of Newton's method or the gradient is multiplied
 
     @property
     def explicit(self) -> bool:
@@ -69,56 +57,41 @@ class Integrator(NamedTuple):
 
 
 class Model(NamedTuple):
-    """A complete description of a step, honest or not.
+    """A complete description of a step, honest or not."""
 
-    Attributes:
-        integrator: of the positions.
-        substeps: equal steps that make up h.
-        damper: none, explicit, length_rate, end_velocity; implicit in diag(C), in C's 3 x 3 blocks,
-            or in C, beside explicit springs: diagonal, blocks, matrix.
-        scaling: of every velocity after each substep.
-        pins: eliminated, overwritten, a key of PIN_STRENGTHS; at_the_end: free through the
-            substeps; free; unattached: no springs to them; first: only one is held; origin: their
-            columns dropped, so that springs end at the origin.
-        velocity: displacement, separate; or a key of VELOCITIES.
-        matrix: of an implicit step: a key of MATRICES.
-        inertia: what stands for y: y; x_n: no velocity; doubled: x_n + 2 h v; squared: x_n + h² v.
-        time: divided among substeps; undivided; before: of the last request, in the matrix only;
-            or a number of seconds instead of h.
-    """
-
-    integrator: Integrator = Integrator("converged", "y")
-    substeps: int = 1
+    integrator: Integrator = Integrator("converged", "y")  # of the positions
+    substeps: int = 1  # equal steps that make up h
+    # none, explicit, length_rate, end_velocity; implicit in diag(C), in C's 3 x 3 blocks, or in C,
+    # beside explicit springs: diagonal, blocks, matrix
     damper: str = "length_rate"
-    scaling: float = 1.0
+    scaling: float = 1.0  # of every velocity after each substep
+    # eliminated, overwritten, a key of PIN_STRENGTHS; at_the_end: free through the substeps; free;
+    # unattached: no springs to them; first: only one is held; origin: their columns dropped, so
+    # that springs end at the origin
     pins: str = "eliminated"
-    velocity: str = "displacement"
-    matrix: str = "M+h²L"
+    velocity: str = "displacement"  # displacement, separate; or a key of VELOCITIES
+    matrix: str = "M+h²L"  # of an implicit step: a key of MATRICES
+    # what stands for y: y; x_n: no velocity; doubled: x_n + 2 h v; squared: x_n + h² v
     inertia: str = "y"
+    # divided among substeps; undivided; before: of the last request, in the matrix only; or a
+    # number of seconds instead of h
     time: str | float = "divided"
 
 
 class Matrix(NamedTuple):
-    """How the system matrix is put together from masses and springs.
+    """How the system matrix is put together from masses and springs."""
 
-    Attributes:
-        masses: whether M is added.
-        power: of h before the springs' part, with its sign.
-        stiffness: whether the springs' part has its factor k.
-        beside: by what the entries off the diagonal are multiplied.
-    """
-
-    masses: bool = True
-    power: int = 2
+    masses: float = 1.0  # how many times M is added
+    power: int = 2  # of h before the springs' part, with its sign
     sign: float = 1.0
-    stiffness: bool = True
-    beside: float = 1.0
+    stiffness: bool = True  # whether the springs' part has its factor k
+    beside: float = 1.0  # by what the entries off the diagonal are multiplied
 
 
 MATRICES: Mapping[str, Matrix] = {
     "M+h²L": Matrix(),
-    "L": Matrix(masses=False),
-    "L without h²": Matrix(masses=False, power=0),
+    "L": Matrix(masses=0.0),
+    "L without h²": Matrix(masses=0.0, power=0),
     "M+hL": Matrix(power=1),
     "M+L": Matrix(power=0),
     "M-h²L": Matrix(sign=-1.0),
@@ -128,7 +101,7 @@ MATRICES: Mapping[str, Matrix] = {
     "positive beside": Matrix(beside=-1.0),
     "diagonal": Matrix(beside=0.0),
     "M": Matrix(sign=0.0),
-    "2M+h²L": Matrix(sign=0.5),
+    "2M+h²L": Matrix(masses=2.0),
 }
 
 
@@ -155,16 +128,23 @@ def simulate(p: Problem, model: Model) -> dict[str, FloatArray]:
     p = _with_pins(p, model)
     if model.integrator.explicit and model.damper == "none":
         p = p.changed(dampings=np.zeros_like(p.dampings))
-    x, v, frames_of = p.positions, p.velocities, []
+    x, v, states = p.positions, p.velocities, []
     for _ in range(p.steps or 1):
         x, v = _step(p, model, x, v)
-        frames_of.append((x, v))
+        states.append((x, v))
     if p.steps is None:
         return {"positions": x, "velocities": v}
-    return {
-        "positions": np.array([x for x, _ in frames_of]),
-        "velocities": np.array([v for _, v in frames_of]),
-    }
+    positions, velocities = map(np.array, zip(*states, strict=True))
+    return {"positions": positions, "velocities": velocities}
+
+
+def predicted(p: Problem, model: Model) -> dict[str, FloatArray]:
+    """Return the model's result, {} if its matrix is singular."""
+    with np.errstate(all="ignore"):
+        try:
+            return simulate(p, model)
+        except np.linalg.LinAlgError:
+            return {}
 
 
 def _with_pins(p: Problem, model: Model) -> Problem:
@@ -176,15 +156,8 @@ def _with_pins(p: Problem, model: Model) -> Problem:
         return p.changed(masses=masses, weighing=p.weighed if kind == "heavy" else masses)
     if kind == "unattached":
         kept = ~np.isin(p.springs, pinned).any(axis=1)
-        return p.changed(
-            stiffnesses=np.where(kept, p.stiffnesses, 0.0),
-            dampings=np.where(kept, p.dampings, 0.0),
-        )
-    if kind == "first":
-        return p.changed(pinned=pinned[:1])
-    if kind == "free":
-        return p.changed(pinned=pinned[:0])
-    return p
+        return p.changed(stiffnesses=kept * p.stiffnesses, dampings=kept * p.dampings)
+    return p.changed(pinned=pinned[: {"first": 1, "free": 0}.get(kind)])
 
 
 def _step(p: Problem, model: Model, x: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -201,16 +174,15 @@ def _step(p: Problem, model: Model, x: FloatArray, v: FloatArray) -> tuple[Float
 
 def substep(start: Start) -> tuple[FloatArray, FloatArray]:
     """Return positions and velocities a time h later."""
-    p, model, x_n, v_n, h = start
+    p, model, x_n, natural, h = start
     if model.integrator.explicit:
         x, natural = EXPLICIT[model.integrator.method](start)
     else:
         equation = Equation(start)
         x = _implicit(equation)
-        natural = v_n
         if model.velocity == "separate":
-            rest = equation.gradient(x) / p.masses[:, None]
-            natural = v_n + (x - equation.y - rest) / h
+            force = x - equation.y - equation.gradient(x) / p.masses[:, None]
+            natural = natural + force / h
     v = VELOCITIES[model.velocity](start, x, natural) * model.scaling
     if model.pins == "overwritten" or not start.free.all():
         x, v = x.copy(), v.copy()
@@ -249,21 +221,12 @@ def _damper_implicit(start: Start, x: FloatArray, a: FloatArray) -> FloatArray:
     return solved.reshape(n, 3)
 
 
-def _explicit(start: Start) -> tuple[FloatArray, FloatArray]:
-    _, _, x, v, h = start
-    return x + h * v, v + h * _explicit_rates(start, x, v)
-
-
-def _symplectic(start: Start) -> tuple[FloatArray, FloatArray]:
-    _, _, x, v, h = start
-    v = v + h * _explicit_rates(start, x, v)
-    return x + h * v, v
-
-
-def _taylor(start: Start) -> tuple[FloatArray, FloatArray]:
-    _, _, x, v, h = start
+def _by_one_rate(start: Start) -> tuple[FloatArray, FloatArray]:
+    """Step by the acceleration at the start: explicit or symplectic Euler, or x + h v + h²/2 a."""
+    _, model, x, v, h = start
     a = _explicit_rates(start, x, v)
-    return x + h * v + h * h / 2 * a, v + h * a
+    share = {"explicit": 0.0, "taylor": 0.5, "symplectic": 1.0}[model.integrator.method]
+    return x + h * (v + share * h * a), v + h * a
 
 
 def _runge_kutta(start: Start) -> tuple[FloatArray, FloatArray]:
@@ -288,9 +251,9 @@ def _in_place(start: Start) -> tuple[FloatArray, FloatArray]:
 
 
 EXPLICIT: Mapping[str, Callable[[Start], tuple[FloatArray, FloatArray]]] = {
-    "explicit": _explicit,
-    "symplectic": _symplectic,
-    "taylor": _taylor,
+    "explicit": _by_one_rate,
+    "symplectic": _by_one_rate,
+    "taylor": _by_one_rate,
     "runge_kutta": _runge_kutta,
     "in_place": _in_place,
 }
@@ -368,6 +331,10 @@ class Equation:
         result[self.pins] += self.hold * (x - p.positions)[self.pins]
         return result
 
+    def free_gradient(self, x: FloatArray) -> FloatArray:
+        """Return the gradient, zero at what the step may not move."""
+        return np.where(self.free[:, None], self.gradient(x), 0.0)
+
     def value(self, x: FloatArray) -> float:
         """Return g(x)."""
         p, h = self.start.p, self.start.h
@@ -426,18 +393,14 @@ class Equation:
 
     def put_together(self, springs: FloatArray, size: int) -> FloatArray:
         """Return M + h² times the springs' part, or what a faulty solver makes of it."""
-        p, model, h = self.start.p, self.start.model, self.start.h
+        p, model = self.start.p, self.start.model
         how = MATRICES[model.matrix]
-        if model.time == "before":
-            h = p.h_before / model.substeps
-        factor = how.sign * h**how.power
+        h = p.h_before / model.substeps if model.time == "before" else self.start.h
         if how.beside != 1.0:
             cells = np.kron(np.eye(p.count), np.ones((size, size)))
             springs = np.where(cells, springs, how.beside * springs)
-        masses = np.repeat(p.masses, size) * (2.0 if model.matrix == "2M+h²L" else 1.0)
-        if model.matrix == "2M+h²L":
-            factor = h**how.power
-        return factor * springs + (np.diag(masses) if how.masses else 0.0)
+        masses = how.masses * np.repeat(p.masses, size)
+        return how.sign * h**how.power * springs + np.diag(masses)
 
     def solve(self, A: FloatArray, right: FloatArray) -> FloatArray:
         """Return A^-1 right over the free particles, zero elsewhere, shape (particle, 3)."""
@@ -449,14 +412,12 @@ class Equation:
         return result.reshape(right.shape)
 
 
+# What a kind of Hessian makes of 1 - r/l, the share of the stiffness that acts across a spring.
 TRANSVERSE: Mapping[str, Callable[[FloatArray], FloatArray]] = {
-    "exact": lambda share: share,
-    "frozen": lambda share: share,
     "gauss": lambda share: 0.0 * share,
     "projected": lambda share: np.maximum(share, 0.0),
     "flipped": lambda share: -share,
-    "transverse": lambda share: share,
-}
+} | dict.fromkeys(("exact", "frozen", "transverse"), lambda share: share)
 
 
 def _isotropic(scale: FloatArray) -> FloatArray:
@@ -517,38 +478,35 @@ def _local_global(equation: Equation, x: FloatArray, how: Integrator) -> FloatAr
 
 def _descent(equation: Equation, x: FloatArray, how: Integrator) -> FloatArray:
     for _ in range(how.iterations):
-        x = x - how.rate * np.where(equation.free[:, None], equation.gradient(x), 0.0)
+        x = x - how.rate * equation.free_gradient(x)
     return x
 
 
 def _converged(equation: Equation, x: FloatArray, how: Integrator) -> FloatArray:
     """Minimise g by Newton's method with a shift and a line search, else solve by residuals."""
-    free = equation.free[:, None]
-    merit = equation.value if equation.conservative else None
-    best = np.inf
-    since = 0
+    best, since = np.inf, 0
     for _ in range(MOST_ITERATIONS):
-        gradient = np.where(free, equation.gradient(x), 0.0)
+        gradient = equation.free_gradient(x)
         norm = float(np.linalg.norm(gradient))
         since = 0 if norm < 0.5 * best else since + 1
         best = min(best, norm)
         if norm == 0.0 or not np.isfinite(norm) or since > 3:
             break
         A = equation.matrix(x, "exact")
-        if merit is not None:
+        if equation.conservative:
             A = _shifted(equation, A)
-        x = _searched(equation, x, gradient, -equation.solve(A, gradient), merit)
+        x = _searched(equation, x, gradient, -equation.solve(A, gradient))
     return x
 
 
 def _shifted(equation: Equation, A: FloatArray) -> FloatArray:
     """Return A plus the least of some multiples of M that makes it positive definite."""
-    free = np.repeat(equation.free, 3)
+    free = np.ix_(*2 * [np.repeat(equation.free, 3)])
     M = np.diag(np.repeat(equation.start.p.masses, 3))
     shift = 0.0
     while shift < 1e12:
         try:
-            np.linalg.cholesky((A + shift * M)[np.ix_(free, free)])
+            np.linalg.cholesky((A + shift * M)[free])
         except np.linalg.LinAlgError:
             shift = max(1e-2, 4.0 * shift)
         else:
@@ -557,24 +515,21 @@ def _shifted(equation: Equation, A: FloatArray) -> FloatArray:
 
 
 def _searched(
-    equation: Equation,
-    x: FloatArray,
-    gradient: FloatArray,
-    step: FloatArray,
-    merit: Callable[[FloatArray], float] | None,
+    equation: Equation, x: FloatArray, gradient: FloatArray, step: FloatArray
 ) -> FloatArray:
     """Return x + t step with the largest t = 1, 1/2, ... that lowers g, or the residual."""
-    slope, norm = float((gradient * step).sum()), float(np.linalg.norm(gradient))
-    value = merit(x) if merit else 0.0
+    norm, is_minimum = float(np.linalg.norm(gradient)), equation.conservative
+    slope = float((gradient * step).sum())
+    value = equation.value(x) if is_minimum else 0.0
     t = 1.0
     while t > 1e-6:
         there = x + t * step
-        left = np.where(equation.free[:, None], equation.gradient(there), 0.0)
-        if float(np.linalg.norm(left)) < 0.5 * norm and (merit is None or norm < 1e-6):
+        residual = float(np.linalg.norm(equation.free_gradient(there)))
+        if residual < 0.5 * norm and (norm < 1e-6 or not is_minimum):
             return there
-        if merit is not None and merit(there) <= value + 1e-4 * t * slope:
+        if is_minimum and equation.value(there) <= value + 1e-4 * t * slope:
             return there
-        if merit is None and float(np.linalg.norm(left)) < (1.0 - 1e-4 * t) * norm:
+        if not is_minimum and residual < (1.0 - 1e-4 * t) * norm:
             return there
         t *= 0.5
     return x + step if norm < 1e-6 else x

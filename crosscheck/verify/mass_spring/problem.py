@@ -22,44 +22,36 @@ COINCIDENT = 1e-150
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What a request of a force, an energy or a step says, and how a faulty solver reads it.
-
-    Attributes:
-        gravity: acceleration [m/s^2], shape (3,).
-        external: forces besides gravity [N], shape (particle, 3).
-        pinned: indices of pinned particles.
-        h: time step [s]; h_before: that of the request before; both 0 for forces and energies.
-        steps: number of steps, or None for a task of one step.
-        weights: the force of gravity if it is not m gravity [N], shape (particle, 3).
-        weighing: the masses m in m gravity, if they are others than those of inertia.
-        ends: what share of its force a spring exerts on its first and on its second end.
-        accumulated: whether forces of springs at one particle add up; else the last one stays, of
-            those whose first end it is and of those whose second.
-        damping: what the dampers see: the velocity along the spring, all of the relative velocity,
-            the particle's own velocity, or the particle's own along the spring.
-        normalised: whether a spring's direction is of length one.
-    """
+    """What a request of a force, an energy or a step says, and how a faulty solver reads it."""
 
     masses: FloatArray
     springs: IndexArray
     rest_lengths: FloatArray
     stiffnesses: FloatArray
     dampings: FloatArray
-    gravity: FloatArray
+    gravity: FloatArray  # acceleration [m/s^2], shape (3,)
     positions: FloatArray
     velocities: FloatArray
-    pinned: IndexArray
+    pinned: IndexArray  # indices of pinned particles
     tension_only: Any
-    external: FloatArray
+    external: FloatArray  # forces besides gravity [N], shape (particle, 3)
+    # time step [s]; h_before: that of the request before; both 0 for forces and energies
     h: float = 0.0
     h_before: float = 0.0
-    steps: int | None = None
+    steps: int | None = None  # number of steps, or None for a task of one step
+    # the force of gravity if it is not m gravity [N], shape (particle, 3)
     weights: FloatArray | None = None
+    # the masses m in m gravity, if they are others than those of inertia
     weighing: FloatArray | None = None
+    # what share of its force a spring exerts on its first and on its second end
     ends: tuple[float, float] = (1.0, 1.0)
+    # whether forces of springs at one particle add up; else the last one stays, of those whose
+    # first end it is and of those whose second
     accumulated: bool = True
+    # what the dampers see: the velocity along the spring, all of the relative velocity, the
+    # particle's own velocity, or the particle's own along the spring
     damping: str = "along"
-    normalised: bool = True
+    normalised: bool = True  # whether a spring's direction is of length one
 
     @property
     def count(self) -> int:
@@ -69,27 +61,18 @@ class Problem:
     @cached_property
     def incidence(self) -> FloatArray:
         """Rows with 1 at a spring's first end and -1 at its second, shape (spring, particle)."""
-        return self._rows((1.0, 1.0))
+        every = np.eye(self.count)
+        return every[self.springs[:, 0]] - every[self.springs[:, 1]]
 
     @cached_property
     def pulled(self) -> FloatArray:
         """The incidence with the ends that the springs pull, shape (spring, particle)."""
-        rows = self.incidence if self.ends == (1.0, 1.0) else self._rows(self.ends)
-        return rows if self.accumulated else rows * self._is_last
-
-    @property
-    def _is_last(self) -> Any:
-        """Where no later spring has the particle at the same end, shape (spring, particle)."""
-        last = np.zeros((len(self.springs), self.count), dtype=bool)
-        for end in self.springs.T:
-            for particle in np.unique(end):
-                last[np.flatnonzero(end == particle)[-1], particle] = True
-        return last
-
-    def _rows(self, ends: tuple[float, float]) -> FloatArray:
-        rows, every = np.zeros((len(self.springs), self.count)), np.arange(len(self.springs))
-        rows[every, self.springs[:, 0]] = ends[0]
-        rows[every, self.springs[:, 1]] = -ends[1]
+        rows = self.incidence * np.where(self.incidence > 0.0, *self.ends)
+        if not self.accumulated:
+            for (first, second), row in zip(self.springs, range(len(rows)), strict=True):
+                later = self.springs[row + 1 :]
+                rows[row, first] *= first not in later[:, 0]
+                rows[row, second] *= second not in later[:, 1]
         return rows
 
     @cached_property
@@ -102,16 +85,16 @@ class Problem:
         """Whether any spring has a damper."""
         return bool(self.dampings.any())
 
+    @property
+    def weighed(self) -> FloatArray:
+        """The masses that gravity pulls."""
+        return self.masses if self.weighing is None else self.weighing
+
     @cached_property
     def constant(self) -> FloatArray:
         """Gravity and external forces [N], shape (particle, 3)."""
         weights = self.weighed[:, None] * self.gravity if self.weights is None else self.weights
         return weights + self.external
-
-    @property
-    def weighed(self) -> FloatArray:
-        """The masses that gravity pulls."""
-        return self.masses if self.weighing is None else self.weighing
 
     def changed(self, **fields: Any) -> "Problem":
         """Return the problem with other fields."""
@@ -120,19 +103,20 @@ class Problem:
 
 def problem_of(inputs: Mapping[str, Any], h_before: float | None = None) -> Problem:
     """Return the problem that a request states; the velocities of pins count as zero."""
-    n, s = len(inputs["masses"]), len(inputs["springs"])
-    pinned = np.asarray(inputs.get("pinned", ()), dtype=int)
     velocities = np.array(inputs["velocities"], dtype=float)
+    pinned = np.asarray(inputs.get("pinned", ()), dtype=int)
     velocities[pinned] = 0.0
+    springs = np.asarray(inputs["springs"], dtype=int).reshape(-1, 2)
     h = float(inputs.get("h", 0.0))
-    given: dict[str, Any] = {name: np.asarray(inputs[name], dtype=float) for name in _NUMBERS}
+    loads, slack = np.zeros_like(velocities), np.zeros(len(springs))
+    numbers: dict[str, Any] = {name: np.asarray(inputs[name], dtype=float) for name in _NUMBERS}
     return Problem(
-        **given,
-        springs=np.asarray(inputs["springs"], dtype=int).reshape(-1, 2),
+        **numbers,
+        springs=springs,
         velocities=velocities,
         pinned=pinned,
-        tension_only=np.asarray(inputs.get("tension_only", np.zeros(s)), dtype=bool),
-        external=np.asarray(inputs.get("external_forces", np.zeros((n, 3))), dtype=float),
+        tension_only=np.asarray(inputs.get("tension_only", slack), dtype=bool),
+        external=np.asarray(inputs.get("external_forces", loads), dtype=float),
         h=h,
         h_before=h if h_before is None else h_before,
         steps=inputs.get("steps"),

@@ -17,15 +17,10 @@ SOLVED = 1e-6
 
 
 class Rounding(NamedTuple):
-    """What rounding may change.
+    """What rounding may change."""
 
-    Attributes:
-        positions: [m].
-        velocities: [m/s].
-    """
-
-    positions: float
-    velocities: float
+    positions: float  # [m]
+    velocities: float  # [m/s]
 
 
 def rounding(p: Problem, model: Model, epsilon: float) -> Rounding:
@@ -79,3 +74,8 @@ def difference(p: Problem, name: str, one: Any, other: Any) -> float:
     if name == "velocities":
         gap[..., p.pinned, :] = 0.0
     return float(gap.max(initial=0.0))
+
+
+def correct_digits(gap: float, size: float) -> float:
+    """Return how many digits of a number of this size are right, at most 16."""
+    return float(min(16.0, max(0.0, -np.log10(max(gap / size, 1e-16)))))

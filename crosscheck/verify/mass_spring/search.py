@@ -7,6 +7,7 @@ are found without trying the millions that there are.
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from ..contestant import Answer, Asked
 from ..greeting import Step
 from .faults import ASPECTS, INTEGRATORS, Option, apply
 from .honest import compatible, domains
-from .model import PIN_STRENGTHS, Integrator, Model, simulate
+from .model import PIN_STRENGTHS, Integrator, Model, predicted
 from .problem import Problem
 from .rounding import SOLVED, Rounding, apart, rounding
 
@@ -44,15 +45,11 @@ Chosen = dict[str, Option]
 
 
 class Found(NamedTuple):
-    """Choices that reproduce the answers to all probes.
+    """Choices that reproduce the answers to all probes."""
 
-    Attributes:
-        options: one for each aspect that matters in a probe, in the order of the computation.
-        faults: those of them that the greeting denies, or that nobody should make.
-    """
-
+    # one for each aspect that matters in a probe, in the order of the computation
     options: tuple[Option, ...]
-    faults: tuple[Option, ...]
+    faults: tuple[Option, ...]  # those of them that the greeting denies, or that nobody should make
 
 
 class Probe(NamedTuple):
@@ -68,30 +65,21 @@ class Search:
 
     def __init__(self, probes: Sequence[Probe], step: Step, epsilon: float) -> None:
         """Set up the domains of all choices."""
-        self.probes = probes
-        self.step = step
+        self.probes, self.step, self.epsilon = probes, step, epsilon
         self.domains = domains(step)
-        self.costs = {
-            (aspect, option.key, _how(option)): cost
-            for aspect, pairs in self.domains.items()
-            for option, cost in pairs
-        }
-        self.epsilon = epsilon
-        self._class_costs: dict[Integrator, int] = {}
         self.classes, self.members = _classes(self.domains["integrator"])
+        pairs = [*chain.from_iterable(self.domains.values()), *self.classes]
+        self.costs = {id(option): cost for option, cost in pairs}
         self.tried = 0
         self._misplaced: set[tuple[Any, ...]] = set()
         self._roundings: dict[tuple[Any, ...], Rounding] = {}
         self._known: dict[tuple[Any, ...], bool | None] = {}
-        self.farthest = -1
         self._seen: set[tuple[str, ...]] = set()
         self._until = 0.0
 
     def run(self) -> list[Found]:
         """Return what explains all probes with the fewest faults; none if nothing does."""
-        if not self.probes:
-            return []
-        for budget in range(MOST_FAULTS + 1):
+        for budget in range(MOST_FAULTS + 1) if self.probes else ():
             self._until = time.process_time() + PATIENCE[budget]
             found = [one for one in self._extend({}, 0, budget) if len(one.faults) == budget]
             if found:
@@ -106,19 +94,15 @@ class Search:
                 self._seen.add(_keys(found))
                 yield found
             return
-        probe = self.probes[index]
         known = {*chosen, "integrator"} if "class" in chosen else chosen
-        new = [one for one in _relevant(probe.problem) if one not in known]
-        springs = _has_springs(probe.problem)
+        new = [one for one in _relevant(self.probes[index].problem) if one not in known]
+        springs = _has_springs(self.probes[index].problem)
         for more in self._choices(chosen, new, budget, springs):
             if self._told(more):
                 continue
             if time.process_time() > self._until:
                 return
-            explained = self._explains(more, index)
-            if explained:
-                self.farthest = max(self.farthest, index)
-            if explained or explained is None:
+            if self._explains(more, index) is not False:
                 yield from self._extend(more, index + 1, budget)
 
     def _told(self, chosen: Chosen) -> bool:
@@ -137,105 +121,85 @@ class Search:
     ) -> Iterator[Chosen]:
         """Yield the choices extended by those of the aspects that now matter."""
         if springs and "class" in chosen:
+            others = {key: value for key, value in chosen.items() if key != "class"}
             for option in self.members[chosen["class"].fields["integrator"]]:
-                denied = self.costs["integrator", option.key, _how(option)]
-                if (denied and budget > 1 and _tedious(option)) or (
-                    budget > 0 and self._guessed(option)
-                ):
-                    continue
-                rest = {key: value for key, value in chosen.items() if key != "class"}
-                yield from self._choices(rest | {"integrator": option}, new, budget, springs)
+                if not self._tedious(option, budget):
+                    yield from self._choices(others | {"integrator": option}, new, budget, springs)
             return
-        left = budget - self._cost(chosen)
+        left = budget - sum(self.costs[id(option)] for option in chosen.values())
         if left < 0 or not compatible(chosen):
             return
         if not new:
             yield chosen
             return
-        aspect, *others = new
+        aspect, *remaining = new
+        options = self.domains[aspect]
         if aspect == "integrator" and not springs:
-            options, aspect = [(one, self._class_cost(one)) for one in self.classes], "class"
-            others = [one for one in others if one != "integrator"]
-        else:
-            options = self.domains[aspect]
+            options, aspect = self.classes, "class"
         for option, cost in options:
-            tedious = bool(cost) and budget > 1 and _tedious(option)
-            tedious |= budget > 2 and option.key in SINGULAR
-            tedious |= budget > 0 and self._guessed(option)
-            if cost <= left and not tedious:
-                yield from self._choices(chosen | {aspect: option}, others, budget, springs)
+            if cost <= left and not self._tedious(option, budget):
+                yield from self._choices(chosen | {aspect: option}, remaining, budget, springs)
+
+    def _tedious(self, option: Option, budget: int) -> bool:
+        """Return whether a choice is not tried together with so many faults."""
+        return (
+            (budget > 0 and self._guessed(option))
+            or (budget > 1 and self.costs[id(option)] > 0 and _takes_long(option))
+            or (budget > 2 and option.key in SINGULAR)
+        )
 
     def _guessed(self, option: Option) -> bool:
         """Return whether a choice is honest, rare, and nowhere declared."""
-        fields, step = option.fields, self.step
+        value, step = option.fields.get(option.aspect), self.step
         match option.aspect:
             case "scaling":
-                return step.damper is None and fields["scaling"] != 1.0
+                return step.damper is None and value != 1.0
             case "substeps":
-                return step.substeps is None and fields["substeps"] not in FREQUENT
+                return step.substeps is None and value not in FREQUENT
             case "damper":
-                return step.damper is None and fields["damper"] in ("diagonal", "blocks", "matrix")
+                return step.damper is None and value in ("diagonal", "blocks", "matrix")
             case "pins":
-                return fields["pins"] in PIN_STRENGTHS and fields["pins"] not in FREQUENT
+                return value in PIN_STRENGTHS and value not in FREQUENT
             case "integrator":
-                how = fields["integrator"]
+                how = option.fields["integrator"]
                 return how.method in ("taylor", "runge_kutta") or how.hessian == "projected"
         return False
-
-    def _cost(self, chosen: Chosen) -> int:
-        return sum(
-            self._class_cost(option)
-            if aspect == "class"
-            else self.costs[aspect, option.key, _how(option)]
-            for aspect, option in chosen.items()
-        )
-
-    def _class_cost(self, option: Option) -> int:
-        how = option.fields["integrator"]
-        if how not in self._class_costs:
-            costs = [self.costs["integrator", one.key, _how(one)] for one in self.members[how]]
-            self._class_costs[how] = min(costs)
-        return self._class_costs[how]
 
     def _explains(self, chosen: Chosen, index: int) -> bool | None:
         """Return whether choices reproduce an answer; None where neither is a number of use."""
         probe = self.probes[index]
-        matters = chosen
-        if not _has_springs(probe.problem):
-            matters = _in_flight_only(chosen)
-            if chosen["matrix"].key.startswith("matrix without k"):
-                return self._centre_explained(matters, index)
-        key = ((index,), *sorted((aspect, id(option)) for aspect, option in matters.items()))
-        place = tuple(one for one in key if one[:1] != ("velocity",)) if _once(matters) else key
+        in_springs = _has_springs(probe.problem)
+        matters = chosen if in_springs else _in_flight_only(chosen)
+        centre = not in_springs and chosen["matrix"].key.startswith("matrix without k")
+        key = ((index, centre), *sorted((aspect, id(one)) for aspect, one in matters.items()))
+        place = tuple(one for one in key if one[0] != "velocity") if _once(matters) else key
         if place in self._misplaced:
             return False
         if key not in self._known:
-            self.tried += 1
-            self._known[key], there = self._compare(tuple(matters.values()), probe)
-            if not there:
-                self._misplaced.add(place)
+            options = tuple(matters.values())
+            if centre:
+                self._known[key] = self._compare_centre(options, probe)
+            else:
+                self.tried += 1
+                self._known[key], there = self._compare(options, probe)
+                if not there:
+                    self._misplaced.add(place)
         return self._known[key]
 
-    def _centre_explained(self, chosen: Chosen, index: int) -> bool | None:
+    def _compare_centre(self, options: tuple[Option, ...], probe: Probe) -> bool | None:
         """Return False where the centre of mass is elsewhere, else None.
 
         A matrix without stiffness joins particles even where their spring has none, differently
         for each integrator, but leaves their centre where it is.
         """
-        key = ((-1 - index,), *sorted((aspect, id(option)) for aspect, option in chosen.items()))
-        if key not in self._known:
-            probe = self.probes[index]
-            problem, model = apply(tuple(chosen.values()), probe.problem, Model(damper="none"))
-            with np.errstate(all="ignore"):
-                predicted = simulate(problem, model)
-            share = problem.masses / problem.masses.sum()
-            centre = {"positions": share @ predicted["positions"], "velocities": np.zeros(0)}
-            answered = {"positions": share @ probe.answered["positions"]}
-            allowed = self._rounding(probe, model)
-            whole = probe.problem.changed(positions=share @ probe.problem.positions)
-            close = apart(whole, centre, answered, allowed) <= SOLVED
-            self._known[key] = None if close else False
-        return self._known[key]
+        problem, model = apply(options, probe.problem, Model(damper="none"))
+        x, _ = predicted(problem, model).values()
+        share = problem.masses / problem.masses.sum()
+        centre = {"positions": share @ x, "velocities": np.zeros(0)}
+        answered = {"positions": share @ probe.answered["positions"]}
+        whole = probe.problem.changed(positions=share @ probe.problem.positions)
+        error = apart(whole, centre, answered, self._rounding(probe, model))
+        return None if error <= SOLVED else False
 
     def _rounding(self, probe: Probe, model: Model) -> Rounding:
         key = probe.name, model.substeps, model.integrator.explicit
@@ -246,27 +210,22 @@ class Search:
     def _compare(self, options: tuple[Option, ...], probe: Probe) -> tuple[bool | None, bool]:
         """Return whether an answer is reproduced, and whether its positions may be."""
         problem, model = apply(options, probe.problem, Model(damper="none"))
-        with np.errstate(all="ignore"):
-            try:
-                predicted = simulate(problem, model)
-            except np.linalg.LinAlgError:
-                predicted = {}
-        if _absurd(predicted):  # a singular matrix predicts nothing but that
-            return (None if _absurd(probe.answered) else False), True
+        values, answered = predicted(problem, model), probe.answered
+        if _absurd(values):  # a singular matrix predicts nothing but that
+            return (None if _absurd(answered) else False), True
         allowed = self._rounding(probe, model)
-        same = apart(probe.problem, predicted, probe.answered, allowed) <= SOLVED
-        if same or problem.steps or "positions" not in probe.answered:
+        same = apart(probe.problem, values, answered, allowed) <= SOLVED
+        if same or problem.steps or "positions" not in answered:
             return bool(same), True
-        places = {"positions": probe.answered["positions"]}
-        return False, bool(apart(probe.problem, predicted, places, allowed) <= SOLVED)
+        places = {"positions": answered["positions"]}
+        return False, bool(apart(probe.problem, values, places, allowed) <= SOLVED)
 
     def _found(self, chosen: Chosen) -> Found:
         if "class" in chosen:
             option = self.members[chosen["class"].fields["integrator"]][0]
             chosen = {**chosen, "integrator": option}
         options = tuple(chosen[one] for one in ASPECTS if one in chosen)
-        faults = tuple(one for one in options if self.costs[one.aspect, one.key, _how(one)])
-        return Found(options, faults)
+        return Found(options, tuple(one for one in options if self.costs[id(one)]))
 
 
 def _absurd(values: Mapping[str, Any]) -> bool:
@@ -279,13 +238,13 @@ def _once(chosen: Chosen) -> bool:
     return "substeps" in chosen and chosen["substeps"].fields["substeps"] == 1
 
 
-def _tedious(option: Option) -> bool:
+def _takes_long(option: Option) -> bool:
     """Return whether a choice is not tried together with other faults.
 
     These are integrators that take long, and those, as well as numbers of substeps, that are honest
     but denied by the greeting.
     """
-    how = _how(option)
+    how = option.fields.get("integrator")
     if how is None:
         return option.aspect in ("substeps", "scaling")
     denied = id(option) not in FAULTY
@@ -294,12 +253,16 @@ def _tedious(option: Option) -> bool:
 
 def _classes(
     integrators: Sequence[tuple[Option, int]],
-) -> tuple[list[Option], dict[Integrator, list[Option]]]:
+) -> tuple[list[tuple[Option, int]], dict[Integrator, list[Option]]]:
     """Return one integrator of each class that flight does not tell apart, and all of them."""
+    classes: dict[Integrator, tuple[Option, int]] = {}
     members: dict[Integrator, list[Option]] = {}
-    for option, _ in integrators:
-        members.setdefault(in_flight(option.fields["integrator"]), []).append(option)
-    return [one[0]._replace(fields={"integrator": how}) for how, one in members.items()], members
+    for option, cost in integrators:
+        how = in_flight(option.fields["integrator"])
+        members.setdefault(how, []).append(option)
+        first, least = classes.get(how, (option._replace(fields={"integrator": how}), cost))
+        classes[how] = first, min(least, cost)
+    return list(classes.values()), members
 
 
 def _in_flight_only(chosen: Chosen) -> Chosen:
@@ -320,10 +283,6 @@ def in_flight(how: Integrator) -> Integrator:
     if how.method == "newton" and how.rate != 1.0:
         return how._replace(hessian="gauss")
     return Integrator("newton", "x_n", 1, "gauss")
-
-
-def _how(option: Option) -> Any:
-    return option.fields.get("integrator")
 
 
 def _has_springs(p: Problem) -> bool:

@@ -22,9 +22,9 @@ from .cases import task_cases
 from .faults import ASPECTS, Option, apply
 from .honest import DAMPERS, HONEST_VELOCITIES, compatible, domains, honest
 from .laws import Context
-from .model import Model
+from .model import Model, predicted
 from .problem import Problem, problem_of, state_of, system_of
-from .rounding import SOLVED, apart, rounding
+from .rounding import SOLVED, apart, correct_digits, rounding
 from .search import Found, Search, probes_of
 
 MOST_TOLD = 3
@@ -83,21 +83,16 @@ def _state(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def honest_options(found: Sequence[Found], step: Step) -> tuple[Option, ...]:
     """Return what was found of a solver, its faults replaced by what it declares."""
-    chosen = {one.aspect: one for one in found[0].options} if found else {}
     wrong = {one.aspect for one in found[0].faults} if found else set()
+    options = {o.aspect: o for o in found[0].options if o.aspect not in wrong} if found else {}
     choices = domains(step)
-    options = {
-        aspect: choices[aspect][0][0] if aspect in wrong or aspect not in chosen
-        else chosen[aspect]
-        for aspect in ASPECTS
-    }  # fmt: skip
-    explicit = options["integrator"].fields["integrator"].explicit
-    usual = {"damper": "explicit", "velocity": "separate"} if explicit else {}
-    for aspect, value in usual.items():
-        if aspect in wrong or aspect not in chosen:
-            fits = [o for o, cost in choices[aspect] if not cost and o.fields.get(aspect) == value]
-            options[aspect] = fits[0] if fits else options[aspect]
-    return tuple(options[aspect] for aspect in ASPECTS)
+    usual = {aspect: choices[aspect][0][0] for aspect in ASPECTS} | options
+    if usual["integrator"].fields["integrator"].explicit:
+        for aspect, value in (("damper", "explicit"), ("velocity", "separate")):
+            if aspect not in options:
+                fits = (o for o, cost in choices[aspect] if not cost and o.fields[aspect] == value)
+                usual[aspect] = next(fits, usual[aspect])
+    return tuple(usual[aspect] for aspect in ASPECTS)
 
 
 def describe_model(options: Sequence[Option]) -> Sentence:
@@ -118,42 +113,40 @@ def _judge_case(
     options: tuple[Option, ...],
     known: bool,
 ) -> CaseJudgement:
-    _, model = apply(options, p, Model())
     if not isinstance(one.answer, Answer):
         return CaseJudgement(one.case, one.answer, (), {})
-    expected = laws.predicted(p, model)
-    allowed = rounding(p, model, greeting.epsilon)
+    _, model = apply(options, p, Model())
+    expected = predicted(p, model)
     context = Context(
-        p, one.answer.values, allowed, model, known, describe_model(options), expected,
-        greeting.step.pins is not None,
+        p, one.answer.values, rounding(p, model, greeting.epsilon), model, known,
+        describe_model(options), expected, greeting.step.pins is not None,
     )  # fmt: skip
-    findings = _findings(one, asked, context)
-    digits = _digits(expected, one.answer.values) if known else None
-    return CaseJudgement(
-        one.case, one.answer, tuple(findings), expected if known else {}, digits,
-        _reference_seconds(p, model),
-    )  # fmt: skip
+    findings = tuple(_findings(one, one.answer, asked, context))
+    seconds = _reference_seconds(p, model)
+    if not known:
+        return CaseJudgement(one.case, one.answer, findings, {}, None, seconds)
+    digits = _digits(expected, one.answer.values)
+    return CaseJudgement(one.case, one.answer, findings, expected, digits, seconds)
 
 
-def _findings(one: Asked, asked: Sequence[Asked], context: Context) -> list[Finding]:
+def _findings(
+    one: Asked, answer: Answer, asked: Sequence[Asked], context: Context
+) -> list[Finding]:
     """Return what all laws that apply say."""
     broken = laws.finite(context)
     if broken is not None:
         return [broken]
-    found = [law(context) for law in LAWS]
-    if one.case.facts.get("consistent"):
-        found.append(laws.consistency(context))
-    allowed = {
+    limits = {
         "positions": 4.0 * context.allowed.positions + _slack(context, "positions"),
         "velocities": 4.0 * context.allowed.velocities + _slack(context, "velocities"),
     }
-    bases = [other.answer for other in asked if other.case.name == one.case.facts.get("of")]
-    if bases and isinstance(bases[0], Answer) and context.model.damper != "diagonal":
-        found.append(laws.symmetry(one, bases[0], allowed))
-    found.append(laws.equal_requests(one, ("positions", "velocities"), allowed))
-    assert isinstance(one.answer, Answer)
-    remarks = [Finding("remarks", Verdict.RIGHT_BUT, 0, 0, "", said) for said in one.answer.remarks]
-    return [finding for finding in found if finding is not None] + remarks
+    found = [
+        *(law(context) for law in LAWS),
+        laws.consistency(context) if one.case.facts.get("consistent") else None,
+        laws.symmetry(one, asked, limits) if context.model.damper != "diagonal" else None,
+        laws.equal_requests(one, limits),
+    ]
+    return [finding for finding in found if finding is not None] + laws.remarks(answer)
 
 
 def _slack(context: Context, name: str) -> float:
@@ -169,9 +162,7 @@ def _digits(expected: Mapping[str, Any], answered: Mapping[str, Any]) -> float |
         return None
     x = np.asarray(expected["positions"])
     gap = float(np.abs(x - answered["positions"]).max())
-    if not np.isfinite(gap):
-        return None
-    return float(min(16.0, max(0.0, -np.log10(max(gap / np.abs(x).max(), 1e-16)))))
+    return correct_digits(gap, float(np.abs(x).max())) if np.isfinite(gap) else None
 
 
 def _reference_seconds(p: Problem, model: Model) -> float:
@@ -193,14 +184,10 @@ def _diagnose(
     greeting: Greeting,
 ) -> Diagnosis:
     explanations: tuple[Explanation, ...] = ()
+    behaviour = None
     if found and found[0].faults:
         explanations = _explanations(found, asked, problems, greeting)
-    undeclared = any(
-        getattr(greeting.step, name) is None
-        for name in ("method", "substeps", "damper", "pins", "velocity")
-    )
-    behaviour = None
-    if found and not found[0].faults and undeclared:
+    elif found and any(getattr(greeting.step, name) is None for name in _DECLARED):
         behaviour = sentence(
             "In small cases it behaves like {model}, with which it is compared."
             if any(one.verdict >= Verdict.WRONG for one in judgements)
@@ -214,6 +201,10 @@ def _diagnose(
     if search.probes and behaviour is None and greeting.step.method is None:
         hints += (_nearest(asked, problems, greeting), _what_holds(judgements))
     return replace(diagnosis, first_broken=_first_broken(judgements), hints=hints)
+
+
+# What a greeting may say of its step; anything else is inferred.
+_DECLARED = ("method", "substeps", "damper", "pins", "velocity")
 
 
 def _nearest(asked: Sequence[Asked], problems: Problems, greeting: Greeting) -> Sentence:
@@ -231,8 +222,10 @@ def _nearest(asked: Sequence[Asked], problems: Problems, greeting: Greeting) -> 
     return sentence(
         "The nearest step that is known is {model}; it differs by {median:.2g} of a displacement "
         "in the median small case, by {worst:.2g} in the worst.",
-        model=describe_model(options), median=median, worst=worst,
-    )  # fmt: skip
+        model=describe_model(options),
+        median=median,
+        worst=worst,
+    )
 
 
 def _what_holds(judgements: Sequence[CaseJudgement]) -> Sentence:
@@ -248,29 +241,19 @@ def _explanations(
     found: Sequence[Found], asked: Sequence[Asked], problems: Problems, greeting: Greeting
 ) -> tuple[Explanation, ...]:
     """Return the faults found with the share of all answers that they reproduce, in classes."""
-    scored = sorted(
-        (_score(one, asked, problems, greeting) for one in found),
-        key=lambda score: (-score[0], score[1]),
-    )
-    best = [score for score in scored if score[0] == scored[0][0]]
-    alternatives = {_key(score[2].faults): score[2].faults for score in best}
-    keys = tuple(alternatives)[:MOST_TOLD]
-    said = either([list(map(_fault_sentence, alternatives[key])) for key in keys])
-    share, distance, _ = best[0]
-    return (Explanation(keys, said, share, distance),)
-
-
-def _key(faults: Sequence[Option]) -> str:
-    return " + ".join(one.key for one in faults)
-
-
-def _score(
-    one: Found, asked: Sequence[Asked], problems: Problems, greeting: Greeting
-) -> tuple[float, float, Found]:
-    """Return the share of answers that are reproduced, and the largest difference of those."""
-    errors = _errors(one.options, asked, problems, greeting)
-    hits = [error for error in errors if error <= SOLVED]
-    return len(hits) / max(len(errors), 1), max(hits, default=0.0), one
+    scores = []
+    for one in found:
+        errors = _errors(one.options, asked, problems, greeting)
+        hits = [error for error in errors if error <= SOLVED]
+        scores.append((-len(hits) / max(len(errors), 1), max(hits, default=0.0), one.faults))
+    scores.sort(key=lambda score: score[:2])
+    share, distance, _ = scores[0]
+    classes = {
+        " + ".join(one.key for one in faults): faults for lost, _, faults in scores if lost == share
+    }
+    keys = tuple(classes)[:MOST_TOLD]
+    said = either([list(map(_fault_sentence, classes[key])) for key in keys])
+    return (Explanation(keys, said, -share, distance),)
 
 
 def _errors(
@@ -282,11 +265,9 @@ def _errors(
         if isinstance(question.answer, Answer):
             plain = problems[question.case.name]
             p, model = apply(options, plain, Model(damper="none"))
-            expected = laws.predicted(p, model)
-            allowed = rounding(plain, model, greeting.epsilon)
-            errors.append(
-                apart(plain, expected, question.answer.values, allowed) if expected else np.inf
-            )
+            expected, allowed = predicted(p, model), rounding(plain, model, greeting.epsilon)
+            values = question.answer.values
+            errors.append(apart(plain, expected, values, allowed) if expected else np.inf)
     return errors
 
 
@@ -303,12 +284,10 @@ def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
     The cases add one aspect after another.
     """
     law = first_broken(judgements)
-    doubtful = (one.case for one in judgements if one.verdict > Verdict.RIGHT_BUT)
-    case = next(doubtful, None)
+    case = next((one.case for one in judgements if one.verdict > Verdict.RIGHT_BUT), None)
     if law is None or case is None or case.name != law.values["case"]:
         return law
-    trace = _TRACES.get(case.family, _TRACES["cloth"])
-    return sentence("{law} {trace}", law=law, trace=trace)
+    return sentence("{law} {trace}", law=law, trace=_TRACES.get(case.family, _TRACES["cloth"]))
 
 
 _TRACES: Mapping[str, Sentence] = {
@@ -332,11 +311,12 @@ def _with_faults(
     """Return the judgements, undecided steps wrong where a fault explains them."""
     if known or not diagnosis.explained:
         return list(judgements)
-    return [replace(one, findings=tuple(map(_wrong, one.findings))) for one in judgements]
-
-
-def _wrong(finding: Finding) -> Finding:
-    if finding.law != "declared step" or finding.verdict is not Verdict.UNDECIDED:
-        return finding
     said = sentence("No honest step gives its answers; a faulty one does.")
-    return replace(finding, verdict=Verdict.WRONG, sentence=said)
+    return [
+        replace(judgement, findings=tuple(
+            replace(one, verdict=Verdict.WRONG, sentence=said)
+            if one.law == "declared step" and one.verdict is Verdict.UNDECIDED else one
+            for one in judgement.findings
+        ))
+        for judgement in judgements
+    ]  # fmt: skip

@@ -1,44 +1,118 @@
-"""A failing case as SVG: theirs dashed, ours solid, seen along the direction that hides least."""
+"""A failing case drawn in space as SVG: theirs dashed, ours solid."""
 
-import xml.etree.ElementTree as ElementTree
+import io
+import re
+from html import escape
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from markupsafe import Markup
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from .geometry import FloatArray, Scene, Shape
 
-WIDTH, HEIGHT, MARGIN = 640.0, 400.0, 28.0
-# Of what lies along the line of sight, so much is seen to the side and upwards.
-_OBLIQUE = np.array([0.35, 0.45])
 # Differences below the first part of the drawing are magnified to about the second.
 _VISIBLE, _MAGNIFIED = 0.02, 0.2
 # So few points are numbered.
 _NUMBERED = 12
 # Points further from the middle than so many extents of the right answer are left out.
 _FAR = 3.0
-STYLES = {
-    "given": {"stroke": "var(--rule)", "stroke-width": "1.5"},
-    "ours": {"stroke": "var(--blue)", "stroke-width": "4", "stroke-opacity": "0.55"},
-    "theirs": {"stroke": "var(--orange)", "stroke-width": "1.8", "stroke-dasharray": "6 3"},
+# Colours that stand for those of the page, which are others in the dark.
+_COLOURS = {"rule": "#010101", "blue": "#020202", "orange": "#030303", "ink": "#040404",
+            "faint": "#050505"}  # fmt: skip
+_STYLES: dict[str, dict[str, Any]] = {
+    "given": {"color": _COLOURS["rule"], "linewidth": 1.2},
+    "ours": {"color": _COLOURS["blue"], "linewidth": 3.0, "alpha": 0.55},
+    "theirs": {"color": _COLOURS["orange"], "linewidth": 1.4, "linestyle": (0, (4, 2))},
 }
 
 
 def svg(scene: Scene, title: str) -> Markup:
     """Return a drawing in the colours of the page."""
-    root = ElementTree.Element("svg", viewBox=f"0 0 {WIDTH:g} {HEIGHT:g}", role="img")
-    ElementTree.SubElement(root, "title").text = title
-    project = _projection(scene)
-    for name, style in STYLES.items():
+    points = _near(scene)
+    figure = Figure(figsize=(6.4, 4.8))
+    axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d", facecolor="none")
+    _set_box(axes, np.concatenate([*points.values(), np.zeros((0, 3))]))
+    for name, style in _STYLES.items():
         shape = getattr(scene, name)
         if shape is not None:
-            _draw(root, project(shape.points), shape, style, name)
-    numbered = scene.ours or scene.theirs
-    if numbered is not None and len(numbered.points) <= _NUMBERED:
-        _number(root, project(numbered.points))
-    for x, y in _seen(project(scene.marks)):
-        cross = f"M{x - 7:.1f} {y:.1f}h14M{x:.1f} {y - 7:.1f}v14"
-        ElementTree.SubElement(root, "path", {"d": cross, "stroke": "var(--ink)", "fill": "none"})
-    return Markup(ElementTree.tostring(root, encoding="unicode"))
+            _draw(axes, shape, points, name, style)
+    numbered = "ours" if scene.ours is not None else "theirs"
+    if len(points[numbered]) <= _NUMBERED:
+        for i, place in enumerate(points[numbered]):
+            if np.isfinite(place).all():
+                flat = proj_transform(*_up(place), axes.get_proj())[:2]
+                axes.annotate(str(i), flat, (6, 4), textcoords="offset points", fontsize=11,
+                              color=_COLOURS["faint"])  # fmt: skip
+    axes.plot(*_up(points["marks"]).T, "+", color=_COLOURS["ink"], markersize=11, clip_on=False)
+    return Markup(_text(figure, title))
+
+
+def _near(scene: Scene) -> dict[str, FloatArray]:
+    """Return the points of each shape, NaN where they are far from the right answer."""
+    shapes = {name: getattr(scene, name) for name in _STYLES}
+    points = {name: np.zeros((0, 3)) if s is None else s.points for name, s in shapes.items()}
+    points["marks"] = scene.marks
+    right = np.concatenate([points["given"], points["ours"], points["marks"]])
+    right = right[np.isfinite(right).all(axis=1)]
+    if len(right):
+        low, high = right.min(axis=0), right.max(axis=0)
+        reach = _FAR * max(float((high - low).max()), 1e-9)
+        away = ~(np.abs(points["theirs"] - (low + high) / 2.0).max(axis=1) <= reach)
+        points["theirs"] = np.where(away[:, None], np.nan, points["theirs"])
+    return points
+
+
+def _up(points: FloatArray) -> FloatArray:
+    """Return points with y upwards, as mass-spring systems and skeletons have it, for z."""
+    return points[..., [0, 2, 1]] * [1.0, -1.0, 1.0]
+
+
+def _set_box(axes: Any, points: FloatArray) -> None:
+    """Fill the drawing with the points, each axis to the same scale."""
+    seen = _up(points[np.isfinite(points).all(axis=1)])
+    seen = seen if len(seen) else np.zeros((1, 3))
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    sides = np.maximum(high - low, 0.2 * max(float((high - low).max()), 1e-9))
+    middle = (low + high) / 2.0
+    axes.set(**{f"{axis}lim": (m - s / 2, m + s / 2)
+                for axis, m, s in zip("xyz", middle, sides, strict=True)})  # fmt: skip
+    axes.set_box_aspect(sides)
+    axes.set_proj_type("ortho")
+    axes.view_init(elev=18, azim=-65)
+    axes.set_axis_off()
+
+
+def _draw(
+    axes: Any, shape: Shape, points: dict[str, FloatArray], name: str, style: dict[str, Any]
+) -> None:
+    places = _up(points[name])
+    ends = places[np.asarray(shape.lines, dtype=int)]
+    ends = ends[np.isfinite(ends).all(axis=(1, 2))]
+    axes.add_collection3d(Line3DCollection(ends, gid=name, clip_on=False, **style), autolim=False)
+    if name != "given":
+        axes.plot(*places.T, "o", color=style["color"], markersize=4, clip_on=False)
+
+
+def _text(figure: Figure, title: str) -> str:
+    """Return a figure as SVG without size, in colours and the font of the page."""
+    written = io.StringIO()
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": title}):
+        figure.savefig(written, format="svg", transparent=True, metadata={"Date": None},
+                       bbox_inches="tight", pad_inches=0.25)  # fmt: skip
+    text = written.getvalue()
+    box = re.search(r'viewBox="[^"]*"', text)
+    for name, colour in _COLOURS.items():
+        text = text.replace(colour, f"var(--{name})")
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r" (font-family|font): [^;\"]*", " ", text)
+    inside = text[text.index(">", text.index("<svg")) + 1 :]
+    names = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    head = f'<svg {names} {box[0] if box else ""} role="img"><title>{escape(title)}</title>'
+    return head + inside
 
 
 def apart(scene: Scene) -> float | None:
@@ -56,89 +130,10 @@ def magnified(scene: Scene) -> tuple[Scene, float]:
     distance = apart(scene)
     if not distance or scene.theirs is None or scene.ours is None:
         return scene, 1.0
-    extent = float(np.ptp(scene.ours.points, axis=0).max(initial=0.0))
+    ours = scene.ours.points
+    extent = float(np.ptp(ours, axis=0).max(initial=0.0))
     if distance >= _VISIBLE * extent:
         return scene, 1.0
     factor = float(f"{_MAGNIFIED * extent / distance:.0e}")
-    ours = scene.ours.points
     theirs = Shape(ours + factor * (scene.theirs.points - ours), scene.theirs.lines)
     return scene._replace(theirs=theirs), factor
-
-
-class _Projection:
-    """Puts points of space on the page: along their widest axes, the third one obliquely."""
-
-    def __init__(self, points: FloatArray) -> None:
-        self.middle = (points.max(axis=0) + points.min(axis=0)) / 2.0
-        axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2]
-        *flat_axes, depth = _upright(axes)
-        across, up = sorted(flat_axes, key=lambda axis: abs(axis[1]))
-        self.axes = np.stack([across, up]) + np.outer(_OBLIQUE, depth)
-        flat = (points - self.middle) @ self.axes.T
-        self.centre = (flat.max(axis=0) + flat.min(axis=0)) / 2.0
-        extent = np.maximum(np.ptp(flat, axis=0), 1e-12)
-        room = np.array([WIDTH, HEIGHT]) - 2.0 * MARGIN
-        self.scale = float((room / extent).min())
-
-    def __call__(self, points: FloatArray) -> FloatArray:
-        flat = ((points - self.middle) @ self.axes.T - self.centre) * self.scale
-        return np.array([WIDTH / 2.0, HEIGHT / 2.0]) + flat * [1.0, -1.0]
-
-
-def _upright(axes: FloatArray) -> list[FloatArray]:
-    """Return axes that point upwards, to the right, or towards the reader."""
-    return [axis if (axis[1], axis[0], axis[2]) >= (0.0, 0.0, 0.0) else -axis for axis in axes]
-
-
-def _projection(scene: Scene) -> _Projection:
-    """Return a view that holds the right answer, and of theirs what is not far off."""
-    shapes = [s.points for s in (scene.ours, scene.given) if s is not None]
-    right = _finite(np.concatenate([*shapes, scene.marks]))
-    theirs = _finite(scene.theirs.points) if scene.theirs is not None else right[:0]
-    if len(right):
-        middle = (right.max(axis=0) + right.min(axis=0)) / 2.0
-        extent = max(float(np.ptp(right, axis=0).max()), 1e-9)
-        theirs = theirs[np.abs(theirs - middle).max(axis=-1) <= _FAR * extent]
-    points = np.concatenate([right, theirs])
-    if len(points) < 3:  # an axis for each dimension
-        points = np.concatenate([points, np.zeros((3, 3))])
-    return _Projection(points)
-
-
-def _finite(points: FloatArray) -> FloatArray:
-    return points[np.isfinite(points).all(axis=-1)]
-
-
-def _seen(flat: FloatArray) -> FloatArray:
-    """Return points that lie near the page."""
-    with np.errstate(invalid="ignore"):
-        return flat[(np.abs(flat) < 10.0 * WIDTH).all(axis=-1)]
-
-
-def _draw(
-    root: ElementTree.Element, flat: FloatArray, shape: Shape, style: dict[str, str], name: str
-) -> None:
-    group = ElementTree.SubElement(
-        root, "g", {"class": name, "fill": "none", "stroke-linecap": "round", **style}
-    )
-    ends = flat[np.asarray(shape.lines, dtype=int)].reshape(-1, 4)
-    path = "".join(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for a, b, c, d in _seen(ends))
-    ElementTree.SubElement(group, "path", d=path)
-    if name == "given":
-        return
-    for x, y in _seen(flat):
-        ElementTree.SubElement(
-            group, "circle",
-            {"cx": f"{x:.1f}", "cy": f"{y:.1f}", "r": "3", "fill": style["stroke"],
-             "stroke": "none"},
-        )  # fmt: skip
-
-
-def _number(root: ElementTree.Element, flat: FloatArray) -> None:
-    for i, (x, y) in enumerate(flat):
-        if np.isfinite([x, y]).all():
-            text = ElementTree.SubElement(
-                root, "text", {"x": f"{x + 7:.1f}", "y": f"{y - 6:.1f}", "fill": "var(--faint)",
-                               "font-size": "12"},
-            )  # fmt: skip
-            text.text = str(i)

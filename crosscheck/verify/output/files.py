@@ -7,11 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from plumbob.bench.harness.record import check_regular
-from plumbob.bench.text import visible
-
 from ..judgement import Report
-from ..sentence import Sentence, sentence
+from ..sentence import Sentence, sentence, visible
 from . import json_file, junit, page, saved, terminal
 from .question import Question
 from .words import GOOD, Presentation
@@ -29,19 +26,8 @@ class Files(NamedTuple):
     html: Path | None
     folder: Path | None
 
-    def check(self) -> None:
-        """Find out before anything is asked whether the files can be written.
-
-        Raises:
-            ValueError, OSError: naming the file or folder that cannot.
-        """
-        from plumbob.commands.options import writable
-
-        for path in filter(None, self._paths()):
-            check_regular(path)
-            writable(path.parent)
-
-    def _paths(self) -> tuple[Path | None, Path | None, Path | None]:
+    def paths(self) -> tuple[Path | None, Path | None, Path | None]:
+        """Return where JSON, JUnit XML and the page are wanted."""
         if self.folder is None:
             return self.json, self.junit, self.html
         return (
@@ -72,7 +58,7 @@ class Files(NamedTuple):
         )
         written = [
             _attempt(path, partial(_write, path, make), failures)
-            for path, make in zip(self._paths(), makers, strict=True)
+            for path, make in zip(self.paths(), makers, strict=True)
             if path is not None
         ]
         if screen and any(written):

@@ -1,146 +1,81 @@
-"""The result of `verify` as JSON, typed and versioned; docs/verify.md says what each key holds."""
+"""The result of `verify` as JSON, versioned; docs/verify.md says what each key holds."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 
-from plumbob.bench.text import all_visible
-
 from ..contestant import Answer
-from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, Report, TaskReport
 from ..message import plain
-from .words import GOOD, Say, advice, passed, remarks
+from ..sentence import Sentence, all_visible
+from .words import GOOD, Say, advice, remarks
 
 FORMAT: Literal["plumbob verify"] = "plumbob verify"
 VERSION: Literal[1] = 1
-VerdictName = Literal["right", "right_but", "undecided", "wrong", "broken"]
-
-
-class FindingRecord(msgspec.Struct, frozen=True):
-    """A law and how an answer stands to it; error and tolerance in `unit`, null if not finite."""
-
-    law: str
-    verdict: VerdictName
-    error: float | None
-    tolerance: float | None
-    unit: str
-    text: str
-    where: int | None
-
-
-class CaseRecord(msgspec.Struct, frozen=True):
-    """A case; `failure` is the kind of a missing answer, or null.
-
-    `seconds` is the solver's own time, null if only the round trip was timed.
-    """
-
-    name: str
-    family: str
-    about: str
-    verdict: VerdictName
-    digits: float | None
-    seconds: float | None
-    reference_seconds: float | None
-    failure: str | None
-    failure_text: str | None
-    findings: list[FindingRecord]
-    remarks: list[str]
-
-
-class ExplanationRecord(msgspec.Struct, frozen=True):
-    """Faults that reproduce wrong answers: their keys, a sentence, and what share of answers."""
-
-    faults: list[str]
-    text: str
-    share: float
-    distance: float | None
-
-
-class TaskRecord(msgspec.Struct, frozen=True):
-    """A task, or one method of it."""
-
-    task: str
-    method: str
-    verdict: VerdictName
-    digits: float | None
-    slowdown: float | None
-    passed: int
-    explanations: list[ExplanationRecord]
-    behaviour: str | None
-    first_broken: str | None
-    hints: list[str]
-    tried: int
-    smallest_failure: str | None
-    cases: list[CaseRecord]
-
-
-class ReportRecord(msgspec.Struct, frozen=True):
-    """All that was found."""
-
-    format: Literal["plumbob verify"]
-    version: Literal[1]
-    verdict: VerdictName
-    passed: bool
-    seed: int
-    solver: Greeting
-    remarks: list[str]
-    advice: str
-    tasks: list[TaskRecord]
+Record = dict[str, Any]
 
 
 def text(report: Report, say: Say) -> str:
-    """Return the file's text."""
+    """Return the file's text; numbers that are not finite are null."""
     fields = all_visible(msgspec.to_builtins(record(report, say), enc_hook=plain))
     return msgspec.json.format(msgspec.json.encode(fields), indent=1).decode() + "\n"
 
 
-def record(report: Report, say: Say) -> ReportRecord:
+def record(report: Report, say: Say) -> Record:
     """Return the report in plain numbers and words."""
-    return ReportRecord(
-        FORMAT, VERSION, _name(report), report.verdict in GOOD, report.seed,
-        report.greeting,
-        [say(one) for one in remarks(report)], say(advice(report.tasks)),
-        [_task(task, say) for task in report.tasks],
-    )  # fmt: skip
+    return {
+        "format": FORMAT, "version": VERSION, "verdict": _name(report),
+        "passed": report.verdict in GOOD, "seed": report.seed, "solver": report.greeting,
+        "remarks": list(map(say, remarks(report))), "advice": say(advice(report.tasks)),
+        "tasks": [_task(task, say) for task in report.tasks],
+    }  # fmt: skip
 
 
-def _name(judged: Report | TaskReport | CaseJudgement | Finding) -> VerdictName:
-    name: VerdictName = judged.verdict.name.lower()  # type: ignore[assignment]
-    return name
+def _name(judged: Report | TaskReport | CaseJudgement | Finding) -> str:
+    return judged.verdict.name.lower()
 
 
-def _task(task: TaskReport, say: Say) -> TaskRecord:
+def _task(task: TaskReport, say: Say) -> Record:
+    """Return a task, or one method of it."""
     found = task.diagnosis
-    explained = [
-        ExplanationRecord([*map(str, one.faults)], say(one.sentence), one.share, one.distance)
-        for one in found.explanations
-    ]
-    return TaskRecord(
-        task.task, task.method, _name(task), task.digits, task.slowdown, passed(task),
-        explained,
-        say(found.behaviour) if found.behaviour else None,
-        say(found.first_broken) if found.first_broken else None,
-        [say(hint) for hint in found.hints], found.tried,
-        task.smallest_failure.case.name if task.smallest_failure else None,
-        [_case(one, say) for one in task.judgements],
-    )  # fmt: skip
+    return {
+        "task": task.task, "method": task.method, "verdict": _name(task), "digits": task.digits,
+        "slowdown": task.slowdown,
+        "passed": sum(one.verdict in GOOD for one in task.judgements),
+        "explanations": [
+            {"faults": one.faults, "text": say(one.sentence), "share": one.share,
+             "distance": one.distance}
+            for one in found.explanations
+        ],
+        "behaviour": _said(found.behaviour, say), "first_broken": _said(found.first_broken, say),
+        "hints": list(map(say, found.hints)), "tried": found.tried,
+        "smallest_failure": task.smallest_failure.case.name if task.smallest_failure else None,
+        "cases": [_case(one, say) for one in task.judgements],
+    }  # fmt: skip
 
 
-def _case(one: CaseJudgement, say: Say) -> CaseRecord:
+def _said(words: Sentence | None, say: Say) -> str | None:
+    return None if words is None else say(words)
+
+
+def _case(one: CaseJudgement, say: Say) -> Record:
+    """Return a case; `seconds` is the solver's own time, null if only the round trip was timed."""
     case, answer = one.case, one.answer
-    return CaseRecord(
-        case.name, case.family, say(case.about), _name(one), one.digits,
-        answer.seconds if isinstance(answer, Answer) and not answer.untimed else None,
-        one.reference_seconds,
-        None if isinstance(answer, Answer) else answer.kind.value,
-        None if isinstance(answer, Answer) else say(answer.sentence),
-        [_finding(finding, say) for finding in one.findings],
-        [say(remark) for remark in answer.remarks] if isinstance(answer, Answer) else [],
-    )  # fmt: skip
+    failure = None if isinstance(answer, Answer) else answer
+    return {
+        "name": case.name, "family": case.family, "about": say(case.about), "verdict": _name(one),
+        "digits": one.digits,
+        "seconds": answer.seconds if isinstance(answer, Answer) and not answer.untimed else None,
+        "reference_seconds": one.reference_seconds,
+        "failure": failure and failure.kind.value,
+        "failure_text": failure and say(failure.sentence),
+        "findings": [_finding(finding, say) for finding in one.findings],
+        "remarks": list(map(say, answer.remarks)) if isinstance(answer, Answer) else [],
+    }  # fmt: skip
 
 
-def _finding(one: Finding, say: Say) -> FindingRecord:
-    return FindingRecord(
-        one.law, _name(one), one.error, one.tolerance, one.unit, say(one.sentence), one.where
-    )
+def _finding(one: Finding, say: Say) -> Record:
+    return {
+        "law": one.law, "verdict": _name(one), "error": one.error, "tolerance": one.tolerance,
+        "unit": one.unit, "text": say(one.sentence), "where": one.where,
+    }  # fmt: skip

@@ -50,17 +50,14 @@ def _seconds(one: CaseJudgement) -> float:
 
 
 def _case(one: CaseJudgement, suite: str, say: Say) -> ElementTree.Element:
-    element = ElementTree.Element(
-        "testcase", name=one.case.name, classname=suite, time=f"{_seconds(one):.6f}"
-    )
-    told = [say(words) for words in complaints(one)]
-    if one.verdict in _ELEMENTS:
-        found = ElementTree.SubElement(
-            element, _ELEMENTS[one.verdict], message=told[0] if told else ""
-        )
-        if one.verdict is not Verdict.UNDECIDED:
+    names = {"name": one.case.name, "classname": suite, "time": f"{_seconds(one):.6f}"}
+    element = ElementTree.Element("testcase", names)
+    told = list(map(say, complaints(one)))
+    if tag := _ELEMENTS.get(one.verdict, "system-out" if told else None):
+        found = ElementTree.SubElement(element, tag)
+        if one.verdict in _ELEMENTS:
+            found.set("message", told[0] if told else "")
+        if one.verdict >= Verdict.WRONG:
             found.set("type", one.verdict.name)
         found.text = "\n".join(told)
-    elif told:
-        ElementTree.SubElement(element, "system-out").text = "\n".join(told)
     return element

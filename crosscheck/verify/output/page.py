@@ -1,32 +1,19 @@
 """The result of `verify` as one page that needs nothing else, with the failing cases drawn."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from ..judgement import CaseJudgement, Report, TaskReport
+from ..judgement import Report, TaskReport
 from ..sentence import Sentence, sentence
 from ..task import TASKS
-from . import comparison, drawing, saved
+from . import comparison, drawing, words
 from .geometry import scene
-from .words import (
-    VERDICTS,
-    Presentation,
-    Say,
-    advice,
-    complaints,
-    explanations,
-    introduction,
-    passed,
-    remarks,
-    speed,
-    title,
-)
+from .words import Presentation, Say
 
 _HERE = Path(__file__).parent
-_STYLES = (_HERE.parent / "presentation" / "page" / "page.css", _HERE / "page.css")
 _ROWS = 8
 WORDS = {
     "heading": sentence("Verdict on your solver"),
@@ -46,33 +33,16 @@ WORDS = {
 }
 
 
-class _Task(NamedTuple):
-    """A task's report and all that the page says of it."""
-
-    report: TaskReport
-    title: str
-    about: Sentence
-    passed: int
-    speed: Sentence | None
-    explanations: list[Sentence]
-    failure: CaseJudgement | None
-    complaints: list[Sentence]
-    drawing: Markup | None
-    apart: Sentence | None
-    rows: list[comparison.Row]
-    command: Sentence | None
-
-
 def render(report: Report, context: Presentation) -> str:
     """Return the page; nothing that a solver says stands in it unescaped."""
     return _environment(context.say).get_template("page.html").render(
-        style=Markup("\n".join(path.read_text(encoding="utf-8") for path in _STYLES)),
+        style=Markup((_HERE / "page.css").read_text(encoding="utf-8")),
         language={"zh": "zh-CN"}.get(context.language, context.language),
         words=WORDS,
-        verdicts=VERDICTS,
-        introduction=introduction(report),
-        advice=advice(report.tasks),
-        remarks=list(remarks(report)),
+        verdicts=words.VERDICTS,
+        introduction=words.introduction(report),
+        advice=words.advice(report.tasks),
+        remarks=list(words.remarks(report)),
         tasks=[_task(task, context) for task in report.tasks],
     )  # fmt: skip
 
@@ -82,27 +52,30 @@ def _environment(say: Say) -> Environment:
         loader=FileSystemLoader(_HERE), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters |= {"say": say, "numbers": comparison.written, "complaints": complaints}
+    environment.filters |= {"say": say, "numbers": comparison.written, "digits": words.digits,
+                            "complaints": words.complaints}  # fmt: skip
     return environment
 
 
-def _task(task: TaskReport, context: Presentation) -> _Task:
-    path = context.files.get((task.task, task.method))
+def _task(task: TaskReport, context: Presentation) -> dict[str, Any]:
+    """Return a task's report and all that the page says of it."""
     failure = task.smallest_failure
     drawn = scene(failure) if failure else None
     larger, factor = drawing.magnified(drawn) if drawn else (None, 1.0)
-    return _Task(
-        task, title(task), Sentence(TASKS[task.task].about, {}), passed(task), speed(task),
-        list(explanations(task)), failure, complaints(failure) if failure else [],
-        drawing.svg(larger, title(task)) if larger else None,
-        _apart(drawing.apart(drawn), factor) if drawn and _in_metres(task) else None,
-        comparison.rows(failure, _ROWS) if failure else [],
-        saved.command(context.solver, path) if path else None,
-    )  # fmt: skip
-
-
-def _in_metres(task: TaskReport) -> bool:
-    return task.task != "mass_spring_forces"
+    in_metres = task.task != "mass_spring_forces"
+    return {
+        "report": task,
+        "title": words.title(task),
+        "about": Sentence(TASKS[task.task].about, {}),
+        "passed": words.passed(task),
+        "speed": words.speed(task, context.say),
+        "explanations": list(words.explanations(task)),
+        "failure": failure,
+        "drawing": drawing.svg(larger, words.title(task)) if larger else None,
+        "apart": _apart(drawing.apart(drawn), factor) if drawn and in_metres else None,
+        "rows": comparison.rows(failure, _ROWS) if failure else [],
+        "command": context.command(task),
+    }
 
 
 def _apart(distance: float | None, factor: float) -> Sentence | None:

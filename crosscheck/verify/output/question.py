@@ -1,29 +1,82 @@
-"""Ask a solver what the command line says, with a bar that shows how far it is."""
+"""Which solver a command line means, and what it is asked."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from ..contestant import Contestant
 from ..judgement import Report
+from ..sentence import sentence
+from ..solvers import LIMITS, Limits, open_contestant
 from ..solvers.files import FileContestant
 from ..verify import DISCIPLINES, judge_cases, verify
 from . import saved
+from .words import Say
+
+# Told the task, the number of cases done, and of all, before each case.
+Notify = Callable[[str, int, int], None]
+
+
+# What stands before a program, and before a folder of answers.
+PROGRAM, ANSWERS = "--", "--answers"
+
+
+def limits(seconds: float | None, mebibytes: int | None) -> Limits:
+    """Return the limits of a program; the first request of a task may take longer, to compile.
+
+    Raises:
+        ValueError: if the time is none.
+    """
+    if seconds is not None and not 0.0 < seconds < float("inf"):
+        raise ValueError(f"time-limit: expected seconds above 0, got {seconds}")
+    chosen = LIMITS if mebibytes is None else LIMITS._replace(memory=mebibytes << 20)
+    if seconds is None:
+        return chosen
+    return chosen._replace(request=seconds, first=max(seconds, chosen.first))
+
+
+def opened(words: Sequence[str], chosen: Limits, say: Say) -> Contestant:
+    """Return the solver behind its door.
+
+    Args:
+        words: a Python file, module:object or the like; or "--", a program, its arguments; or
+            "--answers" and a folder.
+        chosen: what it may take.
+        say: for what is wrong with the words.
+
+    Raises:
+        ValueError: if the words name no solver.
+    """
+    if words[:1] == [PROGRAM] and len(words) > 1:
+        return open_contestant(words[1:], chosen)
+    if words[:1] == [ANSWERS] and len(words) > 2:
+        raise ValueError(say(sentence(
+            "answers: expected a folder in place of a solver, got {solver} as well",
+            solver=" ".join(words[2:]),
+        )))  # fmt: skip
+    if words[:1] == [ANSWERS]:
+        return FileContestant(Path(words[1]))
+    if not words or words == [PROGRAM]:
+        raise ValueError(say(sentence(
+            "solver: expected a Python file, module:object, or -- and a program, got none; "
+            "plumbob verify --template python writes a starter"
+        )))  # fmt: skip
+    if len(words) > 1:
+        raise ValueError(say(sentence(
+            "solver: expected one Python file or module:object, got {count} words; a program "
+            "stands behind --, as in plumbob verify -- {program}",
+            count=len(words), program=" ".join(words),
+        )))  # fmt: skip
+    return open_contestant(words[0], chosen)
 
 
 class Question(NamedTuple):
-    """Which cases to ask.
+    """Which cases to ask."""
 
-    Attributes:
-        tasks: only these, () for all that the solver offers.
-        rerun: a saved failing case, which is then all that is asked.
-        thorough, seed: as of `plumbob.crosscheck.verify.verify`.
-    """
-
-    tasks: tuple[str, ...] = ()
-    rerun: Path | None = None
-    thorough: bool = False
+    tasks: tuple[str, ...] = ()  # only these, () for all that the solver offers
+    rerun: Path | None = None  # a saved failing case, which is then all that is asked
+    thorough: bool = False  # thorough, seed: as of `plumbob.crosscheck.verify.verify`
     seed: int = 0
 
 
@@ -34,28 +87,16 @@ def suited(question: Question, contestant: Contestant) -> Question:
     return question
 
 
-def ask(contestant: Contestant, question: Question) -> Report:
+def ask(contestant: Contestant, question: Question, notify: Notify) -> Report:
     """Return what was found; the solver is ended then, whatever happens."""
-    from plumbob.terminal import progress
-
     try:
-        with progress() as bar:
-            shown = bar.add_task("", total=None)
-            report = _report(
-                contestant,
-                question,
-                lambda task, done, of: bar.update(
-                    shown, description=task, completed=done, total=of
-                ),
-            )
+        report = _report(contestant, question, notify)
     finally:
         contestant.close()  # its remarks are complete then
     return replace(report, remarks=(*report.remarks, *contestant.remarks))
 
 
-def _report(
-    contestant: Contestant, question: Question, notify: Callable[[str, int, int], None]
-) -> Report:
+def _report(contestant: Contestant, question: Question, notify: Notify) -> Report:
     if question.rerun is None:
         return verify(contestant, question.tasks or None, question.seed, question.thorough, notify)
     one = saved.load(question.rerun)

@@ -16,7 +16,7 @@ from plumbob.reference.formats.source import read_bytes
 
 from ..case import Case
 from ..contestant import Answer
-from ..judgement import CaseJudgement, TaskReport
+from ..judgement import TaskReport
 from ..message import plain
 from ..sentence import Sentence, sentence
 
@@ -26,20 +26,18 @@ _LARGEST = 1 << 28
 
 
 class Saved(msgspec.Struct, frozen=True):
-    """What finds a case again: its task, method, seed and name, and which list it is from."""
+    """What finds a case again: its task, method, seed and name, and which list it is from.
+
+    The request, the answer and what was expected stand beside it to be read.
+    """
 
     task: str
     method: str
     seed: int
     thorough: bool
     name: str
-
-
-class _File(Saved, frozen=True, kw_only=True):
-    """A saved case with all that is there to be read."""
-
-    format: str
-    version: int
+    format: str = ""
+    version: int = 0
     about: str = ""
     request: Any = None
     answer: Any = None
@@ -52,27 +50,18 @@ def save(report: TaskReport, folder: Path, seed: int, thorough: bool) -> Path | 
     if failure is None:
         return None
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{_plain(f'{report.task} {report.method}')}.json"
-    content = _File(
-        report.task, report.method, seed, thorough, failure.case.name,
-        format=FORMAT, version=VERSION, about=str(failure.case.about),
-        request={"id": 1, "task": report.task, **failure.case.inputs},
-        answer=_answer(failure), expected=failure.expected,
+    name = re.sub(r"[^A-Za-z0-9_]+", "-", f"{report.task} {report.method}").strip("-")[:100]
+    case, answer = failure.case, failure.answer
+    content = Saved(
+        report.task, report.method, seed, thorough, case.name, FORMAT, VERSION, str(case.about),
+        {"id": 1, "task": report.task, **case.inputs},
+        answer.values if isinstance(answer, Answer) else {"error": str(answer.sentence)},
+        failure.expected,
     )  # fmt: skip
     text = msgspec.json.format(msgspec.json.encode(content, enc_hook=plain), indent=1)
+    path = folder / f"{name}.json"
     path.write_bytes(text + b"\n")
     return path
-
-
-def _plain(name: str) -> str:
-    """Return a name fit for a file: letters, digits and hyphens."""
-    return re.sub(r"[^A-Za-z0-9_]+", "-", name).strip("-")[:100]
-
-
-def _answer(failure: CaseJudgement) -> Any:
-    if isinstance(failure.answer, Answer):
-        return failure.answer.values
-    return {"error": str(failure.answer.sentence)}
 
 
 def load(path: Path) -> Saved:
@@ -82,7 +71,7 @@ def load(path: Path) -> Saved:
         ValueError: if the file holds something else or cannot be read.
     """
     try:
-        found = msgspec.json.decode(read_bytes(path, largest=_LARGEST), type=_File)
+        found = msgspec.json.decode(read_bytes(path, largest=_LARGEST), type=Saved)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
         found = None
     if found is None or found.format != FORMAT or found.version != VERSION:

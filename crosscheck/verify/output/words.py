@@ -4,12 +4,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from plumbob.bench.text import visible
-
 from ..contestant import Answer
 from ..judgement import LEAST_SHARE, CaseJudgement, Report, TaskReport, Verdict
 from ..language import translator
-from ..sentence import Sentence, sentence
+from ..sentence import Sentence, sentence, visible
+from . import saved
 
 Say = Callable[[Sentence], str]
 GOOD = (Verdict.RIGHT, Verdict.RIGHT_BUT)
@@ -23,19 +22,18 @@ VERDICTS = {
 
 
 class Presentation(NamedTuple):
-    """What is shown besides a report.
+    """What is shown besides a report."""
 
-    Attributes:
-        say: puts sentences into words of the language.
-        language: a key of LANGUAGES.
-        solver: as it stands on the command line.
-        files: where the smallest failing case of a task and method is saved.
-    """
-
-    say: Say
-    language: str
-    solver: Sequence[str]
+    say: Say  # puts sentences into words of the language
+    language: str  # a key of LANGUAGES
+    solver: Sequence[str]  # as it stands on the command line
+    # where the smallest failing case of a task and method is saved
     files: Mapping[tuple[str, str], Path] = {}
+
+    def command(self, task: TaskReport) -> Sentence | None:
+        """Return what asks the saved case of a task again, None if there is none."""
+        path = self.files.get((task.task, task.method))
+        return saved.command(self.solver, path) if path else None
 
 
 def speaker(language: str) -> Say:
@@ -49,27 +47,29 @@ def title(report: TaskReport) -> str:
     return visible(f"{report.task} {report.method}".strip())
 
 
-def passed(report: TaskReport) -> int:
-    """Return how many cases are right, or right but for what is said."""
-    return sum(one.verdict in GOOD for one in report.judgements)
+def passed(report: TaskReport) -> str:
+    """Return how many cases of all are right, or right but for what is said."""
+    return f"{sum(one.verdict in GOOD for one in report.judgements)}/{len(report.judgements)}"
 
 
-def speed(report: TaskReport) -> Sentence | None:
-    """Return the time of a solver beside the reference's, or None if that is not measured."""
+def digits(judged: TaskReport | CaseJudgement) -> str:
+    """Return how many digits are correct, a dash where that says nothing."""
+    return "–" if judged.digits is None else f"{judged.digits:.1f}"
+
+
+def speed(report: TaskReport, say: Say) -> str:
+    """Return the time of a solver beside the reference's, a dash if that is not measured."""
     if report.untimed:
-        return sentence("not timed")
-    times = report.slowdown
-    if times is None:
-        return None
-    if times >= 9.95:
-        return sentence("{times:,.0f} x slower", times=times)
-    if times >= 1.05:
-        return sentence("{times:.1f} x slower", times=times)
-    if times > 1 / 1.05:
-        return sentence("as fast")
-    if times > 1 / 9.95:
-        return sentence("{times:.1f} x faster", times=1 / times)
-    return sentence("{times:,.0f} x faster", times=1 / times)
+        return say(sentence("not timed"))
+    if report.slowdown is None:
+        return "–"
+    rate = max(report.slowdown, 1.0 / report.slowdown)
+    times = f"{rate:,.0f}" if rate >= 9.95 else f"{rate:.1f}"
+    if rate < 1.05:
+        return say(sentence("as fast"))
+    if report.slowdown > 1.0:
+        return say(sentence("{times} x slower", times=times))
+    return say(sentence("{times} x faster", times=times))
 
 
 def introduction(report: Report) -> Sentence:
@@ -79,9 +79,13 @@ def introduction(report: Report) -> Sentence:
     language = sentence(", {language}", language=greeting.language) if greeting.language else ""
     if any(task.precision for task in report.tasks):
         return sentence("{name}{language}", name=words, language=language)
-    if greeting.precision == "single":
-        return sentence("{name}{language}, single precision", name=words, language=language)
-    return sentence("{name}{language}, double precision", name=words, language=language)
+    return sentence(
+        "{name}{language}, single precision"
+        if greeting.precision == "single"
+        else "{name}{language}, double precision",
+        name=words,
+        language=language,
+    )
 
 
 def remarks(report: Report) -> Iterator[Sentence]:
@@ -100,8 +104,7 @@ def complaints(judgement: CaseJudgement) -> list[Sentence]:
     if not isinstance(judgement.answer, Answer):
         return [judgement.answer.sentence]
     found = [one for one in judgement.findings if one.verdict is not Verdict.RIGHT]
-    found.sort(key=lambda one: -one.verdict)
-    return [one.sentence for one in found]
+    return [one.sentence for one in sorted(found, key=lambda one: -one.verdict)]
 
 
 def explanations(report: TaskReport) -> Iterator[Sentence]:
@@ -114,10 +117,8 @@ def explanations(report: TaskReport) -> Iterator[Sentence]:
             what=one.sentence,
             share=one.share,
         )
-    for words in (report.diagnosis.first_broken, report.diagnosis.behaviour):
-        if words is not None:
-            yield words
-    yield from report.diagnosis.hints
+    found = report.diagnosis
+    yield from filter(None, (found.first_broken, found.behaviour, *found.hints))
 
 
 def advice(tasks: Sequence[TaskReport]) -> Sentence:
@@ -129,21 +130,20 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
             "more cases."
         )
     first = bad[0]
-    if first.verdict is Verdict.UNDECIDED and first.diagnosis.hints:
-        return sentence(
-            'Next: declare the step that you make, by "step" in the greeting (docs/protocol.md).'
-        )
     if first.verdict is Verdict.UNDECIDED:
-        return sentence("Next: ask the long list of cases with --thorough.")
+        return (
+            sentence('Next: declare the step that you make, by "step" in the greeting '
+                     "(docs/protocol.md).")
+            if first.diagnosis.hints
+            else sentence("Next: ask the long list of cases with --thorough.")
+        )  # fmt: skip
+    template = sentence("Next: correct {task}, rerun the saved case, then run all again.")
     if first.verdict is Verdict.BROKEN and not first.diagnosis.explained:
-        return sentence(
-            "Next: let {task} answer every case first; what it breaks on is saved above.",
-            task=title(first),
+        template = sentence(
+            "Next: let {task} answer every case first; what it breaks on is saved above."
         )
-    if len(bad) > 1:
-        return sentence(
-            "Next: correct {task} first, since the others may rest on it; then run this again.",
-            task=title(first),
+    elif len(bad) > 1:
+        template = sentence(
+            "Next: correct {task} first, since the others may rest on it; then run this again."
         )
-    return sentence("Next: correct {task}, rerun the saved case, then run all again.",
-                    task=title(first))  # fmt: skip
+    return Sentence(template.template, {"task": title(first)})

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..contestant import Contestant
 from .files import FileContestant
-from .line_process import LIMITS, Limits
+from .losses import LIMITS, Limits
 from .program import ProgramContestant
 from .python_file import python_contestant
 

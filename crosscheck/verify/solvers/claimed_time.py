@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...process_tree import family, main_thread_seconds
 from ..sentence import Sentence, sentence
-from .processes import family, main_thread_seconds
 
 # So many requests are compared, then again after as many more; the last ones are kept.
 COMPARED, KEPT = 10, 40

@@ -9,7 +9,7 @@ import msgspec
 from .. import message
 from ..case import Case
 from ..greeting import Greeting
-from ..task import TASKS, Field, Task
+from ..task import TASKS, Task
 from ..verify import DISCIPLINES, trials
 from .files import GREETING, REQUEST, SETTINGS, place_of, read_greeting
 from .tables import write_table
@@ -94,18 +94,23 @@ def write_cases(
     """
     _check_is_ours(folder)
     places = [place_of(case) for case in cases]
-    if len(set(places)) < len(places):
-        twice = next(place for place in places if places.count(place) > 1)
+    twice = next((place for place in places if places.count(place) > 1), None)
+    if twice:
         raise ValueError(f"cases: expected different names, got {twice} twice")
-    folder.mkdir(parents=True, exist_ok=True)
-    settings = {"seed": seed, "thorough": thorough}
-    (folder / SETTINGS).write_text(json.dumps(settings) + "\n", encoding="utf-8")
-    pretty = msgspec.json.format(msgspec.json.encode(greeting), indent=2)
-    (folder / GREETING).write_bytes(pretty + b"\n")
-    (folder / "cases.txt").write_text("".join(f"{one}\n" for one in places), encoding="utf-8")
-    (folder / "README.txt").write_text(README + _about_tasks(cases), encoding="utf-8")
+    texts = {
+        SETTINGS: json.dumps({"seed": seed, "thorough": thorough}) + "\n",
+        GREETING: msgspec.json.format(msgspec.json.encode(greeting), indent=2).decode() + "\n",
+        "cases.txt": "".join(f"{one}\n" for one in places),
+        "README.txt": README + _about_tasks(cases),
+    }
     for number, (place, case) in enumerate(zip(places, cases, strict=True), 1):
-        _write_case(folder / place, number, case)
+        texts[f"{place}/{REQUEST}"] = message.encode_case(number, case).decode()
+        for name, value in case.inputs.items():
+            if value is not None:
+                texts[f"{place}/{name}.csv"] = write_table(value)
+    for name, text in texts.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _check_is_ours(folder: Path) -> None:
@@ -118,25 +123,14 @@ def _check_is_ours(folder: Path) -> None:
         )
 
 
-def _write_case(place: Path, number: int, case: Case) -> None:
-    place.mkdir(parents=True, exist_ok=True)
-    (place / REQUEST).write_bytes(message.encode_case(number, case))
-    for name, value in case.inputs.items():
-        if value is not None:
-            (place / f"{name}.csv").write_text(write_table(value), encoding="utf-8")
-
-
 def _about_tasks(cases: Iterable[Case]) -> str:
-    names = dict.fromkeys(case.task for case in cases)
-    return "\n".join(_about(TASKS[name]) for name in names)
+    return "\n".join(_about(TASKS[name]) for name in dict.fromkeys(case.task for case in cases))
 
 
 def _about(task: Task) -> str:
     lines = [f"{task.name}: {task.about}"]
     for title, fields in (("in", task.inputs), ("out", task.outputs)):
-        lines += [f"  {title:3} {field.name} {_shape(field)}: {field.about}" for field in fields]
+        for field in fields:
+            shape = " x ".join(map(str, field.shape)) or "one value"
+            lines.append(f"  {title:3} {field.name} {shape}: {field.about}")
     return "\n".join(lines) + "\n"
-
-
-def _shape(field: Field) -> str:
-    return " x ".join(map(str, field.shape)) or "one value"

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from ..contestant import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
 from ..sentence import Sentence, did_you_mean, sentence
 from ..task import TASKS, Task
-from .line_process import LIMITS
+from .losses import LIMITS
 from .tables import read_table
 
 GREETING, SETTINGS, REQUEST, ANSWER = "greeting.json", "export.json", "request.json", "answer.json"
@@ -47,21 +46,30 @@ def read_greeting(folder: Path) -> Greeting:
     path = folder / GREETING
     if not path.is_file():
         raise ValueError(f"answers: expected a folder of exported cases, got {folder}")
-    return message.decode_greeting(_object(_content(path), GREETING), GREETING)
+    return message.decode_greeting(_object(path), GREETING)
 
 
-def _object(data: bytes, name: str) -> dict[str, Any]:
-    """Return the JSON object of a file.
-
-    Raises:
-        ValueError: if it holds something else.
-    """
+def _object(path: Path) -> dict[str, Any]:
+    """Return the JSON object of a file; raise ValueError if it holds something else."""
+    data = _content(path)
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         data = data.decode("utf-16", errors="replace").encode()
     fields = message.decode_object(data)
     if fields is None:
-        raise ValueError(f"{name}: expected a JSON object, got {message.shown(data, 60)!r}")
+        raise ValueError(f"{path.name}: expected a JSON object, got {message.shown(data, 60)!r}")
     return fields
+
+
+def _content(path: Path) -> bytes:
+    # The host of Python solvers never needs this.
+    from plumbob.reference.formats.source import read_bytes
+
+    return read_bytes(path, largest=LIMITS.line)
+
+
+def _exported(task: Task) -> set[str]:
+    """Return the names of the files that an export writes for a case."""
+    return {REQUEST, *(f"{field.name}.csv" for field in task.inputs)}
 
 
 class FileContestant:
@@ -79,21 +87,19 @@ class FileContestant:
         self.folder = folder
         if not (folder / SETTINGS).is_file():
             raise ValueError(f"answers: expected a folder of exported cases, got {folder}")
-        settings = _object(_content(folder / SETTINGS), SETTINGS)
+        settings = _object(folder / SETTINGS)
         self.seed, self.thorough = int(settings.get("seed", 0)), bool(settings.get("thorough"))
 
     @property
     def remarks(self) -> tuple[Sentence, ...]:
         """That an answer is never given twice, and which tasks have none."""
+        answered = self.greeting.tasks
+        without = ", ".join(task for task in self._offered().tasks if task not in answered)
         once = sentence(
             "Files answer once: whether equal requests have equal answers is not known."
         )
-        left_out = [task for task in self._offered().tasks if task not in self.greeting.tasks]
-        if not left_out:
-            return (once,)
-        return once, sentence(
-            "Left out, for they have no answers: {tasks}.", tasks=", ".join(left_out)
-        )
+        left_out = sentence("Left out, for they have no answers: {tasks}.", tasks=without)
+        return (once, left_out) if without else (once,)
 
     @property
     def greeting(self) -> Greeting:
@@ -114,9 +120,8 @@ class FileContestant:
 
     def _answers(self, task: str, method: str) -> bool:
         """Return whether anything stands beside the cases of a task that was not exported."""
-        exported = {REQUEST, *(f"{field.name}.csv" for field in TASKS[task].inputs)}
         files = (self.folder / _folder(task, method)).glob("*/[!.]*")
-        return any(path.name not in exported for path in files)
+        return any(path.name not in _exported(TASKS[task]) for path in files)
 
     def _offered(self) -> Greeting:
         try:
@@ -130,12 +135,9 @@ class FileContestant:
         place = self.folder / place_of(case)
         try:
             if not _is_asked(place, case):
-                return Failure(
-                    FailureKind.ABSENT,
-                    sentence(
-                        "{place} holds another case: export again, and solve it.", place=place
-                    ),
-                )
+                return Failure(FailureKind.ABSENT, sentence(
+                    "{place} holds another case: export again, and solve it.", place=place
+                ))  # fmt: skip
             return _read_answer(place, case)
         except (ValueError, OSError) as error:
             return Failure(FailureKind.GARBAGE, sentence("{why}", why=str(error)))
@@ -146,16 +148,24 @@ class FileContestant:
 
 def _is_asked(place: Path, case: Case) -> bool:
     """Return whether the request that was exported is the same as that of now."""
-    path = place / REQUEST
-    if not path.is_file():
+    if not (place / REQUEST).is_file():
         return False
-    then, now = _object(_content(path), REQUEST), json.loads(message.encode_case(0, case))
-    return then | {"id": 0} == now
+    return _object(place / REQUEST) | {"id": 0} == json.loads(message.encode_case(0, case))
 
 
 def _read_answer(place: Path, case: Case) -> Answer | Failure:
+    """Return what answer.json of a folder says, or the tables.
+
+    Raises:
+        ValueError: if they are not understood.
+    """
     task = TASKS[case.task]
-    fields = _fields(place, task, case)
+    counts = task.counts(case.inputs)
+    paths = {field: place / f"{PREFIX}{field.name}.csv" for field in task.outputs}
+    fields = _object(place / ANSWER) if (place / ANSWER).is_file() else {
+        field.name: read_table(field, counts, _content(path))
+        for field, path in paths.items() if path.is_file()
+    }  # fmt: skip
     if not fields:
         return Failure(FailureKind.ABSENT, _absent(place, task))
     answer = message.decode_answer(fields, task, case.inputs, LONGEST)
@@ -165,42 +175,13 @@ def _read_answer(place: Path, case: Case) -> Answer | Failure:
     return answer
 
 
-def _fields(place: Path, task: Task, case: Case) -> Mapping[str, Any]:
-    """Return the outputs that stand in a folder, those of answer.json first.
-
-    Raises:
-        ValueError: if they are not understood.
-    """
-    if (place / ANSWER).is_file():
-        return _object(_content(place / ANSWER), ANSWER)
-    counts = task.counts(case.inputs)
-    paths = {field: place / f"{PREFIX}{field.name}.csv" for field in task.outputs}
-    return {
-        field.name: read_table(field, counts, _content(path))
-        for field, path in paths.items()
-        if path.is_file()
-    }
-
-
-def _content(path: Path) -> bytes:
-    from plumbob.reference.formats.source import (
-        read_bytes,  # which the host of Python solvers never needs
-    )
-
-    return read_bytes(path, largest=LIMITS.line)
-
-
 def _absent(place: Path, task: Task) -> Sentence:
     """Return that there is no answer, and which file was perhaps meant as one."""
     names = [ANSWER, *(f"{PREFIX}{field.name}.csv" for field in task.outputs)]
-    inputs = {REQUEST, *(f"{field.name}.csv" for field in task.inputs)}
-    for path in sorted(place.iterdir()):
-        if path.name not in inputs and (near := did_you_mean(path.name, names)):
+    for file in sorted({path.name for path in place.iterdir()} - _exported(task)):
+        if near := did_you_mean(file, names):
             return sentence(
-                "There is no answer in {place}, but {file}{near}",
-                place=place,
-                file=path.name,
-                near=near,
+                "There is no answer in {place}, but {file}{near}", place=place, file=file, near=near
             )
     return sentence(
         "There is no answer in {place}: expected {names}", place=place, names=" or ".join(names)

@@ -22,6 +22,7 @@ from typing import Any, BinaryIO
 
 import msgspec
 
+from ...child_process import take_streams
 from ..contestant import Answer, Failure, FailureKind
 from ..functions import call, describe_exception, is_beside, takes
 from ..greeting import PROTOCOL
@@ -221,10 +222,8 @@ class _Prints(io.RawIOBase):
 @contextlib.contextmanager
 def _moved() -> Iterator[tuple[BinaryIO, BinaryIO, _Prints]]:
     """Yield the protocol's streams, and what is printed instead of them."""
-    requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.dup2(2, 1)
+    descriptors = take_streams()
+    requests, answers = os.fdopen(descriptors[0], "rb"), os.fdopen(descriptors[1], "wb")
     prints = _Prints()
     stream = io.TextIOWrapper(prints, encoding="utf-8", errors="replace", write_through=True)  # type: ignore[type-var]
     sys.stdout = stream

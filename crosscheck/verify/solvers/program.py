@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ...child_process import ChildProcess, LostError
 from .. import message
 from ..case import Case
 from ..contestant import Answer, Failure, FailureKind, NoGreetingError
@@ -13,7 +14,7 @@ from ..greeting import Greeting
 from ..sentence import Sentence, sentence
 from ..task import TASKS
 from .claimed_time import ClaimedTimes
-from .line_process import LIMITS, Limits, LineProcess, LostError
+from .losses import LIMITS, FailureError, Limits, departure, failure_of, not_started
 
 
 class ProgramContestant:
@@ -32,7 +33,7 @@ class ProgramContestant:
         self._command = tuple(map(str, command))
         self._folder = folder
         self._limits = limits
-        self._process: LineProcess | None = None
+        self._process: ChildProcess | None = None
         self._greeting: Greeting | None = None
         self._number = 0
         self._warm: set[object] = set()
@@ -50,7 +51,7 @@ class ProgramContestant:
         if self._greeting is None:
             try:
                 self._ready()
-            except LostError as lost:
+            except FailureError as lost:
                 self._lose()
                 raise NoGreetingError(lost.failure) from None
         assert self._greeting is not None
@@ -61,7 +62,7 @@ class ProgramContestant:
         try:
             process = self._ready()
             return self._ask(process, case)
-        except LostError as lost:
+        except FailureError as lost:
             self._lose()
             return lost.failure
 
@@ -69,30 +70,40 @@ class ProgramContestant:
         """End its input, then it and whatever it has started."""
         process, self._process = self._process, None
         if process is not None:
-            odd = process.leave()
+            odd = departure(process, self._limits.leave)
             self.remarks += tuple(one for one in odd if one not in self.remarks)
 
-    def _ready(self) -> LineProcess:
+    def _ready(self) -> ChildProcess:
         if self._process is None:
             self._number, self._warm, self._print = 0, set(), None
-            self._process = LineProcess(self._command, self._folder, self._limits)
+            self._process = self._start()
             self._greet(self._process)
             self._times = ClaimedTimes(self._process.pid)
         return self._process
 
-    def _greet(self, process: LineProcess) -> None:
+    def _start(self) -> ChildProcess:
+        limits = self._limits
+        try:
+            return ChildProcess(
+                self._command, folder=self._folder, memory=limits.memory, longest=limits.line
+            )
+        except (OSError, ValueError) as error:
+            raise not_started(self._command[0], error) from None
+
+    def _greet(self, process: ChildProcess) -> None:
         fields, *_ = self._exchange(process, message.encode_greeting(), self._limits.first)
         if fields.get("error") is not None:
-            raise LostError.of(message.decode_error(fields))
+            failure = message.decode_error(fields)
+            raise FailureError(failure.kind, failure.sentence)
         try:
             greeting = message.decode_greeting(fields)
         except ValueError as error:
-            raise LostError(FailureKind.GARBAGE, sentence("{why}", why=str(error))) from None
+            raise FailureError(FailureKind.GARBAGE, sentence("{why}", why=str(error))) from None
         if isinstance(fields.get("printed"), str):
             self._print = fields["printed"].encode()
         self._greeting = self._greeting or greeting
 
-    def _ask(self, process: LineProcess, case: Case) -> Answer | Failure:
+    def _ask(self, process: ChildProcess, case: Case) -> Answer | Failure:
         kind = (case.task, case.inputs.get("method"))
         patience = self._limits.request if kind in self._warm else self._limits.first
         self._number += 1
@@ -120,22 +131,23 @@ class ProgramContestant:
         return replace(answer, seconds=round_trip, untimed=untimed)
 
     def _exchange(
-        self, process: LineProcess, line: bytes, patience: float
+        self, process: ChildProcess, line: bytes, patience: float
     ) -> tuple[Mapping[str, Any], float, int]:
         """Send a request; return its answer, how long it took, and how many bytes came back."""
         start, size = time.monotonic(), 0
         process.send(line)
         for _ in range(self._limits.prints + 1):
             try:
-                answer = process.receive(start + patience - time.monotonic(), patience)
+                answer = process.receive(start + patience - time.monotonic())
             except LostError as lost:
-                raise self._with_prints(lost) from None
+                failure = failure_of(lost.loss, process, self._limits, patience)
+                raise self._with_prints(failure) from None
             seconds = time.monotonic() - start
             size += len(answer)
             fields = self._decode(answer)
             if fields is not None:
                 return fields, seconds, size
-        raise LostError(
+        raise FailureError(
             FailureKind.GARBAGE,
             sentence(
                 "It printed more than {count} lines that are no answers, for example: {line}",
@@ -149,14 +161,14 @@ class ProgramContestant:
         try:
             fields = message.decode_object(line)
         except ValueError as error:
-            raise LostError(
+            raise FailureError(
                 FailureKind.GARBAGE,
                 sentence("It answered with a broken line: {why}", why=str(error)),
             ) from None
         if fields is None or not line.lstrip(b"\xef\xbb\xbf \t").startswith(b"{"):
             self._print = self._print or line.strip() or None
         if fields is not None and not self._is_mine(fields):
-            raise LostError(FailureKind.GARBAGE, self._of_another(fields))
+            raise FailureError(FailureKind.GARBAGE, self._of_another(fields))
         return fields
 
     def _of_another(self, fields: Mapping[str, Any]) -> Sentence:
@@ -178,10 +190,10 @@ class ProgramContestant:
         number = fields.get("id")
         return not isinstance(number, bool) and number == self._number
 
-    def _with_prints(self, lost: LostError) -> LostError:
+    def _with_prints(self, lost: FailureError) -> FailureError:
         if self._print is None:
             return lost
-        return LostError(
+        return FailureError(
             lost.failure.kind,
             sentence(
                 "{what} Before it had printed lines that are no answers, for example: {line}",

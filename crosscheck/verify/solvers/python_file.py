@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from .line_process import LIMITS, Limits
+from .losses import LIMITS, Limits
 from .program import ProgramContestant
 
 # After this share of its time a solver's line is noted, in case it takes longer.

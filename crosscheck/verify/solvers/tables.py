@@ -55,12 +55,13 @@ def read_table(field: Field, counts: Mapping[str, int], data: bytes) -> Any:
     if not lines:
         return checked(field, counts, [])
     errors = []
-    for separator, decimal in _dialects([line for _, line in lines]):
-        try:
-            rows = list(_rows(field, lines, separator, decimal))
-            return checked(field, counts, _shaped(field, counts, rows))
-        except ValueError as error:
-            errors.append(error)
+    for separator, decimal in _DIALECTS:
+        if separator is None or any(separator in line for _, line in lines):
+            try:
+                rows = list(_rows(field, lines, separator, decimal))
+                return checked(field, counts, _shaped(field, counts, rows))
+            except ValueError as error:
+                errors.append(error)
     raise errors[0]
 
 
@@ -70,12 +71,6 @@ def _text(field: Field, data: bytes) -> str:
         return data.decode(encoding)
     except UnicodeDecodeError:
         raise ValueError(f"{field.name}: expected a text file in UTF-8, got other bytes") from None
-
-
-def _dialects(lines: list[str]) -> Iterator[tuple[str | None, str]]:
-    for separator, decimal in _DIALECTS:
-        if separator is None or any(separator in line for line in lines):
-            yield separator, decimal
 
 
 def _rows(

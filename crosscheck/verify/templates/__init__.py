@@ -7,17 +7,11 @@ from typing import NamedTuple
 
 
 class Language(NamedTuple):
-    """What a starter consists of.
+    """What a starter consists of."""
 
-    Attributes:
-        files: their names; the first is the user's to fill in.
-        build: the command that compiles it, or "".
-        run: the command to be judged.
-    """
-
-    files: tuple[str, ...]
-    build: str
-    run: str
+    files: tuple[str, ...]  # their names; the first is the user's to fill in
+    build: str  # the command that compiles it, or ""
+    run: str  # the command to be judged
 
 
 LANGUAGES: Mapping[str, Language] = {

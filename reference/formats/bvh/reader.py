@@ -37,11 +37,7 @@ def read(path: str | Path) -> Motion:
 
 
 def parse(text: str) -> Motion:
-    """Return the motion that a text describes.
-
-    Raises:
-        ValueError: as for `read`.
-    """
+    """Return the motion that a text describes; see `read`."""
     return _motion(arguments.text("text", text), "BVH")
 
 
@@ -92,11 +88,7 @@ class _Lines:
         return self.text.count("\n", 0, self.position) + 1
 
     def next(self, expected: str) -> str:
-        """Return the next line.
-
-        Raises:
-            ValueError: if there is none.
-        """
+        """Return the next line."""
         for line in self:
             return line
         raise ValueError(f"expected {expected}, got the end of the file")
@@ -232,8 +224,7 @@ def _frames(lines: _Lines, joints: list[_Joint], size: int) -> tuple[float, Floa
 def _extra_frame(lines: _Lines, values: FloatArray) -> int:
     """Return the line number of a single extra frame after the last one, 0 if the text ends.
 
-    Raises:
-        ValueError: if anything else follows.
+    Anything else is a ValueError.
     """
     count, width = values.shape
     line = next(iter(lines), "")

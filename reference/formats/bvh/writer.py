@@ -40,11 +40,10 @@ def write(
             position, (frame, 3); by default the skeleton's offsets.
         order: the axes of the rotation channels.
 
-    Numbers have six decimals: the rounding error of an offset is at most 5e-7 per axis, 9e-7 in
-    all, and that of a rotation 1.5e-6 degrees in three angles, 2.7e-8 rad. The position of a joint
-    at depth n, along links of total length L, is off by at most (n + 1) 9e-7 + n L 2.7e-8. Angles
-    are continuous, without jumps of 360 degrees. Joints are written depth first, which is their
-    order when read back, and keep their names.
+    Numbers have six decimals: an offset is rounded by at most 9e-7, a rotation by 2.7e-8 rad. The
+    position of a joint at depth n, along links of total length L, is off by at most (n + 1) 9e-7 +
+    n L 2.7e-8. Angles are continuous, without jumps of 360 degrees. Joints are written depth first,
+    which is their order when read back, and keep their names.
 
     Raises:
         ValueError: if an argument is invalid or a name cannot be written; names the argument.
@@ -62,11 +61,7 @@ def format(
     *,
     order: str = "ZXY",
 ) -> str:
-    """Return the text of a motion; see `write`.
-
-    Raises:
-        ValueError: as for `write`.
-    """
+    """Return the text of a motion; see `write`."""
     arguments.choice("order", order, ORDERS)
     frame_time = arguments.number("frame_time", frame_time, above=0.0)
     if isinstance(skeleton, Articulation):

@@ -44,11 +44,7 @@ def read(path: str | Path, *, root: str | Path | None = None) -> Robot:
 
 
 def parse(text: str) -> Robot:
-    """Return the robot or character that a text describes, which can include no files.
-
-    Raises:
-        ValueError: as for `read`.
-    """
+    """Return the robot that a text describes, which can include no files; see `read`."""
     root = xml.parse(text, "MJCF")
     refuse_includes(root)
     return robot(root, "MJCF")

@@ -37,11 +37,7 @@ class _Joint(NamedTuple):
 
 
 def robot(root: Element, origin: str) -> Robot:
-    """Return the robot or character that a <mujoco> element describes.
-
-    Raises:
-        ValueError: if anything in it is invalid; names the location and element.
-    """
+    """Return the robot or character that a <mujoco> element describes."""
     if root.tag != "mujoco":
         raise root.error("expected a <mujoco>")
     tree = _Tree(settings(root))

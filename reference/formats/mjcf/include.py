@@ -17,15 +17,9 @@ class _Folders(NamedTuple):
 def include_files(root: Element, path: Path, top: str | Path | None) -> None:
     """Replace all includes by the content of the files, each of which may be included once.
 
-    Args:
-        root: the main file's root element.
-        path: of the main file.
-        top: the folder that must contain all files after symbolic links are resolved; that of the
-            main file if None.
-
-    Raises:
-        ValueError: if a file is included twice, does not exist or is outside of that folder, or if
-            that folder does not contain the main file.
+    `top` is the folder that must contain all files after symbolic links are resolved; that of the
+    main file at `path` if None. A file that is included twice, does not exist or is outside of that
+    folder is a ValueError, as is a folder that does not contain the main file.
     """
     main = path.resolve()
     folders = _Folders(main.parent, main.parent if top is None else _checked_top(main, top))

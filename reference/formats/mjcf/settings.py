@@ -1,4 +1,7 @@
-"""The compiler settings and default classes of an MJCF file, applied to poses and joints."""
+"""The compiler settings and default classes of an MJCF file, applied to poses and joints.
+
+What the file may not have is a ValueError that names the location, the element and the problem.
+"""
 
 import math
 from collections.abc import Sequence
@@ -44,47 +47,27 @@ class Transform(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """The compiler's settings and the default classes of a file.
+    """The compiler's settings and the default classes of a file."""
 
-    Attributes:
-        angle: the file's unit of angles [rad].
-        sequence: the axes of Euler angles; capitals denote fixed axes.
-        autolimits: whether a range implies a limit.
-        alignfree: whether the frames of free bodies are aligned with their inertia.
-        classes: the joint attributes of each default class.
-    """
-
-    angle: float
-    sequence: str
-    autolimits: bool
-    alignfree: bool
-    classes: dict[str, dict[str, str]]
+    angle: float  # the file's unit of angles [rad]
+    sequence: str  # the axes of Euler angles; capitals denote fixed axes
+    autolimits: bool  # whether a range implies a limit
+    alignfree: bool  # whether the frames of free bodies are aligned with their inertia
+    classes: dict[str, dict[str, str]]  # the joint attributes of each default class
 
     def transform(self, element: Element) -> Transform:
-        """Return the transform of a body or a frame in its parent.
-
-        Raises:
-            ValueError: if a number is invalid, or there are several orientations.
-        """
+        """Return the transform of a body or a frame in its parent."""
         return Transform(element.numbers("pos", ORIGIN), self._orientation(element))
 
     def class_of(self, element: Element, attribute: str, inherited: str) -> str:
-        """Return the default class that an element names, or the one it inherits.
-
-        Raises:
-            ValueError: if there is no such class.
-        """
+        """Return the default class that an element names, or the one it inherits."""
         name = element.word(attribute, inherited)
         if name not in self.classes:
             raise element.error(f"expected a default class, got {name!r:.80}")
         return name
 
     def with_defaults(self, joint: Element, inherited: str) -> Element:
-        """Return a joint with missing attributes taken from its class.
-
-        Raises:
-            ValueError: if there is no such class.
-        """
+        """Return a joint with missing attributes taken from its class."""
         defaults = self.classes[self.class_of(joint, "class", inherited)]
         return joint._replace(attributes=defaults | joint.attributes)
 
@@ -117,11 +100,7 @@ class Settings(NamedTuple):
 
 
 def settings(root: Element) -> Settings:
-    """Return the settings of a file.
-
-    Raises:
-        ValueError: if a value is not allowed, or a default class is invalid.
-    """
+    """Return the settings of a file."""
     merged = Element("compiler", {}, [], root.location)
     for compiler in root.named("compiler"):
         merged = compiler._replace(attributes=merged.attributes | compiler.attributes)
@@ -140,11 +119,7 @@ def settings(root: Element) -> Settings:
 
 
 def one_of(element: Element, name: str, valid: Sequence[str], default: str) -> str:
-    """Return an attribute that is one of several words.
-
-    Raises:
-        ValueError: if it is another.
-    """
+    """Return an attribute that is one of several words."""
     value = element.word(name, default)
     if value not in valid:
         raise element.error(f"expected one of {', '.join(valid)} for {name}, got {value!r:.80}")
@@ -152,11 +127,7 @@ def one_of(element: Element, name: str, valid: Sequence[str], default: str) -> s
 
 
 def direction(element: Element, name: str, vector: Vector) -> Vector:
-    """Return the vector scaled to unit length.
-
-    Raises:
-        ValueError: if it is zero; names the attribute.
-    """
+    """Return the vector scaled to unit length."""
     length = math.hypot(*vector)
     if length == 0.0:
         raise element.error(f"expected a direction in {name!r}, got {element.word(name)!r:.80}")

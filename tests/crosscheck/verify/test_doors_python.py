@@ -176,21 +176,19 @@ def test_methods_of_inverse_kinematics_are_found(inside, text, methods):
         assert contestant.answer(inverse(method)).values["positions"][0, 0] == value
 
 
-def test_an_answer_of_another_kind_names_the_kind(inside):
-    text = f"import numpy as np\n{FORWARD}return {{'positions': np.zeros((2, 3), complex)}}\n"
-    told = str(inside(text).answer(case(2)).sentence)
-    assert told.endswith(
-        "expected numbers of shape (joint, 3), got complex128 values of shape (2, 3)"
-    )
-
-
-def test_an_answer_without_outputs_is_described(inside):
-    none = inside("def inverse_kinematics(target): return None\n").answer(inverse(""))
-    assert str(none.sentence).endswith("got None")
-    failure = inside(f"{FORWARD}return {{}}\n").answer(case(2))
-    assert str(failure.sentence).endswith("got an empty dict")
-    failure = inside(f"{FORWARD}return {{'x': 1, 'y': 2}}\n").answer(case(2))
-    assert str(failure.sentence).endswith("got the keys x, y")
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        ("{'positions': np.zeros((2, 3), complex)}",
+         "expected numbers of shape (joint, 3), got complex128 values of shape (2, 3)"),
+        ("None", "got None"),
+        ("{}", "got an empty dict"),
+        ("{'x': 1, 'y': 2}", "got the keys x, y"),
+    ],
+)  # fmt: skip
+def test_an_answer_that_is_none_is_described(inside, answer, words):
+    contestant = inside(f"import numpy as np\n{FORWARD}return {answer}\n")
+    assert str(contestant.answer(case(2)).sentence).endswith(words)
 
 
 def test_a_method_is_no_answer_to_another_task(inside):
@@ -320,7 +318,6 @@ def three_joints(body):
     ("body", "message"),
     [
         ("return helper.deep(0)", "raised: .*ZeroDivisionError in line 2 of helper.py: division"),
-        ("return offsets[:1]", r"garbage: .*positions \(joint, 3\).*got \(1, 3\)"),
         ("import os; os._exit(4)", "crashed: It ended instead of answering: exit code 4"),
         (
             "import os; os.kill(os.getpid(), 11)",
@@ -346,7 +343,6 @@ def test_a_process_survives_or_is_started_anew(solver, body, message):
     [
         ("x = input()", "raised: It raised EOFError in line 1 of my_ik.py"),
         ("import os; os._exit(3)", "crashed: .*exit code 3"),
-        ("def f(:\n  pass", "raised: It raised SyntaxError in line 1 of my_ik.py: invalid syntax"),
         ("def energies(masses): pass", r"garbage: .*energies \(did you mean energy\?\)"),
     ],
 )
@@ -377,27 +373,24 @@ def test_an_argument_that_no_input_has_is_told_with_those_there_are(inside, argu
 
 
 PRINTS = {
-    "print": "print('joint 1')",
-    "much": "print('joint 1' * 10**6)",
-    "bytes": "sys.stdout.buffer.write(b'joint 1\\xff')",
-    "a line and a half": "print('joint 1\\nand', end='')",
+    "print": ("print('joint 1')", True),
+    "much": ("print('joint 1' * 10**6)", True),
+    "bytes": ("sys.stdout.buffer.write(b'joint 1\\xff')", True),
+    "a line and a half": ("print('joint 1\\nand', end='')", True),
+    "a shell past Python": ("os.system('echo hello')", False),
+    "a system call": ("os.write(1, b'hello\\n' * 1000)", False),
 }
 
 
 @pytest.mark.parametrize("name", PRINTS)
 def test_prints_do_no_harm_and_are_remarked(solver, name):
-    contestant = solver(f"import sys\n{FORWARD}{PRINTS[name]}\n    return offsets\n")
+    body, remarked = PRINTS[name]
+    contestant = solver(f"import os, sys\n{FORWARD}{body}\n    return offsets\n")
     for _ in range(2):
         remarks = contestant.answer(case(2)).remarks
-        assert len(remarks) == 1
-        assert "prints to its standard output, for example: joint 1" in str(remarks[0])
-
-
-@pytest.mark.parametrize("body", ["os.system('echo hello')", "os.write(1, b'hello\\n' * 1000)"])
-def test_prints_past_python_do_no_harm(solver, body):
-    contestant = solver(f"import os\n{FORWARD}{body}\n    return offsets\n")
-    for _ in range(2):
-        assert isinstance(contestant.answer(case(2)), Answer)
+        if remarked:
+            assert len(remarks) == 1
+            assert "prints to its standard output, for example: joint 1" in str(remarks[0])
 
 
 def test_a_print_while_loading_is_remarked_once(solver):

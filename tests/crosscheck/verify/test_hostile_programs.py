@@ -10,158 +10,114 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from hostile_programs import LIMITS, LOOP, case, program, running
 
+from plumbob.crosscheck import child_process
+from plumbob.crosscheck.child_process import ChildProcess
 from plumbob.crosscheck.verify.contestant import Answer, Failure, FailureKind, NoGreetingError
 from plumbob.crosscheck.verify.judgement import Diagnosis, TaskReport
-from plumbob.crosscheck.verify.solvers import line_process
-from plumbob.crosscheck.verify.solvers.line_process import LineProcess
 from plumbob.crosscheck.verify.solvers.program import ProgramContestant
 from plumbob.crosscheck.verify.verify import DISCIPLINES, verify
 
 FORK = "if os.fork() == 0:\n    {before}\n    os.close(1)\n    while True: tick()\n"
-HOSTILE = {
-    "hangs and waits": ("while True: tick()", "hung", "was not computing: does it .* flush"),
-    "hangs and computes": ("while True: pass", "hung", "It computed for 0.5 s without an answer"),
-    "answers nothing and reads on": ("pass", "hung", "no answer within 0.5 s"),
+ALLOCATE = "kept = []\nwhile True: kept.append(b'x' * (8 << 20)); tick()"
+# What a program does instead of answering, and words of the sentence, by the kind of failure.
+HUNG = {
+    "waits": ("while True: tick()", "was not computing: does it .* flush"),
+    "computes": ("while True: pass", "It computed for 0.5 s without an answer"),
     "answers without an end of line": (
         "sys.stdout.write('{\"id\": 2'); sys.stdout.flush()\nwhile True: tick()",
-        "hung",
         'printed 8 bytes, but no end of line within 0.5 s: {"id": 2',
     ),
-    "crashes": (
-        "os.kill(os.getpid(), signal.SIGSEGV)",
-        "crashed",
-        "instead of answering: it used memory that is not its own",
+    "prints bytes": (
+        "sys.stdout.buffer.write(b'\\xff\\x00\\xfe\\n'); sys.stdout.flush()\nwhile True: tick()",
+        "Before it had printed lines that are no answers",
     ),
+    "closes its input": (
+        "os.close(0)\nright(request)\nwhile True: tick()",
+        "closed its standard input",
+    ),
+    "forks twice into another session": (
+        FORK.format(before="os.setsid(); os.fork() and os._exit(0)") + "while True: tick()",
+        "no answer",
+    ),
+    "forks and forks": ("for _ in range(4): os.fork()\nwhile True: tick()", "no answer"),
+    "ignores all signals": (
+        "for one in (1, 2, 3, 13, 15): signal.signal(one, signal.SIG_IGN)\nwhile True: tick()",
+        "no answer",
+    ),
+    "stops itself": ("os.kill(os.getpid(), signal.SIGSTOP)", "no answer"),
+    "floods standard error": ("while True: os.write(2, b'e' * 65536)", " 0.5 s"),
+}
+CRASHED = {
+    "crashes": ("os.kill(os.getpid(), 11)", "instead of answering: it used memory that is not its"),
     "aborts with words": (
         "sys.stderr.write('one\\ntwo\\nthree\\n\\x1b[31massert x > 0\\n'); os.abort()",
-        "crashed",
         r"aborted, .*Its last words on standard error: two / three / \[31massert x > 0$",
     ),
-    "ends": ("os._exit(3)", "crashed", "It ended instead of answering: exit code 3."),
-    "ends well": ("sys.exit()", "crashed", "It ended instead of answering: exit code 0."),
-    "raises": ("{}['offsets']", "crashed", "exit code 1. Its last words .* KeyError: 'offsets'"),
+    "ends": ("os._exit(3)", "It ended instead of answering: exit code 3."),
+    "raises": ("{}['offsets']", "exit code 1. Its last words .* KeyError: 'offsets'"),
     "a signal without a story": (
         "signal.signal(signal.SIGUSR1, signal.SIG_DFL); os.kill(os.getpid(), signal.SIGUSR1)",
-        "crashed",
         "ended by signal SIGUSR1",
     ),
     "half a line": (
         'sys.stdout.write(\'{"id": 2, "posi\'); sys.stdout.flush(); os._exit(0)',
-        "crashed",
         r'ended in the middle of a line \({"id": 2, "posi\): exit code 0',
-    ),
-    "prints garbage without end": (
-        "while True: print('garbage')",
-        "garbage",
-        "printed more than 100 lines that are no answers, for example: garbage",
-    ),
-    "prints bytes": (
-        "sys.stdout.buffer.write(b'\\xff\\x00\\xfe\\n'); sys.stdout.flush()\nwhile True: tick()",
-        "hung",
-        "Before it had printed lines that are no answers",
-    ),
-    "a gigabyte without an end of line": (
-        "while True: os.write(1, b'x' * 65536)",
-        "garbage",
-        "more than 1048576 bytes without an end of line, beginning with: xxx",
-    ),
-    "the wrong id": (
-        "request['id'] += 7; right(request)",
-        "garbage",
-        "answered request 2 with the id 9",
-    ),
-    "no id": ("say(positions=[])", "garbage", "answered request 2 without an id"),
-    "true as id": ("say(id=True)", "garbage", "with the id True"),
-    "a list as id": ("say(id=[1])", "garbage", r"with the id \[1\]"),
-    "broken JSON": ("print('{\"id\": 2, positions}', flush=True)", "garbage", "a broken line: exp"),
-    "lists in lists": ("print('{\"id\":' + '[' * 10**6, flush=True)", "garbage", "nested too deep"),
-    "the wrong shape": (
-        "say(id=request['id'], positions=[[1, 2, 3]])",
-        "garbage",
-        r"positions: expected shape \(3, 3\), got \(1, 3\)",
-    ),
-    "texts": ("say(id=request['id'], positions=[['1'] * 3] * 3)", "garbage", "expected numbers"),
-    "huge integers": ("say(id=2, positions=[[10**400] * 3] * 3)", "garbage", "expected numbers"),
-    "longer integers": (
-        "print('{\"id\": 2, \"a\": ' + '9' * 10**5 + '}', flush=True)",
-        "garbage",
-        "expected JSON",
-    ),
-    "a format instead of an error": (
-        "say(id=2, error='{0.__class__} {why} %s <b>')",
-        "refused",
-        r"cannot: {0.__class__} {why} %s <b>$",
-    ),
-    "closes its input": (
-        "os.close(0)\nright(request)\nwhile True: tick()",
-        "hung",
-        "closed its standard input",
     ),
     "closes its output": (
         "os.close(1)\nwhile True: tick()",
-        "crashed",
         "closed its standard output, but runs on",
     ),
-    "closes all and sleeps": (
-        "os.closerange(0, 99)\nwhile True: tick()",
-        "crashed",
-        "closed its standard output, but runs on",
-    ),
-    "allocates without end": (
-        "kept = []\nwhile True: kept.append(b'x' * (8 << 20)); tick()",
-        "memory",
-        "took more than 0.262 GB of memory",
-    ),
-    "lets a child allocate": (
-        "kept = []\nif os.fork() == 0:\n"
-        "    while True: kept.append(b'x' * (8 << 20)); tick()\nwhile True: tick()",
-        "memory",
-        "took more than 0.262 GB",
-    ),
-    "forks and ends": (FORK.format(before="pass") + "os._exit(4)", "crashed", "exit code 4"),
-    "leaves its output to a child and ends": (
+    "closes all": ("os.closerange(0, 99)\nwhile True: tick()", "its standard output, but runs on"),
+    "leaves its output to a child": (
         "if os.fork() == 0:\n    while True: tick()\nos._exit(4)",
-        "crashed",
         "ended instead of answering: exit code 4",
     ),
-    "forks into another session and ends": (
-        FORK.format(before="os.setsid()") + "os._exit(4)",
-        "crashed",
-        "exit code 4",
-    ),
-    "forks twice into another session and hangs": (
-        FORK.format(before="os.setsid(); os.fork() and os._exit(0)") + "while True: tick()",
-        "hung",
-        "no answer",
-    ),
+    "forks into another session": (FORK.format(before="os.setsid()") + "os._exit(4)", "code 4"),
     "forks and ends, on and on": (
         "end = time.time() + 5\nwhile time.time() < end:\n    if os.fork(): os._exit(0)",
-        "crashed",
         "exit code 0",
     ),
-    "forks and forks": (
-        "for _ in range(4): os.fork()\nwhile True: tick()",
-        "hung",
-        "no answer",
-    ),
-    "ignores all signals": (
-        "for one in (1, 2, 3, 13, 15): signal.signal(one, signal.SIG_IGN)\nwhile True: tick()",
-        "hung",
-        "no answer",
-    ),
-    "stops itself": ("os.kill(os.getpid(), signal.SIGSTOP)", "hung", "no answer"),
-    "floods standard error": ("while True: os.write(2, b'e' * 65536)", "hung", " 0.5 s"),
     "fills standard error": (
         "for _ in range(20): os.write(2, b'e' * 65536)\nsys.exit(5)",
-        "crashed",
         r"exit code 5. Its last words on standard error: e{197}\.\.\.$",
     ),
+}
+GARBAGE = {
+    "prints garbage without end": (
+        "while True: print('garbage')",
+        "printed more than 100 lines that are no answers, for example: garbage",
+    ),
+    "a gigabyte without an end of line": (
+        "while True: os.write(1, b'x' * 65536)",
+        "more than 1048576 bytes without an end of line, beginning with: xxx",
+    ),
+    "the wrong id": ("request['id'] += 7; right(request)", "answered request 2 with the id 9"),
+    "no id": ("say(positions=[])", "answered request 2 without an id"),
+    "true as id": ("say(id=True)", "with the id True"),
+    "a list as id": ("say(id=[1])", r"with the id \[1\]"),
+    "broken JSON": ("print('{\"id\": 2, positions}', flush=True)", "a broken line: exp"),
+    "the wrong shape": (
+        "say(id=request['id'], positions=[[1, 2, 3]])",
+        r"positions: expected shape \(3, 3\), got \(1, 3\)",
+    ),
+}
+HOSTILE = {
+    **{name: (*case, "hung") for name, case in HUNG.items()},
+    **{name: (*case, "crashed") for name, case in CRASHED.items()},
+    **{name: (*case, "garbage") for name, case in GARBAGE.items()},
+    "a format instead of an error": (
+        "say(id=2, error='{0.__class__} {why} %s <b>')",
+        r"cannot: {0.__class__} {why} %s <b>$",
+        "refused",
+    ),
+    "allocates without end": (ALLOCATE, "took more than 0.262 GB of memory", "memory"),
+    "lets a child allocate": (f"os.fork()\n{ALLOCATE}", "took more than 0.262 GB", "memory"),
 }
 
 
 def ask(folder, name):
     """What a program answers before, when and after it misbehaves, and what still runs then."""
-    misbehave, kind, _ = HOSTILE[name]
+    misbehave, _, kind = HOSTILE[name]
     patience = LIMITS.request if kind == "hung" else LIMITS.first
     contestant = program(folder, misbehave, LIMITS._replace(request=patience))
     try:
@@ -211,7 +167,7 @@ def outcomes(request, tmp_path_factory):
 def test_each_has_its_sentence_and_the_next_case_works(outcomes, name):
     folder, future = outcomes[ask, name]
     before, failure, after, contestant = future.result()
-    _, kind, words = HOSTILE[name]
+    _, words, kind = HOSTILE[name]
     assert isinstance(before, Answer)
     assert isinstance(failure, Failure)
     assert re.search(words, str(failure.sentence)), str(failure.sentence)
@@ -255,25 +211,42 @@ def test_what_does_not_greet_is_a_misuse_with_its_sentence(outcomes, name):
     assert not running(folder)
 
 
-def test_a_large_request_that_is_not_read_blocks_nothing(tmp_path):
-    contestant = program(tmp_path, "while True: tick()")
-    contestant.answer(case(2))
-    contestant._ready().send(b'{"id": 1, "parents": [1, 2, 3]}\n' + b" " * (4 << 20))
-    start = time.monotonic()
-    failure = contestant.answer(case(3))
-    assert failure.kind is FailureKind.HUNG
-    assert "did not read the whole request" in str(failure.sentence)
-    assert time.monotonic() - start < 3.0
-    contestant.close()
+@pytest.fixture
+def start(tmp_path):
+    """Start a program in this test's folder; it leaves nothing running when the test is done."""
+    contestants = []
+
+    def begin(misbehave, **options):
+        contestants.append(program(tmp_path, misbehave, **options))
+        return contestants[-1]
+
+    yield begin
+    for contestant in contestants:
+        contestant.close()
     assert not running(tmp_path)
 
 
-def test_large_requests_and_answers_pass(tmp_path):
-    contestant = program(tmp_path, "pass", LIMITS._replace(request=20.0, line=1 << 24))
-    big = case(20_000)
+def test_a_large_request_that_is_not_read_blocks_nothing(start):
+    contestant = start("while True: tick()")
+    contestant.answer(case(2))
+    contestant._ready().send(b'{"id": 1, "parents": [1, 2, 3]}\n' + b" " * (4 << 20))
+    failure = contestant.answer(case(3))
+    assert failure.kind is FailureKind.HUNG
+    assert "did not read the whole request" in str(failure.sentence)
+
+
+def test_large_requests_and_answers_pass(start):
+    contestant = start("pass", limits=LIMITS._replace(request=20.0, line=1 << 24))
     assert isinstance(contestant.answer(case(2)), Answer)
-    assert contestant.answer(big).values["positions"].shape == (20_000, 3)
-    contestant.close()
+    assert contestant.answer(case(20_000)).values["positions"].shape == (20_000, 3)
+
+
+def finally_do(what):
+    """The usual loop, and what the program does once its input has ended."""
+    return f"try:{LOOP}".replace("\n", "\n    ") + f"\nfinally:\n    {what}"
+
+
+LEAVES_A_CHILD = f"if os.fork() == 0:\n    while True: tick()\n{LOOP}"
 
 
 @pytest.mark.parametrize(
@@ -281,26 +254,15 @@ def test_large_requests_and_answers_pass(tmp_path):
     [
         (LOOP, None),
         (LOOP.replace("read()\n", "read()\n    print('joint 1')\n", 1), None),
-        (LOOP + "\n", None),
-        (f"try:{LOOP}".replace("\n", "\n    ") + "\nfinally:\n    os._exit(7)", "exit code 7"),
-        (
-            f"try:{LOOP}".replace("\n", "\n    ") + "\nfinally:\n    os.abort()",
-            "it did not just leave: it aborted",
-        ),
-        (
-            f"try:{LOOP}".replace("\n", "\n    ") + "\nfinally:\n    while True: tick()",
-            "does not leave when its input ends",
-        ),
-        (
-            f"os.setsid if os.fork() else 0\nif os.getppid() != {os.getpid()}:\n"
-            f"    while True: tick()\n{LOOP}",
-            r"left processes running that it had started \(1\)",
-        ),
+        (finally_do("os._exit(7)"), "exit code 7"),
+        (finally_do("os.abort()"), "it did not just leave: it aborted"),
+        (finally_do("while True: tick()"), "does not leave when its input ends"),
+        (LEAVES_A_CHILD, r"left processes running that it had started \(1\)"),
     ],
-    ids=["leaves", "prints", "leaves again", "code", "aborts", "stays", "leaves a child"],
+    ids=["leaves", "prints", "code", "aborts", "stays", "leaves a child"],
 )
-def test_how_it_leaves_is_remarked(tmp_path, loop, remark):
-    contestant = program(tmp_path, "pass", loop=loop, limits=LIMITS._replace(leave=3.0))
+def test_how_it_leaves_is_remarked(tmp_path, start, loop, remark):
+    contestant = start("pass", loop=loop, limits=LIMITS._replace(leave=3.0))
     if remark and "does not" in remark:
         contestant._limits = LIMITS
     assert isinstance(contestant.answer(case(2)), Answer)
@@ -309,49 +271,43 @@ def test_how_it_leaves_is_remarked(tmp_path, loop, remark):
     assert all(re.search(remark, str(one)) for one in contestant.remarks)
     assert not running(tmp_path)
     assert isinstance(contestant.answer(case(2)), Answer)  # a closed one starts anew
-    contestant.close()
-    assert not running(tmp_path)
 
 
-PRINTS = {
-    "a line": "print('joint 1'); right(request)",
-    "lines": "print('joint 1\\n[1, 2]\\n\\n3'); right(request)",
-    "on the answer's line": "print('joint 1', end=' '); right(request)",
-    "bytes": "sys.stdout.buffer.write(b'joint 1 \\xff\\x00\\n'); right(request)",
-}
-
-
-@pytest.mark.parametrize("name", PRINTS)
-def test_prints_are_a_remark_on_the_answer(tmp_path, name):
-    contestant = program(tmp_path, PRINTS[name])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "print('joint 1')",
+        "print('joint 1\\n[1, 2]\\n\\n3')",
+        "print('joint 1', end=' ')",  # on the answer's line
+        "sys.stdout.buffer.write(b'joint 1 \\xff\\x00\\n')",
+    ],
+)
+def test_prints_are_a_remark_on_the_answer(start, words):
+    contestant = start(f"{words}; right(request)")
     answers = [contestant.answer(case(joints)) for joints in (2, 3, 2)]
-    contestant.close()
     first, told, last = ([str(one) for one in answer.remarks] for answer in answers)
     assert (first, last) == ([], [])
     assert len(told) == 1
     assert "It prints to its standard output, for example: joint 1" in told[0]
 
 
-def test_blank_lines_and_a_byte_order_mark_are_no_prints(tmp_path):
-    contestant = program(tmp_path, "print('\\n\\r\\n\\ufeff', end=''); right(request)")
+def test_blank_lines_and_a_byte_order_mark_are_no_prints(start):
+    contestant = start("print('\\n\\r\\n\\ufeff', end=''); right(request)")
     assert contestant.answer(case(3)).remarks == ()
-    contestant.close()
 
 
-def test_the_first_request_of_a_task_may_compile(tmp_path):
-    contestant = program(tmp_path, "time.sleep(0.8); right(request)", LIMITS._replace(request=0.4))
+def test_the_first_request_of_a_task_may_compile(start):
+    contestant = start("time.sleep(0.8); right(request)", limits=LIMITS._replace(request=0.4))
     assert isinstance(contestant.answer(case(3)), Answer)
     assert contestant.answer(case(3)).kind is FailureKind.HUNG
     assert isinstance(contestant.answer(case(3)), Answer)
-    contestant.close()
 
 
-def test_a_late_answer_is_not_taken_for_the_next_one(tmp_path):
-    contestant = program(tmp_path, "time.sleep(1.0); right(request)")
+def test_a_late_answer_is_not_taken_for_the_next_one(start):
+    contestant = start("time.sleep(1.0); right(request)")
     contestant.answer(case(2))
     assert contestant.answer(case(3)).kind is FailureKind.HUNG
     assert contestant.answer(case(2)).values["positions"][0, 0] == 1.0  # of a process anew
-    contestant.close()
 
 
 @pytest.mark.parametrize(
@@ -385,11 +341,11 @@ def test_a_contestant_without_a_command_is_a_misuse():
         ProgramContestant([])
 
 
-def test_a_program_that_dies_kills_nobody_by_a_broken_pipe(tmp_path):
+def test_a_program_that_dies_kills_nobody_by_a_broken_pipe(start):
     """Even where SIGPIPE has its default, which ends a process."""
     default = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     try:
-        contestant = program(tmp_path, "os.close(0); right(request); os._exit(0)")
+        contestant = start("os.close(0); right(request); os._exit(0)")
         contestant.answer(case(3))
         time.sleep(0.2)
         assert contestant.answer(case(3)).kind is FailureKind.CRASHED
@@ -397,11 +353,11 @@ def test_a_program_that_dies_kills_nobody_by_a_broken_pipe(tmp_path):
         signal.signal(signal.SIGPIPE, default)
 
 
-def test_an_answer_counts_though_the_program_ends_right_after_it(tmp_path, monkeypatch):
+def test_an_answer_counts_though_the_program_ends_right_after_it(start, monkeypatch):
     """It is read by the look that finds the program ended, before the end of its output is."""
-    contestant = program(tmp_path, "right(request); os._exit(0)")
+    contestant = start("right(request); os._exit(0)")
     assert contestant.greeting
-    ended = LineProcess._has_ended
+    ended = ChildProcess._has_ended
 
     def wait(process):
         deadline = time.monotonic() + 5.0
@@ -409,27 +365,25 @@ def test_an_answer_counts_though_the_program_ends_right_after_it(tmp_path, monke
             time.sleep(0.01)
         return ended(process)
 
-    exchange = LineProcess._exchange
-    monkeypatch.setattr(line_process, "TICK", 0.0)
-    monkeypatch.setattr(LineProcess, "_has_ended", wait)
+    exchange = ChildProcess._exchange
+    monkeypatch.setattr(child_process, "TICK", 0.0)
+    monkeypatch.setattr(ChildProcess, "_has_ended", wait)
     process = contestant._ready()
     send = process.send
     monkeypatch.setattr(process, "send", lambda line: (send(line), exchange(process, 1.0)))
     answer = contestant.answer(case(3))
     assert isinstance(answer, Answer), str(answer.sentence)
     monkeypatch.undo()
-    contestant.close()
 
 
-def test_an_answer_too_many_is_told_at_the_next_case(tmp_path):
-    contestant = program(tmp_path, "right(request); right(request)")
+def test_an_answer_too_many_is_told_at_the_next_case(start):
+    contestant = start("right(request); right(request)")
     assert isinstance(contestant.answer(case(3)), Answer)
     assert "answered request 2 with the id 1" in str(contestant.answer(case(2)).sentence)
     assert isinstance(contestant.answer(case(2)), Answer)
-    contestant.close()
 
 
-def test_the_rest_of_the_cases_goes_on(tmp_path, monkeypatch):
+def test_the_rest_of_the_cases_goes_on(start, monkeypatch):
     judged = []
 
     class Discipline:
@@ -443,15 +397,13 @@ def test_the_rest_of_the_cases_goes_on(tmp_path, monkeypatch):
             return TaskReport("forward_kinematics", "", (), Diagnosis())
 
     monkeypatch.setitem(DISCIPLINES, "forward_kinematics", Discipline)
-    stays = f"try:{LOOP}".replace("\n", "\n    ") + "\nfinally:\n    while True: tick()"
-    contestant = program(tmp_path, "os.abort()", loop=stays)
+    contestant = start("os.abort()", loop=finally_do("while True: tick()"))
     verify(contestant, ["forward_kinematics"])
     contestant.close()
     kinds = [type(question.answer) for question in judged]
     assert kinds == [Answer, Failure, Answer, Failure, Answer]
     assert [type(question.again) for question in judged] == kinds
     assert [str(one) for one in contestant.remarks] == ["It does not leave when its input ends."]
-    assert not running(tmp_path)
 
 
 def test_a_contestant_that_is_dropped_leaves_nothing(tmp_path):

@@ -5,96 +5,64 @@ import itertools
 import conformance_students as students
 import numpy as np
 import pytest
+from kinematics_solvers import (
+    METHODS,
+    RESAMPLE,
+    TRACK,
+    broken,
+    case_of,
+    judged,
+    named,
+    reference,
+    textbook,
+)
 
-from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.functions import FunctionContestant
-from plumbob.crosscheck.verify.greeting import Greeting
 from plumbob.crosscheck.verify.judgement import Verdict
-from plumbob.crosscheck.verify.kinematics import laws, resample_faults
-from plumbob.crosscheck.verify.kinematics.faults import FAULTS, switches
+from plumbob.crosscheck.verify.kinematics import resample_faults
+from plumbob.crosscheck.verify.kinematics.faults import FAULTS, by_key
 from plumbob.crosscheck.verify.kinematics.polylines import Line, even_by_count, even_by_spacing
-from plumbob.crosscheck.verify.kinematics.predictions import predict_track
-from plumbob.crosscheck.verify.verify import verify
-from plumbob.reference import IK_SOLVERS, Skeleton, resample, track
+from plumbob.reference import IK_SOLVERS, resample
 
-METHODS = ("ccd", "fabrik")
 FOLLOW = [fault for fault in FAULTS["track ccd"] if fault.part == "follow"]
-
-
-def judged(task, function, method="", **greeting):
-    said = Greeting(1, (task,), methods=(method,), **greeting)
-    return verify(FunctionContestant({task: function}, said)).tasks[0]
-
-
-def broken(report, least=Verdict.WRONG):
-    return {
-        finding.law
-        for told in report.judgements
-        for finding in told.findings
-        if finding.verdict >= least
-    }
-
-
-def follower(method, faults):
-    def function(**inputs):
-        found = predict_track(method, switches(faults), Case("", "", inputs, "", laws.HOLDS))
-        return {name: found[name] for name in ("local_rotations", "positions") if name in found}
-
-    return function
-
-
-def by_reference(solver):
-    def function(parents, offsets, local_rotations, curve, effector, tolerance, max_iterations):
-        found = track(
-            Skeleton(parents, offsets), curve, solver, start=local_rotations, effector=effector,
-            tolerance=tolerance, max_iterations=max_iterations,
-        )  # fmt: skip
-        return {"local_rotations": found.local_rotations, "positions": found.positions}
-
-    return function
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("fault", FOLLOW, ids=lambda fault: fault.key)
 def test_fault_of_tracking_is_caught_and_named(method, fault):
-    report = judged("track", follower(method, [fault]), method)
+    report = judged(TRACK, textbook(TRACK, [fault], method), method)
     rest = method == "fabrik" and fault.key == "frames start at rest"
     expected = Verdict.RIGHT_BUT if fault.honest or rest else Verdict.WRONG
     assert report.verdict is expected
-    assert report.diagnosis.explanations[0].faults == (fault.key,)
+    assert named(report)[0] == {fault.key}
 
 
 @pytest.mark.parametrize("key", ["world rotation on the left", "offset not rotated"])
 def test_fault_of_the_solver_is_named_in_tracking(key):
-    fault = next(one for one in FAULTS["ccd"] if one.key == key)
-    report = judged("track", follower("ccd", [fault]), "ccd")
+    report = judged(TRACK, textbook(TRACK, [by_key("ccd")[key]]), "ccd")
     if report.verdict is not Verdict.RIGHT:
-        assert report.diagnosis.explanations[0].faults == (key,)
+        assert named(report)[0] == {key}
 
 
 @pytest.mark.parametrize("solver", IK_SOLVERS)
 def test_reference_tracks_rightly(solver):
-    report = judged("track", by_reference(solver), solver)
+    report = judged(TRACK, reference(TRACK, solver), solver)
     assert report.verdict <= Verdict.RIGHT_BUT
     assert not report.diagnosis.explanations
 
 
 def test_jump_is_told():
-    def function(**inputs):
-        found = predict_track("fabrik", switches(()), Case("", "", inputs, "", laws.HOLDS))
-        positions = np.array(found["positions"])
-        return {"positions": positions}
+    follow = textbook(TRACK, (), "fabrik")
 
     def jumping(**inputs):
-        positions = function(**inputs)["positions"]
+        positions = follow(**inputs)["positions"]
         root, x = positions[4, 0], positions[4]
         axis = inputs["curve"][4] - root
         axis = axis / np.linalg.norm(axis)
         positions[4] = root + 2.0 * np.outer((x - root) @ axis, axis) - (x - root)
         return {"positions": positions}
 
-    assert "continuity" not in broken(judged("track", function), Verdict.RIGHT_BUT)
-    assert "continuity" in broken(judged("track", jumping), Verdict.RIGHT_BUT)
+    assert "continuity" not in broken(judged(TRACK, follow), Verdict.RIGHT_BUT)
+    assert "continuity" in broken(judged(TRACK, jumping), Verdict.RIGHT_BUT)
 
 
 def resampler(make):
@@ -102,16 +70,16 @@ def resampler(make):
         inputs = {"curve": curve, "strokes": strokes, "closed": closed}
         inputs |= {"count": count} if count is not None else {"spacing": spacing}
         line = Line(curve, tuple(int(i) for i in strokes), closed)
-        return make(Case("", "", inputs, "", laws.HOLDS, facts={"line": line}))
+        return make(case_of(RESAMPLE, inputs, line=line))
 
     return function
 
 
 @pytest.mark.parametrize("key", resample_faults.FAULTS)
 def test_fault_of_resampling_is_caught_and_named(key):
-    report = judged("resample", resampler(resample_faults.FAULTS[key][0]))
+    report = judged(RESAMPLE, resampler(resample_faults.FAULTS[key][0]))
     assert report.verdict is Verdict.WRONG
-    assert report.diagnosis.explanations[0].faults == (key,)
+    assert named(report)[0] == {key}
 
 
 def bridged(case):
@@ -157,14 +125,14 @@ def keeping_ends(case):
 
 @pytest.mark.parametrize("make", [bridged, kept, by_reference_spacing, keeping_ends])
 def test_honest_rule_is_not_accused(make):
-    report = judged("resample", resampler(make))
+    report = judged(RESAMPLE, resampler(make))
     assert report.verdict <= Verdict.RIGHT_BUT
     assert make is not bridged or report.verdict is Verdict.RIGHT
 
 
 @pytest.mark.parametrize(("make", "word"), [(bridged, "bridges"), (kept, "keeps")])
 def test_strokes_are_told(make, word):
-    assert word in str(judged("resample", resampler(make)).diagnosis.behaviour)
+    assert word in str(judged(RESAMPLE, resampler(make)).diagnosis.behaviour)
 
 
 LIES = {
@@ -179,7 +147,7 @@ LIES = {
 
 @pytest.mark.parametrize("law", LIES)
 def test_law_of_resampling_sees_the_lie(law):
-    report = judged("resample", resampler(lambda case: LIES[law](bridged(case))))
+    report = judged(RESAMPLE, resampler(lambda case: LIES[law](bridged(case))))
     assert law in broken(report)
 
 
@@ -187,7 +155,7 @@ def test_single_precision_is_not_accused():
     def single(case):
         return bridged(case).astype(np.float32)
 
-    assert judged("resample", resampler(single), precision="single").verdict is Verdict.RIGHT
+    assert judged(RESAMPLE, resampler(single), precision="single").verdict is Verdict.RIGHT
 
 
 @pytest.mark.slow
@@ -201,4 +169,4 @@ def test_student_follows_curves():
             found.append(local)
         return {"local_rotations": np.array(found)}
 
-    assert judged("track", function, "ccd").verdict is Verdict.RIGHT
+    assert judged(TRACK, function, "ccd").verdict is Verdict.RIGHT

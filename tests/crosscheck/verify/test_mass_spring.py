@@ -15,7 +15,6 @@ from mass_spring_solvers import (
     DECLARED,
     LINEARISED,
     LOCAL_GLOBAL,
-    SYMPLECTIC,
     Stepper,
     named,
     report,
@@ -46,17 +45,9 @@ from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
 
 EVERYTHING = System(external_forces=True, tension_only=True)
 BY_KEY = {one.key: one for one in reversed(STEP_FAULTS)}
-# A fault that a model cannot have, or has under another name.
-ON_SUBSTEPS = ("h not divided", "pins free until the end", "velocity over the whole h")
-ON_LOCAL_GLOBAL = ("pins at the origin",)
-ON_SYMPLECTIC = ("moved in place",)
-SOME = ("gravity g/m", "factor kept", "pins free", "damping as drag")
-
-
-def base_of(key):
-    if key in ON_SUBSTEPS or key in ON_SYMPLECTIC:
-        return DECLARED["symplectic"]
-    return DECLARED["local/global" if key in ON_LOCAL_GLOBAL else "linearised"]
+# Faults that a linearised step cannot have, or has under another name.
+NOT_LINEARISED = ("h not divided", "pins free until the end", "velocity over the whole h",
+                  "pins at the origin", "moved in place")  # fmt: skip
 
 
 def mark(values, some):
@@ -76,58 +67,42 @@ def broken_laws(found):
     }
 
 
-def ours(name):
-    """Return a step of the reference by a function of the system, the state and h."""
-
-    def step(system, state, h):
-        return _REFERENCE[name](system, state, h)
-
-    return step
+def assert_not_accused(found):
+    assert found.verdict <= Verdict.RIGHT_BUT, broken_laws(found)
+    assert found.diagnosis.explanations == ()
 
 
 def _solver(name, **options):
     return lambda s, state, h: ImplicitEuler(s, h=h, solver=name, **options).step(state).state
 
 
-_REFERENCE = {
-    "converged": _solver("newton", tolerance=0.0),
-    "local_global": _solver("local_global", tolerance=0.0, max_iterations=3),
-    "newton": _solver("newton", tolerance=0.0, max_iterations=2),
-    "gauss_newton": _solver("gauss_newton", tolerance=0.0, max_iterations=1),
-    "symplectic": symplectic_euler,
-    "runge_kutta": runge_kutta,
-}
-_DENSE = {
-    "converged": CONVERGED,
-    "local_global": Model(Integrator("local_global", "y", 3)),
-    "newton": Model(Integrator("newton", "y", 2)),
-    "gauss_newton": Model(Integrator("newton", "x_n", 1, "gauss")),
-    "symplectic": Model(Integrator("symplectic"), 1, "explicit", velocity="separate"),
-    "runge_kutta": Model(Integrator("runge_kutta"), 1, "explicit", velocity="separate"),
-}
+# A step of the reference, and the dense model that is the same.
+STEPS = {
+    "converged": (_solver("newton", tolerance=0.0), CONVERGED),
+    "local_global": (_solver("local_global", tolerance=0.0, max_iterations=3),
+                     Model(Integrator("local_global", "y", 3))),
+    "newton": (_solver("newton", tolerance=0.0, max_iterations=2),
+               Model(Integrator("newton", "y", 2))),
+    "gauss_newton": (_solver("gauss_newton", tolerance=0.0, max_iterations=1),
+                     Model(Integrator("newton", "x_n", 1, "gauss"))),
+    "symplectic": (symplectic_euler,
+                   Model(Integrator("symplectic"), 1, "explicit", velocity="separate")),
+    "runge_kutta": (runge_kutta,
+                    Model(Integrator("runge_kutta"), 1, "explicit", velocity="separate")),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", _DENSE)
+@pytest.mark.parametrize("name", STEPS)
 def test_the_dense_step_is_the_reference_s(name):
     for case in task_cases("mass_spring_step", Greeting(1, ("mass_spring_step",)), 0, False):
         if case.family == "compression" or case.name == "stiff cloth":
             continue  # there Newton's safeguards act, which nobody declares
-        p = problem_of(case.inputs)
-        found, wanted = simulate(p, _DENSE[name]), ours(name)(system_of(p), state_of(p), p.h)
+        p, (step, model) = problem_of(case.inputs), STEPS[name]
+        found, wanted = simulate(p, model), step(system_of(p), state_of(p), p.h)
         moved = np.abs(wanted.positions - p.positions).max()
         np.testing.assert_allclose(
             found["positions"], wanted.positions, rtol=0, atol=1e-13 + 1e-9 * moved
         )
-
-
-@pytest.mark.parametrize("key", mark(BY_KEY, SOME))
-def test_every_fault_of_a_step_is_caught_and_named(key):
-    model, declared = base_of(key)
-    found = report(Stepper(model, [BY_KEY[key]]), step=declared, system=EVERYTHING)
-    assert found.verdict >= Verdict.WRONG
-    assert broken_laws(found) - {"remarks"}
-    assert key in named(found)
-    assert found.smallest_failure is not None
 
 
 PAIRS = [
@@ -135,9 +110,8 @@ PAIRS = [
     for i, first in enumerate(BY_KEY)
     for second in [list(BY_KEY)[(7 * i + 13) % len(BY_KEY)]]
     if BY_KEY[first].aspect != BY_KEY[second].aspect
-    and not {first, second} & {*ON_SUBSTEPS, *ON_LOCAL_GLOBAL, *ON_SYMPLECTIC, "springs missing",
-                               "factor kept", "matrix L", "matrix L without h²",
-                               "tension only ignored"}
+    and not {first, second} & {*NOT_LINEARISED, "springs missing", "factor kept", "matrix L",
+                               "matrix L without h²", "tension only ignored"}
     and not any(BY_KEY[one].aspect == "integrator" for one in (first, second))
 ]  # fmt: skip
 
@@ -157,17 +131,8 @@ def test_three_faults_at_once_are_named():
     assert {frozenset(one.split(" + ")) for one in named(found)} == {frozenset(three)}
 
 
+# Besides those of the self-test.
 HONEST = {
-    "linearised": (LINEARISED, DECLARED["linearised"][1], "double"),
-    "converged": (CONVERGED, DECLARED["converged"][1], "double"),
-    "local/global": (LOCAL_GLOBAL, DECLARED["local/global"][1], "double"),
-    "symplectic": (SYMPLECTIC, DECLARED["symplectic"][1], "double"),
-    "linearised, single": (LINEARISED, DECLARED["linearised"][1], "single"),
-    "converged, single": (CONVERGED, DECLARED["converged"][1], "single"),
-    "symplectic, single": (SYMPLECTIC, DECLARED["symplectic"][1], "single"),
-    "linearised, undeclared": (LINEARISED, Step(), "double"),
-    "converged, undeclared": (CONVERGED, Step(), "single"),
-    "local/global, undeclared": (LOCAL_GLOBAL, Step(), "double"),
     "explicit, undeclared": (
         Model(Integrator("explicit"), 100, "explicit", velocity="separate"), Step(), "double",
     ),
@@ -176,9 +141,7 @@ HONEST = {
         Step("local_global", "y", 10, 1, "length_rate", None, "overwritten"), "double",
     ),
     "overwritten pins, undeclared": (LINEARISED._replace(pins="overwritten"), Step(), "double"),
-    "penalty": (LINEARISED._replace(pins="penalty 1e10"), Step(pins="penalty"), "double"),
     "penalty, undeclared": (LINEARISED._replace(pins="penalty 1e10"), Step(), "double"),
-    "heavy pins": (LINEARISED._replace(pins="heavy 1e8"), Step(pins="heavy"), "double"),
     "end velocity": (CONVERGED._replace(damper="end_velocity"), Step("converged"), "double"),
     "no damping": (CONVERGED._replace(damper="none"), Step("converged", damper="none"), "double"),
     "global factor": (
@@ -193,13 +156,11 @@ HONEST = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", mark(HONEST, ("linearised, undeclared", "symplectic, single")))
+@pytest.mark.parametrize("name", mark(HONEST, ("overwritten pins, undeclared", "global factor")))
 def test_an_honest_step_is_not_accused(name):
     model, declared, precision = HONEST[name]
     kind = np.float32 if precision == "single" else np.float64
-    found = report(Stepper(model, (), kind), step=declared, precision=precision)
-    assert found.verdict <= Verdict.RIGHT_BUT, broken_laws(found)
-    assert found.diagnosis.explanations == ()
+    assert_not_accused(report(Stepper(model, (), kind), step=declared, precision=precision))
 
 
 @pytest.mark.slow
@@ -213,22 +174,12 @@ def test_the_reference_s_solvers_are_converged(name):
         state = euler.step(state_of(p)).state
         return {"positions": state.positions, "velocities": state.velocities}
 
-    found = report(step, step=Step("converged", damper="length_rate", pins="eliminated"))
-    assert found.verdict <= Verdict.RIGHT_BUT, broken_laws(found)
-    assert found.diagnosis.explanations == ()
-
-
-MUJOCO = {
-    "Euler": Step("symplectic"),
-    "discrete": Step("linearised"),
-    "implicitfast": Step(),
-    "implicit": Step(),
-    "RK4": Step(),
-}
+    declared = Step("converged", damper="length_rate", pins="eliminated")
+    assert_not_accused(report(step, step=declared))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("integrator", MUJOCO)
+@pytest.mark.parametrize("integrator", ["implicitfast", "implicit", "RK4"])
 def test_mujoco_is_not_accused(integrator):
     def step(**inputs):
         p = problem_of(inputs)
@@ -236,9 +187,7 @@ def test_mujoco_is_not_accused(integrator):
         state = engine.step(state_of(p))
         return {"positions": state.positions, "velocities": state.velocities}
 
-    found = report(step, step=MUJOCO[integrator])
-    assert found.verdict <= Verdict.RIGHT_BUT, broken_laws(found)
-    assert found.diagnosis.explanations == ()
+    assert_not_accused(report(step))
 
 
 @pytest.mark.slow
@@ -378,14 +327,14 @@ def test_noise_is_named():
     rng = np.random.default_rng(3)
     right = Stepper(LINEARISED)
 
-    def step(masses, springs, rest_lengths, stiffnesses, dampings, pinned, gravity, positions,
-             velocities, h):  # fmt: skip
-        found = right(masses=masses, springs=springs, rest_lengths=rest_lengths, h=h,
-                      stiffnesses=stiffnesses, dampings=dampings, pinned=pinned, gravity=gravity,
-                      positions=positions, velocities=velocities)  # fmt: skip
-        found["positions"] = found["positions"] + 7e-4 * rng.standard_normal(positions.shape)
+    def step(**inputs):
+        found = right(**inputs)
+        found["positions"] = found["positions"] + 7e-4 * rng.standard_normal(
+            found["positions"].shape
+        )
         return found
 
+    step.__signature__ = right.__signature__
     found = report(step, step=DECLARED["linearised"][1])
     assert "equal requests" in broken_laws(found)
     assert any("-fsanitize" in str(one) for one in found.diagnosis.hints)
@@ -463,14 +412,6 @@ def force_function(faults, precision=np.float64):
 NO_FORCES = ("tension only ignored",)
 LAST_ONLY = "last spring of a particle only"
 FORCES = {one.key: one for one in FORCE_FAULTS if one.key not in NO_FORCES}
-
-
-@pytest.mark.parametrize("key", mark(FORCES, ("gravity g/m", "damping not projected", LAST_ONLY)))
-def test_every_fault_of_forces_is_caught_and_named(key):
-    found = report(force_function([FORCES[key]]), "mass_spring_forces")
-    assert found.verdict is Verdict.WRONG
-    assert "force formula" in broken_laws(found)
-    assert key in named(found)
 
 
 def test_forces_that_numpy_does_not_add_up_are_named():

@@ -12,7 +12,7 @@ from plumbob.crosscheck.verify.contestant import Answer, Asked
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.mass_spring import laws
 from plumbob.crosscheck.verify.mass_spring.laws import IMPRECISE, Context
-from plumbob.crosscheck.verify.mass_spring.model import Integrator, Model
+from plumbob.crosscheck.verify.mass_spring.model import Integrator, Model, predicted
 from plumbob.crosscheck.verify.mass_spring.problem import problem_of
 from plumbob.crosscheck.verify.mass_spring.rounding import ROUNDINGS, SOLVED, rounding
 from plumbob.crosscheck.verify.sentence import sentence
@@ -43,14 +43,14 @@ def triangle(pinned=()):
 
 def judged(law, p, model=LINEARISED, declares_pins=True, known=True, **changes):
     """Return what a law finds of the model's own step with some outputs changed by an array."""
-    expected = laws.predicted(p, model)
+    expected = predicted(p, model)
     answered = {name: value + changes.get(name, 0.0) for name, value in expected.items()}
     allowed = rounding(p, model, EPSILON)
     return law(Context(p, answered, allowed, model, known, sentence(""), expected, declares_pins))
 
 
 def displacement(p, model=LINEARISED):
-    return float(np.abs(laws.predicted(p, model)["positions"] - p.positions).max())
+    return float(np.abs(predicted(p, model)["positions"] - p.positions).max())
 
 
 def one_moved(particle, distance, axis=2):
@@ -100,7 +100,7 @@ def test_a_pin_that_nothing_is_said_of_may_move_by_what_is_imprecise(share, verd
 
 def test_a_penalty_s_pin_may_move_as_far_as_the_penalty_lets_it():
     p, model = triangle([0]), LINEARISED._replace(pins="penalty 1e6")
-    yields = np.abs(laws.predicted(p, model)["positions"] - p.positions)[0].max()
+    yields = np.abs(predicted(p, model)["positions"] - p.positions)[0].max()
     assert yields > 1e3 * rounding(p, model, EPSILON).positions
     for axis, share, verdict in (
         (2, 0.0, RIGHT_BUT),
@@ -130,7 +130,7 @@ def test_positions_that_are_imprecise_are_right_with_a_reservation(share, verdic
 @pytest.mark.parametrize(("share", "verdict"), GRADES)
 def test_velocities_that_are_imprecise_are_right_with_a_reservation(share, verdict):
     p = triangle()
-    gap = share * np.abs(laws.predicted(p, LINEARISED)["velocities"]).max()
+    gap = share * np.abs(predicted(p, LINEARISED)["velocities"]).max()
     found = judged(laws.velocities, p, velocities=one_moved(2, gap))
     assert (found.law, found.verdict) == ("velocities", verdict)
 
@@ -206,7 +206,7 @@ def test_a_converged_step_is_the_minimiser_and_another_says_so(share, verdict):
 def test_the_acceleration_of_a_small_step_is_the_force_over_the_mass(share, verdict):
     """To a tenth of the largest; the step itself is off by h omega, a thousandth here."""
     p = triangle([0]).changed(h=1e-4)
-    scale = np.abs((laws.predicted(p, LINEARISED)["velocities"] - p.velocities) / p.h)[1:].max()
+    scale = np.abs((predicted(p, LINEARISED)["velocities"] - p.velocities) / p.h)[1:].max()
     change = one_moved(1, share * scale * p.h)
     found = judged(laws.consistency, p, velocities=change)
     assert (found.law, found.verdict) == ("consistency", verdict)
@@ -226,7 +226,7 @@ def test_equal_requests_have_equal_answers_to_what_is_allowed(name, share, verdi
     allowed = {"positions": 1e-12, "velocities": 1e-9}
     first = {key: np.ones((3, 3)) for key in allowed}
     second = first | {name: first[name] + one_moved(1, share * allowed[name])}
-    found = laws.equal_requests(asked(first, second), tuple(allowed), allowed)
+    found = laws.equal_requests(asked(first, second), allowed)
     assert found.verdict is verdict
     assert found.tolerance == allowed[name]
 
@@ -247,9 +247,8 @@ def test_an_answer_turns_with_the_world_and_the_numbering(rng, name, share, verd
         turned[key] = np.empty((3, 3))
         turned[key][order] = [turn @ v + (shift if key == "positions" else 0.0) for v in values]
     turned[name] = turned[name] + one_moved(1, share * allowed[name])
-    found = laws.symmetry(
-        asked(turned, matrix=turn, shift=shift, order=order), Answer(base, 0.0), allowed
-    )
+    changed = asked(turned, of="", matrix=turn, shift=shift, order=order)
+    found = laws.symmetry(changed, [asked(base)], allowed)
     assert found.verdict is verdict
     assert found.error == pytest.approx(share, rel=1e-5)
 

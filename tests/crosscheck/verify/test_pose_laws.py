@@ -22,7 +22,6 @@ PATH = np.array([0, 1, 2, 4])
 SIZE, REACH = 3.0, 2.5
 # The angle below which helpers drop a rotation [rad].
 DEAD = {"double": 1e-6, "single": 5e-4}
-EDGES = [(0.5, True), (2.0, False)]
 
 
 @pytest.fixture
@@ -40,29 +39,17 @@ def case(rng):
         "tolerance": 1e-4,
         "max_iterations": 10,
     }
-    facts = {
-        "start": start,
-        "path": PATH,
-        "size": SIZE,
-        "reach": REACH,
-        "least": 0.0,
-        "before": 1.0,
-    }
-    return Case("", "inverse_kinematics", inputs, "", sentence(""), facts=facts)
+    facts = {"path": PATH, "size": SIZE, "reach": REACH, "least": 0.0, "before": 1.0}
+    return Case("", "inverse_kinematics", inputs, "", sentence(""), facts=facts | {"x": start})
 
 
 def findings(case, precision="double", **changes):
     """Return the findings, by their laws, of the pose at the start with its outputs changed."""
-    answer = {"local_rotations": case.inputs["local_rotations"], "positions": case.facts["start"]}
+    answer = {"local_rotations": case.inputs["local_rotations"], "positions": case.facts["x"]}
     answer = {name: value + changes.get(name, 0.0) for name, value in answer.items()}
     posed = pose_laws.understood(answer, case.inputs, case.facts)
     greeting = Greeting(1, ("inverse_kinematics",), precision=precision)
     return {one.law: one for one in pose_laws.all_of(posed, case, greeting)}
-
-
-def rounded(precision):
-    """Return what rounding moves a joint by: 16 epsilons of the size for each of five joints."""
-    return 5 * 16.0 * EPSILON[precision] * SIZE
 
 
 def moved(joint, change):
@@ -71,86 +58,92 @@ def moved(joint, change):
     return array
 
 
+def along_the_link(case, bound):
+    link = case.facts["x"][4] - case.facts["x"][2]
+    return {"positions": moved(4, SIZE * bound * link / np.linalg.norm(link))}
+
+
+def round_its_parent(case, bound):
+    """Child 3 goes round joint 1, as far as twice what rounds one end of a distance."""
+    x = case.facts["x"]
+    link, gap = x[3] - x[1], x[3] - x[2]
+    aside = gap - (gap @ link) / (link @ link) * link  # at right angles to the link
+    slope = np.linalg.norm(aside) / np.linalg.norm(gap)
+    return {"positions": moved(3, 2.0 * SIZE * bound * aside / slope / np.linalg.norm(aside))}
+
+
+def stretched(case, bound):
+    return {"local_rotations": moved_row(2, bound * case.inputs["local_rotations"][2])}
+
+
+def moved_row(joint, change):
+    array = np.zeros((5, 4))
+    array[joint] = change
+    return array
+
+
+def rotated(joint):
+    def change(case, bound):
+        old = case.inputs["local_rotations"][joint]
+        new = rotation.multiply(old, rotation.exponential([0.0, bound, 0.0]))
+        return {"local_rotations": moved_row(joint, new - old)}
+
+    return change
+
+
+# A law, the joint that it names, what follows beyond its bound, and a change of an answer by so
+# many times 16 epsilons for each of five joints, of the size where it is of positions.
+CHANGES = {
+    "root": ("root in place", 0, WRONG,
+             lambda case, bound: {"positions": np.full((5, 3), [0.0, SIZE * bound, 0.0])}),
+    "link": ("link lengths", 4, WRONG, along_the_link),
+    "branch": ("branches", 3, WRONG, round_its_parent),
+    "quaternion": ("unit quaternions", 2, RIGHT_BUT, stretched),
+    "joint off the path": ("joints off the path", 3, WRONG, rotated(3)),
+    "effector": ("joints off the path", 4, RIGHT_BUT, rotated(4)),  # which brings it nowhere
+}  # fmt: skip
+
+
 def test_a_pose_of_its_own_rotations_keeps_every_law(case):
     assert {one.verdict for one in findings(case).values()} == {RIGHT}
 
 
 @pytest.mark.parametrize("precision", EPSILON)
-@pytest.mark.parametrize(("share", "holds"), EDGES)
-def test_the_root_stays_to_rounding(case, precision, share, holds):
-    shift = np.full((5, 3), [0.0, share * rounded(precision), 0.0])  # of all joints
-    found = findings(case, precision, positions=shift)
-    assert found["root in place"].verdict is (RIGHT if holds else WRONG)
-    assert found["link lengths"].verdict is found["branches"].verdict is RIGHT
-
-
-@pytest.mark.parametrize("precision", EPSILON)
-@pytest.mark.parametrize(("share", "holds"), EDGES)
-def test_links_keep_their_lengths_to_rounding(case, precision, share, holds):
-    x = case.facts["start"]
-    along = (x[4] - x[2]) / np.linalg.norm(x[4] - x[2])
-    found = findings(case, precision, positions=moved(4, share * rounded(precision) * along))
-    assert found["link lengths"].verdict is (RIGHT if holds else WRONG)
-    assert found["link lengths"].where == 4
-    assert found["root in place"].verdict is found["branches"].verdict is RIGHT
-
-
-@pytest.mark.parametrize("precision", EPSILON)
-@pytest.mark.parametrize(("share", "holds"), EDGES)
-def test_children_of_a_joint_keep_their_distance_to_rounding(case, precision, share, holds):
-    """Child 3 goes round joint 1, as far as twice what rounds one end of a distance."""
-    x = case.facts["start"]
-    link, apart = x[3] - x[1], x[3] - x[2]
-    aside = apart - (apart @ link) / (link @ link) * link  # at right angles to the link
-    slope = np.linalg.norm(aside) / np.linalg.norm(apart)
-    aside *= share * 2.0 * rounded(precision) / slope / np.linalg.norm(aside)
-    found = findings(case, precision, positions=moved(3, aside))
-    assert found["branches"].verdict is (RIGHT if holds else WRONG)
-    assert found["branches"].where == 3
-    assert found["link lengths"].verdict is RIGHT
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_law_is_kept_to_rounding(case, name, precision):
+    law, where, verdict, change = CHANGES[name]
+    for share, expected in ((0.5, RIGHT), (2.0, verdict)):
+        found = findings(case, precision, **change(case, share * 5 * 16.0 * EPSILON[precision]))
+        assert found[law].verdict is expected
+        assert found[law].where == where
+        others = {"root in place", "link lengths", "branches", "unit quaternions"} - {law}
+        assert {found[other].verdict for other in others} == {RIGHT}
 
 
 @pytest.mark.parametrize("precision", EPSILON)
 @pytest.mark.parametrize(
-    ("gap", "verdict"),
-    [
-        (lambda precision: 1.0 * rounded(precision), RIGHT),
-        (lambda precision: 4.0 * rounded(precision), RIGHT_BUT),
-        (lambda precision: 2.0 * DEAD[precision] * REACH, RIGHT_BUT),
-        (lambda precision: 8.0 * DEAD[precision] * REACH, WRONG),
-    ],
+    ("roundings", "dead_angles", "verdict"),
+    [(1.0, 0.0, RIGHT), (4.0, 0.0, RIGHT_BUT), (0.0, 2.0, RIGHT_BUT), (0.0, 8.0, WRONG)],
 )
-def test_positions_are_where_the_rotations_put_them_to_rounding(case, precision, gap, verdict):
+def test_positions_are_where_the_rotations_put_them_to_rounding(
+    case, precision, roundings, dead_angles, verdict
+):
     """Or to four rotations that a helper rounds to the identity: one for every inner joint."""
-    found = findings(case, precision, positions=moved(4, [0.0, 0.0, gap(precision)]))
+    gap = roundings * 5 * 16.0 * EPSILON[precision] * SIZE + dead_angles * DEAD[precision] * REACH
+    found = findings(case, precision, positions=moved(4, [0.0, 0.0, gap]))
     assert found["rotations agree with positions"].verdict is verdict
     assert found["rotations agree with positions"].where == 4
 
 
-@pytest.mark.parametrize("precision", EPSILON)
-@pytest.mark.parametrize(("share", "holds"), EDGES)
-def test_quaternions_are_of_unit_length_to_rounding(case, precision, share, holds):
-    stretch = share * 5 * 16.0 * EPSILON[precision]
-    changes = stretch * case.inputs["local_rotations"]
-    changes[[0, 1, 3, 4]] = 0.0
-    found = findings(case, precision, local_rotations=changes)
-    assert found["unit quaternions"].verdict is (RIGHT if holds else RIGHT_BUT)
-    assert found["unit quaternions"].where == 2
-
-
-@pytest.mark.parametrize("precision", EPSILON)
-@pytest.mark.parametrize(("share", "holds"), EDGES)
-@pytest.mark.parametrize(("joint", "verdict"), [(3, WRONG), (4, RIGHT_BUT)])
-def test_joints_off_the_path_are_left_as_they_were(case, precision, joint, verdict, share, holds):
-    """The effector's own rotation brings it nowhere, which is a remark."""
-    angle = share * 5 * 16.0 * EPSILON[precision]
-    old = case.inputs["local_rotations"]
-    new = old.copy()
-    new[joint] = rotation.multiply(old[joint], rotation.exponential([0.0, angle, 0.0]))
-    found = findings(case, precision, local_rotations=new - old)
-    assert found["joints off the path"].verdict is (RIGHT if holds else verdict)
-    assert found["joints off the path"].error == pytest.approx(angle, rel=0.1)
-    assert found["joints off the path"].where == joint
+def test_what_lacks_numbers_is_judged_where_it_has_some(case):
+    """A rotation that does not move the path may lack; without one that does nothing is placed."""
+    for joint, placed in ((3, True), (1, False)):
+        local = case.inputs["local_rotations"].copy()
+        local[joint] = np.nan
+        posed = pose_laws.understood({"local_rotations": local}, case.inputs, case.facts)
+        assert posed.finite is placed
+        (found,) = pose_laws.all_of(posed, case, GREETING)
+        assert (found.law, found.verdict, found.where) == ("numbers", Verdict.BROKEN, joint)
 
 
 # ---- targets and claims

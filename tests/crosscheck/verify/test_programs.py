@@ -1,7 +1,5 @@
 """Programs written apart from the reference answer as it does; what is planted in them shows."""
 
-import itertools
-
 import numpy as np
 import planted_programs
 import pytest
@@ -16,10 +14,6 @@ LANGUAGES = ("cpp", "javascript", "python", "single")
 # 6e-8 on results of size 10: the forces are sums of products of about 100.
 TOLERANCE = {"cpp": 1e-12, "javascript": 1e-12, "python": 1e-12, "single": 1e-4}
 IK_METHODS = ("ccd", "fabrik")
-
-
-def asked(task):
-    return [one for one in REQUESTS if one["task"] == task]
 
 
 def close(a, b, tolerance):
@@ -38,17 +32,9 @@ def skeleton(request):
 
 def system(request):
     names = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "gravity")
-    given = {name: np.array(request[name]) for name in names}
-    made = reference.MassSpring(
-        given["masses"],
-        given["springs"],
-        rest_lengths=given["rest_lengths"],
-        stiffnesses=given["stiffnesses"],
-        dampings=given["dampings"],
-        pinned=request.get("pinned", []),
-        gravity=given["gravity"],
-    )
-    return made, reference.State(np.array(request["positions"]), np.array(request["velocities"]))
+    parts = {name: np.array(request[name]) for name in names}
+    model = reference.MassSpring(**parts, pinned=request.get("pinned", []))
+    return model, reference.State(np.array(request["positions"]), np.array(request["velocities"]))
 
 
 @pytest.fixture(params=LANGUAGES)
@@ -204,24 +190,17 @@ def unlike(one, other):
 
 
 PLANTED = [(language, fault) for language in IN for fault in IN[language]]
-# The compiled program starts at once; of those that an interpreter runs, every sixth.
-QUICK = [pair for pair, n in zip(PLANTED, itertools.count()) if pair[0] == "cpp" or n % 6 == 0]
+# The compiled program starts at once; of those that an interpreter runs, every sixth is quick.
+CHOSEN = [
+    pytest.param(*pair, marks=[] if pair[0] == "cpp" or n % 6 == 0 else [pytest.mark.slow])
+    for n, pair in enumerate(PLANTED)
+]
 
 
-def assert_shows(language, fault, program, right_answers):
+@pytest.mark.parametrize(("language", "fault"), CHOSEN)
+def test_a_planted_fault_changes_its_tasks_answers(language, fault, program, right_answers):
     answers, _ = planted_programs.ask([*program(language), "--fault", fault], REQUESTS)
     assert FAULTS[fault].task in unlike(right_answers(language), answers)
-
-
-@pytest.mark.parametrize(("language", "fault"), QUICK)
-def test_a_planted_fault_changes_its_tasks_answers(language, fault, program, right_answers):
-    assert_shows(language, fault, program, right_answers)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("language", "fault"), sorted(set(PLANTED) - set(QUICK)))
-def test_every_planted_fault_changes_its_tasks_answers(language, fault, program, right_answers):
-    assert_shows(language, fault, program, right_answers)
 
 
 def test_each_program_has_twenty_faults_and_each_fault_a_program():

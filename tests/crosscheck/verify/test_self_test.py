@@ -3,7 +3,7 @@
 import pytest
 
 from plumbob.crosscheck.verify.judgement import Verdict
-from plumbob.crosscheck.verify.output.self_test import lines
+from plumbob.crosscheck.verify.output.listings import self_test as lines
 from plumbob.crosscheck.verify.self_test import HONEST, Trial, attempt, subjects
 
 SUBJECTS = list(subjects())

@@ -62,30 +62,25 @@ def spring():
     )
 
 
-def test_rounding_of_a_force_is_that_of_its_terms(spring):
-    """Eight epsilons of k (|x| + r) + c |v| + m g: 300, 6 and 10 N."""
+def test_rounding_of_a_force_and_of_an_energy_is_that_of_their_terms(spring):
+    """Eight epsilons of k (|x| + r) + c |v| + m g: 300, 6 and 10 N; and sixteen of
+    k (|x| + r) (|l| + r), m v² and m |x| g of each: 900, 9 and 20 J.
+    """
     assert forces.tolerance(spring, EPSILON) == pytest.approx(8 * EPSILON * 316.0)
-
-
-def test_rounding_of_an_energy_is_that_of_its_terms(spring):
-    """Sixteen epsilons of k (|x| + r) (|l| + r), m v² and m |x| g of each: 900, 9 and 20 J."""
     assert energy.tolerance(spring, EPSILON) == pytest.approx(16 * EPSILON * 929.0)
 
 
 @pytest.mark.parametrize(("share", "verdict"), EDGES)
-def test_a_force_is_that_of_the_formula_to_rounding(spring, share, verdict):
+def test_forces_are_those_of_the_formula_and_add_up_to_the_weight_to_rounding(
+    spring, share, verdict
+):
+    """The sum to twice the rounding of one, times the root of the number of particles."""
     expected, allowed = all_forces(spring), forces.tolerance(spring, EPSILON)
     given = expected.copy()
     given[1, 2] += share * allowed
     found = forces._formula(spring, given, expected, allowed)
     assert (found.verdict, found.where) == (verdict, 1)
-
-
-@pytest.mark.parametrize(("share", "verdict"), EDGES)
-def test_forces_add_up_to_the_weight_to_rounding(spring, share, verdict):
-    """Twice the rounding of one, times the root of the number of particles."""
-    allowed = forces.tolerance(spring, EPSILON)
-    given = all_forces(spring)
+    given = expected.copy()
     given[:, 1] += share * allowed * np.sqrt(2.0)
     assert forces._balance(spring, given, allowed).verdict is verdict
 
@@ -126,22 +121,17 @@ ON_LINE = 16 * EPSILON * (3 * 3.0 + 5.0)
 
 
 @pytest.mark.parametrize(("share", "verdict"), EDGES)
-@pytest.mark.parametrize(("end", "back"), [(0, [1.0, 0, 0]), (-1, [0, -1.0, 0])])
-def test_both_ends_are_kept_to_rounding(segments, end, back, share, verdict):
+@pytest.mark.parametrize(
+    ("law", "point", "direction"),
+    [("ends", 0, [1, 0, 0]), ("ends", -1, [0, -1, 0])]
+    + [("on the line", point, [0, 0, 1]) for point in (2, 8)],
+)
+def test_points_and_ends_are_kept_to_rounding(segments, law, point, direction, share, verdict):
     case, points = segments
-    points[end] += share * ON_LINE * np.array(back)
+    points[point] += share * ON_LINE * np.array(direction)
     found = by_law(resample.point_laws(points, case, GREETING))
-    assert found["ends"].verdict is verdict
-    assert found["on the line"].verdict is RIGHT
-
-
-@pytest.mark.parametrize(("share", "verdict"), EDGES)
-@pytest.mark.parametrize("point", [2, 8])
-def test_points_are_on_the_line_to_rounding(segments, point, share, verdict):
-    case, points = segments
-    points[point, 2] += share * ON_LINE
-    found = by_law(resample.point_laws(points, case, GREETING))
-    assert found["on the line"].verdict is verdict
+    assert found[law].verdict is verdict
+    assert {found[other].verdict for other in {"ends", "on the line"} - {law}} == {RIGHT}
 
 
 @pytest.mark.parametrize(("share", "verdict"), [(0.015, RIGHT), (0.025, WRONG)])
@@ -226,7 +216,7 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
     """Sixteen epsilons of the largest limit, 2.4 rad."""
     q = robot.inputs["start"].copy()
     q[3] = robot.inputs[side][3] + sign * share * 16 * EPSILON * 2.4
-    found = robot_inverse_kinematics._limits(q, robot, ROBOTS)
+    (found, *_) = robot_inverse_kinematics._findings(robot, ROBOTS, {"q": q})
     assert (found.law, found.verdict, found.where) == ("limits kept", verdict, 3)
 
 
@@ -247,12 +237,11 @@ def test_a_claim_is_about_the_position_and_the_rotation(distance, angle, claim, 
 
 
 def test_a_target_s_quaternion_may_have_either_sign(robot):
-    pose = robot_models.tool_pose(robot.inputs, robot.inputs["start"])
     for sign in (1.0, -1.0):
         inputs = {**robot.inputs, "target_rotation": sign * robot.inputs["target_rotation"]}
-        distance, angle = robot_models.apart(pose, inputs)
-        assert distance <= 1e-12
-        assert angle <= 1e-12
+        found = robot_models.judgement_of(inputs, robot.inputs["start"])
+        assert found.distance <= 1e-12
+        assert found.angle <= 1e-12
 
 
 # ---- what is said of a task
@@ -315,8 +304,5 @@ def test_a_fault_is_told_only_if_it_explains_more_than_no_fault_does():
     assert _telling([right, as_good, better]) == [better]
     whole = match(1.0, "c")
     assert _telling([right, as_good, better, whole]) == [whole]
-    assert _telling([replace_share(right, 1.0), whole]) == [replace_share(right, 1.0), whole]
-
-
-def replace_share(match, share):
-    return match._replace(share=share)
+    perfect = right._replace(share=1.0)
+    assert _telling([perfect, whole]) == [perfect, whole]

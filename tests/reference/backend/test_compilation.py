@@ -2,9 +2,9 @@
 
 import gc
 
+import numba
 import numpy as np
 import pytest
-from numba.core.compiler import Flags
 from numba.core.errors import TypingError
 
 from plumbob.reference import IK_SOLVERS
@@ -108,10 +108,19 @@ def test_what_several_callees_call_is_linked_once():
     assert sorted(len(list(one.get_defined_functions())) for one in callees) == [1, 1]
 
 
-def test_kernels_with_equal_options_share_them():
-    """Numba looks implementations up by them."""
-    one, other = (compiled.compile_kernel(fresh(plain))._compiler for plain in (once, twice))
-    assert one._customize_flags(Flags()) is other._customize_flags(Flags())
+def test_this_numba_is_of_a_series_that_the_linker_is_tested_with():
+    """After an update of numba: run all tests of the backend, and raise `linking.NEWEST`."""
+    assert linking.OLDEST == (0, 61)  # the lowest that pyproject.toml allows
+    assert linking.is_supported()
+
+
+@pytest.mark.parametrize("version", ["0.60.3", "0.99.0", "1.2.0rc1"])
+def test_another_numba_compiles_as_ever(version, monkeypatch):
+    monkeypatch.setattr(numba, "__version__", version)
+    kernel = fresh(polynomial)
+    assert compiled.compile_kernel(kernel)(2.0) == polynomial(2.0)
+    (result, *_) = callee_of(kernel).overloads.values()
+    assert not isinstance(result.library, linking.LinkedLibrary)
 
 
 @pytest.mark.parametrize(("large", "inlined"), [(10**6, True), (0, False)])

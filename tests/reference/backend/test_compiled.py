@@ -2,6 +2,7 @@ import math
 import subprocess
 import sys
 import textwrap
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -66,36 +67,31 @@ def test_only_a_name_that_the_kernel_calls_can_be_bound():
         compiled.bind(total, sphere=cube)
 
 
-operation = compiled.Slot("operation")
+class Operations(NamedTuple):
+    """Kernels that another one calls."""
+
+    first: Any
+    second: Any
 
 
-def applied(x):
-    return operation(x)
+operations = Operations(square, cube)
+
+
+def applied(calls, x):
+    return calls.first(x) + 10.0 * calls.second(x)
 
 
 def applied_to_all(x):
     result = 0.0
     for i in range(len(x)):
-        result += applied(x[i])
+        result += applied(operations, x[i])
     return result
 
 
-def test_a_slot_is_filled_in_all_that_a_kernel_calls(backend):
-    cubes = compiled.Kernel(compiled.bind(applied_to_all, operation=cube))
-    assert cubes(np.arange(3.0)) == 1 + 8
-
-
-def test_slots_are_filled_with_one_kernel_and_with_another(backend):
-    cubes = compiled.Kernel(compiled.bind(applied_to_all, operation=cube))
-    squares = compiled.Kernel(compiled.bind(applied_to_all, operation=square))
-    assert (cubes(np.arange(3.0)), squares(np.arange(3.0))) == (9.0, 15.0)
-
-
-def test_an_empty_slot_is_refused():
-    with pytest.raises(ValueError, match="operation: expected a kernel bound to this slot"):
-        applied(1.0)
-    with pytest.raises(ValueError, match="operation: expected a kernel bound to this slot"):
-        compiled.compile_kernel(applied)
+def test_kernels_in_a_tuple_are_called_by_their_names(backend):
+    both = compiled.Kernel(applied_to_all)
+    swapped = compiled.Kernel(compiled.bind(applied_to_all, operations=Operations(cube, square)))
+    assert (both(np.arange(3.0)), swapped(np.arange(3.0))) == (105.0, 159.0)
 
 
 def test_a_closure_is_refused():
@@ -152,8 +148,9 @@ def weighed(x):
         (plus_default, plus_other_default),
         (at_sine, at_cosine),
         (weighed, compiled.bind(weighed, WEIGHTS=OTHER_WEIGHTS)),
+        (applied_to_all, compiled.bind(applied_to_all, operations=Operations(square, square))),
     ],
-    ids=["constant", "operation", "default", "attribute", "array"],
+    ids=["constant", "operation", "default", "attribute", "array", "tuple"],
 )
 def test_kernels_that_differ_in_one_ingredient_have_other_digests(one, other):
     assert compiled.digest(one) != compiled.digest(other)

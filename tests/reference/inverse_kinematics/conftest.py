@@ -13,8 +13,6 @@ from plumbob.reference import (
     forward_kinematics,
     rotation,
 )
-from plumbob.reference.inverse_kinematics.box_step import new_task_system
-from plumbob.reference.inverse_kinematics.fabrik import new_fabrik_workspace
 from plumbob.reference.inverse_kinematics.mechanism import (
     TARGET,
     gather,
@@ -22,6 +20,7 @@ from plumbob.reference.inverse_kinematics.mechanism import (
     update_forward_kinematics,
 )
 from plumbob.reference.inverse_kinematics.reduce import prepare
+from plumbob.reference.inverse_kinematics.solve_mechanism import new_workspace
 
 
 @pytest.fixture(params=IK_SOLVERS)
@@ -108,14 +107,6 @@ class Machine(NamedTuple):
     workspace: Any
 
 
-class Workspace(NamedTuple):
-    """The arrays of every solver."""
-
-    system: Any
-    backward: Any
-    eigen: Any
-
-
 def machine_of(model, q, targets):
     """Return the mechanism that moves some effectors, placed, and a workspace for every solver."""
     oriented = tuple(target.rotation is not None for target in targets)
@@ -126,10 +117,7 @@ def machine_of(model, q, targets):
     data = new_data(mechanism)
     gather(mechanism, np.array(q), data.q)
     update_forward_kinematics(mechanism, data)
-    workspace = Workspace(
-        new_task_system(mechanism), new_fabrik_workspace(mechanism).backward, np.empty((2, 4, 4))
-    )
-    return Machine(mechanism, target_rows, data, workspace)
+    return Machine(mechanism, target_rows, data, new_workspace(mechanism))
 
 
 @pytest.fixture(scope="session")

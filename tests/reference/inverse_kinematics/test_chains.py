@@ -24,10 +24,6 @@ from plumbob.reference.inverse_kinematics.chain import BEND, bend, new_chain, po
 ROUNDING = 1e-14
 
 
-# Towards a target out of reach, plain damped least squares and the transpose may swing for ever.
-SETTLING = ("ccd", "fabrik", "levenberg_marquardt")
-
-
 @pytest.fixture
 def target(rng, skeleton):
     """Return a point that the last joint reaches in some pose."""
@@ -38,32 +34,29 @@ def target(rng, skeleton):
 # ---- what every solver promises
 
 
-def test_a_reachable_target_is_reached(skeleton, local, target, solver, backend):
-    solution = solve_ik(skeleton, local, target, solver, max_iterations=500)
-    assert solution.outcome is Outcome.CONVERGED
-    assert solution.residual <= 1e-4
-    assert solution.iterations > 0
-
-
-def test_the_residual_is_the_distance_by_forward_kinematics(
-    skeleton, local, target, solver, backend
+@pytest.mark.parametrize("iterations", [0, 2, 500])
+def test_the_answer_is_forward_kinematics_of_its_rotations(
+    skeleton, local, target, solver, iterations, backend
 ):
-    solution = solve_ik(skeleton, local, target, solver, max_iterations=2)
+    before = local.copy(), target.copy()
+    solution = solve_ik(skeleton, local, target, solver, max_iterations=iterations)
+    positions = solution.positions
     pose = forward_kinematics(skeleton, solution.local_rotations)
-    np.testing.assert_allclose(solution.positions, pose.positions, rtol=0, atol=ROUNDING)
-    distance = np.linalg.norm(pose.positions[-1] - target)
-    assert solution.residual == pytest.approx(distance, abs=ROUNDING)
-
-
-def test_links_keep_their_lengths(skeleton, local, target, solver, backend):
-    positions = solve_ik(skeleton, local, target, solver).positions
+    np.testing.assert_allclose(positions, pose.positions, rtol=0, atol=ROUNDING)
+    x, y, z = positions[-1] - target
+    assert solution.residual == pytest.approx(np.sqrt(x * x + y * y + z * z), rel=1e-15, abs=0)
     links = np.linalg.norm(positions[1:] - positions[skeleton.parents[1:]], axis=-1)
     np.testing.assert_allclose(links, skeleton.link_lengths[1:], rtol=ROUNDING)
-
-
-def test_the_root_stays(skeleton, local, target, solver, backend):
-    solution = solve_ik(skeleton, local, target, solver)
-    assert (solution.positions[0] == skeleton.offsets[0]).all()
+    assert (positions[0] == skeleton.offsets[0]).all()
+    if iterations == 0:
+        np.testing.assert_allclose(solution.local_rotations, local, rtol=0, atol=ROUNDING)
+    if iterations == 500:
+        assert solution.outcome is Outcome.CONVERGED
+        assert solution.residual <= 1e-4
+    assert (local == before[0]).all()
+    assert (target == before[1]).all()
+    with pytest.raises(ValueError, match="read-only"):
+        solution.local_rotations[0] = 0.0
 
 
 def test_joints_off_the_path_and_the_effector_keep_their_local_rotations(
@@ -129,39 +122,14 @@ def test_a_target_already_reached_takes_no_iteration(skeleton, local, solver, ba
     solution = solve_ik(skeleton, local, tip, solver)
     assert (solution.iterations, solution.outcome) == (0, Outcome.CONVERGED)
     np.testing.assert_allclose(solution.local_rotations, local, rtol=0, atol=ROUNDING)
+    arm, rest = scenes.lab_arm()
+    tip = forward_kinematics(arm, rest).positions[-1]
+    assert solve_ik(arm, rest, tip, solver, tolerance=0.0).iterations == 0
 
 
 def test_all_iterations_used_is_said(skeleton, local, target, solver, backend):
     solution = solve_ik(skeleton, local, target, solver, tolerance=0.0, max_iterations=1)
     assert (solution.iterations, solution.outcome) == (1, Outcome.ITERATION_LIMIT)
-
-
-def test_no_iterations_are_allowed_to_be_asked_for(skeleton, local, target, solver, backend):
-    solution = solve_ik(skeleton, local, target, solver, max_iterations=0)
-    np.testing.assert_allclose(solution.local_rotations, local, rtol=0, atol=ROUNDING)
-
-
-def test_the_inputs_are_unchanged_and_the_answer_read_only(
-    skeleton, local, target, solver, backend
-):
-    before = local.copy(), target.copy()
-    solution = solve_ik(skeleton, local, target, solver)
-    assert (local == before[0]).all()
-    assert (target == before[1]).all()
-    with pytest.raises(ValueError, match="read-only"):
-        solution.local_rotations[0] = 0.0
-
-
-def test_the_residual_is_exactly_that_of_the_positions(skeleton, local, target, solver, backend):
-    solution = solve_ik(skeleton, local, target, solver)
-    x, y, z = solution.positions[-1] - target
-    assert solution.residual == pytest.approx(np.sqrt(x * x + y * y + z * z), rel=1e-15, abs=0)
-
-
-def test_an_effector_exactly_on_its_target_is_left_there_even_at_tolerance_zero(solver, backend):
-    arm, rest = scenes.lab_arm()
-    tip = forward_kinematics(arm, rest).positions[-1]
-    assert solve_ik(arm, rest, tip, solver, tolerance=0.0).iterations == 0
 
 
 @pytest.mark.parametrize("solver", ["levenberg_marquardt"], indirect=True)
@@ -231,26 +199,6 @@ def test_fabrik_folds_the_chain_back_from_a_target_in_the_hole_at_once(depth, rn
     assert (solution.iterations, solution.outcome) == (1, Outcome.UNREACHABLE)
 
 
-@pytest.mark.parametrize("solver", SETTLING, indirect=True)
-def test_beyond_reach_the_residual_tends_to_the_distance_less_the_reach(solver, backend):
-    arm, rest = scenes.lab_arm()
-    solution = solve_ik(arm, rest, [3.0, 1.7, 4.0], solver, max_iterations=1000)
-    assert solution.outcome is Outcome.UNREACHABLE
-    assert solution.residual == pytest.approx(5.0 - 2.6, abs=2e-4)
-
-
-@pytest.mark.parametrize("solver", SETTLING, indirect=True)
-@pytest.mark.parametrize("depth", [0.0, 0.3, 1.0])
-def test_in_the_hole_of_the_longest_link_the_rim_is_the_nearest(solver, depth, backend):
-    """Links of 3, 0.5 and 0.5 leave an inner radius of 2 about the root."""
-    claw = Skeleton([-1, 0, 1, 2], [[0, 0, 0], [0.5, 0, 0], [0, 3.0, 0], [0, 0, 0.5]])
-    target = np.array([0.0, 0.0, 2.0 * (1.0 - depth)])
-    solution = solve_ik(claw, rotation.identity(4), target, solver, max_iterations=3000)
-    assert solution.residual == pytest.approx(2.0 * depth, abs=2e-3)
-    if depth:
-        assert solution.outcome is Outcome.UNREACHABLE
-
-
 def test_the_root_itself_as_effector_cannot_move(skeleton, local, solver, backend):
     off = skeleton.offsets[0] + [0.0, 3.0, 4.0]
     solution = solve_ik(skeleton, local, off, solver, effector=0)
@@ -288,17 +236,21 @@ def test_a_straight_chain_is_bent_in_one_plane_however_its_joints_are_twisted(rn
     np.testing.assert_allclose(normals, normals[[0] * 4], rtol=0, atol=ROUNDING)
 
 
-def test_a_straight_chain_of_two_links_is_freed_too(solver, backend):
-    chain, rest = scenes.ball_chain(links=2)
-    solution = solve_ik(chain, rest, [0.1, 0.0, 0.0], solver)  # at the middle joint
-    assert solution.outcome is Outcome.CONVERGED
+ODD_CHAINS = {
+    "two links, at the middle joint": ([[1, 0, 0], [1, 0, 0]], [1, 0, 0], Outcome.CONVERGED),
+    "links of no length": (
+        [[0, 0, 0], [1, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 0]], [0.5, 0.9, 0], Outcome.CONVERGED,
+    ),
+    "a point": ([[0, 0, 0]], [1, 0, 0], Outcome.UNREACHABLE),
+}  # fmt: skip
 
 
-def test_two_equal_links_fold_onto_the_root(backend):
-    chain, rest = scenes.ball_chain(links=2)
-    solution = solve_ik(chain, rest, [0.0, 0.0, 0.0], "fabrik")
-    assert solution.outcome is Outcome.CONVERGED
-    assert solution.residual <= ROUNDING
+@pytest.mark.parametrize("name", ODD_CHAINS)
+def test_odd_chains_are_answered(name, solver, backend):
+    links, target, outcome = ODD_CHAINS[name]
+    chain = Skeleton(range(-1, len(links)), [[0, 0, 0], *links])
+    solution = solve_ik(chain, rotation.identity(len(links) + 1), target, solver)
+    assert solution.outcome is outcome
 
 
 @pytest.mark.parametrize("target", [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -316,19 +268,6 @@ def test_a_straight_chain_rotates_to_a_target_behind_it(solver, backend):
         solution = solve_ik(chain, rest, [-distance, 0.0, 0.0], solver, max_iterations=1000)
         assert solution.outcome is outcome
         assert solution.residual < distance
-
-
-def test_links_of_no_length_do_no_harm(solver, backend):
-    offsets = [[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 0], [1, 0, 0], [0, 0, 0]]
-    chain = Skeleton(range(-1, 5), offsets)
-    solution = solve_ik(chain, rotation.identity(6), [0.5, 0.9, 0.0], solver)
-    assert solution.outcome is Outcome.CONVERGED
-
-
-def test_a_skeleton_of_nothing_but_a_point_answers(solver, backend):
-    point = Skeleton([-1, 0], np.zeros((2, 3)))
-    solution = solve_ik(point, rotation.identity(2), [1.0, 0.0, 0.0], solver)
-    assert (solution.residual, solution.outcome) == (1.0, Outcome.UNREACHABLE)
 
 
 @pytest.mark.parametrize("links", [1, 2, 5])
@@ -504,19 +443,6 @@ def test_whatever_comes_in_the_kernel_is_compiled_once(skeleton, local, target, 
     assert len(IK_SOLVERS[solver].chain.compiled.signatures) == 1
 
 
-@pytest.mark.parametrize("excess", [1e-6 - 1e-13, -1e-6 + 1e-13])
-def test_a_start_on_the_edge_of_the_unit_tolerance_is_a_start(
-    skeleton, local, target, solver, excess, backend
-):
-    exact = solve_ik(skeleton, local, target, solver, max_iterations=2)
-    edge = solve_ik(skeleton, local * (1.0 + excess), target, solver, max_iterations=2)
-    np.testing.assert_allclose(edge.positions, exact.positions, rtol=0, atol=1e-13)
-
-
-def test_no_targets_give_no_solutions(skeleton, local, solver, backend):
-    assert solve_ik(skeleton, local, np.empty((0, 3)), solver).residual.shape == (0,)
-
-
 def test_a_target_names_its_effector(skeleton, local, target, solver, backend):
     plain = solve_ik(skeleton, local, target, solver, effector=3)
     for named_target in (Target(target, effector=3), [Target(target, effector="joint3")]):
@@ -527,15 +453,8 @@ def test_a_target_names_its_effector(skeleton, local, target, solver, backend):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"solver": "newton"}, "solver: expected one of ccd, fabrik, .*, got 'newton'"),
-        ({"target": [1.0, 2.0]}, r"target: expected shape \(..., 3\), got \(2,\)"),
         ({"target": [1.0, np.nan, 0.0]}, "target: expected finite numbers, got nan"),
         ({"target": [1e80, 0.0, 0.0]}, "target: expected coordinates of at most"),
-        ({"target": [Target([0, 0, 0])] * 2}, "target: expected one an effector, got two for"),
-        (
-            {"target": Target([0, 0, 0], effector=2), "effector": 3},
-            "effector: expected that of the target, 2, got 3",
-        ),
         ({"target": np.zeros((2, 3))}, "target: expected leading axes that broadcast"),
         ({"effector": "hand"}, "effector: expected one of joint0"),
         ({"effector": 6}, "effector: expected an integer of at least -6 and at most 5, got 6"),
@@ -543,10 +462,6 @@ def test_a_target_names_its_effector(skeleton, local, target, solver, backend):
             {"skeleton": scenes.lab_arm()},
             "skeleton: expected a Skeleton, an Articulation or a Robot, got t",
         ),
-        ({"tolerance": -1.0}, "tolerance: expected a number of at least 0"),
-        ({"tolerance": np.nan}, "tolerance: expected a finite number"),
-        ({"max_iterations": 1.5}, "max_iterations: expected an integer, got 1.5"),
-        ({"max_iterations": -1}, "max_iterations: expected an integer of at least 0"),
         ({"local_rotations": np.zeros((3, 6, 4))}, "local_rotations: expected unit quaternions"),
         ({"local_rotations": np.full((3, 6, 4), np.nan)}, "local_rotations: expected finite"),
         ({"local_rotations": np.ones((5, 4))}, r"local_rotations: expected shape \(..., 6, 4\)"),

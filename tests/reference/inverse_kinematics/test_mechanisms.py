@@ -347,6 +347,8 @@ def test_no_targets_give_no_solutions(many, solver, backend):
     solution = solve_ik(model, starts[0, 0], none, solver)
     assert solution.residual.shape == (0,)
     assert solution.coordinates.shape == (0, model.coordinate_count)
+    chain = Skeleton([-1, 0], np.eye(2, 3))
+    assert solve_ik(chain, rotation.identity(2), np.empty((0, 3)), solver).residual.shape == (0,)
 
 
 # ---- the same world seen otherwise
@@ -509,6 +511,10 @@ def as_arrays(value):
         ({"tolerance_rotation": -1e-3}, "tolerance_rotation: expected a number of at least 0"),
         ({"tolerance_rotation": np.nan}, "tolerance_rotation: expected a finite number"),
         ({"tolerance": [1e-3, 1e-3]}, "tolerance: expected one number"),
+        ({"tolerance": -1.0}, "tolerance: expected a number of at least 0"),
+        ({"tolerance": np.nan}, "tolerance: expected a finite number"),
+        ({"max_iterations": 1.5}, "max_iterations: expected an integer, got 1.5"),
+        ({"max_iterations": -1}, "max_iterations: expected an integer of at least 0"),
         ({"max_iterations": True}, "max_iterations: expected an integer"),
         ({"solver": "lm"}, "solver: expected one of ccd, fabrik, .*, got 'lm'"),
         ({"skeleton": "arm"}, "skeleton: expected a Skeleton, an Articulation or a Robot, got str"),
@@ -537,6 +543,11 @@ def test_lengths_on_the_edge_of_the_unit_tolerance_are_unit(
     target, long = Target(there.positions[-1], there.rotations[-1]), 1.0 + excess
     edge = target._replace(rotation=long * there.rotations[-1])
     exact = solve_ik(skeleton, local, target, solver, max_iterations=2)
+    here, there_too = (
+        solve_ik(skeleton, start, target.position, solver, max_iterations=2)
+        for start in (local, long * local)
+    )
+    np.testing.assert_allclose(there_too.positions, here.positions, rtol=0, atol=1e-13)
     for start, wanted in ((local, edge), (long * local, target), (long * local, edge)):
         there = solve_ik(skeleton, start, wanted, solver, max_iterations=2)
         assert there.coordinates.shape == (6, 4)

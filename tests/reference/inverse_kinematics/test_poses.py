@@ -161,11 +161,3 @@ def test_a_solve_is_the_same_wherever_its_arrays_come_from(change, articulated):
     for one in (target, [target], target._replace(effector=5)):
         found = solve_ik(arm, change(arm.neutral()), one, "levenberg_marquardt", restarts=3)
         np.testing.assert_array_equal(found.coordinates, expected.coordinates)
-
-
-@pytest.mark.parametrize("weight", [1e80, 0.0, -1.0, np.inf, np.nan])
-def test_one_target_s_weight_is_checked_as_those_of_several(weight, skeleton, local):
-    """By itself it counts for nothing, but it is an argument all the same."""
-    for model, start in ((skeleton, local), (Articulation(skeleton, "hinge"), np.zeros(6))):
-        with pytest.raises(ValueError, match="weight: expected"):
-            solve_ik(model, start, Target(np.ones(3), None, 5, weight), max_iterations=1)

@@ -19,11 +19,7 @@ from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.inverse_kinematics.problem import checked_targets
 from plumbob.reference.inverse_kinematics.reduce import prepare
 from plumbob.reference.inverse_kinematics.settings import checked_settings
-from plumbob.reference.inverse_kinematics.solve import (
-    solve_checked,
-    solve_on_chain,
-    solve_on_mechanism,
-)
+from plumbob.reference.inverse_kinematics.solve import solve_checked
 
 COUNTS = range(13)
 # Merits come from positions recomputed: some roundings of a few metres.
@@ -126,7 +122,7 @@ def badness(solution, settings):
 def rises(name, solver, seed, counts, settings):
     """Return how many answers are worse with more restarts, or than one start with all of it."""
     model, q, targets = problem(name, seed)
-    found, worse, reached = np.inf, [], 0
+    found, worse = np.inf, []
     for restarts in counts:
         answer = solve_ik(model, q, targets, solver, restarts=restarts, seed=seed, **settings)
         last = badness(answer, settings)
@@ -135,10 +131,10 @@ def rises(name, solver, seed, counts, settings):
         limit = min(found, once)
         if last > limit + ROUNDING:
             worse.append((name, solver, seed, restarts, last, limit))
-        found, reached = last, reached + (answer.outcome is Outcome.CONVERGED)
+        found = last
         most = 2 + 3 * restarts if isinstance(model, Skeleton) else 1 + 2 * restarts
         assert answer.iterations <= most * settings["max_iterations"]
-    return worse, reached
+    return worse
 
 
 @pytest.mark.parametrize("solver", IK_SOLVERS)
@@ -146,24 +142,17 @@ def rises(name, solver, seed, counts, settings):
 def test_restarts_never_make_an_answer_worse(name, solver):
     settings = {"tolerance": 1e-4, "max_iterations": 15}
     for seed in range(3):
-        worse, _ = rises(name, solver, seed, (0, 1, 2, 5), settings)
-        assert worse == []
+        assert rises(name, solver, seed, (0, 1, 2, 5), settings) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", IK_SOLVERS)
 @pytest.mark.parametrize("name", MODELS)
-def test_restarts_never_make_an_answer_worse_for_every_count(name, solver, capsys):
-    total, reached = 0, 0
+def test_restarts_never_make_an_answer_worse_for_every_count(name, solver):
     for seed in range(12):
         for most in (3, 40):
             settings = {"tolerance": 1e-4, "max_iterations": most}
-            worse, some = rises(name, solver, seed, COUNTS, settings)
-            assert worse == []
-            total, reached = total + len(COUNTS), reached + some
-    with capsys.disabled():
-        print(f"\n{name}, {solver}: {total} answers, {reached} reached, none worse")
-    assert total == 12 * 2 * len(COUNTS)
+            assert rises(name, solver, seed, COUNTS, settings) == []
 
 
 @pytest.mark.parametrize("solver", ["levenberg_marquardt", "fabrik"])
@@ -236,8 +225,9 @@ def test_a_chain_s_answer_is_the_better_of_one_start_s_and_its_restarts_with_bot
     goals = forward_kinematics(chain, rotation.random(rng, 40, 5)).positions[:, -1]
     settings = checked_settings("ccd", 1e-12, 1e-12, 2, 1, 3, True, False)
     targets, start = checked_targets(chain, goals, None), rotation.random(rng, 5)
-    one = solve_on_chain(chain, start, targets[0], settings)
-    more = solve_on_mechanism(chain, start, targets, settings)
+    one = solve_ik(chain, start, goals, "ccd", tolerance=1e-12, max_iterations=4, record=True)
+    balls = Articulation(chain, "ball")
+    more = solve_checked(balls, start.ravel(), targets, settings)
     best = solve_checked(chain, start, targets, settings)
     np.testing.assert_array_equal(best.merit, np.minimum(one.merit, more.merit))
     assert 5 < np.count_nonzero(one.merit < more.merit) < 35

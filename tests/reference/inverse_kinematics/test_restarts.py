@@ -8,7 +8,6 @@ import pytest
 from plumbob.reference import Outcome, Target, forward_kinematics, rotation, solve_ik
 from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.inverse_kinematics.reduce import prepare
-from plumbob.reference.inverse_kinematics.restarts import RANK, new_progress
 from plumbob.reference.inverse_kinematics.solve_mechanism import rank_restarts, take_nearest
 
 
@@ -78,7 +77,7 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
         mechanism=prepared.mechanism,
         restarts=prepared.restarts,
         effector_frames=prepared.effector_frames,
-        progress=new_progress(10),
+        ranks=np.empty(9),
     )
     rank_restarts(state, target)
     full = np.hstack([prepared.restarts, np.zeros((9, arm.coordinate_count))])[:, :8]
@@ -88,24 +87,11 @@ def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
     angles = rotation.angle(pose.rotations[:, 7], targets[0].rotation)
     lever = LEVER * prepared.mechanism.reach
     expected = np.max(distances, axis=0) + lever * 4.0 * np.sin(angles / 4.0)
-    np.testing.assert_allclose(state.progress[1:10, RANK], expected, rtol=1e-12, atol=0)
+    np.testing.assert_allclose(state.ranks, expected, rtol=1e-12, atol=0)
     taken = np.empty((9, prepared.mechanism.coordinates))
     for q in taken:
         take_nearest(state, q)
     assert (taken == prepared.restarts[np.argsort(expected)]).all()
-
-
-def test_the_best_of_all_attempts_is_returned(arm, poses, rng, solver, backend):
-    """With no iterations the attempts are the start and the random poses as they are."""
-    q, wanted = arm.random(rng), Target(poses.position[0])
-    random = prepare(arm, (7,), (False,), 6, 5).restarts
-    starts = np.vstack([q[:7], random])
-    full = np.hstack([starts, np.full((7, 1), q[7])])
-    errors = forward_kinematics(arm, full).positions[:, -1] - wanted.position
-    best = np.linalg.norm(errors, axis=1)
-    solution = solve_ik(arm, q, wanted, solver, restarts=6, seed=5, max_iterations=0)
-    assert solution.residual == pytest.approx(best.min(), abs=1e-14)
-    np.testing.assert_allclose(solution.coordinates, full[best.argmin()], rtol=0, atol=1e-15)
 
 
 def test_restarts_follow_from_the_seed(arm, poses, rng):
@@ -150,10 +136,3 @@ def test_the_iterations_of_all_attempts_are_counted_and_recorded(arm, rng, solve
     assert solution.history.shape == (solution.iterations + 1,)
     assert np.isfinite(solution.history).all()
     assert (solution.history >= 90.0).all()
-
-
-def test_a_skeleton_may_be_restarted_too(skeleton, local, rng, solver, backend):
-    target = forward_kinematics(skeleton, rotation.random(rng, 6)).positions[-1]
-    solution = solve_ik(skeleton, local, target, solver, restarts=2, max_iterations=300)
-    assert solution.outcome is Outcome.CONVERGED
-    assert solution.local_rotations.shape == (6, 4)

@@ -103,22 +103,6 @@ def test_the_history_of_a_long_solve_is_whole(rng):
     assert (solution.history[1, solution.iterations[1] :] == last[1]).all()
 
 
-def test_the_history_of_a_skeleton_s_restarts_is_one_row(rng):
-    arm, rest = scenes.lab_arm()
-    targets = [[2.55, 0.1, 0.0], [0.3, 0.2, 0.4]]
-    options = {"max_iterations": 2, "restarts": 1, "record": True, "tolerance": 1e-12}
-    batch = solve_ik(arm, rest, targets, "ccd", **options)
-    assert batch.history.shape == (2, batch.iterations.max() + 1)
-    for i in range(2):
-        one = solve_ik(arm, rest, targets[i], "ccd", **options)
-        assert one.iterations == batch.iterations[i]
-        assert (batch.history[i, : one.iterations + 1] == one.history).all()
-        assert one.residual == batch.residual[i]
-        assert type(one.outcome) is Outcome
-    start = forward_kinematics(arm, rest).positions[-1]
-    assert batch.history[0, 0] == pytest.approx(np.linalg.norm(start - targets[0]))
-
-
 def test_tracking_out_of_reach_settles_too():
     arm, _ = scenes.lab_arm()
     motion = track(arm, [[3.0, 0.0, 1.0], [3.0, 0.1, 1.0]], "levenberg_marquardt")

@@ -76,6 +76,12 @@ def test_positions_that_are_not_the_pose_s_are_told(arm, rng):
     assert longer.position_error == pytest.approx(0.25)
     assert longer.length_error == pytest.approx(0.25)
     assert not longer.reached  # a tip that the rotations do not lead to reaches nothing
+    for errors in (longer.position_errors, longer.length_errors):
+        assert errors == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.25])
+    alone = judge_pose(arm, None, x[-1], positions=x)
+    assert alone.reached
+    assert (alone.position_error, alone.length_errors[4]) == (None, pytest.approx(0.25))
+    assert (alone.positions == x).all()
 
 
 def test_our_own_answers_are_judged_as_they_say(arm, rng):
@@ -109,6 +115,7 @@ def test_what_is_given_stays_as_it_is(arm, rng):
         ({"target": np.zeros((2, 3))}, r"target: expected shape \(3,\)"),
         ({"positions": np.zeros((4, 3))}, r"positions: expected shape \(5, 3\)"),
         ({"effector": "hand"}, "effector: expected one of"),
+        ({"pose": None}, "pose: expected rotations or coordinates, got None"),
     ],
 )
 def test_bad_input_is_named(arm, change, message):

@@ -1,1 +1,0 @@
-"""Solvers and problems of users: opened by the doors of `verify`, measured as peers are."""

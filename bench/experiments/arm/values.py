@@ -1,0 +1,21 @@
+"""The records of the lab's arm: curves that it draws, and targets beyond its reach."""
+
+from ...harness.values import Floats1, Integers1, Kind, Values
+from ..chain.values import Reached, ReachedDetails
+from . import BEYOND, CURVE
+
+
+class Followed(Values, frozen=True):
+    """A motion along a curve, (frame,): an outcome is the number of an `Outcome`.
+
+    The angles are those by which joints rotate from each frame to the next [rad].
+    """
+
+    residual: Floats1
+    iterations: Integers1
+    outcome: Integers1
+    largest_angle: Floats1
+    mean_angle: Floats1
+
+
+KINDS = {CURVE: Kind(Followed, ReachedDetails), BEYOND: Kind(Reached, ReachedDetails)}

@@ -1,0 +1,35 @@
+"""The records of a chain that reaches for targets."""
+
+import math
+
+from ...harness.values import Booleans1, Details, Floats1, Integers1, Kind, Values
+from . import CHAIN
+
+
+class Reached(Values, frozen=True):
+    """The answers to a batch of targets, (target,); lengths in metres."""
+
+    residual: Floats1  # infinite without an answer
+    solved: Booleans1  # whether the residual is within the tolerance
+    iterations: Floats1  # NaN where the solver does not say them
+    distance: Floats1  # of the target from the root
+    bend: Floats1  # how far joints are off the line from root to target
+    excess: Floats1  # residual above distance - reach
+    reach: float
+    outcome: Integers1 | None = None  # the number of an `Outcome`, of our solvers
+    history_low: Floats1 | None = None  # 10th percentile of the residuals by iteration
+    history_median: Floats1 | None = None
+    history_high: Floats1 | None = None  # 90th percentile
+    seconds: Floats1 | None = None  # for a target by itself
+
+
+class ReachedDetails(Details, frozen=True):
+    """The tolerance [m], whether the solver starts warm, and what is reached for."""
+
+    tolerance: float = math.nan
+    warm: bool | None = None
+    stratum: str = ""
+    curve: str = ""
+
+
+KINDS = {CHAIN: Kind(Reached, ReachedDetails)}

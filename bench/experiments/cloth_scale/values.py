@@ -1,0 +1,32 @@
+"""The records of growing cloths: times [s], (round,), memory [bytes] and sizes of factors."""
+
+from ...harness.values import Details, Floats1, Kind, Values
+
+
+class Scaled(Values, frozen=True, kw_only=True):
+    """A cloth factored by one library; what only ours measures is None for others."""
+
+    before: int  # the memory before anything was made
+    assembly: float | None = None
+    factor: float
+    refactor: float | None = None  # the time of a second factor of the same pattern
+    solve: Floats1  # of three right-hand sides
+    local: Floats1 | None = None
+    step: Floats1 | None = None
+    limit: Floats1 | None = None  # plain reads of as many bytes as an iteration reads
+    entries: int | None = None  # nonzeros of the factor
+    matrix_entries: int | None = None
+    memory: int  # the most that the process ever had
+    residual: float | None = None  # after all iterations of a step
+    history: Floats1 | None = None  # the residual at first and after each iteration
+
+
+class ScaledDetails(Details, frozen=True):
+    """How many particles there are and iterations a step makes, and why a library is missing."""
+
+    particles: int
+    iterations: int
+    missing: str = ""
+
+
+KINDS = {"": Kind(Scaled, ScaledDetails)}

@@ -1,0 +1,25 @@
+"""The records of the timing: rounds, and what was done in them."""
+
+import math
+
+from ...harness.values import Details, Floats2, Kind, Values
+
+
+class Timed(Values, frozen=True):
+    """The seconds of one operation, (sweep, round), and the bytes that it moves as a yardstick."""
+
+    seconds: Floats2
+    moved: float
+
+
+class WorkDetails(Details, frozen=True):
+    """What was timed: see `case.Work`."""
+
+    subject: str
+    group: str
+    work: str
+    noise: float = math.nan  # half the width of the middle 80 % of a fixed loop's times
+    together: str = ""  # a word that all that were timed in turns have in common
+
+
+KINDS = {"": Kind(Timed, WorkDetails)}

@@ -1,0 +1,95 @@
+"""A user's solver for cloths: a frame is one request or several, one a step."""
+
+from typing import Any
+
+import numpy as np
+
+from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.reference import MassSpring, State
+from plumbob.reference.arguments import FloatArray
+
+from ..contestant import Contestant, opened, remark
+from ..entrant import MOTION_TASK, STEP_TASK, Spec
+from ..protocol import OwnTime, total
+from .protocol import Mover
+
+__all__ = ["prepare", "remark"]
+
+_PARTS = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity")
+
+
+def prepare(system: MassSpring, frame: float, spec: Spec = "", substeps: int = 1) -> Mover:
+    """Return a user's solver that takes so many steps a frame.
+
+    Raises:
+        ValueError: if its model cannot hold the system.
+    """
+    solver = opened(spec)
+    _check_model(system, solver.greeting)
+    return _Requests(solver, system, frame / substeps, substeps)
+
+
+class _Requests:
+    """Steps of which each is a request; there is none after a step that is not finite."""
+
+    def __init__(self, solver: Contestant, system: MassSpring, h: float, substeps: int) -> None:
+        self._solver, self._h, self._substeps = solver, h, substeps
+        self._task = STEP_TASK if STEP_TASK in solver.greeting.tasks else MOTION_TASK
+        self._known = _inputs(system, solver.greeting, self._task) | {"h": h}
+        self._before = solver.greeting.system.state == "previous_positions"
+
+    def begin(self, state: State) -> None:
+        self._x, self._v = state.positions, state.velocities
+
+    def advance(self) -> OwnTime | None:
+        steps = range(self._substeps)
+        return total(self._step() for _ in steps if np.isfinite(self._x).all())
+
+    def positions(self) -> FloatArray:
+        return self._x
+
+    def _step(self) -> OwnTime:
+        inputs = {**self._known, "positions": self._x, "velocities": self._v}
+        if self._before:
+            inputs["previous_positions"] = self._x - self._h * self._v
+        values, time = self._solver.answer(self._task, inputs)
+        if self._task == MOTION_TASK:
+            values = {name: value[-1] for name, value in values.items()}
+        x = values.get("positions")
+        if x is None:
+            x = self._x + self._h * values["velocities"]
+        self._x, self._v = x, values.get("velocities", (x - self._x) / self._h)
+        return time
+
+
+def _inputs(system: MassSpring, greeting: Greeting, task: str) -> dict[str, Any]:
+    inputs = {name: getattr(system, name) for name in _PARTS}
+    if greeting.system.external_forces:
+        inputs["external_forces"] = np.zeros((system.particle_count, 3))
+    if greeting.system.tension_only:
+        inputs["tension_only"] = system.tension_only
+    return inputs | ({"steps": 1} if task == MOTION_TASK else {})
+
+
+def _check_model(system: MassSpring, greeting: Greeting) -> None:
+    """Make sure that a solver's own model can hold a system.
+
+    Raises:
+        ValueError: if it cannot; the message says in what.
+    """
+    can, gravity = greeting.system, system.gravity
+    is_down = not gravity[[0, 2]].any() and bool(gravity[1] <= 0.0)
+    one_mass, one_stiffness = can.masses == "one", can.stiffnesses == "one"
+    compressible = bool(system.tension_only.any())
+    reasons = {
+        "it measures rest lengths itself": can.rest_lengths == "measured",
+        "it pins nothing": not can.pinned and not system.free.all(),
+        "it goes on from its own state": can.continues,
+        "it knows one mass": one_mass and np.ptp(system.masses) > 0.0,
+        "it knows one stiffness": one_stiffness and np.ptp(system.stiffnesses) > 0.0,
+        "it knows gravity along -y only": can.gravity == "number" and not is_down,
+        "it knows no springs that resist no compression": compressible and not can.tension_only,
+    }
+    for reason, applies in reasons.items():
+        if applies:
+            raise ValueError(f"not asked: {reason}, by its own greeting")

@@ -1,0 +1,82 @@
+"""MuJoCo: point masses on slides, joined by tendons or by the edges of a one-dimensional flex.
+
+"discrete" solves a linear system by conjugate gradients, of which MuJoCo allows 100 iterations to a
+tolerance of 1e-8; more, and a smaller one, are a matter of settings here. All springs of a flex are
+alike.
+"""
+
+import mujoco
+import numpy as np
+
+from plumbob.crosscheck.engines import MujocoFlex, MujocoMassSpring
+from plumbob.reference import MassSpring, State
+from plumbob.reference.arguments import FloatArray
+
+from .protocol import Mover
+
+# What a model is built from; stiffness and damping are set anew every time.
+_BUILT_FROM = ("masses", "springs", "rest_lengths", "tension_only", "pinned", "gravity")
+_kept: dict[tuple[bool, int], tuple[MassSpring, MujocoMassSpring]] = {}
+
+
+def prepare(
+    system: MassSpring,
+    frame: float,
+    integrator: str = "Euler",
+    substeps: int = 1,
+    iterations: int = 100,
+    tolerance: float = 1e-8,
+    flex: bool = False,
+) -> Mover:
+    """Return MuJoCo, stepping so many times a frame."""
+    engine = _engine(system, flex)
+    model, option = engine.model, engine.model.opt
+    if flex:
+        model.flex_edgestiffness[:] = system.stiffnesses[0]
+        model.flex_edgedamping[:] = system.dampings[0]
+    else:
+        engine.set_integrator(integrator)
+        model.tendon_stiffness[:], model.tendon_damping[:] = system.stiffnesses, system.dampings
+        option.iterations, option.tolerance = iterations, tolerance
+    option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_ENERGY)  # nobody asks for energies here
+    option.timestep = frame / substeps
+    mujoco.set_mju_user_warning(_ignore)
+    return _Steps(engine, substeps)
+
+
+def _engine(system: MassSpring, flex: bool) -> MujocoMassSpring:
+    """Return the engine made before for a system alike but for stiffness and damping, or a new one.
+
+    At most one is kept for each number of particles: to build one takes time cubic in it.
+    """
+    key = flex, system.particle_count
+    if key not in _kept or not _are_alike(_kept[key][0], system):
+        _kept[key] = system, MujocoFlex(system) if flex else MujocoMassSpring(system)
+    return _kept[key][1]
+
+
+def _are_alike(a: MassSpring, b: MassSpring) -> bool:
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in _BUILT_FROM)
+
+
+class _Steps:
+    """Steps of a MuJoCo model, so many a frame."""
+
+    def __init__(self, engine: MujocoMassSpring, substeps: int) -> None:
+        self._engine, self._substeps = engine, substeps
+
+    def begin(self, state: State) -> None:
+        self._engine.write(state)
+
+    def advance(self) -> None:
+        self._engine.advance(self._substeps)
+
+    def positions(self) -> FloatArray:
+        engine = self._engine
+        positions = engine.model.body_pos[engine.bodies]
+        positions[engine.free] = engine.data.qpos[engine.columns]
+        return positions
+
+
+def _ignore(warning: str) -> None:
+    """MuJoCo would write it to a file; that a motion blew up is seen from the positions."""

@@ -1,0 +1,49 @@
+"""Plumbob's own steps, implicit Euler's and explicit ones, through their public interface."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from plumbob.reference import ImplicitEuler, MassSpring, State, runge_kutta, symplectic_euler
+from plumbob.reference.arguments import FloatArray
+
+from .protocol import Mover
+
+EXPLICIT = {"symplectic_euler": symplectic_euler, "runge_kutta": runge_kutta}
+
+
+def prepare(
+    system: MassSpring,
+    frame: float,
+    solver: str = "newton",
+    substeps: int = 1,
+    tolerance: float = 0.0,
+    iterations: int | None = None,
+) -> Mover:
+    """Return an explicit integrator, or one of `STEP_SOLVERS`.
+
+    Without a tolerance, the latter makes so many iterations in every step.
+    """
+    h = frame / substeps
+    if solver in EXPLICIT:
+        return _Steps(partial(EXPLICIT[solver], system, h=h), substeps)
+    limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": iterations}
+    integrator = ImplicitEuler(system, h=h, solver=solver, **limits)
+    return _Steps(lambda state: integrator.step(state).state, substeps)
+
+
+class _Steps:
+    """So many steps a frame of what maps a state to the next."""
+
+    def __init__(self, step: Callable[[State], State], substeps: int) -> None:
+        self._step, self._substeps = step, substeps
+
+    def begin(self, state: State) -> None:
+        self._state = state
+
+    def advance(self) -> None:
+        for _ in range(self._substeps):
+            self._state = self._step(self._state)
+
+    def positions(self) -> FloatArray:
+        return self._state.positions

@@ -1,0 +1,73 @@
+"""The user's solver that works in this process's child: one at a time, opened when first asked."""
+
+from collections.abc import Mapping
+from time import perf_counter
+from typing import Any
+
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.contestant import Failure
+from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.crosscheck.verify.message import NO_SECONDS
+from plumbob.crosscheck.verify.sentence import sentence
+from plumbob.crosscheck.verify.solvers import Limits, open_contestant
+
+from .entrant import Spec
+from .protocol import NoAnswerError, OwnTime
+
+# The bench itself loses patience with a silent worker sooner.
+LIMITS = Limits(first=900.0, request=900.0, line=1 << 26)
+_ABOUT = sentence("")
+ROUND_TRIPS = 'timed by the round trip of a request, for want of valid "seconds"'
+
+
+class Contestant:
+    """A solver behind its door.
+
+    Attributes:
+        remark: how its times are taken, where that is not by its own clock.
+    """
+
+    def __init__(self, spec: Spec) -> None:
+        self._door, self.remark = open_contestant(spec, LIMITS), ""
+
+    @property
+    def greeting(self) -> Greeting:
+        """What it says of itself."""
+        return self._door.greeting
+
+    def close(self) -> None:
+        """End it."""
+        self._door.close()
+
+    def answer(self, task: str, inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], OwnTime]:
+        """Return what it answers, and its time.
+
+        Raises:
+            NoAnswerError: if it answers nothing.
+        """
+        begin = perf_counter()
+        answer = self._door.answer(Case("of the bench", task, inputs, "bench", _ABOUT))
+        round_trip = perf_counter() - begin
+        if isinstance(answer, Failure):
+            raise NoAnswerError(str(answer.sentence))
+        doubt = "" if answer.untimed in (None, NO_SECONDS) else str(answer.untimed)
+        if not doubt and (answer.untimed or not answer.seconds):
+            self.remark = ROUND_TRIPS
+        return answer.values, OwnTime(answer.seconds or round_trip, round_trip, doubt)
+
+
+_open: dict[Spec, Contestant] = {}
+
+
+def opened(spec: Spec) -> Contestant:
+    """Return a solver, the same as before if it is asked again; any other is ended."""
+    if spec not in _open:
+        for other in list(_open):
+            _open.pop(other).close()
+        _open[spec] = Contestant(spec)
+    return _open[spec]
+
+
+def remark() -> str:
+    """Return what is to be said of the times of the solver that works."""
+    return next(iter(_open.values())).remark if _open else ""

@@ -1,0 +1,59 @@
+"""A solver that a user entered: what it is called, where it comes from, what it offers."""
+
+from dataclasses import dataclass
+from typing import Any
+
+# What `open_contestant` takes: a Python file or object, or a command.
+Spec = str | tuple[str, ...]
+
+CHAIN_TASK, ROBOT_TASK = "inverse_kinematics", "robot_inverse_kinematics"
+STEP_TASK, MOTION_TASK = "mass_spring_step", "mass_spring_motion"
+# The tasks that each suite asks of an entrant.
+SUITE_TASKS = {"ik": (CHAIN_TASK, ROBOT_TASK), "cloth": (STEP_TASK, MOTION_TASK)}
+
+
+@dataclass(frozen=True)
+class Entrant:
+    """A solver that was opened once and said what it is.
+
+    Attributes:
+        name: of its own, or as the user calls it.
+        door: its address as the user gave it.
+        spec: what opens it.
+        version: of its own; "" if it says none.
+        commit: of its sources, and whether they were changed since; "" outside of git.
+        digest: twelve hex digits over its sources.
+        tasks: that it offers.
+        methods: of inverse kinematics.
+        step: the method of its time step, None if it declares none.
+    """
+
+    name: str
+    door: str
+    spec: Spec
+    version: str = ""
+    commit: str = ""
+    digest: str = ""
+    tasks: tuple[str, ...] = ()
+    methods: tuple[str, ...] = ("",)
+    step: str | None = None
+
+    @property
+    def titles(self) -> dict[str, str]:
+        """The names of its rows, by its methods of inverse kinematics."""
+        several = len(self.methods) > 1
+        return {m: f"{self.name}, {m}" if m and several else self.name for m in self.methods}
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What every record of it says of it."""
+        return {"entrant": True, "door": self.door, "digest": self.digest}
+
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """What it was measured under that makes it no other measurement."""
+        return {"solver_commit": self.commit}
+
+    def offers(self, suite: str) -> list[str]:
+        """Return which of its tasks a suite asks for."""
+        return [task for task in SUITE_TASKS.get(suite, ()) if task in self.tasks]

@@ -1,0 +1,70 @@
+"""A user's solver for robots: hinges in a row, a tool, poses within limits."""
+
+from typing import Any
+
+import numpy as np
+
+from plumbob.crosscheck.verify.kinematics import robot_models
+from plumbob.reference import rotation
+
+from ...problems.robots import links
+from ..contestant import opened, remark
+from ..entrant import ROBOT_TASK, Spec
+from ..protocol import NoAnswerError
+from .protocol import Ask, FloatArray, Robot, Solve, SolverOutput, Tolerance, UnableError
+
+__all__ = ["prepare", "remark", "robot_inputs"]
+
+ITERATIONS = 200
+
+
+def prepare(robot: Robot, tolerance: Tolerance, spec: Spec = "") -> Ask:
+    """Return a user's solver, set up for a robot.
+
+    Raises:
+        UnableError: for a robot that the protocol has no words for.
+    """
+    if not robot.is_chain:
+        raise UnableError("not asked: the protocol has hinges and one effector, no balls")
+    solver, known = opened(spec), robot_inputs(robot)
+    known |= {"tolerance": tolerance.position, "tolerance_rotation": tolerance.rotation}
+
+    def ask(positions: FloatArray, rotations: FloatArray, start: FloatArray) -> Solve:
+        target = {"target_position": positions[0]}
+        target["target_rotation"] = rotation.from_matrix(rotations[0])
+
+        def solve() -> SolverOutput:
+            values, time = solver.answer(ROBOT_TASK, {**known, **target, "start": start})
+            if "q" not in values:
+                raise NoAnswerError("It answered no q.")
+            return SolverOutput(values["q"], values.get("converged"), time)
+
+        return solve
+
+    return ask
+
+
+def robot_inputs(robot: Robot) -> dict[str, Any]:
+    """Return what the protocol says of a chain of hinges; its frames hold the fixed joints."""
+    transform, frames, axes = np.eye(4), [], []
+    for link in links(robot):
+        transform = transform @ link.transform
+        if link.axis is not None:
+            frames.append(transform)
+            axes.append(link.axis)
+            transform = np.eye(4)
+    count, origins = len(frames), np.array(frames)
+    inputs = {
+        "parents": np.arange(count) - 1,
+        "origins": origins[:, :3, 3],
+        "orientations": rotation.from_matrix(origins[:, :3, :3]),
+        "axes": np.array(axes),
+        "slides": np.zeros(count, dtype=bool),
+        "lower": robot.lower,
+        "upper": robot.upper,
+        "effector": count - 1,
+        "tool_position": transform[:3, 3],
+        "tool_rotation": rotation.from_matrix(transform[:3, :3]),
+        "max_iterations": ITERATIONS,
+    }
+    return inputs | {"urdf": robot_models.urdf(inputs)}

@@ -1,0 +1,70 @@
+"""A user's solver for chains of balls: its answers are the joints' positions."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from plumbob.reference import Skeleton, forward_kinematics
+from plumbob.reference.arguments import FloatArray
+
+from ..contestant import opened, remark
+from ..entrant import CHAIN_TASK, Spec
+from .protocol import Solve, SolverOutput
+
+__all__ = ["joint_positions", "prepare", "remark"]
+
+# Positions without rotations count if they keep every link to this share of its length.
+STRETCH = 1e-6
+Ask = Callable[[FloatArray, FloatArray, int], Solve]
+
+
+def prepare(skeleton: Skeleton, tolerance: float, spec: Spec = "", method: str = "") -> Ask:
+    """Return a user's solver, set up for a skeleton whose last joint is the effector.
+
+    An output holds the iterations, NaN if unsaid, and the joints' positions in a row.
+
+    Raises:
+        NoAnswerError: if it gives no answer when one iteration is allowed.
+    """
+    solver = opened(spec)
+    known = {"parents": skeleton.parents, "offsets": skeleton.offsets, "tolerance": tolerance}
+    known |= {"effector": skeleton.joint_count - 1, "method": method}
+
+    def inputs(target: FloatArray, start: FloatArray, iterations: int) -> dict[str, Any]:
+        asked = {"local_rotations": start, "target": target, "max_iterations": iterations}
+        return {**known, **asked}
+
+    def ask(target: FloatArray, start: FloatArray, iterations: int) -> Solve:
+        def solve() -> SolverOutput:
+            values, time = solver.answer(CHAIN_TASK, inputs(target, start, iterations))
+            positions = joint_positions(skeleton, values)
+            q = np.append(values.get("iterations", np.nan), positions)
+            return SolverOutput(q, values.get("converged"), time)
+
+        return solve
+
+    rest = np.tile([1.0, 0.0, 0.0, 0.0], (skeleton.joint_count, 1))
+    effector = forward_kinematics(skeleton, rest).positions[-1]
+    solver.answer(CHAIN_TASK, inputs(0.5 * (skeleton.offsets[0] + effector), rest, 1))
+    return ask
+
+
+def joint_positions(skeleton: Skeleton, values: Mapping[str, Any]) -> FloatArray:
+    """Return where an answer puts the joints [m], (joint, 3): by its rotations if it has any.
+
+    Raises:
+        ValueError: if it has neither rotations nor positions, or positions that stretch links.
+    """
+    if "local_rotations" in values:
+        return forward_kinematics(skeleton, values["local_rotations"]).positions
+    if "positions" not in values:
+        raise ValueError("answered neither local_rotations nor positions")
+    positions = np.asarray(values["positions"], dtype=float)
+    links, lengths = positions[1:] - positions[skeleton.parents[1:]], skeleton.offsets[1:]
+    wanted = np.linalg.norm(lengths, axis=-1)
+    stretched = np.abs(np.linalg.norm(links, axis=-1) - wanted).max(initial=0.0)
+    rooted = np.linalg.norm(positions[0] - skeleton.offsets[0])
+    if not max(stretched, rooted) <= STRETCH * max(wanted.sum(), 1e-30):
+        raise ValueError("answered positions that do not keep the links' lengths or the root")
+    return positions

@@ -1,0 +1,1 @@
+"""What solvers are asked: robots, chains, cloths, curves, their targets and evaluation."""

@@ -1,0 +1,91 @@
+"""Position targets for a chain of ten ball joints, from seeded random poses."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from plumbob.reference import Skeleton, scenes
+from plumbob.reference.arguments import FloatArray, IndexArray, choice
+
+BALLS = 10
+BEYOND = "beyond"
+
+# How far targets lie from the root, as shares of the reach; uniform within the shell.
+STRATA = {"near": (0.05, 0.4), "far": (0.6, 0.95), "edge": (0.99, 0.9999), BEYOND: (1.01, 2.0)}
+_SEED = 1986
+
+
+@dataclass(frozen=True)
+class TargetsForSkeleton:
+    """A batch of independent position targets for the last joint.
+
+    Attributes:
+        name: of the problem.
+        title: how it is written.
+        skeleton: the chain.
+        starts: local rotations to start from, (target, joint, 4) or (joint, 4) for all.
+        targets: global positions [m], (target, 3).
+    """
+
+    name: str
+    title: str
+    skeleton: Skeleton
+    starts: FloatArray
+    targets: FloatArray
+
+    @property
+    def every_start(self) -> FloatArray:
+        """The start for each target, (target, joint, 4)."""
+        shape = (len(self.targets), self.skeleton.joint_count, 4)
+        return np.broadcast_to(self.starts, shape)
+
+
+class ChainRequests(NamedTuple):
+    """Targets as a user's solver is asked for them, one by one.
+
+    Attributes:
+        problem: the targets.
+        iterations: how many are allowed for each of them, (target,).
+    """
+
+    problem: TargetsForSkeleton
+    iterations: IndexArray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The number of targets, and of numbers of an answer: iterations, then positions."""
+        return len(self.iterations), 1 + 3 * self.problem.skeleton.joint_count
+
+    def request(self, i: int) -> tuple[FloatArray, FloatArray, int]:
+        """Return a target, the start and the iterations that are allowed."""
+        return self.problem.targets[i], self.problem.every_start[i], int(self.iterations[i])
+
+
+def chain_targets(stratum: str, count: int) -> TargetsForSkeleton:
+    """Return targets in one stratum of distance; directions and starts are uniform at random.
+
+    Raises:
+        ValueError: if there is no such stratum.
+    """
+    low, high = STRATA[choice("stratum", stratum, STRATA)]
+    rng = np.random.default_rng([_SEED, list(STRATA).index(stratum)])
+    skeleton, _ = scenes.ball_chain(links=BALLS)
+    distances = skeleton.reach() * rng.uniform(low, high, count)
+    return TargetsForSkeleton(
+        f"chain/{stratum}",
+        f"chain, {stratum}",
+        skeleton,
+        random_rotations(rng, count, skeleton.joint_count),
+        distances[:, None] * unit(rng.standard_normal((count, 3))),
+    )
+
+
+def random_rotations(rng: np.random.Generator, *shape: int) -> FloatArray:
+    """Return uniformly random unit quaternions, (..., 4)."""
+    return unit(rng.standard_normal((*shape, 4)))
+
+
+def unit(vectors: FloatArray) -> FloatArray:
+    """Return the vectors of the last axis at unit length."""
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)

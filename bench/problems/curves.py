@@ -1,0 +1,118 @@
+"""Curves followed by the lab's arm and a robot of seven hinges; targets that are too far away."""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from plumbob.reference import Articulation, Skeleton, curves, resample, scenes
+from plumbob.reference.arguments import FloatArray
+from plumbob.reference.formats import urdf
+
+from .chains import TargetsForSkeleton, unit
+from .robots import robot
+
+# Samples of each curve, as the lab takes them; the custom curve is resampled from a raw drawing.
+FRAMES = {"circle": 150, "square": 150, "heart": 150, "triangle": 150, "star": 400}
+CUSTOM = "plumb_bob"
+CUSTOM_SAMPLES = 1200
+MIN_SPACING = 0.01
+MAX_SPACING = 0.02
+BEYOND = (1.01, 2.0)
+_SEED = 1986
+# Closed curves, and where a robot draws them.
+ARM_CURVES = ("circle", "heart", "triangle", "star")
+ROBOT, ROBOT_CURVES = "iiwa14", ("circle", "heart")
+# A pose with the elbow bent and the wrist over the table [°], and where the curves are drawn [m]:
+# upright, in front of the robot, so small that all of it is within reach.
+_START = (0.0, 35.0, 0.0, 80.0, 0.0, 65.0, 0.0)
+_CENTRE, _SCALE = (0.5, 0.0, 0.5), 0.4
+# Frames of the heart where it is drawn several times.
+DRIFT_FRAMES = 60
+
+
+@dataclass(frozen=True)
+class FollowedCurve:
+    """A curve that an effector is to follow, frame by frame.
+
+    Attributes:
+        name: of the problem.
+        title: how it is written.
+        model: what follows.
+        start: its pose at the start: local rotations of a Skeleton, else coordinates.
+        curve: the target of the effector in each frame [m], (frame, 3).
+    """
+
+    name: str
+    title: str
+    model: Skeleton | Articulation
+    start: FloatArray
+    curve: FloatArray
+
+
+def arm_curves() -> list[FollowedCurve]:
+    """Return the arm with every named curve; the custom one evened out."""
+    skeleton, rest = scenes.lab_arm()
+    even = {name: curves[name](frames) for name, frames in FRAMES.items()}
+    even[CUSTOM] = evened_custom_curve()
+    return [
+        FollowedCurve(f"arm/{name}", spaced(name), skeleton, rest, curve)
+        for name, curve in even.items()
+    ]
+
+
+def spaced(name: str) -> str:
+    """Return how the name of a curve is written."""
+    return name.replace("_", " ")
+
+
+def custom_curve() -> FloatArray:
+    """Return the custom curve as it is drawn, unevenly sampled [m], (point, 3)."""
+    return curves[CUSTOM](CUSTOM_SAMPLES)
+
+
+def evened_custom_curve() -> FloatArray:
+    """Return the custom curve resampled between the two spacings [m], (frame, 3)."""
+    return resample(custom_curve(), min_spacing=MIN_SPACING, max_spacing=MAX_SPACING)
+
+
+def arm_beyond(count: int) -> TargetsForSkeleton:
+    """Return seeded targets in all directions, farther from the arm's root than it can reach."""
+    skeleton, rest = scenes.lab_arm()
+    rng = np.random.default_rng(_SEED)
+    distances = skeleton.reach() * rng.uniform(*BEYOND, count)
+    targets = skeleton.offsets[0] + distances[:, None] * unit(rng.standard_normal((count, 3)))
+    return TargetsForSkeleton("arm/beyond", "arm, beyond", skeleton, rest, targets)
+
+
+@functools.cache
+def arm_closed_curves() -> Sequence[FollowedCurve]:
+    """Return the lab's arm on the lab's curves; the custom one evened out, its ends joined."""
+    skeleton, rest = scenes.lab_arm()
+    drawn = {name: curves[name](FRAMES[name]) for name in ARM_CURVES}
+    spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
+    drawn[CUSTOM] = resample(custom_curve(), closed=True, **spacing)
+    return [
+        FollowedCurve(f"arm/{name}", f"arm, {spaced(name)}", skeleton, rest, curve)
+        for name, curve in drawn.items()
+    ]
+
+
+def robot_closed_curves() -> list[FollowedCurve]:
+    """Return a robot arm of seven hinges with limits on two of the curves."""
+    arm = urdf.parse(robot(ROBOT).text).articulation
+    drawn = {name: _SCALE * curves[name](FRAMES[name])[:, [0, 2, 1]] for name in ROBOT_CURVES}
+    return [
+        FollowedCurve(
+            f"{ROBOT}/{name}", f"{ROBOT}, {name}", arm, np.radians(_START), curve + _CENTRE
+        )
+        for name, curve in drawn.items()
+    ]
+
+
+def heart_three_times() -> FollowedCurve:
+    """Return the lab's arm on the heart, three times over."""
+    skeleton, rest = scenes.lab_arm()
+    thrice = np.tile(curves["heart"](DRIFT_FRAMES), (3, 1))
+    return FollowedCurve("drift/heart", "drift, heart", skeleton, rest, thrice)

@@ -1,0 +1,140 @@
+"""Evaluate solutions of inverse kinematics by MuJoCo's kinematics of the robot's own text.
+
+It shares no code with the reference, and measures the same for every solver: the distance and the
+angle of each effector from its target, and by how much a joint is beyond its limits.
+"""
+
+import functools
+import xml.etree.ElementTree as ElementTree
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+
+from .robots import LIMIT_TOLERANCE, Robot, robot
+
+
+class Tolerance(NamedTuple):
+    """When an effector has reached its target."""
+
+    position: float
+    rotation: float
+
+
+class Targets(NamedTuple):
+    """Where effectors are wanted.
+
+    Attributes:
+        positions: [m], (target, effector, 3).
+        rotations: matrices, (target, effector, 3, 3).
+        starts: coordinates to start from, (target, coordinate).
+        strata: the number of each target's stratum, (target,).
+    """
+
+    positions: FloatArray
+    rotations: FloatArray
+    starts: FloatArray
+    strata: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The number of targets, and of coordinates."""
+        return len(self.starts), self.starts.shape[-1]
+
+    def request(self, i: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return what a solver is asked for."""
+        return self.positions[i], self.rotations[i], self.starts[i].copy()
+
+    def after(self, count: int) -> "Targets":
+        """Return the targets after the first ones."""
+        return Targets(*(part[count:] for part in self))
+
+
+class Evaluation(NamedTuple):
+    """What the answers come to, one entry a target.
+
+    Attributes:
+        position: the farthest effector's distance from its target [m]; NaN if there is no answer.
+        rotation: the largest angle of an effector from its target [rad]; zero where none is wanted.
+        beyond: by how much the worst joint is beyond its limit [rad].
+        solved: whether all three are within tolerance.
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+    beyond: FloatArray
+    solved: np.ndarray
+
+
+def mujoco_model(robot: Robot) -> Any:
+    """Return the robot in MuJoCo, all of its links kept."""
+    tree = ElementTree.fromstring(robot.text)
+    if robot.is_chain:
+        extension = ElementTree.SubElement(tree, "mujoco")
+        ElementTree.SubElement(extension, "compiler", fusestatic="false")
+    return mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
+
+
+class Evaluator:
+    """The kinematics of one robot."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.model = mujoco_model(robot)
+        self._data = mujoco.MjData(self.model)
+        self._effectors = [self.model.body(effector).id for effector in robot.effectors]
+
+    def forward(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the effectors' positions [m], (..., effector, 3), and rotations, (..., 3, 3)."""
+        shape = (*q.shape[:-1], len(self._effectors))
+        positions, rotations = np.empty((*shape, 3)), np.empty((*shape, 9))
+        for i in np.ndindex(q.shape[:-1]):
+            self._update_kinematics(q[i])
+            positions[i] = self._data.xpos[self._effectors]
+            rotations[i] = self._data.xmat[self._effectors]
+        return positions, rotations.reshape(*shape, 3, 3)
+
+    def jacobians(self, q: FloatArray) -> FloatArray:
+        """Return the Jacobians of positions and rotations, (row, 6 effector, freedom)."""
+        J = np.empty((len(q), 6 * len(self._effectors), self.model.nv))
+        for i, row in enumerate(q):
+            self._update_kinematics(row)
+            mujoco.mj_comPos(self.model, self._data)
+            for k, effector in enumerate(self._effectors):
+                linear, angular = J[i, 6 * k : 6 * k + 3], J[i, 6 * k + 3 : 6 * k + 6]
+                mujoco.mj_jacBody(self.model, self._data, linear, angular, effector)
+        return J
+
+    def evaluate(self, targets: Targets, q: FloatArray, tolerance: Tolerance) -> Evaluation:
+        """Return what answers (target, coordinate) to the first targets come to; NaN is none."""
+        answered, count = np.asarray(np.isfinite(q).all(axis=-1)), len(q)
+        positions, rotations = self.forward(np.where(answered[:, None], q, targets.starts[:count]))
+        distance = np.linalg.norm(positions - targets.positions[:count], axis=-1).max(axis=-1)
+        angle = angle_between(rotations, targets.rotations[:count]).max(axis=-1)
+        over = np.maximum(self.robot.lower - q, q - self.robot.upper).max(axis=-1).clip(0.0)
+        errors = np.stack([distance, angle * self.robot.posed, over])
+        errors[:, ~answered] = np.nan
+        limits = np.array([*tolerance, LIMIT_TOLERANCE])[:, None]
+        solved = np.asarray((errors <= limits).all(axis=0))
+        return Evaluation(errors[0], errors[1], errors[2], solved)
+
+    def _update_kinematics(self, q: FloatArray) -> None:
+        self._data.qpos[:] = q
+        mujoco.mj_kinematics(self.model, self._data)
+
+
+def angle_between(A: FloatArray, B: FloatArray) -> FloatArray:
+    """Return the angle of the rotation from A to B [rad], exact also where it is tiny, (...).
+
+    |A - B| in the norm of Frobenius is 2 sqrt 2 sin(angle / 2).
+    """
+    distance = np.linalg.norm(A - B, axis=(-2, -1))
+    return 2.0 * np.arcsin(np.minimum(distance / np.sqrt(8.0), 1.0))
+
+
+@functools.cache
+def evaluator_of(name: str) -> Evaluator:
+    """Return the evaluator of a robot by name."""
+    return Evaluator(robot(name))

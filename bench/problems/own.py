@@ -1,0 +1,49 @@
+"""Problems of a user's own: targets of a skeleton, a robot, a cloth."""
+
+from dataclasses import dataclass
+
+from plumbob.crosscheck.verify.message import shown
+from plumbob.reference import MassSpring, State
+
+from ..text import visible
+from .chains import TargetsForSkeleton
+from .robots import Robot
+
+# Letters of a name that a user gives to a problem or a solver.
+_LONGEST = 60
+
+
+def clean(name: str) -> str:
+    """Return a name on one line, without what cannot be shown."""
+    return shown(visible(name.encode(errors="replace").decode()), _LONGEST)
+
+
+@dataclass(frozen=True, eq=False)
+class OwnProblem:
+    """A problem that a user entered: one of targets of balls, a chain of hinges, or a cloth.
+
+    Attributes:
+        name: as it stands in tables.
+        digest: twelve hex digits over what it is made of.
+        suite: which asks it, "ik" or "cloth".
+        targets: of a skeleton of balls, its last joint the effector.
+        robot: a chain of hinges.
+        cloth: particles, springs and the state it is let go from.
+        h: the frame of a cloth [s].
+    """
+
+    name: str
+    digest: str
+    suite: str
+    targets: TargetsForSkeleton | None = None
+    robot: Robot | None = None
+    cloth: tuple[MassSpring, State] | None = None
+    h: float = 1 / 60
+
+    @property
+    def recorded(self) -> list[str]:
+        """The names of its problems in records."""
+        if self.targets is not None:
+            return [self.targets.name]
+        kinds = ("robots", "unreachable") if self.robot else ("peers/one step", "peers/motion")
+        return [f"{kind}/{self.name}" for kind in kinds]

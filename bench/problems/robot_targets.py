@@ -1,0 +1,166 @@
+"""Targets for the effectors of robots: strata, all from seeded poses, so that they can be reached.
+
+Targets come from a pool of random poses within the limits. Those of a stratum are drawn from the
+poses of the pool that belong to it. Unreachable ones are made up: they lie farther from the first
+joint than all links in a row are long.
+"""
+
+import functools
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+
+from .chains import random_rotations, unit
+from .evaluate import Evaluator, Targets, evaluator_of
+from .robots import links, seed_of
+
+STRATA = {
+    "joint space": "uniform in joint space",
+    "space": "the effector uniform in the space that it reaches",
+    "outer shell": "the twentieth of the poses that reach farthest from the root",
+    "near the root": "the twentieth that stay nearest to it",
+    "near singular": "the twentieth with the smallest least singular value of the Jacobian",
+    "at a limit": "uniform in joint space, then one joint put at one of its limits",
+}
+# Poses in the pool for each target of a stratum, and the share that makes an extreme stratum.
+_POOL = 40
+_EXTREME = 0.05
+# Cells a side of the grid by which effectors are spread evenly over space.
+_CELLS = 12
+_SEED = 1986
+
+
+@functools.lru_cache(maxsize=16)
+def robot_targets(name: str, count: int) -> Targets:
+    """Return `count` targets in each stratum, the strata alternating, and random starts."""
+    evaluator = evaluator_of(name)
+    rng = np.random.default_rng([_SEED, seed_of(name)])
+    poses = stratum_poses(evaluator, rng, count).values()
+    positions, rotations = (
+        np.stack(parts, axis=1).reshape(count * len(STRATA), *parts[0].shape[1:])
+        for parts in zip(*(evaluator.forward(q) for q in poses), strict=True)
+    )
+    strata = np.tile(np.arange(len(STRATA)), count)
+    return Targets(positions, rotations, evaluator.robot.draw(rng, len(strata)), strata)
+
+
+def stratum_poses(
+    evaluator: Evaluator, rng: np.random.Generator, count: int
+) -> dict[str, FloatArray]:
+    """Return the poses whose effectors are the targets, (count, coordinate) for each stratum."""
+    pool = evaluator.robot.draw(rng, _POOL * count)
+    effectors, _ = evaluator.forward(pool)
+    distance = np.linalg.norm(effectors - root(evaluator), axis=-1).max(axis=-1)
+    chosen = [
+        pool[:count],
+        pool[spread(rng, effectors, count)],
+        pool[_extreme(rng, -distance, count)],
+        pool[_extreme(rng, distance, count)],
+        pool[_extreme(rng, least_singular_values(evaluator, pool), count)],
+        _at_a_limit(rng, evaluator, count),
+    ]
+    return dict(zip(STRATA, chosen, strict=True))
+
+
+@functools.lru_cache(maxsize=16)
+def unreachable_targets(name: str, count: int) -> Targets:
+    """Return targets 1.05 to 1.5 times as far from the first joint as all links in a row reach."""
+    evaluator, rng = evaluator_of(name), np.random.default_rng([_SEED, seed_of(name), 1])
+    poses = _unreachable(rng, evaluator, count)
+    return Targets(*poses, evaluator.robot.draw(rng, count), np.zeros(count, dtype=int))
+
+
+def least_distances(name: str, targets: Targets) -> FloatArray:
+    """Return a bound below which no pose brings the farther effector to its target [m], (target,).
+
+    It is how much farther the target is from the first joint than all links in a row are long.
+    """
+    evaluator = evaluator_of(name)
+    away = np.linalg.norm(targets.positions - root(evaluator), axis=-1)
+    return np.maximum(away - farthest(evaluator), 0.0).max(axis=-1)
+
+
+@functools.lru_cache(maxsize=16)
+def uniform_targets(name: str, count: int, middle: bool) -> Targets:
+    """Return targets uniform in joint space, from random starts or the middle of the limits."""
+    evaluator = evaluator_of(name)
+    rng = np.random.default_rng([_SEED, seed_of(name), count])
+    positions, rotations = evaluator.forward(evaluator.robot.draw(rng, count))
+    starts = evaluator.robot.draw(rng, count)
+    if middle:
+        starts[:] = (evaluator.robot.lower + evaluator.robot.upper) / 2
+    return Targets(positions, rotations, starts, np.zeros(count, dtype=int))
+
+
+def least_singular_values(evaluator: Evaluator, q: FloatArray) -> FloatArray:
+    """Return the least singular value of each pose's Jacobian, lengths in units of the reach."""
+    J = evaluator.jacobians(q).reshape(len(q), len(evaluator.robot.effectors), 2, 3, -1)
+    J[:, :, 0] /= farthest(evaluator)
+    if not evaluator.robot.posed:  # the effectors' rotations do not count
+        J = J[:, :, :1]
+    values = np.linalg.svd(J.reshape(len(q), -1, J.shape[-1]), compute_uv=False)
+    return np.asarray(values[:, -1], dtype=float)
+
+
+def _extreme(rng: np.random.Generator, measure: FloatArray, count: int) -> FloatArray:
+    least = np.argsort(measure, kind="stable")[: max(count, int(_EXTREME * len(measure)))]
+    return rng.choice(least, count, replace=False)
+
+
+def spread(rng: np.random.Generator, effectors: FloatArray, count: int) -> FloatArray:
+    """Return the numbers of poses whose first effector is spread over all cells that one is in.
+
+    A cell is drawn first, then one of the poses within.
+    """
+    points = effectors[:, 0]
+    edge = np.ptp(points, axis=0).max() / _CELLS
+    cells = np.unique((points // edge).astype(int), axis=0, return_inverse=True)[1].ravel()
+    order = rng.permutation(len(points))
+    members = [order[cells[order] == cell] for cell in range(cells.max() + 1)]
+    drawn = rng.integers(len(members), size=count)
+    return np.array([rng.choice(members[cell]) for cell in drawn])
+
+
+def _at_a_limit(rng: np.random.Generator, evaluator: Evaluator, count: int) -> FloatArray:
+    q = evaluator.robot.draw(rng, count)
+    limited = np.flatnonzero(np.isfinite(evaluator.robot.lower))
+    joint = rng.choice(limited, count)
+    robot, is_low = evaluator.robot, rng.random(count) < 0.5
+    q[np.arange(count), joint] = np.where(is_low, robot.lower[joint], robot.upper[joint])
+    return q
+
+
+def _unreachable(
+    rng: np.random.Generator, evaluator: Evaluator, count: int
+) -> tuple[FloatArray, FloatArray]:
+    effectors = len(evaluator.robot.effectors)
+    distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (count, effectors, 1))
+    positions = root(evaluator) + distance * unit(rng.standard_normal((count, effectors, 3)))
+    w, x, y, z = np.moveaxis(random_rotations(rng, count, effectors), -1, 0)
+    rotations = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return positions, np.moveaxis(np.array(rotations), (0, 1), (-2, -1))
+
+
+def root(evaluator: Evaluator) -> FloatArray:
+    """Return where the first joint is: nothing before it moves [m], (3,)."""
+    if evaluator.robot.is_chain:
+        return links(evaluator.robot)[0].transform[:3, 3]
+    return np.array(evaluator.model.body(evaluator.model.jnt_bodyid[0]).pos)
+
+
+def farthest(evaluator: Evaluator) -> float:
+    """Return a distance from the first joint that no effector exceeds [m]: its links in a row."""
+    lengths = []
+    for effector in evaluator.robot.effectors:
+        body, length = evaluator.model.body(effector).id, 0.0
+        first = evaluator.model.jnt_bodyid[0]
+        while body not in (first, 0):
+            length += float(np.linalg.norm(evaluator.model.body_pos[body]))
+            body = int(evaluator.model.body_parentid[body])
+        lengths.append(length)
+    return max(lengths)

@@ -1,0 +1,151 @@
+"""Laws of finding, measuring and ending what a program has started."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+from hostile_programs import case, program, running
+
+from plumbob.crosscheck import process_tree
+from plumbob.crosscheck.process_tree import carry, end_group, family
+
+ROOT = str(Path(__file__).parents[2])
+MARKER = (1 << 61) - 1234567
+# Starts a child in its session, one in another, and one that nothing but its marker betrays.
+BROOD = """
+import os, sys, time
+if os.fork():
+    if os.fork():
+        if os.fork():
+            print("ready", flush=True); time.sleep(99)
+        os.setsid()
+        if os.fork():
+            os._exit(0)
+        time.sleep(99)
+    os.setsid(); time.sleep(99)
+kept = b"x" * (40 << 20); time.sleep(99)
+"""
+
+
+@pytest.fixture(params=[MARKER, 0], ids=["marked", "unmarked"])
+def marker(request):
+    if request.param and process_tree.LIMIT is None:
+        pytest.skip("Linux has this limit only")
+    return request.param
+
+
+@pytest.fixture
+def brood(tmp_path):
+    file = tmp_path / "brood.py"
+    file.write_text(BROOD)
+    process = subprocess.Popen(
+        [sys.executable, "-I", "-S", str(file)],
+        stdout=subprocess.PIPE,
+        preexec_fn=partial(carry, MARKER),
+        start_new_session=True,
+    )
+    process.stdout.readline()
+    yield process
+    end_group(process.pid, MARKER)
+    process.communicate()
+    assert not running(tmp_path)
+
+
+def wait_for(condition, seconds=5.0):
+    deadline = time.monotonic() + seconds
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert condition()
+
+
+def test_a_family_is_group_descendants_and_what_carries_the_marker(brood, marker):
+    wait_for(lambda: len(family(brood.pid, marker)) == (4 if marker else 3))
+    assert len(family(brood.pid, MARKER - 1)) == 3
+    assert os.getpid() not in [process.pid for process in family(brood.pid, marker)]
+
+
+def test_memory_is_measured(brood):
+    wait_for(lambda: max(process.memory for process in family(brood.pid)) > 40 << 20)
+    assert all(process.memory < 80 << 20 for process in family(brood.pid))
+
+
+def test_a_group_is_ended_and_with_a_marker_all_that_can_be_found(brood, marker):
+    wait_for(lambda: len(family(brood.pid, MARKER)) == 4)
+    end_group(brood.pid, marker)
+    assert brood.wait() == -signal.SIGKILL
+    wait_for(lambda: len(family(brood.pid, MARKER)) == (0 if marker else 2))
+
+
+def test_what_has_ended_is_in_no_family():
+    process = subprocess.Popen(["sleep", "99"], start_new_session=True)
+    process.kill()
+    wait_for(lambda: family(process.pid) == [])
+    end_group(process.pid)
+    assert process.wait() == -signal.SIGKILL
+
+
+def test_what_forks_and_ends_on_and_on_is_caught_at_once(tmp_path, monkeypatch):
+    """No list of processes is true for as long as it takes to read it."""
+    monkeypatch.setattr(process_tree, "ROUNDS", 1)
+    code = (
+        "import os, time\nprint(flush=True)\nend = time.time() + 5\n"
+        "while time.time() < end:\n    if os.fork(): os._exit(0)"
+    )
+    command = [sys.executable, "-I", "-S", "-c", code, f"{tmp_path}/"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, start_new_session=True)
+    process.stdout.readline()
+    end_group(process.pid)
+    assert not running(tmp_path)
+    process.communicate()
+
+
+@pytest.mark.parametrize("columns", ["40", None])
+def test_what_runs_is_seen(tmp_path, monkeypatch, columns):
+    """Otherwise no test would see what is left running."""
+    if columns:
+        monkeypatch.setenv("COLUMNS", columns)
+    contestant = program(tmp_path, "pass")
+    contestant.answer(case(2))
+    assert len(running(tmp_path, 0.0)) == 1
+    contestant.close()
+    assert not running(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "end", ["os._exit(0)", "os.kill(os.getpid(), 9)", "os.kill(os.getpid(), 15)"]
+)
+def test_a_judge_that_is_killed_takes_the_program_with_it(tmp_path, end):
+    """Even one that ignores the end of its input and hangs."""
+    program(tmp_path, "while True: tick()")
+    judge = (
+        "import os, sys; sys.path[:0] = sys.argv[1:3]\n"
+        "from hostile_programs import LIMITS, case, program\n"
+        "from plumbob.crosscheck.verify.solvers.program import ProgramContestant\n"
+        "contestant = ProgramContestant([sys.executable, '-I', '-S', sys.argv[3]], limits=LIMITS)\n"
+        "contestant.answer(case(2))\n"
+        'contestant._ready().send(b\'{"id": 2, "parents": [1, 2, 3]}\\n\')\n'
+        f"contestant._ready()._exchange(0.1)\n{end}\n"
+    )
+    command = [sys.executable, "-c", judge, ROOT, f"{ROOT}/tests", str(tmp_path / "contestant.py")]
+    assert subprocess.run(command, check=False).returncode in (0, -9, -15)
+    assert not running(tmp_path)
+
+
+def test_each_contestant_has_one_guard_and_it_leaves(tmp_path):
+    contestant = program(tmp_path, "pass")
+    contestant.answer(case(2))
+    pid, marker = contestant._process.pid, contestant._process._marker
+
+    def guards():
+        listed = subprocess.run(["ps", "-A", "-ww", "-o", "args="], capture_output=True, check=True)
+        lines = listed.stdout.decode().splitlines()
+        return sum("read line ||" in line and line.endswith(f" {pid} {marker}") for line in lines)
+
+    assert guards() == 1
+    contestant.close()
+    assert guards() == 0

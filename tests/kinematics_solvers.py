@@ -1,0 +1,84 @@
+"""Solvers of kinematics for the tests: the textbook with chosen faults, and the reference."""
+
+from plumbob.crosscheck.verify.case import Case
+from plumbob.crosscheck.verify.functions import FunctionContestant
+from plumbob.crosscheck.verify.greeting import Greeting
+from plumbob.crosscheck.verify.judgement import Verdict
+from plumbob.crosscheck.verify.kinematics.faults import switches
+from plumbob.crosscheck.verify.kinematics.laws import HOLDS
+from plumbob.crosscheck.verify.kinematics.predictions import (
+    predict_forward,
+    predict_track,
+    solve,
+)
+from plumbob.crosscheck.verify.verify import verify
+from plumbob.reference import Skeleton, forward_kinematics, solve_ik, track
+
+FORWARD, INVERSE, TRACK, RESAMPLE = (
+    "forward_kinematics", "inverse_kinematics", "track", "resample",
+)  # fmt: skip
+METHODS = ("ccd", "fabrik")
+LIMITS = ("effector", "tolerance", "max_iterations")
+
+
+def judged(task, function, method="", seed=0, **greeting):
+    """Return the report on a function."""
+    said = Greeting(1, (task,), methods=(method,), **greeting)
+    return verify(FunctionContestant({task: function}, said), seed=seed).tasks[0]
+
+
+def case_of(task, inputs, **facts):
+    return Case("", task, inputs, "", HOLDS, facts=facts)
+
+
+def textbook(task, faults=(), method="ccd", outputs=None):
+    """Return the textbook's solver with some faults, by default with all outputs of its task."""
+    switched = switches(faults)
+
+    def function(**inputs):
+        if task == INVERSE:
+            local, positions, _ = solve(method, inputs, switched)
+            answer = {"local_rotations": local, "positions": positions}
+        elif task == TRACK:
+            answer = dict(predict_track(method, switched, case_of(task, inputs)))
+        else:
+            answer = predict_forward(switched, case_of(task, inputs))
+        return {name: answer[name] for name in outputs or answer.keys() - {"placed"}}
+
+    return function
+
+
+def reference(task, solver=""):
+    """Return the reference's solver of a task."""
+
+    def function(parents, offsets, local_rotations, target=None, curve=None, **inputs):
+        skeleton = Skeleton(parents, offsets)
+        if task == FORWARD:
+            return tuple(forward_kinematics(skeleton, local_rotations))
+        options = {name: inputs[name] for name in LIMITS}
+        if task == TRACK:
+            found = track(skeleton, curve, solver, start=local_rotations, **options)
+            return {"local_rotations": found.local_rotations, "positions": found.positions}
+        found = solve_ik(skeleton, local_rotations, target, solver, **options)
+        names = ("local_rotations", "positions", "residual", "iterations")
+        answer = {name: getattr(found, name) for name in names}
+        return answer | {"converged": found.outcome.name == "CONVERGED"}
+
+    return function
+
+
+def broken(report, least=Verdict.WRONG):
+    """Return the laws that are broken, in whatever case."""
+    findings = (finding for told in report.judgements for finding in told.findings)
+    return {finding.law for finding in findings if finding.verdict >= least}
+
+
+def told(report):
+    """Return what is said of findings that are not right."""
+    findings = (finding for one in report.judgements for finding in one.findings)
+    return [str(finding.sentence) for finding in findings if finding.verdict]
+
+
+def named(report):
+    """Return the classes of faults that are named."""
+    return [set(one.faults) for one in report.diagnosis.explanations]
