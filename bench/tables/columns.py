@@ -30,11 +30,6 @@ def titled(title: str) -> Column:
 SOLVER = text("solver", lambda record: label(record.solver))
 
 
-def setting(title: str, name: str, unit: str = "") -> Column:
-    """Return the column of a setting."""
-    return Column(title, unit, read=lambda record: record.settings[name])
-
-
 def least(columns: Iterable[Column]) -> list[Column]:
     """Return columns in which the least number is best."""
     return [replace(column, best="least") for column in columns]
@@ -105,11 +100,6 @@ def iterations(of: Sequence[str] = (MEDIAN, LARGEST)) -> list[Column]:
     return places("iterations", "", of, spread_of_iterations)
 
 
-def times(title: str, unit: str = "µs") -> list[Column]:
-    """Return the columns of the seconds that solves take, failures included."""
-    return places(title, unit, (MEDIAN, P95, "mean"), effort)
-
-
 def effort(record: Record) -> metrics.Effort:
     """Return where the seconds of a record's solves lie."""
     return metrics.effort(record.arrays["seconds"])
@@ -128,11 +118,6 @@ def places(
 def at(i: int, read: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """Return what reads one of several cells that are read together."""
     return lambda subject: read(subject)[i]
-
-
-def largest(records: Sequence[Record], name: str) -> float:
-    """Return the largest value in the arrays of this name."""
-    return max(metrics.spread(record.arrays[name]).largest for record in records)
 
 
 def words_in(value: float, unit: str) -> str:

@@ -18,13 +18,9 @@ N = 200
 ACCURATE, FASTEST = "Most accurate, one start", "Fastest, one start"
 
 
-def raced(make, solver, solved, seconds=1e-5, robot="arm", size=N, kind="one start"):
+def raced(make, solver, solved, seconds=1e-5, **more):
     """A record of N targets, the first so many of them solved, each in these seconds."""
-    count = len(seconds) if np.ndim(seconds) else N
-    changed = {"solved": np.arange(count) < solved, "claimed": np.ones(count, int)}
-    changed |= {"seconds": np.full(count, seconds), "stratum": np.zeros(count, int)}
-    changed |= dict.fromkeys(("position", "rotation", "beyond"), np.zeros(count))
-    return replace(make.raced(solver, kind, robot=robot, **changed), size=float(size))
+    return make.solving(solver, solved, seconds=seconds, **more)
 
 
 def asked(records, question, chapter="kinematics"):

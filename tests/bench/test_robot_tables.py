@@ -1,6 +1,7 @@
 """Tables on robots: every solver of a table is scored over the same targets, however slow."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from plumbob.bench.experiments.published.tables import published_ik
 from plumbob.bench.experiments.robots.figures import FIGURES
 from plumbob.bench.experiments.robots.participants import participants
 from plumbob.bench.experiments.robots.tables import (
-    LAYOUTS,
+    FALSE_SUCCESSES,
     outcomes,
     over_all,
     robot_by_robot,
@@ -40,16 +41,10 @@ def shares(table, heading):
 
 @pytest.fixture
 def run(make):
-    """What makes a record of the first `begun` of all targets, `hits` of them solved."""
+    """What makes a record of the first targets of `MANY`, `hits` of them solved."""
 
-    def made(solver, hits, begun=MANY, size=MANY, seconds=1e-4, robot="arm", start=ONE, **more):
-        solved = np.arange(begun) < hits
-        arrays = {
-            "solved": solved, "claimed": solved.astype(int), "stratum": np.arange(begun) % 2,
-            "seconds": np.full(begun, seconds), "position": np.where(solved, 1e-9, 0.5),
-            "rotation": np.zeros(begun), "beyond": np.zeros(begun),
-        } | {name: np.resize(values, begun) for name, values in more.items()}  # fmt: skip
-        return make.raced(solver, start, robot=robot, size=size, **arrays)
+    def made(solver, hits, start=ONE, robot="arm", **more):
+        return make.solving(solver, hits, start, robot, **{"count": MANY, "seconds": 1e-4} | more)
 
     return made
 
@@ -73,17 +68,13 @@ def test_success_counts_the_evaluation_says_and_times_count_failures(make):
     assert column(table, "set-up [ms]") == [250.0]
 
 
-def test_a_solver_that_says_nothing_is_not_said_to_lie(make):
-    silent = make.raced("a", ONE, claimed=[-1] * 4)
-    assert column(robot_by_robot(Results([silent])), "false successes") == [None]
-
-
-def test_a_solver_that_solves_nothing_has_no_residual(make):
-    none = make.raced("a", ONE, solved=[False] * 4, position=[np.nan] * 4, rotation=[np.nan] * 4)
-    table = robot_by_robot(Results([none]))
+def test_a_solver_that_says_nothing_is_not_said_to_lie_and_none_solved_leaves_no_residual(make):
+    changed = {"claimed": [-1] * 4, "solved": [False] * 4, "position": [np.nan] * 4}
+    table = robot_by_robot(Results([make.raced("a", ONE, **changed)]))
+    assert column(table, "false successes") == [None]
     assert column(table, "position residual, largest [m]") == [None]
-    far = make.raced("a", ONE, "unreachable", position=[np.nan] * 4)
-    assert column(unreachable(Results([far])), "distance left, median [m]") == [None]
+    table = unreachable(Results([make.raced("a", ONE, "unreachable", **changed)]))
+    assert column(table, "distance left, median [m]") == [None]
 
 
 @pytest.mark.parametrize("layout", SCORES, ids=lambda layout: layout.name)
@@ -113,10 +104,15 @@ def test_a_solver_cut_by_its_budget_is_scored_over_all_targets_and_never_leads(c
         assert {row for row, _ in best_cells(table)} <= {column(table, "solver").index("steady")}
 
 
-def test_strata_and_curves_count_what_was_never_begun(cut):
+def test_strata_and_curves_count_what_was_never_begun(cut, make):
     table = outcomes(cut)
     assert shares(table, "solved, joint space")["slow"] == (1, MANY // 2)
     assert shares(table, "solved, space")["slow"] == (1, MANY // 2)
+    hard = make.raced("a", ONE, solved=[True, False, True, True])
+    assert outcomes(Results([hard])).summary.points[-1] == (
+        "one start, strata from the hardest: space 1/2 = 50 % (9.5–90.5), "
+        "joint space 2/2 = 100 % (34.2–100)"
+    )
     curves = {
         sketch.name: {one.solver: one.y[-1] for one in sketch.data.panels[0].series}
         for figure in FIGURES[2:]
@@ -133,14 +129,6 @@ def test_records_of_other_targets_are_marked_and_not_ranked(run):
     assert "few" not in " ".join(table.summary.points)
     profile = FIGURES[4](results)
     assert [one.solver for one in profile.data.panels[0].series] == ["a", "b"]
-
-
-def test_the_hardest_strata_are_named_first(make):
-    hard = make.raced("a", ONE, solved=[True, False, True, True])
-    assert outcomes(Results([hard])).summary.points[-1] == (
-        "one start, strata from the hardest: space 1/2 = 50 % (9.5–90.5), "
-        "joint space 2/2 = 100 % (34.2–100)"
-    )
 
 
 def test_beyond_a_limit_missed_wrong_claim_and_no_answer_are_apart(run):
@@ -175,23 +163,22 @@ def test_the_outcomes_add_up_to_all_targets(make, seed):
     assert row[4] == np.count_nonzero(near & (arrays["beyond"] > 1e-6))
 
 
-@pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.name)
-def test_few_columns_are_shown_unasked(run, make, layout):
-    records = [run("a", 100), make.raced("a", ONE, "unreachable")]
-    table = layout(Results(records))
-    assert sum(not c.folded for c in table.columns) <= 9
-    assert not [c for c in table.columns if c.title == "false successes" and c.folded]
-
-
-def test_a_headline_names_the_ties_its_interval_and_its_n(run):
-    points = over_all(Results([run("a", 118), run("b", 117), run("c", 60)])).summary.points
-    assert points[0].startswith(
-        "the arm, one start: a, in a tie with b, 118/120 = 98.3 % (94.1–99.5); "
-    )
-    points = over_all(Results([run("a", 118), run("c", 60)])).summary.points
-    assert points[0].startswith("the arm, one start: a, 118/120 = 98.3 % (94.1–99.5); ")
-    many = over_all(Results([run(solver, 118) for solver in "abcdef"])).summary.points
-    assert many[0].startswith("the arm, one start: a, in a tie with 5 others, ")
+@pytest.mark.parametrize(
+    ("others", "leads"),
+    [
+        ([60], "a, "),
+        ([117, 60], "a, in a tie with b, "),
+        ([118] * 5, "a, in a tie with 5 others, "),
+    ],
+)
+def test_who_leads_and_who_ties_is_said_with_interval_and_marked(run, others, leads):
+    records = [run("a", 118), *(run(s, hits) for s, hits in zip("bcdef", others, strict=False))]
+    table = over_all(Results(records))
+    share = "118/120 = 98.3 % (94.1–99.5); "
+    assert table.summary.points[0].startswith(f"the arm, one start: {leads}{share}")
+    ties = [solver for solver, mark in by_solver(table, "mark").items() if "solved (tie)" in mark]
+    assert len(ties) == (leads.count("tie") and 1 + sum(hits > 60 for hits in others))
+    assert not [column for column in table.columns if column == FALSE_SUCCESSES and column.folded]
 
 
 def test_times_lead_only_where_the_same_targets_tell_them_apart(run, rng):
@@ -288,13 +275,6 @@ def test_who_is_cut_on_one_robot_is_not_ranked_over_all(run):
     assert "slow" not in table.summary.points[0]
 
 
-def test_a_tie_is_marked_as_one(run):
-    marks = by_solver(over_all(Results([run("a", 118), run("b", 117), run("c", 20)])), "mark")
-    assert "most solved (tie)" in marks["a"]
-    assert "most solved (tie)" in marks["b"]
-    assert marks["c"] == ""
-
-
 def test_the_map_has_a_field_for_each_robot_that_a_solver_takes(run, cut):
     results = Results([run("a", MANY), run("a", MANY, robot="leg"),
                        run("b", MANY, seconds=1e-2)])  # fmt: skip
@@ -346,28 +326,20 @@ def published(results, problem, quantity):
     return [(row[2], *row[4:7]) for row in rows if (row[1], row[3]) == (problem, quantity)]
 
 
-def test_published_numbers_stand_beside_those_measured_here(make):
-    results = Results(make.republished())
+@pytest.mark.parametrize(("size", "share", "mark"), [(2, 50.0, ""), (4, 25.0, "cut at 2 of 4")])
+def test_published_numbers_stand_beside_those_measured_here(make, size, share, mark):
+    """Targets that were never begun count as not solved."""
+    results = Results([replace(record, size=size) for record in make.republished()])
     assert published(results, "ur5", "solved [%]") == [
         ("KDL", 35.89, None, ""),
         ("KDL with restarts", 88.71, None, ""),
-        ("TRAC-IK, 5 ms", 99.62, 50.0, ""),
+        ("TRAC-IK, 5 ms", 99.62, share, mark),
     ]
-    assert published(results, "ur5", "infeasible by its own word [%]") == [
-        ("ik_LM, NR", 11.0, 50.0, "")
-    ]
+    infeasible = ("ik_LM, NR", 11.0, 100.0 - share, mark)
+    assert published(results, "ur5", "infeasible by its own word [%]") == [infeasible]
     assert published(results, "reachable", "iterations, mean") == [("FABRIK", 15.5, 5.0, "")]
     assert published(results, "unreachable", "iterations, largest") == [("FABRIK", None, 6.0, "")]
     text = markdown(published_ik(results))
     assert "jhavl/dkt at 1155dcb" in text
     assert "TRAC-IK README, v1.1.0" in text
-
-
-def test_a_published_table_counts_what_was_never_begun(make):
-    records = make.republished()
-    results = Results([record.__class__(**{**vars(record), "size": 4}) for record in records])
-    assert published(results, "ur5", "solved [%]")[-1][2:] == (25.0, "cut at 2 of 4")
-    assert published(results, "ur5", "infeasible by its own word [%]") == [
-        ("ik_LM, NR", 11.0, 75.0, "cut at 2 of 4")
-    ]
-    assert published_ik(results).summary.points[0].endswith("cut at 2 of 4")
+    assert published_ik(results).summary.points[0].endswith(mark)

@@ -23,16 +23,6 @@ from plumbob.cli import run_command
 N = 200
 
 
-def solving(make, solver, hits, seconds=1e-3, begun=N, kind="one start", mine=False, **facts):
-    """A record of N targets of a robot, the first so many solved, each in these seconds."""
-    arrays = {"solved": np.arange(begun) < hits, "claimed": np.ones(begun, int)}
-    arrays |= {"seconds": np.full(begun, seconds), "stratum": np.zeros(begun, int)}
-    arrays |= dict.fromkeys(("position", "rotation", "beyond"), np.zeros(begun))
-    made = replace(make.raced(solver, kind, **arrays), size=float(N))
-    facts |= {"entrant": True, "door": "mine.py"} if mine else {}
-    return replace(made, facts={**made.facts, **facts})
-
-
 def only(records):
     (standing,) = standings(Results(records))
     return standing
@@ -40,8 +30,11 @@ def only(records):
 
 def test_rank_share_and_times_are_those_of_the_records(make):
     """Beside the best and beside ours, with 95 % intervals."""
-    mine = solving(make, "Mine", 150, 4e-3, mine=True)
-    others = [solving(make, "pink", 190, 1e-3), solving(make, "Plumbob LM", 195, 2e-3)]
+    mine = make.solving("Mine", 150, seconds=4e-3, mine=True)
+    others = [
+        make.solving("pink", 190, seconds=1e-3),
+        make.solving("Plumbob LM", 195, seconds=2e-3),
+    ]
     standing = only([*others, mine])
     assert standing.asked == "Mine, robots, one start"
     assert standing.answer == "rank 3 of 3 solvers"
@@ -58,8 +51,8 @@ def test_rank_share_and_times_are_those_of_the_records(make):
 
 
 def test_the_best_is_told_by_how_much_it_is_faster(make):
-    mine = solving(make, "Mine", N, 1e-3, mine=True)
-    others = [solving(make, "pink", 100, 4e-3), solving(make, "Plumbob LM", N, 8e-3)]
+    mine = make.solving("Mine", N, seconds=1e-3, mine=True)
+    others = [make.solving("pink", 100, seconds=4e-3), make.solving("Plumbob LM", N, seconds=8e-3)]
     standing = only([*others, mine])
     assert standing.answer == "rank 1 of 3 solvers (tie)"
     assert "7.93 times faster than Plumbob LM" in standing.detail
@@ -67,17 +60,17 @@ def test_the_best_is_told_by_how_much_it_is_faster(make):
 
 
 def test_a_solver_that_is_cut_off_has_no_rank_and_one_that_solves_nothing_neither(make):
-    rivals = [solving(make, "pink", 100), solving(make, "mink", 50)]
-    cut = only([*rivals, solving(make, "Mine", 3, begun=18, mine=True)])
+    rivals = [make.solving("pink", 100), make.solving("mink", 50)]
+    cut = only([*rivals, make.solving("Mine", 3, begun=18, mine=True)])
     assert cut.answer == "not ranked, cut at 18 of 200"
     assert cut.detail == "1.5 % of 200 targets solved (0.5–4.3)"
-    none = only([*rivals, solving(make, "Mine", 0, mine=True)])
+    none = only([*rivals, make.solving("Mine", 0, mine=True)])
     assert none.answer == "not ranked, solves nothing"
 
 
 def test_a_rank_is_among_those_that_finished(make):
-    rivals = [solving(make, "pink", 100), solving(make, "mink", 18, begun=18)]
-    standing = only([*rivals, solving(make, "Mine", 20, mine=True)])
+    rivals = [make.solving("pink", 100), make.solving("mink", 18, begun=18)]
+    standing = only([*rivals, make.solving("Mine", 20, mine=True)])
     assert standing.answer == "rank 2 of the 2 of 3 solvers that finished"
 
 
@@ -146,8 +139,10 @@ RAISED = "It raised ValueError in line 3 of mine.py: no, on 4 of 200 targets"
 
 
 def test_what_a_solver_raised_stands_below_its_ranks_with_how_often(make):
-    good = solving(make, "Mine", 20, mine=True)
-    bad = solving(make, "Mine, 20 restarts", 0, mine=True, kind="restarts", trouble=RAISED)
+    good = make.solving("Mine", 20, mine=True)
+    bad = make.solving(
+        "Mine, 20 restarts", 0, mine=True, kind="restarts", facts={"trouble": RAISED}
+    )
     rank, trouble, unranked = standings(Results([bad, good]))
     assert rank.answer == "rank 1 of 1 solver"
     assert (trouble.asked, trouble.answer) == ("Mine, suite ik", "trouble on 1 of 2 problems")
@@ -166,10 +161,10 @@ def test_a_problem_that_could_not_be_measured_is_not_forgotten(make):
 
 def run_folder(make, tmp_path):
     """A folder with records of a solver of the user's beside others, on all robots and a cloth."""
-    records = [solving(make, "Mine", 150, mine=True), solving(make, "Mine, 20 restarts", 150,
-               kind="restarts", mine=True, trouble=RAISED)]  # fmt: skip
+    records = [make.solving("Mine", 150, mine=True), make.solving("Mine, 20 restarts", 150,
+               kind="restarts", mine=True, facts={"trouble": RAISED})]  # fmt: skip
     for kind in ("one start", "restarts"):
-        records += [solving(make, s, 190, kind=kind) for s in ("pink", "Plumbob LM")]
+        records += [make.solving(s, 190, kind=kind) for s in ("pink", "Plumbob LM")]
         records += [make.lacking(f"{peer}, {kind}", kind, "not installed") for peer in "abc"]
     RecordFile(tmp_path).append(records)
     return tmp_path
