@@ -226,6 +226,7 @@ def made_up(monkeypatch, tmp_path):
     pytest.importorskip("distributed", reason=INSTALLED)
     monkeypatch.setattr(run, "blocks", lambda suite, _: (b for b in PLANTED if b.suite == suite))
     monkeypatch.setattr(dask, "_LOOK", 0.01)
+    monkeypatch.setattr("plumbob.bench.harness.values.kind_of", lambda suite, task: None)
 
     def go(cluster, mix=False):
         monkeypatch.setattr(dask, "_connected", lambda *_: cluster)
