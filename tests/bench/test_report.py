@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import fields
 
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.harness.results import Results, results_of
@@ -287,6 +288,8 @@ SPOILT = {
 def test_a_record_that_is_not_of_its_type_costs_that_record_and_a_sentence(tmp_path, records, how):
     """Every record of an experiment that declares its types is spoilt, and left out by its line."""
     typed = [r for r in records if r.values is not None]
+    if how == "no settings, notes and facts":  # which some records do without
+        typed = [r for r in typed if any(f.required for f in fields(type(r.details)))]
     bad = [SPOILT[how](replace(r, solver="the spoilt one")) for r in typed]
     RecordFile(tmp_path).append([*records, *bad])
     results, warning = results_of(tmp_path)
