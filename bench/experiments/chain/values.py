@@ -10,12 +10,12 @@ class Reached(Values, frozen=True):
     """The answers to a batch of targets, (target,); lengths in metres."""
 
     residual: Floats1  # infinite without an answer
-    solved: Booleans1  # whether the residual is within the tolerance
     iterations: Floats1  # NaN where the solver does not say them
     distance: Floats1  # of the target from the root
     bend: Floats1  # how far joints are off the line from root to target
     excess: Floats1  # residual above distance - reach
     reach: float
+    solved: Booleans1 | None = None  # whether the residual is within the tolerance
     outcome: Integers1 | None = None  # the number of an `Outcome`, of our solvers
     history_low: Floats1 | None = None  # 10th percentile of the residuals by iteration
     history_median: Floats1 | None = None

@@ -37,14 +37,22 @@ class Dampers(Values, frozen=True):
 
 
 class StepDetails(Details, frozen=True):
-    """How many iterations each step makes, where that is fixed."""
+    """The length of a step [s], and how many iterations it makes, where that is fixed."""
 
+    h: float
     iterations: int = 0
 
 
+class DamperDetails(Details, frozen=True):
+    """The damping of every spring [N s/m], and after how many steps the laws are compared."""
+
+    damping: float
+    first: int
+
+
 KINDS = {
-    SWING: Kind(Converged),
+    SWING: Kind(Converged, StepDetails),
     ONE_STEP: Kind(Iterated, StepDetails),
     FEW: Kind(FewIterations, StepDetails),
-    DAMPERS: Kind(Dampers),
+    DAMPERS: Kind(Dampers, DamperDetails),
 }

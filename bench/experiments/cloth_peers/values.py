@@ -53,22 +53,27 @@ class Published(Values, frozen=True):
     vertices: int
 
 
-class ClothDetails(Details, frozen=True):
-    """Which cloth it is, and with which settings."""
+class FallDetails(Details, frozen=True):
+    """Which cloth falls, and with which settings it is solved."""
 
+    stiffness: float  # of the springs [N/m]
+    frame: float  # its length [s]
     size: int = 0  # particles along a side
-    stiffness: float = 0.0  # of the springs [N/m]
-    frame: float = 0.0  # its length [s]
     cloth: str = ""  # the name of a user's cloth
     rungs: tuple[str, ...] = ()  # the settings, (rung,)
     remarks: tuple[str, ...] = ()  # what happened, (remark,)
-    remark: str = ""  # why an engine is missing, or what is to be said of its stability
+
+
+class ClothDetails(Details, frozen=True):
+    """Why an engine is missing, or what is to be said of its stability."""
+
+    remark: str = ""
 
 
 KINDS = {
-    ONE_STEP: Kind(StepWork, ClothDetails),
-    MOTION: Kind(MotionWork, ClothDetails),
-    NEEDED: Kind(Counted, ClothDetails),
+    ONE_STEP: Kind(StepWork, FallDetails),
+    MOTION: Kind(MotionWork, FallDetails),
+    NEEDED: Kind(Counted, FallDetails),
     STABILITY: Kind(Stability, ClothDetails),
     LIU: Kind(Published, ClothDetails),
     MISSING: Kind(Values, ClothDetails),
