@@ -5,10 +5,12 @@ fast or slow by the accident of its addresses too.
 """
 
 import contextlib
+import fcntl
 import json
 import math
 import os
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
@@ -42,6 +44,7 @@ Taken = dict[tuple[RowKey, str], list[tuple[float, float]]]
 Ratios = dict[tuple[RowKey, str], Ratio]
 
 SEED = 20130
+PREFIX = "plumbob-rerun-"
 HOW = (
     "Both revisions are measured side by side in fresh processes, {pairs} times each, the order "
     "drawn by lot. Answers are compared to the bit. Times are decided by Wilcoxon's signed-rank "
@@ -77,8 +80,8 @@ def rerun(plan: Plan, root: Path, tell: Callable[[str], None] = lambda _: None) 
         ValueError: if there is no such revision, nothing to measure in both, or a process ends
             before it has measured all.
     """
-    with tempfile.TemporaryDirectory(prefix="plumbob-rerun-") as folder:
-        old, new = Path(folder, "old"), Path(folder, "new")
+    with _temporary_folder() as folder:
+        old, new = folder / "old", folder / "new"
         _check_out(root, plan.revision, old)
         new.symlink_to(root, target_is_directory=True)  # so that both paths are as long
         return _measured((old, new), plan, tell)
@@ -100,6 +103,26 @@ def clone_root(folder: Path) -> Path:
         "--rerun: expected to be run in a clone of Plumbob, whose revisions it measures, "
         f"got {folder}: change to a clone, or compare two folders of records"
     )
+
+
+@contextlib.contextmanager
+def _temporary_folder() -> Iterator[Path]:
+    """Yield a locked folder; remove those whose process was killed, which ended its lock."""
+    for old in Path(tempfile.gettempdir()).glob(f"{PREFIX}*/old"):
+        with contextlib.suppress(OSError):
+            _remove_abandoned(old.parent)
+    with tempfile.TemporaryDirectory(prefix=PREFIX) as name, Path(name, "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield Path(name)
+
+
+def _remove_abandoned(folder: Path) -> None:
+    """Remove a folder of this user's that no process holds; others may have put any there."""
+    status = folder.lstat()
+    if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid():
+        with Path(folder, "lock").open() as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(folder)
 
 
 def _check_out(root: Path, revision: str, folder: Path) -> None:

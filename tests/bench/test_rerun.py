@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from plumbob import cli
-from plumbob.bench.comparison.rerun import Plan, rerun
+from plumbob.bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
 from plumbob.bench.comparison.rows import Verdict
 from plumbob.bench.harness import machine
 
@@ -208,7 +209,7 @@ def test_what_cannot_be_measured_is_said_and_nothing_is_left(repository):
 @pytest.mark.skipif(not Path("/proc").exists(), reason="reads the states of processes in /proc")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 def test_a_signal_leaves_no_worktree_no_file_and_no_process(number, repository, temporary, start):
-    """Ctrl-C goes to the terminal's whole group; SIGKILL leaves the files, and no process."""
+    """Ctrl-C goes to the terminal's whole group; what SIGKILL leaves, the next start removes."""
     measure_endlessly(repository)
     process = start()
     pids = temporary.with_name("pids")
@@ -293,3 +294,16 @@ def test_this_revision_beside_itself_differs_in_nothing():
     made = rerun(Plan("HEAD", ("timing",), ("10 balls/one pose",)), root)
     assert len(made.rows) >= 4
     assert called(made) == {}
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_only_own_folders_of_runs_that_were_killed_are_removed(tmp_path, monkeypatch, own):
+    """Everyone may write to the folder of temporary files."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    folder = tmp_path / f"{PREFIX}killed"
+    (folder / "old").mkdir(parents=True)
+    (folder / "lock").touch()
+    user = os.getuid()
+    monkeypatch.setattr(os, "getuid", lambda: user if own else user + 1)
+    with _temporary_folder():
+        assert folder.exists() != own
