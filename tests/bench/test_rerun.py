@@ -224,6 +224,18 @@ def test_a_signal_leaves_no_worktree_no_file_and_no_process(number, repository, 
     assert eventually(lambda: not any(map(is_running, started)))
     assert worktrees(repository) == 1
     assert bool(list(temporary.iterdir())) is killed
+    if killed:
+        assert start("--only", "no such solver").wait(timeout=60) == 2
+    assert list(temporary.iterdir()) == []
+
+
+def test_a_rerun_beside_another_one_leaves_its_files(repository, temporary, start):
+    measure_endlessly(repository)
+    start()
+    assert eventually(temporary.with_name("pids").exists)
+    [folder] = temporary.iterdir()
+    assert start("--only", "no such solver").wait(timeout=60) == 2
+    assert (folder / "old" / "bench").is_dir()
 
 
 @pytest.mark.parametrize("content", [bytes(20_000), os.urandom(20_000)], ids=["files", "archive"])
