@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..peers.entrant import Entrant
-from .values import stored
 
 if TYPE_CHECKING:
     from ..problems.own import OwnProblem
@@ -27,6 +26,8 @@ class Measured(NamedTuple):
     @property
     def arrays(self) -> Mapping[str, Any]:
         """The values by the names they have on record."""
+        from .values import stored  # the command line lists blocks without NumPy
+
         return {} if self.values is None else stored(self.values)
 
 

@@ -28,6 +28,8 @@ def test_only_runs_the_stopwatch_and_timing_read_a_clock():
     # PlaCo lives in an environment of its own, where nothing of ours is: it times itself.
     allowed = {"harness/measure.py", "harness/run.py", "harness/stopwatch.py"}
     allowed |= {"peers/ik/placo_program.py"}
+    # What these say their solver took is less than their call: the round trip, the choice.
+    allowed |= {"peers/contestant.py", "peers/ik/eaik.py"}
     assert readers >= allowed
     assert {reader for reader in readers if "timing/" not in reader} == allowed
 

@@ -77,9 +77,9 @@ def blocks(scale: Scale) -> Iterator[Block]:
             yield Block(SUITE, f"robots/{name}", EVERY_SOLVER, absent, ANY, 0, facts)
     peers = registry.robot_peers(scale.entrants)
     made = by_lot(block for peer in peers for block in blocks_of(peer, [*here, *own], scale))
+    entered = {f"{kind}/{name}": own[name] for kind in ("robots", "unreachable") for name in own}
     for block in made:
-        name = block.problem.rpartition("/")[2]
-        yield block.on(own[name]) if name in own else block
+        yield block.on(entered[block.problem]) if block.problem in entered else block
     for entrant in scale.entrants:
         if entrant.offers(SUITE) and ROBOT_TASK not in entrant.tasks:
             measure, facts = partial(not_asked, NO_ROBOTS), _facts(REACHABLE, "every robot")
