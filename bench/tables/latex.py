@@ -23,8 +23,8 @@ WIDTHS = {"column": 240.0, "page": 504.0}
 _UNITS = {"pt": 1.0, "mm": 72.27 / 25.4, "cm": 72.27 / 2.54, "in": 72.27}
 NARROWEST, WIDEST = 160.0, 2000.0
 SIZES = (10, 9, 8)
-# Tables of more lines break over pages.
-MOST_LINES = 40
+# Tables of more rows, or lines with those of the caption, break over pages.
+MOST_ROWS, MOST_LINES = 40, 50
 # Letters of a name, of which a paper needs no more.
 _LONGEST = 200
 # Words are broken into pieces of so many letters where columns do not fit otherwise.
@@ -80,7 +80,8 @@ def latex(table: Table, width: str = "page") -> str:
     if not _fits(columns, page.width, size):
         columns = [column for column in columns if not column.column.folded]
     parts = [_Part(table, part, page.width, size) for part in _parts(table, columns, page, size)]
-    is_long = len(table.rows) > MOST_LINES or sum(part.lines for part in parts) > MOST_LINES
+    lines = sum(part.lines for part in parts) + _LETTER * SIZES[0] * len(_said(table)) / page.width
+    is_long = len(table.rows) > MOST_ROWS or lines > MOST_LINES
     body = _long(table, parts, page) if is_long else _float(table, parts, page)
     return "\n".join([_PACKAGES, *_comments(table, len(columns)), *body, ""])
 
@@ -234,9 +235,9 @@ class _Part:
 
     @property
     def lines(self) -> int:
-        """Roughly how many lines it has."""
+        """Roughly how many lines it has, four of them in its head."""
         places = [(self.columns[j], self.widths[j]) for j in self.flexible]
-        return sum(
+        return 4 + sum(
             max((math.ceil(1.2 * c.letter * len(c.texts[i]) / w) for c, w in places), default=1)
             for i in range(len(self.table.rows))
         )  # fmt: skip
@@ -337,8 +338,8 @@ def _setting(size: int) -> list[str]:
     ]
 
 
-def _caption(table: Table, ordinal: str = "") -> str:
-    """Return caption and label: set-up, samples, machine and versions."""
+def _said(table: Table, ordinal: str = "") -> str:
+    """Return what the caption says: set-up, samples, machine and versions."""
     title = shortened(table.title, _LONGEST)
     sentences = [
         f"{title}{ordinal}.",
@@ -346,7 +347,12 @@ def _caption(table: Table, ordinal: str = "") -> str:
         "Best in bold, ties too." if best_cells(table) else "",
         f"{shortened(table.provenance, 3 * _LONGEST)}." if table.provenance else "",
     ]
-    text = breakable(" ".join(filter(None, sentences)))
+    return " ".join(filter(None, sentences))
+
+
+def _caption(table: Table, ordinal: str = "") -> str:
+    """Return caption and label."""
+    title, text = shortened(table.title, _LONGEST), breakable(_said(table, ordinal))
     label = re.sub(r"[^\w:.-]", "-", table.name, flags=re.ASCII)
     return rf"\caption[{{{escaped(title)}}}]{{{text}}}\label{{tab:{label}}}"
 
