@@ -103,7 +103,7 @@ def a_record(solver="ccd", **more):
     """A record that a report can be made of."""
     facts = {"subject": "kinematics", "group": "x", "work": "one pose a call"}
     return Record("timing", "kinematics/x/one pose a call", solver, {"operations": 1}, facts=facts,
-                  arrays={"seconds": np.ones(5), "moved": np.array(0)}, **more)  # fmt: skip
+                  arrays={"seconds": np.ones((1, 5)), "moved": np.array(0)}, **more)  # fmt: skip
 
 
 def in_the_way(path, kind):
@@ -223,7 +223,9 @@ def test_a_figure_that_cannot_be_drawn_costs_itself_and_a_sentence(capsys, monke
 
 
 def test_a_quantity_without_a_finite_number_is_not_called_unknown(capsys):
-    RecordFile("out").append([replace(a_record(), arrays={"seconds": np.full(5, np.nan)})])
+    RecordFile("out").append(
+        [replace(a_record(), arrays={"seconds": np.full((1, 5), np.nan), "moved": np.array(0)})]
+    )
     code, _, err = plumbob(capsys, "history", "out", "--quantity", "seconds")
     assert (code, err) == (
         2, "plumbob: quantity: expected finite numbers of 'seconds', got none\n"

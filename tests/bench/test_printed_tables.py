@@ -120,7 +120,7 @@ def test_the_tables_of_other_suites_are_not_printed(capsys, tmp_path, records):
     RecordFile(tmp_path).append(records)
     terminal.print_tables(["ik"], tmp_path)
     out = capsys.readouterr().out
-    assert "Robots, restarts: success, time and accuracy" in out
+    assert "Robots one by one: success, time and accuracy" in out
     assert "Claims held" not in out
 
 

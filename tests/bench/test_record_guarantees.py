@@ -11,6 +11,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 
 from plumbob import bench
@@ -109,7 +110,7 @@ def test_affinity_and_load_are_notes_and_no_identity(solvers, tmp_path, monkeypa
     go(tmp_path)
     machine.stamp.cache_clear()
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
-    monkeypatch.setattr(os, "getloadavg", lambda: (99.0, 9.0, 9.0))
+    monkeypatch.setattr(psutil, "getloadavg", lambda: (99.0, 9.0, 9.0))
     states = [event.state for event in go(tmp_path)]
     assert states == [run.KEPT, run.KEPT]
     assert machine.conditions()["affinity"] == 1
