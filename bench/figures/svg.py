@@ -17,6 +17,8 @@ _OF_A_TAG = re.compile(
 # Hundredths of a point are not seen.
 _DECIMALS = re.compile(r"(?<![\w#])-?\d+\.\d\d+(?![\w])")
 _FONT = re.compile(r"font: (?:(\d+) )?([\d.]+px) [^;\"]*")
+# Between the letters and numbers of a path, and within a style.
+_SPACES = re.compile(r"(?<=[MLCQz:;]) | (?=[MLCQz][ \d\"-])| (?=\")")
 _IDS = re.compile(r'((?<= )id="|href="#|url\(#)')
 _COLOURS = re.compile("|".join(COLOURS.values()))
 _NAMES = {colour: name for name, colour in COLOURS.items()}
@@ -42,4 +44,4 @@ def _shorter_tag(tag: str, prefix: str) -> str:
     tag = _DECIMALS.sub(lambda number: f"{float(number[0]):.1f}".removesuffix(".0"), tag)
     tag = _FONT.sub(r"font-size: \2; font-weight: \1", tag).replace("; font-weight: ;", ";")
     tag = _COLOURS.sub(lambda colour: f"var(--{_NAMES[colour[0]]})", tag)
-    return _IDS.sub(rf"\g<1>{prefix}-", tag)
+    return _SPACES.sub("", _IDS.sub(rf"\g<1>{prefix}-", tag))
