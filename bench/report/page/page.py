@@ -12,6 +12,8 @@ from typing import NamedTuple
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+from plumbob.crosscheck.verify.output import BASE_STYLE
+
 from ...figures import svg
 from ...figures.sketch import Drawing
 from ...harness.record import Record
@@ -77,7 +79,7 @@ def render(shown: Shown, newest: Record, missing: Sequence[str]) -> str:
     template = _environment().get_template("page.html")
     scripts = [SCRIPT, *([motion.SCRIPT] if shown.scenes else [])]
     return template.render(
-        style=Markup((_HERE / "page.css").read_text(encoding="utf-8")),
+        style=Markup(BASE_STYLE + (_HERE / "page.css").read_text(encoding="utf-8")),
         motion_style=Markup(motion.STYLE if shown.scenes else ""),
         scripts=list(map(Markup, scripts)),
         policy=policy(scripts),

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from ..judgement import Report, TaskReport
 from ..sentence import Sentence, sentence
 from ..task import TASKS
-from . import comparison, drawing, words
+from . import BASE_STYLE, comparison, drawing, words
 from .geometry import scene
 from .words import Presentation, Say
 
@@ -36,7 +36,7 @@ WORDS = {
 def render(report: Report, context: Presentation) -> str:
     """Return the page; nothing that a solver says stands in it unescaped."""
     return _environment(context.say).get_template("page.html").render(
-        style=Markup((_HERE / "page.css").read_text(encoding="utf-8")),
+        style=Markup(BASE_STYLE + (_HERE / "page.css").read_text(encoding="utf-8")),
         language={"zh": "zh-CN"}.get(context.language, context.language),
         words=WORDS,
         verdicts=words.VERDICTS,
