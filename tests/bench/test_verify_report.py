@@ -427,11 +427,13 @@ def test_every_word_of_the_page_has_a_translation():
         ("", 10, []),
         ("one two three", 7, ["one two", "three"]),
         ("正运动学是错的，请改。", 8, ["正运动学", "是错的，", "请改。"]),
+        ("正运动，学", 6, ["正运", "动，学"]),
+        ("正运（动学）", 6, ["正运", "（动", "学）"]),
         ("abcdefghij", 4, ["abcd", "efgh", "ij"]),
-        ("in 正运动学 only", 8, ["in", "正运动学", "only"]),
+        ("in 正运动学 only", 8, ["in 正运", "动学", "only"]),
     ],
 )
-def test_no_line_is_wider_than_it_may_be(text, size, expected):
+def test_lines_are_broken_where_they_may_be(text, size, expected):
     assert terminal.wrapped(text, size=size) == expected
     assert terminal.wrapped(text, "  ", size + 2) == [f"  {line}" for line in expected]
 

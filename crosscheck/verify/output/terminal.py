@@ -35,6 +35,12 @@ WIDTH, HEIGHT, ENDLESS = 80, 24, sys.maxsize
 # third and an eighth of the room.
 _WHY, _COMPLAINT = 6, 3
 _CUT = " …"
+# What a line may be broken between: words, and letters of scripts that are written without spaces.
+_PIECE = re.compile(
+    r"[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]|[^\s\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]+|\s+"
+)
+# Marks that no line begins with, and that none ends with.
+_CLOSING, _OPENING = "，。、；：！？）》」』”’", "（《「『"
 _PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}
 _WIDEST = 10_000
 _PAPER = Console(**_PLAIN, width=_WIDEST, color_system=None, force_terminal=False)
@@ -149,9 +155,28 @@ def _numbers(failure: CaseJudgement, say: Say, most: int) -> list[str]:
 
 
 def wrapped(text: str, indent: str = "", size: int = WIDTH) -> list[str]:
-    """Return a text in lines of at most so many columns, each indented."""
-    found = Text(visible(text)).wrap(_PAPER, size - len(indent))
-    return [f"{indent}{line.plain.rstrip()}" for line in found if line.plain.strip()]
+    """Return a text in lines of at most so many columns, each indented.
+
+    Rich breaks lines at spaces only, which Chinese has none of.
+    """
+    rows, line = [], indent
+    for piece in _pieces(text, size - len(indent)):
+        if cell_len(line + piece) <= size or not line.strip():
+            line += piece
+            continue
+        moved = _PIECE.findall(line)[-1] if piece in _CLOSING or line[-1] in _OPENING else ""
+        rows.append(line.removesuffix(moved).rstrip())
+        line = indent + moved + piece.lstrip()
+    return [*rows, line.rstrip()] if line.strip() else rows
+
+
+def _pieces(text: str, size: int) -> list[str]:
+    """Return words, spaces and single letters, those that fit no line cut."""
+    return [
+        match[i : i + size]
+        for match in _PIECE.findall(visible(text))
+        for i in range(0, len(match), size)
+    ]
 
 
 def paragraphs(sentences: Iterable[Sentence], say: Say, indent: str = "") -> list[str]:
