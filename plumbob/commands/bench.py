@@ -15,8 +15,8 @@ from plumbob.bench.experiments import SUITES
 from plumbob.bench.harness.progress import TROUBLE, Progress, listening
 from plumbob.bench.text import visible
 
-from ..help_text import block
-from ..terminal import lines_in_a_pipe, print_ending, print_tables, progress
+from ..help_text import block, fitted
+from ..terminal import lines_in_a_pipe, print_ending, print_tables, progress, width
 from .options import MISSED, REPORT, SUCCESS, Fresh, Output, known, writable
 from .report import write_report
 from .verify import program_of
@@ -164,12 +164,12 @@ def _choice(suites: Sequence[str], scale: str, asked: Asked) -> "Choice":
 
 
 def _look_ahead(suites: Sequence[str], choice: "Choice", output: Path, listing: bool) -> int:
-    from plumbob.commands.outlook import dry_run
-
     from .listing import listed
+    from .outlook import dry_run
 
     for line in listed(suites, choice) if listing else dry_run(suites, choice, output):
-        print("".join(part if part.isspace() else visible(part) for part in _COLUMNS.split(line)))
+        parts = (part if part.isspace() else visible(part) for part in _COLUMNS.split(line))
+        print("\n".join(fitted("".join(parts), width())))
     return SUCCESS
 
 
