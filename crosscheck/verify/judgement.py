@@ -56,6 +56,14 @@ class CaseJudgement:
             return Verdict.BROKEN
         return max((finding.verdict for finding in self.findings), default=Verdict.UNDECIDED)
 
+    @property
+    def complaints(self) -> list[Sentence]:
+        """The sentences about a failure, or about laws that are not kept, the worst first."""
+        if isinstance(self.answer, Failure):
+            return [self.answer.sentence]
+        broken = [finding for finding in self.findings if finding.verdict is not Verdict.RIGHT]
+        return [finding.sentence for finding in sorted(broken, key=lambda f: -f.verdict)]
+
 
 @dataclass(frozen=True, eq=False)
 class Explanation:

@@ -6,11 +6,9 @@ from typing import Any
 
 import pytest
 
-from .contestant import Failure
 from .functions import FunctionContestant
-from .judgement import LEAST_SHARE, CaseJudgement, TaskReport, Verdict
+from .judgement import LEAST_SHARE, TaskReport, Verdict
 from .message import decode_greeting
-from .sentence import Sentence
 from .solvers.host import Solver
 from .verify import DISCIPLINES, judge_cases, trials
 
@@ -71,14 +69,7 @@ def _check(report: TaskReport, name: str) -> None:
         reason = "it was not asked, since too many answers before were waited for"
         pytest.fail(reason, pytrace=False)
     if judgement.verdict is Verdict.UNDECIDED:
-        pytest.skip("; ".join(map(str, _complaints(judgement))) or "nobody can tell")
+        pytest.skip("; ".join(map(str, judgement.complaints)) or "nobody can tell")
     if judgement.verdict > Verdict.UNDECIDED:
         likely = [e.sentence for e in report.diagnosis.explanations if e.share >= LEAST_SHARE]
-        pytest.fail("\n".join(map(str, [*_complaints(judgement), *likely])), pytrace=False)
-
-
-def _complaints(judgement: CaseJudgement) -> list[Sentence]:
-    if isinstance(judgement.answer, Failure):
-        return [judgement.answer.sentence]
-    broken = [finding for finding in judgement.findings if finding.verdict is not Verdict.RIGHT]
-    return [finding.sentence for finding in sorted(broken, key=lambda broken: -broken.verdict)]
+        pytest.fail("\n".join(map(str, [*judgement.complaints, *likely])), pytrace=False)
