@@ -7,19 +7,34 @@ from typing import NamedTuple
 
 from plumbob.crosscheck.engines.file_kind import FRAGMENT
 from plumbob.crosscheck.robots import files
-from plumbob.crosscheck.robots.files import AGREES, DIFFERS, ENGINES, Checked, Found, Reading
+from plumbob.crosscheck.robots.files import (
+    AGREES,
+    DIFFERS,
+    ENGINES,
+    CheckedFile,
+    FileReading,
+    FileSelection,
+)
 
 from ...tables.columns import text
 from ...tables.table import Column, Summary, Table, cells, words
 
 # Outcomes by which a file is counted; the first two are shown whether there are any or not.
-OUTCOMES = (AGREES, DIFFERS, files.DEVIATES, files.UNREAD, files.REFUSED, files.NEITHER, files.LOST)
+OUTCOMES = (
+    AGREES,
+    DIFFERS,
+    files.DEVIATES,
+    files.UNREAD,
+    files.REFUSED,
+    files.NEITHER,
+    files.CRASHED,
+)
 SHOWS = (
     "Differences are the largest in random configurations, or frames: of positions and linear "
     "velocities over the extent of the links, of rotation matrices and angular velocities."
 )
 # A kind of files and an engine, with all readings of such files by it.
-Group = tuple[tuple[str, str], list[Reading]]
+Group = tuple[tuple[str, str], list[FileReading]]
 
 
 class Report(NamedTuple):
@@ -30,7 +45,7 @@ class Report(NamedTuple):
     disagreements: int
 
 
-def report(found: Found, checked: Sequence[Checked]) -> Report:
+def report(found: FileSelection, checked: Sequence[CheckedFile]) -> Report:
     """Return the tables of files that were checked."""
     readings = [reading for file in checked for reading in file.readings]
     engines = dict.fromkeys(engine for engines in ENGINES.values() for engine in engines)
@@ -48,7 +63,7 @@ def report(found: Found, checked: Sequence[Checked]) -> Report:
     return Report(table, _summary(list(_groups(checked)), summary), disagreements)
 
 
-def _groups(checked: Sequence[Checked]) -> Iterator[Group]:
+def _groups(checked: Sequence[CheckedFile]) -> Iterator[Group]:
     """Yield the readings of each kind of files by each engine, if there are any."""
     for kind, engines in ENGINES.items():
         of_kind = [r for file in checked if file.file.kind == kind for r in file.readings]
@@ -71,7 +86,7 @@ def _summary(groups: Sequence[Group], summary: Summary) -> Table:
     return Table("summary", title, columns, cells(columns, groups), summary=summary)
 
 
-def _outcome(engine: str, checked: Checked) -> str | None:
+def _outcome(engine: str, checked: CheckedFile) -> str | None:
     """Return what came of an engine's reading, with the difference; None if it was not asked."""
     reading = next((r for r in checked.readings if r.engine == engine), None)
     if reading is None or reading.difference is None:
@@ -88,26 +103,26 @@ def _largest_difference(group: Group) -> float | None:
     return max((r.difference or 0.0 for r in group[1] if r.outcome == AGREES), default=None)
 
 
-def _name(checked: Checked) -> str:
+def _name(checked: CheckedFile) -> str:
     root = checked.file.root
     return (Path(root.resolve().name) / checked.file.path.relative_to(root)).as_posix()
 
 
-def _points(checked: Checked) -> Iterator[str]:
+def _points(checked: CheckedFile) -> Iterator[str]:
     """Return what is to be said of a file beyond its row."""
     reasons = [f"{r.engine}: {r.outcome}: {r.why}" for r in checked.readings if r.why]
     notes = dict.fromkeys(note for reading in checked.readings for note in reading.notes)
     return (f"{_name(checked)}: {sentence}" for sentence in (*reasons, *notes))
 
 
-def _sentence(found: Found, checked: Sequence[Checked], disagreements: int) -> str:
+def _sentence(found: FileSelection, checked: Sequence[CheckedFile], disagreements: int) -> str:
     fragments = sum(file.file.kind == FRAGMENT for file in checked)
     outcomes = ({reading.outcome for reading in file.readings} for file in checked)
     unread = sum(outcome == {files.NEITHER} for outcome in outcomes)
     silent = f", {_counted(unread, 'is', 'are')} read by none" if unread else ""
     differ = _counted(disagreements, "reading disagrees", "readings disagree")
     parts = _counted(fragments, "is a part", "are parts")
-    others = _counted(found.others, "XML file is", "XML files are")
+    others = _counted(found.ignored, "XML file is", "XML files are")
     return (
         f"Of {len(checked) - fragments:,} files {differ if disagreements else 'nothing disagrees'}"
         f"{silent}; {parts} that others include, {others} of other kinds"
