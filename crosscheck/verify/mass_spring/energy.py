@@ -14,7 +14,7 @@ import numpy as np
 from plumbob.reference.mass_spring import kinetic_energy, potential_energy
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import either, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
@@ -65,7 +65,7 @@ def _displaced(case: Case, seed: int) -> Case:
     )
 
 
-def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold the energies against formulas and the work of forces, and name the faults."""
     judgements = [_judge_case(one, asked, greeting) for one in asked]
     return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
@@ -94,7 +94,7 @@ def tolerance(p: Problem, epsilon: float) -> float:
     return ROUNDINGS * epsilon * terms + 1e-300
 
 
-def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJudgement:
+def _judge_case(one: Exchange, asked: Sequence[Exchange], greeting: Greeting) -> CaseJudgement:
     p = problem_of(one.case.inputs)
     system, state = system_of(p), state_of(p)
     _, seconds = timed(
@@ -112,7 +112,7 @@ def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJ
 
 
 def _findings(
-    one: Asked, answer: Answer, asked: Sequence[Asked], p: Problem, allowed: float
+    one: Exchange, answer: Answer, asked: Sequence[Exchange], p: Problem, allowed: float
 ) -> list[Finding]:
     given, expected = answer.values, right(p)
     if not np.isfinite(list(given.values())).all():
@@ -222,7 +222,7 @@ def predict(faults: Sequence[Option], p: Problem) -> dict[str, float]:
 
 
 def _diagnose(
-    asked: Sequence[Asked], judgements: Sequence[CaseJudgement], greeting: Greeting
+    asked: Sequence[Exchange], judgements: Sequence[CaseJudgement], greeting: Greeting
 ) -> Diagnosis:
     answered = [
         (problem_of(one.case.inputs), one.answer.values)
@@ -241,8 +241,8 @@ def _diagnose(
         if matches:
             keys = tuple(" + ".join(one.key for one in faults) for faults in matches)[:3]
             said = either([[one.sentence for one in faults] for faults in matches])
-            return Diagnosis((Explanation(keys, said, 1.0, 0.0),), tried=tried)
-    return Diagnosis(first_broken=first_broken(judgements), tried=tried)
+            return Diagnosis((Explanation(keys, said, 1.0, 0.0),), variant_count=tried)
+    return Diagnosis(first_broken=first_broken(judgements), variant_count=tried)
 
 
 def _matches(faults: Sequence[Option], p: Problem, given: Values, epsilon: float) -> bool:

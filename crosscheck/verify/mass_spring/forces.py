@@ -9,7 +9,7 @@ import numpy as np
 from plumbob.reference.mass_spring import forces as reference_forces
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import Variant, either, explain, first_broken
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
@@ -40,7 +40,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return task_cases(TASK, greeting, seed, thorough)
 
 
-def judge(asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+def judge(asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
     """Hold the forces against the formula and the balance of momentum, and name the faults."""
     judgements = [_judge_case(one, asked, greeting) for one in asked]
     return TaskReport(TASK, "", judgements, _diagnose(asked, judgements, greeting))
@@ -55,7 +55,7 @@ def tolerance(p: Problem, epsilon: float) -> float:
     return ROUNDINGS * epsilon * float((springs + weights).max())
 
 
-def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJudgement:
+def _judge_case(one: Exchange, asked: Sequence[Exchange], greeting: Greeting) -> CaseJudgement:
     p = problem_of(one.case.inputs)
     system, state = system_of(p), state_of(p)
     forces, seconds = timed(lambda: reference_forces(system, state))
@@ -70,7 +70,12 @@ def _judge_case(one: Asked, asked: Sequence[Asked], greeting: Greeting) -> CaseJ
 
 
 def _findings(
-    one: Asked, answer: Answer, asked: Sequence[Asked], p: Problem, expected: Any, allowed: float
+    one: Exchange,
+    answer: Answer,
+    asked: Sequence[Exchange],
+    p: Problem,
+    expected: Any,
+    allowed: float,
 ) -> list[Finding]:
     given = answer.values["forces"]
     if not np.isfinite(given).all():
@@ -141,7 +146,7 @@ def describe(keys: Sequence[str]) -> Sentence:
 
 
 def _diagnose(
-    asked: Sequence[Asked], judgements: Sequence[CaseJudgement], greeting: Greeting
+    asked: Sequence[Exchange], judgements: Sequence[CaseJudgement], greeting: Greeting
 ) -> Diagnosis:
     wrong = [one.verdict >= Verdict.WRONG for one in judgements]
     if not any(wrong):

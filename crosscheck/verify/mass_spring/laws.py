@@ -10,7 +10,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.judging import StepJudgement, judge_step
 
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import largest_gap
 from ..judgement import Finding, Verdict
 from ..sentence import Sentence, sentence
@@ -248,9 +248,9 @@ def consistency(one: Context) -> Finding | None:
     return bounded("consistency", gap, tolerance, "m/s²", said)
 
 
-def equal_requests(asked: Asked, allowed: Mapping[str, float]) -> Finding:
+def equal_requests(asked: Exchange, allowed: Mapping[str, float]) -> Finding:
     """Return how far two answers to one request are apart, in the outputs that are named."""
-    answer, again = asked.answer, asked.again
+    answer, again = asked.answer, asked.repeat
     if not isinstance(answer, Answer) or not isinstance(again, Answer):
         said = sentence("Asked a second time, it gave no answer.")
         return Finding("equal requests", Verdict.BROKEN, np.inf, 0.0, "", said)
@@ -269,7 +269,9 @@ def equal_requests(asked: Asked, allowed: Mapping[str, float]) -> Finding:
     return bounded("equal requests", gap, tolerance, "", said)
 
 
-def symmetry(asked: Asked, every: Sequence[Asked], allowed: Mapping[str, float]) -> Finding | None:
+def symmetry(
+    asked: Exchange, every: Sequence[Exchange], allowed: Mapping[str, float]
+) -> Finding | None:
     """Return how far the answer is from the transformed answer to the untransformed case."""
     facts = asked.case.facts
     base = next((one.answer for one in every if one.case.name == facts.get("of")), None)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..greeting import Step
 from .faults import ASPECTS, INTEGRATORS, Option, apply
 from .honest import compatible, domains
@@ -302,7 +302,7 @@ def _keys(found: Found) -> tuple[str, ...]:
 
 
 def probes_of(
-    asked: Sequence[Asked], problems: Mapping[str, Problem], every: bool = False
+    asked: Sequence[Exchange], problems: Mapping[str, Problem], every: bool = False
 ) -> list[Probe]:
     """Return the probes, or every case, that were answered, in their order."""
     return [

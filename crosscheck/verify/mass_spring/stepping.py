@@ -11,7 +11,7 @@ from plumbob.reference.explicit import symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
 
 from ..case import Case
-from ..contestant import Answer, Asked
+from ..contestant import Answer, Exchange
 from ..explain import either, first_broken, hints_of
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
@@ -42,7 +42,7 @@ class Stepping(NamedTuple):
         """Return cases that suit the solver, the smallest first."""
         return task_cases(self.task, greeting, seed, thorough)
 
-    def judge(self, asked: Sequence[Asked], greeting: Greeting, method: str) -> TaskReport:
+    def judge(self, asked: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
         """Hold answers against the step that is declared, or inferred, and name the faults."""
         problems = problems_of(asked, greeting)
         search = Search(probes_of(asked, problems), greeting.step, greeting.epsilon)
@@ -57,7 +57,7 @@ class Stepping(NamedTuple):
         return TaskReport(self.task, "", _with_faults(judgements, diagnosis, known), diagnosis)
 
 
-def problems_of(asked: Sequence[Asked], greeting: Greeting) -> dict[str, Problem]:
+def problems_of(asked: Sequence[Exchange], greeting: Greeting) -> dict[str, Problem]:
     """Return the problem of each case; a solver that goes on starts from its own answer."""
     by_name = {one.case.name: one for one in asked}
     problems: dict[str, Problem] = {}
@@ -105,8 +105,8 @@ def describe_model(options: Sequence[Option]) -> Sentence:
 
 
 def _judge_case(
-    one: Asked,
-    asked: Sequence[Asked],
+    one: Exchange,
+    asked: Sequence[Exchange],
     p: Problem,
     greeting: Greeting,
     options: tuple[Option, ...],
@@ -129,7 +129,7 @@ def _judge_case(
 
 
 def _findings(
-    one: Asked, answer: Answer, asked: Sequence[Asked], context: Context
+    one: Exchange, answer: Answer, asked: Sequence[Exchange], context: Context
 ) -> list[Finding]:
     """Return what all laws that apply say."""
     broken = laws.finite(context)

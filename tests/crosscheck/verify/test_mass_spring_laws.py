@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck.verify.case import Case
-from plumbob.crosscheck.verify.contestant import Answer, Asked
+from plumbob.crosscheck.verify.contestant import Answer, Exchange
 from plumbob.crosscheck.verify.judgement import Verdict
 from plumbob.crosscheck.verify.mass_spring import laws
 from plumbob.crosscheck.verify.mass_spring.laws import IMPRECISE, Context
@@ -84,7 +84,7 @@ def test_a_declared_pin_may_move_by_rounding_only(share, verdict):
     p = triangle([0, 1])
     bound = rounding(p, LINEARISED, EPSILON).positions
     found = judged(laws.pins, p, positions=one_moved(1, share * bound))
-    assert (found.law, found.verdict, found.where) == ("pins", verdict, 1)
+    assert (found.law, found.verdict, found.index) == ("pins", verdict, 1)
     assert found.error == pytest.approx(share * bound)
     assert found.tolerance == bound
 
@@ -123,7 +123,7 @@ def test_positions_that_are_imprecise_are_right_with_a_reservation(share, verdic
     p = triangle()
     gap = share * displacement(p)
     found = judged(laws.declared_step, p, positions=one_moved(2, gap))
-    assert (found.law, found.verdict, found.where) == ("declared step", verdict, 2)
+    assert (found.law, found.verdict, found.index) == ("declared step", verdict, 2)
     assert found.error == pytest.approx(share, rel=1e-3)
 
 
@@ -217,7 +217,7 @@ def test_the_acceleration_of_a_small_step_is_the_force_over_the_mass(share, verd
 def asked(answer, again=None, **facts):
     """Return a case with such an answer."""
     case = Case("", "mass_spring_step", {}, "", sentence(""), facts=facts)
-    return Asked(case, Answer(answer, 0.0), None if again is None else Answer(again, 0.0))
+    return Exchange(case, Answer(answer, 0.0), None if again is None else Answer(again, 0.0))
 
 
 @pytest.mark.parametrize(("share", "verdict"), [(0.5, RIGHT), (2.0, WRONG)])
