@@ -49,7 +49,7 @@ def docstring_words(tree):
 
 
 def trees(package):
-    """Yield the files of a package with their syntax trees; links to other packages are left out."""
+    """Yield the files of a package with their syntax trees, without those of linked packages."""
     for path in sorted((ROOT / package).rglob("*.py")):
         folders = [ROOT.joinpath(*path.relative_to(ROOT).parts[:depth]) for depth in (1, 2)]
         if not any(folder.is_symlink() for folder in folders):
@@ -86,7 +86,9 @@ def test_a_class_name_stands_for_one_class():
     assert len(shared) <= SHARED_CLASS_NAMES, shared
 
 
-@pytest.mark.parametrize("source", ["found = 1", "def told(): pass", "def f(given): pass",
-                                    "x.most = 1", "import a as one", "class _It: pass"])  # fmt: skip
+SLIPS = ["found = 1", "def told(): pass", "def f(given): pass", "x.most = 1", "import a as one"]
+
+
+@pytest.mark.parametrize("source", SLIPS)
 def test_a_barred_name_is_seen(source):
     assert any(is_barred(name) for name, _ in bound_names(ast.parse(source)))
