@@ -211,7 +211,7 @@ def test_a_budget_goes_by_the_seconds_that_a_solver_behind_a_slow_door_counts(fo
     (folder / "slow.py").write_text(slow.replace("import json", "import json, time"))
     entrant = Entrant("slow", "", (sys.executable, str(folder / "slow.py")), tasks=(CHAIN_TASK,))
     (peer,) = registry.chain_peers([entrant])
-    limits = chain.Limits(1e-4, 5)
+    limits = chain.SolverLimits(1e-4, 5)
     found = chain.solve_one_by_one(chain_targets("near", 6), peer, limits, budget=0.2)
     assert np.isfinite(found.arrays["residual"]).sum() == done
     assert ("cut by its time budget" in found.notes["remark"]) == (done < 6)

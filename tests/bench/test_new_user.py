@@ -71,7 +71,7 @@ def test_iterations_that_nobody_counts_are_not_reported_and_no_number(printed, m
     for name in ("accuracy", "q1_beyond_reach", "published_ik"):
         (row, *_) = made[name].rows
         said = {c.heading: words(v) for c, v in zip(made[name].columns, row, strict=True)}
-        counts = [v for h, v in said.items() if h.startswith("iterations, ") or "here" in h]
+        counts = [v for h, v in said.items() if h.startswith("iterations, ") or "measured" in h]
         assert set(counts) == {"–"}, name
         assert "not a number" not in said.values()
 
