@@ -10,7 +10,7 @@ from plumbob.crosscheck import samples
 from plumbob.crosscheck.engines import ROBOT_ENGINES
 from plumbob.crosscheck.engines.robot_engine import UnreadableError
 from plumbob.crosscheck.robots.comparisons import CONFIGURATIONS, differences, sweep
-from plumbob.crosscheck.robots.models import CAUSES, PACKAGES, Model, models, slots
+from plumbob.crosscheck.robots.models import CAUSES, PACKAGES, RobotFile, models, moving_joints
 from plumbob.reference import forward_kinematics, rotation
 from plumbob.reference.formats import mjcf, urdf
 
@@ -43,22 +43,22 @@ def blocks(scale: Scale) -> Iterator[Block]:
             yield Block(SUITE, f"peers/{name}", peer.title, measure, settings, facts=facts)
 
 
-def compare(engine: str, model: Model) -> Measured:
+def compare(engine: str, model: RobotFile) -> Measured:
     """Compare a file in random configurations; keep why the engine does not read it."""
     try:
-        swept = sweep(engine, model)
+        comparison = sweep(engine, model)
     except (UnreadableError, ValueError) as error:
         reason = f"{engine} reads it, the reference does not"
         if isinstance(error, UnreadableError):
             reason = f"{engine} does not read it"
         sentence = f"{reason}: {error}".replace(str(model.path), model.path.name)
         return Measured(None, {"unread": sentence})
-    articulation = swept.robot.articulation
-    joints = len(slots(swept.robot)) + len(articulation.mimics)
-    sizes = (len(swept.links), joints, articulation.freedom_count)
+    articulation = comparison.robot.articulation
+    joints = len(moving_joints(comparison.robot)) + len(articulation.mimics)
+    sizes = (len(comparison.links), joints, articulation.freedom_count)
     return Measured(
-        FileValues(*sizes, **differences([swept])._asdict()),
-        {"cause": CAUSES.get((engine, model.name), ""), "free mimics": swept.free_mimics},
+        FileValues(*sizes, **differences([comparison])._asdict()),
+        {"cause": CAUSES.get((engine, model.name), ""), "free mimics": comparison.free_mimics},
     )
 
 
