@@ -8,6 +8,7 @@ import ast
 import io
 import re
 import string
+import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -15,9 +16,7 @@ from babel.messages import Catalog
 from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po, write_po
 
-from .kinematics import faults
 from .language import DOMAIN, LANGUAGES, LOCALES
-from .task import FILE, TASKS
 
 ROOT = Path(__file__).resolve().parents[2]
 # The folders and files that call `sentence`.
@@ -33,9 +32,9 @@ def templates() -> dict[str, str]:
             place = path.relative_to(ROOT).as_posix()
             for template in literal_templates(path.read_text(encoding="utf-8"), place):
                 templates.setdefault(template, place)
-    for path, texts in ((faults.FILE, _of_faults()), (FILE, _of_tasks())):
-        for template in texts:
-            templates.setdefault(template, path.resolve().relative_to(ROOT).as_posix())
+    for path in sorted((ROOT / SOURCES[0]).rglob("*.toml")):
+        for template in table_templates(tomllib.loads(path.read_text(encoding="utf-8"))):
+            templates.setdefault(template, path.relative_to(ROOT).as_posix())
     return {template: place for template, place in templates.items() if has_words(template)}
 
 
@@ -61,15 +60,15 @@ def _choices(node: ast.expr | None) -> list[ast.expr | None]:
     return [node]
 
 
-def _of_faults() -> Iterator[str]:
-    for known_faults in faults.FAULTS.values():
-        yield from (fault.sentence.template for fault in known_faults)
-
-
-def _of_tasks() -> Iterator[str]:
-    for task in TASKS.values():
-        yield task.about
-        yield from (field.about for field in (*task.inputs, *task.outputs))
+def table_templates(entry: object) -> Iterator[str]:
+    """Yield the texts of the keys `sentence` and `about` in the content of a TOML file."""
+    if isinstance(entry, dict):
+        texts = (entry.get("sentence"), entry.get("about"))
+        yield from (text for text in texts if isinstance(text, str))
+    for inner in entry.values() if isinstance(entry, dict) else ():
+        yield from table_templates(inner)
+    for inner in entry if isinstance(entry, list) else ():
+        yield from table_templates(inner)
 
 
 def has_words(template: str) -> bool:

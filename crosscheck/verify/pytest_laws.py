@@ -9,7 +9,7 @@ import pytest
 from .functions import FunctionContestant
 from .judgement import LEAST_SHARE, TaskReport, Verdict
 from .message import decode_greeting
-from .solvers.host import Solver
+from .solvers.host import PythonSolver
 from .verify import DISCIPLINES, judge_cases, trials
 
 
@@ -40,7 +40,7 @@ def laws(
         raise ValueError("laws: expected a module or functions by name, got both or neither")
     declared = functions.get("PLUMBOB") or getattr(solver, "PLUMBOB", None) or {}
     name = getattr(solver, "__name__", "") or "solver"
-    offered = Solver(functions if solver is None else solver, name, declared)
+    offered = PythonSolver(functions if solver is None else solver, name, declared)
     contestant = FunctionContestant(offered.functions, decode_greeting(offered.greeting))
     groups = {
         (task, method): DISCIPLINES[task].cases(contestant.greeting, method, seed, thorough)

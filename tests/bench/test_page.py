@@ -45,11 +45,11 @@ def of_full_length(make):
                 changed |= {"seconds": generator.uniform(1, 9, 120) * 1e-5 / chance}
                 changed |= {name: generator.random(120) for name in ("position", "rotation")}
                 changed |= {"stratum": np.arange(120) % 2, "beyond": np.zeros(120)}
-                made = make.raced(peer.called(entry), entry.kind, robot=robot, **changed)
+                made = make.raced(peer.label_of(entry), entry.kind, robot=robot, **changed)
                 yield made.__class__(**{**vars(made), "size": 120.0})
     for peer in registry.PEERS[len(PRESENT) :]:
         entry = peer.entries[-1]  # with restarts: in another table than the one that is tried
-        yield make.lacking(peer.called(entry), entry.kind, f"{peer.package} is not installed")
+        yield make.lacking(peer.label_of(entry), entry.kind, f"{peer.package} is not installed")
     for stiffness in (1e2, 1e3, 1e4):
         for i, peer in enumerate(registry.cloth_peers()):
             sizes, error = (20, 40, 80), (0.5, 1e-4, 10.0**-i)
@@ -434,7 +434,7 @@ def test_without_its_script_every_table_can_be_read(browser, address):
         tree = browser.send("Accessibility.getFullAXTree")["nodes"]
         named = {node.get("name", {}).get("value", "") for node in tree}
         # a column that is folded where there is a script
-        assert "time, geometric mean, 95 % from [µs]" in named
+        assert "time, geometric mean, 95 % low [µs]" in named
     finally:
         browser.send("Emulation.setScriptExecutionDisabled", value=False)
 

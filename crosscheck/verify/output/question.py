@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..contestant import Contestant
 from ..judgement import Report
 from ..sentence import sentence
-from ..solvers import LIMITS, Limits, open_contestant
+from ..solvers import LIMITS, ProcessLimits, open_contestant
 from ..solvers.files import FileContestant
 from ..verify import DISCIPLINES, Notify, judge_cases, verify
 from . import saved
@@ -18,7 +18,7 @@ from .words import Say
 PROGRAM, ANSWERS = "--", "--answers"
 
 
-def limits(seconds: float | None, mebibytes: int | None) -> Limits:
+def limits(seconds: float | None, mebibytes: int | None) -> ProcessLimits:
     """Return the limits of a program; the first request of a task may take longer, to compile.
 
     Raises:
@@ -32,7 +32,7 @@ def limits(seconds: float | None, mebibytes: int | None) -> Limits:
     return limits._replace(request=seconds, first=max(seconds, limits.first))
 
 
-def opened(words: Sequence[str], limits: Limits, say: Say) -> Contestant:
+def opened(words: Sequence[str], limits: ProcessLimits, say: Say) -> Contestant:
     """Return the solver that words name.
 
     Args:
