@@ -181,8 +181,8 @@ def _compiled_global(value: Any, relaxed: bool, inline: bool) -> Any:
 
 def _calls(kernel: PythonKernel) -> Counter[str]:
     """Return how many times a kernel mentions each of its globals."""
-    found = (dis.get_instructions(code) for code in code_objects(kernel.__code__))
-    return Counter(i.argval for code in found for i in code if i.opname in GLOBAL_LOADS)
+    codes = map(dis.get_instructions, code_objects(kernel.__code__))
+    return Counter(i.argval for code in codes for i in code if i.opname in GLOBAL_LOADS)
 
 
 @functools.cache

@@ -17,7 +17,7 @@ PythonKernel = Any
 def digest(kernel: PythonKernel) -> str:
     """Return 16 hex digits of the code, constants and globals of a kernel and all its callees."""
     parts: list[bytes] = []
-    _collect(kernel, parts, seen=set())
+    _collect(kernel, parts, visited=set())
     return hashlib.sha256(b"\0".join(parts)).hexdigest()[:16]
 
 
@@ -51,10 +51,10 @@ def code_objects(code: types.CodeType) -> Iterator[types.CodeType]:
             yield from code_objects(constant)
 
 
-def _collect(kernel: PythonKernel, parts: list[bytes], seen: set[Any]) -> None:
-    if kernel in seen:
+def _collect(kernel: PythonKernel, parts: list[bytes], visited: set[Any]) -> None:
+    if kernel in visited:
         return
-    seen.add(kernel)
+    visited.add(kernel)
     _collect_code(kernel.__code__, parts)
     parts.append(repr(kernel.__defaults__).encode())
     if hasattr(kernel, "compiled_in"):
@@ -62,7 +62,7 @@ def _collect(kernel: PythonKernel, parts: list[bytes], seen: set[Any]) -> None:
     for name, value in named_globals(kernel):
         parts.append(name.encode())
         for callee in kernels_in(value):
-            _collect(callee, parts, seen)
+            _collect(callee, parts, visited)
         if not kernels_in(value):
             parts.append(_fingerprint(value))
 

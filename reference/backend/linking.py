@@ -58,9 +58,9 @@ class KernelLibrary(JITCodeLibrary):
         """Add a library and those that it would have linked."""
         super().add_linking_library(library)
         if isinstance(library, LinkedLibrary):
-            for one in library._linking_libraries:
-                if one not in self._linking_libraries:
-                    self.add_linking_library(one)
+            for linked in library._linking_libraries:
+                if linked not in self._linking_libraries:
+                    self.add_linking_library(linked)
 
 
 class LinkedCompiler(Compiler):

@@ -127,8 +127,11 @@ class Certificate:
         """Do what `shares_minimiser` does, of a distance that is not checked."""
         if not (self.covered and other.covered):
             return None
-        one, two = apart * SLACK + other.distance, apart * SLACK + self.distance
-        if one <= self.unique_within or two <= other.unique_within:
+        reach = apart * SLACK
+        if (
+            reach + other.distance <= self.unique_within
+            or reach + self.distance <= other.unique_within
+        ):
             return True
         return False if apart > (self.distance + other.distance) * SLACK else None
 
@@ -142,10 +145,10 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     """
     system = instance("objective", objective, Objective).system
     x = coordinates("positions", positions, system.particle_count, 3)
-    here = objective.iterate_at(x)
-    if not (here.finite and objective.inertial.finite):
+    iterate = objective.iterate_at(x)
+    if not (iterate.finite and objective.inertial.finite):
         return Certificate(math.inf, Coverage.OVERFLOWN)
-    residual = objective.residual(here)
+    residual = objective.residual(iterate)
     if not np.array_equal(x[system.pinned], objective.y[system.pinned]):
         return Certificate(residual, Coverage.PINS_ASTRAY)
     if not system.free.any():
@@ -153,7 +156,7 @@ def certify(objective: Objective, positions: ArrayLike) -> Certificate:
     smooth, _ = hessian_change(objective, x, 0.0)
     if smooth != Coverage.COVERED:
         return Certificate(residual, smooth)
-    return _certify_smooth(objective, x, here.gradient, residual)
+    return _certify_smooth(objective, x, iterate.gradient, residual)
 
 
 def _certify_smooth(

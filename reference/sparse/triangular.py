@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import uint64 as at
 
-from ..backend.simd.rows import load_row, prefetch, scale_row, store_row, subtract_scaled
+from ..backend.simd.vectors import load_row, prefetch, scale_row, store_row, subtract_scaled
 
 # Right-hand sides solved together, and the doubles of a register that holds one unknown of each.
 RIGHT_HAND_SIDES, REGISTER = 3, 4

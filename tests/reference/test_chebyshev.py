@@ -8,7 +8,7 @@ import pytest
 
 from plumbob.reference import ImplicitEuler, scenes
 from plumbob.reference.implicit_euler import chebyshev
-from plumbob.reference.implicit_euler.chebyshev import PLAIN, Acceleration
+from plumbob.reference.implicit_euler.local_global import PLAIN, Acceleration
 
 h = 1 / 30
 

@@ -8,8 +8,7 @@ from a file whose root has OFFSET zero. Lengths are in the unit of the file; ang
 in the file and become quaternions.
 """
 
-from .motion import Motion
-from .reader import parse, read
+from .reader import Motion, parse, read
 from .writer import format, write
 
 __all__ = ["Motion", "format", "parse", "read", "write"]

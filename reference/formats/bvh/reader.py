@@ -4,16 +4,18 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from ... import arguments
+from ... import arguments, rotation
 from ...arguments import LARGEST_COORDINATE, FloatArray, frozen
+from ...articulation import Articulation
+from ...kinematics import forward_kinematics
 from ...quaternion import IDENTITY, multiply
-from ...skeleton import Skeleton
+from ...skeleton import Pose, Skeleton, checked_skeleton
 from ..robot import MOST_JOINTS, ORIGIN
 from ..source import read_text, warn
-from .motion import Motion
 
 # Frames times joints, so that a motion needs at most about a gigabyte.
 MOST_POSES = 20_000_000
@@ -23,6 +25,33 @@ CHANNEL = re.compile(r"([XYZ])(POSITION|ROTATION)", re.IGNORECASE)
 COUNT = re.compile(r"[0-9]{1,9}")
 LINE = re.compile(r"\S[^\n]*")
 BRACES = re.compile(r"([{}])")
+
+
+class Motion(NamedTuple):
+    """A skeleton and its poses over time; `bvh.write(path, *motion)` writes it to a file."""
+
+    skeleton: Skeleton  # the offset of its root is the root's position in the first frame
+    local_rotations: FloatArray  # (frame, joint, 4)
+    frame_time: float  # time between frames [s]
+    # each joint's position in its parent's frame, for the root in the world, (frame, joint, 3);
+    # equal to the skeleton's offsets for joints without position channels
+    offsets: FloatArray
+
+    def pose(self) -> Pose:
+        """Return the global poses of all joints, with frames as the leading axis.
+
+        Without position channels it equals `forward_kinematics(skeleton, local_rotations)`.
+
+        Raises:
+            ValueError: if the skeleton is none, or the rotations or offsets are not its own.
+        """
+        skeleton = checked_skeleton(self.skeleton)
+        count = skeleton.joint_count
+        R = arguments.array("local_rotations", self.local_rotations, "frame", count, 4)
+        x = arguments.array("offsets", self.offsets, len(R), count, 3)
+        centred = Skeleton(skeleton.parents, np.zeros_like(skeleton.offsets))
+        q = np.concatenate([x, rotation.unit("local_rotations", R)], axis=-1)
+        return forward_kinematics(Articulation(centred, "free"), q.reshape(len(q), 7 * count))
 
 
 def read(path: str | Path) -> Motion:
