@@ -101,8 +101,7 @@ class ImplicitEuler:
     def __post_init__(self) -> None:
         """Check the settings and prepare the solver.
 
-        Raises:
-            ValueError: if a setting is out of range or unknown.
+        Raise a ValueError if a setting is out of range or unknown.
         """
         instance("system", self.system, MassSpring)
         object.__setattr__(self, "h", number("h", self.h, above=0))

@@ -21,6 +21,7 @@ the rounding errors of x_n + h v_n, the effective springs, the gradient, the Hes
 factor (Rump 2006, "Verification of Positive Definiteness") and the linear solve.
 """
 
+import contextlib
 import math
 from dataclasses import dataclass
 from enum import IntEnum
@@ -197,7 +198,8 @@ def least_curvature(H: Any, error: float) -> tuple[float, Factor | None]:
         factor = factorize(H)
         shift = FIRST_SHIFT * _estimate_smallest_eigenvalue(factor, n)
         while shift > allowance:
-            if _is_definite(factor, H - shift * scipy.sparse.eye_array(n, format="csc")):
+            with contextlib.suppress(NotPositiveDefiniteError):
+                factor.refactorize(H - shift * scipy.sparse.eye_array(n, format="csc"))
                 return shift - allowance, factor
             shift /= 2.0
     except NotPositiveDefiniteError:
@@ -304,14 +306,6 @@ def _estimate_smallest_eigenvalue(factor: Factor, n: int) -> float:
         inverse, k=1, which="LA", v0=start, tol=ESTIMATE_TOLERANCE, return_eigenvectors=False
     )
     return 1.0 / float(largest)
-
-
-def _is_definite(factor: Factor, matrix: Any) -> bool:
-    try:
-        factor.refactorize(matrix)
-    except NotPositiveDefiniteError:
-        return False
-    return True
 
 
 def _sum_over_springs(

@@ -102,7 +102,9 @@ class Acceleration:
         if self._plain < PLAIN:
             self._plain += 1
         elif self._R == 0.0:
-            self._first_estimate(size)
+            rho = min(size / self._last, LARGEST) if self._last > 0 else 0.0
+            self._R = rho / (2 - rho)
+            self.restart()
         elif self._count >= TRIAL:
             self._correct_estimate(size)
         if self._count == 0:
@@ -113,11 +115,6 @@ class Acceleration:
             self._weight = 4 / (4 - self._R**2 * self._weight)
         self._count, self._last = self._count + 1, size
         return self._weight, 1 + self._R
-
-    def _first_estimate(self, size: float) -> None:
-        rho = min(size / self._last, LARGEST) if self._last > 0 else 0.0
-        self._R = rho / (2 - rho)
-        self.restart()
 
     def _correct_estimate(self, size: float) -> None:
         expected = 1 / math.cosh(min(self._count * math.acosh(1 / self._R), LARGEST_EXPONENT))

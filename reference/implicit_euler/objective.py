@@ -148,10 +148,9 @@ class Objective:
     ) -> None:
         """Set up the step of length h from a state; `start` is the first iterate, "y" or "x_n".
 
-        Raises:
-            ValueError: if h is not positive, the state has another number of particles, or the
-                external forces [N], shape (particle, 3), or the pins' positions at the end of the
-                step [m], shape (pinned, 3), have another shape or are not finite.
+        Raise a ValueError if h is not positive, the state has another number of particles, or the
+        external forces [N], shape (particle, 3), or the pins' positions at the end of the step [m],
+        shape (pinned, 3), have another shape or are not finite.
         """
         self.system = system
         self.h = h = number("h", h, above=0)

@@ -96,8 +96,12 @@ def grid_cloth(
     ]
     springs_of = [(steps, k) for steps, k in parts if k > 0 or steps is NEIGHBOURS]
     springs = [_springs((rows, columns), steps) for steps, _ in springs_of]
+    spacing, positions = number("spacing", spacing, above=0), np.empty((rows, columns, 3))
+    positions[..., 0] = spacing * np.arange(rows)[:, None]
+    positions[..., 1] = number("height", height)
+    positions[..., 2] = spacing * (np.arange(columns) - (columns - 1) / 2)
     return at_rest(
-        _level(rows, columns, number("spacing", spacing, above=0), number("height", height)),
+        positions.reshape(-1, 3),
         np.concatenate(springs),
         masses=np.full(rows * columns, number("mass", mass, above=0)),
         stiffnesses=np.repeat([k for _, k in springs_of], [len(ends) for ends in springs]),
@@ -237,15 +241,6 @@ def at_rest(
 
 def _stiffness(name: str, value: float | None, default: float) -> float:
     return default if value is None else number(name, value, least=0)
-
-
-def _level(rows: int, columns: int, spacing: float, height: float) -> FloatArray:
-    """Return the positions of a horizontal grid, shape (rows columns, 3)."""
-    positions = np.empty((rows, columns, 3))
-    positions[..., 0] = spacing * np.arange(rows)[:, None]
-    positions[..., 1] = height
-    positions[..., 2] = spacing * (np.arange(columns) - (columns - 1) / 2)
-    return positions.reshape(-1, 3)
 
 
 def _shape(rows: int, columns: int) -> tuple[int, int]:

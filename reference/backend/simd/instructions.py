@@ -1,6 +1,6 @@
 """The compiled versions of the functions in `vectors.py`, as LLVM's vectors of doubles.
 
-LLVM maps a vector of eight to one register of AVX-512, two of AVX or four of SSE. Floating point is
+LLVM maps a vector of eight to a register of AVX-512, two of AVX or four of SSE. Floating point is
 as strict as for floats, except that products of rows may be fused with the differences that they go
 into, as everywhere in relaxed kernels. Functions that read or write a row of a tile also prefetch a
 share of the next tile: the processor does not foresee accesses so far apart.
@@ -35,14 +35,14 @@ READ, WRITE, NEAR, DATA = 0, 1, 3, 1
 
 
 class LanesType(types.Type):
-    """LANES doubles side by side; a float stands for as many equal ones."""
+    """LANES doubles side by side; a float is converted to equal doubles."""
 
     def can_convert_from(self, typingctx, other):
         """Say that floats convert."""
         return Conversion.safe if isinstance(other, types.Float) else None
 
     def unify(self, typingctx, other):
-        """Let a variable that is here a float and there lanes be lanes."""
+        """Give a variable that is a float in some branches the type of lanes."""
         return self if isinstance(other, types.Float) else None
 
 
@@ -51,7 +51,7 @@ lanes = LanesType("lanes")
 
 @register_model(LanesType)
 class LanesModel(models.PrimitiveModel):
-    """Lanes are one LLVM value."""
+    """Lanes are an LLVM value."""
 
     def __init__(self, manager, kind):
         super().__init__(manager, kind, VECTOR)
@@ -169,7 +169,7 @@ row_type = RowType("row")
 
 @register_model(RowType)
 class RowModel(models.PrimitiveModel):
-    """A row is one LLVM value."""
+    """A row is an LLVM value."""
 
     def __init__(self, manager, kind):
         super().__init__(manager, kind, ROW)
@@ -222,7 +222,7 @@ def subtract_scaled(typingctx, row, factor, other):
 
 @intrinsic
 def prefetch(typingctx, values, i):
-    """Prefetch; memory that is not there does no harm."""
+    """Prefetch a cache line; the address may be invalid."""
 
     def generate(context, builder, signature, arguments):
         entry = _pointer(context, builder, signature, *arguments)
@@ -259,10 +259,7 @@ def _writing(tile, count):
 
 
 def _transposed(builder, rows):
-    """Transpose the lower halves of four vectors as a 4 x 4 matrix, and likewise the upper ones.
-
-    So a pose with the one four lanes on makes four vectors of eight numbers, and back.
-    """
+    """Transpose the lower halves of four vectors as a 4 x 4 matrix, and the upper halves."""
     low, high = (0, 8, 2, 10, 4, 12, 6, 14), (1, 9, 3, 11, 5, 13, 7, 15)
     first, last = (0, 1, 8, 9, 4, 5, 12, 13), (2, 3, 10, 11, 6, 7, 14, 15)
     a, b, c, d = rows
@@ -273,7 +270,7 @@ def _transposed(builder, rows):
 
 
 def _fenced(builder, vector):
-    """Return a vector as it is; LLVM is not to cut the shuffles that make it into smaller ones."""
+    """Return a vector, and prevent LLVM from splitting the shuffles that make it."""
     kind = ir.FunctionType(VECTOR, [VECTOR])
     name = f"llvm.arithmetic.fence.v{LANES}f64"
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [vector])
@@ -320,12 +317,12 @@ def _array(context, builder, signature, arguments):
 
 
 def _moved(builder, pointer, count, size):
-    """Return the pointer moved on by so many times so many bytes."""
+    """Return the pointer advanced by count times size bytes."""
     return builder.gep(pointer, [builder.mul(count, count.type(size))])
 
 
 def _prefetch(builder, pointer, size, access):
-    """Prefetch memory that will soon be read or written; any address is allowed."""
+    """Prefetch memory that will be read or written soon; any address is allowed."""
     kind = ir.FunctionType(ir.VoidType(), [POINTER, INT, INT, INT])
     fetch = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
     for offset in range(0, size, LINE_BYTES):

@@ -1,13 +1,13 @@
 """Functions on vector registers: arrays in the interpreter, instructions in compiled kernels.
 
 *Lanes* are the same joint of eight poses side by side. A kernel on tuples of components also runs
-on lanes: `in_lanes` exchanges the functions that read and write one pose for those that read and
-write a tile; data that all poses share, such as a skeleton's offsets, stay as they are. No
-operation mixes lanes: every pose gets the same bits as by itself. A *tile* is as many poses of a batch as
-there are lanes, (lane, joint, component). A *scratch* array, (joint, component, lane), holds unit
-quaternions in the order of the registers.
+on lanes: `in_lanes` replaces the functions that read and write a pose by functions on tiles; data
+that all poses share, such as a skeleton's offsets, stay as they are. No operation mixes lanes:
+every pose gets the same bits as by itself. A *tile* is as many poses of a batch as there are lanes,
+(lane, joint, component). A *scratch* array, (joint, component, lane), holds unit quaternions in the
+order of the registers.
 
-A *row* is four right-hand sides of one unknown, a row of an array (unknown, 4), which is loaded,
+A *row* is four right-hand sides of an unknown, a row of an array (unknown, 4), which is loaded,
 changed and stored whole. Three right-hand sides leave the fourth at zero.
 """
 
@@ -17,7 +17,7 @@ from ...quaternion import load_quaternion, load_vector, made_unit, store_quatern
 from ..compiled import bind, compiled_in
 from ..digest import PythonKernel
 
-# A row of doubles that fills an AVX-512 register, or two of AVX.
+# Doubles in a register of AVX-512, or two of AVX.
 LANES = 8
 
 in_vector_registers = compiled_in("plumbob.reference.backend.simd.instructions")
@@ -112,7 +112,7 @@ _ON_TILES = {
 
 
 def in_lanes(kernel: PythonKernel) -> PythonKernel:
-    """Return a kernel on one pose as a kernel on a tile of LANES poses; every pose the same bits.
+    """Return a kernel on a pose as a kernel on a tile of LANES poses, with the same bits.
 
     Positions and rotations get a leading axis, (LANES, joint, ...); unit quaternions lie in a
     scratch array, (joint, 4, LANES).
