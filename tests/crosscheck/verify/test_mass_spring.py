@@ -470,7 +470,9 @@ def energies(faults, shift=0.0):
 
 
 @pytest.mark.parametrize(
-    "fault", [one for one in energy.ENERGY_FAULTS if one.key not in NO_FORCES], ids=lambda one: one.key
+    "fault",
+    [one for one in energy.ENERGY_FAULTS if one.key not in NO_FORCES],
+    ids=lambda one: one.key,
 )
 def test_every_fault_of_energies_is_caught_and_named(fault):
     found = report(energies([fault]), "energy")

@@ -46,7 +46,9 @@ def judged(law, p, model=LINEARISED, declares_pins=True, known=True, **changes):
     expected = predicted(p, model)
     answered = {name: value + changes.get(name, 0.0) for name, value in expected.items()}
     allowed = rounding(p, model, EPSILON)
-    return law(StepContext(p, answered, allowed, model, known, sentence(""), expected, declares_pins))
+    return law(
+        StepContext(p, answered, allowed, model, known, sentence(""), expected, declares_pins)
+    )
 
 
 def displacement(p, model=LINEARISED):
