@@ -11,8 +11,8 @@ from pathlib import Path
 
 from plumbob.bench.harness.record import FILE_NAME, RecordFile
 from plumbob.bench.report.headlines import Headline
-from plumbob.bench.report.report import Written, write
-from plumbob.bench.tables.provenance import provenance
+from plumbob.bench.report.report import Report, write
+from plumbob.bench.tables.layout import provenance
 from plumbob.bench.tables.results import listed
 from plumbob.bench.tables.table import words
 
@@ -35,11 +35,11 @@ def write_sample(folder: Path) -> None:
     README.write_text(with_headlines(README.read_text(encoding="utf-8"), text), encoding="utf-8")
 
 
-def headlines(written: Written, folder: Path) -> str:
+def headlines(written: Report, folder: Path) -> str:
     """Return the headlines in Markdown, with what they come from."""
     verdict = written.answers.verdict
     right = (
-        [f"- Right: {verdict.held} of {verdict.total} claims hold; the narrowest uses "
+        [f"- Right: {verdict.holding} of {verdict.total} claims hold; the narrowest uses "
          f"{words(100 * verdict.used)} % of its tolerance."]
         if verdict
         else []
@@ -53,9 +53,9 @@ def headlines(written: Written, folder: Path) -> str:
 
 
 def _line(headline: Headline) -> str:
+    question = headline.question[:1].lower() + headline.question[1:]
     return (
-        f"- {headline.chapter.capitalize()}, {headline.asked[:1].lower()}{headline.asked[1:]}: "
-        f"**{headline.answer}**, {headline.detail} "
+        f"- {headline.chapter.capitalize()}, {question}: **{headline.answer}**, {headline.detail} "
         f"([table](docs/sample/tables/{headline.table}.md))."
     )
 

@@ -229,7 +229,7 @@ def test_compare_prints_whole_sentences_in_ten_lines(capsys, tmp_path, monkeypat
     assert lines[:2] == ["12 rows worse", "12 LESS RIGHT"]
     sentences = re.split(r"LESS RIGHT ", " ".join(" ".join(lines[2:]).split()))[1:]
     more = 12 - len(sentences)
-    assert f"and {more} more: --markdown FILE or --json FILE has all" in sentences[-1]
+    assert f"and {more} more: --markdown FILE or --json FILE writes all" in sentences[-1]
     solvers = [re.match(r"arm/circle, (solver \d+), residual: (.*?), now (\S+)", s).groups()
                for s in sentences]  # fmt: skip
     assert len({solver for solver, *_ in solvers}) == len(sentences) > 2
