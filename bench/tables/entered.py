@@ -70,7 +70,7 @@ entered = Layout(
         text("remark", _remark),
     ),
     shows="A plus behind a commit stands for uncommitted changes. “sources” is a digest of the "
-    "solver's files; when they change, the solver is measured again.",
+    "solver’s files; when they change, the solver is measured again.",
     measured="Opened as by plumbob verify. A Python file is timed call by call in its own "
     "process; a program by the seconds in its answers, or else by the round trip of a request, "
     "as its remark says.",

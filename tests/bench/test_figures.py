@@ -169,7 +169,7 @@ def test_a_legend_on_the_data_and_crowded_texts_would_be_found(records):
 
 
 def test_text_on_the_page_is_never_below_seven_points(records):
-    css = (page._HERE / "page.css").read_text()
+    css = (page._FOLDER / "page.css").read_text()
     narrowest = min(
         float(rem) for rem in re.findall(r"figure svg \{[^}]*min-width: ([\d.]+)rem", css)
     )

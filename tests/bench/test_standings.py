@@ -195,7 +195,7 @@ def test_a_bench_ends_with_the_solver_of_the_user_and_who_leads(
     for standing in standings(Results(RecordFile(tmp_path).read().records)):
         assert f"{standing.question}: {standing.answer}; {standing.detail}." in said
     assert lines[0].startswith("Mine, robots, one start: rank 3 of 3 solvers; ")
-    assert said.index("trouble on 1 of 2 problems") < said.index("kinematics, most accurate")
+    assert said.index("trouble on 1 of 2 problems") < said.index("Kinematics, most accurate")
 
 
 def test_a_report_ends_with_the_solver_of_the_user_first(make, tmp_path):
