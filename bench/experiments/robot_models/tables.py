@@ -2,94 +2,147 @@
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from operator import methodcaller
+from typing import NamedTuple
 
+from ...harness.record import Record
+from ...peers import registry
+from ...tables.captions import Captions
 from ...tables.columns import folded, text
 from ...tables.layout import Layout
-from ...tables.results import counted, settings
-from ...tables.table import Column, Summary, words
-from .readings import QUANTITIES, Comparison, comparisons, largest
+from ...tables.results import Results, by_problem, counted, grouped, listed, settings
+from ...tables.table import Cell, Column, Summary, words
+from . import PEERS
+from .values import FileDetails
+
+QUANTITIES = ("positions", "rotations", "jacobians")
 
 
-def _measured(comparisons: Sequence[Comparison]) -> str:
+class ModelComparison(NamedTuple):
+    """A file in both engines, or a robot of the bench in the engine of a peer.
+
+    The numbers are those of the valid records; the remark is on all others.
+    """
+
+    engines: str
+    records: Sequence[Record]
+    valid: Sequence[Record]
+    remark: str
+
+    @property
+    def is_file(self) -> bool:
+        """Whether it is a file of others, and no robot of the bench."""
+        return self.records[0].facts.get("task") != PEERS
+
+    def size(self, name: str) -> Cell:
+        """Return a size by the engine that counts fewest: one that leaves mimics free has more."""
+        if not (self.is_file and self.valid):
+            return None
+        fewest = min(self.valid, key=lambda record: (record.values.freedoms, record.solver))
+        size: int = getattr(fewest.values, name)
+        return size
+
+
+def _comparisons(results: Results) -> list[ModelComparison]:
+    """Return files in both engines, and then robots of the bench in those of peers."""
+    records = results.all("robot_models")
+    files = by_problem(r for r in records if r.facts.get("task") != PEERS).values()
+    return [*map(_of_file, files), *map(_of_robot, results.all("robot_models", task=PEERS))]
+
+
+def _of_file(records: Sequence[Record]) -> ModelComparison:
+    valid = [record for record in records if record.values and not record.details.cause]
+    engines = listed([record.solver for record in valid]) or "none"
+    return ModelComparison(engines, records, valid, "; ".join(filter(None, map(_remark, records))))
+
+
+def _remark(record: Record) -> str:
+    details: FileDetails = record.details
+    if not record.values:
+        return details.unread
+    if details.cause:
+        difference = max(getattr(record.values, quantity) for quantity in QUANTITIES)
+        return f"{record.solver} differs by {words(difference)}: {details.cause}"
+    mimics = f"{record.solver} with mimic joints left free: {details.free_mimics}"
+    return mimics if details.free_mimics else ""
+
+
+def _of_robot(record: Record) -> ModelComparison:
+    remark = record.details.remark or registry.SINGLE_PRECISION.get(record.solver, "")
+    engine = f"{record.solver} {record.details.version}"
+    return ModelComparison(engine, [record], [record], remark)
+
+
+def _largest(quantity: str, records: Sequence[Record]) -> float | None:
+    """Return the largest difference in records, None if they have none."""
+    values = (getattr(record.values, quantity, None) for record in records)
+    return max((value for value in values if value is not None), default=None)
+
+
+def _measured(rows: Sequence[ModelComparison]) -> dict[str, str]:
     files, robots = (
-        settings((r for c in comparisons if c.is_file == of for r in c.records), "configurations")
+        settings((r for row in rows if row.is_file == of for r in row.records), "configurations")
         for of in (True, False)
     )
-    return (
-        f"{files or 'No'} random configurations of each file and {robots or 'none'} of each robot, "
-        "within the limits; links and joints are matched by name."
-    )
+    return {"files": files or "No", "robots": robots or "none"}
 
 
-def _summary(comparisons: Sequence[Comparison]) -> Summary:
-    files = [comparison for comparison in comparisons if comparison.is_file]
+def _summary(rows: Sequence[ModelComparison]) -> Summary:
+    files = [row for row in rows if row.is_file]
     valid = [record for file in files for record in file.valid]
-    worst = [words(largest(valid, quantity)) for quantity in QUANTITIES]
+    positions, rotations, jacobians = (words(_largest(q, valid)) for q in QUANTITIES)
     sentence = (
         f"Over {counted(sum(bool(f.valid) for f in files), 'file')} positions differ by at most "
-        f"{worst[0]} of the extent, rotations by {worst[1]}, Jacobians by {worst[2]}:"
+        f"{positions} of the extent, rotations by {rotations}, Jacobians by {jacobians}:"
     )
-    return Summary(sentence * bool(valid), tuple(_points(comparisons)))
+    return Summary(sentence * bool(valid), tuple(_points(rows)))
 
 
-def _points(comparisons: Sequence[Comparison]) -> Iterator[str]:
-    """Yield how many files each engine reads, and how far engines of peers place robots."""
-    files = [record for c in comparisons if c.is_file for record in c.records]
-    for engine in dict.fromkeys(record.solver for record in files):
-        mine = [record for record in files if record.solver == engine]
-        read = [record for record in mine if record.values]
+def _points(rows: Sequence[ModelComparison]) -> Iterator[str]:
+    """Yield how many files each engine reads, and how closely engines of peers place robots."""
+    files = [record for row in rows if row.is_file for record in row.records]
+    for engine, records in grouped(files, lambda record: record.solver).items():
+        read = [record for record in records if record.values]
         different = sum(bool(record.details.cause) for record in read)
-        otherwise = f", {words(different)} of them otherwise than MuJoCo's documentation says"
-        count = f"{words(len(read))} of {counted(len(mine), 'file')} read"
-        yield f"{engine}: {count}{otherwise * bool(different)}"
-    robots = [r for c in comparisons if not c.is_file for r in c.records if r.values]
-    for engine in dict.fromkeys(record.solver for record in robots):
-        mine = [record for record in robots if record.solver == engine]
-        positions, rotations = (words(largest(mine, name)) for name in QUANTITIES[:2])
+        deviation = f", {words(different)} of them otherwise than MuJoCo's documentation says"
+        count = f"{words(len(read))} of {counted(len(records), 'file')} read"
+        yield f"{engine}: {count}{deviation * bool(different)}"
+    robots = (r for row in rows if not row.is_file for r in row.records if r.values)
+    for engine, records in grouped(robots, lambda record: record.solver).items():
+        positions, rotations = (words(_largest(quantity, records)) for quantity in QUANTITIES[:2])
         yield (
             f"{engine} on the bench’s robots: effectors within {positions} m and {rotations} in a "
             "rotation matrix"
         )
 
 
-def _positions(of_files: bool, comparison: Comparison) -> float | None:
-    return comparison.largest("positions") if comparison.is_file == of_files else None
+def _difference(quantity: str, row: ModelComparison, of_files: bool | None = None) -> Cell:
+    return _largest(quantity, row.valid) if of_files in (None, row.is_file) else None
+
+
+def _column(title: str, unit: str, quantity: str, of_files: bool | None = None) -> Column:
+    read = partial(_difference, quantity, of_files=of_files)
+    return Column(title, unit, group="largest difference", read=read)
 
 
 readers = Layout(
-    "Do other engines read the same robots and characters?",
-    "readers",
-    "Robots and characters, as engines read them",
+    **Captions(__file__).of("readers", _measured),
+    subjects=_comparisons,
     columns=(
-        text("robot", lambda comparison: comparison.records[0].title),
-        text("engines", lambda comparison: comparison.engines),
-        Column("freedoms", read=lambda comparison: comparison.size("freedoms")),
-        *(
-            Column(title, unit, group="largest difference", read=read)
-            for title, unit, read in (
-                ("positions, of the extent", "", partial(_positions, True)),
-                ("positions", "m", partial(_positions, False)),
-                ("rotations", "", methodcaller("largest", "rotations")),
-                ("Jacobians", "", methodcaller("largest", "jacobians")),
-            )
-        ),
-        text("remark", lambda comparison: comparison.remark),
+        text("robot", lambda row: row.records[0].title),
+        text("engines", lambda row: row.engines),
+        Column("freedoms", read=lambda row: row.size("freedoms")),
+        _column("positions, of the extent", "", "positions", of_files=True),
+        _column("positions", "m", "positions", of_files=False),
+        _column("rotations", "", "rotations"),
+        _column("Jacobians", "", "jacobians"),
+        text("remark", lambda row: row.remark),
         *folded(
             [
-                Column("links", read=lambda comparison: comparison.size("links")),
-                Column("moving joints", read=lambda comparison: comparison.size("joints")),
+                Column("links", read=lambda row: row.size("links")),
+                Column("moving joints", read=lambda row: row.size("joints")),
             ]
         ),
     ),
-    subjects=comparisons,
-    shows="The reference reads each file itself. For files, differences are the largest of all "
-    "links in all configurations; positions are measured against the extent of the links, "
-    "Jacobians against that and one radian. An engine that is known to place links elsewhere "
-    "is left out of the numbers, and the cause is given. For the bench’s own robots, each engine "
-    "of a peer reads the same text as the reference, and the differences are of the effectors. "
-    "Rotations are compared entry by entry as matrices; rounding in double precision leaves 1e-15.",
-    measured=_measured,
     summary=_summary,
 )
 
