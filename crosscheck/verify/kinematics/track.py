@@ -70,8 +70,8 @@ def _is_smooth(problem: CurveProblem) -> bool:
     path = path_to(start.skeleton.parents, start.effector)
     for method in METHODS:
         x = predict_track(method, Switches(), case)["positions"]
-        missed = np.linalg.norm(x[:, start.effector] - curve, axis=-1).max() > TOLERANCE
-        if missed or np.linalg.norm(np.diff(x[:, path], axis=0), axis=-1).max() >= 0.5:
+        is_far = np.linalg.norm(x[:, start.effector] - curve, axis=-1).max() > TOLERANCE
+        if is_far or np.linalg.norm(np.diff(x[:, path], axis=0), axis=-1).max() >= 0.5:
             return False
     return True
 
@@ -152,10 +152,7 @@ def _largest_share(diagnosis: Diagnosis) -> float:
 
 
 def _prediction_bound(greeting: Greeting, case: Case) -> float:
-    """Return the relative difference from a variant's answer that rounding explains.
-
-    Frames hand on their rounding to the next, each solve enlarging it a few times.
-    """
+    """Return the relative difference that rounding, enlarged from frame to frame, explains."""
     return max(1e-8, 16.0 * sweeps.prediction_bound(greeting, case))
 
 
