@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from plumbob.bench.experiments.cloth.problem import HEAVY_STIFFNESSES
 
 from plumbob.bench.experiments import SCALES, Scale, blocks
 from plumbob.bench.experiments.cloth import tables
-from plumbob.bench.experiments.cloth.problem import HEAVY_STIFFNESSES
 from plumbob.bench.experiments.newton import measurement as suite
 from plumbob.bench.tables.results import Results
 from plumbob.reference import STEP_SOLVERS

@@ -11,7 +11,7 @@ from plumbob.bench.experiments import Scale, blocks
 from plumbob.bench.experiments.chain import tables as chain_tables
 from plumbob.bench.experiments.cloth import measurement as cloth
 from plumbob.bench.experiments.cloth import tables as cloth_tables
-from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.robots import measurement as robots
 from plumbob.bench.experiments.robots import tables as robot_tables
 from plumbob.bench.harness import run

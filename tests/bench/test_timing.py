@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import Scale
-from plumbob.bench.experiments.cloth.problem import cloth_swing
+from plumbob.bench.experiments.cloth.measurement import cloth_swing
 from plumbob.bench.experiments.timing import case as timing_case
 from plumbob.bench.experiments.timing import cloth, kinematics, measurement
 from plumbob.bench.experiments.timing.case import (
